@@ -69,6 +69,18 @@ impl ImageLimit {
         }
     }
 
+    /// The limit that holds if both do; the origin is that of the smaller file.
+    #[must_use]
+    pub(crate) fn stricter(self, other: Self) -> Self {
+        let (small, large) = if self.bytes <= other.bytes {
+            (self, other)
+        } else {
+            (other, self)
+        };
+        let side = small.side.into_iter().chain(large.side).min();
+        Self { side, ..small }
+    }
+
     /// The limit that the user set by `--max-image`.
     #[must_use]
     pub(crate) fn stated(bytes: usize) -> Self {
@@ -108,6 +120,11 @@ mod tests {
                 "{error}"
             );
         }
+        let both = limit.stricter(ImageLimit::stated(5));
+        assert_eq!(
+            (both.bytes, both.side, both.origin),
+            (5, Some(8000), "--max-image")
+        );
         assert!(ImageLimit::stated(5).check(&image(6, 10)).is_err());
     }
 }

@@ -50,6 +50,7 @@ pub use extra_fields::ExtraFields;
 pub(crate) use extra_fields::RequestArgs;
 pub use failure::{AskError, Reach};
 pub(crate) use image_limit::ImageLimit;
+pub(crate) use key_form::{is_secret_name, is_secret_value, looks_like_key};
 pub(crate) use key_header::KeyHeader;
 pub(crate) use local::{Local, LocalAnswer};
 pub use model::Model;

@@ -69,6 +69,16 @@ impl Model {
         }
     }
 
+    /// Whether both models are asked at one endpoint, whose window they share; or both are in this process.
+    #[must_use]
+    pub fn shares_endpoint(&self, other: &Self) -> bool {
+        match (self.remote(), other.remote()) {
+            (Some(one), Some(other)) => std::ptr::eq(one.endpoint(), other.endpoint()),
+            (None, None) => true,
+            _ => false,
+        }
+    }
+
     /// Stops further requests to the model's endpoint; those in flight are finished.
     pub fn close(&self) {
         if let Self::Remote(model) = self {
@@ -99,6 +109,15 @@ impl Model {
     #[must_use]
     pub fn max_tokens(&self) -> Option<u32> {
         Some(self.remote()?.parameters().max_tokens.get())
+    }
+
+    /// The body of a request as it would be sent now; `None` for models without requests.
+    pub fn body(
+        &self,
+        message: Message<'_>,
+        choices: usize,
+    ) -> Option<Result<Vec<u8>, serde_json::Error>> {
+        Some(self.remote()?.body(message, choices))
     }
 
     /// One line of a Batch API's input file, with a line end; `None` if the model cannot be asked in a batch. `url` replaces

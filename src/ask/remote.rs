@@ -10,7 +10,7 @@ use tracing::warn;
 use super::call::Message;
 use super::constraint::letter_of;
 use super::endpoint::{Endpoint, Request};
-use super::failure::AskError;
+use super::failure::{AskError, Reach};
 use super::field::{AdaptableField, RequestFields, SentFields};
 use super::parameters::{Constrain, Parameters, Temperature, TokenField};
 use super::wire::Wire;
@@ -26,11 +26,22 @@ pub struct Remote {
     parameters: Parameters,
     /// The fields that the server accepts, as far as is known.
     fields: Mutex<RequestFields>,
-    /// Whether a question to the model has come to an end. Until the first has, the others wait: what the server refuses in all requests
-    /// is then found out by one.
-    scouted: tokio::sync::Mutex<bool>,
+    /// What came of the first question to the model. Until it has come to an end, the others wait: what the server refuses in all
+    /// requests is then found out by one.
+    scout: tokio::sync::Mutex<Scout>,
     /// Whether the warning about an unconstrained reply was printed.
     warned_unconstrained: AtomicBool,
+}
+
+/// What came of the first question to a model.
+#[derive(Debug)]
+enum Scout {
+    /// None has come to an end.
+    Waiting,
+    /// It has a reply, or a failure that is its own.
+    Ended,
+    /// It has a failure that every other question would have, too.
+    Refused(AskError),
 }
 
 impl Remote {
@@ -52,7 +63,7 @@ impl Remote {
             endpoint,
             wire,
             parameters,
-            scouted: tokio::sync::Mutex::new(false),
+            scout: tokio::sync::Mutex::new(Scout::Waiting),
             warned_unconstrained: AtomicBool::new(false),
         })
     }
@@ -104,13 +115,24 @@ impl Remote {
 
     /// Sends the single message of a conversation with this number of choices; 0 if the question is open.
     pub async fn ask(&self, message: Message<'_>, choices: usize) -> Result<Reply, AskError> {
-        let mut scouted = self.scouted.lock().await;
-        if *scouted {
-            drop(scouted);
-            return self.ask_adapting(message, choices).await;
+        let mut scout = self.scout.lock().await;
+        match &*scout {
+            Scout::Waiting => {}
+            Scout::Ended => {
+                drop(scout);
+                return self.ask_adapting(message, choices).await;
+            }
+            Scout::Refused(error) => {
+                let (error, attempts) = (error.clone(), 0);
+                return Err(AskError { attempts, ..error });
+            }
         }
         let outcome = self.ask_adapting(message, choices).await;
-        *scouted = true;
+        *scout = match &outcome {
+            Err(error) if error.reach == Reach::Endpoint => Scout::Refused(error.clone()),
+            Err(error) if error.reach == Reach::Interrupted => Scout::Waiting,
+            _ => Scout::Ended,
+        };
         outcome
     }
 

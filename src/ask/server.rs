@@ -117,6 +117,22 @@ impl AccessArgs {
         Ok(Server { access, sending })
     }
 
+    /// Where the key comes from, for people: never the key itself.
+    pub(crate) fn key_source(&self, base: &BaseUrl) -> String {
+        if let Some(path) = &self.api_key_file {
+            return format!("the file {}", path.display());
+        }
+        let names = match self.api_key_env.as_deref() {
+            Some(NO_KEY) => return "none".to_owned(),
+            Some(name) => vec![name],
+            None => key_variables(base),
+        };
+        match names.iter().find(|name| variable(name).is_some()) {
+            Some(name) => format!("the variable {name}"),
+            None => format!("none: {} is not set", names.join(" or ")),
+        }
+    }
+
     /// The key from a file or a variable. For an endpoint on another machine a key is required, except with `none`.
     fn key(&self, base: &BaseUrl) -> Result<Option<Secret>> {
         if let Some(path) = &self.api_key_file {

@@ -14,6 +14,7 @@ use crate::run::enhance::EnhanceArgs;
 use crate::run::evaluate::EvaluateArgs;
 use crate::run::export::ExportArgs;
 use crate::run::import::ImportArgs;
+use crate::run::models::ModelsArgs;
 use crate::run::openeqa::OpenEqaArgs;
 use crate::run::questions::QuestionsArgs;
 use crate::run::realism::RealismArgs;
@@ -91,6 +92,8 @@ pub(crate) enum Command {
     Rooms(RoomsArgs),
     /// Enhance images with an ONNX model, as an evaluation would; or describe its inputs and outputs
     Enhance(Box<EnhanceArgs>),
+    /// Show what each model of a file comes to: endpoint, key, request and digest; sends nothing without --check
+    Models(ModelsArgs),
     /// Ask through a Batch API, at half the price: write its input files, import its output files
     #[command(subcommand)]
     Batch(BatchCommand),

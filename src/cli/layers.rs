@@ -4,7 +4,7 @@
 //! them are parsed together, once. So a value is read in the same way wherever it comes from. ripgrep does so with its configuration
 //! file (`crates/core/flags/parse.rs`).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
@@ -35,6 +35,13 @@ impl From<Error> for Problem {
     }
 }
 
+/// The matches of all words, and the flags that the call itself names.
+pub(super) struct Parsed {
+    pub(super) matches: ArgMatches,
+    /// Flags by long name, without those of variables and files.
+    pub(super) typed: BTreeSet<String>,
+}
+
 /// Value of one flag from the environment or a file.
 struct LayeredValue {
     /// Source of the value for messages: a variable, or a file and a key in it.
@@ -50,18 +57,22 @@ pub(super) fn parse(
     mut all: Command,
     typed: Vec<OsString>,
     variable: impl Fn(&str) -> Option<OsString>,
-) -> Result<ArgMatches, Problem> {
+) -> Result<Parsed, Problem> {
     // Cloned before `build`: only then does this setting reach the nested commands.
     let lenient = all.clone().ignore_errors(true);
     all.build();
     let Ok(matches) = lenient.try_get_matches_from(&typed) else {
-        return parse_words(all, typed, &BTreeMap::new());
+        let matches = parse_words(all, typed, &BTreeMap::new())?;
+        let typed = BTreeSet::new();
+        return Ok(Parsed { matches, typed });
     };
     let (path, own) = called_command(&matches);
     let command = descend(&all, &path);
     let mut set: Vec<&Arg> = settable_flags(command)
         .filter(|arg| own.value_source(arg.get_id().as_str()) == Some(ValueSource::CommandLine))
         .collect();
+    let in_call = set.iter().filter_map(|arg| arg.get_long());
+    let in_call: BTreeSet<String> = in_call.map(str::to_owned).collect();
     let environment = environment_values(&all, command, &variable)?;
     let file = match own.get_one::<PathBuf>(CONFIG) {
         Some(path) => Some(path.clone()),
@@ -91,7 +102,10 @@ pub(super) fn parse(
     let end = typed.iter().position(|word| word == "--");
     let end = end.unwrap_or(typed.len());
     typed.splice(end..end, words);
-    parse_words(all, typed, &origins)
+    Ok(Parsed {
+        matches: parse_words(all, typed, &origins)?,
+        typed: in_call,
+    })
 }
 
 /// The matches of the command that is called.

@@ -13,7 +13,7 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
-use clap::{ArgMatches, FromArgMatches as _};
+use clap::FromArgMatches as _;
 use clap_complete::Shell;
 use tracing_subscriber::EnvFilter;
 
@@ -53,8 +53,8 @@ const FIRST_STEPS: &str = "
 pub fn main(words: impl Iterator<Item = OsString>) -> ExitCode {
     let words: Vec<OsString> = words.collect();
     let first_steps = if words.len() == 1 { FIRST_STEPS } else { "" };
-    let matches = match layers::parse(command::command(), words, |name| std::env::var_os(name)) {
-        Ok(matches) => matches,
+    let parsed = match layers::parse(command::command(), words, |name| std::env::var_os(name)) {
+        Ok(parsed) => parsed,
         Err(layers::Problem::Error(e)) => return fail(&e.to_string()),
         Err(layers::Problem::Help(help)) => {
             let written = help.print();
@@ -65,7 +65,7 @@ pub fn main(words: impl Iterator<Item = OsString>) -> ExitCode {
             };
         }
     };
-    let cli = match read(&matches) {
+    let cli = match read(&parsed) {
         Ok(cli) => cli,
         Err(e) => return fail(&e.to_string()),
     };
@@ -82,7 +82,7 @@ pub fn main(words: impl Iterator<Item = OsString>) -> ExitCode {
         .without_time()
         .with_writer(progress.clone())
         .init();
-    for line in no_effect::without_effect(&cli, &matches) {
+    for line in no_effect::without_effect(&cli, &parsed.matches) {
         tracing::warn!("{line}");
     }
     match carry_out(cli, &progress) {
@@ -93,7 +93,8 @@ pub fn main(words: impl Iterator<Item = OsString>) -> ExitCode {
 }
 
 /// The parsed command line, with the image flags that the manifest of a run stores.
-fn read(matches: &ArgMatches) -> Result<Cli> {
+fn read(parsed: &layers::Parsed) -> Result<Cli> {
+    let matches = &parsed.matches;
     let mut cli = Cli::from_arg_matches(matches)
         .map_err(|e| Error::usage("the command line", one_line(&e)))?;
     let own = layers::command_matches(matches);
@@ -105,6 +106,7 @@ fn read(matches: &ArgMatches) -> Result<Cli> {
     };
     if let Some(job) = job {
         job.image_flags = image_words::typed_flags(own)?;
+        job.typed.clone_from(&parsed.typed);
     }
     Ok(cli)
 }
@@ -121,6 +123,7 @@ fn carry_out(cli: Cli, progress: &Progress) -> Result<Outcome> {
         Command::Import(args) => run::import::import(&args, progress),
         Command::Export(args) => run::export::export(&args, progress),
         Command::Rooms(args) => run::rooms::rooms(&args, progress),
+        Command::Models(args) => run::models::models(&args, progress),
         Command::Enhance(args) => run::enhance::enhance(&args, progress),
         Command::OpenEqa(args) => openeqa(*args, progress),
         Command::Batch(BatchCommand::Export(args)) => {

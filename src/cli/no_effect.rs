@@ -177,7 +177,7 @@ impl NoEffect {
         judge: Option<&ModelName>,
     ) {
         let models = &args.models;
-        if models.blind || models.model.is_empty() {
+        if models.models.is_none() && (models.blind || models.model.is_empty()) {
             let shown = [
                 light(),
                 enhancement(),
@@ -191,7 +191,7 @@ impl NoEffect {
         self.light(&args.light);
         self.enhancement(&args.enhancers);
         let mut names = models.model.iter().chain(&models.blind_model).chain(judge);
-        if !names.any(|name| matches!(name, ModelName::Remote(_))) {
+        if models.models.is_none() && !names.any(|name| matches!(name, ModelName::Remote(_))) {
             let sent = [
                 ids::<AccessArgs>(),
                 ids::<Parameters>(),

@@ -36,12 +36,7 @@ impl Budget {
         models: &[ModelUnderTest],
         stored: &[Record<D>],
     ) -> Result<Self> {
-        let price = |model: &ModelUnderTest| {
-            let remote = model.model.is_remote();
-            remote
-                .then(|| money.prices.of(model.model.name()))
-                .flatten()
-        };
+        let price = |model: &ModelUnderTest| model.price(&money.prices);
         let prices: Vec<Option<Price>> = models.iter().map(price).collect();
         let unknown = models
             .iter()
@@ -51,9 +46,8 @@ impl Budget {
             return Err(Error::usage(
                 "--max-cost",
                 format_args!(
-                    "the price of {} is not in the table of {}; add it to a table of your own and name that with --prices FILE",
-                    model.model.name(),
-                    money.prices.as_of
+                    "the price of {} is not in the table of {}; add it to a table of your own and name that with --prices FILE, or set price in a file of models",
+                    model.name, money.prices.as_of
                 ),
             ));
         }
@@ -64,7 +58,11 @@ impl Budget {
             highest_cost: None,
         };
         for record in stored {
-            let price = money.prices.of(&record.model);
+            let model = models.iter().find(|model| *model.name == record.model);
+            let price = match model {
+                Some(model) => model.price(&money.prices),
+                None => money.prices.of(&record.model),
+            };
             let Some((price, usage)) = price.zip(record.usage) else {
                 continue;
             };
@@ -119,6 +117,11 @@ impl Budget {
             .iter()
             .any(Option::is_some)
             .then_some(self.spent)
+    }
+
+    /// Whether a model has a price.
+    pub(crate) fn is_paid(&self, model: usize) -> bool {
+        self.prices[model].is_some()
     }
 
     /// Whether one more question is within `--max-cost`, if each request in flight costs as much as the most expensive reply so

@@ -25,8 +25,8 @@ pub(crate) enum EndReason {
     OverBudget,
     /// No model could be asked any further, or too much had failed.
     Stopped(Error),
-    /// At least one model could not be asked any further; the others were.
-    ModelStopped(Error),
+    /// These models could not be asked any further; the others were.
+    ModelsStopped(Vec<Error>),
 }
 
 impl EndReason {
@@ -36,7 +36,7 @@ impl EndReason {
             Self::AllAsked => Status::Incomplete,
             Self::Interrupted => Status::Cancelled,
             Self::OverBudget => Status::OverBudget,
-            Self::Stopped(_) | Self::ModelStopped(_) => Status::Stopped,
+            Self::Stopped(_) | Self::ModelsStopped(_) => Status::Stopped,
         }
     }
 }
@@ -75,6 +75,8 @@ pub(crate) struct CircuitBreaker {
     /// Whether nothing more is asked of any model.
     stopped: bool,
     end: Option<EndReason>,
+    /// Why each of the stopped models was stopped.
+    model_errors: Vec<Error>,
 }
 
 impl CircuitBreaker {
@@ -85,8 +87,8 @@ impl CircuitBreaker {
         max_failures: Option<usize>,
     ) -> Self {
         let states = models.iter().map(|model| ModelState {
-            name: model.model.name().to_owned(),
-            endpoint: model.endpoint_name().to_owned(),
+            name: model.name.to_string(),
+            endpoint: model.endpoint_name(),
             health: ModelHealth::default(),
         });
         Self {
@@ -96,6 +98,7 @@ impl CircuitBreaker {
             failures: 0,
             stopped: false,
             end: None,
+            model_errors: Vec::new(),
         }
     }
 
@@ -116,7 +119,9 @@ impl CircuitBreaker {
 
     pub(crate) fn into_end(self) -> EndReason {
         match self.end {
-            Some(EndReason::Stopped(error)) if !self.stopped => EndReason::ModelStopped(error),
+            Some(EndReason::Stopped(_)) if !self.stopped => {
+                EndReason::ModelsStopped(self.model_errors)
+            }
             end => end.unwrap_or(EndReason::AllAsked),
         }
     }
@@ -190,6 +195,8 @@ impl CircuitBreaker {
         } else {
             None
         };
+        // Replies that were in flight may fail after the model was stopped.
+        let newly = problem.is_some() && !health.stopped;
         health.stopped |= problem.is_some();
         let too_many = self.max_failures.is_some_and(|max| self.failures >= max);
         let too_many = too_many.then(|| {
@@ -203,6 +210,11 @@ impl CircuitBreaker {
         if let Some(problem) = problem.or(too_many) {
             let problem =
                 format!("{problem} (replies so far are kept; the same command continues)");
+            if newly {
+                let (endpoint, problem) = (endpoint.clone(), problem.clone());
+                self.model_errors
+                    .push(Error::Endpoint { endpoint, problem });
+            }
             self.end
                 .get_or_insert(EndReason::Stopped(Error::Endpoint { endpoint, problem }));
         }
@@ -211,19 +223,13 @@ impl CircuitBreaker {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use super::*;
     use crate::ask::{Model, Random};
     use crate::types::View;
 
     fn breaker(models: usize, max_failures: Option<usize>) -> CircuitBreaker {
-        let model = |_| ModelUnderTest {
-            model: Arc::new(Model::Random(Random { seed: 0 })),
-            digest: "".into(),
-            view: View::Image,
-            address: None,
-        };
+        let model =
+            |_| ModelUnderTest::new(Model::Random(Random { seed: 0 }), View::Image, None).unwrap();
         let models: Vec<ModelUnderTest> = (0..models).map(model).collect();
         CircuitBreaker::new(&models, 2, max_failures)
     }

@@ -1,6 +1,5 @@
 //! The asynchronous part: asks about the images from the pipeline, and stores every reply when it arrives.
 
-use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -11,11 +10,12 @@ use tokio::task::{JoinError, JoinSet};
 use super::budget::Budget;
 use super::circuit_breaker::{CircuitBreaker, EndReason};
 use super::interrupt::Interrupt;
+use super::lanes::{Lanes, PreparedTrial};
 use super::models::ModelUnderTest;
 use super::progress::{Progress, StepBar};
 use super::settings::JobSettings;
 use super::timings::{TimedStep, Timings};
-use super::trial::{Item, PreparedGroup, Stimulus, Trial};
+use super::trial::{Item, PreparedGroup};
 use super::workers::unstarted;
 use crate::ask::{AskError, Call, Reach};
 use crate::enhance::Stopper;
@@ -41,12 +41,6 @@ pub(crate) struct TrialCounts {
     pub(crate) trials: usize,
     /// Number of trials with a reply.
     pub(crate) answered: usize,
-}
-
-/// One trial, with the stimulus that its group shares.
-struct PreparedTrial<I> {
-    trial: Trial<I>,
-    stimulus: Arc<Stimulus>,
 }
 
 /// One trial, with its reply or error.
@@ -82,13 +76,6 @@ impl Dispatcher<'_> {
             scope.spawn(move || make(&sender));
             runtime.block_on(sink.ask(groups))
         })
-    }
-
-    /// Maximum number of requests in flight now.
-    fn width(&self) -> usize {
-        let widths = self.models.iter().filter_map(|model| model.model.width());
-        // Models of one endpoint share its window.
-        widths.max().unwrap_or(self.settings.concurrency.most())
     }
 
     fn breaker(&self) -> CircuitBreaker {
@@ -144,53 +131,48 @@ impl TruncationCheck {
 
 impl<I: Item> ReplySink<'_, I> {
     async fn ask(mut self, mut groups: Receiver<PreparedGroup<I>>) -> Result<EndReason> {
-        let mut waiting = VecDeque::<PreparedTrial<I>>::new();
+        let concurrency = self.dispatcher.settings.concurrency.most();
+        let mut lanes = Lanes::<I>::new(self.dispatcher.models, concurrency);
         let mut in_flight = JoinSet::<Finished<I>>::new();
         let mut interrupt = Interrupt::listen()?;
         let mut more_groups = true;
         loop {
-            while in_flight.len() < self.dispatcher.width()
-                && let Some(ready) = waiting.pop_front()
-            {
-                let model = &self.dispatcher.models[ready.trial.model];
-                if self.breaker.is_stopped(ready.trial.model) {
-                    continue;
+            while let Some(ready) = lanes.next(|model| self.breaker.is_stopped(model)) {
+                if self.can_afford(&lanes, &ready) {
+                    let model = &self.dispatcher.models[ready.trial.model];
+                    in_flight.spawn(send(model.clone(), ready));
+                } else {
+                    lanes.put_back(ready);
                 }
-                let prompt_tokens = self.expected_tokens(&ready);
-                if !self.budget.can_afford(
-                    in_flight.len(),
-                    ready.trial.model,
-                    prompt_tokens,
-                    ready.trial.item.reply_tokens(),
-                ) {
-                    waiting.push_front(ready);
-                    break;
-                }
-                in_flight.spawn(send(model.clone(), ready));
             }
-            if in_flight.is_empty() && !waiting.is_empty() {
+            if in_flight.is_empty() && !lanes.is_empty() {
                 self.breaker.over_budget();
             }
-            let all_asked = !more_groups && waiting.is_empty() && in_flight.is_empty();
+            let all_asked = !more_groups && lanes.is_empty() && in_flight.is_empty();
             if all_asked || self.breaker.stopped() {
                 break;
             }
             let state = match in_flight.len() {
                 0 => Some(TimedStep::Idle),
-                n if n >= self.dispatcher.width() => Some(TimedStep::Full),
+                _ if lanes.is_full() => Some(TimedStep::Full),
                 _ => None,
             };
             let since = Instant::now();
+            let wants_more =
+                more_groups && lanes.wants_more(|model| self.breaker.is_stopped(model));
             tokio::select! {
                 () = interrupt.next() => self.breaker.interrupted(),
                 Some(done) = in_flight.join_next() => {
                     self.record_wait(state, since);
+                    if let Ok((ready, _)) = &done {
+                        lanes.ended(ready.trial.model);
+                    }
                     self.store_result(done)?;
                 }
-                group = groups.recv(), if more_groups && waiting.is_empty() => match group {
+                group = groups.recv(), if wants_more => match group {
                     Some(group) => {
                         self.record_wait(state, since);
-                        waiting.extend(self.accept(group)?);
+                        lanes.extend(self.accept(group)?);
                     }
                     None => more_groups = false,
                 },
@@ -204,6 +186,16 @@ impl<I: Item> ReplySink<'_, I> {
         }
         self.store.sync()?;
         Ok(self.breaker.into_end())
+    }
+
+    /// Whether `--max-cost` allows a trial, which is counted in its lane already.
+    fn can_afford(&self, lanes: &Lanes<'_, I>, ready: &PreparedTrial<I>) -> bool {
+        let (model, prompt_tokens) = (ready.trial.model, self.expected_tokens(ready));
+        let paid = lanes.in_flight(|model| self.budget.is_paid(model));
+        let others = paid.saturating_sub(1);
+        let reply_tokens = ready.trial.item.reply_tokens();
+        self.budget
+            .can_afford(others, model, prompt_tokens, reply_tokens)
     }
 
     /// Adds the time waited in a state to the timings.
@@ -313,7 +305,7 @@ impl<I: Item> ReplySink<'_, I> {
         self.bar
             .count(self.answered, self.breaker.failures(), self.budget.spent());
         let model = &self.dispatcher.models[ready.trial.model];
-        let blank = I::blank(&ready.trial, &ready.stimulus, model.model.name());
+        let blank = I::blank(&ready.trial, &ready.stimulus, &model.name);
         self.store.append(&match result {
             Ok(reply) => blank.answered(reply)?,
             Err(error) => blank.failed_by(error.failure, error.attempts),

@@ -1,6 +1,7 @@
 //! An estimate of what a run takes, without sending anything: [`estimate`].
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::budget::{Budget, image_tokens, text_tokens};
@@ -11,8 +12,7 @@ use super::models::ModelUnderTest;
 use super::open_run::limit;
 use super::plan::Plan;
 use super::trial::Item as _;
-use crate::ask::Price;
-use crate::ask::Server;
+use crate::ask::{Price, Server};
 use crate::error::Result;
 use crate::report::forecast::{CostLine, Forecast, ReadingCost};
 use crate::types::{Condition, Degradation, ImageFacts, ReadingName, View};
@@ -42,9 +42,13 @@ pub(crate) fn estimate<E: Experiment>(
         .first()
         .map_or_else(Vec::new, |plan| experiment.expected_requests(&plan.sources));
     let (mut lines, mut all_models) = (Vec::new(), Vec::new());
+    let mut loads = Vec::new();
     for (phase, plan) in plans.iter().enumerate() {
         let expected = if phase == 0 { &[] } else { &expected[..] };
-        lines.extend(self::lines(experiment, phase, plan, expected));
+        for (model, line) in self::lines(experiment, phase, plan, expected) {
+            add_load(&mut loads, &experiment.models(phase)[model], &line);
+            lines.push(line);
+        }
         all_models.extend(experiment.models(phase).iter().cloned());
     }
     let budget = Budget::new(money, &all_models, stored)?;
@@ -80,14 +84,13 @@ pub(crate) fn estimate<E: Experiment>(
             }
         }
     }
-    let requests: usize = lines.iter().map(|line| line.requests).sum();
-    let tokens = lines
-        .iter()
-        .map(|line| line.text_tokens + line.image_tokens.unwrap_or(0.0) + line.reply_tokens)
-        .sum();
     let latencies = stored.iter().filter_map(|record| record.latency_ms);
+    let latencies: Vec<u64> = latencies.collect();
+    // Endpoints are asked side by side: the slowest decides.
+    let times = loads.iter().map(|load| asking_time(load, &latencies));
+    let slowest = times.max_by(|(a, _), (b, _)| a.total_cmp(b));
     let (asking_seconds, pace) =
-        asking_time(experiment.server(), latencies, requests as f64, tokens);
+        slowest.unwrap_or_else(|| (0.0, "built-in models alone".to_owned()));
     let largest = sample.images.iter().max_by_key(|image| image.bytes);
     let limit = limit(settings);
     let planned: usize = plans.iter().map(|plan| plan.keys.len()).sum();
@@ -124,12 +127,12 @@ fn lines<E: Experiment>(
     phase: usize,
     plan: &Plan<E::Item>,
     expected: &[ExpectedRequest],
-) -> Vec<CostLine> {
+) -> Vec<(usize, CostLine)> {
     let sources = experiment.sources();
     let models = experiment.models(phase).iter().enumerate();
     let remote = models.filter(|(_, model)| model.model.is_remote());
     let lines = remote.map(|(index, model)| {
-        let price = experiment.settings().money.prices.of(model.model.name());
+        let price = model.price(&experiment.settings().money.prices);
         let mut by_reading = BTreeMap::<Option<ReadingName>, Tokens>::new();
         for (place, group) in plan.groups() {
             let degradation = group
@@ -156,9 +159,39 @@ fn lines<E: Experiment>(
             let tokens = by_reading.entry(None).or_default();
             tokens.add(request.text_tokens, request.reply_tokens);
         }
-        line(model, price, &by_reading, E::PHASES[phase])
+        (index, line(model, price, &by_reading, E::PHASES[phase]))
     });
-    lines.filter(|line| line.requests > 0).collect()
+    lines.filter(|(_, line)| line.requests > 0).collect()
+}
+
+/// The requests to one endpoint and their tokens.
+struct Load {
+    server: Arc<Server>,
+    requests: f64,
+    tokens: f64,
+}
+
+/// Adds the requests to a model to those of its endpoint.
+fn add_load(loads: &mut Vec<Load>, model: &ModelUnderTest, line: &CostLine) {
+    let Some(server) = &model.server else {
+        return;
+    };
+    let requests = line.requests as f64;
+    let tokens = line.text_tokens + line.image_tokens.unwrap_or(0.0) + line.reply_tokens;
+    match loads
+        .iter_mut()
+        .find(|load| Arc::ptr_eq(&load.server, server))
+    {
+        Some(load) => {
+            load.requests += requests;
+            load.tokens += tokens;
+        }
+        None => loads.push(Load {
+            server: Arc::clone(server),
+            requests,
+            tokens,
+        }),
+    }
 }
 
 /// Numbers of requests to one model and of their tokens.
@@ -224,7 +257,7 @@ fn line(
     };
     let readings = by_reading.iter().filter(|(_, part)| part.requests > 0);
     CostLine {
-        model: format!("{}{role}", model.model.name()),
+        model: format!("{}{role}", model.name),
         requests: tokens.requests,
         text_tokens: tokens.text,
         image_tokens: tokens.image,
@@ -242,20 +275,16 @@ fn line(
     }
 }
 
-/// Seconds until all replies have arrived, and the limit that decides it: `--rpm`, `--tpm`, or the mean time of a stored reply.
-fn asking_time(
-    server: Option<&Server>,
-    latencies_ms: impl Iterator<Item = u64>,
-    requests: f64,
-    tokens: f64,
-) -> (f64, String) {
-    let Some(server) = server else {
-        return (0.0, "built-in models alone".to_owned());
-    };
-    let times: Vec<f64> = latencies_ms
-        .filter(|ms| *ms > 0)
-        .map(|ms| ms as f64 / 1e3)
-        .collect();
+/// Seconds until all replies of an endpoint have arrived, and the limit that decides it: `--rpm`, `--tpm`, or the mean time of a stored reply.
+fn asking_time(load: &Load, latencies_ms: &[u64]) -> (f64, String) {
+    let Load {
+        server,
+        requests,
+        tokens,
+    } = load;
+    let (requests, tokens) = (*requests, *tokens);
+    let times = latencies_ms.iter().filter(|ms| **ms > 0);
+    let times: Vec<f64> = times.map(|ms| *ms as f64 / 1e3).collect();
     let (each, origin) = if times.is_empty() {
         (REPLY_SECONDS, "assumed")
     } else {

@@ -11,7 +11,6 @@ use super::settings::JobSettings;
 use super::source::{Frames, Source};
 use super::stored::StoredRun;
 use super::trial::Item;
-use crate::ask::Server;
 use crate::error::Result;
 use crate::store::Store;
 use crate::types::{Record, RunQuestion};
@@ -46,11 +45,6 @@ pub(crate) trait Experiment: Sync {
 
     /// The settings that every experiment has.
     fn settings(&self) -> &JobSettings;
-
-    /// The endpoint that is asked most; `None` if all models are built in.
-    fn server(&self) -> Option<&Server> {
-        self.settings().ask.server.as_ref()
-    }
 
     /// Name of the data, for the name of a run folder.
     fn data(&self) -> &str;

@@ -7,7 +7,6 @@ use serde_json::json;
 
 use super::experiment::{DetailOf, Experiment};
 use super::models::{AskSettings, ModelName};
-use super::observer;
 use super::plan::Plan;
 use super::settings::{RESULTS, RunPlace};
 use crate::error::{Error, Result};
@@ -55,15 +54,9 @@ fn automatic<E: Experiment>(experiment: &E) -> Result<PathBuf> {
 
 /// Names of the first two models, for the name of a folder.
 fn label(ask: &AskSettings) -> String {
-    let models = ask.models.iter().chain(&ask.blind_models);
-    let names = models.map(|name| match name {
-        ModelName::Random => "random".to_owned(),
-        ModelName::Observer(control) => observer::name(*control),
-        ModelName::Script(path) => path.file_stem().map_or_else(
-            || "script".to_owned(),
-            |stem| stem.to_string_lossy().into_owned(),
-        ),
-        ModelName::Remote(name) => name.clone(),
+    let names = ask.models.iter().map(|model| match &model.id {
+        ModelName::Remote(_) => model.name.clone(),
+        built_in => built_in.label(),
     });
     let names: Vec<String> = names.take(2).collect();
     names.join("-").chars().take(60).collect()

@@ -47,7 +47,7 @@ pub(crate) fn columns<'a>(
     settings: &JobSettings,
 ) -> Columns {
     let models = models.into_iter();
-    let models = models.map(|entry| (entry.model.name().to_owned(), model(entry)));
+    let models = models.map(|entry| (entry.name.to_string(), model(entry)));
     let enhancers = recipe.enhancers.iter();
     let enhancers = enhancers.map(|(name, digest)| {
         let content = enhancer(digest, &settings.loading.size);
@@ -84,7 +84,7 @@ pub(crate) fn columns<'a>(
 /// Settings that decide the replies of a model besides question and images, by flag; with the address of its endpoint.
 fn model(model: &ModelUnderTest) -> Value {
     let mut content = model.model.content();
-    if let (Some(address), Some(fields)) = (&model.address, content.as_object_mut()) {
+    if let (Some(address), Some(fields)) = (model.address(), content.as_object_mut()) {
         let own = std::mem::take(fields).into_iter();
         fields.extend(own.map(|(name, value)| (flag(&name), value)));
         fields.insert("--base-url".to_owned(), json!(address));
@@ -96,6 +96,8 @@ fn model(model: &ModelUnderTest) -> Value {
 fn flag(parameter: &str) -> String {
     match parameter {
         "seed" => "--sampling-seed".to_owned(),
+        // A key of a file of models that is no flag.
+        "deployment" => "deployment".to_owned(),
         name => format!("--{}", name.replace('_', "-")),
     }
 }
@@ -144,7 +146,9 @@ pub(crate) fn settings(job: &JobSettings) -> BTreeMap<String, Value> {
         ("--max-failures", json!(job.money.max_failures)),
         ("--threads", json!(job.loading.threads.threads)),
     ];
-    if let Some(server) = &job.ask.server {
+    if let Some(models) = &job.ask.file {
+        settings.push(("models", models.clone()));
+    } else if let Some(server) = job.ask.servers().first() {
         let sending = server.sending;
         settings.extend([
             ("--timeout", json!(sending.timeout.as_secs_f64())),

@@ -24,6 +24,7 @@ pub(crate) mod image_pipeline;
 pub(crate) mod image_words;
 pub(crate) mod input_tally;
 pub(crate) mod interrupt;
+mod lanes;
 mod manifest;
 pub(crate) mod merge;
 pub(crate) mod models;

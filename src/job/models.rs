@@ -1,138 +1,28 @@
-//! The models of a run: their flags ([`ModelArgs`]), settings ([`AskSettings`]) and the opened models (`ModelUnderTest`).
+//! The models of a run: their flags ([`ModelArgs`]), their settings ([`AskSettings`]) and the opened models (`ModelUnderTest`).
+//!
+//! Flags and a file of models make one list of settings; a model that a flag names is an entry like those of the file.
 
-use std::path::PathBuf;
-use std::str::FromStr;
+mod args;
+mod asking;
+mod describe;
+mod entry;
+mod file;
+mod name;
+mod settings;
+
 use std::sync::Arc;
 
-use clap::Args;
 use serde_json::{Value, json};
-use strsim::damerau_levenshtein;
 
-use crate::ask::{AccessArgs, Endpoint, Model, Parameters, Remote, Script, Sending, Server, Wire};
+use crate::ask::{Endpoint, Model, Parameters, Price, Prices, Remote, Script, Server, Wire};
 use crate::error::{Error, Result};
-use crate::types::{Condition, Control, Decides, View};
+use crate::types::{Condition, View};
 
-/// Flags that name the models to ask.
-#[derive(Debug, Clone, Default, Args)]
-#[command(next_help_heading = "Model")]
-pub(crate) struct ModelArgs {
-    /// The model to ask, by its name at the endpoint; repeatable; built in: observer (frames with maps), its controls
-    /// (observer:CONTROL), random, script:FILE; default: none, one must be named
-    #[arg(long, value_name = "NAME", add = Decides::Trials)]
-    pub model: Vec<ModelName>,
-    /// Show the models no image, only text
-    #[arg(long, add = Decides::Trials)]
-    pub blind: bool,
-    /// Add a text-only baseline by this model; repeatable; default: none
-    #[arg(long, value_name = "NAME", add = Decides::Trials)]
-    pub blind_model: Vec<ModelName>,
-}
-
-impl ModelArgs {
-    /// Whether neither `--model` nor `--blind-model` names a model.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.model.is_empty() && self.blind_model.is_empty()
-    }
-}
-
-/// A model as flags name it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum ModelName {
-    /// Built-in model that guesses.
-    Random,
-    /// Built-in model that answers what can still be read from the pixels by one who knows the frame; or one of its controls.
-    Observer(Option<Control>),
-    /// Built-in model that answers from this file.
-    Script(PathBuf),
-    /// Model of this name at the endpoint.
-    Remote(String),
-}
-
-/// The built-in models that need no file.
-const BUILT_IN_NAMES: [&str; 2] = ["random", "observer"];
-
-impl ModelName {
-    /// Checks that the model can answer an open question.
-    ///
-    /// # Errors
-    /// If it can only choose.
-    pub(crate) fn require_open_answers(&self) -> Result<()> {
-        let name = match self {
-            Self::Random => "random",
-            Self::Observer(_) => "observer",
-            Self::Script(_) | Self::Remote(_) => return Ok(()),
-        };
-        let problem = format_args!("{name} can only choose, and these questions are open");
-        Err(Error::usage("--model", problem))
-    }
-}
-
-impl FromStr for ModelName {
-    type Err = String;
-
-    /// Reads a name. One that is similar to a built-in model's is refused, because it would be sent to an endpoint.
-    fn from_str(text: &str) -> Result<Self, String> {
-        let text = text.trim();
-        let near = |name: &&&str| damerau_levenshtein(name, &text.to_lowercase()) <= 2;
-        if let Some(control) = text.strip_prefix("observer:") {
-            return Ok(Self::Observer(Some(control.parse()?)));
-        }
-        match text {
-            "" => Err("the name of a model is empty".to_owned()),
-            "random" => Ok(Self::Random),
-            "observer" => Ok(Self::Observer(None)),
-            "script" => Err("script:FILE expected, a file of replies".to_owned()),
-            name => match (
-                name.strip_prefix("script:"),
-                BUILT_IN_NAMES.iter().find(near),
-            ) {
-                (Some(path), _) => Ok(Self::Script(path.into())),
-                (None, Some(built_in)) => {
-                    Err(format!("did you mean the built-in model {built_in}?"))
-                }
-                (None, None) => Ok(Self::Remote(name.to_owned())),
-            },
-        }
-    }
-}
-
-/// The models to ask, their parameters and their endpoint with its key.
-#[derive(Debug)]
-pub(crate) struct AskSettings {
-    /// Models that `--model` names.
-    pub models: Vec<ModelName>,
-    /// Whether `models` see the images.
-    pub view: View,
-    /// Models of the text-only baseline.
-    pub blind_models: Vec<ModelName>,
-    /// The endpoint; `None` if all models are built in.
-    pub server: Option<Server>,
-    /// Parameters of every request; the name is set for each model.
-    pub parameters: Parameters,
-}
-
-impl AskSettings {
-    /// The settings of these flags. The key is read if a model needs one.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] with the flag that cannot be used.
-    pub(super) fn resolve(
-        args: ModelArgs,
-        parameters: Parameters,
-        access: &AccessArgs,
-        sending: Sending,
-    ) -> Result<Self> {
-        let mut all = args.model.iter().chain(&args.blind_model);
-        let remote = all.any(|name| matches!(name, ModelName::Remote(_)));
-        Ok(Self {
-            view: if args.blind { View::Blind } else { View::Image },
-            server: remote.then(|| access.server(sending)).transpose()?,
-            models: args.model,
-            blind_models: args.blind_model,
-            parameters,
-        })
-    }
-}
+pub(crate) use args::ModelArgs;
+pub(crate) use asking::AskingArgs;
+pub(crate) use describe::{check, describe};
+pub(crate) use name::ModelName;
+pub(crate) use settings::{AskSettings, KeyUse, ResolveContext};
 
 /// Name of the endpoint of built-in models in messages.
 const BUILT_IN: &str = "built-in models";
@@ -141,58 +31,130 @@ const BUILT_IN: &str = "built-in models";
 #[derive(Debug, Clone)]
 pub(crate) struct ModelUnderTest {
     pub(crate) model: Arc<Model>,
+    /// The name in records and tables.
+    pub(crate) name: Arc<str>,
     /// Digest of the settings that decide the model's replies ([`Model::digest`]). Computed once, because it enters every trial key.
     pub(crate) digest: Arc<str>,
     pub(crate) view: View,
-    /// Address of its endpoint; `None` if it is built in.
-    pub(crate) address: Option<String>,
+    /// Its endpoint; `None` if it is built in.
+    pub(crate) server: Option<Arc<Server>>,
+    /// The price, if it is not that of the table of prices.
+    pub(crate) price: Option<Price>,
+    /// The number of questions that it is asked; `None` for all.
+    pub(crate) limit: Option<usize>,
 }
 
 impl ModelUnderTest {
-    pub(crate) fn new(model: Model, view: View, server: Option<&Server>) -> Result<Self> {
+    /// A model under its own name, at this endpoint if it is remote.
+    pub(crate) fn new(model: Model, view: View, server: Option<&Arc<Server>>) -> Result<Self> {
         let server = server.filter(|_| model.is_remote());
         Ok(Self {
             digest: model.digest()?.to_string().into(),
-            address: server.map(|server| server.access.base.to_string()),
+            name: model.name().into(),
+            server: server.cloned(),
             model: Arc::new(model),
             view,
+            price: None,
+            limit: None,
         })
     }
 
+    /// Address of its endpoint; `None` if it is built in.
+    pub(crate) fn address(&self) -> Option<String> {
+        let server = self.server.as_ref();
+        server.map(|server| server.access.base.to_string())
+    }
+
     /// Name of its endpoint for messages: the address, or that it is built in.
-    pub(crate) fn endpoint_name(&self) -> &str {
-        self.address.as_deref().unwrap_or(BUILT_IN)
+    pub(crate) fn endpoint_name(&self) -> String {
+        self.address().unwrap_or_else(|| BUILT_IN.to_owned())
+    }
+
+    /// The price of its tokens; `None` if it is built in or the price is unknown.
+    pub(crate) fn price(&self, prices: &Prices) -> Option<Price> {
+        let remote = self.model.is_remote();
+        let of_table = || prices.of(self.model.name());
+        remote.then(|| self.price.or_else(of_table)).flatten()
+    }
+
+    /// Whether it is asked the question at this place among the selected ones.
+    pub(crate) fn is_asked(&self, place: usize) -> bool {
+        self.limit.is_none_or(|limit| place < limit)
     }
 }
 
-/// The opened models, those that see images and those that do not. A model that is named twice is an error. Nothing is sent.
-/// `added` are asked too, with images, although no flag names them. `built_in` makes the built-in models that only one
-/// experiment has.
+/// The opened models, those that see images and those that do not. Nothing is sent. `added` are asked too, with images, although no
+/// flag names them. `built_in` makes the built-in models that only one experiment has.
+///
+/// # Errors
+/// If a model cannot be opened, or two differ in nothing that decides a reply.
 pub(crate) fn open_all(
     ask: &AskSettings,
     added: &[ModelName],
     built_in: impl Fn(&ModelName) -> Result<Model>,
 ) -> Result<Vec<ModelUnderTest>> {
-    let server = ask.server.as_ref();
-    let endpoint = endpoint(server)?;
-    let named = ask.models.iter().map(|name| (name, ask.view));
-    let named = named.chain(added.iter().map(|name| (name, View::Image)));
-    let blind = ask.blind_models.iter().map(|name| (name, View::Blind));
+    let mut endpoints = Endpoints::default();
     let mut models: Vec<ModelUnderTest> = Vec::new();
-    for (name, view) in named.chain(blind) {
-        let model = match name {
-            ModelName::Random | ModelName::Observer(_) => built_in(name)?,
-            name => open(name, endpoint.as_ref(), &ask.parameters)?,
+    for settings in &ask.models {
+        let model = match &settings.id {
+            name @ (ModelName::Random | ModelName::Observer(_)) => built_in(name)?,
+            name => {
+                let endpoint = endpoints.get(settings.server.as_ref())?;
+                open(name, endpoint.as_ref(), &settings.parameters)?
+            }
         };
-        let name = model.name();
-        let mut others = models.iter();
-        if others.any(|other| other.view == view && other.model.name() == name) {
-            let problem = format_args!("{name} is named twice");
+        let opened = ModelUnderTest::new(model, settings.view, settings.server.as_ref())?;
+        models.push(ModelUnderTest {
+            name: settings.name.as_str().into(),
+            price: settings.price,
+            limit: settings.limit,
+            ..opened
+        });
+    }
+    // Behind the last model that sees images.
+    let last = models.iter().rposition(|model| model.view == View::Image);
+    let place = last.map_or(models.len(), |last| last + 1);
+    for (i, name) in added.iter().enumerate() {
+        let model = ModelUnderTest::new(built_in(name)?, View::Image, None)?;
+        models.insert(place + i, model);
+    }
+    refuse_same_trials(&models)?;
+    Ok(models)
+}
+
+/// Refuses two models whose trials would have the same keys.
+fn refuse_same_trials(models: &[ModelUnderTest]) -> Result<()> {
+    for (i, model) in models.iter().enumerate() {
+        let mut before = models[..i].iter();
+        let facts = |model: &ModelUnderTest| (model.view, Arc::clone(&model.digest));
+        if let Some(other) = before.find(|other| facts(other) == facts(model)) {
+            let problem = format_args!(
+                "{} and {} differ in nothing that decides the reply; in a file of models, set deployment",
+                other.name, model.name
+            );
             return Err(Error::usage("--model", problem));
         }
-        models.push(ModelUnderTest::new(model, view, server)?);
     }
-    Ok(models)
+    Ok(())
+}
+
+/// The opened endpoints, each once: all its models share its connections and its pauses.
+#[derive(Default)]
+struct Endpoints(Vec<(Arc<Server>, Arc<Endpoint>)>);
+
+impl Endpoints {
+    fn get(&mut self, server: Option<&Arc<Server>>) -> Result<Option<Arc<Endpoint>>> {
+        let Some(server) = server else {
+            return Ok(None);
+        };
+        let mut known = self.0.iter();
+        if let Some((_, endpoint)) = known.find(|(known, _)| Arc::ptr_eq(known, server)) {
+            return Ok(Some(Arc::clone(endpoint)));
+        }
+        let endpoint = endpoint(server)?;
+        self.0.push((Arc::clone(server), Arc::clone(&endpoint)));
+        Ok(Some(endpoint))
+    }
 }
 
 /// The models that are asked in a condition, or without images if it is `None`; each with its index among all.
@@ -205,10 +167,9 @@ pub(crate) fn asked_in<'a>(
     all.filter(|(_, model)| model.view == view).collect()
 }
 
-/// The opened endpoint; `None` if all models are built in.
-pub(crate) fn endpoint(server: Option<&Server>) -> Result<Option<Arc<Endpoint>>> {
-    let open = |server: &Server| Endpoint::open(server.access.clone(), server.sending);
-    Ok(server.map(open).transpose()?.map(Arc::new))
+/// The opened endpoint.
+pub(crate) fn endpoint(server: &Server) -> Result<Arc<Endpoint>> {
+    Endpoint::open(server.access.clone(), server.sending).map(Arc::new)
 }
 
 /// A model that can answer open questions, opened.
@@ -240,7 +201,7 @@ pub(crate) fn open(
 pub(crate) fn adapted(models: &[ModelUnderTest]) -> impl Iterator<Item = (String, Value)> {
     models.iter().filter_map(|model| {
         let adapted = model.model.adapted();
-        let name = format!("adapted for {}", model.model.name());
+        let name = format!("adapted for {}", model.name);
         (!adapted.is_empty()).then(|| (name, json!(adapted)))
     })
 }

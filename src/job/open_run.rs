@@ -54,7 +54,7 @@ pub(super) struct Remaining<E: Experiment> {
 impl<E: Experiment> OpenRun<'_, E> {
     /// Asks the remaining trials, phase by phase.
     pub(super) fn ask(mut self) -> Result<Outcome> {
-        let mut end = EndReason::AllAsked;
+        let (mut end, mut stopped) = (EndReason::AllAsked, Vec::new());
         for phase in 0..E::PHASES.len() {
             let remaining = self.remaining(phase)?;
             self.warn_of_batches(remaining.in_batch);
@@ -64,12 +64,15 @@ impl<E: Experiment> OpenRun<'_, E> {
             match self.ask_phase(phase, remaining)? {
                 EndReason::AllAsked => {}
                 // The next phases go on with the answers of the other models.
-                EndReason::ModelStopped(error) => end = EndReason::ModelStopped(error),
+                EndReason::ModelsStopped(errors) => stopped.extend(errors),
                 early => {
                     end = early;
                     break;
                 }
             }
+        }
+        if matches!(end, EndReason::AllAsked) && !stopped.is_empty() {
+            end = EndReason::ModelsStopped(stopped);
         }
         let settings = self.experiment.settings();
         if let (EndReason::OverBudget, Some(max_cost)) = (&end, settings.money.max_cost) {
@@ -232,7 +235,13 @@ impl<E: Experiment> OpenRun<'_, E> {
         let show = self.experiment.settings().show;
         let outcome = self.experiment.report(&self.store, run, show)?;
         match end {
-            EndReason::Stopped(error) | EndReason::ModelStopped(error) => Err(error),
+            EndReason::Stopped(error) => Err(error),
+            EndReason::ModelsStopped(errors) => {
+                for error in errors {
+                    tracing::warn!("not asked any further: {error}");
+                }
+                Ok(outcome)
+            }
             _ => Ok(outcome),
         }
     }
@@ -266,11 +275,15 @@ pub(crate) fn pipeline<'a, E: Experiment>(
     }
 }
 
-/// Largest image that the endpoint takes; `None` if all models are built in.
+/// Largest image that all endpoints take; `None` if all models are built in. Each image is made once, for all of them.
 pub(crate) fn limit(settings: &JobSettings) -> Option<ImageLimit> {
-    let server = settings.ask.server.as_ref()?;
-    let known = || ImageLimit::of(&server.access.base);
-    Some(settings.max_image.map_or_else(known, ImageLimit::stated))
+    let servers = settings.ask.servers().into_iter();
+    let limits = servers.map(|server| {
+        let stated = server.sending.max_image;
+        let stated = stated.map(|megabytes| ImageLimit::stated((megabytes * 1e6) as usize));
+        stated.unwrap_or_else(|| ImageLimit::of(&server.access.base))
+    });
+    limits.reduce(ImageLimit::stricter)
 }
 
 /// The notes about images that a run folder does not have yet.

@@ -1,5 +1,6 @@
 //! The settings that every experiment has: their flags ([`JobArgs`]) and the validated settings ([`JobSettings`]).
 
+use std::collections::BTreeSet;
 use std::fmt::Display;
 use std::num::NonZeroU32;
 use std::path::{self, Path, PathBuf};
@@ -9,7 +10,7 @@ use clap::Args;
 use super::conditions::check_used;
 use super::enhancers::{self, EnhancerRunArgs};
 use super::image_words::ImageWords;
-use super::models::{AskSettings, ModelArgs};
+use super::models::{AskSettings, AskingArgs, KeyUse, ModelArgs, ResolveContext};
 use super::money::{MoneyArgs, MoneySettings};
 use super::outcome::{ShowArgs, StdoutFormat};
 use super::shard::Shard;
@@ -63,6 +64,9 @@ pub(crate) struct JobArgs {
     /// Flags that decide the images, as typed.
     #[arg(skip)]
     pub image_flags: ImageWords,
+    /// Flags of the call itself, by long name: those that variables and files set are not among them.
+    #[arg(skip)]
+    pub typed: BTreeSet<String>,
 }
 
 /// Flags that distribute a job over processes.
@@ -107,8 +111,6 @@ pub(crate) struct JobSettings {
     pub format: PayloadFormat,
     /// Longest side of an image as sent, in pixels; `None` for no limit.
     pub max_side: Option<NonZeroU32>,
-    /// Largest file of an image, in bytes; `None` for the known limit of the endpoint.
-    pub max_image: Option<usize>,
     /// Bounds of the number of requests in flight.
     pub concurrency: Bounds,
     /// Limits of cost and failures.
@@ -139,7 +141,8 @@ pub(crate) struct ExperimentSettings {
 impl JobSettings {
     /// Whether a model of the run is shown images.
     pub(crate) fn shows_images(&self) -> bool {
-        self.ask.view == View::Image && !self.ask.models.is_empty()
+        let mut models = self.ask.models.iter();
+        models.any(|model| model.view == View::Image)
     }
 
     /// The files of the enhancement models, each of which works on some images of the run. ONNX Runtime is opened, too, so that an
@@ -176,33 +179,31 @@ impl JobArgs {
     /// [`Error::Usage`] with the flag that cannot be used.
     pub(crate) fn resolve(self, experiment: &ExperimentSettings) -> Result<JobSettings> {
         let shard = Shard::resolve(self.scale.shard.as_deref(), |name| std::env::var(name).ok())?;
-        let sending = Sending {
-            quota: shard.quota(self.sending.quota),
-            ..self.sending
-        };
-        let parameters = Parameters {
+        let asking = AskingArgs {
+            parameters: self.parameters,
+            request: self.request,
+            access: self.access,
+            sending: self.sending,
             constrain: experiment.constrain,
             seed: experiment.sampling_seed,
-            extra: self.request.resolve()?,
-            ..self.parameters
         };
-        // A dry run sends nothing, so it needs no key.
-        let access = if self.money.dry_run {
-            self.access.without_key()
-        } else {
-            self.access
+        let context = ResolveContext {
+            typed: &self.typed,
+            shard,
+            keys: if self.money.dry_run {
+                KeyUse::NotNeeded
+            } else {
+                KeyUse::Needed
+            },
         };
         Ok(JobSettings {
             light: LightSettings::resolve(&self.light)?,
-            ask: AskSettings::resolve(self.models, parameters, &access, sending)?,
+            ask: AskSettings::resolve(&self.models, &asking, context)?,
             enhancers: self.enhancers,
             loading: self.loading,
             format: self.images.image,
             max_side: experiment.max_side,
-            max_image: sending
-                .max_image
-                .map(|megabytes| (megabytes * 1e6) as usize),
-            concurrency: sending.concurrency,
+            concurrency: self.sending.concurrency,
             money: MoneySettings::resolve(&self.money, shard)?,
             shard,
             show_timings: self.scale.timings,

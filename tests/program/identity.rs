@@ -405,7 +405,7 @@ fn what_decides_nothing_asks_nothing() {
 }
 
 /// Flags that the tables here leave out, and where they are held.
-const ELSEWHERE: [(&str, &str); 23] = [
+const ELSEWHERE: [(&str, &str); 26] = [
     (
         "--transfer",
         "it changes images of 16 bits: tests/program/inputs/depth.rs",
@@ -424,6 +424,9 @@ const ELSEWHERE: [(&str, &str); 23] = [
         "settings_of_the_camera_are_those_of_its_variants",
     ),
     ("--llie-anyway", "tests/program/enhance/probe.rs"),
+    ("--models", "tests/program/models_file.rs"),
+    ("--only", "tests/program/models_file.rs"),
+    ("--set", "tests/program/models_file.rs"),
     ("--splits", "tests/program/openeqa/"),
     ("--categories", "tests/program/openeqa/"),
     ("--file-size", "tests/program/batch.rs"),

@@ -26,6 +26,7 @@ mod identity;
 mod import;
 mod inputs;
 mod levels;
+mod models_file;
 mod money;
 mod observer;
 mod openeqa;

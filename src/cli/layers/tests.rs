@@ -20,10 +20,12 @@ fn parsed(words: &[&str], variables: &[(&str, &str)], file: &str) -> Result<ArgM
         let found = variables.find(|(known, _)| *known == name);
         found.map(|(_, value)| value.into())
     };
-    parse(Cli::command(), words, variable).map_err(|problem| match problem {
-        Problem::Error(error) => error.to_string(),
-        Problem::Help(help) => help.to_string(),
-    })
+    parse(Cli::command(), words, variable)
+        .map(|parsed| parsed.matches)
+        .map_err(|problem| match problem {
+            Problem::Error(error) => error.to_string(),
+            Problem::Help(help) => help.to_string(),
+        })
 }
 
 /// The values of a flag of the command that is called.
@@ -333,7 +335,7 @@ fn errors_name_the_source_of_a_value_and_suggest_a_correction() {
             "a similar value exists: 'paper'",
         ),
         (
-            &["--model", "rndom"],
+            &["--model", "observer:tile"],
             "",
             "did you mean the built-in model random?",
         ),

@@ -35,7 +35,7 @@ impl<'a, I: Item> Requests<'a, I> {
         let bytes = args.file_size.get().saturating_mul(1_000_000);
         let files = models.iter().enumerate().map(|(i, model)| {
             // The number is needed: two names may give the same file name, and a model may be asked with and without images.
-            let stem = format!("{}-{}", i + 1, model.model.name());
+            let stem = format!("{}-{}", i + 1, model.name);
             ModelInputFiles::new(&folder, &stem, bytes, args.file_requests.get())
         });
         Ok(Self {
@@ -51,14 +51,15 @@ impl<'a, I: Item> Requests<'a, I> {
         let stimulus = &group.stimulus;
         group.notes.store(self.store)?;
         for trial in &group.trials {
-            let model = &self.models[trial.model].model;
+            let under_test = &self.models[trial.model];
+            let model = &under_test.model;
             let (id, query) = (trial.key.to_string(), trial.item.query());
             let message = trial.prompt.message(&stimulus.images);
             let line = model.batch_line(&id, self.url, message, query.choices());
             let Some(line) = line.map_err(|e| Error::data(query.id(), e))? else {
                 continue;
             };
-            let blank = I::blank(trial, stimulus, model.name());
+            let blank = I::blank(trial, stimulus, &under_test.name);
             self.files[trial.model].add(&line, blank, self.store)?;
         }
         Ok(())
@@ -84,7 +85,7 @@ pub(crate) fn require_remote(models: &[ModelUnderTest]) -> Result<()> {
         Some(local) => {
             let problem = format_args!(
                 "{} is built in; a batch can only ask models of an endpoint",
-                local.model.name()
+                local.name
             );
             Err(Error::usage("--model", problem))
         }

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::job::models::{ModelName, ModelUnderTest};
 
 use crate::job::progress::Progress;
-use crate::types::{Control, View};
+use crate::types::Control;
 
 /// Whether a model is the control that is shown the image of another scene; the plan gives it that image.
 pub(super) fn is_other_room(model: &ModelUnderTest) -> bool {
@@ -29,12 +29,11 @@ impl AddedControls {
     pub(super) fn of(config: &Evaluation, has_other_scene: bool) -> Result<Self> {
         let ask = &config.job.ask;
         let other_room = ModelName::Observer(Some(Control::OtherRoom));
-        let is_seeing = ask.view == View::Image;
-        if is_seeing && !has_other_scene && ask.models.contains(&other_room) {
+        if !has_other_scene && ask.shows_images_to(&other_room) {
             let problem = "observer:other-room needs frames of at least two scenes";
             return Err(Error::usage("--model", problem));
         }
-        if !is_seeing || !ask.models.contains(&ModelName::Observer(None)) {
+        if !ask.shows_images_to(&ModelName::Observer(None)) {
             return Ok(Self::default());
         }
         let standing = if has_other_scene {
@@ -47,7 +46,7 @@ impl AddedControls {
             is_wanted && (has_other_scene || *control != Control::OtherRoom)
         });
         let names = controls.map(|control| ModelName::Observer(Some(control)));
-        let names: Vec<ModelName> = names.filter(|name| !ask.models.contains(name)).collect();
+        let names: Vec<ModelName> = names.filter(|name| !ask.shows_images_to(name)).collect();
         if !has_other_scene {
             tracing::warn!(
                 "all frames are of one scene, so observer:other-room is not possible; observer:tiles is asked instead: the observer \

@@ -118,6 +118,8 @@ fn group(
             View::Blind => &shown.blind,
         };
         let models = models.iter();
+        let place = setup.question_places[&shown.item.question.id];
+        let models = models.filter(|(_, model)| model.is_asked(place));
         for &(index, model) in models.filter(|(_, model)| is_control(model) == is_of_other) {
             trials.push(Trial {
                 key: facts(shown, prompt, model, condition, image).key()?,

@@ -18,7 +18,7 @@ use crate::job::questions::{open_data, select};
 use crate::job::recipe::Recipe;
 use crate::job::shard::part;
 use crate::job::source::{Source, SourceFrame, first_asked, inspect_all};
-use crate::types::{Condition, Digest, FrameId, Question};
+use crate::types::{Condition, Digest, FrameId, Question, QuestionId};
 
 /// All data and models of an evaluation, opened and checked. Nothing is asked or written yet.
 pub(super) struct ChoiceSetup<'a> {
@@ -31,6 +31,8 @@ pub(super) struct ChoiceSetup<'a> {
     pub(super) sources: Vec<Source>,
     /// The index of each frame in `sources`.
     pub(super) places: HashMap<FrameId, usize>,
+    /// The place of each question among all that are selected, for models that are asked the first ones alone.
+    pub(super) question_places: HashMap<QuestionId, usize>,
     /// The digest of the file of each frame that a question is about; empty if no image is read.
     pub(super) digests: HashMap<FrameId, Digest>,
     pub(super) models: Vec<ModelUnderTest>,
@@ -79,6 +81,11 @@ impl<'a> ChoiceSetup<'a> {
         let mut setup = Self {
             config,
             places: names.zip(0..).collect(),
+            question_places: all
+                .iter()
+                .map(|question| question.id.clone())
+                .zip(0..)
+                .collect(),
             digests: digests(&sources),
             sources,
             models,
@@ -135,8 +142,8 @@ fn open_models(
     let prior = Random {
         seed: config.job.light.kinds.sensor.seed,
     };
-    let mut named = ask.models.iter().chain(&ask.blind_models);
-    let observer = named.any(|name| matches!(name, ModelName::Observer(_)));
+    let mut models = ask.models.iter();
+    let observer = models.any(|model| matches!(model.id, ModelName::Observer(_)));
     let open = || {
         let rules = config.rules.clone();
         Observer::open(dataset, &config.data.data, questions, rules)

@@ -10,7 +10,6 @@ use super::marks::{marks, prompt};
 use super::plan::answers;
 use super::record::OpenItem;
 use super::setup::OpenSetup;
-use crate::ask::Server;
 use crate::error::Result;
 use crate::job::budget::text_tokens;
 use crate::job::experiment::{ExpectedRequest, Experiment};
@@ -39,12 +38,6 @@ impl Experiment for OpenSetup<'_> {
 
     fn settings(&self) -> &JobSettings {
         &self.config.job
-    }
-
-    fn server(&self) -> Option<&Server> {
-        let judge = self.config.judge.as_ref();
-        let of_models = self.config.job.ask.server.as_ref();
-        of_models.or(judge.and_then(|judge| judge.server.as_ref()))
     }
 
     fn data(&self) -> &str {
@@ -117,7 +110,7 @@ impl Experiment for OpenSetup<'_> {
     }
 
     fn notes(&self) -> Vec<(&'static str, Value)> {
-        let judge = self.judge.as_ref().map(|judge| judge.model.name());
+        let judge = self.judge.as_ref().map(|judge| &*judge.name);
         let answers: Vec<&str> = self.config.answers.iter().map(|file| &*file.name).collect();
         vec![
             (open::JUDGE, json!(judge)),

@@ -2,6 +2,7 @@
 
 use std::num::NonZeroU32;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use clap::Args;
 
@@ -45,7 +46,7 @@ pub(crate) struct JudgeArgs {
 pub(super) struct Judge {
     pub(super) model: ModelName,
     /// The endpoint; `None` if the model is built in.
-    pub(super) server: Option<Server>,
+    pub(super) server: Option<Arc<Server>>,
     /// The parameters of a request; the name of the model is filled in later.
     pub(super) parameters: Parameters,
 }
@@ -58,6 +59,9 @@ impl JudgeArgs {
         };
         let of_judge = |e: crate::error::Error| e.at("the judge");
         model.require_open_answers().map_err(of_judge)?;
+        if self.judge_base_url.is_none() && job.access.base_url.is_none() {
+            model.refuse_near_miss().map_err(of_judge)?;
+        }
         let mut access = job.access.clone();
         let own_access = self.judge_base_url.is_some()
             || self.judge_api_key_env.is_some()
@@ -78,7 +82,9 @@ impl JudgeArgs {
             access = access.without_key();
         }
         let remote = matches!(model, ModelName::Remote(_));
-        let server = remote.then(|| access.server(job.sending)).transpose();
+        let server = remote
+            .then(|| access.server(job.sending).map(Arc::new))
+            .transpose();
         Ok(Some(Judge {
             model,
             server: server.map_err(of_judge)?,

@@ -52,7 +52,8 @@ fn group(
     let mut trials = Vec::new();
     for question in questions {
         let prompt = prompt(question, view);
-        for &(index, model) in &models {
+        let place = setup.question_places[&question.id];
+        for &(index, model) in models.iter().filter(|(_, model)| model.is_asked(place)) {
             trials.push(Trial {
                 key: KeyFacts::new(model, &question.id, &prompt, condition, images).key()?,
                 model: index,

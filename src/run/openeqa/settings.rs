@@ -144,8 +144,9 @@ impl OpenEqaArgs {
             return Err(self.job.no_model_error());
         }
         let models = &self.job.models;
-        let mut names = models.model.iter().chain(&models.blind_model);
-        names.try_for_each(ModelName::require_open_answers)?;
+        models
+            .named()
+            .try_for_each(ModelName::require_open_answers)?;
         let SamplingSeed(seed) = self.sampling_seed;
         let protocol = self.judge.protocol;
         let judge = self.judge.resolve(&self.job, seed)?;

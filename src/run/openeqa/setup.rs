@@ -7,6 +7,7 @@ use super::answers_file;
 use super::judge::Judge;
 use super::questions::{select, some};
 use super::settings::{OpenEqa, OpenTask};
+use crate::ask::Parameters;
 use crate::dataset::openeqa::{self, OpenQuestion};
 use crate::enhance::ModelFile;
 use crate::error::{Error, Result};
@@ -24,6 +25,8 @@ pub(super) struct OpenSetup<'a> {
     pub(super) config: &'a OpenEqa,
     /// The questions that are asked, in the order of the file.
     pub(super) questions: Vec<Arc<OpenQuestion>>,
+    /// The place of each question among all that are selected, for models that are asked the first ones alone.
+    pub(super) question_places: HashMap<QuestionId, usize>,
     /// The index of each question in the file.
     pub(super) file_places: HashMap<QuestionId, usize>,
     pub(super) walks: WalkFolder,
@@ -44,11 +47,12 @@ impl<'a> OpenSetup<'a> {
         let all = openeqa::questions(&config.questions)?;
         let ids = all.iter().map(|question| question.id.clone());
         let file_places = ids.zip(0..).collect();
-        let questions = part(select(all, &config.chosen)?, job.shard, |question| {
-            question.episode.clone()
-        })?;
+        let selected = select(all, &config.chosen)?;
+        let ids = selected.iter().map(|question| question.id.clone());
+        let question_places = ids.zip(0..).collect();
+        let questions = part(selected, job.shard, |question| question.episode.clone())?;
         let models = models::open_all(&job.ask, &[], |name| {
-            models::open(name, None, &job.ask.parameters)
+            models::open(name, None, &Parameters::new(String::new()))
         })?;
         let judge = config.judge.as_ref().map(judge).transpose()?;
         // If no model or person sees a frame, none is read and no enhancer is opened.
@@ -75,6 +79,7 @@ impl<'a> OpenSetup<'a> {
         let mut setup = Self {
             config,
             questions: questions.into_iter().map(Arc::new).collect(),
+            question_places,
             file_places,
             walks,
             sources,
@@ -98,7 +103,7 @@ impl<'a> OpenSetup<'a> {
     /// The answers from all `--answers` files.
     fn answers_of_files(&self) -> Result<Vec<Record<OpenDetail>>> {
         let models = self.models.iter();
-        let mut names: BTreeSet<&str> = models.map(|model| model.model.name()).collect();
+        let mut names: BTreeSet<&str> = models.map(|model| &*model.name).collect();
         let mut all = Vec::new();
         for file in &self.config.answers {
             if !names.insert(&file.name) {
@@ -117,7 +122,7 @@ impl<'a> OpenSetup<'a> {
 
 fn judge(config: &Judge) -> Result<ModelUnderTest> {
     let server = config.server.as_ref();
-    let endpoint = models::endpoint(server)?;
+    let endpoint = server.map(|server| models::endpoint(server)).transpose()?;
     let model = models::open(&config.model, endpoint.as_ref(), &config.parameters)?;
     ModelUnderTest::new(model, View::Blind, server)
 }

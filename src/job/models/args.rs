@@ -1,0 +1,45 @@
+//! Flags that name the models to ask: [`ModelArgs`].
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::name::ModelName;
+use crate::types::Decides;
+
+/// Flags that name the models to ask.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Model")]
+pub(crate) struct ModelArgs {
+    /// The model to ask, by its name at the endpoint; repeatable; built in: observer (frames with maps), its controls
+    /// (observer:CONTROL), random, script:FILE; default: none, one must be named
+    #[arg(long, value_name = "NAME", add = Decides::Trials)]
+    pub model: Vec<ModelName>,
+    /// Show the models no image, only text
+    #[arg(long, add = Decides::Trials)]
+    pub blind: bool,
+    /// Add a text-only baseline by this model; repeatable; default: none
+    #[arg(long, value_name = "NAME", add = Decides::Trials)]
+    pub blind_model: Vec<ModelName>,
+    /// A TOML file of models, each a table [[model]] with its endpoint, key and settings; default: none
+    #[arg(long, value_name = "FILE", add = Decides::Trials)]
+    pub models: Option<PathBuf>,
+    /// Ask only these of the models, by their names, separated by commas; default: all
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', add = Decides::Trials)]
+    pub only: Vec<String>,
+    /// One key of one model, above the file of models; repeatable; default: none
+    #[arg(long, value_name = "NAME.KEY=VALUE", add = Decides::Reply)]
+    pub set: Vec<String>,
+}
+
+impl ModelArgs {
+    /// Whether no model is named.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.model.is_empty() && self.blind_model.is_empty() && self.models.is_none()
+    }
+
+    /// The models that flags name.
+    pub(crate) fn named(&self) -> impl Iterator<Item = &ModelName> {
+        self.model.iter().chain(&self.blind_model)
+    }
+}

@@ -1,0 +1,142 @@
+//! The flags that each model of a file may have for itself: [`AskingArgs`].
+
+use clap::builder::Resettable;
+use clap::{ArgAction, Args, Command, FromArgMatches as _, value_parser};
+
+use crate::ask::{AccessArgs, Constrain, Parameters, RequestArgs, Sending};
+use crate::error::{Error, Result};
+
+/// How a model is asked: the flags, and the same settings in a file of models.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct AskingArgs {
+    /// Parameters of the model.
+    #[command(flatten)]
+    pub(crate) parameters: Parameters,
+    /// What is added to requests or left out.
+    #[command(flatten)]
+    pub(crate) request: RequestArgs,
+    /// Endpoint and its key.
+    #[command(flatten)]
+    pub(crate) access: AccessArgs,
+    /// Concurrency, timeouts, retries and rate limits.
+    #[command(flatten)]
+    pub(crate) sending: Sending,
+    /// The constraint on replies.
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) constrain: Constrain,
+    /// The seed of the server's sampling.
+    #[arg(long)]
+    pub(crate) seed: Option<u64>,
+}
+
+impl AskingArgs {
+    /// The settings of a call without flags.
+    ///
+    /// # Errors
+    /// None in practice: every flag has a default.
+    pub(crate) fn defaults() -> Result<Self> {
+        let command = Self::augment_args(Command::new("model").no_binary_name(true));
+        let matches = command.try_get_matches_from([""; 0]);
+        let args = matches.and_then(|matches| Self::from_arg_matches(&matches));
+        args.map_err(|e| Error::usage("model", line(&e)))
+    }
+
+    /// The names of all settings, as flags.
+    pub(super) fn flags() -> Vec<String> {
+        let command = command();
+        let flags = command.get_arguments().filter_map(|arg| arg.get_long());
+        flags.map(str::to_owned).collect()
+    }
+
+    /// Replaces the settings that these words name; the others stay. A switch is written `--flag=true`.
+    ///
+    /// # Errors
+    /// The text of the parser about a value that cannot be used.
+    pub(super) fn update(&mut self, words: &[String]) -> Result<(), String> {
+        let matches = command()
+            .try_get_matches_from(words)
+            .map_err(|e| line(&e))?;
+        let given = |id: &str| matches.contains_id(id);
+        // Of two settings of one thing, the one of this layer holds.
+        if given("api_key_env") || given("api_key_file") {
+            (self.access.api_key_env, self.access.api_key_file) = (None, None);
+        }
+        if given("base_url") && !given("api_key_env") && !given("api_key_file") {
+            // A key that belongs to another address is not sent to this one.
+            (self.access.api_key_env, self.access.api_key_file) = (None, None);
+        }
+        if given("system") || given("system_file") {
+            (self.request.system, self.request.system_file) = (None, None);
+        }
+        self.update_from_arg_matches(&matches).map_err(|e| line(&e))
+    }
+}
+
+/// The parser of one layer: no flag has a default, so that only those that are named change anything.
+fn command() -> Command {
+    let command = Command::new("model")
+        .no_binary_name(true)
+        .disable_help_flag(true);
+    AskingArgs::augment_args_for_update(command).mut_args(|arg| {
+        let arg = arg.required(false).default_value(Resettable::Reset);
+        match arg.get_action() {
+            ArgAction::SetTrue => arg
+                .action(ArgAction::Set)
+                .num_args(1)
+                .value_parser(value_parser!(bool)),
+            _ => arg,
+        }
+    })
+}
+
+/// The text of an error of the parser, on one line.
+fn line(error: &clap::Error) -> String {
+    let text = error.render().to_string();
+    let lines = text
+        .lines()
+        .map(str::trim)
+        .take_while(|line| !line.starts_with("Usage:"));
+    let lines: Vec<&str> = lines
+        .filter(|line| !line.is_empty() && !line.starts_with("For more"))
+        .collect();
+    lines.join(" ").trim_start_matches("error: ").to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_is_named_changes() {
+        let mut args = AskingArgs::defaults().unwrap();
+        args.access.allow_http = true;
+        args.sending.retries = 9;
+        args.parameters.top_p = Some(0.5);
+        let before = format!("{args:?}");
+        args.update(&[]).unwrap();
+        assert_eq!(format!("{args:?}"), before);
+        args.update(&["--allow-http=false".into(), "--rpm=30".into()])
+            .unwrap();
+        assert!(!args.access.allow_http);
+        assert_eq!(args.sending.quota.requests.unwrap().get(), 30);
+        assert_eq!(
+            (args.sending.retries, args.parameters.top_p),
+            (9, Some(0.5))
+        );
+        assert_eq!(args.sending.timeout, Sending::default().timeout);
+        let error = args.update(&["--rpm=0".into()]).unwrap_err();
+        assert!(error.contains("--rpm"), "{error}");
+    }
+
+    #[test]
+    fn a_key_does_not_follow_another_address() {
+        let mut args = AskingArgs::defaults().unwrap();
+        args.access.api_key_env = Some("A".into());
+        args.update(&["--temperature=1".into()]).unwrap();
+        assert_eq!(args.access.api_key_env.as_deref(), Some("A"));
+        args.update(&["--api-key-file=f".into()]).unwrap();
+        assert_eq!(args.access.api_key_env, None);
+        args.update(&["--base-url=http://h/v1".into()]).unwrap();
+        assert_eq!(args.access.api_key_file, None);
+    }
+}

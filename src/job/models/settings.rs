@@ -1,0 +1,357 @@
+//! The models of a run, resolved: [`AskSettings`], one [`ModelSettings`] a model.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use serde_json::{Value, json};
+
+use super::args::ModelArgs;
+use super::asking::AskingArgs;
+use super::entry::{Entry, check_keys, flag_of};
+use super::file::{Keys, Located, ModelsFile};
+use super::name::ModelName;
+use crate::ask::{AccessArgs, Parameters, Price, Sending, Server};
+use crate::error::{Error, Result};
+use crate::job::shard::Shard;
+use crate::types::View;
+
+/// One model of a run, with all that its requests need.
+#[derive(Debug, Clone)]
+pub(crate) struct ModelSettings {
+    /// The name in records and tables.
+    pub(crate) name: String,
+    pub(crate) id: ModelName,
+    /// Whether it sees the images.
+    pub(crate) view: View,
+    /// Parameters of every request.
+    pub(crate) parameters: Parameters,
+    /// The endpoint; `None` if the model is built in. Models with the same endpoint and pace share one.
+    pub(crate) server: Option<Arc<Server>>,
+    /// The price, if it is not that of the table of prices.
+    pub(crate) price: Option<Price>,
+    /// The number of questions that it is asked; `None` for all.
+    pub(crate) limit: Option<usize>,
+}
+
+/// The models of a run.
+#[derive(Debug)]
+pub(crate) struct AskSettings {
+    /// The models: those of the file in its order, then those that flags name.
+    pub(crate) models: Vec<ModelSettings>,
+    /// The file of models as resolved, without secrets; `None` without one.
+    pub(crate) file: Option<Value>,
+}
+
+/// What the resolution of models needs besides their flags.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ResolveContext<'a> {
+    /// The flags of the call itself, by long name: those of variables and files are not among them.
+    pub(crate) typed: &'a BTreeSet<String>,
+    pub(crate) shard: Shard,
+    /// Whether keys are read.
+    pub(crate) keys: KeyUse,
+}
+
+/// Whether the keys of endpoints are needed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum KeyUse {
+    /// Requests are sent: a key that is missing is an error.
+    Needed,
+    /// Nothing is sent.
+    NotNeeded,
+}
+
+impl AskSettings {
+    /// The models of these flags and of the file that they name. The keys are read if a model needs one.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the flag, or the line of the file, that cannot be used.
+    pub(crate) fn resolve(
+        args: &ModelArgs,
+        asking: &AskingArgs,
+        context: ResolveContext<'_>,
+    ) -> Result<Self> {
+        let view = if args.blind { View::Blind } else { View::Image };
+        let file = args.models.as_deref().map(ModelsFile::read).transpose()?;
+        let mut entries = match &file {
+            Some(file) => of_file(file, view, asking, context.typed)?,
+            None => Vec::new(),
+        };
+        let flag = |name: &ModelName, view| Entry::of_flag(name.clone(), view, asking.clone());
+        entries.extend(args.model.iter().map(|name| flag(name, view)));
+        entries.extend(args.blind_model.iter().map(|name| flag(name, View::Blind)));
+        for text in &args.set {
+            set(&mut entries, text)?;
+        }
+        select(&mut entries, &args.only)?;
+        if asking.access.base_url.is_none() {
+            let of_flags = entries.iter().filter(|entry| entry.place.is_none());
+            of_flags
+                .map(|entry| &entry.id)
+                .try_for_each(ModelName::refuse_near_miss)?;
+        }
+        let (mut models, mut servers, mut notes) = (Vec::new(), Servers::default(), Vec::new());
+        for entry in &entries {
+            let resolved = resolve(entry, context, &mut servers)?;
+            notes.push(note(entry, &resolved));
+            models.extend(entry.views.iter().map(|view| ModelSettings {
+                view: *view,
+                ..resolved.clone()
+            }));
+        }
+        refuse_same_names(&models)?;
+        Ok(Self {
+            models,
+            file: file.map(|_| json!(notes)),
+        })
+    }
+
+    /// Whether a model of this name is shown images.
+    pub(crate) fn shows_images_to(&self, id: &ModelName) -> bool {
+        let mut models = self.models.iter();
+        models.any(|model| model.id == *id && model.view == View::Image)
+    }
+
+    /// The endpoints, each once.
+    pub(crate) fn servers(&self) -> Vec<&Arc<Server>> {
+        let mut servers: Vec<&Arc<Server>> = Vec::new();
+        for server in self.models.iter().filter_map(|model| model.server.as_ref()) {
+            if !servers.iter().any(|known| Arc::ptr_eq(known, server)) {
+                servers.push(server);
+            }
+        }
+        servers
+    }
+}
+
+/// The models of a file: the flags of the call above its defaults, its tables above the flags.
+fn of_file(
+    file: &ModelsFile,
+    view: View,
+    asking: &AskingArgs,
+    typed: &BTreeSet<String>,
+) -> Result<Vec<Entry>> {
+    check_keys(&file.defaults, true)?;
+    let is_typed = |key: &str| match key {
+        "view" => typed.contains("blind"),
+        "seed" => typed.contains("sampling-seed"),
+        "headers" => typed.contains("header") || typed.contains("header-env"),
+        key => flag_of(key).is_some_and(|flag| typed.contains(flag)),
+    };
+    let defaults: Keys = file
+        .defaults
+        .clone()
+        .into_iter()
+        .filter(|(key, _)| !is_typed(key))
+        .collect();
+    let mut entries = Vec::new();
+    let mut overridden = BTreeSet::new();
+    for keys in &file.models {
+        check_keys(keys, false)?;
+        overridden.extend(keys.keys().filter(|key| is_typed(key)).cloned());
+        entries.push(Entry::of_file(
+            keys,
+            &[&defaults, keys],
+            view,
+            asking.clone(),
+        )?);
+    }
+    if !overridden.is_empty() {
+        let keys: Vec<String> = overridden.into_iter().collect();
+        tracing::warn!(
+            "{}: models with {} of their own keep it; the flag holds for the others (--set NAME.KEY=VALUE is above both)",
+            file.path.display(),
+            keys.join(", ")
+        );
+    }
+    Ok(entries)
+}
+
+/// Carries out one `--set NAME.KEY=VALUE`.
+fn set(entries: &mut [Entry], text: &str) -> Result<()> {
+    let wrong = |problem: String| Error::usage("--set", problem);
+    let (place, value) = text
+        .split_once('=')
+        .ok_or_else(|| wrong("NAME.KEY=VALUE expected, as GPT-4o.rpm=60".to_owned()))?;
+    let of_name = |entry: &Entry| {
+        place
+            .strip_prefix(&*entry.name)?
+            .strip_prefix('.')
+            .map(str::to_owned)
+    };
+    // The longest name first: a name may begin as another one does.
+    let longest = entries.iter().filter(|entry| of_name(entry).is_some());
+    let longest = longest
+        .map(|entry| entry.name.clone())
+        .max_by_key(String::len);
+    let Some(name) = longest else {
+        let names: Vec<&str> = entries.iter().map(|entry| &*entry.name).collect();
+        let problem = format!(
+            "{place}: no model of this name; the models are {}",
+            names.join(", ")
+        );
+        return Err(wrong(problem));
+    };
+    // What is no value of TOML is a text.
+    let mut parsed: toml::Table = format!("value = {value}").parse().unwrap_or_default();
+    let as_text = || toml::Value::String(value.to_owned());
+    let value = parsed.remove("value").unwrap_or_else(as_text);
+    let key = place[name.len() + 1..].replace('_', "-");
+    if matches!(&*key, "name" | "id") {
+        return Err(wrong(format!(
+            "{key} is what a model is, and cannot be set"
+        )));
+    }
+    let located = Located {
+        value,
+        place: "--set".to_owned(),
+    };
+    let keys = Keys::from([(key, located)]);
+    check_keys(&keys, false)?;
+    let named = entries.iter_mut().filter(|entry| entry.name == name);
+    named.map(|entry| entry.apply(&keys)).collect()
+}
+
+/// Keeps only the models that `--only` names.
+fn select(entries: &mut Vec<Entry>, only: &[String]) -> Result<()> {
+    if only.is_empty() {
+        return Ok(());
+    }
+    for name in only {
+        if !entries.iter().any(|entry| entry.name == *name) {
+            let names: Vec<&str> = entries.iter().map(|entry| &*entry.name).collect();
+            let problem = format_args!(
+                "{name}: no model of this name; the models are {}",
+                names.join(", ")
+            );
+            return Err(Error::usage("--only", problem));
+        }
+    }
+    entries.retain(|entry| only.contains(&entry.name));
+    Ok(())
+}
+
+/// The endpoints of a run, each made once for its flags.
+#[derive(Debug, Default)]
+struct Servers(Vec<(AccessArgs, Sending, Arc<Server>)>);
+
+impl Servers {
+    /// The endpoint with these flags; a new one only if no model had the same.
+    fn get(&mut self, access: &AccessArgs, sending: Sending) -> Result<Arc<Server>> {
+        let known = self.0.iter().find(|(a, s, _)| (a, *s) == (access, sending));
+        if let Some((_, _, server)) = known {
+            return Ok(Arc::clone(server));
+        }
+        let server = Arc::new(access.server(sending)?);
+        self.0.push((access.clone(), sending, Arc::clone(&server)));
+        Ok(server)
+    }
+}
+
+/// A model with its endpoint and parameters; the view is that of its first line in tables.
+fn resolve(
+    entry: &Entry,
+    context: ResolveContext<'_>,
+    servers: &mut Servers,
+) -> Result<ModelSettings> {
+    let AskingArgs {
+        parameters,
+        request,
+        access,
+        sending,
+        constrain,
+        seed,
+    } = entry.asking.clone();
+    let placed = |e: Error| match (&entry.place, e) {
+        (Some(place), Error::Usage { origin, problem }) => {
+            Error::usage(place, format_args!("{}: {origin}: {problem}", entry.name))
+        }
+        (_, e) => e,
+    };
+    let mut extra = request.resolve().map_err(placed)?;
+    extra.deployment.clone_from(&entry.deployment);
+    let parameters = Parameters {
+        constrain,
+        seed,
+        extra,
+        ..parameters
+    };
+    let sending = Sending {
+        quota: context.shard.quota(sending.quota),
+        ..sending
+    };
+    // A dry run sends nothing, so it needs no key.
+    let access = match context.keys {
+        KeyUse::Needed => access,
+        KeyUse::NotNeeded => access.without_key(),
+    };
+    let remote = matches!(entry.id, ModelName::Remote(_));
+    let server = remote.then(|| servers.get(&access, sending)).transpose();
+    Ok(ModelSettings {
+        name: entry.name.clone(),
+        id: entry.id.clone(),
+        view: entry.views[0],
+        parameters,
+        server: server.map_err(placed)?,
+        price: entry.price,
+        limit: entry.limit.map(std::num::NonZeroUsize::get),
+    })
+}
+
+/// What a model comes to, for the manifest: without keys, passwords and values of secret headers.
+fn note(entry: &Entry, resolved: &ModelSettings) -> Value {
+    let access = &entry.asking.access;
+    let views: Vec<String> = entry.views.iter().map(|view| view.to_string()).collect();
+    let names = |headers: &[String]| -> Vec<String> {
+        let name = |text: &String| {
+            text.split([':', '='])
+                .next()
+                .unwrap_or_default()
+                .trim()
+                .to_owned()
+        };
+        headers.iter().map(name).collect()
+    };
+    let mut note = json!({
+        "name": entry.name,
+        "id": entry.id.label(),
+        "view": views,
+        "settings": resolved.parameters,
+        "price": entry.price.map(|price| json!({"input": price.input, "output": price.output, "cached-input": price.cached_input})),
+        "limit": entry.limit,
+    });
+    if let Some(server) = &resolved.server {
+        let sending = &server.sending;
+        note["endpoints"] = json!([server.access.base.to_string()]);
+        note["key"] = json!(access.key_source(&server.access.base));
+        note["headers"] = json!([names(&access.header), names(&access.header_env)].concat());
+        note["pace"] = json!({
+            "concurrency": sending.concurrency.to_string(), "rpm": sending.quota.requests, "tpm": sending.quota.tokens,
+            "timeout": sending.timeout.as_secs_f64(), "retries": sending.retries, "max-wait": sending.max_wait.as_secs_f64(),
+            "patience": sending.patience.as_secs_f64(),
+        });
+    }
+    if let Some(fields) = note["settings"].as_object_mut() {
+        fields.remove("model");
+        fields.retain(|_, value| !value.is_null());
+    }
+    if let Some(fields) = note.as_object_mut() {
+        fields.retain(|_, value| !value.is_null());
+    }
+    note
+}
+
+/// Refuses two models of one name and view: their replies could not be told apart in tables.
+fn refuse_same_names(models: &[ModelSettings]) -> Result<()> {
+    for (i, model) in models.iter().enumerate() {
+        let mut before = models[..i].iter();
+        if before.any(|other| other.view == model.view && other.name == model.name) {
+            let problem = format_args!(
+                "{} is named twice; in a file of models, name tells them apart",
+                model.name
+            );
+            return Err(Error::usage("--model", problem));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,70 @@
+//! What each model of a file comes to: [`models`].
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::error::Result;
+use crate::job::Outcome;
+use crate::job::models::{
+    AskSettings, AskingArgs, KeyUse, ModelArgs, ResolveContext, check, describe,
+};
+use crate::job::progress::Progress;
+use crate::job::shard::Shard;
+use crate::types::Decides;
+use crate::types::manifest::Status;
+
+/// The flags of `models`.
+#[derive(Debug, Args)]
+pub(crate) struct ModelsArgs {
+    /// The file of models
+    #[arg(value_name = "FILE", add = Decides::Trials)]
+    pub file: PathBuf,
+    /// Show only these of the models, by their names, separated by commas; default: all
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', help_heading = "Model", add = Decides::Trials)]
+    pub only: Vec<String>,
+    /// One key of one model, above the file; repeatable; default: none
+    #[arg(long, value_name = "NAME.KEY=VALUE", help_heading = "Model", add = Decides::Reply)]
+    pub set: Vec<String>,
+    /// Send one tiny request to each model, and print what came of it
+    #[arg(long, help_heading = "Model", add = Decides::Nothing)]
+    pub check: bool,
+}
+
+/// Prints what each model of a file comes to: endpoint, where its key comes from, request and digest. Sends nothing without `--check`.
+///
+/// # Errors
+/// If the file cannot be used, or a key is missing that `--check` needs.
+pub(crate) fn models(args: &ModelsArgs, progress: &Progress) -> Result<Outcome> {
+    let named = ModelArgs {
+        models: Some(args.file.clone()),
+        only: args.only.clone(),
+        set: args.set.clone(),
+        ..ModelArgs::default()
+    };
+    let context = ResolveContext {
+        typed: &BTreeSet::new(),
+        shard: Shard::WHOLE,
+        keys: if args.check {
+            KeyUse::Needed
+        } else {
+            KeyUse::NotNeeded
+        },
+    };
+    let ask = AskSettings::resolve(&named, &AskingArgs::defaults()?, context)?;
+    let mut output = describe(&ask)?;
+    let mut status = Status::Complete;
+    if args.check {
+        output.push('\n');
+        for (name, answer) in check(&ask, progress)? {
+            if answer.is_err() {
+                status = Status::Incomplete;
+            }
+            let answer = answer.map_or_else(|problem| format!("FAILED: {problem}"), |reply| reply);
+            let _ = writeln!(output, "{name}: {answer}");
+        }
+    }
+    Ok(Outcome { status, output })
+}

@@ -1,0 +1,501 @@
+//! Files of models: many models, each with its own endpoint and settings, in one run.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::time::Duration;
+
+use serde_json::{Value, json};
+
+use crate::support::endpoint::{Answer, MockEndpoint};
+use crate::support::house::House;
+use crate::support::run::{Bench, Called, called, files, model_args, records, words};
+
+/// A folder with questions and this file of models.
+fn bench(questions: usize, models: &str) -> Bench {
+    let bench = Bench::with_questions(questions);
+    bench.file("models.toml", models);
+    bench
+}
+
+const RUN: &str = "--models models.toml --data set.jsonl --levels L0 --retries 0 --out run";
+
+fn call(bench: &Bench, line: &str) -> Called {
+    bench.call(&words(&format!("{RUN} {line}")))
+}
+
+fn complete(bench: &Bench, line: &str) {
+    let called = call(bench, line);
+    assert_eq!(called.code, Some(0), "{called:?}");
+}
+
+/// The error of a call that must be refused.
+fn refusal(models: &str, line: &str) -> String {
+    let bench = bench(1, models);
+    let called = call(&bench, line);
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert!(!bench.path("run").exists());
+    called.stderr
+}
+
+/// Keys of the records of a run by model and question.
+fn keys(bench: &Bench, run: &str) -> BTreeMap<(String, String), String> {
+    let text = |record: &Value, field: &str| record[field].as_str().unwrap().to_owned();
+    let records = records(&bench.path(run));
+    let keys = records.iter().map(|record| {
+        let place = (text(record, "model"), text(record, "question"));
+        (place, text(record, "key"))
+    });
+    keys.collect()
+}
+
+#[test]
+fn models_at_several_endpoints_are_asked_in_one_run() {
+    let (one, two) = (
+        MockEndpoint::start([Answer::text("A")]),
+        MockEndpoint::start([Answer::text("C")]),
+    );
+    let bench = bench(
+        3,
+        &format!(
+            r#"
+[defaults]
+max-tokens = 64
+[[model]]
+name = "First"
+id = "org/first"
+endpoints = ["{}"]
+body = {{ chat_template_kwargs = {{ enable_thinking = false }} }}
+[[model]]
+id = "second"
+endpoints = ["{}"]
+key-env = "SECOND_KEY"
+headers = {{ X-Team = "a", X-Auth = {{ env = "GATEWAY" }} }}
+omit = ["temperature"]
+system = "Be brief."
+[[model]]
+name = "words"
+id = "second"
+endpoints = ["{}"]
+view = "blind"
+[[model]]
+id = "random"
+"#,
+            one.base_url(),
+            two.base_url(),
+            two.base_url()
+        ),
+    );
+    let mut command = bench.command(&words(RUN));
+    command
+        .env("SECOND_KEY", "second-key-0123456789")
+        .env("GATEWAY", "gateway-0123456789");
+    command
+        .env("OPENAI_API_KEY", "openai-key-0123456789")
+        .env("RUST_LOG", "trace");
+    let run = called(&mut command);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    let (first, second) = (one.requests(), two.requests());
+    assert_eq!((first.len(), second.len()), (3, 6));
+    let body = first[0].json();
+    assert_eq!(
+        (&body["model"], &body["max_tokens"]),
+        (&json!("org/first"), &json!(64))
+    );
+    assert_eq!(body["chat_template_kwargs"]["enable_thinking"], false);
+    let seen: Vec<_> = second
+        .iter()
+        .filter(|request| request.header("x-auth").is_some())
+        .collect();
+    assert_eq!(seen.len(), 3);
+    for request in seen {
+        let body = request.json();
+        assert_eq!(
+            request.header("authorization"),
+            Some("Bearer second-key-0123456789")
+        );
+        assert_eq!(request.header("x-team"), Some("a"));
+        assert!(body.get("temperature").is_none());
+        assert_eq!(body["messages"][0]["content"], "Be brief.");
+        // The image was made once for all.
+        let image = &body["messages"][1]["content"][1];
+        assert_eq!(*image, first[0].json()["messages"][0]["content"][1]);
+    }
+    let names: Vec<String> = keys(&bench, "run")
+        .into_keys()
+        .map(|(model, _)| model)
+        .collect();
+    for name in ["First", "second", "words", "random"] {
+        assert_eq!(
+            names.iter().filter(|other| *other == name).count(),
+            3,
+            "{name}"
+        );
+    }
+    let manifest: Value =
+        serde_json::from_slice(&fs::read(bench.path("run/manifest.json")).unwrap()).unwrap();
+    let models = manifest["settings"]["models"].as_array().unwrap();
+    assert_eq!(models.len(), 4);
+    assert_eq!(models[1]["key"], "the variable SECOND_KEY");
+    assert_eq!(models[1]["headers"], json!(["X-Team", "X-Auth"]));
+    assert!(run.stdout.contains("First"), "{}", run.stdout);
+    for file in files(&bench.path("run")) {
+        let text = String::from_utf8_lossy(&fs::read(&file).unwrap()).into_owned();
+        assert!(!text.contains("-0123456789"), "{}", file.display());
+    }
+    assert!(!run.stderr.contains("-0123456789"));
+}
+
+/// The token limit that is sent, with these layers.
+fn limit_sent(models: &str, line: &str, variable: Option<&str>) -> Value {
+    let mock = MockEndpoint::start([Answer::text("A")]);
+    let bench = bench(1, &models.replace("URL", &mock.base_url()));
+    let mut command = bench.command(&words(&format!("{RUN} {line}")));
+    if let Some(value) = variable {
+        command.env("DARKQA_MAX_TOKENS", value);
+    }
+    let called = called(&mut command);
+    assert_eq!(called.code, Some(0), "{called:?}");
+    mock.requests()[0].json()["max_tokens"].clone()
+}
+
+#[test]
+fn a_model_is_above_the_flags_and_the_flags_are_above_the_defaults() {
+    const BARE: &str = "[[model]]\nid = \"m\"\nendpoints = [\"URL\"]\n";
+    let defaults = format!("[defaults]\nmax-tokens = 12\n{BARE}");
+    let own = format!("{defaults}max_tokens = 14\n");
+    assert_eq!(limit_sent(BARE, "", None), 1024);
+    assert_eq!(limit_sent(BARE, "", Some("11")), 11);
+    assert_eq!(limit_sent(&defaults, "", Some("11")), 12);
+    assert_eq!(limit_sent(&defaults, "--max-tokens 13", Some("11")), 13);
+    assert_eq!(limit_sent(&own, "--max-tokens 13", Some("11")), 14);
+    assert_eq!(
+        limit_sent(&own, "--max-tokens 13 --set m.max-tokens=15", None),
+        15
+    );
+}
+
+#[test]
+fn a_flag_that_a_model_overrides_is_said_once() {
+    let mock = MockEndpoint::start([Answer::text("A")]);
+    let url = mock.base_url();
+    let table =
+        |id: &str| format!("[[model]]\nid = \"{id}\"\nendpoints = [\"{url}\"]\nmax-tokens = 14\n");
+    let bench = bench(1, &(table("m") + &table("n")));
+    let stderr = call(&bench, "--max-tokens 13").stderr;
+    assert_eq!(
+        stderr.matches("max-tokens of their own").count(),
+        1,
+        "{stderr}"
+    );
+    assert!(!call(&bench, "").stderr.contains("of their own"));
+}
+
+#[test]
+fn what_is_wrong_in_a_file_is_named_by_line() {
+    let table = |line: &str| {
+        format!("[[model]]\nid = \"m\"\nendpoints = [\"http://127.0.0.1:9/v1\"]\n{line}\n")
+    };
+    for (line, part) in [
+        (
+            "max-token = 3",
+            "line 4: there is no key max-token; did you mean max-tokens?",
+        ),
+        ("base-url = \"a\"", "did you mean endpoints?"),
+        ("api_key = \"a\"", "did you mean key-env?"),
+        ("model = \"a\"", "did you mean id?"),
+        ("qqqq = 3", "line 4: there is no key qqqq\n"),
+        ("rpm = \"many\"", "line 4: rpm: invalid value 'many'"),
+        ("temperature = \"hot\"", "line 4: temperature: "),
+        ("view = \"both eyes\"", "image, blind or both"),
+        ("price = { input = 1 }", "line 4: price: "),
+        ("limit = 0", "line 4: limit: "),
+        ("headers = { X-A = 3 }", "line 4: headers: "),
+        ("body = { temperature = 1 }", "use --temperature"),
+        ("max-side = 300", "use --max-side"),
+        ("name = \"\"", "line 4: name: a text expected"),
+        ("key-env = \"NOWHERE_KEY\"", "NOWHERE_KEY is not set"),
+    ] {
+        let error = refusal(&table(line), "");
+        assert!(error.contains(part), "{line}: {error}");
+        assert!(error.contains("models.toml, line"), "{line}: {error}");
+    }
+    let error = refusal("[defaults]\nid = \"m\"\n[[model]]\nid = \"random\"", "");
+    assert!(error.contains("line 2: id is of one model"), "{error}");
+    let error = refusal("[[model]]\nname = \"m\"", "");
+    assert!(error.contains("a model without id"), "{error}");
+    let secret = refusal(&table("key-env = \"sk-0123456789\""), "");
+    assert!(
+        secret.contains("line 4") && !secret.contains("0123"),
+        "{secret}"
+    );
+    for (line, part) in [
+        ("--set n.rpm=3", "the models are m"),
+        ("--set m.rpms=3", "did you mean rpm?"),
+        ("--set m.id=n", "cannot be set"),
+        ("--only n", "the models are m"),
+    ] {
+        let error = refusal(&table(""), line);
+        assert!(error.contains(part), "{line}: {error}");
+    }
+}
+
+#[test]
+fn two_models_with_the_same_trials_are_refused() {
+    let table = |name: &str, more: &str| {
+        format!(
+            "[[model]]\nname = \"{name}\"\nid = \"m\"\nendpoints = [\"http://127.0.0.1:9/v1\"]\n{more}\n"
+        )
+    };
+    let error = refusal(&(table("a", "") + &table("b", "rpm = 3")), "");
+    assert!(
+        error.contains("a and b differ in nothing that decides the reply"),
+        "{error}"
+    );
+    let error = refusal(&(table("a", "") + &table("a", "temperature = 1")), "");
+    assert!(error.contains("a is named twice"), "{error}");
+    let bench = bench(1, &(table("a", "") + &table("b", "deployment = \"fp8\"")));
+    let called = call(&bench, "--dry-run");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    for name in ["a", "b"] {
+        assert!(
+            called
+                .stdout
+                .lines()
+                .any(|line| line.trim_start().starts_with(name)),
+            "{}",
+            called.stdout
+        );
+    }
+}
+
+#[test]
+fn flags_and_a_file_make_the_same_trials() {
+    let mock = MockEndpoint::start([Answer::text("A")]);
+    let url = mock.base_url();
+    let bench = bench(
+        2,
+        &format!(
+            "[[model]]\nid = \"m\"\nendpoints = [\"{url}\"]\nmax-tokens = 9\nview = \"both\"\n"
+        ),
+    );
+    complete(&bench, "");
+    let asked = mock.requests().len();
+    assert_eq!(asked, 4);
+    // By flags, the same run; under another name, too, and only what is new is asked.
+    let flags = "--blind-model m --data set.jsonl --levels L0 --max-tokens 9 --out run";
+    bench.complete(&model_args(&url, flags));
+    bench.file(
+        "models.toml",
+        format!(
+            "[[model]]\nname = \"Renamed\"\nid = \"m\"\nendpoints = [\"{url}\"]\nmax-tokens = 9\n"
+        ),
+    );
+    complete(&bench, "");
+    assert_eq!(mock.requests().len(), asked);
+    bench.file(
+        "models.toml",
+        format!("[[model]]\nname = \"New\"\nid = \"m\"\nendpoints = [\"{url}\"]\nmax-tokens = 8\n"),
+    );
+    complete(&bench, "");
+    assert_eq!(mock.requests().len(), asked + 2);
+}
+
+#[test]
+fn a_fatal_answer_stops_one_model_alone() {
+    let refused = MockEndpoint::start([Answer::error(401, "invalid_api_key", "no such key")]);
+    let good = MockEndpoint::start([Answer::text("A")]);
+    let table =
+        |id: &str, url: &str| format!("[[model]]\nid = \"{id}\"\nendpoints = [\"{url}\"]\n");
+    let bench = bench(
+        8,
+        &(table("locked", &refused.base_url()) + &table("open", &good.base_url())),
+    );
+    let run = call(&bench, "");
+    assert_eq!(run.code, Some(1), "{run:?}");
+    assert_eq!((refused.requests().len(), good.requests().len()), (1, 8));
+    assert!(
+        run.stderr.contains("not asked any further") && run.stderr.contains("locked: "),
+        "{run:?}"
+    );
+    assert!(run.stdout.contains("open"), "{}", run.stdout);
+    // The same command asks it again, and nothing else.
+    assert_eq!(call(&bench, "").code, Some(2));
+    assert_eq!((refused.requests().len(), good.requests().len()), (2, 8));
+}
+
+#[test]
+fn some_of_the_models_and_some_of_the_questions() {
+    let mock = MockEndpoint::start([Answer::text("A")]);
+    let url = mock.base_url();
+    let table = |id: &str, more: &str| {
+        format!("[[model]]\nid = \"{id}\"\nendpoints = [\"{url}\"]\n{more}\n")
+    };
+    let bench = bench(
+        5,
+        &(table("m-1.5", "limit = 2") + &table("m-1", "") + &table("left", "")),
+    );
+    complete(&bench, "--only m-1.5,m-1 --set m-1.5.max-tokens=7");
+    let sent = |model: &str| {
+        let requests = mock.requests().into_iter().map(|request| request.json());
+        requests
+            .filter(|body| body["model"] == *model)
+            .collect::<Vec<Value>>()
+    };
+    assert_eq!(
+        (sent("m-1.5").len(), sent("m-1").len(), sent("left").len()),
+        (2, 5, 0)
+    );
+    assert_eq!(sent("m-1.5")[0]["max_tokens"], 7);
+    assert_eq!(sent("m-1")[0]["max_tokens"], 1024);
+}
+
+#[test]
+fn a_slow_model_does_not_hold_up_the_others() {
+    let slow = MockEndpoint::answering(|_| {
+        std::thread::sleep(Duration::from_millis(120));
+        Answer::text("A")
+    });
+    let fast = MockEndpoint::answering(|_| {
+        std::thread::sleep(Duration::from_millis(5));
+        Answer::text("A")
+    });
+    let table = |id: &str, url: &str| {
+        format!("[[model]]\nid = \"{id}\"\nendpoints = [\"{url}\"]\nconcurrency = \"1\"\n")
+    };
+    let bench = bench(
+        12,
+        &(table("slow", &slow.base_url()) + &table("fast", &fast.base_url())),
+    );
+    complete(&bench, "");
+    let records = records(&bench.path("run"));
+    let last = |model: &str| {
+        records
+            .iter()
+            .rposition(|record| record["model"] == model)
+            .unwrap()
+    };
+    assert!(
+        last("fast") < last("slow"),
+        "{} {}",
+        last("fast"),
+        last("slow")
+    );
+    assert!(
+        last("fast") <= 15,
+        "fast ended as number {} of 24",
+        last("fast")
+    );
+}
+
+#[test]
+fn prices_of_a_model_hold_for_its_cost() {
+    let table = "[[model]]\nid = \"unpriced\"\nendpoints = [\"http://127.0.0.1:9/v1\"]\n";
+    let error = refusal(table, "--max-cost 5");
+    assert!(
+        error.contains("price of unpriced") && error.contains("set price"),
+        "{error}"
+    );
+    let bench = bench(
+        1,
+        &format!("{table}price = {{ input = 1000000, output = 0, image-tokens = 100 }}\n"),
+    );
+    let called = call(&bench, "--max-cost 500000000 --dry-run --json");
+    let forecast: Value = serde_json::from_str(&called.stdout).unwrap();
+    let dollars = forecast.to_string();
+    assert!(dollars.contains("unpriced"), "{dollars}");
+    let called = call(&bench, "--max-cost 5 --concurrency 1");
+    assert_eq!(called.code, Some(3), "{called:?}");
+}
+
+#[test]
+fn the_command_models_shows_what_each_comes_to() {
+    let mock = MockEndpoint::start([Answer::text("OK"), Answer::error(401, "x", "no")]);
+    let url = mock.base_url();
+    let bench = bench(
+        1,
+        &format!(
+            "[[model]]\nname = \"A\"\nid = \"a\"\nendpoints = [\"{url}\"]\nkey-env = \"A_KEY\"\nbody = {{ top_k = 1 }}\n[[model]]\nid = \"b\"\nendpoints = [\"{url}\"]\n[[model]]\nid = \"random\"\n"
+        ),
+    );
+    let shown = bench.complete(&["models", "models.toml"]);
+    for part in [
+        "A (image)",
+        "id        a",
+        &url,
+        "none: A_KEY is not set",
+        "\"top_k\":1",
+        "digest",
+        "random",
+    ] {
+        assert!(shown.contains(part), "{part}: {shown}");
+    }
+    assert!(mock.requests().is_empty());
+    let mut command = bench.command(&["models", "models.toml", "--check", "--quiet"]);
+    let checked = called(command.env("A_KEY", "secret-0123456789"));
+    assert_eq!(checked.code, Some(1), "{checked:?}");
+    assert!(
+        checked.stdout.contains("A: \"OK\"") && checked.stdout.contains("b: FAILED"),
+        "{checked:?}"
+    );
+    assert!(!checked.stdout.contains("secret-0123"));
+    assert_eq!(mock.requests().len(), 2);
+}
+
+#[test]
+fn open_questions_take_a_file_of_models() {
+    let house = House::new();
+    let mock = MockEndpoint::start([Answer::text("A table.")]);
+    let url = mock.base_url();
+    house.0.file("models.toml", format!(
+        "[defaults]\nmax-tokens = 50\n[[model]]\nname = \"One\"\nid = \"m\"\nendpoints = [\"{url}\"]\nlimit = 1\n[[model]]\nid = \"n\"\nendpoints = [\"{url}\"]\nseed = 7\n"
+    ));
+    let line = "openeqa --questions questions.json --frames walks --num-frames 2 --image-size 32 --levels L0 --models models.toml --out run";
+    house.0.complete(&words(line));
+    let bodies: Vec<Value> = mock
+        .requests()
+        .iter()
+        .map(|request| request.json())
+        .collect();
+    let of = |model: &str| {
+        bodies
+            .iter()
+            .filter(|body| body["model"] == *model)
+            .cloned()
+            .collect::<Vec<_>>()
+    };
+    assert_eq!((of("m").len(), of("n").len()), (1, 3));
+    assert_eq!(
+        (&of("m")[0]["seed"], &of("n")[0]["seed"]),
+        (&json!(1234), &json!(7))
+    );
+    assert_eq!(of("m")[0]["max_tokens"], 50);
+    let house_models = "[[model]]\nid = \"random\"\n";
+    house.0.file("models.toml", house_models);
+    let called = house.0.call(&words(line));
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert!(called.stderr.contains("open questions"), "{called:?}");
+}
+
+#[test]
+fn a_near_miss_of_a_built_in_model_is_refused() {
+    let bench = Bench::with_questions(1);
+    let called = bench.call(&words("--model rndom --data set.jsonl --out run"));
+    assert_eq!(called.code, Some(2));
+    let expected = "rndom: did you mean random? To ask an endpoint for a model of this name: --models FILE, or --base-url";
+    assert!(called.stderr.contains(expected), "{called:?}");
+    let mock = MockEndpoint::start([Answer::text("A")]);
+    let url = mock.base_url();
+    bench.complete(&[
+        "--model",
+        "rndom",
+        "--base-url",
+        &url,
+        "--data",
+        "set.jsonl",
+        "--levels",
+        "L0",
+        "--out",
+        "run",
+    ]);
+    assert_eq!(mock.requests()[0].json()["model"], "rndom");
+}
