@@ -126,7 +126,10 @@ pub(crate) fn open_all(
 fn refuse_same_trials(models: &[ModelUnderTest]) -> Result<()> {
     for (i, model) in models.iter().enumerate() {
         let mut before = models[..i].iter();
-        let facts = |model: &ModelUnderTest| (model.view, Arc::clone(&model.digest));
+        let facts = |model: &ModelUnderTest| {
+            let name = model.model.name().to_owned();
+            (model.view, name, Arc::clone(&model.digest))
+        };
         if let Some(other) = before.find(|other| facts(other) == facts(model)) {
             let problem = format_args!(
                 "{} and {} differ in nothing that decides the reply; in a file of models, set deployment",

@@ -319,7 +319,7 @@ fn a_fatal_answer_stops_one_model_alone() {
     );
     assert!(run.stdout.contains("open"), "{}", run.stdout);
     // The same command asks it again, and nothing else.
-    assert_eq!(call(&bench, "").code, Some(2));
+    assert_eq!(call(&bench, "").code, Some(1));
     assert_eq!((refused.requests().len(), good.requests().len()), (2, 8));
 }
 
@@ -390,7 +390,7 @@ fn a_slow_model_does_not_hold_up_the_others() {
 #[test]
 fn prices_of_a_model_hold_for_its_cost() {
     let table = "[[model]]\nid = \"unpriced\"\nendpoints = [\"http://127.0.0.1:9/v1\"]\n";
-    let error = refusal(table, "--max-cost 5");
+    let error = call(&bench(1, table), "--max-cost 5").stderr;
     assert!(
         error.contains("price of unpriced") && error.contains("set price"),
         "{error}"

@@ -334,11 +334,6 @@ fn errors_name_the_source_of_a_value_and_suggest_a_correction() {
             "",
             "a similar value exists: 'paper'",
         ),
-        (
-            &["--model", "observer:tile"],
-            "",
-            "did you mean the built-in model random?",
-        ),
     ] {
         let error = wrong(words, &[], file);
         assert!(error.contains(says), "{says}: {error}");

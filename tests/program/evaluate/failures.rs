@@ -65,7 +65,7 @@ fn a_model_that_does_not_exist_stops_itself_alone() {
     let run = bench.call(&words(&format!(
         "--data frames --model random --model gone --base-url {url} --levels L0-L2 --out run"
     )));
-    assert_eq!(run.code, Some(2), "{run:?}");
+    assert_eq!(run.code, Some(1), "{run:?}");
     assert!(
         run.stderr.contains("gone") && run.stderr.contains("no such model"),
         "{run:?}"
