@@ -4,11 +4,13 @@ use std::time::Duration;
 
 use reqwest::header::{CONTENT_TYPE, HeaderMap};
 use reqwest::{Client, Response, StatusCode};
+use serde_json::Value;
 use tokio::time::Instant;
 
 use super::access::{Access, with_causes};
 use super::body::Parts;
 use super::failure::{Again, FailedTry};
+use super::parameters::Parameters;
 use super::secret::Scrub;
 use super::url::BaseUrl;
 use crate::error::Result;
@@ -86,6 +88,31 @@ impl Connection {
             body,
             took: started.elapsed(),
         })
+    }
+
+    /// What the server says of a model: its longest context and the files that it was loaded from, where it says so (vLLM does);
+    /// `None` if it cannot be asked.
+    pub(super) async fn model_facts(
+        &self,
+        headers: &HeaderMap,
+        parameters: &Parameters,
+    ) -> Option<String> {
+        let request = self.client.get(self.base.join("models"));
+        let request = request.headers(headers.clone());
+        let response = request.send().await.ok()?;
+        if !response.status().is_success() {
+            return None;
+        }
+        let body = self.receive(response).await.ok()?;
+        let list: Value = serde_json::from_slice(&body).ok()?;
+        let models = list.get("data")?.as_array()?;
+        let own = models
+            .iter()
+            .find(|model| model["id"] == *parameters.model)?;
+        let facts = ["max_model_len", "root"]
+            .map(|name| own.get(name).map(|value| format!("{name} {value}")));
+        let facts: Vec<String> = facts.into_iter().flatten().collect();
+        Some(self.scrub.line(&facts.join(", ")))
     }
 
     /// The body of a response, decompressed, up to [`MAX_REPLY`].

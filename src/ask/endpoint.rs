@@ -1,63 +1,96 @@
-//! A server and the way requests are sent to it: [`Endpoint`].
+//! A server, at one or several addresses, and the way questions are put to it: [`Endpoint`].
 
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 use backon::{BackoffBuilder as _, ExponentialBuilder};
-use reqwest::header::{CONTENT_TYPE, HeaderMap, LOCATION};
-use tokio::sync::watch;
-use tokio::time::{Instant, sleep};
-use tracing::debug;
+use reqwest::header::HeaderMap;
+use tokio::sync::{OnceCell, watch};
+use tokio::time::{Instant, sleep, timeout};
+use tracing::{debug, warn};
 
 use super::access::Access;
 use super::body::Parts;
-use super::complaint::{Complaint, UnreadableReply};
-use super::connection::{Connection, HttpReply};
 use super::failure::{Again, AskError, FailedTry, Reach};
-use super::failure_class::FailureClass;
 use super::field::SentFields;
-use super::pace::{Allowance, Gate, Window, asked_wait};
+use super::pace::{Allowance, Gate, Quota};
+use super::replica::Replica;
 use super::sending::Sending;
+use super::service::{Choice, Effect, Services};
 use super::url::BaseUrl;
 use super::wire::Wire;
-use crate::error::Result;
-use crate::types::{Failure, FailureKind, Reply};
+use crate::error::{Error, Result};
+use crate::types::{FailureKind, Reply};
 
 /// The maximum wait between retries if the server asks for none; chosen. A server may ask for longer waits.
 const MAX_DELAY: Duration = Duration::from_secs(30);
 
-/// A server: its address, key, pooled connections, and the pauses that it asked for.
+/// The longest time for the comparison of replicas before the first request; chosen.
+const COMPARING: Duration = Duration::from_secs(3);
+
+/// A server: one replica, or several that serve the same models.
+///
+/// With several, each request goes to the one that has the fewest in flight, and among nearly equal ones to the same for the same
+/// images, so that their cache of prefixes is used. What one replica cannot take goes to another without spending a retry.
 #[derive(Debug)]
 pub struct Endpoint {
-    access: Access,
-    connection: Connection,
+    replicas: Vec<Replica>,
     sending: Sending,
-    gate: Gate,
-    window: Window,
+    /// The user's limits per minute, which hold for all replicas together; `None` if the only replica keeps them.
+    quota: Option<Gate>,
+    services: Services,
+    /// Whether what the replicas say of their models was compared.
+    compared: OnceCell<()>,
     closing: watch::Sender<bool>,
 }
 
 /// One request, which may be sent several times.
 pub(super) struct Request<'a> {
     pub(super) wire: Wire,
-    pub(super) headers: &'a HeaderMap,
+    /// The headers for each replica.
+    pub(super) headers: &'a [HeaderMap],
     pub(super) body: Parts,
     pub(super) sent: SentFields<'a>,
+    /// A number that is the same for requests about the same images.
+    pub(super) affinity: u64,
 }
 
 impl Endpoint {
-    /// An endpoint that is ready for requests; nothing is sent yet.
+    /// An endpoint at one address that is ready for requests; nothing is sent yet.
     ///
     /// # Errors
     /// If a key would be sent unencrypted to another machine, or if two keys are set.
     pub fn open(access: Access, sending: Sending) -> Result<Self> {
-        let scrub = access.scrub();
-        access.check(&scrub)?;
+        Self::of(vec![access], sending)
+    }
+
+    /// An endpoint of replicas at these addresses; nothing is sent yet. The user's limits hold for all of them together.
+    ///
+    /// # Errors
+    /// As [`Endpoint::open`], or if there is no address.
+    pub fn of(addresses: Vec<Access>, sending: Sending) -> Result<Self> {
+        let count = addresses.len();
+        let each = if count > 1 {
+            Sending {
+                quota: Quota::default(),
+                concurrency: sending.concurrency.share(count),
+                ..sending
+            }
+        } else {
+            sending
+        };
+        let replicas = addresses
+            .into_iter()
+            .map(|access| Replica::open(access, each));
+        let replicas = replicas.collect::<Result<Vec<_>>>()?;
+        if replicas.is_empty() {
+            return Err(Error::usage("--base-url", "an address expected"));
+        }
         Ok(Self {
-            connection: Connection::new(&access, scrub, sending.timeout)?,
-            access,
+            services: Services::new(replicas.iter().map(|replica| replica.base().to_string())),
+            quota: (count > 1).then(|| Gate::new(sending.quota)),
+            replicas,
             sending,
-            gate: Gate::new(sending.quota),
-            window: Window::new(sending.concurrency),
+            compared: OnceCell::new(),
             closing: watch::Sender::new(false),
         })
     }
@@ -65,13 +98,16 @@ impl Endpoint {
     /// The number of requests that may be in flight now, within [`Sending::concurrency`].
     #[must_use]
     pub fn width(&self) -> usize {
-        self.window.width()
+        let replicas = self.replicas.iter().enumerate();
+        let working = replicas.filter(|(index, _)| self.services.is_working(*index));
+        let width: usize = working.map(|(_, replica)| replica.width()).sum();
+        width.max(1)
     }
 
-    /// The base URL; its text has no user, password and query string.
+    /// The base URL of the first replica; its text has no user, password and query string.
     #[must_use]
     pub fn base(&self) -> &BaseUrl {
-        &self.access.base
+        self.replicas[0].base()
     }
 
     pub(super) fn host(&self) -> &str {
@@ -79,12 +115,13 @@ impl Endpoint {
     }
 
     pub(super) fn has_key(&self) -> bool {
-        self.access.key.is_some() || self.base().has_credentials()
+        self.replicas[0].has_key()
     }
 
-    /// The headers of every request to an API.
-    pub(super) fn headers(&self, wire: Wire) -> Result<HeaderMap> {
-        self.access.headers(wire)
+    /// The headers of every request to an API, for each replica.
+    pub(super) fn headers(&self, wire: Wire) -> Result<Vec<HeaderMap>> {
+        let replicas = self.replicas.iter();
+        replicas.map(|replica| replica.headers(wire)).collect()
     }
 
     /// Stops further requests: those in flight are finished, those that wait fail at once.
@@ -98,8 +135,8 @@ impl Endpoint {
         let _ = self.closing.subscribe().wait_for(|closing| *closing).await;
     }
 
-    /// Waits until the request may be sent, and tells when that is; an error if the endpoint is closed before.
-    async fn wait_turn(&self) -> Result<Instant, FailedTry> {
+    /// Waits for something, or fails as soon as the endpoint is closed.
+    async fn unless_closed<T>(&self, future: impl Future<Output = T>) -> Result<T, FailedTry> {
         let message = "the run ended before it was asked";
         tokio::select! {
             biased;
@@ -107,43 +144,161 @@ impl Endpoint {
                 reach: Reach::Interrupted,
                 ..FailedTry::new(FailureKind::Connection, message.to_owned())
             }),
-            turn = self.gate.pass() => Ok(turn),
+            value = future => Ok(value),
         }
     }
 
     /// Sends a request, with retries after failures that may pass. While the endpoint takes no more, the request waits without spending
     /// a retry, for at most [`Sending::patience`]. The future may be dropped at any time.
     pub(super) async fn ask(&self, request: &Request<'_>) -> Result<Reply, AskError> {
+        if self.replicas.len() > 1 {
+            let compare = || async {
+                // What takes longer is not waited for.
+                let _ = timeout(COMPARING, self.compare(request)).await;
+            };
+            self.compared.get_or_init(compare).await;
+        }
         let mut tries = ExponentialBuilder::new()
             .with_jitter()
             .with_min_delay(self.sending.first_delay)
             .with_max_delay(MAX_DELAY)
             .with_max_times(self.sending.retries as usize)
             .build();
-        let mut attempts = 0;
+        let (mut attempts, mut avoided, mut last) = (0, Vec::new(), None::<FailedTry>);
         loop {
-            let sent = self.wait_turn().await.map_err(|e| e.after(attempts))?;
+            let turn = self.turn(request, &avoided).await;
+            let turn = turn.map_err(|e| last.take().unwrap_or(e).after(attempts))?;
             attempts += 1;
-            let mut failed = match self.send(request, sent).await {
+            let (failed, effect) = match self.send(request, turn).await {
                 Ok(reply) => return Ok(Reply { attempts, ..reply }),
                 Err(failed) => failed,
             };
-            let delay = match failed.again {
-                Again::Never => None,
-                Again::Later => tries.next().map(|delay| failed.wait.unwrap_or(delay)),
-                Again::WhenTaken if self.gate.refused_for() > self.sending.patience => {
-                    failed = self.out_of_patience(failed);
-                    None
-                }
-                // The gate holds all requests for as long as the server asked.
-                Again::WhenTaken if failed.wait.is_some() => Some(Duration::ZERO),
-                Again::WhenTaken => Some(self.sending.first_delay),
-            };
+            avoided.push(turn.replica);
+            if effect == Effect::Elsewhere && self.services.has_other(&avoided) {
+                last = Some(failed);
+                continue;
+            }
+            let (delay, failed) = self.delay(failed, &mut tries);
             let Some(delay) = delay else {
                 return Err(failed.after(attempts));
             };
-            debug!(endpoint = %self.base(), ?delay, problem = failed.failure.message, "trying again");
+            avoided.clear();
+            let base = self.replicas[turn.replica].base();
+            debug!(endpoint = %base, ?delay, problem = failed.failure.message, "trying again");
             self.rest(delay).await;
+        }
+    }
+
+    /// The time until a request is sent again; `None` if it is not. A failure after which no request is taken says so.
+    fn delay(
+        &self,
+        mut failed: FailedTry,
+        tries: &mut impl Iterator<Item = Duration>,
+    ) -> (Option<Duration>, FailedTry) {
+        let delay = match failed.again {
+            Again::Never => None,
+            Again::Later => tries.next().map(|delay| failed.wait.unwrap_or(delay)),
+            Again::WhenTaken if self.refused_for() > self.sending.patience => {
+                failed = self.out_of_patience(failed);
+                None
+            }
+            // The gate holds all requests for as long as the server asked.
+            Again::WhenTaken if failed.wait.is_some() => Some(Duration::ZERO),
+            Again::WhenTaken => Some(self.sending.first_delay),
+        };
+        (delay, failed)
+    }
+
+    /// Waits for the turn of a request: the user's limits, a replica that takes it, and the pace of that replica.
+    async fn turn(&self, request: &Request<'_>, avoided: &[usize]) -> Result<Turn, FailedTry> {
+        let limited = match &self.quota {
+            Some(gate) => Some(self.unless_closed(gate.pass()).await?),
+            None => None,
+        };
+        let ready = |index: usize| {
+            let replica = &self.replicas[index];
+            let room = self.services.in_flight(index) < replica.width();
+            room && replica.gate.ready_at() <= Instant::now() + SOON
+        };
+        let Choice::Replica(replica) = self.services.choose(request.affinity, avoided, ready)
+        else {
+            let message = "no replica of this endpoint can be asked any further";
+            return Err(FailedTry {
+                reach: Reach::Endpoint,
+                ..FailedTry::new(FailureKind::Connection, message.to_owned())
+            });
+        };
+        let passed = self.unless_closed(self.replicas[replica].gate.pass()).await;
+        match passed {
+            Ok(sent) => Ok(Turn {
+                replica,
+                sent,
+                limited,
+            }),
+            Err(closed) => {
+                self.services.released(replica);
+                Err(closed)
+            }
+        }
+    }
+
+    /// Sends a request to the replica of its turn; a failure with what follows from it.
+    async fn send(&self, request: &Request<'_>, turn: Turn) -> Result<Reply, (FailedTry, Effect)> {
+        let Turn {
+            replica: index,
+            sent,
+            limited,
+        } = turn;
+        // Released also if the future is dropped.
+        let _in_flight = self.services.guard(index);
+        let replica = &self.replicas[index];
+        let outcome = replica.send(request, &request.headers[index], sent).await;
+        let reply = match outcome {
+            Ok(reply) => reply,
+            Err(failed) if self.replicas.len() == 1 => return Err((failed, Effect::Own)),
+            Err(failed) => {
+                let effect = self.services.failed(index, &failed);
+                return Err((failed, effect));
+            }
+        };
+        if let (Some(gate), Some(sent)) = (&self.quota, limited) {
+            let tokens = reply.usage.and_then(|usage| usage.total());
+            gate.succeeded(sent, tokens, Allowance::default(), self.sending.max_wait);
+        }
+        if self.replicas.len() > 1
+            && let Err(effect) = self
+                .services
+                .succeeded(index, reply.served_model.as_deref())
+        {
+            let served = reply.served_model.unwrap_or_default();
+            let message = format!("{} served the model {served}", replica.base());
+            let failed = FailedTry {
+                reach: Reach::Endpoint,
+                ..FailedTry::new(FailureKind::Response, message)
+            };
+            return Err((failed, effect));
+        }
+        Ok(reply)
+    }
+
+    /// Warns if the replicas say different things of the model. What cannot be asked for is ignored.
+    async fn compare(&self, request: &Request<'_>) {
+        let mut said = Vec::new();
+        for (replica, headers) in self.replicas.iter().zip(request.headers) {
+            let facts = replica
+                .connection
+                .model_facts(headers, request.sent.parameters);
+            if let Some(facts) = facts.await {
+                said.push((replica.base().to_string(), facts));
+            }
+        }
+        let Some((first, facts)) = said.first() else {
+            return;
+        };
+        for (other, different) in said.iter().filter(|(_, other)| other != facts) {
+            warn!(
+                "the replicas {first} and {other} serve the model differently ({facts} and {different}): their replies may differ"
+            );
         }
     }
 
@@ -155,181 +310,34 @@ impl Endpoint {
         }
     }
 
+    /// The time for which no working replica has taken a request.
+    fn refused_for(&self) -> Duration {
+        let replicas = self.replicas.iter().enumerate();
+        let working = replicas.filter(|(index, _)| self.services.is_working(*index));
+        let times = working.map(|(_, replica)| replica.gate.refused_for());
+        times.min().unwrap_or_default()
+    }
+
     /// The failure of a request that was turned away for too long: every other one is, too.
     fn out_of_patience(&self, mut failed: FailedTry) -> FailedTry {
         failed.reach = Reach::Endpoint;
         failed.failure.message = format!(
             "{} (nothing was taken for {:.0} s, beyond --patience; go on later with --resume)",
             failed.failure.message,
-            self.gate.refused_for().as_secs_f64()
+            self.refused_for().as_secs_f64()
         );
         failed
     }
-
-    /// Sends the request once; `sent` is the time of its turn.
-    async fn send(&self, request: &Request<'_>, sent: Instant) -> Result<Reply, FailedTry> {
-        let Request { wire, headers, .. } = *request;
-        let body = request.body.clone();
-        let posted = self.connection.post(wire.path(), headers, body).await;
-        let answer = posted.inspect_err(|failed| {
-            if failed.failure.kind == FailureKind::Timeout {
-                self.window.overloaded(sent);
-            }
-        })?;
-        let status = answer.status.as_u16();
-        let (request_id, took) = (self.request_id(&answer), answer.took);
-        debug!(endpoint = %self.base(), status, ?took, request_id, "answered");
-        if !answer.status.is_success() {
-            if asks_for_pause(status) {
-                self.window.overloaded(sent);
-            }
-            let mut complaint = wire.complaint(&answer.body);
-            if answer.status.is_redirection() {
-                complaint.message = format!("moved to {}", answer.header(LOCATION.as_str()));
-            }
-            return Err(self.refused_try(status, &complaint, &answer, request, sent));
-        }
-        let unreadable = match wire.reply(&answer.body, answer.header(CONTENT_TYPE.as_str())) {
-            Ok(reply) => return Ok(self.succeeded(reply, &answer, sent)),
-            Err(unreadable) => unreadable,
-        };
-        let mut failed = match unreadable {
-            // An error without a code is a failure of the server, which may pass.
-            UnreadableReply::Complaint(complaint) => {
-                let code = complaint.status().unwrap_or(500);
-                self.refused_try(code, &complaint, &answer, request, sent)
-            }
-            UnreadableReply::Other(what) => {
-                let what = self.connection.scrub.line(&what);
-                let message = format!("{} answered with {what}", self.base());
-                FailedTry {
-                    again: Again::Later,
-                    ..FailedTry::new(FailureKind::Response, message)
-                }
-            }
-        };
-        failed.failure.status = Some(status);
-        Err(failed)
-    }
-
-    /// The reply without keys; its tokens and the remaining limits are noted in the gate.
-    fn succeeded(&self, reply: Reply, answer: &HttpReply, sent: Instant) -> Reply {
-        self.window.succeeded(answer.took);
-        let allowance = Allowance::read(&answer.headers, SystemTime::now());
-        let tokens = reply.usage.and_then(|usage| usage.total());
-        self.gate
-            .succeeded(sent, tokens, allowance, self.sending.max_wait);
-        let scrubbed = |text: String| self.connection.scrub.reply(text);
-        Reply {
-            text: scrubbed(reply.text),
-            refusal: reply.refusal.map(scrubbed),
-            served_model: reply.served_model.map(scrubbed),
-            latency_ms: answer.took.as_millis() as u64,
-            ..reply
-        }
-    }
-
-    /// The failure of a request that the server refused with this status.
-    fn refused_try(
-        &self,
-        status: u16,
-        complaint: &Complaint,
-        answer: &HttpReply,
-        request: &Request<'_>,
-        sent: Instant,
-    ) -> FailedTry {
-        let mut class = FailureClass::of(status, complaint, request.wire, request.sent);
-        match answer.header("x-should-retry") {
-            "true" => class.retryable = true,
-            "false" => class.retryable = false,
-            _ => {}
-        }
-        let hint = class.hint.as_deref();
-        let message = self.message(status, complaint, hint, &self.request_id(answer));
-        let now = SystemTime::now();
-        let stated = asked_wait(&answer.headers, now).max(complaint.wait);
-        let reset = || Allowance::read(&answer.headers, now).pause();
-        let wait = stated
-            .or_else(|| reset().filter(|_| status == 429))
-            .filter(|_| class.retryable);
-        let again = match class.retryable {
-            false => Again::Never,
-            true if status == 429 || (asks_for_pause(status) && wait.is_some()) => Again::WhenTaken,
-            true => Again::Later,
-        };
-        let mut failed = FailedTry {
-            failure: Failure {
-                kind: class.kind,
-                status: Some(status),
-                message,
-            },
-            reach: class.reach,
-            again,
-            wait,
-            refused_field: class.refused_field,
-        };
-        self.pause(status, sent, &mut failed);
-        failed
-    }
-
-    /// The error text for a refused request.
-    fn message(
-        &self,
-        status: u16,
-        complaint: &Complaint,
-        hint: Option<&str>,
-        request_id: &str,
-    ) -> String {
-        let mut message = format!("{} answered {status}", self.base());
-        let text = self.connection.scrub.line(&complaint.message);
-        if !text.is_empty() {
-            message = format!("{message}: {text}");
-        }
-        if let Some(hint) = hint {
-            message = format!("{message} ({hint})");
-        }
-        if !request_id.is_empty() {
-            message = format!("{message} [request {request_id}]");
-        }
-        message
-    }
-
-    /// Makes all requests wait as long as the server asked; a request that would wait more than `--max-wait` is given up, and
-    /// the time at which it could go on is said.
-    fn pause(&self, status: u16, sent: Instant, failed: &mut FailedTry) {
-        let max_wait = self.sending.max_wait;
-        match failed.wait {
-            Some(wait) if wait > max_wait => {
-                failed.again = Again::Never;
-                if asks_for_pause(status) {
-                    failed.reach = Reach::Endpoint;
-                }
-                failed.failure.message = format!(
-                    "{} (it asks to wait {:.0} s, beyond --max-wait of {:.0} s)",
-                    failed.failure.message,
-                    wait.as_secs_f64(),
-                    max_wait.as_secs_f64()
-                );
-            }
-            wait if status == 429 && failed.again != Again::Never => {
-                self.gate.rate_limited(sent, wait);
-            }
-            Some(wait) if asks_for_pause(status) => self.gate.pause(wait),
-            // The server states no time: all wait as long as the refused request does before its first retry.
-            None if asks_for_pause(status) && failed.again != Again::Never => {
-                self.gate.pause(self.sending.first_delay);
-            }
-            _ => {}
-        }
-    }
-
-    /// The server's id of a request, without secrets; empty if it sent none.
-    fn request_id(&self, answer: &HttpReply) -> String {
-        self.connection.scrub.line(answer.header("x-request-id"))
-    }
 }
 
-/// Whether a status means that the server accepts no request at the moment.
-fn asks_for_pause(status: u16) -> bool {
-    matches!(status, 429 | 503 | 529)
+/// A replica whose next turn is within this time takes a request now; chosen: shorter than a reply.
+const SOON: Duration = Duration::from_millis(250);
+
+/// The turn of a request: the replica that takes it and the time at which it is sent.
+#[derive(Debug, Clone, Copy)]
+struct Turn {
+    replica: usize,
+    sent: Instant,
+    /// The time at which it passed the user's limits for all replicas.
+    limited: Option<Instant>,
 }

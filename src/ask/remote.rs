@@ -22,7 +22,8 @@ use crate::types::{FailureKind, Reply};
 pub struct Remote {
     endpoint: Arc<Endpoint>,
     wire: Wire,
-    headers: HeaderMap,
+    /// Headers for each replica of the endpoint.
+    headers: Vec<HeaderMap>,
     parameters: Parameters,
     /// The fields that the server accepts, as far as is known.
     fields: Mutex<RequestFields>,
@@ -192,6 +193,7 @@ impl Remote {
                 has_image: !message.images.is_empty(),
                 has_key: self.endpoint.has_key(),
             },
+            affinity: affinity(message),
         };
         self.endpoint.ask(&request).await
     }
@@ -257,4 +259,14 @@ impl Remote {
             text
         })
     }
+}
+
+/// A number that is the same for all questions about the same images.
+fn affinity(message: Message<'_>) -> u64 {
+    let digests = message.images.iter().map(|image| image.facts().digest);
+    digests.fold(0, |sum, digest| {
+        let mut first = [0; 8];
+        first.copy_from_slice(&digest.as_bytes()[..8]);
+        sum ^ u64::from_le_bytes(first)
+    })
 }

@@ -35,9 +35,10 @@ const NO_KEY: &str = "none";
 #[derive(Debug, Clone, Default, PartialEq, Args)]
 #[command(next_help_heading = "Model")]
 pub(crate) struct AccessArgs {
-    /// The endpoint; /chat/completions is appended; default: OPENAI_BASE_URL, else OpenAI's own
+    /// The endpoint; /chat/completions is appended; repeatable for several replicas of one server; default: OPENAI_BASE_URL, else
+    /// OpenAI's own
     #[arg(long, value_name = "URL", add = Decides::Reply)]
-    pub base_url: Option<String>,
+    pub base_url: Vec<String>,
     /// The variable that holds the API key, or none for an endpoint without keys; default: that of the vendor's own tools
     /// (ANTHROPIC_API_KEY, GEMINI_API_KEY …), else OPENAI_API_KEY, which goes to no other vendor of the table by itself
     #[arg(long, value_name = "NAME|none", conflicts_with = "api_key_file", add = Decides::Nothing)]
@@ -65,10 +66,18 @@ pub(crate) struct AccessArgs {
 /// The address of a server, and how requests are sent to it.
 #[derive(Debug, Clone)]
 pub(crate) struct Server {
-    /// The address, the key and the certificates.
-    pub access: Access,
+    /// The address, the key and the certificates of each replica; at least one.
+    pub replicas: Vec<Access>,
     /// The timeouts, retries and rate limits of requests.
     pub sending: Sending,
+}
+
+impl Server {
+    /// The addresses of all replicas, as text without secrets.
+    pub(crate) fn addresses(&self) -> Vec<String> {
+        let replicas = self.replicas.iter();
+        replicas.map(|replica| replica.base.to_string()).collect()
+    }
 }
 
 impl AccessArgs {
@@ -87,7 +96,7 @@ impl AccessArgs {
     #[must_use]
     pub(crate) fn elsewhere(&self, base_url: String) -> Self {
         Self {
-            base_url: Some(base_url),
+            base_url: vec![base_url],
             ca_file: self.ca_file.clone(),
             allow_http: self.allow_http,
             ..Self::default()
@@ -99,22 +108,34 @@ impl AccessArgs {
     /// # Errors
     /// If the address is not valid, or a key, header or certificate cannot be read.
     pub(crate) fn server(&self, sending: Sending) -> Result<Server> {
-        let named = self
-            .base_url
-            .clone()
-            .or_else(|| variable(BASE_URL_VARIABLE));
-        let base: BaseUrl = named.as_deref().unwrap_or(BASE_URL).parse()?;
         let authorities = self.ca_file.as_deref().map(Authorities::load).transpose()?;
-        let access = Access {
-            key: self.key(&base)?,
-            key_header: self.key_header,
-            account: account_headers(&base),
-            headers: OwnHeaders::read(&self.header, &self.header_env)?,
-            authorities: authorities.unwrap_or_default(),
-            allow_http: self.allow_http,
-            ..Access::new(base)
-        };
-        Ok(Server { access, sending })
+        let authorities = authorities.unwrap_or_default();
+        let mut replicas: Vec<Access> = Vec::new();
+        for base in self.addresses()? {
+            if replicas.iter().any(|other| other.base == base) {
+                let problem = format_args!("{base} is named twice");
+                return Err(Error::usage("--base-url", problem));
+            }
+            replicas.push(Access {
+                key: self.key(&base)?,
+                key_header: self.key_header,
+                account: account_headers(&base),
+                headers: OwnHeaders::read(&self.header, &self.header_env)?,
+                authorities: authorities.clone(),
+                allow_http: self.allow_http,
+                ..Access::new(base)
+            });
+        }
+        Ok(Server { replicas, sending })
+    }
+
+    /// The addresses that flags or the environment name, else OpenAI's.
+    fn addresses(&self) -> Result<Vec<BaseUrl>> {
+        if self.base_url.is_empty() {
+            let named = variable(BASE_URL_VARIABLE);
+            return Ok(vec![named.as_deref().unwrap_or(BASE_URL).parse()?]);
+        }
+        self.base_url.iter().map(|text| text.parse()).collect()
     }
 
     /// Where the key comes from, for people: never the key itself.

@@ -62,7 +62,7 @@ impl ModelUnderTest {
     /// Address of its endpoint; `None` if it is built in.
     pub(crate) fn address(&self) -> Option<String> {
         let server = self.server.as_ref();
-        server.map(|server| server.access.base.to_string())
+        server.map(|server| server.addresses().join(" "))
     }
 
     /// Name of its endpoint for messages: the address, or that it is built in.
@@ -172,7 +172,7 @@ pub(crate) fn asked_in<'a>(
 
 /// The opened endpoint.
 pub(crate) fn endpoint(server: &Server) -> Result<Arc<Endpoint>> {
-    Endpoint::open(server.access.clone(), server.sending).map(Arc::new)
+    Endpoint::of(server.replicas.clone(), server.sending).map(Arc::new)
 }
 
 /// A model that can answer open questions, opened.

@@ -281,9 +281,13 @@ pub(crate) fn limit(settings: &JobSettings) -> Option<ImageLimit> {
     let limits = servers.map(|server| {
         let stated = server.sending.max_image;
         let stated = stated.map(|megabytes| ImageLimit::stated((megabytes * 1e6) as usize));
-        stated.unwrap_or_else(|| ImageLimit::of(&server.access.base))
+        let known = server
+            .replicas
+            .iter()
+            .map(|replica| ImageLimit::of(&replica.base));
+        stated.or_else(|| known.reduce(ImageLimit::stricter))
     });
-    limits.reduce(ImageLimit::stricter)
+    limits.flatten().reduce(ImageLimit::stricter)
 }
 
 /// The notes about images that a run folder does not have yet.

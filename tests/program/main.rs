@@ -34,6 +34,7 @@ mod own_requests;
 mod pins;
 mod questions;
 mod realism;
+mod replicas;
 mod report;
 mod rooms;
 mod same_bytes;

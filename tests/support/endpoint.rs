@@ -210,19 +210,34 @@ impl MockEndpoint {
     pub fn start(answers: impl IntoIterator<Item = Answer>) -> Self {
         let answers: VecDeque<Answer> = answers.into_iter().collect();
         let answers = Mutex::new(answers);
-        Self::serving(Box::new(move |_| {
+        Self::posted(move |_| {
             let mut answers = answers.lock().unwrap();
             if answers.len() > 1 {
                 answers.pop_front().unwrap()
             } else {
                 answers[0].clone()
             }
-        }))
+        })
     }
 
     /// One that looks at what it is asked.
     pub fn answering(answer: impl Fn(&Value) -> Answer + Send + Sync + 'static) -> Self {
-        Self::serving(Box::new(move |request| answer(&request.json())))
+        Self::posted(move |request| answer(&request.json()))
+    }
+
+    /// One that knows nothing but questions: what else it is asked for is not there.
+    fn posted(answer: impl Fn(&Request) -> Answer + Send + Sync + 'static) -> Self {
+        Self::serving(Box::new(move |request| {
+            if request.line.starts_with("GET ") {
+                return Answer::new(404, "");
+            }
+            answer(request)
+        }))
+    }
+
+    /// One that looks at the whole request.
+    pub fn watching(answer: impl Fn(&Request) -> Answer + Send + Sync + 'static) -> Self {
+        Self::serving(Box::new(answer))
     }
 
     /// Starts it on a free port of this machine.

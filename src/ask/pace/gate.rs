@@ -82,6 +82,12 @@ impl Gate {
         }
     }
 
+    /// The time at which a request could be sent if none waited.
+    pub(in crate::ask) fn ready_at(&self) -> Instant {
+        let (now, mut state) = (Instant::now(), self.state());
+        state.turn(now).max(now)
+    }
+
     /// Pauses all requests, because the endpoint has no capacity; no rate is learned from it.
     pub(in crate::ask) fn pause(&self, wait: Duration) {
         let (now, mut state) = (Instant::now(), self.state());

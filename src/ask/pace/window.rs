@@ -23,6 +23,23 @@ impl Bounds {
         most: NonZeroUsize::new(32).unwrap(),
     };
 
+    /// The bounds of each of several replicas, so that the stated ones hold for all together, at least one each. The default holds
+    /// for each.
+    #[must_use]
+    pub(in crate::ask) fn share(self, count: usize) -> Self {
+        if self == Self::DEFAULT {
+            return self;
+        }
+        let share = |number: NonZeroUsize| {
+            NonZeroUsize::new(number.get().div_ceil(count.max(1))).unwrap_or(NonZeroUsize::MIN)
+        };
+        Self {
+            least: share(self.least),
+            first: share(self.first),
+            most: share(self.most),
+        }
+    }
+
     /// The maximum number of requests in flight.
     #[must_use]
     pub fn most(self) -> usize {

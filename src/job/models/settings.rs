@@ -84,7 +84,7 @@ impl AskSettings {
             set(&mut entries, text)?;
         }
         select(&mut entries, &args.only)?;
-        if asking.access.base_url.is_none() {
+        if asking.access.base_url.is_empty() {
             let of_flags = entries.iter().filter(|entry| entry.place.is_none());
             of_flags
                 .map(|entry| &entry.id)
@@ -322,8 +322,8 @@ fn note(entry: &Entry, resolved: &ModelSettings) -> Value {
     });
     if let Some(server) = &resolved.server {
         let sending = &server.sending;
-        note["endpoints"] = json!([server.access.base.to_string()]);
-        note["key"] = json!(access.key_source(&server.access.base));
+        note["endpoints"] = json!(server.addresses());
+        note["key"] = json!(access.key_source(&server.replicas[0].base));
         note["headers"] = json!([names(&access.header), names(&access.header_env)].concat());
         note["pace"] = json!({
             "concurrency": sending.concurrency.to_string(), "rpm": sending.quota.requests, "tpm": sending.quota.tokens,

@@ -1,0 +1,251 @@
+//! Several replicas of one server: the load, the caches, and what happens if one of them fails.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+
+use crate::support::endpoint::{Answer, MockEndpoint};
+use crate::support::run::{Bench, Called, records, words};
+
+const RUN: &str = "--data set.jsonl --levels L0 --out run --models models.toml";
+
+/// A run of one model at these replicas.
+fn run(bench: &Bench, replicas: &[&MockEndpoint], more: &str, line: &str) -> Called {
+    let urls: Vec<String> = replicas
+        .iter()
+        .map(|mock| format!("\"{}\"", mock.base_url()))
+        .collect();
+    let endpoints = urls.join(", ");
+    bench.file(
+        "models.toml",
+        format!("[[model]]\nid = \"m\"\nendpoints = [{endpoints}]\n{more}\n"),
+    );
+    bench.call(&words(&format!("{RUN} {line}")))
+}
+
+/// The number of chat requests that a replica was sent.
+fn asked(mock: &MockEndpoint) -> usize {
+    let requests = mock.requests();
+    requests
+        .iter()
+        .filter(|request| request.line.starts_with("POST"))
+        .count()
+}
+
+/// A server that answers after a time.
+fn slow(milliseconds: u64) -> MockEndpoint {
+    MockEndpoint::answering(move |_| {
+        std::thread::sleep(Duration::from_millis(milliseconds));
+        Answer::text("A")
+    })
+}
+
+#[test]
+fn the_load_is_shared() {
+    let bench = Bench::with_questions(80);
+    let mocks = [slow(20), slow(20), slow(20)];
+    let called = run(&bench, &mocks.each_ref(), "", "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    let shares = mocks.each_ref().map(asked);
+    assert_eq!(
+        shares.iter().sum::<usize>(),
+        80,
+        "none was sent twice: {shares:?}"
+    );
+    assert!(shares.iter().all(|share| *share >= 12), "{shares:?}");
+    let manifest = std::fs::read_to_string(bench.path("run/manifest.json")).unwrap();
+    assert!(mocks.iter().all(|mock| manifest.contains(&mock.base_url())));
+}
+
+#[test]
+fn a_replica_that_dies_costs_no_trial() {
+    let bench = Bench::with_questions(120);
+    let (dead, before) = (
+        Arc::new(AtomicBool::new(false)),
+        Arc::new(AtomicUsize::new(0)),
+    );
+    let dying = MockEndpoint::answering({
+        let (dead, before) = (Arc::clone(&dead), Arc::clone(&before));
+        move |_| {
+            std::thread::sleep(Duration::from_millis(10));
+            if before.fetch_add(1, Ordering::SeqCst) >= 15 {
+                dead.store(true, Ordering::SeqCst);
+            }
+            if dead.load(Ordering::SeqCst) {
+                Answer::dropped()
+            } else {
+                Answer::text("A")
+            }
+        }
+    });
+    let living = [slow(10), slow(10)];
+    // Without retries a trial that lost a try would have failed.
+    let called = run(&bench, &[&living[0], &dying, &living[1]], "retries = 0", "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    let records = records(&bench.path("run"));
+    assert_eq!(records.len(), 120);
+    assert!(records.iter().all(|record| record["outcome"] != "failed"));
+    let lost = asked(&dying) - 15;
+    assert!(
+        lost <= 16,
+        "{lost} requests were lost: those in flight, and one to try it again"
+    );
+    assert_eq!(asked(&living[0]) + asked(&living[1]), 120 - 15);
+    assert!(called.stderr.contains("failures in a row"), "{called:?}");
+}
+
+#[test]
+fn a_replica_that_refuses_the_key_is_left_out_and_the_last_one_stops_the_model() {
+    let bench = Bench::with_questions(20);
+    let locked = MockEndpoint::start([Answer::error(401, "invalid_api_key", "no such key")]);
+    let open = slow(5);
+    let called = run(&bench, &[&locked, &open], "", "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_eq!(asked(&open), 20);
+    assert_eq!(
+        called.stderr.matches("asked nothing more").count(),
+        usize::from(asked(&locked) > 0)
+    );
+    let other = MockEndpoint::start([Answer::error(401, "invalid_api_key", "no such key")]);
+    let bench = Bench::with_questions(20);
+    let called = run(&bench, &[&locked, &other], "", "");
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert!(called.stderr.contains("no such key"), "{called:?}");
+    assert_eq!(asked(&other), 1);
+}
+
+#[test]
+fn a_replica_of_another_model_gives_no_reply() {
+    let bench = Bench::with_questions(40);
+    let named = |name: &'static str| {
+        MockEndpoint::answering(move |_| {
+            std::thread::sleep(Duration::from_millis(10));
+            let choice = json!({"index": 0, "message": {"content": "A"}, "finish_reason": "stop"});
+            Answer::json(200, &json!({"model": name, "choices": [choice]}))
+        })
+    };
+    let (one, two) = (named("m"), named("other"));
+    let called = run(&bench, &[&one, &two], "", "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    let served: BTreeMap<String, usize> =
+        records(&bench.path("run"))
+            .iter()
+            .fold(BTreeMap::new(), |mut counts, record| {
+                *counts
+                    .entry(record["served_model"].as_str().unwrap().to_owned())
+                    .or_default() += 1;
+                counts
+            });
+    assert_eq!(served.len(), 1, "{served:?}");
+    assert_eq!(
+        called.stderr.matches("it is asked nothing more").count(),
+        1,
+        "{called:?}"
+    );
+}
+
+#[test]
+fn replicas_that_serve_a_model_differently_are_said() {
+    let bench = Bench::with_questions(4);
+    let serving = |length: u32| {
+        MockEndpoint::watching(move |request| {
+            if request.line.starts_with("GET /v1/models ") {
+                let data = json!([{"id": "m", "root": "/models/m", "max_model_len": length}]);
+                return Answer::json(200, &json!({"data": data}));
+            }
+            Answer::text("A")
+        })
+    };
+    let (one, two, three) = (serving(8192), serving(8192), serving(4096));
+    let called = run(&bench, &[&one, &two], "", "");
+    assert_eq!((called.code, &*called.stderr), (Some(0), ""));
+    let bench = Bench::with_questions(4);
+    let called = run(&bench, &[&one, &three], "", "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert!(
+        called.stderr.contains("max_model_len 8192") && called.stderr.contains("4096"),
+        "{called:?}"
+    );
+    // A single one is not asked for its models.
+    let single = serving(1);
+    let bench = Bench::with_questions(1);
+    run(&bench, &[&single], "", "");
+    assert_eq!((single.requests().len(), asked(&single)), (1, 1));
+}
+
+#[test]
+fn one_address_twice_is_refused() {
+    let bench = Bench::with_questions(1);
+    let mock = slow(0);
+    let called = run(&bench, &[&mock, &mock], "", "");
+    assert_eq!(called.code, Some(2));
+    assert!(called.stderr.contains("is named twice"), "{called:?}");
+}
+
+/// A server that takes so many requests a second and turns the others away, with the store that it begins with.
+fn limited(rate: f64) -> MockEndpoint {
+    let state = Mutex::new((Instant::now(), rate));
+    MockEndpoint::answering(move |_| {
+        let taken = {
+            let mut state = state.lock().unwrap();
+            let (last, store) = *state;
+            let now = Instant::now();
+            let store = (store + rate * now.duration_since(last).as_secs_f64()).min(rate);
+            let taken = store >= 1.0;
+            *state = (now, if taken { store - 1.0 } else { store });
+            taken
+        };
+        if !taken {
+            return Answer::error(429, "rate_limit_exceeded", "slow down")
+                .header("retry-after", "1");
+        }
+        std::thread::sleep(Duration::from_millis(100));
+        Answer::text("A")
+    })
+}
+
+/// A limit of the user is one for all replicas together.
+#[test]
+fn a_limit_per_minute_holds_for_all_replicas_together() {
+    let bench = Bench::with_questions(6);
+    let times = Arc::new(Mutex::new(VecDeque::new()));
+    let watched = || {
+        let times = Arc::clone(&times);
+        MockEndpoint::answering(move |_| {
+            times.lock().unwrap().push_back(Instant::now());
+            Answer::text("A")
+        })
+    };
+    let mocks = [watched(), watched(), watched()];
+    // One every 200 ms, whichever takes it.
+    let called = run(&bench, &mocks.each_ref(), "rpm = 300", "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    let times = times.lock().unwrap();
+    let took = times
+        .back()
+        .unwrap()
+        .duration_since(*times.front().unwrap());
+    assert!(took >= Duration::from_millis(950), "{took:?}");
+}
+
+/// Four replicas of ten a second each. Prints the rate; the bound is far below what is measured on a quiet machine.
+#[test]
+fn four_replicas_are_four_times_as_fast() {
+    let bench = Bench::with_questions(240);
+    let mocks = [limited(10.0), limited(10.0), limited(10.0), limited(10.0)];
+    let called = run(&bench, &mocks.each_ref(), "", "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    let sent: usize = mocks.iter().map(asked).sum();
+    let records = records(&bench.path("run"));
+    assert!(
+        records
+            .iter()
+            .all(|record: &Value| record["outcome"] != "failed")
+    );
+    // 40 are stored at first: 240 need 5 s at least.
+    println!("{sent} requests for 240 trials");
+    assert!(sent < 300, "{sent}");
+}
