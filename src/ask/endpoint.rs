@@ -9,11 +9,10 @@ use tokio::time::{Instant, sleep, timeout};
 use tracing::{debug, warn};
 
 use super::access::Access;
-use super::body::Parts;
 use super::failure::{Again, AskError, FailedTry, Reach};
-use super::field::SentFields;
 use super::pace::{Allowance, Gate, Quota};
 use super::replica::Replica;
+use super::request::Request;
 use super::sending::Sending;
 use super::service::{Choice, Effect, Services};
 use super::url::BaseUrl;
@@ -41,17 +40,6 @@ pub struct Endpoint {
     /// Whether what the replicas say of their models was compared.
     compared: OnceCell<()>,
     closing: watch::Sender<bool>,
-}
-
-/// One request, which may be sent several times.
-pub(super) struct Request<'a> {
-    pub(super) wire: Wire,
-    /// The headers for each replica.
-    pub(super) headers: &'a [HeaderMap],
-    pub(super) body: Parts,
-    pub(super) sent: SentFields<'a>,
-    /// A number that is the same for requests about the same images.
-    pub(super) affinity: u64,
 }
 
 impl Endpoint {

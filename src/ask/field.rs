@@ -3,6 +3,7 @@
 
 use super::complaint::Complaint;
 use super::parameters::{Parameters, Temperature, TokenField};
+use super::vendor::Vendor;
 
 /// A field that a server may refuse and that the program can send in another way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,7 +27,7 @@ impl RequestFields {
     /// The fields of the first request to a host.
     pub(super) fn first(parameters: &Parameters, host: &str) -> Self {
         Self {
-            token_field: parameters.token_field.at(host),
+            token_field: Vendor::token_field_at(host, parameters.token_field),
             temperature: match parameters.temperature {
                 Temperature::Auto => Some(0.0),
                 Temperature::Server => None,

@@ -36,12 +36,14 @@ mod prompt;
 mod random;
 mod remote;
 mod replica;
+mod request;
 mod script;
 mod secret;
 mod sending;
 mod server;
 mod service;
 mod url;
+mod variable;
 mod vendor;
 mod wire;
 

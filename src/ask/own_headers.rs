@@ -3,7 +3,7 @@
 use reqwest::header::{HeaderMap, HeaderName, HeaderValue};
 
 use super::key_form::{is_secret_name, is_secret_value};
-use super::server::variable;
+use super::variable::variable;
 use crate::error::{Error, Result};
 
 /// Headers that the program or its HTTP library sets, so that they cannot be set by the user.

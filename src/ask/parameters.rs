@@ -9,7 +9,6 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::extra_fields::ExtraFields;
-use super::vendor::Vendor;
 use crate::types::Decides;
 use crate::types::flag::flag_words;
 use crate::types::words::written_as_text;
@@ -149,16 +148,6 @@ pub enum TokenField {
     Omit,
 }
 
-impl TokenField {
-    /// The field for an endpoint of this host: never `Auto`.
-    pub(super) fn at(self, host: &str) -> Self {
-        match self {
-            Self::Auto => Vendor::of(host).map_or(Self::MaxTokens, Vendor::token_field),
-            field => field,
-        }
-    }
-}
-
 /// The resolution at which the server reads an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
@@ -204,15 +193,6 @@ mod tests {
         for wrong in ["-1", "NaN", "inf", "", "hot"] {
             assert!(wrong.parse::<Temperature>().is_err(), "{wrong}");
         }
-    }
-
-    #[test]
-    fn the_field_depends_on_the_host() {
-        let auto = TokenField::Auto;
-        assert_eq!(auto.at("api.openai.com"), TokenField::MaxCompletionTokens);
-        assert_eq!(auto.at("localhost"), TokenField::MaxTokens);
-        assert_eq!(auto.at("api.mistral.ai"), TokenField::MaxTokens);
-        assert_eq!(TokenField::Omit.at("api.openai.com"), TokenField::Omit);
     }
 
     #[test]

@@ -9,10 +9,11 @@ use tracing::warn;
 
 use super::call::Message;
 use super::constraint::letter_of;
-use super::endpoint::{Endpoint, Request};
+use super::endpoint::Endpoint;
 use super::failure::{AskError, Reach};
 use super::field::{AdaptableField, RequestFields, SentFields};
 use super::parameters::{Constrain, Parameters, Temperature, TokenField};
+use super::request::Request;
 use super::wire::Wire;
 use crate::error::{Error, Result};
 use crate::types::{FailureKind, Reply};

@@ -1,7 +1,7 @@
 //! The server at which models are asked: its flags ([`AccessArgs`]), and its settings with the key ([`Server`]).
 
+use std::fs;
 use std::path::PathBuf;
-use std::{env, fs};
 
 use clap::Args;
 
@@ -12,6 +12,7 @@ use super::own_headers::OwnHeaders;
 use super::secret::Secret;
 use super::sending::Sending;
 use super::url::BaseUrl;
+use super::variable::variable;
 use super::vendor::Vendor;
 use crate::error::{Error, Result};
 use crate::types::Decides;
@@ -235,9 +236,4 @@ fn account_headers(base: &BaseUrl) -> Vec<(String, String)> {
     headers
         .filter_map(|(header, name)| Some((header.clone(), variable(name)?)))
         .collect()
-}
-
-/// The value of an environment variable; `None` if it is not set or blank.
-pub(super) fn variable(name: &str) -> Option<String> {
-    env::var(name).ok().filter(|text| !text.trim().is_empty())
 }

@@ -81,8 +81,16 @@ impl Vendor {
         }
     }
 
+    /// The field that carries the token limit at a host: never `Auto`.
+    pub(super) fn token_field_at(host: &str, field: TokenField) -> TokenField {
+        match field {
+            TokenField::Auto => Self::of(host).map_or(TokenField::MaxTokens, Self::token_field),
+            field => field,
+        }
+    }
+
     /// The field in which this vendor expects the token limit.
-    pub(super) fn token_field(&self) -> TokenField {
+    fn token_field(&self) -> TokenField {
         match self.token_field {
             LimitField::MaxTokens => TokenField::MaxTokens,
             LimitField::MaxCompletionTokens => TokenField::MaxCompletionTokens,
@@ -122,6 +130,16 @@ mod tests {
         hosts.sort();
         hosts.dedup();
         assert_eq!(hosts.len(), count, "a host stands twice");
+    }
+
+    #[test]
+    fn the_token_field_depends_on_the_host() {
+        let at = |host, field| Vendor::token_field_at(host, field);
+        let auto = TokenField::Auto;
+        assert_eq!(at("api.openai.com", auto), TokenField::MaxCompletionTokens);
+        assert_eq!(at("localhost", auto), TokenField::MaxTokens);
+        assert_eq!(at("api.mistral.ai", auto), TokenField::MaxTokens);
+        assert_eq!(at("api.openai.com", TokenField::Omit), TokenField::Omit);
     }
 
     #[test]

@@ -1,0 +1,18 @@
+//! One request, which may be sent several times: [`Request`].
+
+use reqwest::header::HeaderMap;
+
+use super::body::Parts;
+use super::field::SentFields;
+use super::wire::Wire;
+
+/// One request, which may be sent several times.
+pub(super) struct Request<'a> {
+    pub(super) wire: Wire,
+    /// The headers for each replica.
+    pub(super) headers: &'a [HeaderMap],
+    pub(super) body: Parts,
+    pub(super) sent: SentFields<'a>,
+    /// A number that is the same for requests about the same images.
+    pub(super) affinity: u64,
+}
