@@ -266,7 +266,8 @@ impl Endpoint {
             };
             return Err((failed, effect));
         }
-        Ok(reply)
+        let endpoint = (self.replicas.len() > 1).then_some(index);
+        Ok(Reply { endpoint, ..reply })
     }
 
     /// Warns if the replicas say different things of the model. What cannot be asked for is ignored.

@@ -38,6 +38,8 @@ struct Service {
     in_flight: usize,
     /// Failures to connect or of the server since the last reply.
     failures: u32,
+    /// The time of the last of them: replies to requests that were sent before it say nothing of the replica now.
+    failed_at: Option<Instant>,
     /// How often it was out since the last reply.
     outs: u32,
     health: Health,
@@ -88,6 +90,7 @@ impl Services {
             address,
             in_flight: 0,
             failures: 0,
+            failed_at: None,
             outs: 0,
             health: Health::Working,
         });
@@ -174,11 +177,16 @@ impl Services {
         }
     }
 
-    /// Notes a reply of a replica, which names this model.
+    /// Notes a reply of a replica to a request that was sent at a time; the reply names this model.
     ///
     /// # Errors
     /// If it is another model than that of the other replicas: the reply does not count, and the replica is asked nothing more.
-    pub(super) fn succeeded(&self, index: usize, served: Option<&str>) -> Result<(), Effect> {
+    pub(super) fn succeeded(
+        &self,
+        index: usize,
+        served: Option<&str>,
+        sent: Instant,
+    ) -> Result<(), Effect> {
         let mut state = self.state();
         let known = state.served.clone();
         if let (Some(known), Some(served)) = (&known, served)
@@ -198,6 +206,9 @@ impl Services {
             state.served = served.map(str::to_owned);
         }
         let replica = &mut state.replicas[index];
+        if replica.failed_at.is_some_and(|failed| sent < failed) {
+            return Ok(());
+        }
         if matches!(replica.health, Health::OnTrial | Health::OutUntil(_)) {
             warn!("{}: it answers again", replica.address);
             replica.health = Health::Working;
@@ -242,6 +253,7 @@ impl Services {
             return Effect::Own;
         }
         replica.failures += 1;
+        replica.failed_at = Some(now);
         let was_trial = replica.health == Health::OnTrial;
         if was_trial || (replica.failures >= FAILURES_IN_A_ROW && replica.health == Health::Working)
         {

@@ -8,6 +8,7 @@ use super::experiment::{DetailOf, Experiment};
 use super::folder::now;
 use super::identity;
 use super::image_words::ImageWords;
+use super::renamed;
 use super::source::input_summary;
 use crate::types::manifest::{Counts, RunManifest, Status};
 use crate::types::{Detail as _, InputSummary, Record};
@@ -26,7 +27,7 @@ pub(crate) fn of<E: Experiment>(experiment: &E, stored: Option<RunManifest>) -> 
     for (column, values) in experiment.columns() {
         columns.entry(column).or_default().extend(values);
     }
-    let manifest = RunManifest {
+    let mut manifest = RunManifest {
         schema: DetailOf::<E>::SCHEMA.to_owned(),
         status: Status::Started,
         version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -46,6 +47,8 @@ pub(crate) fn of<E: Experiment>(experiment: &E, stored: Option<RunManifest>) -> 
     let Some(mut stored) = stored else {
         return manifest;
     };
+    let before = stored.clone();
+    renamed::note(&mut manifest, &before, &experiment.columns());
     let images = merged_flags(&stored.images, manifest.images);
     if stored.status != Status::Complete {
         return RunManifest {
@@ -59,6 +62,7 @@ pub(crate) fn of<E: Experiment>(experiment: &E, stored: Option<RunManifest>) -> 
         };
     }
     stored.settings.extend(notes);
+    renamed::note(&mut stored, &before, &experiment.columns());
     RunManifest {
         identity: manifest.identity,
         columns: manifest.columns,

@@ -39,6 +39,7 @@ pub(crate) mod questions;
 mod questions_by_rule;
 pub(crate) mod rebuild;
 pub(crate) mod recipe;
+mod renamed;
 pub(crate) mod report;
 pub(crate) mod scaling;
 pub(crate) mod settings;

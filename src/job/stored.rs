@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+use super::renamed;
 use crate::error::{Error, Result};
 use crate::store;
 use crate::types::manifest::RunManifest;
@@ -34,8 +35,10 @@ impl<D: Detail> StoredRun<D> {
     /// Reads everything in a run folder except `manifest`.
     pub(crate) fn of(folder: &Path, manifest: RunManifest) -> Result<Self> {
         let questions = store::read_questions(folder)?;
+        let mut records = store::read_records(folder)?;
+        renamed::rename(&mut records, &manifest);
         Ok(Self {
-            records: in_order(store::read_records(folder)?, &questions),
+            records: in_order(records, &questions),
             questions,
             thumbnails: store::read_thumbnails(folder)?,
             fidelity: store::read_fidelity(folder)?,

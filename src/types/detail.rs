@@ -38,6 +38,8 @@ macro_rules! details {
             failure: Option<Failure>,
             usage: Option<Usage>,
             served_model: Option<String>,
+            #[serde(default)]
+            endpoint: Option<usize>,
             latency_ms: Option<u64>,
             attempts: u32,
             $($(#[$meta])* $field: $type,)+
@@ -58,6 +60,7 @@ macro_rules! details {
                     failure: line.failure,
                     usage: line.usage,
                     served_model: line.served_model,
+                    endpoint: line.endpoint,
                     latency_ms: line.latency_ms,
                     attempts: line.attempts,
                     detail: $name { $($field: line.$field,)+ },

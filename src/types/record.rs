@@ -41,6 +41,9 @@ pub struct Record<D> {
     pub usage: Option<Usage>,
     /// The model's name in the server's reply.
     pub served_model: Option<String>,
+    /// The replica of the endpoint that replied, by its place among the addresses; not in the file if there is one address.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub endpoint: Option<usize>,
     /// The duration of the last try, in milliseconds.
     pub latency_ms: Option<u64>,
     /// The number of requests that were sent.
@@ -109,6 +112,7 @@ impl<D> Record<D> {
             failure: None,
             usage: None,
             served_model: None,
+            endpoint: None,
             latency_ms: None,
             attempts: 0,
             detail,
@@ -153,6 +157,7 @@ impl<D: Detail> Record<D> {
         self.finish = Some(reply.finish);
         self.usage = reply.usage;
         self.served_model = reply.served_model;
+        self.endpoint = reply.endpoint;
         self.latency_ms = Some(reply.latency_ms);
         self.attempts = reply.attempts;
         Ok(self)

@@ -55,6 +55,8 @@ pub struct Reply {
     pub usage: Option<Usage>,
     /// The model's name in the server's reply.
     pub served_model: Option<String>,
+    /// The replica of the endpoint that replied; `None` if there is one address.
+    pub endpoint: Option<usize>,
     /// The time from the first byte sent to the last byte received in the last try, in milliseconds.
     pub latency_ms: u64,
     /// The number of requests that were sent.
@@ -73,6 +75,7 @@ impl Reply {
             finish: Finish::Stop,
             usage: None,
             served_model: None,
+            endpoint: None,
             latency_ms: 0,
             attempts: 1,
             observed: None,

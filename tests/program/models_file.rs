@@ -292,6 +292,20 @@ fn flags_and_a_file_make_the_same_trials() {
     );
     complete(&bench, "");
     assert_eq!(mock.requests().len(), asked);
+    let summary = || fs::read_to_string(bench.path("run/summary.csv")).unwrap();
+    assert!(
+        summary().contains("Renamed,image") && !summary().contains("\nm,"),
+        "{}",
+        summary()
+    );
+    // The name back, in a report alone, too.
+    bench.complete(&model_args(&url, flags));
+    bench.complete(&["report", "run"]);
+    assert!(
+        summary().contains("m,blind") && !summary().contains("Renamed"),
+        "{}",
+        summary()
+    );
     bench.file(
         "models.toml",
         format!("[[model]]\nname = \"New\"\nid = \"m\"\nendpoints = [\"{url}\"]\nmax-tokens = 8\n"),

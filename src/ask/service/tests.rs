@@ -118,7 +118,7 @@ async fn a_replica_that_fails_three_times_is_out_for_longer_each_time() {
     // One reply brings it back, with a clean record.
     tokio::time::advance(Duration::from_mins(2)).await;
     assert_eq!(all.choose(0, &[1], |_| true), Choice::Replica(0));
-    assert!(all.succeeded(0, None).is_ok());
+    assert!(all.succeeded(0, None, Instant::now()).is_ok());
     assert!(all.is_working(0));
     all.failed(0, &refused_connection());
     assert!(all.is_working(0));
@@ -134,9 +134,16 @@ async fn what_the_request_may_have_caused_spends_a_retry() {
     // A reply in between begins the count anew.
     all.failed(1, &server);
     all.failed(1, &server);
-    assert!(all.succeeded(1, None).is_ok());
+    assert!(all.succeeded(1, None, Instant::now()).is_ok());
     all.failed(1, &server);
     assert!(all.is_working(1));
+    // One to a request from before the failure does not.
+    let before = Instant::now();
+    tokio::time::advance(Duration::from_secs(1)).await;
+    all.failed(1, &server);
+    assert!(all.succeeded(1, None, before).is_ok());
+    tokio::time::advance(Duration::from_secs(1)).await;
+    assert!(all.succeeded(1, None, Instant::now()).is_ok());
     // A refusal of the request, and a rate limit, say nothing of the replica.
     for (kind, status, again) in [
         (FailureKind::Request, 400, Again::Never),
@@ -170,11 +177,17 @@ async fn a_replica_without_the_model_is_gone_and_the_last_one_stops_the_run() {
 #[tokio::test(start_paused = true)]
 async fn a_replica_of_another_model_is_gone() {
     let all = services(3);
-    assert!(all.succeeded(0, Some("a")).is_ok());
-    assert!(all.succeeded(1, None).is_ok(), "it does not say");
-    assert_eq!(all.succeeded(1, Some("b")), Err(Effect::Elsewhere));
+    assert!(all.succeeded(0, Some("a"), Instant::now()).is_ok());
+    assert!(
+        all.succeeded(1, None, Instant::now()).is_ok(),
+        "it does not say"
+    );
+    assert_eq!(
+        all.succeeded(1, Some("b"), Instant::now()),
+        Err(Effect::Elsewhere)
+    );
     assert!(!all.is_working(1));
-    assert!(all.succeeded(2, Some("a")).is_ok() && all.is_working(2));
+    assert!(all.succeeded(2, Some("a"), Instant::now()).is_ok() && all.is_working(2));
 }
 
 #[tokio::test(start_paused = true)]

@@ -55,6 +55,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
             .get("model")
             .and_then(Value::as_str)
             .map(str::to_owned),
+        endpoint: None,
         latency_ms: 0,
         attempts: 0,
         observed: None,
