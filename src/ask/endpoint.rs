@@ -256,7 +256,7 @@ impl Endpoint {
         if self.replicas.len() > 1
             && let Err(effect) = self
                 .services
-                .succeeded(index, reply.served_model.as_deref())
+                .succeeded(index, reply.served_model.as_deref(), sent)
         {
             let served = reply.served_model.unwrap_or_default();
             let message = format!("{} served the model {served}", replica.base());
