@@ -259,7 +259,7 @@ mod tests {
         }
     }
 
-    fn resolve(args: RequestArgs) -> Result<ExtraFields> {
+    fn resolve(args: &RequestArgs) -> Result<ExtraFields> {
         args.resolve()
     }
 
@@ -271,7 +271,7 @@ mod tests {
                 extra_body,
                 ..RequestArgs::default()
             };
-            let error = resolve(args).unwrap_err().to_string();
+            let error = resolve(&args).unwrap_err().to_string();
             assert!(
                 error.starts_with("--extra-body: ") && error.contains(by),
                 "{error}"
@@ -282,20 +282,20 @@ mod tests {
                 extra_body: Some(wrong.into()),
                 ..RequestArgs::default()
             };
-            assert!(resolve(args).is_err(), "{wrong}");
+            assert!(resolve(&args).is_err(), "{wrong}");
         }
         for wrong in ["model", "messages", " "] {
             let args = RequestArgs {
                 omit_field: vec![wrong.into()],
                 ..RequestArgs::default()
             };
-            assert!(resolve(args).is_err(), "{wrong}");
+            assert!(resolve(&args).is_err(), "{wrong}");
         }
         let args = RequestArgs {
             system: Some("  ".into()),
             ..RequestArgs::default()
         };
-        assert!(resolve(args).is_err());
+        assert!(resolve(&args).is_err());
     }
 
     #[test]
@@ -307,7 +307,7 @@ mod tests {
             system: Some(" Look.\n".into()),
             ..RequestArgs::default()
         };
-        let fields = resolve(args).unwrap();
+        let fields = resolve(&args).unwrap();
         let expected = json!({
             "system": "Look.", "extra_body": r#"{"a":2,"b":{"x":null,"y":1}}"#, "omit_field": ["temperature", "z"],
         });

@@ -25,7 +25,7 @@ pub struct Remote {
     wire: Wire,
     /// Headers for each replica of the endpoint.
     headers: Vec<HeaderMap>,
-    parameters: Parameters,
+    parameters: Box<Parameters>,
     /// The fields that the server accepts, as far as is known.
     fields: Mutex<RequestFields>,
     /// What came of the first question to the model. Until it has come to an end, the others wait: what the server refuses in all
@@ -64,7 +64,7 @@ impl Remote {
             fields: Mutex::new(RequestFields::first(&parameters, endpoint.host())),
             endpoint,
             wire,
-            parameters,
+            parameters: Box::new(parameters),
             scout: tokio::sync::Mutex::new(Scout::Waiting),
             warned_unconstrained: AtomicBool::new(false),
         })

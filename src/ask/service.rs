@@ -19,7 +19,7 @@ const FAILURES_IN_A_ROW: u32 = 3;
 const FIRST_OUT: Duration = Duration::from_secs(5);
 
 /// The longest time for which a replica is out; chosen.
-const LONGEST_OUT: Duration = Duration::from_secs(60);
+const LONGEST_OUT: Duration = Duration::from_mins(1);
 
 /// The state of each replica of an endpoint.
 #[derive(Debug)]

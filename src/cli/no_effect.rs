@@ -208,7 +208,7 @@ impl NoEffect {
         if args.money.dry_run {
             self.because(
                 "--dry-run sends nothing",
-                &["timings".into(), "max_failures".into()],
+                &["timings".into(), "max_failures".into(), "fail_fast".into()],
             );
         }
     }

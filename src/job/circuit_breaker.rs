@@ -68,6 +68,8 @@ struct ModelState {
 #[derive(Debug)]
 pub(crate) struct CircuitBreaker {
     max_failures: Option<usize>,
+    /// Whether the first model that is stopped ends the run.
+    fails_fast: bool,
     /// Failures in a row after which a model that has succeeded is stopped.
     max_outage: usize,
     models: Vec<ModelState>,
@@ -93,6 +95,7 @@ impl CircuitBreaker {
         });
         Self {
             max_failures,
+            fails_fast: false,
             max_outage: FAILURES_IN_A_ROW.max(3 * concurrency),
             models: states.collect(),
             failures: 0,
@@ -100,6 +103,11 @@ impl CircuitBreaker {
             end: None,
             model_errors: Vec::new(),
         }
+    }
+
+    /// The same circuit breaker; if `fails_fast`, the first model that is stopped ends the run.
+    pub(crate) fn failing_fast(self, fails_fast: bool) -> Self {
+        Self { fails_fast, ..self }
     }
 
     /// Whether nothing more is asked of any model.
@@ -206,6 +214,7 @@ impl CircuitBreaker {
             )
         });
         let endpoint = endpoint.clone();
+        self.stopped |= self.fails_fast && newly;
         self.stopped |= too_many.is_some() || self.models.iter().all(|model| model.health.stopped);
         if let Some(problem) = problem.or(too_many) {
             let problem =

@@ -84,6 +84,7 @@ impl Dispatcher<'_> {
             self.settings.concurrency.most(),
             self.settings.money.max_failures,
         )
+        .failing_fast(self.settings.money.fail_fast)
     }
 }
 

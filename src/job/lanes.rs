@@ -29,7 +29,7 @@ struct Lane<I> {
 /// are made once for all of them.
 pub(super) struct Lanes<'a, I> {
     models: &'a [ModelUnderTest],
-    lanes: Vec<Lane<I>>,
+    all: Vec<Lane<I>>,
     /// Index of the lane of each model.
     of_model: Vec<usize>,
     /// Width of a lane of models that have none.
@@ -59,7 +59,7 @@ impl<'a, I> Lanes<'a, I> {
         }
         Self {
             models,
-            lanes,
+            all: lanes,
             of_model,
             default_width,
             held: VecDeque::new(),
@@ -85,18 +85,18 @@ impl<'a, I> Lanes<'a, I> {
         }
         for ready in ready {
             let lane = self.of_model[ready.trial.model];
-            self.lanes[lane].waiting.push_back(ready);
+            self.all[lane].waiting.push_back(ready);
         }
     }
 
     /// Takes the next trial of a lane that has room and is not held; trials of models that `is_stopped` names are dropped.
     pub(super) fn next(&mut self, is_stopped: impl Fn(usize) -> bool) -> Option<PreparedTrial<I>> {
-        for index in 0..self.lanes.len() {
-            let lane = &self.lanes[index];
+        for index in 0..self.all.len() {
+            let lane = &self.all[index];
             if lane.is_held || lane.in_flight >= self.width(lane) {
                 continue;
             }
-            let lane = &mut self.lanes[index];
+            let lane = &mut self.all[index];
             while let Some(ready) = lane.waiting.pop_front() {
                 if !is_stopped(ready.trial.model) {
                     lane.in_flight += 1;
@@ -109,7 +109,7 @@ impl<'a, I> Lanes<'a, I> {
 
     /// Puts back a trial that the budget does not allow now; its lane is held until something ends.
     pub(super) fn put_back(&mut self, ready: PreparedTrial<I>) {
-        let lane = &mut self.lanes[self.of_model[ready.trial.model]];
+        let lane = &mut self.all[self.of_model[ready.trial.model]];
         lane.in_flight -= 1;
         lane.is_held = true;
         lane.waiting.push_front(ready);
@@ -117,15 +117,15 @@ impl<'a, I> Lanes<'a, I> {
 
     /// Notes that a trial of a model has ended.
     pub(super) fn ended(&mut self, model: usize) {
-        let lane = &mut self.lanes[self.of_model[model]];
+        let lane = &mut self.all[self.of_model[model]];
         lane.in_flight = lane.in_flight.saturating_sub(1);
-        self.lanes.iter_mut().for_each(|lane| lane.is_held = false);
+        self.all.iter_mut().for_each(|lane| lane.is_held = false);
     }
 
     /// The number of trials in flight of models for which `is_counted` holds, by lane.
     pub(super) fn in_flight(&self, is_counted: impl Fn(usize) -> bool) -> usize {
         let lanes = self
-            .lanes
+            .all
             .iter()
             .filter(|lane| lane.models.iter().any(|model| is_counted(*model)));
         lanes.map(|lane| lane.in_flight).sum()
@@ -133,7 +133,7 @@ impl<'a, I> Lanes<'a, I> {
 
     /// Whether no trial waits.
     pub(super) fn is_empty(&self) -> bool {
-        self.lanes.iter().all(|lane| lane.waiting.is_empty())
+        self.all.iter().all(|lane| lane.waiting.is_empty())
     }
 
     /// Whether more trials wait than may be sent.
@@ -146,7 +146,7 @@ impl<'a, I> Lanes<'a, I> {
         if self.is_empty() {
             return true;
         }
-        let mut idle = self.lanes.iter().filter(|lane| lane.waiting.is_empty());
+        let mut idle = self.all.iter().filter(|lane| lane.waiting.is_empty());
         if !idle.any(|lane| lane.models.iter().any(|model| !is_stopped(*model))) {
             return false;
         }

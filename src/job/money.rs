@@ -18,6 +18,9 @@ pub(crate) struct MoneyArgs {
     /// Stop when this many trials have failed; default: never
     #[arg(long, value_name = "N", add = Decides::Nothing)]
     pub max_failures: Option<NonZeroUsize>,
+    /// End the whole run when one of its models cannot be asked any further; else the others are asked on
+    #[arg(long, add = Decides::Nothing)]
+    pub fail_fast: bool,
     /// Stop before the run has cost more than this; the same command with more goes on; default: never
     #[arg(long, value_name = "DOLLARS", value_parser = positive, add = Decides::Nothing)]
     pub max_cost: Option<f64>,
@@ -37,6 +40,8 @@ pub(crate) struct MoneySettings {
     pub max_cost: Option<f64>,
     /// Number of failed trials that ends the run; `None` for no limit.
     pub max_failures: Option<usize>,
+    /// End the run when one of its models cannot be asked any further.
+    pub fail_fast: bool,
     /// Print an estimate, and send nothing.
     pub dry_run: bool,
 }
@@ -54,6 +59,7 @@ impl MoneySettings {
             },
             max_cost: args.max_cost.map(|whole| shard.share_of_cost(whole)),
             max_failures: args.max_failures.map(NonZeroUsize::get),
+            fail_fast: args.fail_fast,
             dry_run: args.dry_run,
         })
     }

@@ -62,7 +62,7 @@ pub(crate) fn models(args: &ModelsArgs, progress: &Progress) -> Result<Outcome> 
             if answer.is_err() {
                 status = Status::Incomplete;
             }
-            let answer = answer.map_or_else(|problem| format!("FAILED: {problem}"), |reply| reply);
+            let answer = answer.unwrap_or_else(|problem| format!("FAILED: {problem}"));
             let _ = writeln!(output, "{name}: {answer}");
         }
     }

@@ -358,7 +358,7 @@ const OPEN_ADDITIONS: [Addition; 10] = [
 ];
 
 /// What changes no answer: given on the folder of a run, it asks nothing.
-const NOTHING: [&str; 28] = [
+const NOTHING: [&str; 29] = [
     "--max-pixels 1000000",
     "--threads 1",
     "--offline",
@@ -378,6 +378,7 @@ const NOTHING: [&str; 28] = [
     "--patience 60",
     "--max-image 3",
     "--max-failures 4",
+    "--fail-fast",
     "--max-cost 5",
     "--prices prices.toml",
     "--dry-run",

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
-use crate::support::endpoint::{Answer, MockEndpoint};
+use crate::support::endpoint::{Answer, MockEndpoint, Request};
 use crate::support::house::House;
 use crate::support::run::{Bench, Called, called, files, model_args, records, words};
 
@@ -332,9 +332,18 @@ fn a_fatal_answer_stops_one_model_alone() {
         "{run:?}"
     );
     assert!(run.stdout.contains("open"), "{}", run.stdout);
+    let line = RUN.replace("--out run", "--out fast --fail-fast --concurrency 1");
+    let fast = bench.call(&words(&line));
+    assert_eq!(fast.code, Some(2), "{fast:?}");
+    let refusals = refused.requests().len();
+    assert_eq!(refusals, 2);
     // The same command asks it again, and nothing else.
+    let answered = good.requests().len();
     assert_eq!(call(&bench, "").code, Some(1));
-    assert_eq!((refused.requests().len(), good.requests().len()), (2, 8));
+    assert_eq!(
+        (refused.requests().len(), good.requests().len()),
+        (3, answered)
+    );
 }
 
 #[test]
@@ -419,6 +428,16 @@ fn prices_of_a_model_hold_for_its_cost() {
     assert!(dollars.contains("unpriced"), "{dollars}");
     let called = call(&bench, "--max-cost 5 --concurrency 1");
     assert_eq!(called.code, Some(3), "{called:?}");
+    // The report knows the price, too: 90 tokens of a prompt at a dollar each.
+    let mock = MockEndpoint::start([Answer::text("A")]);
+    let priced = format!(
+        "[[model]]\nname = \"A name\"\nid = \"m\"\nendpoints = [\"{}\"]\nprice = {{ input = 1000000, output = 0 }}\n",
+        mock.base_url()
+    );
+    let bench = self::bench(1, &priced);
+    complete(&bench, "");
+    let page = fs::read_to_string(bench.path("run/report.html")).unwrap();
+    assert!(page.contains("$90"), "the cost is on the page");
 }
 
 #[test]
@@ -465,11 +484,7 @@ fn open_questions_take_a_file_of_models() {
     ));
     let line = "openeqa --questions questions.json --frames walks --num-frames 2 --image-size 32 --levels L0 --models models.toml --out run";
     house.0.complete(&words(line));
-    let bodies: Vec<Value> = mock
-        .requests()
-        .iter()
-        .map(|request| request.json())
-        .collect();
+    let bodies: Vec<Value> = mock.requests().iter().map(Request::json).collect();
     let of = |model: &str| {
         bodies
             .iter()

@@ -224,7 +224,7 @@ fn a_limit_per_minute_holds_for_all_replicas_together() {
     assert!(took >= Duration::from_millis(950), "{took:?}");
 }
 
-/// Four replicas of ten a second each. Prints the rate; the bound is far below what is measured on a quiet machine.
+/// Four replicas of ten a second each. What is turned away tells how well each is known; the time depends on the machine.
 #[test]
 fn four_replicas_are_four_times_as_fast() {
     let bench = Bench::with_questions(240);
@@ -238,7 +238,5 @@ fn four_replicas_are_four_times_as_fast() {
             .iter()
             .all(|record: &Value| record["outcome"] != "failed")
     );
-    // 40 are stored at first: 240 need 5 s at least.
-    println!("{sent} requests for 240 trials");
     assert!(sent < 300, "{sent}");
 }

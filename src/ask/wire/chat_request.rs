@@ -102,13 +102,13 @@ pub(super) fn body(
     let fields = fields.strip_suffix('}').unwrap_or(&fields);
     let head = format!("{fields},\"messages\":");
     let messages = serde_json::to_string(&messages)? + "}";
-    Ok(with_images(head, messages, message.images))
+    Ok(with_images(head, &messages, message.images))
 }
 
 /// A body of these two texts with the images in their places in the second; their bytes are shared, not copied.
-fn with_images(head: String, json: String, images: &[Arc<Payload>]) -> Parts {
+fn with_images(head: String, json: &str, images: &[Arc<Payload>]) -> Parts {
     if images.is_empty() {
-        return Parts::new([(head + &json).into()]);
+        return Parts::new([(head + json).into()]);
     }
     debug_assert_eq!(json.matches(PLACE).count(), images.len());
     let (open, close) = PLACE.split_at(PLACE.len() - 1);

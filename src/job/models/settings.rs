@@ -208,8 +208,8 @@ fn set(entries: &mut [Entry], text: &str) -> Result<()> {
     };
     let keys = Keys::from([(key, located)]);
     check_keys(&keys, false)?;
-    let named = entries.iter_mut().filter(|entry| entry.name == name);
-    named.map(|entry| entry.apply(&keys)).collect()
+    let mut named = entries.iter_mut().filter(|entry| entry.name == name);
+    named.try_for_each(|entry| entry.apply(&keys))
 }
 
 /// Keeps only the models that `--only` names.
@@ -271,8 +271,8 @@ fn resolve(
     let mut extra = request.resolve().map_err(placed)?;
     extra.deployment.clone_from(&entry.deployment);
     let parameters = Parameters {
-        constrain,
         seed,
+        constrain,
         extra,
         ..parameters
     };
@@ -301,7 +301,7 @@ fn resolve(
 /// What a model comes to, for the manifest: without keys, passwords and values of secret headers.
 fn note(entry: &Entry, resolved: &ModelSettings) -> Value {
     let access = &entry.asking.access;
-    let views: Vec<String> = entry.views.iter().map(|view| view.to_string()).collect();
+    let views: Vec<String> = entry.views.iter().map(ToString::to_string).collect();
     let names = |headers: &[String]| -> Vec<String> {
         let name = |text: &String| {
             text.split([':', '='])

@@ -1,8 +1,11 @@
 //! The cost of the replies of a run: [`cost`], [`dollars`].
 
-use crate::ask::Prices;
+use serde_json::Value;
+
+use crate::ask::{Price, Prices};
 use crate::error::Result;
 use crate::report::forecast::money;
+use crate::types::manifest::RunManifest;
 use crate::types::{Record, Via};
 
 /// The cost of replies of a model at list prices, in US dollars; `None` if the model has no known price or no reply says its tokens.
@@ -16,19 +19,43 @@ pub(super) fn dollars<D>(model: &str, records: &[&Record<D>]) -> Result<Option<f
 
 /// The cost of a reply; `None` if it is not known.
 fn charged<D>(prices: &Prices, model: &str, record: &Record<D>) -> Option<f64> {
+    charged_at(prices.of(model)?, prices.batch, record)
+}
+
+/// The cost of a reply at this price; `batch` is the share of it that a batch costs.
+fn charged_at<D>(price: Price, batch: f64, record: &Record<D>) -> Option<f64> {
     let share = match record.via {
         Via::Direct | Via::File => 1.0,
-        Via::Batch => prices.batch,
+        Via::Batch => batch,
     };
-    Some(share * prices.of(model)?.charged(record.usage?))
+    Some(share * price.charged(record.usage?))
+}
+
+/// The price of a model of a run: the one that its file of models states, else that of the table by the name that the endpoint knows.
+fn price(prices: &Prices, manifest: &RunManifest, model: &str) -> Option<Price> {
+    let mut stated = manifest
+        .settings
+        .get("models")
+        .and_then(Value::as_array)
+        .into_iter()
+        .flatten();
+    let stated = stated.find(|entry| entry["name"] == *model);
+    let stated = stated.and_then(|entry| serde_json::from_value(entry.get("price")?.clone()).ok());
+    let columns = manifest
+        .columns
+        .get("model")
+        .and_then(|models| models.get(model));
+    let id = columns.and_then(|content| content.get("--model")?.as_str());
+    stated.or_else(|| prices.of(id.unwrap_or(model)))
 }
 
 /// The cost of a run's replies at list prices, as text; `None` if no model of the run has a known price.
-pub(super) fn cost<D>(records: &[Record<D>]) -> Result<Option<String>> {
+pub(super) fn cost<D>(records: &[Record<D>], manifest: &RunManifest) -> Result<Option<String>> {
     let prices = Prices::built_in()?;
     let (mut dollars, mut counted, mut unknown) = (0.0, 0_usize, 0_usize);
     for record in records.iter().filter(|record| record.reply.is_some()) {
-        match charged(&prices, &record.model, record) {
+        let price = price(&prices, manifest, &record.model);
+        match price.and_then(|price| charged_at(price, prices.batch, record)) {
             Some(cost) => {
                 dollars += cost;
                 counted += 1;

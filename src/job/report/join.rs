@@ -111,7 +111,7 @@ impl<D: Detail> Joined<D> {
         name: String,
         known: &mut Known,
     ) -> Result<JoinedRun> {
-        let cost = cost(&run.records)?;
+        let cost = cost(&run.records, &run.manifest)?;
         let mut records = Vec::with_capacity(run.records.len());
         let (mut replies, mut added) = (0, 0);
         let served = served(&run.records);
