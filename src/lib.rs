@@ -104,6 +104,7 @@
 //! | a format to import | `import/<kind>.rs`, `import/mod.rs`, `import/README.md`, `tests/program/import.rs` |
 //! | a kind of degradation | `types/degradation.rs`, `synthesis/<kind>.rs`, `synthesis/mod.rs`, `synthesis/applied.rs`, `synthesis/exposures.rs`, `tests/program/synthesize.rs`, `results/README.md`; with an axis of its own `types/severity.rs`, `synthesis/levels.rs` |
 //! | an API of endpoints | `ask/wire/<api>.rs`, `ask/wire/mod.rs`, `job/models.rs`, `tests/support/endpoint.rs`, `tests/program/ask.rs` |
+//! | a vendor of endpoints | `ask/vendors.toml` |
 //! | a rule of reading replies | `score/choice/`, its words in `words.toml`, `LENIENT_VERSION`, `tests/data/replies_by_rule.jsonl` |
 //! | an experiment | `run/<experiment>/`, its detail in `types/detail.rs` and `score/record.rs`, `job/stored.rs` |
 //!

@@ -2,8 +2,9 @@
 //! stage.
 //!
 //! [`Prompts`] turn a question into text, [`Payload`] an image into the text of a data URL; both are CPU work and done before.
-//! A [`Model`] takes the two as the [`Message`] of a [`Call`]. [`Remote`] is a model at an [`Endpoint`]. The endpoint has the
-//! address, key, connections and pauses of one server; all models at that server share it. A [`Wire`] defines the form of
+//! A [`Model`] takes the two as the [`Message`] of a [`Call`]. [`Remote`] is a model at an [`Endpoint`]. The endpoint is one server,
+//! at one or several addresses: each replica has its key, connections and pauses. All models at that server share it. What is known
+//! of vendors is a table, `vendors.toml`. A [`Wire`] defines the form of
 //! requests and replies: one file an API, in `wire/`.
 
 mod access;
