@@ -1,5 +1,6 @@
 //! Fields of a request that the user adds or leaves out: their flags ([`RequestArgs`]) and what they come to ([`ExtraFields`]).
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -69,6 +70,9 @@ pub struct ExtraFields {
     /// The words of a system message before each question.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub system: Option<String>,
+    /// Headers that decide replies, with their values.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub reply_headers: BTreeMap<String, String>,
     /// The fields that are merged into the body. As a text in the key: there a null, which removes a field, is kept.
     #[serde(
         rename = "extra_body",
@@ -121,6 +125,7 @@ impl RequestArgs {
         let body = self.extra_body.as_deref().map(body).transpose()?;
         Ok(ExtraFields {
             deployment: None,
+            reply_headers: BTreeMap::new(),
             system,
             body: body.unwrap_or_default(),
             omit,

@@ -14,6 +14,7 @@ use super::failure::{AskError, Reach};
 use super::field::{AdaptableField, RequestFields, SentFields};
 use super::parameters::{Constrain, Parameters, Temperature, TokenField};
 use super::request::Request;
+use super::vendor::Vendor;
 use super::wire::Wire;
 use crate::error::{Error, Result};
 use crate::types::{FailureKind, Reply};
@@ -58,6 +59,9 @@ impl Remote {
         {
             let problem = format_args!("{field} is set by --constrain; leave one of them out");
             return Err(Error::usage("--extra-body", problem));
+        }
+        if let Some(vendor) = Vendor::of(endpoint.host()) {
+            check_vendor(vendor, &parameters)?;
         }
         Ok(Self {
             headers: endpoint.headers(wire)?,
@@ -260,6 +264,29 @@ impl Remote {
             text
         })
     }
+}
+
+/// Refuses a constraint that the vendor ignores, and warns if requests to it are not repeatable.
+fn check_vendor(vendor: &Vendor, parameters: &Parameters) -> Result<()> {
+    if vendor.ignores_constraints() && parameters.constrain != Constrain::None {
+        let problem = format_args!(
+            "{} takes a constraint and ignores it, so it would be none; leave it out",
+            vendor.name
+        );
+        return Err(Error::usage("--constrain", problem));
+    }
+    if let Some(field) = vendor
+        .pin
+        .as_deref()
+        .filter(|field| !parameters.extra.adds(field))
+    {
+        warn!(
+            "{}: {} may answer each request in another way unless {field} is set in the body (--extra-body): the run may not be \
+             repeatable",
+            parameters.model, vendor.name
+        );
+    }
+    Ok(())
 }
 
 /// A number that is the same for all questions about the same images.

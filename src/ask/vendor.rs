@@ -28,6 +28,10 @@ pub(crate) struct Vendor {
     pub(super) image_bytes: Option<usize>,
     /// The longest side of an image, in pixels.
     pub(super) image_side: Option<u32>,
+    /// What the vendor does with a constraint on replies; `None` if it keeps it, or that is not known.
+    constrain: Option<Constraining>,
+    /// A field of the body without which requests are not repeatable.
+    pub(super) pin: Option<String>,
     /// Headers that name the account and are not secret, each with the variable that holds its value.
     #[serde(default)]
     pub(super) account: BTreeMap<String, String>,
@@ -42,6 +46,12 @@ enum Header {
     #[default]
     Bearer,
     ApiKey,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Constraining {
+    Ignored,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
@@ -71,6 +81,11 @@ impl Vendor {
     pub(crate) fn of(host: &str) -> Option<&'static Self> {
         let mut vendors = VENDORS.vendor.iter();
         vendors.find(|vendor| vendor.hosts.iter().any(|end| is_below(host, end)))
+    }
+
+    /// Whether a constraint on replies has no effect.
+    pub(super) fn ignores_constraints(&self) -> bool {
+        self.constrain == Some(Constraining::Ignored)
     }
 
     /// The header in which this vendor expects the key.

@@ -96,8 +96,9 @@ fn model(model: &ModelUnderTest) -> Value {
 fn flag(parameter: &str) -> String {
     match parameter {
         "seed" => "--sampling-seed".to_owned(),
-        // A key of a file of models that is no flag.
+        // Keys of a file of models that are no flags.
         "deployment" => "deployment".to_owned(),
+        "reply_headers" => "reply-headers".to_owned(),
         name => format!("--{}", name.replace('_', "-")),
     }
 }

@@ -186,6 +186,7 @@ impl JobArgs {
             sending: self.sending,
             constrain: experiment.constrain,
             seed: experiment.sampling_seed,
+            reply_headers: Vec::new(),
         };
         let context = ResolveContext {
             typed: &self.typed,

@@ -506,6 +506,58 @@ fn open_questions_take_a_file_of_models() {
 }
 
 #[test]
+fn headers_that_decide_replies_are_part_of_a_trial() {
+    let mock = MockEndpoint::start([Answer::text("A")]);
+    let url = mock.base_url();
+    let table = |name: &str, header: &str, more: &str| {
+        format!(
+            "[[model]]\nname = \"{name}\"\nid = \"m\"\nendpoints = [\"{url}\"]\nheaders = {{ X-Beta = \"{header}\" }}\n{more}\n"
+        )
+    };
+    let decides = "reply-headers = [\"x-beta\"]";
+    let bench = bench(
+        1,
+        &(table("one", "1", decides) + &table("two", "2", decides) + &table("none", "3", "")),
+    );
+    complete(&bench, "");
+    let keys: std::collections::BTreeSet<String> = keys(&bench, "run").into_values().collect();
+    assert_eq!((keys.len(), mock.requests().len()), (3, 3));
+    let error = refusal(&(table("one", "1", "") + &table("two", "2", "")), "");
+    assert!(error.contains("differ in nothing"), "{error}");
+    let error = refusal(&table("one", "1", "reply-headers = [\"x-other\"]"), "");
+    assert!(error.contains("x-other: no header of this name"), "{error}");
+}
+
+#[test]
+fn what_is_known_of_a_vendor_is_said_before_anything_is_sent() {
+    let table = |id: &str, url: &str, more: &str| {
+        format!("[[model]]\nid = \"{id}\"\nendpoints = [\"{url}\"]\n{more}\n")
+    };
+    let anthropic = table(
+        "claude-opus-5",
+        "https://api.anthropic.com/v1",
+        "constrain = \"json\"",
+    );
+    let error = refusal(&anthropic, "--dry-run");
+    assert!(
+        error.contains("--constrain: Anthropic takes a constraint and ignores it"),
+        "{error}"
+    );
+    let mixed = table("q/m", "https://openrouter.ai/api/v1", "");
+    let pinned = table(
+        "q/n",
+        "https://openrouter.ai/api/v1",
+        "body = { provider = { order = [\"a\"] } }",
+    );
+    let called = call(&bench(1, &(mixed + &pinned)), "--dry-run");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert!(
+        called.stderr.contains("q/m: OpenRouter may answer") && !called.stderr.contains("q/n"),
+        "{called:?}"
+    );
+}
+
+#[test]
 fn a_near_miss_of_a_built_in_model_is_refused() {
     let bench = Bench::with_questions(1);
     let called = bench.call(&words("--model rndom --data set.jsonl --out run"));

@@ -27,6 +27,9 @@ pub(crate) struct AskingArgs {
     /// The seed of the server's sampling.
     #[arg(long)]
     pub(crate) seed: Option<u64>,
+    /// Names of headers that decide replies.
+    #[arg(long)]
+    pub(crate) reply_headers: Vec<String>,
 }
 
 impl AskingArgs {

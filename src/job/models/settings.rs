@@ -261,6 +261,7 @@ fn resolve(
         sending,
         constrain,
         seed,
+        reply_headers,
     } = entry.asking.clone();
     let placed = |e: Error| match (&entry.place, e) {
         (Some(place), Error::Usage { origin, problem }) => {
@@ -269,6 +270,19 @@ fn resolve(
         (_, e) => e,
     };
     let mut extra = request.resolve().map_err(placed)?;
+    for name in reply_headers {
+        let value = plain_header(&access.header, &name);
+        let problem =
+            "no header of this name with a value in headers: only such a one can decide replies";
+        let missing = || {
+            placed(Error::usage(
+                "reply-headers",
+                format_args!("{name}: {problem}"),
+            ))
+        };
+        let value = value.ok_or_else(missing)?;
+        extra.reply_headers.insert(name.to_lowercase(), value);
+    }
     extra.deployment.clone_from(&entry.deployment);
     let parameters = Parameters {
         seed,
@@ -296,6 +310,13 @@ fn resolve(
         price: entry.price,
         limit: entry.limit.map(std::num::NonZeroUsize::get),
     })
+}
+
+/// The value of a header that is not secret.
+fn plain_header(headers: &[String], name: &str) -> Option<String> {
+    let mut headers = headers.iter().filter_map(|text| text.split_once(':'));
+    let found = headers.find(|(other, _)| other.trim().eq_ignore_ascii_case(name));
+    found.map(|(_, value)| value.trim().to_owned())
 }
 
 /// What a model comes to, for the manifest: without keys, passwords and values of secret headers.
