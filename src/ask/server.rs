@@ -74,6 +74,12 @@ pub(crate) struct Server {
 }
 
 impl Server {
+    /// The maximum number of requests in flight, at all replicas together.
+    pub(crate) fn most_in_flight(&self) -> usize {
+        let replicas = self.replicas.len();
+        self.sending.concurrency.share(replicas).most() * replicas
+    }
+
     /// The addresses of all replicas, as text without secrets.
     pub(crate) fn addresses(&self) -> Vec<String> {
         let replicas = self.replicas.iter();

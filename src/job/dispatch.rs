@@ -79,9 +79,11 @@ impl Dispatcher<'_> {
     }
 
     fn breaker(&self) -> CircuitBreaker {
+        let servers = self.models.iter().filter_map(|model| model.server.as_ref());
+        let most = servers.map(|server| server.most_in_flight()).max();
         CircuitBreaker::new(
             self.models,
-            self.settings.concurrency.most(),
+            most.unwrap_or(self.settings.concurrency.most()),
             self.settings.money.max_failures,
         )
         .failing_fast(self.settings.money.fail_fast)
