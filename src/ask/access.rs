@@ -10,7 +10,7 @@ use reqwest::{Certificate, Client, redirect};
 use super::key_header::KeyHeader;
 use super::secret::{Scrub, Secret};
 use super::url::BaseUrl;
-use super::wire::Wire;
+use super::wire_kind::Wire;
 use crate::error::{Error, Result};
 
 /// The maximum time to open a connection; chosen.

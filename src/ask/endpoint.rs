@@ -11,16 +11,16 @@ use tracing::debug;
 use super::access::Access;
 use super::body::Parts;
 use super::complaint::{Complaint, UnreadableReply};
-use super::connection::{Connection, HttpReply};
+use super::connection::{Connection, Deadline, HttpReply};
 use super::failure::{Again, AskError, FailedTry, Reach};
 use super::failure_class::FailureClass;
 use super::field::SentFields;
 use super::pace::{Allowance, Gate, Window, asked_wait};
 use super::sending::Sending;
 use super::url::BaseUrl;
-use super::wire::Wire;
+use super::wire_kind::Wire;
 use crate::error::Result;
-use crate::types::{Failure, FailureKind, Reply};
+use crate::types::{Failure, FailureKind, Finish, Reply};
 
 /// The maximum wait between retries if the server asks for none; chosen. A server may ask for longer waits.
 const MAX_DELAY: Duration = Duration::from_secs(30);
@@ -170,7 +170,12 @@ impl Endpoint {
     async fn send(&self, request: &Request<'_>, sent: Instant) -> Result<Reply, FailedTry> {
         let Request { wire, headers, .. } = *request;
         let body = request.body.clone();
-        let posted = self.connection.post(wire.path(), headers, body).await;
+        let deadline = match wire {
+            Wire::ChatStream => Deadline::Silence,
+            Wire::Chat | Wire::Responses => Deadline::Whole,
+        };
+        let posted = self.connection.post(wire.path(), headers, body, deadline);
+        let posted = posted.await;
         let answer = posted.inspect_err(|failed| {
             if failed.failure.kind == FailureKind::Timeout {
                 self.window.overloaded(sent);
@@ -224,6 +229,12 @@ impl Endpoint {
             text: scrubbed(reply.text),
             refusal: reply.refusal.map(scrubbed),
             served_model: reply.served_model.map(scrubbed),
+            finish: match reply.finish {
+                // Shortened last: otherwise the first half of a key could remain.
+                Finish::Other(reason) => Finish::Other(self.connection.scrub.line(&reason)),
+                finish => finish,
+            }
+            .shortened(),
             latency_ms: answer.took.as_millis() as u64,
             ..reply
         }

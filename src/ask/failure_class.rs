@@ -2,8 +2,9 @@
 
 use super::complaint::Complaint;
 use super::failure::Reach;
-use super::field::{AdaptableField, RequestField, SentFields, is_unsupported};
-use super::wire::Wire;
+use super::field::{AdaptableField, FieldState, RequestField, SentFields, is_unsupported};
+use super::wire::other_wire;
+use super::wire_kind::Wire;
 use crate::types::FailureKind;
 
 /// The consequences of a refused request.
@@ -81,6 +82,9 @@ const ADD_CREDIT: &str = "the account has no credit left: add some, then go on w
 impl FailureClass {
     /// The class of a refused request, from its status and the server's error.
     pub(super) fn of(status: u16, complaint: &Complaint, wire: Wire, sent: SentFields<'_>) -> Self {
+        if let Some(wanted) = other_wire(complaint, wire).filter(|_| (400..500).contains(&status)) {
+            return Self::of_wire(wanted);
+        }
         let no_credit = complaint.has_code(&NO_CREDIT)
             || (matches!(status, 400 | 402 | 403 | 429)
                 && complaint.mentions_any(&NO_CREDIT_WORDS));
@@ -171,13 +175,30 @@ impl FailureClass {
         }
     }
 
+    /// The class of a request that the server takes through another wire alone.
+    fn of_wire(wanted: Wire) -> Self {
+        let hint = match wanted {
+            Wire::Responses => "ask the model through the Responses API: --wire responses",
+            _ => "ask for a stream: --wire chat-stream",
+        };
+        Self {
+            refused_field: Some(AdaptableField::Wire(wanted)),
+            ..Self::permanent(hint)
+        }
+    }
+
     /// The class of a request that may have been refused for one of its fields. If the server names the field, every other
-    /// request with it fails too. If only the text mentions it, the cause may be this request alone.
+    /// request with it fails too, and so does every request if the server refuses what is not sent any more. If only the text mentions it, the
+    /// cause may be this request alone.
     fn of_field(complaint: &Complaint, fields: &[RequestField]) -> Self {
-        let mut sent = fields.iter().filter(|field| field.sent);
-        let (reach, field) = match sent.clone().find(|field| field.is_named(complaint)) {
+        let with = |state| fields.iter().filter(move |field| field.state == state);
+        let mut withdrawn = with(FieldState::Withdrawn);
+        let (reach, field) = match with(FieldState::Sent).find(|field| field.is_named(complaint)) {
             Some(field) => (Reach::Endpoint, field),
-            None => match sent.find(|field| field.is_mentioned(complaint)) {
+            None if withdrawn.any(|field| field.is_named(complaint)) => {
+                return Self::permanent("the server refuses a field that is not sent any more");
+            }
+            None => match with(FieldState::Sent).find(|field| field.is_mentioned(complaint)) {
                 Some(field) => (Reach::Trial, field),
                 None => return Self::request_refused(),
             },
@@ -211,8 +232,10 @@ mod tests {
         let sent = SentFields {
             parameters: &parameters(),
             fields: RequestFields {
+                wire: Wire::Chat,
                 token_field: TokenField::MaxTokens,
                 temperature: Some(0.0),
+                stream_usage: true,
             },
             has_image: true,
             has_key: true,
@@ -322,8 +345,24 @@ mod tests {
             ),
             (
                 r#"{"error":{"message":"Unsupported: 'max_tokens'. Use 'max_completion_tokens' instead."}}"#,
-                Reach::Trial,
+                Reach::Endpoint,
                 "--token-field max_completion_tokens",
+            ),
+            (
+                r#"{"error":{"message":"`temperature` is deprecated for this model."}}"#,
+                Reach::Endpoint,
+                "--temperature default",
+            ),
+            (
+                r#"{"detail":[{"type":"extra_forbidden","loc":["body","temperature"],"msg":"Extra inputs are not permitted"}]}"#,
+                Reach::Endpoint,
+                "--temperature default",
+            ),
+            // The words may be about this request alone.
+            (
+                r#"{"error":{"message":"max_tokens is too large for this prompt: 1024"}}"#,
+                Reach::Trial,
+                "--max-tokens",
             ),
             (
                 r#"{"error":{"param":"reasoning_effort","message":"x"}}"#,

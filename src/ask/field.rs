@@ -3,6 +3,7 @@
 
 use super::complaint::Complaint;
 use super::parameters::{Parameters, Temperature, TokenField};
+use super::wire_kind::{Wire, WireSetting};
 
 /// A field that a server may refuse and that the program can send in another way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -11,28 +12,99 @@ pub enum AdaptableField {
     TokenField,
     /// The temperature; some models accept only their default.
     Temperature,
+    /// The wire, to the one that the server asks for.
+    Wire(Wire),
+    /// The request for the number of tokens in a stream.
+    StreamUsage,
 }
 
 /// The adaptable fields of a request, as found out once for a whole run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct RequestFields {
+    /// The API.
+    pub(super) wire: Wire,
     /// The name of the token limit, never `Auto`.
     pub(super) token_field: TokenField,
     /// The temperature; `None` if none is sent.
     pub(super) temperature: Option<f64>,
+    /// Whether a stream is asked for the number of its tokens.
+    pub(super) stream_usage: bool,
 }
 
 impl RequestFields {
     /// The fields of the first request to a host.
     pub(super) fn first(parameters: &Parameters, host: &str) -> Self {
         Self {
+            wire: parameters.wire.first(),
             token_field: parameters.token_field.at(host),
             temperature: match parameters.temperature {
                 Temperature::Auto => Some(0.0),
                 Temperature::Server => None,
                 Temperature::Of(value) => Some(value),
             },
+            stream_usage: true,
         }
+    }
+
+    /// These fields after a server refused one of them; `None` if the user set it, or if it was changed before: a token limit is sent
+    /// by its other name and then not at all.
+    pub(super) fn after_refusal(
+        self,
+        field: AdaptableField,
+        first: Self,
+        parameters: &Parameters,
+    ) -> Option<Self> {
+        let adapted = match field {
+            AdaptableField::Wire(wire) if parameters.wire == WireSetting::Auto => {
+                Self { wire, ..self }
+            }
+            AdaptableField::TokenField if parameters.token_field == TokenField::Auto => {
+                let is_first = self.token_field == first.token_field;
+                let token_field = match self.token_field {
+                    TokenField::MaxTokens if is_first => TokenField::MaxCompletionTokens,
+                    _ if is_first => TokenField::MaxTokens,
+                    _ => TokenField::Omit,
+                };
+                // The Responses API has one name for it.
+                let token_field = match self.wire {
+                    Wire::Responses => TokenField::Omit,
+                    _ => token_field,
+                };
+                Self {
+                    token_field,
+                    ..self
+                }
+            }
+            AdaptableField::Temperature if parameters.temperature == Temperature::Auto => Self {
+                temperature: None,
+                ..self
+            },
+            AdaptableField::StreamUsage => Self {
+                stream_usage: false,
+                ..self
+            },
+            _ => return None,
+        };
+        (adapted != self).then_some(adapted)
+    }
+
+    /// What changed since the `first` request, in words.
+    pub(super) fn changes(self, first: Self) -> Vec<String> {
+        let wire = match self.wire {
+            wire if wire == first.wire => None,
+            Wire::Responses => Some("it is asked through the Responses API".to_owned()),
+            _ => Some("its replies are streamed".to_owned()),
+        };
+        let field = (self.token_field != first.token_field).then(|| match self.token_field {
+            TokenField::Omit => "no token limit is sent".to_owned(),
+            field => format!("the token limit is sent as {field}"),
+        });
+        let temperature = (self.temperature != first.temperature)
+            .then(|| "no temperature is sent: the server's own holds".to_owned());
+        let usage = (self.stream_usage != first.stream_usage)
+            .then(|| "a stream is not asked for the number of its tokens".to_owned());
+        let changes = [wire, field, temperature, usage];
+        changes.into_iter().flatten().collect()
     }
 }
 
@@ -67,11 +139,41 @@ const UNSUPPORTED: [&str; 18] = [
     "instead",
 ];
 
+/// Whether a field is in a request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum FieldState {
+    /// It is.
+    Sent,
+    /// It is not sent any more, because the server refused it before.
+    Withdrawn,
+    /// It was never sent, so it is not the cause of a refusal.
+    Absent,
+}
+
+impl FieldState {
+    /// The state of a field that is sent if it is set.
+    pub(super) fn set(sent: bool) -> Self {
+        if sent { Self::Sent } else { Self::Absent }
+    }
+
+    /// The state of a field that is sent until the server refuses it, unless the user leaves it out.
+    pub(super) fn until_refused(sent: bool, left_out: bool) -> Self {
+        match (sent, left_out) {
+            (true, _) => Self::Sent,
+            (false, true) => Self::Absent,
+            (false, false) => Self::Withdrawn,
+        }
+    }
+}
+
+/// Names of fields that are ordinary words, too: in a message they count only in quotation marks.
+const ORDINARY_WORDS: [&str; 5] = ["detail", "effort", "format", "reasoning", "seed"];
+
 /// A field of a request, with the remedy if it is refused.
 pub(super) struct RequestField {
     pub(super) name: &'static str,
-    /// Whether the field was sent; otherwise it is not the cause.
-    pub(super) sent: bool,
+    /// Whether the field was sent.
+    pub(super) state: FieldState,
     /// The remedy for the user: the flag that changes the field.
     pub(super) hint: &'static str,
     /// The kind of field, if the program can send it in another way.
@@ -79,15 +181,32 @@ pub(super) struct RequestField {
 }
 
 impl RequestField {
-    /// Whether the server names the field as the cause.
+    /// Whether the server names the field as the cause: in the error's own field for it, or in words of refusal that name it.
     pub(super) fn is_named(&self, complaint: &Complaint) -> bool {
         let param = complaint.param.as_deref();
-        param.is_some_and(|param| param.rsplit(['.', '/']).next() == Some(self.name))
+        let param = param.and_then(|param| param.rsplit(['.', '/']).next());
+        if param == Some(self.name) {
+            return true;
+        }
+        let is_ordinary = ORDINARY_WORDS.contains(&self.name);
+        let in_words = self.is_mentioned(complaint) && !is_ordinary;
+        is_unsupported(complaint) && (in_words || self.is_quoted(complaint))
     }
 
     /// Whether the server's text mentions the field.
     pub(super) fn is_mentioned(&self, complaint: &Complaint) -> bool {
-        mentions(&complaint.message, self.name)
+        mentions(&complaint.message.to_lowercase(), self.name)
+    }
+
+    /// Whether the server's text has the field in quotation marks, alone or at the end of a path.
+    fn is_quoted(&self, complaint: &Complaint) -> bool {
+        let quoted = complaint
+            .message
+            .split(['`', '\'', '"', '“', '”', '‘', '’']);
+        quoted
+            .skip(1)
+            .step_by(2)
+            .any(|path| path.rsplit(['.', '/']).next() == Some(self.name))
     }
 }
 

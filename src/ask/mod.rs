@@ -3,8 +3,8 @@
 //!
 //! [`Prompts`] turn a question into text, [`Payload`] an image into the text of a data URL; both are CPU work and done before.
 //! A [`Model`] takes the two as the [`Message`] of a [`Call`]. [`Remote`] is a model at an [`Endpoint`]. The endpoint has the
-//! address, key, connections and pauses of one server; all models at that server share it. A [`Wire`] defines the form of
-//! requests and replies: one file an API, in `wire/`.
+//! address, key, connections and pauses of one server; all models at that server share it. A [`Wire`](wire_kind::Wire) defines the
+//! form of requests and replies: files of one API in `wire/`.
 
 mod access;
 pub(crate) mod batch;
@@ -38,6 +38,7 @@ mod sending;
 mod server;
 mod url;
 mod wire;
+mod wire_kind;
 
 pub use access::Access;
 pub use call::{Call, Message, Query};
@@ -61,4 +62,4 @@ pub use secret::Secret;
 pub use sending::Sending;
 pub(crate) use server::{AccessArgs, Server};
 pub use url::BaseUrl;
-pub use wire::Wire;
+pub use wire_kind::WireSetting;

@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use super::wire_kind::WireSetting;
 use crate::types::Decides;
 use crate::types::flag::flag_words;
 use crate::types::words::written_as_text;
@@ -45,6 +46,10 @@ pub struct Parameters {
     /// How closely the server looks at images; default: not sent
     #[arg(long, value_name = "DETAIL", value_enum, add = Decides::Reply)]
     pub detail: Option<ImageDetail>,
+    /// The API: chat in one piece or as a stream, or the Responses API; auto is chat, and what the server asks for instead
+    #[arg(long, value_name = "WIRE", value_enum, default_value_t, add = Decides::Reply)]
+    #[serde(skip)]
+    pub wire: WireSetting,
     /// The seed of the server's sampling, if the server supports it: replies at a temperature above 0 are then more alike.
     #[arg(skip)]
     pub seed: Option<u64>,
@@ -69,6 +74,7 @@ impl Parameters {
             token_field: TokenField::Auto,
             reasoning_effort: None,
             detail: None,
+            wire: WireSetting::Auto,
             constrain: Constrain::None,
         }
     }
@@ -78,10 +84,11 @@ impl Parameters {
         (self.token_field != TokenField::Omit).then_some(self.max_tokens.get())
     }
 
-    /// The settings that can change a reply. Whether a token limit is sent is one of them; the name of its field is not.
+    /// The settings that can change a reply, the API among them. Whether a token limit is sent is one of them; the name of its field is not.
     pub(super) fn content(&self) -> Value {
         let mut content = json!(self);
         content["max_tokens"] = self.limit().into();
+        content["wire"] = self.wire.content().into();
         content
     }
 }
@@ -211,7 +218,7 @@ mod tests {
     #[test]
     fn settings_that_decide_a_reply_change_the_content() {
         let base = Parameters::new("m".into());
-        let mut others = vec![base.clone(); 8];
+        let mut others = vec![base.clone(); 9];
         others[0].model = "n".into();
         others[1].temperature = Temperature::Server;
         others[2].token_field = TokenField::Omit;
@@ -220,11 +227,13 @@ mod tests {
         others[5].constrain = Constrain::Json;
         others[6].temperature = Temperature::Of(0.0);
         others[7].seed = Some(0);
+        others[8].wire = WireSetting::Responses;
         for other in &others {
             assert_ne!(other.content(), base.content(), "{other:?}");
         }
         let renamed = Parameters {
             token_field: TokenField::MaxTokens,
+            wire: WireSetting::ChatStream,
             ..base.clone()
         };
         assert_eq!(renamed.content(), base.content());

@@ -4,31 +4,40 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use reqwest::header::HeaderMap;
-use serde_json::{Value, json};
+use serde_json::Value;
 use tracing::warn;
 
 use super::call::Message;
 use super::constraint::letter_of;
 use super::endpoint::{Endpoint, Request};
-use super::failure::AskError;
+use super::failure::{AskError, Reach};
 use super::field::{AdaptableField, RequestFields, SentFields};
-use super::parameters::{Constrain, Parameters, Temperature, TokenField};
-use super::wire::Wire;
+use super::parameters::{Constrain, Parameters};
 use crate::error::Result;
 use crate::types::{FailureKind, Reply};
 
-/// One model of an endpoint, asked through one API with one set of parameters.
+/// What the first question to a model has shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Scout {
+    /// It has not come to an end yet.
+    Pending,
+    /// The others can be asked.
+    Passed,
+    /// Every other request would be refused, too.
+    Refused,
+}
+
+/// One model of an endpoint, asked with one set of parameters.
 #[derive(Debug)]
 pub struct Remote {
     endpoint: Arc<Endpoint>,
-    wire: Wire,
     headers: HeaderMap,
     parameters: Parameters,
     /// The fields that the server accepts, as far as is known.
     fields: Mutex<RequestFields>,
-    /// Whether a question to the model has come to an end. Until the first has, the others wait: what the server refuses in all requests
-    /// is then found out by one.
-    scouted: tokio::sync::Mutex<bool>,
+    /// What is known from the first question to the model. Until it has come to an end, the others wait: what the server refuses in
+    /// all requests is then found out by one.
+    scout: tokio::sync::Mutex<Scout>,
     /// Whether the warning about an unconstrained reply was printed.
     warned_unconstrained: AtomicBool,
 }
@@ -38,14 +47,13 @@ impl Remote {
     ///
     /// # Errors
     /// If a header value has characters that HTTP does not allow.
-    pub fn open(endpoint: Arc<Endpoint>, wire: Wire, parameters: Parameters) -> Result<Self> {
+    pub fn open(endpoint: Arc<Endpoint>, parameters: Parameters) -> Result<Self> {
         Ok(Self {
-            headers: endpoint.headers(wire)?,
+            headers: endpoint.headers(parameters.wire.first())?,
             fields: Mutex::new(RequestFields::first(&parameters, endpoint.host())),
             endpoint,
-            wire,
             parameters,
-            scouted: tokio::sync::Mutex::new(false),
+            scout: tokio::sync::Mutex::new(Scout::Pending),
             warned_unconstrained: AtomicBool::new(false),
         })
     }
@@ -72,38 +80,42 @@ impl Remote {
     /// once for all requests, and never for a single one.
     #[must_use]
     pub fn adapted(&self) -> Vec<String> {
-        let (first, now) = (
-            RequestFields::first(&self.parameters, self.endpoint.host()),
-            self.fields(),
-        );
-        let field = (now.token_field != first.token_field)
-            .then(|| format!("the token limit is sent as {}", now.token_field));
-        let temperature = (now.temperature != first.temperature)
-            .then(|| "no temperature is sent: the server's own holds".to_owned());
-        field.into_iter().chain(temperature).collect()
+        self.fields().changes(self.first_fields())
     }
 
     /// The API and all parameters that can change a reply.
     pub(super) fn content(&self) -> Value {
-        let mut content = self.parameters.content();
-        content["wire"] = json!(self.wire);
-        content
+        self.parameters.content()
     }
 
-    /// The path in a line of a Batch API's file; `None` if the API has no batches.
-    pub(super) fn batch_url(&self) -> Option<&'static str> {
-        self.wire.batch_url()
+    /// The path in a line of a Batch API's file.
+    pub(super) fn batch_url(&self) -> &'static str {
+        self.fields().wire.batch_url()
     }
 
     /// Sends the single message of a conversation with this number of choices; 0 if the question is open.
     pub async fn ask(&self, message: Message<'_>, choices: usize) -> Result<Reply, AskError> {
-        let mut scouted = self.scouted.lock().await;
-        if *scouted {
-            drop(scouted);
-            return self.ask_adapting(message, choices).await;
+        let mut scout = self.scout.lock().await;
+        match *scout {
+            Scout::Pending => {}
+            Scout::Passed => {
+                drop(scout);
+                return self.ask_adapting(message, choices).await;
+            }
+            Scout::Refused => {
+                let message = "the server refused the first request, and would refuse this one";
+                let error = AskError::new(FailureKind::Request, message.to_owned(), 0);
+                return Err(AskError {
+                    reach: Reach::Interrupted,
+                    ..error
+                });
+            }
         }
         let outcome = self.ask_adapting(message, choices).await;
-        *scouted = true;
+        *scout = match &outcome {
+            Err(error) if error.reach == Reach::Endpoint => Scout::Refused,
+            _ => Scout::Passed,
+        };
         outcome
     }
 
@@ -131,13 +143,18 @@ impl Remote {
         }
     }
 
-    /// The body of a request as it would be sent now, in one piece.
+    /// The body of a request in a batch, in one piece.
     ///
     /// # Errors
     /// If it cannot be written as JSON.
-    pub fn body(&self, message: Message<'_>, choices: usize) -> Result<Vec<u8>, serde_json::Error> {
-        let (parameters, fields) = (&self.parameters, self.fields());
-        let body = self.wire.body(parameters, fields, message, choices)?;
+    pub(super) fn batch_body(
+        &self,
+        message: Message<'_>,
+        choices: usize,
+    ) -> Result<Vec<u8>, serde_json::Error> {
+        let fields = self.fields();
+        let wire = fields.wire.in_batch();
+        let body = wire.body(&self.parameters, fields, message, choices)?;
         Ok(body.joined())
     }
 
@@ -148,13 +165,13 @@ impl Remote {
         choices: usize,
     ) -> Result<Reply, AskError> {
         let parameters = &self.parameters;
-        let body = self.wire.body(parameters, fields, message, choices);
+        let body = fields.wire.body(parameters, fields, message, choices);
         let body = body.map_err(|error| {
             let message = format!("the request could not be written: {error}");
             AskError::new(FailureKind::Request, message, 0)
         })?;
         let request = Request {
-            wire: self.wire,
+            wire: fields.wire,
             headers: &self.headers,
             body,
             sent: SentFields {
@@ -167,6 +184,10 @@ impl Remote {
         self.endpoint.ask(&request).await
     }
 
+    fn first_fields(&self) -> RequestFields {
+        RequestFields::first(&self.parameters, self.endpoint.host())
+    }
+
     fn fields(&self) -> RequestFields {
         *self.fields.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -174,41 +195,25 @@ impl Remote {
     /// Changes the field for which a request with the fields `sent` was refused, if its setting is `auto`. Returns whether to
     /// ask again.
     fn adapt(&self, sent: RequestFields, refused_field: Option<AdaptableField>) -> bool {
-        let first = RequestFields::first(&self.parameters, self.endpoint.host());
         let mut now = self.fields.lock().unwrap_or_else(PoisonError::into_inner);
         if *now != sent {
             // Another request has changed the fields in the meantime.
             return refused_field.is_some();
         }
-        match refused_field {
-            Some(AdaptableField::TokenField)
-                if self.parameters.token_field == TokenField::Auto
-                    && sent.token_field == first.token_field =>
-            {
-                now.token_field = match sent.token_field {
-                    TokenField::MaxTokens => TokenField::MaxCompletionTokens,
-                    _ => TokenField::MaxTokens,
-                };
-                warn!(
-                    "{}: the token limit is sent as {} from here on, as the server asks",
-                    self.name(),
-                    now.token_field
-                );
-                true
-            }
-            Some(AdaptableField::Temperature)
-                if self.parameters.temperature == Temperature::Auto
-                    && sent.temperature.is_some() =>
-            {
-                now.temperature = None;
-                warn!(
-                    "{}: the server refuses a temperature of 0; its default is used for the whole run",
-                    self.name()
-                );
-                true
-            }
-            _ => false,
+        let first = self.first_fields();
+        let adapted =
+            refused_field.and_then(|field| sent.after_refusal(field, first, &self.parameters));
+        let Some(adapted) = adapted else {
+            return false;
+        };
+        for change in adapted.changes(sent) {
+            warn!(
+                "{}: {change} for the whole run, because the server refuses what was sent before",
+                self.name()
+            );
         }
+        *now = adapted;
+        true
     }
 
     /// The letter in a constrained reply, else the text. Warns once if the server does not follow the constraint.

@@ -9,7 +9,7 @@ use base64::engine::general_purpose::STANDARD;
 use percent_encoding::percent_decode_str;
 use reqwest::Url;
 
-use super::wire::Wire;
+use super::wire_kind::Wire;
 use crate::error::{Error, Result};
 
 /// The base URL of an endpoint, used exactly as written: no `/v1` is added or assumed.

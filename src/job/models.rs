@@ -8,7 +8,7 @@ use clap::Args;
 use serde_json::{Value, json};
 use strsim::damerau_levenshtein;
 
-use crate::ask::{AccessArgs, Endpoint, Model, Parameters, Remote, Script, Sending, Server, Wire};
+use crate::ask::{AccessArgs, Endpoint, Model, Parameters, Remote, Script, Sending, Server};
 use crate::error::{Error, Result};
 use crate::types::{Condition, Control, Decides, View};
 
@@ -226,7 +226,7 @@ pub(crate) fn open(
                 model: name.clone(),
                 ..parameters.clone()
             };
-            let model = Remote::open(Arc::clone(endpoint), Wire::Chat, parameters)?;
+            let model = Remote::open(Arc::clone(endpoint), parameters)?;
             Ok(Model::Remote(model))
         }
         ModelName::Random | ModelName::Observer(_) => Err(Error::usage(
@@ -236,11 +236,14 @@ pub(crate) fn open(
     }
 }
 
+/// The beginning of the fields of a manifest that say how requests to a model were changed; the model's name follows.
+pub(super) const ADAPTED_FOR: &str = "adapted for ";
+
 /// Changes to requests that the endpoint made necessary, by model; for the manifest.
 pub(crate) fn adapted(models: &[ModelUnderTest]) -> impl Iterator<Item = (String, Value)> {
     models.iter().filter_map(|model| {
         let adapted = model.model.adapted();
-        let name = format!("adapted for {}", model.model.name());
+        let name = format!("{ADAPTED_FOR}{}", model.model.name());
         (!adapted.is_empty()).then(|| (name, json!(adapted)))
     })
 }

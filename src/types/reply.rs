@@ -20,6 +20,23 @@ pub enum Finish {
     Unknown,
 }
 
+impl Finish {
+    /// The longest reason in a server's words, in characters; chosen.
+    const LONGEST: usize = 40;
+
+    /// The same reason; one in the server's words is shortened, and has no control characters.
+    #[must_use]
+    pub fn shortened(self) -> Self {
+        match self {
+            Self::Other(reason) => {
+                let shown = reason.chars().filter(|c| !c.is_control());
+                Self::Other(shown.take(Self::LONGEST).collect())
+            }
+            named => named,
+        }
+    }
+}
+
 /// The tokens that the server charged for a request; `None` where it did not say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Usage {

@@ -205,7 +205,7 @@ fn set(conditions: &str) -> BTreeSet<String> {
 }
 
 /// What refuses an evaluation on the folder of another: the field that the message names, and the flag.
-const REFUSED: [(&str, &str); 26] = [
+const REFUSED: [(&str, &str); 27] = [
     ("--data", "--data elsewhere/frames"),
     ("--questions", "--questions other.jsonl"),
     ("--rules", "--rules rules.toml"),
@@ -230,12 +230,13 @@ const REFUSED: [(&str, &str); 26] = [
     ("--reasoning-effort", "--reasoning-effort low"),
     ("--top-p", "--top-p 0.9"),
     ("--detail", "--detail low"),
+    ("--wire", "--wire responses"),
     ("--constrain", "--constrain json"),
     ("--constrain", "--constrain choice"),
 ];
 
 /// The same for open questions.
-const OPEN_REFUSED: [(&str, &str); 23] = [
+const OPEN_REFUSED: [(&str, &str); 24] = [
     ("--questions", "--questions other.json"),
     ("--num-frames", "--num-frames 2"),
     ("--image-size", "--image-size 32"),
@@ -259,6 +260,7 @@ const OPEN_REFUSED: [(&str, &str); 23] = [
     ("--reasoning-effort", "--reasoning-effort low"),
     ("--top-p", "--top-p 0.9"),
     ("--detail", "--detail low"),
+    ("--wire", "--wire responses"),
 ];
 
 #[test]

@@ -1,16 +1,15 @@
 //! Requests of OpenAI's chat completions: the JSON [`body`], and the [`fields`] that servers may refuse.
 
-use std::sync::Arc;
-
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use super::image_places::with_images;
 use crate::ask::body::Parts;
 use crate::ask::call::Message;
 use crate::ask::constraint;
-use crate::ask::field::{AdaptableField, RequestField, RequestFields, SentFields};
-use crate::ask::parameters::{Constrain, ImageDetail, Parameters, TokenField};
-use crate::ask::payload::Payload;
+use crate::ask::field::{AdaptableField, FieldState, RequestField, RequestFields, SentFields};
+use crate::ask::parameters::{Constrain, ImageDetail, Parameters, Temperature, TokenField};
+use crate::ask::wire_kind::Wire;
 use crate::types::question::letter;
 
 #[derive(Serialize)]
@@ -32,6 +31,10 @@ struct ChatRequest<'a> {
     response_format: Option<Value>,
     #[serde(skip_serializing_if = "Option::is_none")]
     structured_outputs: Option<Value>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    stream: Option<bool>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    stream_options: Option<Value>,
     messages: [Turn<'a>; 1],
 }
 
@@ -63,8 +66,7 @@ struct ImageUrl {
     url: &'static str,
 }
 
-/// The place of an image: a field with an empty value. No question can contain it, because in a JSON text every quotation mark
-/// has a backslash before it.
+/// The place of an image.
 const PLACE: &str = r#""url":"""#;
 
 /// The body of one request: text, images, and the text after them.
@@ -75,6 +77,7 @@ pub(super) fn body(
     choices: usize,
 ) -> Result<Parts, serde_json::Error> {
     let limit = |name| parameters.limit().filter(|_| fields.token_field == name);
+    let is_stream = fields.wire == Wire::ChatStream;
     let letters: Vec<char> = (0..choices).map(letter).collect();
     let constrained =
         |kind, value: fn(&[char]) -> Value| (parameters.constrain == kind).then(|| value(&letters));
@@ -88,35 +91,14 @@ pub(super) fn body(
         reasoning_effort: parameters.reasoning_effort.as_deref(),
         response_format: constrained(Constrain::Json, format),
         structured_outputs: constrained(Constrain::Choice, |letters| json!({"choice": letters})),
+        stream: is_stream.then_some(true),
+        stream_options: (is_stream && fields.stream_usage).then(|| json!({"include_usage": true})),
         messages: [Turn {
             role: "user",
             content: content(message, parameters.detail),
         }],
     })?;
-    Ok(with_images(json, message.images))
-}
-
-/// A body with the images in their places; their bytes are shared, not copied.
-fn with_images(json: String, images: &[Arc<Payload>]) -> Parts {
-    if images.is_empty() {
-        return Parts::new([json.into()]);
-    }
-    debug_assert_eq!(json.matches(PLACE).count(), images.len());
-    let (open, close) = PLACE.split_at(PLACE.len() - 1);
-    let mut pieces = Vec::with_capacity(2 * images.len() + 1);
-    let mut begin = "";
-    let mut images = images.iter();
-    for words in json.split(PLACE) {
-        match images.next() {
-            Some(image) => {
-                pieces.push([begin, words, open].concat().into());
-                pieces.push(image.data_url());
-            }
-            None => pieces.push([begin, words].concat().into()),
-        }
-        begin = close;
-    }
-    Parts::new(pieces)
+    Ok(with_images(json, PLACE, message.images))
 }
 
 /// The content of a message, with a place for each image.
@@ -133,10 +115,11 @@ fn content(message: Message<'_>, detail: Option<ImageDetail>) -> Content<'_> {
     let image = || Part::ImageUrl {
         image_url: ImageUrl { detail, url: "" },
     };
-    let parts = std::iter::once(words(before))
-        .chain(images.iter().map(|_| image()))
-        .chain((!behind.is_empty()).then(|| words(behind)));
-    Content::Parts(parts.collect())
+    let is_filled = |text: &&str| !text.is_empty();
+    let before = Some(before).filter(is_filled).map(words);
+    let behind = Some(behind).filter(is_filled).map(words);
+    let images = images.iter().map(|_| image());
+    Content::Parts(before.into_iter().chain(images).chain(behind).collect())
 }
 
 /// OpenAI's `json_schema` format for an object with one of the letters.
@@ -148,55 +131,69 @@ fn format(letters: &[char]) -> Value {
 /// The fields that a server may refuse.
 pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField> {
     let parameters = sent.parameters;
-    let limit = |field| sent.fields.token_field == field;
+    let never = parameters.token_field == TokenField::Omit;
+    let now = sent.fields.token_field;
+    let limit = |field| FieldState::until_refused(now == field, never || now != TokenField::Omit);
     Vec::from([
         RequestField {
             name: "temperature",
-            sent: sent.fields.temperature.is_some(),
+            state: FieldState::until_refused(
+                sent.fields.temperature.is_some(),
+                parameters.temperature == Temperature::Server,
+            ),
             adaptable: Some(AdaptableField::Temperature),
             hint: "leave the temperature to the server: --temperature default",
         },
         RequestField {
             name: "top_p",
-            sent: parameters.top_p.is_some(),
+            state: FieldState::set(parameters.top_p.is_some()),
             adaptable: None,
             hint: "leave --top-p out: the model takes no other than its own",
         },
         RequestField {
             name: "max_tokens",
-            sent: limit(TokenField::MaxTokens),
+            state: limit(TokenField::MaxTokens),
             adaptable: Some(AdaptableField::TokenField),
             hint: "send the limit otherwise: --token-field max_completion_tokens (or none), or another --max-tokens",
         },
         RequestField {
             name: "max_completion_tokens",
-            sent: limit(TokenField::MaxCompletionTokens),
+            state: limit(TokenField::MaxCompletionTokens),
             adaptable: Some(AdaptableField::TokenField),
             hint: "send the limit otherwise: --token-field max_tokens (or none), or another --max-tokens",
         },
         RequestField {
             name: "reasoning_effort",
-            sent: parameters.reasoning_effort.is_some(),
+            state: FieldState::set(parameters.reasoning_effort.is_some()),
             adaptable: None,
             hint: "leave --reasoning-effort out, or give a value the model takes",
         },
         RequestField {
             name: "detail",
-            sent: sent.has_image && parameters.detail.is_some(),
+            state: FieldState::set(sent.has_image && parameters.detail.is_some()),
             adaptable: None,
             hint: "leave --detail out, or give a value the server takes",
         },
         RequestField {
             name: "response_format",
-            sent: parameters.constrain == Constrain::Json,
+            state: FieldState::set(parameters.constrain == Constrain::Json),
             adaptable: None,
             hint: "leave --constrain out: the server does not take it",
         },
         RequestField {
             name: "structured_outputs",
-            sent: parameters.constrain == Constrain::Choice,
+            state: FieldState::set(parameters.constrain == Constrain::Choice),
             adaptable: None,
             hint: "leave --constrain out, or try --constrain json",
+        },
+        RequestField {
+            name: "stream_options",
+            state: FieldState::until_refused(
+                sent.fields.wire == Wire::ChatStream && sent.fields.stream_usage,
+                sent.fields.stream_usage,
+            ),
+            adaptable: Some(AdaptableField::StreamUsage),
+            hint: "ask without a stream: --wire chat",
         },
     ])
 }

@@ -1,5 +1,6 @@
 //! The main job from the outside: the program is called as a user calls it.
 
+mod adapted;
 mod conditions;
 mod failures;
 mod interruption;

@@ -46,19 +46,35 @@ fn fields_are_adapted_once_for_all() {
         error.failure.message.contains("--temperature default"),
         "{error}"
     );
-    // A server that takes neither name is left after both.
-    let outcome = ask_with(
-        vec![
-            limit(),
-            refused("max_completion_tokens", "unsupported_parameter"),
-        ],
-        sending(),
-        Parameters::new("m".into()),
+    // A server that takes neither name gets no limit; one that refuses what is not sent any more is left.
+    let neither = || refused("max_completion_tokens", "unsupported_parameter");
+    let outcome = ask(vec![limit(), neither(), Answer::text("B")]);
+    assert_eq!(outcome.result.unwrap().attempts, 3);
+    let last = &outcome.requests[2];
+    assert!(last.get("max_tokens").is_none() && last.get("max_completion_tokens").is_none());
+    let outcome = ask(vec![limit(), neither()]);
+    let error = outcome.result.unwrap_err();
+    assert_eq!(
+        (error.reach, error.attempts),
+        (Reach::Endpoint, 3),
+        "{error}"
     );
+    let outcome = ask(vec![heat(), heat()]);
     let error = outcome.result.unwrap_err();
     assert_eq!(
         (error.reach, error.attempts),
         (Reach::Endpoint, 2),
         "{error}"
     );
+}
+
+/// Lists of details name the field by its place.
+#[test]
+fn a_field_is_known_by_the_place_in_a_list_of_details() {
+    let details = json!({"object": "error", "message": {"detail": [
+        {"type": "extra_forbidden", "loc": ["body", "max_tokens"], "msg": "Extra inputs are not permitted"},
+    ]}});
+    let outcome = ask(vec![Answer::json(422, &details), Answer::text("B")]);
+    assert_eq!(outcome.result.unwrap().attempts, 2);
+    assert_eq!(outcome.requests[1]["max_completion_tokens"], 1024);
 }
