@@ -20,7 +20,7 @@ use super::sending::Sending;
 use super::url::BaseUrl;
 use super::wire_kind::Wire;
 use crate::error::Result;
-use crate::types::{Failure, FailureKind, Finish, Reply};
+use crate::types::{Failure, FailureKind, Finish, Reply, TokenChances, TokenPosition};
 
 /// The maximum wait between retries if the server asks for none; chosen. A server may ask for longer waits.
 const MAX_DELAY: Duration = Duration::from_secs(30);
@@ -235,6 +235,7 @@ impl Endpoint {
                 finish => finish,
             }
             .shortened(),
+            chances: reply.chances.map(|chances| without_keys(chances, scrubbed)),
             latency_ms: answer.took.as_millis() as u64,
             ..reply
         }
@@ -337,6 +338,22 @@ impl Endpoint {
     /// The server's id of a request, without secrets; empty if it sent none.
     fn request_id(&self, answer: &HttpReply) -> String {
         self.connection.scrub.line(answer.header("x-request-id"))
+    }
+}
+
+/// The likeliest tokens without keys.
+fn without_keys(chances: TokenChances, scrubbed: impl Fn(String) -> String) -> TokenChances {
+    let position = |position: TokenPosition| {
+        let likeliest = position.likeliest.into_iter();
+        let likeliest = likeliest.map(|(token, logprob)| (scrubbed(token), logprob));
+        TokenPosition {
+            likeliest: likeliest.collect(),
+            token: scrubbed(position.token),
+        }
+    };
+    TokenChances {
+        positions: chances.positions.into_iter().map(position).collect(),
+        ..chances
     }
 }
 

@@ -205,7 +205,10 @@ impl FailureClass {
         };
         Self {
             reach,
-            refused_field: field.adaptable.filter(|_| is_unsupported(complaint)),
+            // A number of tokens that is too large is not called unsupported.
+            refused_field: field.adaptable.filter(|adaptable| {
+                *adaptable == AdaptableField::TopLogprobs || is_unsupported(complaint)
+            }),
             ..Self::permanent(field.hint)
         }
     }
@@ -236,6 +239,7 @@ mod tests {
                 token_field: TokenField::MaxTokens,
                 temperature: Some(0.0),
                 stream_usage: true,
+                top_logprobs: None,
             },
             has_image: true,
             has_key: true,

@@ -16,6 +16,10 @@ pub enum AdaptableField {
     Wire(Wire),
     /// The request for the number of tokens in a stream.
     StreamUsage,
+    /// The request for the probabilities of tokens.
+    Logprobs,
+    /// How many of the likeliest tokens are asked for.
+    TopLogprobs,
 }
 
 /// The adaptable fields of a request, as found out once for a whole run.
@@ -29,7 +33,15 @@ pub(super) struct RequestFields {
     pub(super) temperature: Option<f64>,
     /// Whether a stream is asked for the number of its tokens.
     pub(super) stream_usage: bool,
+    /// How many of the likeliest tokens are asked for; `None` if their probabilities are not.
+    pub(super) top_logprobs: Option<u8>,
 }
+
+/// The most likeliest tokens that OpenAI's API states, and most servers after it.
+const TOP_LOGPROBS: u8 = 20;
+
+/// The most that others state, Text Generation Inference among them.
+const FEWER_LOGPROBS: u8 = 5;
 
 impl RequestFields {
     /// The fields of the first request to a host.
@@ -43,6 +55,7 @@ impl RequestFields {
                 Temperature::Of(value) => Some(value),
             },
             stream_usage: true,
+            top_logprobs: parameters.probabilities.then_some(TOP_LOGPROBS),
         }
     }
 
@@ -83,6 +96,15 @@ impl RequestFields {
                 stream_usage: false,
                 ..self
             },
+            AdaptableField::Logprobs => Self {
+                top_logprobs: None,
+                ..self
+            },
+            AdaptableField::TopLogprobs => Self {
+                top_logprobs: Some(FEWER_LOGPROBS)
+                    .filter(|_| self.top_logprobs == Some(TOP_LOGPROBS)),
+                ..self
+            },
             _ => return None,
         };
         (adapted != self).then_some(adapted)
@@ -103,7 +125,11 @@ impl RequestFields {
             .then(|| "no temperature is sent: the server's own holds".to_owned());
         let usage = (self.stream_usage != first.stream_usage)
             .then(|| "a stream is not asked for the number of its tokens".to_owned());
-        let changes = [wire, field, temperature, usage];
+        let logprobs = (self.top_logprobs != first.top_logprobs).then(|| match self.top_logprobs {
+            Some(top) => format!("the probabilities of {top} tokens are asked for"),
+            None => "it states no probabilities: its confidence is not available".to_owned(),
+        });
+        let changes = [wire, field, temperature, usage, logprobs];
         changes.into_iter().flatten().collect()
     }
 }

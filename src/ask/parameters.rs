@@ -9,6 +9,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::wire_kind::WireSetting;
+use crate::error::{Error, Result};
 use crate::types::Decides;
 use crate::types::flag::flag_words;
 use crate::types::words::written_as_text;
@@ -56,6 +57,10 @@ pub struct Parameters {
     /// The constraint that the server puts on the model's reply.
     #[arg(skip)]
     pub constrain: Constrain,
+    /// Whether the probabilities of the likeliest tokens are asked for.
+    #[arg(skip)]
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub probabilities: bool,
 }
 
 impl Parameters {
@@ -76,12 +81,27 @@ impl Parameters {
             detail: None,
             wire: WireSetting::Auto,
             constrain: Constrain::None,
+            probabilities: false,
         }
     }
 
     /// The token limit that is sent; `None` if none is sent.
     pub(super) fn limit(&self) -> Option<u32> {
         (self.token_field != TokenField::Omit).then_some(self.max_tokens.get())
+    }
+
+    /// Checks that the temperature does not change the probabilities of tokens.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if it is another one than 0 or the server's own.
+    pub(crate) fn require_greedy(&self) -> Result<()> {
+        match self.temperature {
+            Temperature::Of(value) if value > 0.0 => Err(Error::usage(
+                "--probabilities",
+                "the probabilities of tokens depend on the temperature: --temperature 0, auto or default expected",
+            )),
+            _ => Ok(()),
+        }
     }
 
     /// The settings that can change a reply, the API among them. Whether a token limit is sent is one of them; the name of its field is not.
@@ -94,7 +114,7 @@ impl Parameters {
 }
 
 /// Reads a probability above 0.
-fn probability(text: &str) -> Result<f64, String> {
+fn probability(text: &str) -> std::result::Result<f64, String> {
     let value = text.parse().ok();
     let value = value.filter(|value| 0.0 < *value && *value <= 1.0);
     value.ok_or_else(|| "a number above 0 and up to 1 expected".to_owned())
@@ -124,7 +144,7 @@ impl fmt::Display for Temperature {
 impl FromStr for Temperature {
     type Err = String;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
         match (text, text.parse::<f64>()) {
             ("auto", _) => Ok(Self::Auto),
             ("default", _) => Ok(Self::Server),
@@ -218,7 +238,7 @@ mod tests {
     #[test]
     fn settings_that_decide_a_reply_change_the_content() {
         let base = Parameters::new("m".into());
-        let mut others = vec![base.clone(); 9];
+        let mut others = vec![base.clone(); 10];
         others[0].model = "n".into();
         others[1].temperature = Temperature::Server;
         others[2].token_field = TokenField::Omit;
@@ -228,6 +248,7 @@ mod tests {
         others[6].temperature = Temperature::Of(0.0);
         others[7].seed = Some(0);
         others[8].wire = WireSetting::Responses;
+        others[9].probabilities = true;
         for other in &others {
             assert_ne!(other.content(), base.content(), "{other:?}");
         }

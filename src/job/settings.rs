@@ -125,6 +125,8 @@ pub(crate) struct JobSettings {
 pub(crate) struct ExperimentSettings {
     /// Constraint on the replies that the server enforces.
     pub constrain: Constrain,
+    /// Whether the probabilities of choices are asked for.
+    pub probabilities: bool,
     /// Seed of the server's sampling; `None` if none is sent.
     pub sampling_seed: Option<u64>,
     /// Longest side of an image as sent, in pixels; `None` for no limit.
@@ -178,6 +180,7 @@ impl JobArgs {
         let parameters = Parameters {
             constrain: experiment.constrain,
             seed: experiment.sampling_seed,
+            probabilities: experiment.probabilities,
             ..self.parameters
         };
         // A dry run sends nothing, so it needs no key.

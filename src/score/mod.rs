@@ -36,6 +36,7 @@ pub(crate) mod health;
 pub(crate) mod llm_match;
 pub(crate) mod observed;
 pub(crate) mod open;
+mod option_probabilities;
 pub(crate) mod paired;
 pub(crate) mod pooled;
 pub(crate) mod pooled_kind;

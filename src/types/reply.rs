@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::observed::Observed;
+use super::option_probabilities::TokenChances;
 
 /// The reason why a model stopped.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -78,6 +79,8 @@ pub struct Reply {
     pub attempts: u32,
     /// What the observer saw; `None` for every other model.
     pub observed: Option<Observed>,
+    /// The likeliest tokens; `None` if the server was not asked for them or stated none.
+    pub chances: Option<TokenChances>,
 }
 
 impl Reply {
@@ -93,6 +96,7 @@ impl Reply {
             latency_ms: 0,
             attempts: 1,
             observed: None,
+            chances: None,
         }
     }
 }

@@ -117,6 +117,7 @@ async fn what_is_set_is_sent_and_what_is_not_is_left_out() {
         detail: Some(ImageDetail::High),
         wire: WireSetting::Auto,
         constrain: Constrain::None,
+        probabilities: false,
     };
     let model = Remote::open(endpoint.clone(), parameters).unwrap();
     let images = [image(), image()].map(Arc::new);

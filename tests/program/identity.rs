@@ -205,7 +205,7 @@ fn set(conditions: &str) -> BTreeSet<String> {
 }
 
 /// What refuses an evaluation on the folder of another: the field that the message names, and the flag.
-const REFUSED: [(&str, &str); 27] = [
+const REFUSED: [(&str, &str); 29] = [
     ("--data", "--data elsewhere/frames"),
     ("--questions", "--questions other.jsonl"),
     ("--rules", "--rules rules.toml"),
@@ -231,6 +231,8 @@ const REFUSED: [(&str, &str); 27] = [
     ("--top-p", "--top-p 0.9"),
     ("--detail", "--detail low"),
     ("--wire", "--wire responses"),
+    ("--probabilities", "--probabilities"),
+    ("--image-first", "--image-first"),
     ("--constrain", "--constrain json"),
     ("--constrain", "--constrain choice"),
 ];

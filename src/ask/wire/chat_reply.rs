@@ -3,9 +3,10 @@
 use serde_json::Value;
 
 use super::json_body::{self, other};
+use super::logprobs;
 use super::stream;
 use crate::ask::complaint::{Complaint, UnreadableReply};
-use crate::types::{Finish, Reply, Usage};
+use crate::types::{Finish, Reply, TokenChances, Usage};
 
 /// Reads a body; `latency_ms` and `attempts` stay zero.
 ///
@@ -40,6 +41,11 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
         .filter(|message| message.is_object())
         .ok_or_else(|| other("a choice without a message"))?;
     let (text, refusal_part) = content(message.get("content"))?;
+    let positions = logprobs::positions(choice.get("logprobs"));
+    let chances = positions.map(|positions| TokenChances {
+        positions,
+        thought: logprobs::thought(message, completion.get("usage"), &text),
+    });
     let refusal = message.get("refusal").and_then(Value::as_str);
     Ok(Reply {
         text,
@@ -56,6 +62,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
         latency_ms: 0,
         attempts: 0,
         observed: None,
+        chances,
     })
 }
 

@@ -32,6 +32,10 @@ struct ChatRequest<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     structured_outputs: Option<Value>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    logprobs: Option<bool>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    top_logprobs: Option<u8>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     stream: Option<bool>,
     #[serde(skip_serializing_if = "Option::is_none")]
     stream_options: Option<Value>,
@@ -91,6 +95,8 @@ pub(super) fn body(
         reasoning_effort: parameters.reasoning_effort.as_deref(),
         response_format: constrained(Constrain::Json, format),
         structured_outputs: constrained(Constrain::Choice, |letters| json!({"choice": letters})),
+        logprobs: fields.top_logprobs.map(|_| true),
+        top_logprobs: fields.top_logprobs,
         stream: is_stream.then_some(true),
         stream_options: (is_stream && fields.stream_usage).then(|| json!({"include_usage": true})),
         messages: [Turn {
@@ -127,6 +133,9 @@ fn format(letters: &[char]) -> Value {
     let schema = constraint::schema(letters);
     json!({"type": "json_schema", "json_schema": {"name": constraint::ANSWER, "strict": true, "schema": schema}})
 }
+
+/// The remedy for a server that states no probabilities.
+pub(super) const PROBABILITIES: &str = "leave --probabilities out: the server states none";
 
 /// The fields that a server may refuse.
 pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField> {
@@ -185,6 +194,21 @@ pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField> {
             state: FieldState::set(parameters.constrain == Constrain::Choice),
             adaptable: None,
             hint: "leave --constrain out, or try --constrain json",
+        },
+        RequestField {
+            name: "top_logprobs",
+            state: FieldState::set(sent.fields.top_logprobs.is_some()),
+            adaptable: Some(AdaptableField::TopLogprobs),
+            hint: PROBABILITIES,
+        },
+        RequestField {
+            name: "logprobs",
+            state: FieldState::until_refused(
+                sent.fields.top_logprobs.is_some(),
+                !parameters.probabilities,
+            ),
+            adaptable: Some(AdaptableField::Logprobs),
+            hint: PROBABILITIES,
         },
         RequestField {
             name: "stream_options",

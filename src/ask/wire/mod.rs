@@ -7,6 +7,7 @@ mod chat_reply;
 mod chat_request;
 mod image_places;
 mod json_body;
+mod logprobs;
 mod refusal;
 mod responses_reply;
 mod responses_request;

@@ -3,9 +3,10 @@
 use serde_json::Value;
 
 use super::json_body::{self, other};
+use super::logprobs;
 use super::stream;
 use crate::ask::complaint::{Complaint, UnreadableReply};
-use crate::types::{Finish, Reply, Usage};
+use crate::types::{Finish, Reply, Thought, TokenChances, Usage};
 
 /// Reads a body; `latency_ms` and `attempts` stay zero.
 ///
@@ -31,6 +32,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
         .and_then(Value::as_array)
         .ok_or_else(|| other("JSON without output"))?;
     let (text, refusal) = words(items);
+    let chances = chances(items, &response, &text);
     Ok(Reply {
         text,
         refusal: Some(refusal).filter(|words| !words.is_empty()),
@@ -43,6 +45,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
         latency_ms: 0,
         attempts: 0,
         observed: None,
+        chances,
     })
 }
 
@@ -80,6 +83,24 @@ fn finish(response: &Value) -> Result<Finish, UnreadableReply> {
         }
         status => Err(other(&format!("a response whose status is {status:?}"))),
     }
+}
+
+/// The likeliest tokens of the first text; `None` if it states none. Items of reasoning stand before it if the model thought.
+fn chances(items: &[Value], response: &Value, text: &str) -> Option<TokenChances> {
+    let contents = items
+        .iter()
+        .filter_map(|item| item.get("content")?.as_array());
+    let mut lists = contents.flatten().map(|part| part.get("logprobs"));
+    let positions = lists.find_map(logprobs::positions)?;
+    let thought = logprobs::thought(response, response.get("usage"), text);
+    let summaries = items
+        .iter()
+        .filter_map(|item| item.get("summary")?.as_array());
+    let summarized = summaries.flatten().next().is_some();
+    Some(TokenChances {
+        positions,
+        thought: if summarized { Thought::Before } else { thought },
+    })
 }
 
 /// The text of the messages among the items of a response, and that of refusals in them.

@@ -5,6 +5,7 @@
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use super::chat_request::PROBABILITIES;
 use super::image_places::with_images;
 use crate::ask::body::Parts;
 use crate::ask::call::Message;
@@ -31,6 +32,10 @@ struct ResponsesRequest<'a> {
     text: Option<Value>,
     #[serde(skip_serializing_if = "Option::is_none")]
     structured_outputs: Option<Value>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    include: Option<[&'static str; 1]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    top_logprobs: Option<u8>,
     input: [Turn<'a>; 1],
 }
 
@@ -76,6 +81,10 @@ pub(super) fn body(
         reasoning: effort.map(|effort| json!({"effort": effort})),
         text: (constrain == Constrain::Json).then(|| format(&letters)),
         structured_outputs: (constrain == Constrain::Choice).then(|| json!({"choice": letters})),
+        include: fields
+            .top_logprobs
+            .map(|_| ["message.output_text.logprobs"]),
+        top_logprobs: fields.top_logprobs,
         input: [Turn {
             role: "user",
             content: content(message, parameters.detail),
@@ -113,6 +122,10 @@ fn format(letters: &[char]) -> Value {
 /// The fields that a server may refuse.
 pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField> {
     let parameters = sent.parameters;
+    let probabilities = FieldState::until_refused(
+        sent.fields.top_logprobs.is_some(),
+        !parameters.probabilities,
+    );
     let field = |name, state, adaptable, hint| RequestField {
         name,
         state,
@@ -173,6 +186,24 @@ pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField> {
             FieldState::set(parameters.constrain == Constrain::Json),
             None,
             "leave --constrain out: the server does not take it",
+        ),
+        field(
+            "top_logprobs",
+            FieldState::set(sent.fields.top_logprobs.is_some()),
+            Some(AdaptableField::TopLogprobs),
+            PROBABILITIES,
+        ),
+        field(
+            "logprobs",
+            probabilities,
+            Some(AdaptableField::Logprobs),
+            PROBABILITIES,
+        ),
+        field(
+            "include",
+            probabilities,
+            Some(AdaptableField::Logprobs),
+            PROBABILITIES,
         ),
         field(
             "structured_outputs",

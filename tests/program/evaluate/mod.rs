@@ -5,6 +5,7 @@ mod conditions;
 mod failures;
 mod interruption;
 mod outputs;
+mod probabilities;
 mod requests;
 mod resume;
 mod untouched;
