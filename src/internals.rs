@@ -47,6 +47,7 @@ pub mod rooms {
 pub mod score {
     pub use crate::score::agreement::{AgreementCounts, clustered_kappa};
     pub use crate::score::bootstrap::Resamples;
+    pub use crate::score::calibration::{Calibration, calibrations};
     pub use crate::score::chance::OfferedChoices;
     pub use crate::score::cluster::Clusters;
     pub use crate::score::curve::curves;

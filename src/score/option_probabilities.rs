@@ -114,7 +114,7 @@ fn masses(
     let mut masses = vec![0.0; choices];
     for (token, logprob) in &position.likeliest {
         if let Some(index) = option(&bare(token)) {
-            masses[index] += logprob.exp();
+            masses[index] += libm::exp(*logprob);
         }
     }
     masses
@@ -122,7 +122,10 @@ fn masses(
 
 /// The most that a token can have that is not listed: less than the least likely one that is, and no more than what they leave.
 fn bound(position: &TokenPosition) -> f64 {
-    let listed = position.likeliest.iter().map(|(_, logprob)| logprob.exp());
+    let listed = position
+        .likeliest
+        .iter()
+        .map(|(_, logprob)| libm::exp(*logprob));
     let least = listed.clone().fold(f64::INFINITY, f64::min);
     let rest = (1.0 - listed.sum::<f64>()).max(0.0);
     least.min(rest)

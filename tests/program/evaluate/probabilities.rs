@@ -124,6 +124,60 @@ fn a_server_without_probabilities_is_asked_without_them() {
     assert_eq!(mock.requests().len(), 4);
 }
 
+/// The true choice is always named, with 7/9 of the probability.
+#[test]
+fn the_report_sets_confidence_against_accuracy() {
+    let bench = Bench::with_questions(120);
+    let mock = MockEndpoint::start([Answer::json(200, &sure())]);
+    let asked = format!("{ASKED} --full").replace("L0", "L0,L3");
+    let printed = bench.complete(&model_args(&mock.base_url(), &asked));
+    assert!(
+        printed.contains("Confidence (mean greatest probability"),
+        "{printed}"
+    );
+    let table = std::fs::read_to_string(bench.path("run/calibration.csv")).unwrap();
+    let mut lines = table
+        .lines()
+        .map(|line| line.split(',').collect::<Vec<_>>());
+    let head = lines.next().unwrap();
+    let rows: Vec<Vec<&str>> = lines.collect();
+    // L0, and L3 by exposure drop alone and with noise.
+    assert_eq!(rows.len(), 3, "{table}");
+    for row in rows {
+        let number = |name: &str| -> f64 {
+            let place = head.iter().position(|known| *known == name).unwrap();
+            row[place].parse().unwrap()
+        };
+        let gap = 7.0 / 9.0 - 1.0;
+        for (name, expected) in [
+            ("replies", 120.0),
+            ("reasoned", 0.0),
+            ("unstated", 0.0),
+            ("confidence", 7.0 / 9.0),
+            ("accuracy", 1.0),
+            ("overconfidence", gap),
+            ("ece", -gap),
+            ("brier", 2.0 * gap * gap),
+            ("risk_100", 0.0),
+        ] {
+            assert!((number(name) - expected).abs() < 1e-4, "{name}: {row:?}");
+        }
+    }
+    let page = std::fs::read_to_string(bench.path("run/report.html")).unwrap();
+    assert!(page.contains("Confidence against accuracy"));
+    assert!(bench.path("run/figures/confidence.svg").exists());
+    // A server that states none: said, and no table of it.
+    let bench = Bench::with_questions(3);
+    let mock = MockEndpoint::start([Answer::text("C")]);
+    let printed = bench.complete(&model_args(&mock.base_url(), ASKED));
+    assert!(
+        printed.contains("The confidence of m is not available"),
+        "{printed}"
+    );
+    assert!(!bench.path("run/calibration.csv").exists());
+    assert!(!bench.path("run/figures/confidence.svg").exists());
+}
+
 #[test]
 fn probabilities_need_a_temperature_of_zero() {
     let bench = Bench::with_questions(3);

@@ -1,0 +1,176 @@
+//! How far the confidence of models goes with their accuracy: [`calibrations`].
+//!
+//! The confidence of a reply is the greatest probability of a choice. Only replies with such probabilities are in these figures, and
+//! of these only those without reasoning before the answer; the others are counted. Right is by the strict reading.
+
+mod blind_shift;
+mod confident_reply;
+mod expected_error;
+mod positions;
+mod risk;
+mod rotations;
+
+use std::ops::RangeInclusive;
+
+use super::auc::{Auc, PairCounts, RankedReply};
+use super::bootstrap::Resamples;
+use super::estimate::Estimate;
+use super::grid::{ClusterCount, Grid};
+use super::subject::Subject;
+use confident_reply::{ConfidentReply, confident_replies};
+
+pub(crate) use positions::PositionShare;
+pub(crate) use risk::RiskCoverage;
+
+/// The least number of replies for an expected calibration error (chosen).
+const LEAST_REPLIES: usize = 100;
+
+/// Confidence and accuracy of a subject.
+#[derive(Debug, Clone)]
+pub struct Calibration {
+    /// The model in its condition.
+    pub subject: Subject,
+    /// Number of replies with probabilities, which all figures are of.
+    pub replies: usize,
+    /// Number of replies with reasoning before the answer, which no figure is of.
+    pub reasoned: usize,
+    /// Number of replies without probabilities.
+    pub unstated: usize,
+    /// Mean confidence.
+    pub confidence: Estimate,
+    /// Accuracy of the same replies.
+    pub accuracy: Estimate,
+    /// Confidence less accuracy: above 0 the model is overconfident.
+    pub overconfidence: Estimate,
+    /// Expected calibration error (`expected_error`); `None` below 100 replies.
+    pub error: Option<Estimate>,
+    /// Mean Brier score over all choices, 0 to 2 (Brier 1950, Mon. Weather Rev. 78:1).
+    pub brier: Estimate,
+    /// 1 less the Brier score over that of equal probabilities for all choices: 0 says no more than a guess.
+    pub skill: Estimate,
+    /// Mean negative logarithm of the probability of the true choice, in nats.
+    pub nll: Estimate,
+    /// Risk among the most confident replies.
+    pub risk: RiskCoverage,
+    /// The share of pairs of a right and a wrong reply in which the right one is more confident.
+    pub auroc: Option<Auc>,
+    /// Mean distance between the probabilities with the image and those of the same model without one.
+    pub blind_shift: Option<Estimate>,
+    /// Accuracy of the choice with the greatest probability averaged over the orders of choices, if there are several.
+    pub over_orders: Option<Estimate>,
+    /// Probability and truth by the place of a choice.
+    pub positions: Vec<PositionShare>,
+}
+
+/// The calibration of each subject with probabilities.
+#[must_use]
+pub fn calibrations(grid: &Grid<'_>, draws: &Resamples) -> Vec<Calibration> {
+    let subjects = 0..grid.subjects.len();
+    subjects
+        .filter_map(|subject| calibration(grid, draws, subject))
+        .collect()
+}
+
+fn calibration(grid: &Grid<'_>, draws: &Resamples, subject: usize) -> Option<Calibration> {
+    let sorted = confident_replies(grid, subject);
+    let replies = &*sorted.replies;
+    if replies.is_empty() {
+        return None;
+    }
+    let n = replies.len();
+    let mean = |number: fn(&ConfidentReply) -> f64| ratio(draws, replies, number, |_| 1.0);
+    let skill = ratio(draws, replies, |reply| reply.brier, |reply| reply.guess);
+    let error = (n >= LEAST_REPLIES).then(|| expected_error::estimate(draws, replies));
+    Some(Calibration {
+        subject: grid.subjects[subject].clone(),
+        replies: n,
+        reasoned: sorted.reasoned,
+        unstated: sorted.unstated,
+        confidence: confidence(grid.clusters, replies)?,
+        accuracy: accuracy(grid.clusters, replies)?,
+        overconfidence: mean(|reply| reply.confidence - f64::from(u8::from(reply.right))),
+        error,
+        brier: mean(|reply| reply.brier),
+        skill: Estimate {
+            value: 1.0 - skill.value,
+            low: 1.0 - skill.high,
+            high: 1.0 - skill.low,
+            n,
+        },
+        nll: mean(|reply| reply.nll),
+        risk: RiskCoverage::of(replies),
+        auroc: auroc(grid.clusters, replies),
+        blind_shift: blind_shift::mean(grid, subject),
+        over_orders: rotations::accuracy(grid, subject),
+        positions: positions::shares(grid, subject),
+    })
+}
+
+/// Mean confidence, with the interval of scores between 0 and 1 in clusters.
+fn confidence(clusters: usize, replies: &[ConfidentReply]) -> Option<Estimate> {
+    let mut sums = vec![(0.0, 0.0); clusters];
+    for reply in replies {
+        let (sum, n) = &mut sums[reply.cluster as usize];
+        *sum += reply.confidence;
+        *n += 1.0;
+    }
+    sums.retain(|(_, n)| *n > 0.0);
+    Estimate::scored(&sums, 1.0, replies.len())
+}
+
+fn accuracy(clusters: usize, replies: &[ConfidentReply]) -> Option<Estimate> {
+    let mut counts = vec![ClusterCount::default(); clusters];
+    for reply in replies {
+        let count = &mut counts[reply.cluster as usize];
+        count.replies += 1;
+        count.right += u32::from(reply.right);
+    }
+    Estimate::clustered(&counts)
+}
+
+/// The sum of a number over the sum of another one, with its interval by the cluster bootstrap.
+fn ratio(
+    draws: &Resamples,
+    replies: &[ConfidentReply],
+    above: impl Fn(&ConfidentReply) -> f64,
+    below: impl Fn(&ConfidentReply) -> f64,
+) -> Estimate {
+    let by_cluster = |number: &dyn Fn(&ConfidentReply) -> f64| {
+        let mut sums = vec![0.0; draws.clusters()];
+        for reply in replies {
+            sums[reply.cluster as usize] += number(reply) as f32;
+        }
+        draws.sums(&sums)
+    };
+    let total = |number: &dyn Fn(&ConfidentReply) -> f64| replies.iter().map(number).sum::<f64>();
+    let (tops, bottoms) = (by_cluster(&above), by_cluster(&below));
+    let pairs = tops.into_iter().zip(bottoms);
+    // A draw of clusters without a reply says nothing.
+    let ratios = pairs.filter(|(_, below)| *below > 0.0);
+    let ratios = ratios.map(|(above, below)| above / below);
+    let value = total(&above) / total(&below);
+    around(value, draws.interval(ratios.collect()), replies.len())
+}
+
+/// An estimate whose interval holds its value.
+fn around(value: f64, [low, high]: [f64; 2], n: usize) -> Estimate {
+    let interval: RangeInclusive<f64> = low.min(value)..=high.max(value);
+    Estimate {
+        value,
+        low: *interval.start(),
+        high: *interval.end(),
+        n,
+    }
+}
+
+/// The area under the receiver operating characteristic of confidence for right against wrong replies.
+fn auroc(clusters: usize, replies: &[ConfidentReply]) -> Option<Auc> {
+    let ranked = replies.iter().map(|reply| RankedReply {
+        cluster: reply.cluster,
+        number: reply.confidence,
+        right: reply.right,
+    });
+    let mut pairs = PairCounts::new(clusters);
+    pairs.add(&mut ranked.collect::<Vec<_>>());
+    pairs.auc()
+}
