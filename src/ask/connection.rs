@@ -130,20 +130,18 @@ impl Connection {
             Deadline::Whole => Ok(step.await),
             Deadline::Silence => tokio::time::timeout(self.timeout, step).await,
         };
-        match done {
-            Ok(done) => done.map_err(|error| self.failed_try(error)),
-            Err(_) => {
-                let timeout = self.timeout.as_secs_f64();
-                let message = format!(
-                    "{} sent nothing for {timeout} s; allow more by --timeout",
-                    self.base
-                );
-                Err(FailedTry {
-                    again: Again::Later,
-                    ..FailedTry::new(FailureKind::Timeout, message)
-                })
-            }
+        if let Ok(done) = done {
+            return done.map_err(|error| self.failed_try(error));
         }
+        let timeout = self.timeout.as_secs_f64();
+        let message = format!(
+            "{} sent nothing for {timeout} s; allow more by --timeout",
+            self.base
+        );
+        Err(FailedTry {
+            again: Again::Later,
+            ..FailedTry::new(FailureKind::Timeout, message)
+        })
     }
 
     /// The failure of a request without a complete response.

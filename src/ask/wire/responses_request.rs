@@ -129,8 +129,8 @@ pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField> {
     let field = |name, state, adaptable, hint| RequestField {
         name,
         state,
-        adaptable,
         hint,
+        adaptable,
     };
     Vec::from([
         field(

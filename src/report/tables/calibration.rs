@@ -22,6 +22,9 @@ pub(super) fn calibration(findings: &Findings<'_>) -> Vec<Table> {
     vec![confidence(findings, all), positions(all)]
 }
 
+/// A number of a row.
+type NumberOf = fn(&Calibration) -> Option<Estimate>;
+
 fn confidence(findings: &Findings<'_>, all: &[Calibration]) -> Table {
     let mut table = TableBuilder::new("calibration", all)
         .page(CONFIDENCE, "Confidence against accuracy")
@@ -46,7 +49,6 @@ fn confidence(findings: &Findings<'_>, all: &[Calibration]) -> Table {
             "csv overconfidence overconfidence_low overconfidence_high | terminal overconfidence, interval | page overconfidence [95 %]",
             |row| row.overconfidence,
         );
-    type NumberOf = fn(&Calibration) -> Option<Estimate>;
     let numbers: [(&str, NumberOf); 6] = [
         (
             "csv ece ece_low ece_high | terminal calibration error | page calibration error [95 %]",
@@ -113,10 +115,9 @@ fn positions(all: &[Calibration]) -> Table {
         let positions = row.positions.iter();
         positions.map(|share| (&row.subject, *share))
     });
-    type Row<'a> = (&'a Subject, PositionShare);
     let mut table = TableBuilder::new("positions", rows)
         .page(CONFIDENCE, "Probability by the place of a choice")
-        .subject(|row: &Row<'_>| row.0, ToString::to_string)
+        .subject(|row: &(&Subject, PositionShare)| row.0, ToString::to_string)
         .column(Text, "csv letter | page letter", |row| {
             TableCell::from(letter(row.1.position).to_string())
         })

@@ -43,7 +43,7 @@ fn distance(one: &[f64], other: &[f64]) -> f64 {
     let divergence: f64 = pairs
         .map(|(&p, &q)| {
             let middle = f64::midpoint(p, q);
-            (part(p, middle) + part(q, middle)) / 2.0
+            f64::midpoint(part(p, middle), part(q, middle))
         })
         .sum();
     divergence.clamp(0.0, 1.0).sqrt()

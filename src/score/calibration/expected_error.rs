@@ -5,7 +5,7 @@
 //! with 100 replies, 0.027 with 4000. Therefore the binomial variance of each bin's accuracy is subtracted (Kumar, Liang and Ma 2019,
 //! NeurIPS, arXiv:1909.10155), so that levels of unlike size can be compared.
 
-use super::ConfidentReply;
+use super::confident_reply::ConfidentReply;
 use crate::score::bootstrap::Resamples;
 use crate::score::estimate::Estimate;
 
@@ -26,7 +26,7 @@ pub(super) fn estimate(draws: &Resamples, replies: &[ConfidentReply]) -> Estimat
     let bias = drawn.iter().sum::<f64>() / drawn.len().max(1) as f64 - value;
     let moved = drawn.into_iter().map(|drawn| drawn - bias).collect();
     let interval = draws.interval(moved).map(root);
-    super::around(root(value), interval, replies.len())
+    Estimate::around(root(value), interval, replies.len())
 }
 
 /// The root of a squared error, which the correction may make negative.

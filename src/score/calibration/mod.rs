@@ -10,8 +10,6 @@ mod positions;
 mod risk;
 mod rotations;
 
-use std::ops::RangeInclusive;
-
 use super::auc::{Auc, PairCounts, RankedReply};
 use super::bootstrap::Resamples;
 use super::estimate::Estimate;
@@ -149,18 +147,7 @@ fn ratio(
     let ratios = pairs.filter(|(_, below)| *below > 0.0);
     let ratios = ratios.map(|(above, below)| above / below);
     let value = total(&above) / total(&below);
-    around(value, draws.interval(ratios.collect()), replies.len())
-}
-
-/// An estimate whose interval holds its value.
-fn around(value: f64, [low, high]: [f64; 2], n: usize) -> Estimate {
-    let interval: RangeInclusive<f64> = low.min(value)..=high.max(value);
-    Estimate {
-        value,
-        low: *interval.start(),
-        high: *interval.end(),
-        n,
-    }
+    Estimate::around(value, draws.interval(ratios.collect()), replies.len())
 }
 
 /// The area under the receiver operating characteristic of confidence for right against wrong replies.

@@ -1,6 +1,6 @@
 //! The share of wrong replies among the most confident ones: [`RiskCoverage`].
 
-use super::ConfidentReply;
+use super::confident_reply::ConfidentReply;
 
 /// Risk at some coverages, and the area under the curve (Geifman and El-Yaniv 2017, NeurIPS).
 ///

@@ -9,10 +9,11 @@ use crate::types::QuestionId;
 
 /// The orders of one question in one repeat.
 #[derive(Default)]
-struct Orders<'a> {
+struct AskedInOrders<'a> {
     cluster: u32,
     truth: &'a str,
-    orders: BTreeSet<&'a [String]>,
+    /// The orders in which its choices were shown.
+    shown: BTreeSet<&'a [String]>,
     /// The sum of the probabilities of each text.
     by_text: BTreeMap<&'a str, f64>,
 }
@@ -20,7 +21,7 @@ struct Orders<'a> {
 /// The share of questions whose true text has the greatest probability on average over their orders; `None` if no question was asked
 /// in several orders. What a model gives to a letter averages out.
 pub(super) fn accuracy(grid: &Grid<'_>, subject: usize) -> Option<Estimate> {
-    let mut questions = BTreeMap::<(&QuestionId, u32), Orders<'_>>::new();
+    let mut questions = BTreeMap::<(&QuestionId, u32), AskedInOrders<'_>>::new();
     for (index, item) in grid.items.iter().enumerate() {
         let Some(record) = grid.record(subject, index) else {
             continue;
@@ -29,22 +30,22 @@ pub(super) fn accuracy(grid: &Grid<'_>, subject: usize) -> Option<Estimate> {
             continue;
         };
         let detail = &record.detail;
-        let orders = questions
+        let asked = questions
             .entry((&record.question, detail.repeat))
             .or_default();
-        orders.cluster = item.cluster;
-        orders.truth = detail.choices.get(detail.truth)?;
-        orders.orders.insert(&detail.choices);
+        asked.cluster = item.cluster;
+        asked.truth = detail.choices.get(detail.truth)?;
+        asked.shown.insert(&detail.choices);
         for (text, p) in detail.choices.iter().zip(&options.p) {
-            *orders.by_text.entry(text).or_default() += p;
+            *asked.by_text.entry(text).or_default() += p;
         }
     }
     let mut counts = vec![ClusterCount::default(); grid.clusters];
-    for orders in questions.values().filter(|asked| asked.orders.len() > 1) {
-        let mut likely = orders.by_text.iter();
-        let truth = orders.by_text.get(orders.truth).copied().unwrap_or(0.0);
-        let is_right = likely.all(|(text, p)| *text == orders.truth || *p < truth);
-        let count = &mut counts[orders.cluster as usize];
+    for asked in questions.values().filter(|asked| asked.shown.len() > 1) {
+        let mut likely = asked.by_text.iter();
+        let truth = asked.by_text.get(asked.truth).copied().unwrap_or(0.0);
+        let is_right = likely.all(|(text, p)| *text == asked.truth || *p < truth);
+        let count = &mut counts[asked.cluster as usize];
         count.replies += 1;
         count.right += u32::from(is_right);
     }

@@ -87,13 +87,14 @@ fn what_the_user_asked_for_stops_the_run() {
 #[test]
 fn a_wire_that_is_found_out_is_no_other_trial() {
     let bench = Bench::with_questions(3);
-    let stream_only = MockEndpoint::answering(|body| match body.get("stream") {
-        None => Answer::error(400, "x", "please enable the stream parameter"),
-        Some(_) => {
-            let piece = json!({"choices": [{"index": 0, "delta": {"content": "C"}, "finish_reason": "stop"}]});
-            let body = format!("data: {piece}\n\ndata: [DONE]\n\n");
-            Answer::new(200, body).header("content-type", "text/event-stream")
+    let stream_only = MockEndpoint::answering(|body| {
+        if body.get("stream").is_none() {
+            return Answer::error(400, "x", "please enable the stream parameter");
         }
+        let piece =
+            json!({"choices": [{"index": 0, "delta": {"content": "C"}, "finish_reason": "stop"}]});
+        let body = format!("data: {piece}\n\ndata: [DONE]\n\n");
+        Answer::new(200, body).header("content-type", "text/event-stream")
     });
     let base = stream_only.base_url();
     let run = |flags: &str| {

@@ -1,6 +1,6 @@
 //! Probabilities of choices: what is asked, and what is kept of what servers state.
 
-use crate::support::endpoint::{Answer, MockEndpoint};
+use crate::support::endpoint::{Answer, MockEndpoint, Request};
 use crate::support::run::{Bench, model_args, records, words};
 use crate::support::table::check_rows;
 use serde_json::{Value, json};
@@ -207,11 +207,7 @@ fn the_image_may_stand_first() {
     };
     let last = sorted(asked);
     let first = sorted(&format!("{asked} --image-first"));
-    let requests: Vec<Value> = mock
-        .requests()
-        .iter()
-        .map(|request| request.json())
-        .collect();
+    let requests: Vec<Value> = mock.requests().iter().map(Request::json).collect();
     let kinds = |body: &Value| -> Vec<String> {
         let parts = body["messages"][0]["content"].as_array();
         let parts = parts.into_iter().flatten();
