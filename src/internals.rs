@@ -4,7 +4,7 @@ pub mod ask {
     pub use crate::ask::{
         Access, AskError, BaseUrl, Call, Constrain, Endpoint, ImageDetail, Message, Model,
         Parameters, Payload, PayloadFormat, Prompts, Query, Quota, Random, Reach, Remote, Script,
-        Secret, Sending, Temperature, TokenField, WireSetting,
+        Secret, Sending, Temperature, Thinking, TokenField, WireSetting,
     };
 }
 

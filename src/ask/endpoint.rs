@@ -74,10 +74,6 @@ impl Endpoint {
         &self.access.base
     }
 
-    pub(super) fn host(&self) -> &str {
-        self.base().host()
-    }
-
     pub(super) fn has_key(&self) -> bool {
         self.access.key.is_some() || self.base().has_credentials()
     }

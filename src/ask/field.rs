@@ -1,9 +1,14 @@
 //! The fields of a request that not all servers accept: [`RequestField`] is one of them, [`RequestFields`] are those that the
 //! program adapts.
 
+use serde_json::{Map, Value};
+
 use super::complaint::Complaint;
 use super::parameters::{Parameters, Temperature, TokenField};
+use super::thinking::ThinkingSwitch;
+use super::url::BaseUrl;
 use super::wire_kind::{Wire, WireSetting};
+use crate::error::{Error, Result};
 
 /// A field that a server may refuse and that the program can send in another way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,6 +40,8 @@ pub(super) struct RequestFields {
     pub(super) stream_usage: bool,
     /// How many of the likeliest tokens are asked for; `None` if their probabilities are not.
     pub(super) top_logprobs: Option<u8>,
+    /// What is said about thinking; `None` if nothing is.
+    pub(super) thinking: Option<&'static ThinkingSwitch>,
 }
 
 /// The most likeliest tokens that OpenAI's API states, and most servers after it.
@@ -44,11 +51,21 @@ const TOP_LOGPROBS: u8 = 20;
 const FEWER_LOGPROBS: u8 = 5;
 
 impl RequestFields {
-    /// The fields of the first request to a host.
-    pub(super) fn first(parameters: &Parameters, host: &str) -> Self {
-        Self {
+    /// The fields of the first request to a server.
+    ///
+    /// # Errors
+    /// If `--thinking` cannot be said to the server, or is said twice.
+    pub(super) fn first(parameters: &Parameters, base: &BaseUrl) -> Result<Self> {
+        let thinking = parameters.thinking.map(|thinking| thinking.at(base));
+        let thinking = thinking.transpose()?;
+        let says_effort = thinking.is_some_and(|switch| switch.effort.is_some());
+        if says_effort && parameters.reasoning_effort.is_some() {
+            let problem = "this server takes it as the reasoning effort, which --reasoning-effort sets already";
+            return Err(Error::usage("--thinking", problem));
+        }
+        Ok(Self {
             wire: parameters.wire.first(),
-            token_field: parameters.token_field.at(host),
+            token_field: parameters.token_field.at(base.host()),
             temperature: match parameters.temperature {
                 Temperature::Auto => Some(0.0),
                 Temperature::Server => None,
@@ -56,7 +73,30 @@ impl RequestFields {
             },
             stream_usage: true,
             top_logprobs: parameters.probabilities.then_some(TOP_LOGPROBS),
-        }
+            thinking,
+        })
+    }
+
+    /// The reasoning effort: as the user set it, or as the server's switch for thinking.
+    pub(super) fn effort<'p>(&self, parameters: &'p Parameters) -> Option<&'p str> {
+        let own = parameters.reasoning_effort.as_deref();
+        own.or_else(|| self.thinking?.effort.as_deref())
+    }
+
+    /// The fields that tell the server whether the model thinks.
+    pub(super) fn switch(&self) -> Option<&'static Map<String, Value>> {
+        self.thinking.map(|switch| &switch.body)
+    }
+
+    /// The fields of the switch for thinking, as a server may refuse them.
+    pub(super) fn of_switch(&self) -> impl Iterator<Item = RequestField> {
+        let names = self.switch().into_iter().flat_map(Map::keys);
+        names.map(|name| RequestField {
+            name,
+            state: FieldState::Sent,
+            hint: "leave --thinking out: the model or its server has no such switch",
+            adaptable: None,
+        })
     }
 
     /// These fields after a server refused one of them; `None` if the user set it, or if it was changed before: a token limit is sent
@@ -196,6 +236,7 @@ impl FieldState {
 const ORDINARY_WORDS: [&str; 5] = ["detail", "effort", "format", "reasoning", "seed"];
 
 /// A field of a request, with the remedy if it is refused.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct RequestField {
     pub(super) name: &'static str,
     /// Whether the field was sent.

@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use super::thinking::Thinking;
 use super::wire_kind::WireSetting;
 use crate::error::{Error, Result};
 use crate::types::Decides;
@@ -44,6 +45,10 @@ pub struct Parameters {
     /// How long a reasoning model thinks, in the server's words (none, minimal, low, medium, high …); default: not sent
     #[arg(long, value_name = "EFFORT", add = Decides::Reply)]
     pub reasoning_effort: Option<String>,
+    /// Whether the model thinks before it answers, said in the server's own field (src/ask/thinking.toml); default: not sent
+    #[arg(long, value_name = "THINKING", value_enum, add = Decides::Reply)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub thinking: Option<Thinking>,
     /// How closely the server looks at images; default: not sent
     #[arg(long, value_name = "DETAIL", value_enum, add = Decides::Reply)]
     pub detail: Option<ImageDetail>,
@@ -78,6 +83,7 @@ impl Parameters {
             max_tokens: Self::MAX_TOKENS,
             token_field: TokenField::Auto,
             reasoning_effort: None,
+            thinking: None,
             detail: None,
             wire: WireSetting::Auto,
             constrain: Constrain::None,
@@ -238,7 +244,7 @@ mod tests {
     #[test]
     fn settings_that_decide_a_reply_change_the_content() {
         let base = Parameters::new("m".into());
-        let mut others = vec![base.clone(); 10];
+        let mut others = vec![base.clone(); 11];
         others[0].model = "n".into();
         others[1].temperature = Temperature::Server;
         others[2].token_field = TokenField::Omit;
@@ -249,6 +255,7 @@ mod tests {
         others[7].seed = Some(0);
         others[8].wire = WireSetting::Responses;
         others[9].probabilities = true;
+        others[10].thinking = Some(Thinking::Off);
         for other in &others {
             assert_ne!(other.content(), base.content(), "{other:?}");
         }

@@ -33,6 +33,8 @@ pub struct Remote {
     endpoint: Arc<Endpoint>,
     headers: HeaderMap,
     parameters: Parameters,
+    /// The fields of the first request.
+    first: RequestFields,
     /// The fields that the server accepts, as far as is known.
     fields: Mutex<RequestFields>,
     /// What is known from the first question to the model. Until it has come to an end, the others wait: what the server refuses in
@@ -46,11 +48,13 @@ impl Remote {
     /// The model that `parameters` name; models of one endpoint share its connections and its pauses.
     ///
     /// # Errors
-    /// If a header value has characters that HTTP does not allow.
+    /// If a header value has characters that HTTP does not allow, or if `--thinking` cannot be said to the server.
     pub fn open(endpoint: Arc<Endpoint>, parameters: Parameters) -> Result<Self> {
+        let first = RequestFields::first(&parameters, endpoint.base())?;
         Ok(Self {
             headers: endpoint.headers(parameters.wire.first())?,
-            fields: Mutex::new(RequestFields::first(&parameters, endpoint.host())),
+            fields: Mutex::new(first),
+            first,
             endpoint,
             parameters,
             scout: tokio::sync::Mutex::new(Scout::Pending),
@@ -80,7 +84,7 @@ impl Remote {
     /// once for all requests, and never for a single one.
     #[must_use]
     pub fn adapted(&self) -> Vec<String> {
-        self.fields().changes(self.first_fields())
+        self.fields().changes(self.first)
     }
 
     /// The API and all parameters that can change a reply.
@@ -184,10 +188,6 @@ impl Remote {
         self.endpoint.ask(&request).await
     }
 
-    fn first_fields(&self) -> RequestFields {
-        RequestFields::first(&self.parameters, self.endpoint.host())
-    }
-
     fn fields(&self) -> RequestFields {
         *self.fields.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -200,9 +200,8 @@ impl Remote {
             // Another request has changed the fields in the meantime.
             return refused_field.is_some();
         }
-        let first = self.first_fields();
         let adapted =
-            refused_field.and_then(|field| sent.after_refusal(field, first, &self.parameters));
+            refused_field.and_then(|field| sent.after_refusal(field, self.first, &self.parameters));
         let Some(adapted) = adapted else {
             return false;
         };

@@ -30,6 +30,12 @@ impl BaseUrl {
         self.0.host_str().unwrap_or_default()
     }
 
+    /// The port; `None` if it is not known for the scheme.
+    #[must_use]
+    pub(super) fn port(&self) -> Option<u16> {
+        self.0.port_or_known_default()
+    }
+
     /// Whether the host is this machine.
     #[must_use]
     pub fn is_loopback(&self) -> bool {

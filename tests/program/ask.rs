@@ -114,6 +114,7 @@ async fn what_is_set_is_sent_and_what_is_not_is_left_out() {
         max_tokens: NonZeroU32::new(16).unwrap(),
         token_field: TokenField::MaxCompletionTokens,
         reasoning_effort: Some("low".into()),
+        thinking: None,
         detail: Some(ImageDetail::High),
         wire: WireSetting::Auto,
         constrain: Constrain::None,

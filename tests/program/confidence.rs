@@ -171,10 +171,10 @@ fn intervals_hold_the_truth_of_an_overconfident_model() {
 /// A model whose confidence says nothing of its answers.
 #[test]
 fn confidence_that_is_noise_tells_nothing() {
-    let found = simulated(6, 100, (60, 5), noise);
+    let found = simulated(6, 60, (120, 5), noise);
     let chance = held(&found, 0.5, |row| row.auroc.map(|auc| auc.estimate));
     println!("AUROC of 0.5 held {chance} %");
-    assert!((90.0..=99.0).contains(&chance), "{chance}");
+    assert!((88.0..=100.0).contains(&chance), "{chance}");
     for row in &found {
         // Leaving out the least confident replies helps nothing.
         assert!(
@@ -185,7 +185,7 @@ fn confidence_that_is_noise_tells_nothing() {
     }
     // It is off by the spread of what it says: 0.17.
     let found_off = found.iter().filter(|row| row.error.unwrap().low > 0.0);
-    assert!(found_off.count() >= 80);
+    assert!(found_off.count() >= 54);
     let error = mean(&found, |row| row.error.unwrap().value);
     let truth = truth_of(|c| (c - noise(c)).powi(2)).sqrt();
     assert!((error - truth).abs() < 0.015, "{error} for {truth}");

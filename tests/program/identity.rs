@@ -205,7 +205,7 @@ fn set(conditions: &str) -> BTreeSet<String> {
 }
 
 /// What refuses an evaluation on the folder of another: the field that the message names, and the flag.
-const REFUSED: [(&str, &str); 29] = [
+const REFUSED: [(&str, &str); 30] = [
     ("--data", "--data elsewhere/frames"),
     ("--questions", "--questions other.jsonl"),
     ("--rules", "--rules rules.toml"),
@@ -230,6 +230,7 @@ const REFUSED: [(&str, &str); 29] = [
     ("--reasoning-effort", "--reasoning-effort low"),
     ("--top-p", "--top-p 0.9"),
     ("--detail", "--detail low"),
+    ("--thinking", "--thinking off"),
     ("--wire", "--wire responses"),
     ("--probabilities", "--probabilities"),
     ("--image-first", "--image-first"),
@@ -238,7 +239,7 @@ const REFUSED: [(&str, &str); 29] = [
 ];
 
 /// The same for open questions.
-const OPEN_REFUSED: [(&str, &str); 24] = [
+const OPEN_REFUSED: [(&str, &str); 25] = [
     ("--questions", "--questions other.json"),
     ("--num-frames", "--num-frames 2"),
     ("--image-size", "--image-size 32"),
@@ -262,6 +263,7 @@ const OPEN_REFUSED: [(&str, &str); 24] = [
     ("--reasoning-effort", "--reasoning-effort low"),
     ("--top-p", "--top-p 0.9"),
     ("--detail", "--detail low"),
+    ("--thinking", "--thinking off"),
     ("--wire", "--wire responses"),
 ];
 

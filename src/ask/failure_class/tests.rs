@@ -18,6 +18,7 @@ fn classify(status: u16, body: &str) -> FailureClass {
             temperature: Some(0.0),
             stream_usage: true,
             top_logprobs: None,
+            thinking: None,
         },
         has_image: true,
         has_key: true,

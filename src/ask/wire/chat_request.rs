@@ -1,14 +1,14 @@
-//! Requests of OpenAI's chat completions: the JSON [`body`], and the [`fields`] that servers may refuse.
+//! Requests of OpenAI's chat completions: the JSON [`body`].
 
 use serde::Serialize;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::image_places::with_images;
 use crate::ask::body::Parts;
 use crate::ask::call::Message;
 use crate::ask::constraint;
-use crate::ask::field::{AdaptableField, FieldState, RequestField, RequestFields, SentFields};
-use crate::ask::parameters::{Constrain, ImageDetail, Parameters, Temperature, TokenField};
+use crate::ask::field::RequestFields;
+use crate::ask::parameters::{Constrain, ImageDetail, Parameters, TokenField};
 use crate::ask::wire_kind::Wire;
 use crate::types::question::letter;
 
@@ -39,6 +39,8 @@ struct ChatRequest<'a> {
     stream: Option<bool>,
     #[serde(skip_serializing_if = "Option::is_none")]
     stream_options: Option<Value>,
+    #[serde(flatten)]
+    switch: Option<&'a Map<String, Value>>,
     messages: [Turn<'a>; 1],
 }
 
@@ -92,13 +94,14 @@ pub(super) fn body(
         seed: parameters.seed,
         max_tokens: limit(TokenField::MaxTokens),
         max_completion_tokens: limit(TokenField::MaxCompletionTokens),
-        reasoning_effort: parameters.reasoning_effort.as_deref(),
+        reasoning_effort: fields.effort(parameters),
         response_format: constrained(Constrain::Json, format),
         structured_outputs: constrained(Constrain::Choice, |letters| json!({"choice": letters})),
         logprobs: fields.top_logprobs.map(|_| true),
         top_logprobs: fields.top_logprobs,
         stream: is_stream.then_some(true),
         stream_options: (is_stream && fields.stream_usage).then(|| json!({"include_usage": true})),
+        switch: fields.switch(),
         messages: [Turn {
             role: "user",
             content: content(message, parameters.detail),
@@ -132,92 +135,4 @@ fn content(message: Message<'_>, detail: Option<ImageDetail>) -> Content<'_> {
 fn format(letters: &[char]) -> Value {
     let schema = constraint::schema(letters);
     json!({"type": "json_schema", "json_schema": {"name": constraint::ANSWER, "strict": true, "schema": schema}})
-}
-
-/// The remedy for a server that states no probabilities.
-pub(super) const PROBABILITIES: &str = "leave --probabilities out: the server states none";
-
-/// The fields that a server may refuse.
-pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField> {
-    let parameters = sent.parameters;
-    let never = parameters.token_field == TokenField::Omit;
-    let now = sent.fields.token_field;
-    let limit = |field| FieldState::until_refused(now == field, never || now != TokenField::Omit);
-    Vec::from([
-        RequestField {
-            name: "temperature",
-            state: FieldState::until_refused(
-                sent.fields.temperature.is_some(),
-                parameters.temperature == Temperature::Server,
-            ),
-            adaptable: Some(AdaptableField::Temperature),
-            hint: "leave the temperature to the server: --temperature default",
-        },
-        RequestField {
-            name: "top_p",
-            state: FieldState::set(parameters.top_p.is_some()),
-            adaptable: None,
-            hint: "leave --top-p out: the model takes no other than its own",
-        },
-        RequestField {
-            name: "max_tokens",
-            state: limit(TokenField::MaxTokens),
-            adaptable: Some(AdaptableField::TokenField),
-            hint: "send the limit otherwise: --token-field max_completion_tokens (or none), or another --max-tokens",
-        },
-        RequestField {
-            name: "max_completion_tokens",
-            state: limit(TokenField::MaxCompletionTokens),
-            adaptable: Some(AdaptableField::TokenField),
-            hint: "send the limit otherwise: --token-field max_tokens (or none), or another --max-tokens",
-        },
-        RequestField {
-            name: "reasoning_effort",
-            state: FieldState::set(parameters.reasoning_effort.is_some()),
-            adaptable: None,
-            hint: "leave --reasoning-effort out, or give a value the model takes",
-        },
-        RequestField {
-            name: "detail",
-            state: FieldState::set(sent.has_image && parameters.detail.is_some()),
-            adaptable: None,
-            hint: "leave --detail out, or give a value the server takes",
-        },
-        RequestField {
-            name: "response_format",
-            state: FieldState::set(parameters.constrain == Constrain::Json),
-            adaptable: None,
-            hint: "leave --constrain out: the server does not take it",
-        },
-        RequestField {
-            name: "structured_outputs",
-            state: FieldState::set(parameters.constrain == Constrain::Choice),
-            adaptable: None,
-            hint: "leave --constrain out, or try --constrain json",
-        },
-        RequestField {
-            name: "top_logprobs",
-            state: FieldState::set(sent.fields.top_logprobs.is_some()),
-            adaptable: Some(AdaptableField::TopLogprobs),
-            hint: PROBABILITIES,
-        },
-        RequestField {
-            name: "logprobs",
-            state: FieldState::until_refused(
-                sent.fields.top_logprobs.is_some(),
-                !parameters.probabilities,
-            ),
-            adaptable: Some(AdaptableField::Logprobs),
-            hint: PROBABILITIES,
-        },
-        RequestField {
-            name: "stream_options",
-            state: FieldState::until_refused(
-                sent.fields.wire == Wire::ChatStream && sent.fields.stream_usage,
-                sent.fields.stream_usage,
-            ),
-            adaptable: Some(AdaptableField::StreamUsage),
-            hint: "ask without a stream: --wire chat",
-        },
-    ])
 }

@@ -3,6 +3,7 @@
 //! Waits, retries, rates and the removal of keys from messages ([`Endpoint`](super::Endpoint), [`Remote`](super::Remote)) do not
 //! depend on it.
 
+mod chat_fields;
 mod chat_reply;
 mod chat_request;
 mod image_places;
@@ -61,10 +62,12 @@ impl Wire {
 
     /// The fields of a request that a server may refuse.
     pub(super) fn fields(self, sent: SentFields<'_>) -> Vec<RequestField> {
-        match self {
-            Self::Chat | Self::ChatStream => chat_request::fields(sent),
+        let mut fields = match self {
+            Self::Chat | Self::ChatStream => chat_fields::fields(sent),
             Self::Responses => responses_request::fields(sent),
-        }
+        };
+        fields.extend(sent.fields.of_switch());
+        fields
     }
 
     /// Reads the body of a reply with a status of success; `latency_ms` and `attempts` stay zero.

@@ -3,9 +3,9 @@
 //! The form is that of OpenAI's reference, `POST /responses`; `store` is false, so that the vendor keeps no image.
 
 use serde::Serialize;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
-use super::chat_request::PROBABILITIES;
+use super::chat_fields::PROBABILITIES;
 use super::image_places::with_images;
 use crate::ask::body::Parts;
 use crate::ask::call::Message;
@@ -36,6 +36,8 @@ struct ResponsesRequest<'a> {
     include: Option<[&'static str; 1]>,
     #[serde(skip_serializing_if = "Option::is_none")]
     top_logprobs: Option<u8>,
+    #[serde(flatten)]
+    switch: Option<&'a Map<String, Value>>,
     input: [Turn<'a>; 1],
 }
 
@@ -70,7 +72,7 @@ pub(super) fn body(
 ) -> Result<Parts, serde_json::Error> {
     let letters: Vec<char> = (0..choices).map(letter).collect();
     let constrain = parameters.constrain;
-    let effort = parameters.reasoning_effort.as_deref();
+    let effort = fields.effort(parameters);
     let json = serde_json::to_string(&ResponsesRequest {
         model: &parameters.model,
         store: false,
@@ -85,6 +87,7 @@ pub(super) fn body(
             .top_logprobs
             .map(|_| ["message.output_text.logprobs"]),
         top_logprobs: fields.top_logprobs,
+        switch: fields.switch(),
         input: [Turn {
             role: "user",
             content: content(message, parameters.detail),
@@ -165,13 +168,13 @@ pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField> {
         ),
         field(
             "effort",
-            FieldState::set(parameters.reasoning_effort.is_some()),
+            FieldState::set(sent.fields.effort(parameters).is_some()),
             None,
             EFFORT,
         ),
         field(
             "reasoning",
-            FieldState::set(parameters.reasoning_effort.is_some()),
+            FieldState::set(sent.fields.effort(parameters).is_some()),
             None,
             EFFORT,
         ),
@@ -215,4 +218,5 @@ pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField> {
 }
 
 /// The remedy for a reasoning effort that the model does not take.
-const EFFORT: &str = "leave --reasoning-effort out, or give a value the model takes";
+const EFFORT: &str =
+    "leave --reasoning-effort (or --thinking) out, or give a value the model takes";

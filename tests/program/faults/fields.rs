@@ -1,6 +1,6 @@
 //! Request fields that a server does not take.
 
-use darkqa_eval::internals::ask::{Parameters, Reach, Temperature};
+use darkqa_eval::internals::ask::{Parameters, Reach, Temperature, Thinking};
 use serde_json::{Value, json};
 
 use super::{ask, ask_with, sending};
@@ -77,4 +77,33 @@ fn a_field_is_known_by_the_place_in_a_list_of_details() {
     let outcome = ask(vec![Answer::json(422, &details), Answer::text("B")]);
     assert_eq!(outcome.result.unwrap().attempts, 2);
     assert_eq!(outcome.requests[1]["max_completion_tokens"], 1024);
+}
+
+/// What the table says of servers on this machine; a model without such a switch is the server's to refuse.
+#[test]
+fn thinking_is_said_in_the_field_of_the_server() {
+    let off = || Parameters {
+        thinking: Some(Thinking::Off),
+        ..Parameters::new("m".into())
+    };
+    let outcome = ask_with(vec![Answer::text("B")], sending(), off());
+    outcome.result.unwrap();
+    let body = &outcome.requests[0];
+    assert_eq!(
+        body["chat_template_kwargs"],
+        json!({"enable_thinking": false})
+    );
+    assert!(body.get("reasoning_effort").is_none() && body.get("switch").is_none());
+    let refusal = Answer::error(
+        400,
+        "unknown_parameter",
+        "Unknown parameter: 'chat_template_kwargs'.",
+    );
+    let outcome = ask_with(vec![refusal], sending(), off());
+    let error = outcome.result.unwrap_err();
+    assert_eq!((error.reach, error.attempts), (Reach::Endpoint, 1));
+    assert!(error.failure.message.contains("--thinking"), "{error}");
+    // Nothing is said unless it is asked for.
+    let outcome = ask(vec![Answer::text("B")]);
+    assert!(outcome.requests[0].get("chat_template_kwargs").is_none());
 }
