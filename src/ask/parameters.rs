@@ -196,6 +196,8 @@ pub enum ImageDetail {
     Low,
     /// Large
     High,
+    /// As large as it is, within the server's limits (the newest models of OpenAI)
+    Original,
 }
 
 /// The constraint on a model's reply. Any value but `None` measures something else: the model's answer if it must name a

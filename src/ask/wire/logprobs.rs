@@ -10,6 +10,9 @@ const KEPT: usize = 16;
 /// Logarithms below this are no numbers: vLLM writes -9999 for what it does not know.
 const UNKNOWN: f64 = -9990.0;
 
+/// Logarithms that differ by less are of the same token; chosen: servers round them.
+const SAME_TOKEN: f64 = 1e-4;
+
 /// The positions in the `logprobs` of a choice or of a part of a response: a list or an object with the list `content`, as OpenAI
 /// defines them, or the older lists `tokens`, `token_logprobs` and `top_logprobs`. `None` if there is none.
 pub(super) fn positions(logprobs: Option<&Value>) -> Option<Vec<TokenPosition>> {
@@ -54,6 +57,9 @@ fn logarithm(value: Option<&Value>) -> Option<f64> {
 }
 
 /// Each token once, with the one that was chosen, which some servers leave out of their list.
+///
+/// A tokenizer may have several tokens of one text, as a letter and its byte, each with a probability of its own. Entries of one
+/// text are therefore the same token only if their probabilities are equal, too.
 fn with_chosen(
     listed: impl Iterator<Item = (String, f64)>,
     token: &str,
@@ -62,7 +68,10 @@ fn with_chosen(
     let mut likeliest: Vec<(String, f64)> = Vec::new();
     let own = own.map(|logprob| (token.to_owned(), logprob));
     for (token, logprob) in listed.chain(own) {
-        if likeliest.iter().all(|(known, _)| *known != token) {
+        let is_same = |(known, other): &(String, f64)| {
+            *known == token && (other - logprob).abs() < SAME_TOKEN
+        };
+        if !likeliest.iter().any(is_same) {
             likeliest.push((token, logprob));
         }
     }
@@ -164,6 +173,13 @@ mod tests {
             assert_eq!(positions(Some(&shape)), None, "{shape}");
         }
         assert_eq!(positions(None), None);
+        // Two tokens of one text, as a letter and its byte, are not one.
+        let twins = json!([{"token": "A", "logprob": -1.0, "top_logprobs": [
+            {"id": 68, "token": "A", "bytes": [65], "logprob": -1.0},
+            {"id": 292, "token": "A", "bytes": [65], "logprob": -2.5},
+        ]}]);
+        let twins = &positions(Some(&twins)).unwrap()[0].likeliest;
+        assert_eq!(twins.len(), 2);
         // A list alone: the chosen token has no number.
         let alone = json!([{"token": "B"}]);
         assert!(positions(Some(&alone)).unwrap()[0].likeliest.is_empty());
