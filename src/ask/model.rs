@@ -18,7 +18,7 @@ use crate::types::{Digest, Reply};
 #[derive(Debug)]
 pub enum Model {
     /// A model at an endpoint.
-    Remote(Remote),
+    Remote(Box<Remote>),
     /// Random guesses, each choice equally likely.
     Random(Random),
     /// Replies from a file.

@@ -227,7 +227,7 @@ pub(crate) fn open(
                 ..parameters.clone()
             };
             let model = Remote::open(Arc::clone(endpoint), parameters)?;
-            Ok(Model::Remote(model))
+            Ok(Model::Remote(Box::new(model)))
         }
         ModelName::Random | ModelName::Observer(_) => Err(Error::usage(
             "--model",

@@ -373,7 +373,7 @@ async fn scripts_and_guesses_answer_without_an_endpoint() {
     assert_ne!(digest(&random), digest(&Model::Random(Random { seed: 2 })));
     let endpoint = endpoint_at("http://127.0.0.1:1/v1", None, quick());
     let remote = Remote::open(endpoint, Parameters::new("m".into())).unwrap();
-    let content = Model::Remote(remote).content();
+    let content = Model::Remote(Box::new(remote)).content();
     assert_eq!(
         (&content["wire"], &content["model"]),
         (&json!("chat"), &json!("m"))

@@ -193,7 +193,8 @@ fn probabilities_and_responses_come_through_a_batch() {
             json!({"status": "completed", "output": [{"type": "message", "content": [part]}]});
         let response = json!({"status_code": 200, "body": body});
         let line = json!({"custom_id": request["custom_id"], "response": response, "error": null});
-        lines.push_str(&format!("{line}\n"));
+        lines += &line.to_string();
+        lines.push('\n');
     }
     bench.file("output.jsonl", lines);
     bench.complete(&words("batch import run output.jsonl"));
