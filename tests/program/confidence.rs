@@ -156,6 +156,7 @@ fn intervals_hold_the_truth_of_an_overconfident_model() {
         let rates = [
             held(&found, error, |row| row.error),
             held(&found, gap, |row| Some(row.overconfidence)),
+            held(&found, 0.625, |row| Some(row.confidence)),
             held(&found, brier, |row| Some(row.brier)),
         ];
         let middle = mean(&found, |row| row.error.unwrap().value);

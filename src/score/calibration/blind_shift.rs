@@ -1,33 +1,26 @@
-//! What the pixels contribute: the distance of probabilities with an image from those without, [`mean`].
+//! What the pixels contribute: the [`distances`] of probabilities with an image from those without.
 
 use super::confident_reply::usable;
-use crate::score::estimate::Estimate;
 use crate::score::grid::Grid;
 use crate::score::subject::Subject;
 use crate::types::View;
 
-/// The mean over the items of the Jensen–Shannon distance, 0 to 1, between the probabilities of a subject and those of the same model
-/// without an image (the root of the divergence in bits: Endres and Schindelin 2003, IEEE Trans. Inf. Theory 49:1858). `None` if there
-/// are none of the latter.
-pub(super) fn mean(grid: &Grid<'_>, subject: usize) -> Option<Estimate> {
+/// For each item its cluster and the Jensen–Shannon distance, 0 to 1, between the probabilities of a subject and those of the same
+/// model without an image (the root of the divergence in bits: Endres and Schindelin 2003, IEEE Trans. Inf. Theory 49:1858). Empty if
+/// there are none of the latter.
+pub(super) fn distances(grid: &Grid<'_>, subject: usize) -> Vec<(u32, f64)> {
     let seeing = &grid.subjects[subject];
-    if seeing.view != Some(View::Image) {
-        return None;
-    }
-    let blind = grid.find(&Subject::new(&seeing.model, None))?;
-    let mut sums = vec![(0.0, 0.0); grid.clusters];
-    let mut n = 0;
-    for (index, item) in grid.items.iter().enumerate() {
-        let pair = [subject, blind].map(|subject| usable(grid.record(subject, index)));
-        if let [Some(seen), Some(unseen)] = pair {
-            let (sum, count) = &mut sums[item.cluster as usize];
-            *sum += distance(&seen.p, &unseen.p);
-            *count += 1.0;
-            n += 1;
-        }
-    }
-    sums.retain(|(_, count)| *count > 0.0);
-    Estimate::scored(&sums, 1.0, n)
+    let blind = grid.find(&Subject::new(&seeing.model, None));
+    let Some(blind) = blind.filter(|_| seeing.view == Some(View::Image)) else {
+        return Vec::new();
+    };
+    let items = grid.items.iter().enumerate();
+    let distances = items.filter_map(|(index, item)| {
+        let seen = usable(grid.record(subject, index))?;
+        let unseen = usable(grid.record(blind, index))?;
+        Some((item.cluster, distance(&seen.p, &unseen.p)))
+    });
+    distances.collect()
 }
 
 /// The Jensen–Shannon distance of two distributions.

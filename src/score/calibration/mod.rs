@@ -84,7 +84,7 @@ fn calibration(grid: &Grid<'_>, draws: &Resamples, subject: usize) -> Option<Cal
         replies: n,
         reasoned: sorted.reasoned,
         unstated: sorted.unstated,
-        confidence: confidence(grid.clusters, replies)?,
+        confidence: mean(|reply| reply.confidence),
         accuracy: accuracy(grid.clusters, replies)?,
         overconfidence: mean(|reply| reply.confidence - f64::from(u8::from(reply.right))),
         error,
@@ -98,22 +98,20 @@ fn calibration(grid: &Grid<'_>, draws: &Resamples, subject: usize) -> Option<Cal
         nll: mean(|reply| reply.nll),
         risk: RiskCoverage::of(replies),
         auroc: auroc(grid.clusters, replies),
-        blind_shift: blind_shift::mean(grid, subject),
+        blind_shift: blind_shift(grid, draws, subject),
         over_orders: rotations::accuracy(grid, subject),
         positions: positions::shares(grid, subject),
     })
 }
 
-/// Mean confidence, with the interval of scores between 0 and 1 in clusters.
-fn confidence(clusters: usize, replies: &[ConfidentReply]) -> Option<Estimate> {
-    let mut sums = vec![(0.0, 0.0); clusters];
-    for reply in replies {
-        let (sum, n) = &mut sums[reply.cluster as usize];
-        *sum += reply.confidence;
-        *n += 1.0;
-    }
-    sums.retain(|(_, n)| *n > 0.0);
-    Estimate::scored(&sums, 1.0, replies.len())
+/// The mean distance to the probabilities without an image; `None` if there are none of the latter.
+fn blind_shift(grid: &Grid<'_>, draws: &Resamples, subject: usize) -> Option<Estimate> {
+    let distances = blind_shift::distances(grid, subject);
+    let terms = distances.into_iter();
+    let terms: Vec<_> = terms
+        .map(|(cluster, distance)| (cluster, distance, 1.0))
+        .collect();
+    (!terms.is_empty()).then(|| ratio_of(draws, &terms))
 }
 
 fn accuracy(clusters: usize, replies: &[ConfidentReply]) -> Option<Estimate> {
@@ -133,21 +131,32 @@ fn ratio(
     above: impl Fn(&ConfidentReply) -> f64,
     below: impl Fn(&ConfidentReply) -> f64,
 ) -> Estimate {
-    let by_cluster = |number: &dyn Fn(&ConfidentReply) -> f64| {
-        let mut sums = vec![0.0; draws.clusters()];
-        for reply in replies {
-            sums[reply.cluster as usize] += number(reply) as f32;
-        }
-        draws.sums(&sums)
+    let terms = replies.iter();
+    let terms = terms.map(|reply| (reply.cluster, above(reply), below(reply)));
+    ratio_of(draws, &terms.collect::<Vec<_>>())
+}
+
+/// The same of terms: the cluster of each, what it adds above and what it adds below.
+fn ratio_of(draws: &Resamples, terms: &[(u32, f64, f64)]) -> Estimate {
+    let mut by_cluster = vec![[0.0; 2]; draws.clusters()];
+    for (cluster, above, below) in terms {
+        let sums = &mut by_cluster[*cluster as usize];
+        sums[0] += above;
+        sums[1] += below;
+    }
+    let sums = |side: usize| {
+        let sums = by_cluster.iter().map(|sums| sums[side] as f32);
+        draws.sums(&sums.collect::<Vec<_>>())
     };
-    let total = |number: &dyn Fn(&ConfidentReply) -> f64| replies.iter().map(number).sum::<f64>();
-    let (tops, bottoms) = (by_cluster(&above), by_cluster(&below));
-    let pairs = tops.into_iter().zip(bottoms);
     // A draw of clusters without a reply says nothing.
-    let ratios = pairs.filter(|(_, below)| *below > 0.0);
-    let ratios = ratios.map(|(above, below)| above / below);
-    let value = total(&above) / total(&below);
-    Estimate::around(value, draws.interval(ratios.collect()), replies.len())
+    let pairs = sums(0).into_iter().zip(sums(1));
+    let pairs = pairs.filter(|(_, below)| *below > 0.0);
+    let ratios = pairs.map(|(above, below)| above / below);
+    let (above, below) = terms.iter().fold((0.0, 0.0), |(above, below), term| {
+        (above + term.1, below + term.2)
+    });
+    let interval = draws.interval(ratios.collect());
+    Estimate::around(above / below, interval, terms.len())
 }
 
 /// The area under the receiver operating characteristic of confidence for right against wrong replies.
