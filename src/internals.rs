@@ -4,7 +4,7 @@ pub mod ask {
     pub use crate::ask::{
         Access, AskError, BaseUrl, Call, Constrain, Endpoint, ExtraFields, ImageDetail, Message,
         Model, Parameters, Payload, PayloadFormat, Prompts, Query, Quota, Random, Reach, Remote,
-        Script, Secret, Sending, Temperature, TokenField, Wire,
+        Script, Secret, Sending, Temperature, Thinking, TokenField, WireSetting,
     };
 }
 
@@ -47,6 +47,7 @@ pub mod rooms {
 pub mod score {
     pub use crate::score::agreement::{AgreementCounts, clustered_kappa};
     pub use crate::score::bootstrap::Resamples;
+    pub use crate::score::calibration::{Calibration, calibrations};
     pub use crate::score::chance::OfferedChoices;
     pub use crate::score::cluster::Clusters;
     pub use crate::score::curve::curves;

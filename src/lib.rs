@@ -103,8 +103,8 @@
 //! | a flag | the structure of its group, where it acts, the test of what it does, for an evaluation or `openeqa` its row in `tests/program/identity.rs`; where it may be idle, `cli/no_effect.rs` |
 //! | a format to import | `import/<kind>.rs`, `import/mod.rs`, `import/README.md`, `tests/program/import.rs` |
 //! | a kind of degradation | `types/degradation.rs`, `synthesis/<kind>.rs`, `synthesis/mod.rs`, `synthesis/applied.rs`, `synthesis/exposures.rs`, `tests/program/synthesize.rs`, `results/README.md`; with an axis of its own `types/severity.rs`, `synthesis/levels.rs` |
-//! | an API of endpoints | `ask/wire/<api>.rs`, `ask/wire/mod.rs`, `job/models.rs`, `tests/support/endpoint.rs`, `tests/program/ask.rs` |
-//! | a vendor of endpoints | `ask/vendors.toml` |
+//! | an API of endpoints | `ask/wire_kind.rs`, `ask/wire/<api>.rs`, `ask/wire/mod.rs`, `tests/program/faults/wires.rs` |
+//! | a vendor of endpoints | `ask/vendors.toml`, `ask/thinking.toml` |
 //! | a rule of reading replies | `score/choice/`, its words in `words.toml`, `LENIENT_VERSION`, `tests/data/replies_by_rule.jsonl` |
 //! | an experiment | `run/<experiment>/`, its detail in `types/detail.rs` and `score/record.rs`, `job/stored.rs` |
 //!

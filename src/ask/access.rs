@@ -12,7 +12,7 @@ use super::own_headers::OwnHeaders;
 use super::secret::{Scrub, Secret};
 use super::url::BaseUrl;
 use super::vendor::Vendor;
-use super::wire::Wire;
+use super::wire_kind::Wire;
 use crate::error::{Error, Result};
 
 /// The maximum time to open a connection; chosen.

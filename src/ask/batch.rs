@@ -6,7 +6,7 @@ use super::complaint::{Complaint, UnreadableReply};
 use super::constraint::letter_of;
 use super::parameters::Constrain;
 use super::secret::Scrub;
-use super::wire::Wire;
+use super::wire::batch_reply;
 use crate::types::{Failure, FailureKind, Reply};
 
 /// One line of an input file: `{"custom_id", "method", "url", "body"}` with a line end; the body is that of a single request.
@@ -26,19 +26,19 @@ pub(crate) struct BatchLine {
 }
 
 impl BatchLine {
-    /// Reads a line about a request to an API; `None` if the line is not one of such a file.
+    /// Reads a line; `None` if the line is not one of such a file.
     #[must_use]
-    pub(crate) fn read(line: &str, wire: Wire) -> Option<Self> {
+    pub(crate) fn read(line: &str) -> Option<Self> {
         let line: Value = serde_json::from_str(line).ok()?;
         let id = line.get("custom_id")?.as_str()?.to_owned();
         Some(Self {
             id,
-            result: result(&line, wire),
+            result: result(&line),
         })
     }
 }
 
-fn result(line: &Value, wire: Wire) -> Result<Reply, Failure> {
+fn result(line: &Value) -> Result<Reply, Failure> {
     let response = line.get("response").filter(|response| !response.is_null());
     let status = response.and_then(|response| response.get("status_code")?.as_u64());
     let status = status.and_then(|status| u16::try_from(status).ok());
@@ -72,17 +72,12 @@ fn result(line: &Value, wire: Wire) -> Result<Reply, Failure> {
         .as_str()
         .map_or_else(|| body.to_string(), str::to_owned);
     match status {
-        None | Some(200..300) => {
-            wire.reply(text.as_bytes(), "application/json")
-                .or_else(|unreadable| match unreadable {
-                    UnreadableReply::Complaint(complaint) => {
-                        fail(FailureKind::Server, &complaint.message)
-                    }
-                    UnreadableReply::Other(what) => fail(FailureKind::Response, &what),
-                })
-        }
+        None | Some(200..300) => batch_reply(&text).or_else(|unreadable| match unreadable {
+            UnreadableReply::Complaint(complaint) => fail(FailureKind::Server, &complaint.message),
+            UnreadableReply::Other(what) => fail(FailureKind::Response, &what),
+        }),
         Some(code) => {
-            let complaint = wire.complaint(text.as_bytes());
+            let complaint = Complaint::of_body(&text);
             let kind = match code {
                 429 => FailureKind::RateLimit,
                 500.. => FailureKind::Server,
@@ -98,6 +93,7 @@ fn result(line: &Value, wire: Wire) -> Result<Reply, Failure> {
 pub(crate) fn with_letter(reply: Reply, constrain: Constrain, choices: usize) -> Reply {
     Reply {
         text: letter_of(constrain, choices, &reply.text).unwrap_or(reply.text),
+        finish: reply.finish.shortened(),
         ..reply
     }
 }
@@ -108,7 +104,7 @@ mod tests {
 
     #[test]
     fn lines_with_replies_and_failures_are_read() {
-        let read = |line: &str| BatchLine::read(line, Wire::Chat).unwrap();
+        let read = |line: &str| BatchLine::read(line).unwrap();
         let answered = read(
             r#"{"id":"batch_req_1","custom_id":"k","response":{"status_code":200,"request_id":"r","body":{"choices":[{"message":{"content":"B"},"finish_reason":"stop"}],"usage":{"prompt_tokens":9}}},"error":null}"#,
         );
@@ -144,7 +140,7 @@ mod tests {
             assert!(failure.message.contains(message), "{}", failure.message);
         }
         for wrong in ["", "{}", r#"{"custom_id":7}"#, "[1]"] {
-            assert_eq!(BatchLine::read(wrong, Wire::Chat), None, "{wrong}");
+            assert_eq!(BatchLine::read(wrong), None, "{wrong}");
         }
     }
 }

@@ -20,6 +20,19 @@ use crate::types::FailureKind;
 /// fill the memory.
 const MAX_REPLY: usize = 16 << 20;
 
+/// The maximum time of a stream, as a multiple of the timeout; chosen: a server that keeps a connection open by comments alone must
+/// not hold a run for ever.
+const STREAM_TIMEOUTS: u32 = 30;
+
+/// What the timeout of a request limits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Deadline {
+    /// The whole try, from the first byte sent to the last byte received.
+    Whole,
+    /// The silence between two pieces of a stream, which may take longer as a whole.
+    Silence,
+}
+
 /// Pooled connections to a server, and the filter for secrets in its texts.
 #[derive(Debug)]
 pub(super) struct Connection {
@@ -63,6 +76,7 @@ impl Connection {
         path: &str,
         headers: &HeaderMap,
         body: Parts,
+        deadline: Deadline,
     ) -> Result<HttpReply, FailedTry> {
         let started = Instant::now();
         let request = self
@@ -71,13 +85,14 @@ impl Connection {
             .headers(headers.clone())
             .header(CONTENT_TYPE, "application/json")
             .body(reqwest::Body::wrap(body));
-        let response = request
-            .send()
-            .await
-            .map_err(|error| self.failed_try(error))?;
+        let request = match deadline {
+            Deadline::Whole => request,
+            Deadline::Silence => request.timeout(self.timeout * STREAM_TIMEOUTS),
+        };
+        let response = self.in_time(deadline, request.send()).await?;
         let status = response.status();
         let headers = response.headers().clone();
-        let body = match self.receive(response).await {
+        let body = match self.receive(response, deadline).await {
             Err(failed) if status.is_success() => return Err(failed),
             // The status alone says that the request was refused.
             body => body.unwrap_or_default(),
@@ -103,7 +118,7 @@ impl Connection {
         if !response.status().is_success() {
             return None;
         }
-        let body = self.receive(response).await.ok()?;
+        let body = self.receive(response, Deadline::Whole).await.ok()?;
         let list: Value = serde_json::from_slice(&body).ok()?;
         let models = list.get("data")?.as_array()?;
         let own = models
@@ -116,13 +131,13 @@ impl Connection {
     }
 
     /// The body of a response, decompressed, up to [`MAX_REPLY`].
-    async fn receive(&self, mut response: Response) -> Result<Vec<u8>, FailedTry> {
+    async fn receive(
+        &self,
+        mut response: Response,
+        deadline: Deadline,
+    ) -> Result<Vec<u8>, FailedTry> {
         let mut body = Vec::new();
-        while let Some(chunk) = response
-            .chunk()
-            .await
-            .map_err(|error| self.failed_try(error))?
-        {
+        while let Some(chunk) = self.in_time(deadline, response.chunk()).await? {
             if body.len() + chunk.len() > MAX_REPLY {
                 let message = format!("{} answered with more than 16 MiB", self.base);
                 return Err(FailedTry::new(FailureKind::Response, message));
@@ -130,6 +145,30 @@ impl Connection {
             body.extend_from_slice(&chunk);
         }
         Ok(body)
+    }
+
+    /// The result of one step of a request, or its failure.
+    async fn in_time<T>(
+        &self,
+        deadline: Deadline,
+        step: impl Future<Output = reqwest::Result<T>>,
+    ) -> Result<T, FailedTry> {
+        let done = match deadline {
+            Deadline::Whole => Ok(step.await),
+            Deadline::Silence => tokio::time::timeout(self.timeout, step).await,
+        };
+        if let Ok(done) = done {
+            return done.map_err(|error| self.failed_try(error));
+        }
+        let timeout = self.timeout.as_secs_f64();
+        let message = format!(
+            "{} sent nothing for {timeout} s; allow more by --timeout",
+            self.base
+        );
+        Err(FailedTry {
+            again: Again::Later,
+            ..FailedTry::new(FailureKind::Timeout, message)
+        })
     }
 
     /// The failure of a request without a complete response.

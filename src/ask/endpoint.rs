@@ -16,7 +16,7 @@ use super::request::Request;
 use super::sending::Sending;
 use super::service::{Choice, Effect, Services};
 use super::url::BaseUrl;
-use super::wire::Wire;
+use super::wire_kind::Wire;
 use crate::error::{Error, Result};
 use crate::types::{FailureKind, Reply};
 
@@ -96,10 +96,6 @@ impl Endpoint {
     #[must_use]
     pub fn base(&self) -> &BaseUrl {
         self.replicas[0].base()
-    }
-
-    pub(super) fn host(&self) -> &str {
-        self.base().host()
     }
 
     pub(super) fn has_key(&self) -> bool {

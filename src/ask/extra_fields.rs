@@ -8,6 +8,7 @@ use clap::Args;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use super::field::{FieldState, RequestField};
 use crate::error::{Error, Result};
 use crate::types::Decides;
 
@@ -37,10 +38,7 @@ const OWNED: [(&str, &str); 15] = [
     ("messages", "--system, or --prompts"),
     ("input", "--system, or --prompts"),
     ("instructions", "--system"),
-    (
-        "stream",
-        "nothing: the program reads whole and streamed replies alike",
-    ),
+    ("stream", "--wire"),
     ("n", "--repeats"),
     ("max_tokens", "--max-tokens"),
     ("max_completion_tokens", "--max-tokens with --token-field"),
@@ -52,8 +50,8 @@ const OWNED: [(&str, &str); 15] = [
         "--sampling-seed of openeqa, or seed in a file of models",
     ),
     ("reasoning_effort", "--reasoning-effort"),
-    ("logprobs", "nothing: the program decides what it reads"),
-    ("top_logprobs", "nothing: the program decides what it reads"),
+    ("logprobs", "--probabilities"),
+    ("top_logprobs", "--probabilities"),
 ];
 
 /// Fields without which no request can be sent.
@@ -180,9 +178,21 @@ impl ExtraFields {
         serde_json::to_string(&fields)
     }
 
-    /// The names of the fields that the user adds at the top of the body.
-    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
-        self.body.keys().map(String::as_str)
+    /// The user's own fields, as a server may refuse them.
+    pub(super) fn request_fields(&self) -> impl Iterator<Item = RequestField<'_>> {
+        let of_body = self.body.keys().map(|name| RequestField {
+            name,
+            state: FieldState::Sent,
+            adaptable: None,
+            hint: "leave this field out of --extra-body, or give a value that the server takes",
+        });
+        let of_system = ["system", "instructions"].map(|name| RequestField {
+            name,
+            state: FieldState::set(self.system.is_some()),
+            adaptable: None,
+            hint: "leave --system out: the model takes no system message",
+        });
+        of_system.into_iter().chain(of_body)
     }
 }
 

@@ -1,9 +1,15 @@
 //! The fields of a request that not all servers accept: [`RequestField`] is one of them, [`RequestFields`] are those that the
 //! program adapts.
 
+use serde_json::{Map, Value};
+
 use super::complaint::Complaint;
 use super::parameters::{Parameters, Temperature, TokenField};
+use super::thinking::ThinkingSwitch;
+use super::url::BaseUrl;
 use super::vendor::Vendor;
+use super::wire_kind::{Wire, WireSetting};
+use crate::error::{Error, Result};
 
 /// A field that a server may refuse and that the program can send in another way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -12,28 +18,160 @@ pub enum AdaptableField {
     TokenField,
     /// The temperature; some models accept only their default.
     Temperature,
+    /// The wire, to the one that the server asks for.
+    Wire(Wire),
+    /// The request for the number of tokens in a stream.
+    StreamUsage,
+    /// The request for the probabilities of tokens.
+    Logprobs,
+    /// How many of the likeliest tokens are asked for.
+    TopLogprobs,
 }
 
 /// The adaptable fields of a request, as found out once for a whole run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct RequestFields {
+    /// The API.
+    pub(super) wire: Wire,
     /// The name of the token limit, never `Auto`.
     pub(super) token_field: TokenField,
     /// The temperature; `None` if none is sent.
     pub(super) temperature: Option<f64>,
+    /// Whether a stream is asked for the number of its tokens.
+    pub(super) stream_usage: bool,
+    /// How many of the likeliest tokens are asked for; `None` if their probabilities are not.
+    pub(super) top_logprobs: Option<u8>,
+    /// What is said about thinking; `None` if nothing is.
+    pub(super) thinking: Option<&'static ThinkingSwitch>,
 }
 
+/// The most likeliest tokens that OpenAI's API states, and most servers after it.
+const TOP_LOGPROBS: u8 = 20;
+
+/// The most that others state, Text Generation Inference among them.
+const FEWER_LOGPROBS: u8 = 5;
+
 impl RequestFields {
-    /// The fields of the first request to a host.
-    pub(super) fn first(parameters: &Parameters, host: &str) -> Self {
-        Self {
-            token_field: Vendor::token_field_at(host, parameters.token_field),
+    /// The fields of the first request to a server.
+    ///
+    /// # Errors
+    /// If `--thinking` cannot be said to the server, or is said twice.
+    pub(super) fn first(parameters: &Parameters, base: &BaseUrl) -> Result<Self> {
+        let thinking = parameters.thinking.map(|thinking| thinking.at(base));
+        let thinking = thinking.transpose()?;
+        let says_effort = thinking.is_some_and(|switch| switch.effort.is_some());
+        if says_effort && parameters.reasoning_effort.is_some() {
+            let problem = "this server takes it as the reasoning effort, which --reasoning-effort sets already";
+            return Err(Error::usage("--thinking", problem));
+        }
+        Ok(Self {
+            wire: parameters.wire.first(),
+            token_field: Vendor::token_field_at(base.host(), parameters.token_field),
             temperature: match parameters.temperature {
                 Temperature::Auto => Some(0.0),
                 Temperature::Server => None,
                 Temperature::Of(value) => Some(value),
             },
-        }
+            stream_usage: true,
+            top_logprobs: parameters.probabilities.then_some(TOP_LOGPROBS),
+            thinking,
+        })
+    }
+
+    /// The reasoning effort: as the user set it, or as the server's switch for thinking.
+    pub(super) fn effort<'p>(&self, parameters: &'p Parameters) -> Option<&'p str> {
+        let own = parameters.reasoning_effort.as_deref();
+        own.or_else(|| self.thinking?.effort.as_deref())
+    }
+
+    /// The fields that tell the server whether the model thinks.
+    pub(super) fn switch(&self) -> Option<&'static Map<String, Value>> {
+        self.thinking.map(|switch| &switch.body)
+    }
+
+    /// The fields of the switch for thinking, as a server may refuse them.
+    pub(super) fn of_switch<'a>(self) -> impl Iterator<Item = RequestField<'a>> {
+        let names = self.switch().into_iter().flat_map(Map::keys);
+        names.map(|name| RequestField {
+            name,
+            state: FieldState::Sent,
+            hint: "leave --thinking out: the model or its server has no such switch",
+            adaptable: None,
+        })
+    }
+
+    /// These fields after a server refused one of them; `None` if the user set it, or if it was changed before: a token limit is sent
+    /// by its other name and then not at all.
+    pub(super) fn after_refusal(
+        self,
+        field: AdaptableField,
+        first: Self,
+        parameters: &Parameters,
+    ) -> Option<Self> {
+        let adapted = match field {
+            AdaptableField::Wire(wire) if parameters.wire == WireSetting::Auto => {
+                Self { wire, ..self }
+            }
+            AdaptableField::TokenField if parameters.token_field == TokenField::Auto => {
+                let is_first = self.token_field == first.token_field;
+                let token_field = match self.token_field {
+                    TokenField::MaxTokens if is_first => TokenField::MaxCompletionTokens,
+                    _ if is_first => TokenField::MaxTokens,
+                    _ => TokenField::Omit,
+                };
+                // The Responses API has one name for it.
+                let token_field = match self.wire {
+                    Wire::Responses => TokenField::Omit,
+                    _ => token_field,
+                };
+                Self {
+                    token_field,
+                    ..self
+                }
+            }
+            AdaptableField::Temperature if parameters.temperature == Temperature::Auto => Self {
+                temperature: None,
+                ..self
+            },
+            AdaptableField::StreamUsage => Self {
+                stream_usage: false,
+                ..self
+            },
+            AdaptableField::Logprobs => Self {
+                top_logprobs: None,
+                ..self
+            },
+            AdaptableField::TopLogprobs => Self {
+                top_logprobs: Some(FEWER_LOGPROBS)
+                    .filter(|_| self.top_logprobs == Some(TOP_LOGPROBS)),
+                ..self
+            },
+            _ => return None,
+        };
+        (adapted != self).then_some(adapted)
+    }
+
+    /// What changed since the `first` request, in words.
+    pub(super) fn changes(self, first: Self) -> Vec<String> {
+        let wire = match self.wire {
+            wire if wire == first.wire => None,
+            Wire::Responses => Some("it is asked through the Responses API".to_owned()),
+            _ => Some("its replies are streamed".to_owned()),
+        };
+        let field = (self.token_field != first.token_field).then(|| match self.token_field {
+            TokenField::Omit => "no token limit is sent".to_owned(),
+            field => format!("the token limit is sent as {field}"),
+        });
+        let temperature = (self.temperature != first.temperature)
+            .then(|| "no temperature is sent: the server's own holds".to_owned());
+        let usage = (self.stream_usage != first.stream_usage)
+            .then(|| "a stream is not asked for the number of its tokens".to_owned());
+        let logprobs = (self.top_logprobs != first.top_logprobs).then(|| match self.top_logprobs {
+            Some(top) => format!("the probabilities of {top} tokens are asked for"),
+            None => "it states no probabilities: its confidence is not available".to_owned(),
+        });
+        let changes = [wire, field, temperature, usage, logprobs];
+        changes.into_iter().flatten().collect()
     }
 }
 
@@ -68,11 +206,42 @@ const UNSUPPORTED: [&str; 18] = [
     "instead",
 ];
 
+/// Whether a field is in a request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum FieldState {
+    /// It is.
+    Sent,
+    /// It is not sent any more, because the server refused it before.
+    Withdrawn,
+    /// It was never sent, so it is not the cause of a refusal.
+    Absent,
+}
+
+impl FieldState {
+    /// The state of a field that is sent if it is set.
+    pub(super) fn set(sent: bool) -> Self {
+        if sent { Self::Sent } else { Self::Absent }
+    }
+
+    /// The state of a field that is sent until the server refuses it, unless the user leaves it out.
+    pub(super) fn until_refused(sent: bool, left_out: bool) -> Self {
+        match (sent, left_out) {
+            (true, _) => Self::Sent,
+            (false, true) => Self::Absent,
+            (false, false) => Self::Withdrawn,
+        }
+    }
+}
+
+/// Names of fields that are ordinary words, too: in a message they count only in quotation marks.
+const ORDINARY_WORDS: [&str; 5] = ["detail", "effort", "format", "reasoning", "seed"];
+
 /// A field of a request, with the remedy if it is refused.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct RequestField<'a> {
     pub(super) name: &'a str,
-    /// Whether the field was sent; otherwise it is not the cause.
-    pub(super) sent: bool,
+    /// Whether the field was sent.
+    pub(super) state: FieldState,
     /// The remedy for the user: the flag that changes the field.
     pub(super) hint: &'static str,
     /// The kind of field, if the program can send it in another way.
@@ -80,15 +249,32 @@ pub(super) struct RequestField<'a> {
 }
 
 impl RequestField<'_> {
-    /// Whether the server names the field as the cause.
+    /// Whether the server names the field as the cause: in the error's own field for it, or in words of refusal that name it.
     pub(super) fn is_named(&self, complaint: &Complaint) -> bool {
         let param = complaint.param.as_deref();
-        param.is_some_and(|param| param.rsplit(['.', '/']).next() == Some(self.name))
+        let param = param.and_then(|param| param.rsplit(['.', '/']).next());
+        if param == Some(self.name) {
+            return true;
+        }
+        let is_ordinary = ORDINARY_WORDS.contains(&self.name);
+        let in_words = self.is_mentioned(complaint) && !is_ordinary;
+        is_unsupported(complaint) && (in_words || self.is_quoted(complaint))
     }
 
     /// Whether the server's text mentions the field.
     pub(super) fn is_mentioned(&self, complaint: &Complaint) -> bool {
-        mentions(&complaint.message, self.name)
+        mentions(&complaint.message.to_lowercase(), self.name)
+    }
+
+    /// Whether the server's text has the field in quotation marks, alone or at the end of a path.
+    fn is_quoted(&self, complaint: &Complaint) -> bool {
+        let quoted = complaint
+            .message
+            .split(['`', '\'', '"', '“', '”', '‘', '’']);
+        quoted
+            .skip(1)
+            .step_by(2)
+            .any(|path| path.rsplit(['.', '/']).next() == Some(self.name))
     }
 }
 

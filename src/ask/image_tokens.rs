@@ -52,6 +52,8 @@ enum Rule {
         side: f64,
         high_most: Option<f64>,
         high_side: Option<f64>,
+        original_most: Option<f64>,
+        original_side: Option<f64>,
         factor: f64,
     },
     Patches {
@@ -111,12 +113,17 @@ impl Rule {
                 side,
                 high_most,
                 high_side,
+                original_most,
+                original_side,
                 factor,
             } => {
-                let is_high = detail == Some(ImageDetail::High);
-                let high =
-                    |value: Option<f64>, other: f64| value.filter(|_| is_high).unwrap_or(other);
-                fitted(width, height, high(high_side, side), high(high_most, most)) * factor
+                let (own_side, own_most) = match detail {
+                    Some(ImageDetail::High) => (high_side, high_most),
+                    Some(ImageDetail::Original) => (original_side, original_most),
+                    _ => (None, None),
+                };
+                let (side, most) = (own_side.unwrap_or(side), own_most.unwrap_or(most));
+                fitted(width, height, side, most) * factor
             }
             Self::Patches { patch, side, most } => largest([width, height], patch, side, most),
             Self::Crops if longer <= 384.0 => 258.0,
@@ -211,6 +218,7 @@ mod tests {
             ("openai/gpt-4.1-2025-04-14", high, 128, 64, 255),
             ("gpt-4o-mini", high, 128, 64, 8500),
             ("gpt-5.4", high, 2560, 1440, 2765),
+            ("gpt-5.4", Some(ImageDetail::Original), 2560, 1440, 4320),
             ("gpt-5.5", high, 2560, 1440, 2765),
             ("gpt-5.5", None, 2560, 1440, 4320),
             // ai.google.dev/gemini-api/docs/tokens

@@ -66,6 +66,7 @@ impl Local {
         };
         Ok(Reply {
             observed: answer.observed,
+            chances: None,
             ..Reply::local(text)
         })
     }

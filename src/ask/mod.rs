@@ -4,8 +4,8 @@
 //! [`Prompts`] turn a question into text, [`Payload`] an image into the text of a data URL; both are CPU work and done before.
 //! A [`Model`] takes the two as the [`Message`] of a [`Call`]. [`Remote`] is a model at an [`Endpoint`]. The endpoint is one server,
 //! at one or several addresses: each replica has its key, connections and pauses. All models at that server share it. What is known
-//! of vendors is a table, `vendors.toml`. A [`Wire`] defines the form of
-//! requests and replies: one file an API, in `wire/`.
+//! of vendors is a table, `vendors.toml`. A [`Wire`](wire_kind::Wire) defines the form of requests and replies: files of one API in
+//! `wire/`.
 
 mod access;
 pub(crate) mod batch;
@@ -43,10 +43,12 @@ mod secret;
 mod sending;
 mod server;
 mod service;
+mod thinking;
 mod url;
 mod variable;
 mod vendor;
 mod wire;
+mod wire_kind;
 
 pub use access::Access;
 pub use call::{Call, Message, Query};
@@ -72,5 +74,6 @@ pub use script::Script;
 pub use secret::Secret;
 pub use sending::Sending;
 pub(crate) use server::{AccessArgs, Server};
+pub use thinking::Thinking;
 pub use url::BaseUrl;
-pub use wire::Wire;
+pub use wire_kind::WireSetting;

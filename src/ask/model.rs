@@ -18,7 +18,7 @@ use crate::types::{Digest, Reply};
 #[derive(Debug)]
 pub enum Model {
     /// A model at an endpoint.
-    Remote(Remote),
+    Remote(Box<Remote>),
     /// Random guesses, each choice equally likely.
     Random(Random),
     /// Replies from a file.
@@ -132,13 +132,11 @@ impl Model {
         message: Message<'_>,
         choices: usize,
     ) -> Result<Option<Vec<u8>>, serde_json::Error> {
-        let remote = self.remote();
-        let Some((model, default_url)) = remote.and_then(|model| Some((model, model.batch_url()?)))
-        else {
+        let Some(model) = self.remote() else {
             return Ok(None);
         };
-        let body = model.body(message, choices)?;
-        batch::line(id, url.unwrap_or(default_url), &body).map(Some)
+        let body = model.batch_body(message, choices)?;
+        batch::line(id, url.unwrap_or(model.batch_url()), &body).map(Some)
     }
 
     fn remote(&self) -> Option<&Remote> {

@@ -9,6 +9,9 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::extra_fields::ExtraFields;
+use super::thinking::Thinking;
+use super::wire_kind::WireSetting;
+use crate::error::{Error, Result};
 use crate::types::Decides;
 use crate::types::flag::flag_words;
 use crate::types::words::written_as_text;
@@ -43,15 +46,27 @@ pub struct Parameters {
     /// How long a reasoning model thinks, in the server's words (none, minimal, low, medium, high …); default: not sent
     #[arg(long, value_name = "EFFORT", add = Decides::Reply)]
     pub reasoning_effort: Option<String>,
+    /// Whether the model thinks before it answers, said in the server's own field (src/ask/thinking.toml); default: not sent
+    #[arg(long, value_name = "THINKING", value_enum, add = Decides::Reply)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub thinking: Option<Thinking>,
     /// How closely the server looks at images; default: not sent
     #[arg(long, value_name = "DETAIL", value_enum, add = Decides::Reply)]
     pub detail: Option<ImageDetail>,
+    /// The API: chat in one piece or as a stream, or the Responses API; auto is chat, and what the server asks for instead
+    #[arg(long, value_name = "WIRE", value_enum, default_value_t, add = Decides::Reply)]
+    #[serde(skip)]
+    pub wire: WireSetting,
     /// The seed of the server's sampling, if the server supports it: replies at a temperature above 0 are then more alike.
     #[arg(skip)]
     pub seed: Option<u64>,
     /// The constraint that the server puts on the model's reply.
     #[arg(skip)]
     pub constrain: Constrain,
+    /// Whether the probabilities of the likeliest tokens are asked for.
+    #[arg(skip)]
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub probabilities: bool,
     /// What the user adds to requests or leaves out.
     #[arg(skip)]
     #[serde(flatten)]
@@ -73,8 +88,11 @@ impl Parameters {
             max_tokens: Self::MAX_TOKENS,
             token_field: TokenField::Auto,
             reasoning_effort: None,
+            thinking: None,
             detail: None,
+            wire: WireSetting::Auto,
             constrain: Constrain::None,
+            probabilities: false,
             extra: ExtraFields::default(),
         }
     }
@@ -84,16 +102,31 @@ impl Parameters {
         (self.token_field != TokenField::Omit).then_some(self.max_tokens.get())
     }
 
-    /// The settings that can change a reply. Whether a token limit is sent is one of them; the name of its field is not.
+    /// Checks that the temperature does not change the probabilities of tokens.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if it is another one than 0 or the server's own.
+    pub(crate) fn require_greedy(&self) -> Result<()> {
+        match self.temperature {
+            Temperature::Of(value) if value > 0.0 => Err(Error::usage(
+                "--probabilities",
+                "the probabilities of tokens depend on the temperature: --temperature 0, auto or default expected",
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// The settings that can change a reply, the API among them. Whether a token limit is sent is one of them; the name of its field is not.
     pub(super) fn content(&self) -> Value {
         let mut content = json!(self);
         content["max_tokens"] = self.limit().into();
+        content["wire"] = self.wire.content().into();
         content
     }
 }
 
 /// Reads a probability above 0.
-fn probability(text: &str) -> Result<f64, String> {
+fn probability(text: &str) -> std::result::Result<f64, String> {
     let value = text.parse().ok();
     let value = value.filter(|value| 0.0 < *value && *value <= 1.0);
     value.ok_or_else(|| "a number above 0 and up to 1 expected".to_owned())
@@ -123,7 +156,7 @@ impl fmt::Display for Temperature {
 impl FromStr for Temperature {
     type Err = String;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
         match (text, text.parse::<f64>()) {
             ("auto", _) => Ok(Self::Auto),
             ("default", _) => Ok(Self::Server),
@@ -158,6 +191,8 @@ pub enum ImageDetail {
     Low,
     /// Large
     High,
+    /// As large as it is, within the server's limits (the newest models of OpenAI)
+    Original,
 }
 
 /// The constraint on a model's reply. Any value but `None` measures something else: the model's answer if it must name a
@@ -198,7 +233,7 @@ mod tests {
     #[test]
     fn settings_that_decide_a_reply_change_the_content() {
         let base = Parameters::new("m".into());
-        let mut others = vec![base.clone(); 12];
+        let mut others = vec![base.clone(); 15];
         others[0].model = "n".into();
         others[1].temperature = Temperature::Server;
         others[2].token_field = TokenField::Omit;
@@ -211,11 +246,15 @@ mod tests {
         others[9].extra.system = Some("a".into());
         others[10].extra.body.insert("a".into(), Value::Null);
         others[11].extra.omit = vec!["a".into()];
+        others[12].wire = WireSetting::Responses;
+        others[13].probabilities = true;
+        others[14].thinking = Some(Thinking::Off);
         for other in &others {
             assert_ne!(other.content(), base.content(), "{other:?}");
         }
         let renamed = Parameters {
             token_field: TokenField::MaxTokens,
+            wire: WireSetting::ChatStream,
             ..base.clone()
         };
         assert_eq!(renamed.content(), base.content());

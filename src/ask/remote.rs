@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use reqwest::header::HeaderMap;
-use serde_json::{Value, json};
+use serde_json::{Map, Value};
 use tracing::warn;
 
 use super::call::Message;
@@ -12,21 +12,21 @@ use super::constraint::letter_of;
 use super::endpoint::Endpoint;
 use super::failure::{AskError, Reach};
 use super::field::{AdaptableField, RequestFields, SentFields};
-use super::parameters::{Constrain, Parameters, Temperature, TokenField};
+use super::parameters::{Constrain, Parameters};
 use super::request::Request;
 use super::vendor::Vendor;
-use super::wire::Wire;
 use crate::error::{Error, Result};
 use crate::types::{FailureKind, Reply};
 
-/// One model of an endpoint, asked through one API with one set of parameters.
+/// One model of an endpoint, asked with one set of parameters.
 #[derive(Debug)]
 pub struct Remote {
     endpoint: Arc<Endpoint>,
-    wire: Wire,
     /// Headers for each replica of the endpoint.
     headers: Vec<HeaderMap>,
-    parameters: Box<Parameters>,
+    parameters: Parameters,
+    /// The fields of the first request.
+    first: RequestFields,
     /// The fields that the server accepts, as far as is known.
     fields: Mutex<RequestFields>,
     /// What came of the first question to the model. Until it has come to an end, the others wait: what the server refuses in all
@@ -51,24 +51,20 @@ impl Remote {
     /// The model that `parameters` name; models of one endpoint share its connections and its pauses.
     ///
     /// # Errors
-    /// If a header value has characters that HTTP does not allow, or the user's own fields contradict `--constrain`.
-    pub fn open(endpoint: Arc<Endpoint>, wire: Wire, parameters: Parameters) -> Result<Self> {
-        let mut formats = ["response_format", "structured_outputs"].into_iter();
-        if parameters.constrain != Constrain::None
-            && let Some(field) = formats.find(|field| parameters.extra.adds(field))
-        {
-            let problem = format_args!("{field} is set by --constrain; leave one of them out");
-            return Err(Error::usage("--extra-body", problem));
-        }
-        if let Some(vendor) = Vendor::of(endpoint.host()) {
+    /// If a header value has characters that HTTP does not allow, if `--thinking` cannot be said to the server, or if the user's own
+    /// fields contradict `--constrain` or `--thinking`.
+    pub fn open(endpoint: Arc<Endpoint>, parameters: Parameters) -> Result<Self> {
+        let first = RequestFields::first(&parameters, endpoint.base())?;
+        check_own_fields(&parameters, first)?;
+        if let Some(vendor) = Vendor::of(endpoint.base().host()) {
             check_vendor(vendor, &parameters)?;
         }
         Ok(Self {
-            headers: endpoint.headers(wire)?,
-            fields: Mutex::new(RequestFields::first(&parameters, endpoint.host())),
+            headers: endpoint.headers(parameters.wire.first())?,
+            fields: Mutex::new(first),
+            first,
             endpoint,
-            wire,
-            parameters: Box::new(parameters),
+            parameters,
             scout: tokio::sync::Mutex::new(Scout::Waiting),
             warned_unconstrained: AtomicBool::new(false),
         })
@@ -96,27 +92,17 @@ impl Remote {
     /// once for all requests, and never for a single one.
     #[must_use]
     pub fn adapted(&self) -> Vec<String> {
-        let (first, now) = (
-            RequestFields::first(&self.parameters, self.endpoint.host()),
-            self.fields(),
-        );
-        let field = (now.token_field != first.token_field)
-            .then(|| format!("the token limit is sent as {}", now.token_field));
-        let temperature = (now.temperature != first.temperature)
-            .then(|| "no temperature is sent: the server's own holds".to_owned());
-        field.into_iter().chain(temperature).collect()
+        self.fields().changes(self.first)
     }
 
     /// The API and all parameters that can change a reply.
     pub(super) fn content(&self) -> Value {
-        let mut content = self.parameters.content();
-        content["wire"] = json!(self.wire);
-        content
+        self.parameters.content()
     }
 
-    /// The path in a line of a Batch API's file; `None` if the API has no batches.
-    pub(super) fn batch_url(&self) -> Option<&'static str> {
-        self.wire.batch_url()
+    /// The path in a line of a Batch API's file.
+    pub(super) fn batch_url(&self) -> &'static str {
+        self.fields().wire.batch_url()
     }
 
     /// Sends the single message of a conversation with this number of choices; 0 if the question is open.
@@ -171,8 +157,25 @@ impl Remote {
     /// # Errors
     /// If it cannot be written as JSON.
     pub fn body(&self, message: Message<'_>, choices: usize) -> Result<Vec<u8>, serde_json::Error> {
-        let (parameters, fields) = (&self.parameters, self.fields());
-        let body = self.wire.body(parameters, fields, message, choices)?;
+        let fields = self.fields();
+        let body = fields
+            .wire
+            .body(&self.parameters, fields, message, choices)?;
+        Ok(body.joined())
+    }
+
+    /// The body of a request in a batch, in one piece.
+    ///
+    /// # Errors
+    /// If it cannot be written as JSON.
+    pub(super) fn batch_body(
+        &self,
+        message: Message<'_>,
+        choices: usize,
+    ) -> Result<Vec<u8>, serde_json::Error> {
+        let fields = self.fields();
+        let wire = fields.wire.in_batch();
+        let body = wire.body(&self.parameters, fields, message, choices)?;
         Ok(body.joined())
     }
 
@@ -183,13 +186,13 @@ impl Remote {
         choices: usize,
     ) -> Result<Reply, AskError> {
         let parameters = &self.parameters;
-        let body = self.wire.body(parameters, fields, message, choices);
+        let body = fields.wire.body(parameters, fields, message, choices);
         let body = body.map_err(|error| {
             let message = format!("the request could not be written: {error}");
             AskError::new(FailureKind::Request, message, 0)
         })?;
         let request = Request {
-            wire: self.wire,
+            wire: fields.wire,
             headers: &self.headers,
             body,
             sent: SentFields {
@@ -210,41 +213,24 @@ impl Remote {
     /// Changes the field for which a request with the fields `sent` was refused, if its setting is `auto`. Returns whether to
     /// ask again.
     fn adapt(&self, sent: RequestFields, refused_field: Option<AdaptableField>) -> bool {
-        let first = RequestFields::first(&self.parameters, self.endpoint.host());
         let mut now = self.fields.lock().unwrap_or_else(PoisonError::into_inner);
         if *now != sent {
             // Another request has changed the fields in the meantime.
             return refused_field.is_some();
         }
-        match refused_field {
-            Some(AdaptableField::TokenField)
-                if self.parameters.token_field == TokenField::Auto
-                    && sent.token_field == first.token_field =>
-            {
-                now.token_field = match sent.token_field {
-                    TokenField::MaxTokens => TokenField::MaxCompletionTokens,
-                    _ => TokenField::MaxTokens,
-                };
-                warn!(
-                    "{}: the token limit is sent as {} from here on, as the server asks",
-                    self.name(),
-                    now.token_field
-                );
-                true
-            }
-            Some(AdaptableField::Temperature)
-                if self.parameters.temperature == Temperature::Auto
-                    && sent.temperature.is_some() =>
-            {
-                now.temperature = None;
-                warn!(
-                    "{}: the server refuses a temperature of 0; its default is used for the whole run",
-                    self.name()
-                );
-                true
-            }
-            _ => false,
+        let adapted =
+            refused_field.and_then(|field| sent.after_refusal(field, self.first, &self.parameters));
+        let Some(adapted) = adapted else {
+            return false;
+        };
+        for change in adapted.changes(sent) {
+            warn!(
+                "{}: {change} for the whole run, because the server refuses what was sent before",
+                self.name()
+            );
         }
+        *now = adapted;
+        true
     }
 
     /// The letter in a constrained reply, else the text. Warns once if the server does not follow the constraint.
@@ -264,6 +250,24 @@ impl Remote {
             text
         })
     }
+}
+
+/// Refuses fields of the user's own that say the same as a flag.
+fn check_own_fields(parameters: &Parameters, first: RequestFields) -> Result<()> {
+    let own = &parameters.extra;
+    let mut formats = ["response_format", "structured_outputs", "text"].into_iter();
+    if parameters.constrain != Constrain::None
+        && let Some(field) = formats.find(|field| own.adds(field))
+    {
+        let problem = format_args!("{field} is set by --constrain; leave one of them out");
+        return Err(Error::usage("--extra-body", problem));
+    }
+    let mut switch = first.switch().into_iter().flat_map(Map::keys);
+    if let Some(field) = switch.find(|field| own.adds(field)) {
+        let problem = format_args!("{field} is set by --thinking; leave one of them out");
+        return Err(Error::usage("--extra-body", problem));
+    }
+    Ok(())
 }
 
 /// Refuses a constraint that the vendor ignores, and warns if requests to it are not repeatable.

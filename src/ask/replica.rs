@@ -8,16 +8,16 @@ use tracing::debug;
 
 use super::access::Access;
 use super::complaint::{Complaint, UnreadableReply};
-use super::connection::{Connection, HttpReply};
+use super::connection::{Connection, Deadline, HttpReply};
 use super::failure::{Again, FailedTry, Reach};
 use super::failure_class::FailureClass;
 use super::pace::{Allowance, Gate, Window, asked_wait};
 use super::request::Request;
 use super::sending::Sending;
 use super::url::BaseUrl;
-use super::wire::Wire;
+use super::wire_kind::Wire;
 use crate::error::Result;
-use crate::types::{Failure, FailureKind, Reply};
+use crate::types::{Failure, FailureKind, Finish, Reply, TokenChances, TokenPosition};
 
 /// One address of an endpoint: its key, pooled connections, and the pauses that it asked for.
 #[derive(Debug)]
@@ -74,7 +74,12 @@ impl Replica {
     ) -> Result<Reply, FailedTry> {
         let wire = request.wire;
         let body = request.body.clone();
-        let posted = self.connection.post(wire.path(), headers, body).await;
+        let deadline = match wire {
+            Wire::ChatStream => Deadline::Silence,
+            Wire::Chat | Wire::Responses => Deadline::Whole,
+        };
+        let posted = self.connection.post(wire.path(), headers, body, deadline);
+        let posted = posted.await;
         let answer = posted.inspect_err(|failed| {
             if failed.failure.kind == FailureKind::Timeout {
                 self.window.overloaded(sent);
@@ -128,6 +133,13 @@ impl Replica {
             text: scrubbed(reply.text),
             refusal: reply.refusal.map(scrubbed),
             served_model: reply.served_model.map(scrubbed),
+            finish: match reply.finish {
+                // Shortened last: otherwise the first half of a key could remain.
+                Finish::Other(reason) => Finish::Other(self.connection.scrub.line(&reason)),
+                finish => finish,
+            }
+            .shortened(),
+            chances: reply.chances.map(|chances| without_keys(chances, scrubbed)),
             latency_ms: answer.took.as_millis() as u64,
             ..reply
         }
@@ -230,6 +242,22 @@ impl Replica {
     /// The server's id of a request, without secrets; empty if it sent none.
     fn request_id(&self, answer: &HttpReply) -> String {
         self.connection.scrub.line(answer.header("x-request-id"))
+    }
+}
+
+/// The likeliest tokens without keys.
+fn without_keys(chances: TokenChances, scrubbed: impl Fn(String) -> String) -> TokenChances {
+    let position = |position: TokenPosition| {
+        let likeliest = position.likeliest.into_iter();
+        let likeliest = likeliest.map(|(token, logprob)| (scrubbed(token), logprob));
+        TokenPosition {
+            likeliest: likeliest.collect(),
+            token: scrubbed(position.token),
+        }
+    };
+    TokenChances {
+        positions: chances.positions.into_iter().map(position).collect(),
+        ..chances
     }
 }
 

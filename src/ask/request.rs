@@ -4,7 +4,7 @@ use reqwest::header::HeaderMap;
 
 use super::body::Parts;
 use super::field::SentFields;
-use super::wire::Wire;
+use super::wire_kind::Wire;
 
 /// One request, which may be sent several times.
 pub(super) struct Request<'a> {

@@ -10,7 +10,7 @@ use percent_encoding::percent_decode_str;
 use reqwest::Url;
 
 use super::vendor::Vendor;
-use super::wire::Wire;
+use super::wire_kind::Wire;
 use crate::error::{Error, Result};
 
 /// The base URL of an endpoint, used exactly as written: no `/v1` is added or assumed.
@@ -29,6 +29,12 @@ impl BaseUrl {
     #[must_use]
     pub fn host(&self) -> &str {
         self.0.host_str().unwrap_or_default()
+    }
+
+    /// The port; `None` if it is not known for the scheme.
+    #[must_use]
+    pub(super) fn port(&self) -> Option<u16> {
+        self.0.port_or_known_default()
     }
 
     /// Whether the host is this machine.

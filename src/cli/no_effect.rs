@@ -135,13 +135,22 @@ impl NoEffect {
     }
 
     fn evaluation(&mut self, args: &EvaluateArgs) {
-        let constrain = ["constrain".to_owned()];
+        let replies = ["constrain".to_owned(), "probabilities".to_owned()];
         let models = &args.job.models;
         if models.blind || !models.model.contains(&ModelName::Observer(None)) {
             let why = "the observer is not asked about images";
             self.because(why, &["observer_controls".to_owned()]);
         }
-        self.job(&args.job, &ids::<ShrinkArgs>(), &constrain, None);
+        let images = [ids::<ShrinkArgs>(), vec!["image_first".into()]].concat();
+        if !models
+            .model
+            .iter()
+            .any(|name| matches!(name, ModelName::Remote(_)))
+        {
+            let why = "no model at an endpoint is shown an image";
+            self.because(why, &["image_first".to_owned()]);
+        }
+        self.job(&args.job, &images, &replies, None);
     }
 
     fn open(&mut self, args: &OpenEqaArgs) {

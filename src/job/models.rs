@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 
-use crate::ask::{Endpoint, Model, Parameters, Price, Prices, Remote, Script, Server, Wire};
+use crate::ask::{Endpoint, Model, Parameters, Price, Prices, Remote, Script, Server};
 use crate::error::{Error, Result};
 use crate::types::{Condition, View};
 
@@ -190,8 +190,8 @@ pub(crate) fn open(
                 model: name.clone(),
                 ..parameters.clone()
             };
-            let model = Remote::open(Arc::clone(endpoint), Wire::Chat, parameters)?;
-            Ok(Model::Remote(model))
+            let model = Remote::open(Arc::clone(endpoint), parameters)?;
+            Ok(Model::Remote(Box::new(model)))
         }
         ModelName::Random | ModelName::Observer(_) => Err(Error::usage(
             "--model",
@@ -200,11 +200,14 @@ pub(crate) fn open(
     }
 }
 
+/// The beginning of the fields of a manifest that say how requests to a model were changed; the model's name follows.
+pub(super) const ADAPTED_FOR: &str = "adapted for ";
+
 /// Changes to requests that the endpoint made necessary, by model; for the manifest.
 pub(crate) fn adapted(models: &[ModelUnderTest]) -> impl Iterator<Item = (String, Value)> {
     models.iter().filter_map(|model| {
         let adapted = model.model.adapted();
-        let name = format!("adapted for {}", model.name);
+        let name = format!("{ADAPTED_FOR}{}", model.name);
         (!adapted.is_empty()).then(|| (name, json!(adapted)))
     })
 }

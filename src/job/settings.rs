@@ -132,6 +132,8 @@ pub(crate) struct JobSettings {
 pub(crate) struct ExperimentSettings {
     /// Constraint on the replies that the server enforces.
     pub constrain: Constrain,
+    /// Whether the probabilities of choices are asked for.
+    pub probabilities: bool,
     /// Seed of the server's sampling; `None` if none is sent.
     pub sampling_seed: Option<u64>,
     /// Longest side of an image as sent, in pixels; `None` for no limit.
@@ -186,6 +188,7 @@ impl JobArgs {
             sending: self.sending,
             constrain: experiment.constrain,
             seed: experiment.sampling_seed,
+            probabilities: experiment.probabilities,
             reply_headers: Vec::new(),
         };
         let context = ResolveContext {

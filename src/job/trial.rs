@@ -116,6 +116,14 @@ impl Prompt {
         }
     }
 
+    /// A prompt whose whole text is after the images.
+    pub(crate) fn behind(text: Arc<str>) -> Self {
+        Self {
+            before: Arc::from(""),
+            behind: Some(text),
+        }
+    }
+
     /// The text before and after the images; the second is empty if there is none.
     pub(crate) fn parts(&self) -> [&str; 2] {
         [&self.before, self.behind.as_deref().unwrap_or_default()]

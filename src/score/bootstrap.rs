@@ -35,6 +35,17 @@ impl Resamples {
         Self { clusters, times }
     }
 
+    /// The number of clusters.
+    #[must_use]
+    pub fn clusters(&self) -> usize {
+        self.clusters
+    }
+
+    /// How many times each cluster occurs, draw by draw.
+    pub(super) fn all(&self) -> impl Iterator<Item = &[u8]> {
+        self.times.chunks(self.clusters.max(1))
+    }
+
     /// Sum over the clusters of each draw; `by_cluster` holds one number for each cluster.
     ///
     /// # Panics

@@ -129,6 +129,17 @@ impl Estimate {
         }
     }
 
+    /// A value with this interval, which is widened so that it holds the value.
+    #[must_use]
+    pub(super) fn around(value: f64, [low, high]: [f64; 2], n: usize) -> Self {
+        Self {
+            value,
+            low: low.min(value),
+            high: high.max(value),
+            n,
+        }
+    }
+
     /// A share that is known exactly: the interval is the value itself.
     #[must_use]
     pub fn exact(value: f64, n: usize) -> Self {

@@ -7,6 +7,7 @@ use super::agreement::{Agreement, agreements};
 use super::best::{BestInTheDark, best_in_the_dark};
 use super::bootstrap::Resamples;
 use super::by_reading::{FindingByReading, by_reading};
+use super::calibration::{Calibration, calibrations};
 use super::chance::OfferedChoices;
 use super::cluster::{ClusterUnit, Clusters};
 use super::common::CommonItems;
@@ -46,6 +47,8 @@ pub struct Findings<'a> {
     pub comparisons: Vec<Comparison>,
     /// Thresholds and areas, for all families together and for each family.
     pub curves: Vec<Curve>,
+    /// Confidence and accuracy of the subjects whose probabilities of choices are known.
+    pub calibrations: Vec<Calibration>,
     /// Answers given against true answers.
     pub confusions: Vec<Confusion>,
     /// Rates of false positives and false negatives.
@@ -128,6 +131,7 @@ impl<'a> Findings<'a> {
                 .into_iter()
                 .flat_map(|family| curves(&grid, &draws, family))
                 .collect(),
+            calibrations: calibrations(&grid, &draws),
             confusions: confusions(&grid),
             hallucinations: hallucinations(&grid),
             first_failures: first_failures(&grid),

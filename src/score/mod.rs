@@ -11,6 +11,7 @@
 //! - shares: Wilson's score interval at the clusters' effective number of replies ([`estimate::Estimate::clustered`]);
 //! - differences: Bonett and Price's adjusted interval with the clusters' variance ([`paired`]), and an exact test;
 //! - κ: its linear form in the clusters' counts, with the clusters' variance ([`agreement`]);
+//! - confidence: the cluster bootstrap, its bias subtracted for the calibration error ([`calibration`]);
 //! - thresholds: the cluster bootstrap ([`bootstrap`]).
 
 pub(crate) mod accuracy;
@@ -20,6 +21,7 @@ pub(crate) mod baseline;
 pub(crate) mod best;
 pub(crate) mod bootstrap;
 pub(crate) mod by_reading;
+pub(crate) mod calibration;
 pub(crate) mod chance;
 pub mod choice;
 pub(crate) mod cluster;
@@ -36,6 +38,7 @@ pub(crate) mod health;
 pub(crate) mod llm_match;
 pub(crate) mod observed;
 pub(crate) mod open;
+mod option_probabilities;
 pub(crate) mod paired;
 pub(crate) mod pooled;
 pub(crate) mod pooled_kind;

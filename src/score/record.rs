@@ -2,6 +2,7 @@
 
 use super::choice::{LENIENT_VERSION, readings};
 use super::llm_match::{Protocol, mark};
+use super::option_probabilities::option_probabilities;
 use crate::error::Result;
 use crate::types::detail::{ChoiceLine, OpenLine};
 use crate::types::{
@@ -26,7 +27,10 @@ impl Detail for ChoiceDetail {
         };
         self.strict = Some(strict.into());
         self.lenient = Some(lenient.into());
-        // A stored reply that is read again says nothing of what was seen.
+        // A stored reply that is read again says nothing of what was seen, or of how likely each choice was.
+        if let Some(chances) = &reply.chances {
+            self.options = option_probabilities(chances, &self.choices);
+        }
         if reply.observed.is_some() {
             self.observed.clone_from(&reply.observed);
         }

@@ -49,6 +49,7 @@ pub(super) fn records(model: &str, condition: &str, answers: Answers) -> Vec<Rec
             image: None,
             shown_frame: None,
             observed: None,
+            options: None,
         };
         let key = Digest::of(format!("{item} {model} {condition:?}").as_bytes()).into();
         let question = QuestionId(format!("q{item:02}"));

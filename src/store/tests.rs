@@ -40,6 +40,7 @@ fn record(name: &str, outcome: TrialOutcome) -> Record {
         image: None,
         shown_frame: None,
         observed: None,
+        options: None,
     };
     let key = Digest::of(name.as_bytes()).into();
     Record {

@@ -7,6 +7,7 @@ use super::digest::Digest;
 use super::exposure_facts::ExposureFacts;
 use super::frame::FrameId;
 use super::observed::Observed;
+use super::option_probabilities::OptionProbabilities;
 use super::question::{Answer, Family, QuestionId, UnreadReason};
 use super::record::{Failure, Record, Via, View};
 use super::reply::{Finish, Usage};
@@ -99,6 +100,9 @@ details! {
         /// What the observer saw; not in the file for other models, and without an image.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         observed: Option<Observed>,
+        /// How likely the model held each choice; not in the file if it was not asked for, or if the server did not say.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        options: Option<OptionProbabilities>,
     }
 }
 

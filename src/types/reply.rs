@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::observed::Observed;
+use super::option_probabilities::TokenChances;
 
 /// The reason why a model stopped.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -18,6 +19,23 @@ pub enum Finish {
     Other(String),
     /// The server did not say.
     Unknown,
+}
+
+impl Finish {
+    /// The longest reason in a server's words, in characters; chosen.
+    const LONGEST: usize = 40;
+
+    /// The same reason; one in the server's words is shortened, and has no control characters.
+    #[must_use]
+    pub fn shortened(self) -> Self {
+        match self {
+            Self::Other(reason) => {
+                let shown = reason.chars().filter(|c| !c.is_control());
+                Self::Other(shown.take(Self::LONGEST).collect())
+            }
+            named => named,
+        }
+    }
 }
 
 /// The tokens that the server charged for a request; `None` where it did not say.
@@ -63,6 +81,8 @@ pub struct Reply {
     pub attempts: u32,
     /// What the observer saw; `None` for every other model.
     pub observed: Option<Observed>,
+    /// The likeliest tokens; `None` if the server was not asked for them or stated none.
+    pub chances: Option<TokenChances>,
 }
 
 impl Reply {
@@ -79,6 +99,7 @@ impl Reply {
             latency_ms: 0,
             attempts: 1,
             observed: None,
+            chances: None,
         }
     }
 }

@@ -10,7 +10,7 @@ use base64::engine::general_purpose::STANDARD;
 use darkqa_eval::internals::ask::{
     Access, BaseUrl, Call, Constrain, Endpoint, ExtraFields, ImageDetail, Message, Model,
     Parameters, Payload, PayloadFormat, Prompts, Query, Random, Remote, Script, Secret, Sending,
-    Temperature, TokenField, Wire,
+    Temperature, TokenField, WireSetting,
 };
 use darkqa_eval::types::{
     Choices, Digest, FailureKind, Family, Finish, FrameId, Question, QuestionId, Reply, Rgb, View,
@@ -36,7 +36,7 @@ fn endpoint_at(base: &str, key: Option<&str>, sending: Sending) -> Arc<Endpoint>
 
 fn model_at(mock: &MockEndpoint, sending: Sending) -> Remote {
     let endpoint = endpoint_at(&mock.base_url(), Some(KEY), sending);
-    Remote::open(endpoint, Wire::Chat, Parameters::new("m".into())).unwrap()
+    Remote::open(endpoint, Parameters::new("m".into())).unwrap()
 }
 
 fn image() -> Payload {
@@ -114,11 +114,14 @@ async fn what_is_set_is_sent_and_what_is_not_is_left_out() {
         max_tokens: NonZeroU32::new(16).unwrap(),
         token_field: TokenField::MaxCompletionTokens,
         reasoning_effort: Some("low".into()),
+        thinking: None,
         detail: Some(ImageDetail::High),
+        wire: WireSetting::Auto,
         constrain: Constrain::None,
+        probabilities: false,
         extra: ExtraFields::default(),
     };
-    let model = Remote::open(endpoint.clone(), Wire::Chat, parameters).unwrap();
+    let model = Remote::open(endpoint.clone(), parameters).unwrap();
     let images = [image(), image()].map(Arc::new);
     let message = Message {
         before: "Look \\\"url\":\"\"",
@@ -131,7 +134,7 @@ async fn what_is_set_is_sent_and_what_is_not_is_left_out() {
         token_field: TokenField::Omit,
         ..Parameters::new("m".into())
     };
-    let model = Remote::open(endpoint, Wire::Chat, bare).unwrap();
+    let model = Remote::open(endpoint, bare).unwrap();
     model.ask(Message::words("Red?"), 2).await.unwrap();
 
     let requests = mock.requests();
@@ -168,7 +171,7 @@ async fn base_urls_keep_their_path_and_query() {
         ),
     ] {
         let endpoint = endpoint_at(&format!("{root}{base}"), None, quick());
-        let model = Remote::open(endpoint, Wire::Chat, Parameters::new("m".into())).unwrap();
+        let model = Remote::open(endpoint, Parameters::new("m".into())).unwrap();
         model.ask(Message::words("Red?"), 2).await.unwrap();
         assert_eq!(mock.requests().pop().unwrap().line, line);
     }
@@ -185,7 +188,7 @@ async fn a_closed_port_is_a_connection_failure() {
         ..quick()
     };
     let endpoint = endpoint_at(&format!("http://127.0.0.1:{port}/v1"), None, sending);
-    let model = Remote::open(endpoint, Wire::Chat, Parameters::new("m".into())).unwrap();
+    let model = Remote::open(endpoint, Parameters::new("m".into())).unwrap();
     let error = model.ask(Message::words("Red?"), 2).await.unwrap_err();
     assert_eq!(error.failure.kind, FailureKind::Connection);
     assert!(
@@ -222,8 +225,8 @@ async fn a_wait_asked_for_is_kept_by_all() {
             ..quick()
         },
     );
-    let first = Remote::open(endpoint.clone(), Wire::Chat, Parameters::new("m".into())).unwrap();
-    let second = Remote::open(endpoint, Wire::Chat, Parameters::new("n".into())).unwrap();
+    let first = Remote::open(endpoint.clone(), Parameters::new("m".into())).unwrap();
+    let second = Remote::open(endpoint, Parameters::new("n".into())).unwrap();
     let start = Instant::now();
     let later = async {
         tokio::time::sleep(Duration::from_millis(40)).await;
@@ -285,7 +288,6 @@ async fn keys_are_in_no_error_and_no_debug_output() {
     let base = mock.base_url().replace("//", "//us3r:passw0rd@") + "?token=t0ken";
     let model = Remote::open(
         endpoint_at(&base, None, quick()),
-        Wire::Chat,
         Parameters::new("m".into()),
     )
     .unwrap();
@@ -371,8 +373,8 @@ async fn scripts_and_guesses_answer_without_an_endpoint() {
     let digest = |model: &Model| model.digest().unwrap();
     assert_ne!(digest(&random), digest(&Model::Random(Random { seed: 2 })));
     let endpoint = endpoint_at("http://127.0.0.1:1/v1", None, quick());
-    let remote = Remote::open(endpoint, Wire::Chat, Parameters::new("m".into())).unwrap();
-    let content = Model::Remote(remote).content();
+    let remote = Remote::open(endpoint, Parameters::new("m".into())).unwrap();
+    let content = Model::Remote(Box::new(remote)).content();
     assert_eq!(
         (&content["wire"], &content["model"]),
         (&json!("chat"), &json!("m"))

@@ -174,3 +174,44 @@ fn broken_files_are_named() {
             .contains("for '--url <PATH>': a path expected")
     );
 }
+
+/// Lines of each API, and probabilities in them, are what single requests are.
+#[test]
+fn probabilities_and_responses_come_through_a_batch() {
+    let bench = Bench::with_questions(QUESTIONS);
+    export(&bench, "--probabilities --wire responses");
+    let requests = requests(&bench);
+    let position =
+        json!({"token": "C", "logprob": -0.1, "top_logprobs": [{"token": "A", "logprob": -3.0}]});
+    let mut lines = String::new();
+    for request in &requests {
+        assert_eq!(request["url"], "/v1/responses");
+        assert_eq!(request["body"]["top_logprobs"], 20);
+        assert!(request["body"].get("stream").is_none());
+        let part = json!({"type": "output_text", "text": "C", "logprobs": [position]});
+        let body =
+            json!({"status": "completed", "output": [{"type": "message", "content": [part]}]});
+        let response = json!({"status_code": 200, "body": body});
+        let line = json!({"custom_id": request["custom_id"], "response": response, "error": null});
+        lines += &line.to_string();
+        lines.push('\n');
+    }
+    bench.file("output.jsonl", lines);
+    bench.complete(&words("batch import run output.jsonl"));
+    let records = records(&bench.path("run"));
+    assert_eq!(records.len(), requests.len());
+    for record in &records {
+        assert_eq!(
+            (&record["reply"], &record["finish"]),
+            (&"C".into(), &"stop".into())
+        );
+        assert_eq!(record["options"]["token"], "C");
+    }
+    // A stream is no part of a file.
+    let bench = Bench::with_questions(QUESTIONS);
+    export(&bench, "--wire chat-stream");
+    for request in self::requests(&bench) {
+        assert_eq!(request["url"], "/v1/chat/completions");
+        assert!(request["body"].get("stream").is_none());
+    }
+}

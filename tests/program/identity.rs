@@ -205,7 +205,7 @@ fn set(conditions: &str) -> BTreeSet<String> {
 }
 
 /// What refuses an evaluation on the folder of another: the field that the message names, and the flag.
-const REFUSED: [(&str, &str); 30] = [
+const REFUSED: [(&str, &str); 34] = [
     ("--data", "--data elsewhere/frames"),
     ("--questions", "--questions other.jsonl"),
     ("--rules", "--rules rules.toml"),
@@ -230,6 +230,10 @@ const REFUSED: [(&str, &str); 30] = [
     ("--reasoning-effort", "--reasoning-effort low"),
     ("--top-p", "--top-p 0.9"),
     ("--detail", "--detail low"),
+    ("--thinking", "--thinking off"),
+    ("--wire", "--wire responses"),
+    ("--probabilities", "--probabilities"),
+    ("--image-first", "--image-first"),
     ("--constrain", "--constrain json"),
     ("--constrain", "--constrain choice"),
     ("--extra-body", "--extra-body {\"top_k\":1}"),
@@ -239,7 +243,7 @@ const REFUSED: [(&str, &str); 30] = [
 ];
 
 /// The same for open questions.
-const OPEN_REFUSED: [(&str, &str); 27] = [
+const OPEN_REFUSED: [(&str, &str); 29] = [
     ("--questions", "--questions other.json"),
     ("--num-frames", "--num-frames 2"),
     ("--image-size", "--image-size 32"),
@@ -267,6 +271,8 @@ const OPEN_REFUSED: [(&str, &str); 27] = [
     ("--omit-field", "--omit-field temperature"),
     ("--system", "--system Look!"),
     ("--system", "--system-file own/choice.txt"),
+    ("--thinking", "--thinking off"),
+    ("--wire", "--wire responses"),
 ];
 
 #[test]

@@ -13,6 +13,7 @@ mod calibrate;
 mod camera;
 mod cli;
 mod compared;
+mod confidence;
 mod coverage;
 mod documentation;
 mod enhance;

@@ -32,6 +32,7 @@ pub fn record(
         image: None,
         shown_frame: None,
         observed: None,
+        options: None,
     };
     let key = Digest::of(format!("{question} {model} {condition}").as_bytes()).into();
     let question = QuestionId(format!("q{question:05}"));

@@ -2,10 +2,11 @@
 
 use serde_json::Value;
 
+use super::json_body::{self, other};
+use super::logprobs;
 use super::stream;
-use crate::ask::complaint::{Complaint, UnreadableReply, page_title};
-use crate::ask::escapes;
-use crate::types::{Finish, Reply, Usage};
+use crate::ask::complaint::{Complaint, UnreadableReply};
+use crate::types::{Finish, Reply, TokenChances, Usage};
 
 /// Reads a body; `latency_ms` and `attempts` stay zero.
 ///
@@ -14,9 +15,7 @@ use crate::types::{Finish, Reply, Usage};
 /// become replacement characters: a small model at temperature 0 would send them again at each retry. An event stream that was
 /// not requested is joined.
 pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableReply> {
-    let text = String::from_utf8_lossy(body);
-    let text = text.trim_start_matches('\u{FEFF}');
-    let completion = parsed(text, content_type)?;
+    let completion = parsed(&json_body::text(body), content_type)?;
     // A completion may have its own field "message", so only `error` counts there.
     let complaint = match completion.get("choices") {
         Some(_) => Complaint::in_error(&completion),
@@ -42,6 +41,11 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
         .filter(|message| message.is_object())
         .ok_or_else(|| other("a choice without a message"))?;
     let (text, refusal_part) = content(message.get("content"))?;
+    let positions = logprobs::positions(choice.get("logprobs"));
+    let chances = positions.map(|positions| TokenChances {
+        positions,
+        thought: logprobs::thought(message, completion.get("usage"), &text),
+    });
     let refusal = message.get("refusal").and_then(Value::as_str);
     Ok(Reply {
         text,
@@ -59,11 +63,8 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
         latency_ms: 0,
         attempts: 0,
         observed: None,
+        chances,
     })
-}
-
-fn other(what: &str) -> UnreadableReply {
-    UnreadableReply::Other(what.to_owned())
 }
 
 fn parsed(text: &str, content_type: &str) -> Result<Value, UnreadableReply> {
@@ -71,21 +72,7 @@ fn parsed(text: &str, content_type: &str) -> Result<Value, UnreadableReply> {
         return stream::assemble(text)
             .ok_or_else(|| other("an event stream that holds no whole chat completion"));
     }
-    serde_json::from_str(text).or_else(|error| {
-        let repaired = escapes::repaired(text).and_then(|text| serde_json::from_str(&text).ok());
-        repaired.ok_or_else(|| unreadable(text, content_type, &error))
-    })
-}
-
-/// The description of a body that is not JSON.
-fn unreadable(text: &str, content_type: &str, error: &serde_json::Error) -> UnreadableReply {
-    if text.trim().is_empty() {
-        return other("an empty body");
-    }
-    UnreadableReply::Other(
-        page_title(text)
-            .unwrap_or_else(|| format!("{content_type:?} that is no whole JSON ({error}): {text}")),
-    )
+    json_body::parsed(text, content_type)
 }
 
 /// The choice with index 0, or the first one if none has it.
@@ -130,13 +117,7 @@ fn finish(reason: Option<&str>) -> Finish {
         "stop" | "eos" | "eos_token" | "end_turn" | "stop_sequence" => Finish::Stop,
         "length" | "max_tokens" => Finish::Length,
         "content_filter" | "safety" => Finish::Filter,
-        _ => Finish::Other(
-            reason
-                .chars()
-                .filter(|c| !c.is_control())
-                .take(40)
-                .collect(),
-        ),
+        _ => Finish::Other(reason.to_owned()),
     }
 }
 
@@ -232,7 +213,7 @@ mod tests {
             ("content_filter", Finish::Filter),
             ("abort\u{7}", Finish::Other("abort".into())),
         ] {
-            assert_eq!(finish(Some(reason)), finish_);
+            assert_eq!(finish(Some(reason)).shortened(), finish_);
         }
     }
 

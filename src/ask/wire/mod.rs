@@ -1,14 +1,21 @@
-//! The APIs through which models are asked: [`Wire`].
+//! The bytes of requests and replies of each [`Wire`].
 //!
-//! A wire defines the bytes of requests and replies. Waits, retries, rates and the removal of keys from messages
-//! ([`Endpoint`](super::Endpoint), [`Remote`](super::Remote)) do not depend on it.
+//! Waits, retries, rates and the removal of keys from messages ([`Endpoint`](super::Endpoint), [`Remote`](super::Remote)) do not
+//! depend on it.
 
+mod chat_fields;
 mod chat_reply;
 mod chat_request;
+mod image_places;
+mod json_body;
+mod logprobs;
+mod refusal;
+mod responses_reply;
+mod responses_request;
 mod stream;
 
 use reqwest::header::{AUTHORIZATION, HeaderMap, HeaderName, HeaderValue};
-use serde::Serialize;
+use serde_json::Value;
 
 use super::body::Parts;
 use super::call::Message;
@@ -17,40 +24,19 @@ use super::field::{RequestField, RequestFields, SentFields};
 use super::key_header::KeyHeader;
 use super::parameters::Parameters;
 use super::secret::Secret;
+use super::wire_kind::Wire;
 use crate::error::{Error, Result};
 use crate::types::Reply;
 
-/// An API through which a model is asked.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Wire {
-    /// OpenAI's chat completions, which most servers support.
-    #[default]
-    Chat,
-}
+pub(super) use refusal::other_wire;
 
 impl Wire {
-    pub(super) const ALL: [Self; 1] = [Self::Chat];
-
-    /// The path of requests, below the base URL.
-    pub(super) fn path(self) -> &'static str {
-        match self {
-            Self::Chat => "chat/completions",
-        }
-    }
-
-    /// The path in a line of a Batch API's file; `None` if the API has no batches of OpenAI's form.
-    #[expect(clippy::unnecessary_wraps, reason = "other APIs have no such batches")]
-    pub(super) fn batch_url(self) -> Option<&'static str> {
-        match self {
-            Self::Chat => Some("/v1/chat/completions"),
-        }
-    }
-
     /// The headers of every request: the key, in the header that `form` names.
     pub(super) fn headers(self, key: Option<&Secret>, form: KeyHeader) -> Result<HeaderMap> {
         match self {
-            Self::Chat => key.map_or_else(|| Ok(HeaderMap::new()), |key| key_header(key, form)),
+            Self::Chat | Self::ChatStream | Self::Responses => {
+                key.map_or_else(|| Ok(HeaderMap::new()), |key| key_header(key, form))
+            }
         }
     }
 
@@ -62,31 +48,60 @@ impl Wire {
         message: Message<'_>,
         choices: usize,
     ) -> Result<Parts, serde_json::Error> {
+        let fields = RequestFields {
+            wire: self,
+            ..fields
+        };
         match self {
-            Self::Chat => chat_request::body(parameters, fields, message, choices),
+            Self::Chat | Self::ChatStream => {
+                chat_request::body(parameters, fields, message, choices)
+            }
+            Self::Responses => responses_request::body(parameters, fields, message, choices),
         }
     }
 
     /// The fields of a request that a server may refuse.
     pub(super) fn fields(self, sent: SentFields<'_>) -> Vec<RequestField<'_>> {
-        match self {
-            Self::Chat => chat_request::fields(sent),
-        }
+        let extra = &sent.parameters.extra;
+        let mut fields: Vec<RequestField<'_>> = match self {
+            Self::Chat | Self::ChatStream => chat_fields::fields(sent),
+            Self::Responses => responses_request::fields(sent),
+        };
+        fields.extend(sent.fields.of_switch());
+        // A field that is left out is not the cause.
+        fields.retain(|field| !extra.omit.iter().any(|name| name == field.name));
+        fields.extend(extra.request_fields());
+        fields
     }
 
     /// Reads the body of a reply with a status of success; `latency_ms` and `attempts` stay zero.
     pub(super) fn reply(self, body: &[u8], content_type: &str) -> Result<Reply, UnreadableReply> {
         match self {
-            Self::Chat => chat_reply::read(body, content_type),
+            Self::Chat | Self::ChatStream => chat_reply::read(body, content_type),
+            Self::Responses => responses_reply::read(body, content_type),
         }
     }
 
     /// Reads the body of a refused request.
     pub(super) fn complaint(self, body: &[u8]) -> Complaint {
         match self {
-            Self::Chat => Complaint::of_body(&String::from_utf8_lossy(body)),
+            Self::Chat | Self::ChatStream | Self::Responses => {
+                Complaint::of_body(&String::from_utf8_lossy(body))
+            }
         }
     }
+}
+
+/// Reads the body of a reply in a batch's file, whichever wire asked for it: a response has an `output`, a chat completion has none.
+pub(super) fn batch_reply(body: &str) -> Result<Reply, UnreadableReply> {
+    let parsed: Option<Value> = serde_json::from_str(body).ok();
+    let is_response = parsed.is_some_and(|body| body.get("output").is_some());
+    let wire = if is_response {
+        Wire::Responses
+    } else {
+        Wire::Chat
+    };
+    wire.reply(body.as_bytes(), "application/json")
 }
 
 /// The header with the key, as OpenAI and Azure expect it.

@@ -1,30 +1,36 @@
-//! A chat completion that came as an event stream, although none was requested: [`assemble`].
+//! Event streams of replies: [`events`] reads one, [`assemble`] joins the pieces of a chat completion.
 
 use serde_json::{Map, Value, json};
 
 /// Whether a body is an event stream, by its content type or its beginning.
 pub(super) fn is_stream(text: &str, content_type: &str) -> bool {
-    content_type.starts_with("text/event-stream") || text.trim_start().starts_with("data:")
+    let text = text.trim_start();
+    content_type.starts_with("text/event-stream")
+        || text.starts_with("data:")
+        || text.starts_with("event:")
+}
+
+/// The events of a stream up to `[DONE]`, each as JSON; one that is not JSON, because it was cut, is null.
+///
+/// Lines may end in CR, LF or both; comments, which keep a connection open, and names of events are skipped.
+pub(super) fn events(stream: &str) -> impl Iterator<Item = Value> {
+    let lines = stream.split(['\n', '\r']);
+    let data = lines.filter_map(|line| line.strip_prefix("data:").map(str::trim));
+    data.take_while(|data| *data != "[DONE]")
+        .map(|data| serde_json::from_str(data).unwrap_or_default())
 }
 
 /// The completion that the pieces of the choice with index 0 make, in the form of `chat_reply`. An event with an error is
-/// returned unchanged. `None` if the stream is not a chat completion, or ended without `[DONE]` and a finish reason.
+/// returned unchanged. `None` if the stream is not a chat completion, or ended without a finish reason: then it was cut.
 pub(super) fn assemble(stream: &str) -> Option<Value> {
     let mut completion = Map::new();
-    let mut finish = Value::Null;
-    let mut message = Map::new();
-    let (mut started, mut done) = (false, false);
-    // Lines may end in CR, LF or both; comments and event names are ignored.
-    let lines = stream.split(['\n', '\r']);
-    for data in lines.filter_map(|line| line.strip_prefix("data:")) {
-        let data = data.trim();
-        if data == "[DONE]" {
-            done = true;
-            break;
+    let mut pieces = Pieces::default();
+    for event in events(stream) {
+        if event.is_null() {
+            return None;
         }
-        let event: Value = serde_json::from_str(data).ok()?;
-        if event.get("error").is_some_and(|error| !error.is_null()) {
-            return Some(event);
+        if let Some(error) = error(&event) {
+            return Some(error);
         }
         for field in ["model", "usage"] {
             if let Some(value) = event.get(field).filter(|value| !value.is_null()) {
@@ -33,28 +39,101 @@ pub(super) fn assemble(stream: &str) -> Option<Value> {
         }
         let choices = event.get("choices").and_then(Value::as_array);
         let first = |choice: &&Value| choice.get("index").is_none_or(|index| *index == 0);
-        let Some(choice) = choices.and_then(|choices| choices.iter().find(first)) else {
-            continue;
-        };
-        started = true;
+        if let Some(choice) = choices.and_then(|choices| choices.iter().find(first)) {
+            // Some gateways state an error in the choice.
+            if choice.get("error").is_some_and(|error| !error.is_null()) {
+                return Some(event);
+            }
+            pieces.add(choice);
+        }
+    }
+    completion.insert("choices".to_owned(), json!([pieces.joined()?]));
+    Some(Value::Object(completion))
+}
+
+/// An event that states an error, in the form of a body that does; `None` if it states none.
+fn error(event: &Value) -> Option<Value> {
+    if event.get("error").is_some_and(|error| !error.is_null()) {
+        return Some(event.clone());
+    }
+    let is_error = |field| event.get(field).is_some_and(|kind| kind == "error");
+    (is_error("type") || is_error("object")).then(|| json!({"error": event}))
+}
+
+/// The pieces of one choice so far.
+#[derive(Default)]
+struct Pieces {
+    finish: Value,
+    content: Vec<Value>,
+    texts: Map<String, Value>,
+    logprobs: Map<String, Value>,
+}
+
+/// The fields of a piece that are texts, besides its content.
+const TEXTS: [&str; 3] = ["refusal", "reasoning_content", "reasoning"];
+
+impl Pieces {
+    fn add(&mut self, choice: &Value) {
         if let Some(reason) = choice.get("finish_reason").filter(|r| !r.is_null()) {
-            finish = reason.clone();
+            self.finish = reason.clone();
         }
         // Some servers send the whole message as the only piece.
         let delta = choice.get("delta").or_else(|| choice.get("message"));
-        for field in ["content", "refusal"] {
+        match delta.and_then(|delta| delta.get("content")) {
+            Some(Value::String(text)) => self.add_content(text),
+            Some(Value::Array(parts)) => self.content.extend(parts.iter().cloned()),
+            _ => {}
+        }
+        for field in TEXTS {
             if let Some(text) = delta.and_then(|delta| delta.get(field)?.as_str()) {
-                let joined = message.entry(field).or_insert_with(|| json!(""));
-                *joined = json!(format!("{}{text}", joined.as_str().unwrap_or_default()));
+                let joined = self.texts.entry(field).or_insert_with(|| json!(""));
+                append(joined, text);
+            }
+        }
+        // Each piece has the tokens of its own text: lists are joined.
+        let logprobs = choice.get("logprobs").and_then(Value::as_object);
+        for (field, value) in logprobs.into_iter().flatten() {
+            if let Value::Array(more) = value {
+                let joined = self.logprobs.entry(field).or_insert_with(|| json!([]));
+                if let Value::Array(joined) = joined {
+                    joined.extend(more.iter().cloned());
+                }
             }
         }
     }
-    if !started || (!done && finish.is_null()) {
-        return None;
+
+    fn add_content(&mut self, text: &str) {
+        match self.content.last_mut() {
+            Some(joined @ Value::String(_)) => append(joined, text),
+            _ => self.content.push(text.into()),
+        }
     }
-    let choice = json!({"index": 0, "message": message, "finish_reason": finish});
-    completion.insert("choices".to_owned(), json!([choice]));
-    Some(Value::Object(completion))
+
+    /// The choice of a whole completion; `None` if the last piece did not come.
+    fn joined(self) -> Option<Value> {
+        if self.finish.is_null() {
+            return None;
+        }
+        let mut message = self.texts;
+        match <[Value; 1]>::try_from(self.content) {
+            Ok([text @ Value::String(_)]) => message.insert("content".to_owned(), text),
+            Ok([part]) => message.insert("content".to_owned(), json!([part])),
+            Err(parts) if parts.is_empty() => None,
+            Err(parts) => message.insert("content".to_owned(), json!(parts)),
+        };
+        let mut choice = json!({"index": 0, "message": message, "finish_reason": self.finish});
+        if !self.logprobs.is_empty() {
+            choice["logprobs"] = self.logprobs.into();
+        }
+        Some(choice)
+    }
+}
+
+/// Adds to a text.
+fn append(joined: &mut Value, text: &str) {
+    if let Value::String(joined) = joined {
+        joined.push_str(text);
+    }
 }
 
 #[cfg(test)]
@@ -69,7 +148,7 @@ mod tests {
             data: {\"choices\":[],\"usage\":{\"prompt_tokens\":3}}\n\ndata: [DONE]\n\n";
         let expected = json!({
             "model": "m", "usage": {"prompt_tokens": 3},
-            "choices": [{"index": 0, "message": {"content": "B."}, "finish_reason": "stop"}],
+            "choices": [{"index": 0, "message": {"content": "B.", "reasoning_content": "A"}, "finish_reason": "stop"}],
         });
         assert_eq!(assemble(stream), Some(expected));
     }
@@ -79,13 +158,41 @@ mod tests {
         let piece = "data: {\"choices\":[{\"index\":0,\"delta\":{\"content\":\"B\"}}]}\n\n";
         assert_eq!(assemble(piece), None);
         assert_eq!(assemble(&format!("{piece}data: {{\"choi")), None);
-        assert!(assemble(&format!("{piece}data: [DONE]")).is_some());
+        assert_eq!(assemble(&format!("{piece}data: [DONE]")), None);
         assert_eq!(assemble("data: [DONE]\n\n"), None);
         assert_eq!(assemble(": keep-alive\n\n"), None);
         let error = "data: {\"error\":{\"message\":\"overloaded\"}}\n\n";
         assert_eq!(
             assemble(&format!("{piece}{error}")).unwrap()["error"]["message"],
             "overloaded"
+        );
+        let error = "event: error\ndata: {\"type\":\"error\",\"message\":\"overloaded\"}\n\n";
+        assert_eq!(
+            assemble(&format!("{piece}{error}")).unwrap()["error"]["message"],
+            "overloaded"
+        );
+    }
+
+    #[test]
+    fn probabilities_and_parts_of_pieces_are_joined() {
+        let piece = |content: &str, token: &str, finish: &str| {
+            format!(
+                "data: {{\"choices\":[{{\"delta\":{{\"content\":{content}}},\"logprobs\":{{\"content\":[{{\"token\":\"{token}\"}}],\"refusal\":null}},\"finish_reason\":{finish}}}]}}\n\n"
+            )
+        };
+        let whole = [piece("\"B\"", "B", "null"), piece("\".\"", ".", "\"stop\"")].concat();
+        let choice = &assemble(&whole).unwrap()["choices"][0];
+        assert_eq!(choice["message"]["content"], "B.");
+        assert_eq!(
+            choice["logprobs"],
+            json!({"content": [{"token": "B"}, {"token": "."}]})
+        );
+        let thought = r#"[{"type":"thinking","thinking":[]}]"#;
+        let parts = [piece(thought, "A", "null"), whole].concat();
+        let choice = &assemble(&parts).unwrap()["choices"][0];
+        assert_eq!(
+            choice["message"]["content"],
+            json!([{"type": "thinking", "thinking": []}, "B."])
         );
     }
 }

@@ -6,8 +6,8 @@ use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
+use crate::ask::Constrain;
 use crate::ask::batch::{BatchLine, with_letter};
-use crate::ask::{Constrain, Wire};
 use crate::error::{Error, Result};
 use crate::store::Store;
 use crate::types::flag::read_word;
@@ -52,7 +52,7 @@ pub(crate) fn import<D: Detail>(
             if line.trim().is_empty() {
                 continue;
             }
-            let line = BatchLine::read(&line, Wire::Chat).ok_or_else(|| not_a_line(path, i + 1))?;
+            let line = BatchLine::read(&line).ok_or_else(|| not_a_line(path, i + 1))?;
             import_line(line, &blanks, manifest, &mut waiting, store, &mut counts)?;
         }
     }

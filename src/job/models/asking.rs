@@ -24,6 +24,9 @@ pub(crate) struct AskingArgs {
     /// The constraint on replies.
     #[arg(long, value_enum, default_value_t)]
     pub(crate) constrain: Constrain,
+    /// Whether the probabilities of choices are asked for.
+    #[arg(long)]
+    pub(crate) probabilities: bool,
     /// The seed of the server's sampling.
     #[arg(long)]
     pub(crate) seed: Option<u64>,

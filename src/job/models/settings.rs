@@ -260,6 +260,7 @@ fn resolve(
         access,
         sending,
         constrain,
+        probabilities,
         seed,
         reply_headers,
     } = entry.asking.clone();
@@ -287,9 +288,13 @@ fn resolve(
     let parameters = Parameters {
         seed,
         constrain,
+        probabilities,
         extra,
         ..parameters
     };
+    if probabilities {
+        parameters.require_greedy().map_err(placed)?;
+    }
     let sending = Sending {
         quota: context.shard.quota(sending.quota),
         ..sending

@@ -1,6 +1,7 @@
 //! The paper's figures and others: each is a function from [`Findings`] to a [`Chart`].
 
 mod answers;
+mod confidence;
 mod story;
 mod thresholds;
 
@@ -31,6 +32,7 @@ pub(crate) fn figures(findings: &Findings<'_>) -> Result<Vec<Figure>> {
         ("families", overview.families()),
         ("hallucination", overview.hallucination()),
         ("collapse", overview.collapse()),
+        ("confidence", overview.confidence()),
     ];
     let mut figures = Vec::new();
     for (name, chart) in charts {

@@ -5,6 +5,7 @@ mod answers;
 mod baseline;
 mod best;
 mod by_reading;
+mod calibration;
 mod comparisons;
 mod enhancers;
 mod families;
@@ -60,6 +61,7 @@ fn all(findings: &Findings<'_>) -> Vec<Table> {
         pooled::pooled(findings),
         comparisons::comparisons(findings),
         answers::answers(findings),
+        calibration::calibration(findings),
         vec![flips::flips(findings)],
         Vec::from_iter(fidelity::fidelity(findings.fidelity.as_ref())),
         vec![agreement::agreement(&findings.agreements)],

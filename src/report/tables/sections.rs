@@ -1,6 +1,7 @@
 //! Sections of the page of an evaluation: [`SECTIONS`].
 
 use super::baseline::BASELINE;
+use super::calibration::CONFIDENCE;
 
 /// A section of the page: its id, its title, the text below the title, and the names of its figures.
 pub(in crate::report) type Section = (
@@ -11,7 +12,7 @@ pub(in crate::report) type Section = (
 );
 
 /// The sections of the page in order.
-pub(in crate::report) const SECTIONS: [Section; 12] = [
+pub(in crate::report) const SECTIONS: [Section; 13] = [
     (
         BASELINE,
         "Against the baseline",
@@ -66,6 +67,17 @@ pub(in crate::report) const SECTIONS: [Section; 12] = [
         "Hallucination and collapse",
         "What is said when nothing is seen: objects that are not there, and one answer to everything.",
         &["hallucination", "collapse"],
+    ),
+    (
+        CONFIDENCE,
+        "Confidence",
+        "How likely the model held its answer, and how often it was right; replies with reasoning before the answer are left out. \
+         Overconfidence is confidence less accuracy, in points. The calibration error is their root mean square distance over bins of \
+         equal count, less what chance alone makes of it; it needs 100 replies. Brier skill is 0 for a model that holds all choices equally \
+         likely, and 1 at best. AUROC is the share of pairs of a right and a wrong reply in which the right one is more confident. Risk \
+         is the share of wrong replies among all, and among the 80 and 50 % with the most confidence. The blind shift is the distance to \
+         the probabilities without an image, 0 to 1: what the pixels still contribute.",
+        &["confidence"],
     ),
     (
         "comparisons",

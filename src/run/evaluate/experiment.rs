@@ -5,6 +5,7 @@ use std::collections::{HashMap, HashSet};
 use serde_json::json;
 
 use super::plan::{ChoiceItem, trials};
+use super::settings::ImagePlace;
 use super::setup::ChoiceSetup;
 use crate::error::Result;
 use crate::job::experiment::Experiment;
@@ -86,6 +87,9 @@ impl Experiment for ChoiceSetup<'_> {
                 .then_some(("--shuffle-options", true.into())),
             order.circular.then_some(("--circular", true.into())),
             rules.map(|rules| ("--rules", json!(rules))),
+            // Left out if unset, so that runs from before the flag go on.
+            (self.config.image_place == ImagePlace::BeforeWords)
+                .then_some(("--image-first", true.into())),
         ];
         let fields = fields.into_iter().flatten();
         fields

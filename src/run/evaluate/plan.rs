@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::choice_order::arrange;
 use super::controls::is_other_room;
+use super::settings::ImagePlace;
 use super::setup::ChoiceSetup;
 use crate::error::Result;
 use crate::job::models::{ModelUnderTest, asked_in};
@@ -75,7 +76,10 @@ fn prompts(
     let prompts = arranged.map(|arranged| {
         let prompt = |view| {
             let words = setup.config.prompts.render(view, &arranged.question)?;
-            Ok(Prompt::of(words.into()))
+            Ok(match (view, setup.config.image_place) {
+                (View::Image, ImagePlace::BeforeWords) => Prompt::behind(words.into()),
+                _ => Prompt::of(words.into()),
+            })
         };
         Ok(QuestionPrompts {
             image: prompt(View::Image)?,

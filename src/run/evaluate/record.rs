@@ -41,6 +41,7 @@ impl Item for ChoiceItem {
             image: image.map(|image| image.facts().clone()),
             shown_frame: trial.item.shown_frame.clone(),
             observed: None,
+            options: None,
         };
         let condition = stimulus.condition.clone();
         Record::blank(trial.key, question.id.clone(), model, condition, detail)

@@ -50,12 +50,28 @@ pub(crate) struct ChoiceArgs {
     /// What the server lets the model say; other numbers than unconstrained ones
     #[arg(long, value_enum, default_value_t, add = Decides::Reply)]
     pub constrain: Constrain,
+    /// Ask how likely each choice is, by the probabilities of tokens (logprobs): the report then has the model's confidence against
+    /// its accuracy; needs temperature 0
+    #[arg(long, add = Decides::Reply)]
+    pub probabilities: bool,
+    /// Show the image before the words, as Anthropic advises, and so that servers can keep it for all questions about a frame
+    #[arg(long, add = Decides::Reply)]
+    pub image_first: bool,
     /// A folder with custom prompts (choice.txt, blind.txt); default: built in
     #[arg(long, value_name = "DIR", add = Decides::Reply)]
     pub prompts: Option<PathBuf>,
     /// Ask every control of the observer too (observer:other-room, or observer:tiles if all frames are of one scene, is always asked)
     #[arg(long, add = Decides::Trials)]
     pub observer_controls: bool,
+}
+
+/// The place of the image in a message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ImagePlace {
+    /// Behind the words.
+    AfterWords,
+    /// Before the words.
+    BeforeWords,
 }
 
 /// The flag for the size in which images are sent.
@@ -76,6 +92,8 @@ pub(super) struct Evaluation {
     pub(super) rule: ReadingRule,
     pub(super) order: ChoiceOrder,
     pub(super) prompts: Prompts,
+    /// The place of the image in a message.
+    pub(super) image_place: ImagePlace,
     /// The rulebook that makes questions, and that the observer answers by.
     pub(super) rules: Rules,
     /// Ask every control of the observer, if it is asked.
@@ -96,6 +114,11 @@ impl EvaluateArgs {
         Ok(Evaluation {
             rules: rules(self.selection.rules.as_deref())?,
             observer_controls: self.choice.observer_controls,
+            image_place: if self.choice.image_first {
+                ImagePlace::BeforeWords
+            } else {
+                ImagePlace::AfterWords
+            },
             data: self.data,
             selection: self.selection,
             rule: self.codes.rule(self.limit),
@@ -103,6 +126,7 @@ impl EvaluateArgs {
             prompts: prompts.map_or_else(Prompts::built_in, Prompts::load)?,
             job: self.job.resolve(&ExperimentSettings {
                 constrain: self.choice.constrain,
+                probabilities: self.choice.probabilities,
                 max_side: self.shrink.max_side,
                 sampling_seed: None,
             })?,

@@ -272,6 +272,7 @@ impl People {
         let detail = ChoiceDetail {
             repeat: turn,
             observed: None,
+            options: None,
             ..asked.detail.clone()
         };
         let (question, condition) = (asked.question.clone(), asked.condition.clone());

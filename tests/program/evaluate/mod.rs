@@ -1,9 +1,11 @@
 //! The main job from the outside: the program is called as a user calls it.
 
+mod adapted;
 mod conditions;
 mod failures;
 mod interruption;
 mod outputs;
+mod probabilities;
 mod requests;
 mod resume;
 mod untouched;

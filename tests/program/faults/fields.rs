@@ -1,6 +1,6 @@
 //! Request fields that a server does not take.
 
-use darkqa_eval::internals::ask::{Parameters, Reach, Temperature};
+use darkqa_eval::internals::ask::{Parameters, Reach, Temperature, Thinking};
 use serde_json::{Value, json};
 
 use super::{ask, ask_with, sending};
@@ -46,19 +46,64 @@ fn fields_are_adapted_once_for_all() {
         error.failure.message.contains("--temperature default"),
         "{error}"
     );
-    // A server that takes neither name is left after both.
-    let outcome = ask_with(
-        vec![
-            limit(),
-            refused("max_completion_tokens", "unsupported_parameter"),
-        ],
-        sending(),
-        Parameters::new("m".into()),
+    // A server that takes neither name gets no limit; one that refuses what is not sent any more is left.
+    let neither = || refused("max_completion_tokens", "unsupported_parameter");
+    let outcome = ask(vec![limit(), neither(), Answer::text("B")]);
+    assert_eq!(outcome.result.unwrap().attempts, 3);
+    let last = &outcome.requests[2];
+    assert!(last.get("max_tokens").is_none() && last.get("max_completion_tokens").is_none());
+    let outcome = ask(vec![limit(), neither()]);
+    let error = outcome.result.unwrap_err();
+    assert_eq!(
+        (error.reach, error.attempts),
+        (Reach::Endpoint, 3),
+        "{error}"
     );
+    let outcome = ask(vec![heat(), heat()]);
     let error = outcome.result.unwrap_err();
     assert_eq!(
         (error.reach, error.attempts),
         (Reach::Endpoint, 2),
         "{error}"
     );
+}
+
+/// Lists of details name the field by its place.
+#[test]
+fn a_field_is_known_by_the_place_in_a_list_of_details() {
+    let details = json!({"object": "error", "message": {"detail": [
+        {"type": "extra_forbidden", "loc": ["body", "max_tokens"], "msg": "Extra inputs are not permitted"},
+    ]}});
+    let outcome = ask(vec![Answer::json(422, &details), Answer::text("B")]);
+    assert_eq!(outcome.result.unwrap().attempts, 2);
+    assert_eq!(outcome.requests[1]["max_completion_tokens"], 1024);
+}
+
+/// What the table says of servers on this machine; a model without such a switch is the server's to refuse.
+#[test]
+fn thinking_is_said_in_the_field_of_the_server() {
+    let off = || Parameters {
+        thinking: Some(Thinking::Off),
+        ..Parameters::new("m".into())
+    };
+    let outcome = ask_with(vec![Answer::text("B")], sending(), off());
+    outcome.result.unwrap();
+    let body = &outcome.requests[0];
+    assert_eq!(
+        body["chat_template_kwargs"],
+        json!({"enable_thinking": false})
+    );
+    assert!(body.get("reasoning_effort").is_none() && body.get("switch").is_none());
+    let refusal = Answer::error(
+        400,
+        "unknown_parameter",
+        "Unknown parameter: 'chat_template_kwargs'.",
+    );
+    let outcome = ask_with(vec![refusal], sending(), off());
+    let error = outcome.result.unwrap_err();
+    assert_eq!((error.reach, error.attempts), (Reach::Endpoint, 1));
+    assert!(error.failure.message.contains("--thinking"), "{error}");
+    // Nothing is said unless it is asked for.
+    let outcome = ask(vec![Answer::text("B")]);
+    assert!(outcome.requests[0].get("chat_template_kwargs").is_none());
 }

@@ -4,6 +4,7 @@ mod failures;
 mod fields;
 mod replies;
 mod retries;
+mod wires;
 
 use std::io::Write as _;
 use std::sync::Arc;
@@ -12,7 +13,7 @@ use std::time::{Duration, Instant};
 use crate::support::endpoint::{Answer, MockEndpoint, Request};
 use darkqa_eval::internals::ask::{
     Access, AskError, Endpoint, Message, Parameters, Payload, PayloadFormat, Remote, Secret,
-    Sending, Wire,
+    Sending,
 };
 use darkqa_eval::types::{Reply, Rgb};
 use serde_json::Value;
@@ -51,7 +52,7 @@ fn ask_with(answers: Vec<Answer>, sending: Sending, parameters: Parameters) -> O
         .unwrap();
     runtime.block_on(async {
         let endpoint = Arc::new(Endpoint::open(access, sending).unwrap());
-        let model = Remote::open(endpoint, Wire::Chat, parameters).unwrap();
+        let model = Remote::open(endpoint, parameters).unwrap();
         let started = Instant::now();
         let images = [Arc::new(image())];
         let message = Message {

@@ -1,5 +1,7 @@
 //! The lines above a report: what differs between its runs, and what is wrong with its numbers ([`alerts`]).
 
+mod adapted;
+mod confidence;
 mod models;
 mod questions;
 mod readings;
@@ -27,6 +29,7 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
     alerts.extend(replies::of_replies(findings));
     alerts.extend(replies::of_people(combined));
     alerts.extend(readings::of_readings(combined));
+    alerts.extend(confidence::of_confidence(&combined.runs, &combined.records));
     alerts.extend(questions::of_repeats(combined));
     alerts.extend(questions::of_items(findings));
     if findings.grid.clusters < MIN_SCENES {
@@ -47,6 +50,7 @@ pub(super) fn of_runs<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     alerts.extend(servers::of_servers(joined));
     alerts.extend(of_enhancers(&joined.runs));
     alerts.extend(of_inputs(&joined.runs));
+    alerts.extend(adapted::of_adaptations(&joined.runs));
     if joined.runs.len() > 1 {
         alerts.extend(settings::of_settings(joined));
         alerts.extend(questions::of_questions(joined));

@@ -40,6 +40,7 @@ fn asked(model: &str, frames: usize, conditions: &[(&str, f64)]) -> Vec<Record> 
                 image: None,
                 shown_frame: None,
                 observed: None,
+                options: None,
             };
             let key = Digest::of(format!("{item} {model} {name}").as_bytes()).into();
             let question = QuestionId(format!("q{item:02}"));

@@ -1,0 +1,40 @@
+//! The JSON in the body of a reply, read leniently: [`parsed`].
+
+use std::borrow::Cow;
+
+use serde_json::Value;
+
+use crate::ask::complaint::{UnreadableReply, page_title};
+use crate::ask::escapes;
+
+/// The reason why a body is not a reply, in words.
+pub(super) fn other(what: &str) -> UnreadableReply {
+    UnreadableReply::Other(what.to_owned())
+}
+
+/// A body as text, without a byte order mark; invalid UTF-8 becomes replacement characters.
+pub(super) fn text(body: &[u8]) -> Cow<'_, str> {
+    match String::from_utf8_lossy(body) {
+        Cow::Borrowed(text) => text.trim_start_matches('\u{FEFF}').into(),
+        Cow::Owned(text) => text.trim_start_matches('\u{FEFF}').to_owned().into(),
+    }
+}
+
+/// The JSON of a text; escapes of no character become replacement characters.
+pub(super) fn parsed(text: &str, content_type: &str) -> Result<Value, UnreadableReply> {
+    serde_json::from_str(text).or_else(|error| {
+        let repaired = escapes::repaired(text).and_then(|text| serde_json::from_str(&text).ok());
+        repaired.ok_or_else(|| unreadable(text, content_type, &error))
+    })
+}
+
+/// The description of a body that is not JSON.
+fn unreadable(text: &str, content_type: &str, error: &serde_json::Error) -> UnreadableReply {
+    if text.trim().is_empty() {
+        return other("an empty body");
+    }
+    UnreadableReply::Other(
+        page_title(text)
+            .unwrap_or_else(|| format!("{content_type:?} that is no whole JSON ({error}): {text}")),
+    )
+}

@@ -1,0 +1,81 @@
+//! Refusals of a wire: [`other_wire`], the one that the server asks for instead.
+
+use crate::ask::complaint::Complaint;
+use crate::ask::wire_kind::Wire;
+
+/// The words by which servers say that they answer by event streams alone (Alibaba's model studio, ModelScope).
+const STREAM_ONLY: [&str; 7] = [
+    "only support stream",
+    "only supports stream",
+    "enable the stream parameter",
+    "does not support http call",
+    "for non-streaming call",
+    "stream=false",
+    "stream must be set to true",
+];
+
+/// The words by which OpenAI says that it takes a model through the Responses API alone.
+const RESPONSES_ONLY: [&str; 3] = [
+    "only supported in v1/responses",
+    "only supported in /v1/responses",
+    "use /v1/responses",
+];
+
+/// The wire that a server asks for in its refusal of a request; `None` if it does not speak of another one.
+pub(in crate::ask) fn other_wire(complaint: &Complaint, sent: Wire) -> Option<Wire> {
+    let wanted = if complaint.mentions_any(&RESPONSES_ONLY) {
+        Wire::Responses
+    } else if complaint.mentions_any(&STREAM_ONLY) {
+        Wire::ChatStream
+    } else {
+        return None;
+    };
+    // A stream is asked of chat completions alone.
+    let is_other = match wanted {
+        Wire::ChatStream => sent == Wire::Chat,
+        wanted => sent != wanted,
+    };
+    is_other.then_some(wanted)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn servers_that_want_another_wire_are_understood() {
+        use Wire::{Chat, ChatStream, Responses};
+        for (words, expected) in [
+            (
+                "This model only support stream mode, please enable the stream parameter to access the model.",
+                Some(ChatStream),
+            ),
+            (
+                "parameter.enable_thinking must be set to false for non-streaming calls",
+                Some(ChatStream),
+            ),
+            (
+                "enable thinking can not be support when `stream=False`",
+                Some(ChatStream),
+            ),
+            (
+                "current user api does not support http call",
+                Some(ChatStream),
+            ),
+            (
+                "This model is only supported in v1/responses and not in v1/chat/completions.",
+                Some(Responses),
+            ),
+            ("Unknown parameter: 'stream_options'.", None),
+            ("a streaming error occurred", None),
+            ("", None),
+        ] {
+            let complaint = Complaint::of_body(words);
+            assert_eq!(other_wire(&complaint, Chat), expected, "{words}");
+            // What was sent already is not the remedy.
+            if let Some(wire) = expected {
+                assert_eq!(other_wire(&complaint, wire), None, "{words}");
+            }
+        }
+    }
+}

@@ -1,0 +1,234 @@
+//! Replies of OpenAI's Responses API, read leniently: [`read`].
+
+use serde_json::Value;
+
+use super::json_body::{self, other};
+use super::logprobs;
+use super::stream;
+use crate::ask::complaint::{Complaint, UnreadableReply};
+use crate::types::{Finish, Reply, Thought, TokenChances, Usage};
+
+/// Reads a body; `latency_ms` and `attempts` stay zero.
+///
+/// The text is that of all parts of type `output_text` in items of type `message`; items of reasoning are never read. A response
+/// that failed states an error; one that is incomplete says why, which becomes the reason why the model stopped.
+pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableReply> {
+    let text = json_body::text(body);
+    let response = if stream::is_stream(&text, content_type) {
+        ended(&text).ok_or_else(|| other("an event stream that holds no whole response"))?
+    } else {
+        json_body::parsed(&text, content_type)?
+    };
+    let complaint = match response.get("output") {
+        Some(_) => Complaint::in_error(&response),
+        None => Complaint::of(&response),
+    };
+    if let Some(complaint) = complaint {
+        return Err(UnreadableReply::Complaint(Box::new(complaint)));
+    }
+    let finish = finish(&response)?;
+    let items = response
+        .get("output")
+        .and_then(Value::as_array)
+        .ok_or_else(|| other("JSON without output"))?;
+    let (text, refusal) = words(items);
+    let chances = chances(items, &response, &text);
+    Ok(Reply {
+        text,
+        refusal: Some(refusal).filter(|words| !words.is_empty()),
+        finish,
+        usage: usage(response.get("usage")),
+        served_model: response
+            .get("model")
+            .and_then(Value::as_str)
+            .map(str::to_owned),
+        latency_ms: 0,
+        attempts: 0,
+        endpoint: None,
+        observed: None,
+        chances,
+    })
+}
+
+/// The response in the last event of a stream that nobody asked for; `None` if the stream was cut before.
+fn ended(stream: &str) -> Option<Value> {
+    let mut events = stream::events(stream);
+    events.find_map(|event| {
+        let kind = event.get("type")?.as_str()?;
+        let ends = [
+            "response.completed",
+            "response.incomplete",
+            "response.failed",
+        ];
+        let response = ends.contains(&kind).then(|| event.get("response"));
+        let error = (kind == "error").then_some(&event);
+        response.flatten().or(error).cloned()
+    })
+}
+
+/// The reason why the model stopped. A response that is not at its end is no reply.
+fn finish(response: &Value) -> Result<Finish, UnreadableReply> {
+    let text = |value: Option<&Value>| value.and_then(Value::as_str).map(str::to_owned);
+    let status = text(response.get("status")).unwrap_or_default();
+    match &*status {
+        "" => Ok(Finish::Unknown),
+        "completed" => Ok(Finish::Stop),
+        "incomplete" => {
+            let details = response.get("incomplete_details");
+            let reason = text(details.and_then(|details| details.get("reason")));
+            Ok(match reason.as_deref() {
+                Some("max_output_tokens" | "max_tokens") => Finish::Length,
+                Some("content_filter") => Finish::Filter,
+                reason => Finish::Other(reason.unwrap_or("incomplete").to_owned()),
+            })
+        }
+        status => Err(other(&format!("a response whose status is {status:?}"))),
+    }
+}
+
+/// The likeliest tokens of the first text; `None` if it states none. Items of reasoning stand before it if the model thought.
+fn chances(items: &[Value], response: &Value, text: &str) -> Option<TokenChances> {
+    let contents = items
+        .iter()
+        .filter_map(|item| item.get("content")?.as_array());
+    let mut lists = contents.flatten().map(|part| part.get("logprobs"));
+    let positions = lists.find_map(logprobs::positions)?;
+    let thought = logprobs::thought(response, response.get("usage"), text);
+    let summaries = items
+        .iter()
+        .filter_map(|item| item.get("summary")?.as_array());
+    let summarized = summaries.flatten().next().is_some();
+    Some(TokenChances {
+        positions,
+        thought: if summarized { Thought::Before } else { thought },
+    })
+}
+
+/// The text of the messages among the items of a response, and that of refusals in them.
+fn words(items: &[Value]) -> (String, String) {
+    let (mut text, mut refusal) = (String::new(), String::new());
+    let is_message = |item: &&Value| item.get("type").is_none_or(|kind| kind == "message");
+    let contents = items.iter().filter(is_message);
+    let parts = contents.filter_map(|item| item.get("content")?.as_array());
+    for part in parts.flatten() {
+        let words = |field| part.get(field).and_then(Value::as_str).unwrap_or_default();
+        match part.get("type").and_then(Value::as_str) {
+            Some("output_text" | "text") => text += words("text"),
+            Some("refusal") => refusal += words("refusal"),
+            _ => {}
+        }
+    }
+    (text, refusal)
+}
+
+fn usage(usage: Option<&Value>) -> Option<Usage> {
+    let tokens = |field| usage?.get(field)?.as_u64();
+    let cached = || {
+        let details = usage?.get("input_tokens_details")?;
+        details.get("cached_tokens")?.as_u64()
+    };
+    let usage = Usage {
+        prompt_tokens: tokens("input_tokens"),
+        completion_tokens: tokens("output_tokens"),
+        cached_tokens: cached().filter(|cached| *cached > 0),
+    };
+    (usage != Usage::default()).then_some(usage)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn json(body: &str) -> Result<Reply, UnreadableReply> {
+        read(body.as_bytes(), "application/json")
+    }
+
+    #[test]
+    fn the_text_of_all_messages_is_read_and_reasoning_is_not() {
+        let reply = json(
+            r#"{"status":"completed","model":"o-1","error":null,"output":[
+                {"type":"reasoning","summary":[{"type":"summary_text","text":"A?"}],"content":[{"type":"reasoning_text","text":"A"}]},
+                {"type":"message","role":"assistant","content":[{"type":"output_text","text":"B","annotations":[]},{"type":"output_text","text":"."}]},
+                {"type":"tool","content":[{"type":"output_text","text":"C"}]}],
+                "usage":{"input_tokens":90,"input_tokens_details":{"cached_tokens":64},"output_tokens":7,"output_tokens_details":{"reasoning_tokens":5}}}"#,
+        )
+        .unwrap();
+        assert_eq!((reply.text.as_str(), &reply.finish), ("B.", &Finish::Stop));
+        assert_eq!(reply.served_model.as_deref(), Some("o-1"));
+        let usage = reply.usage.unwrap();
+        assert_eq!(
+            (
+                usage.prompt_tokens,
+                usage.completion_tokens,
+                usage.cached_tokens
+            ),
+            (Some(90), Some(7), Some(64))
+        );
+        let refused = json(
+            r#"{"status":"completed","output":[{"type":"message","content":[{"type":"refusal","refusal":"I cannot"}]}]}"#,
+        )
+        .unwrap();
+        assert_eq!(
+            (refused.text.as_str(), refused.refusal.as_deref()),
+            ("", Some("I cannot"))
+        );
+    }
+
+    #[test]
+    fn the_status_says_why_the_model_stopped() {
+        for (status, finish) in [
+            (r#""status":"completed","#, Finish::Stop),
+            ("", Finish::Unknown),
+            (
+                r#""status":"incomplete","incomplete_details":{"reason":"max_output_tokens"},"#,
+                Finish::Length,
+            ),
+            (
+                r#""status":"incomplete","incomplete_details":{"reason":"content_filter"},"#,
+                Finish::Filter,
+            ),
+            (
+                r#""status":"incomplete","incomplete_details":null,"#,
+                Finish::Other("incomplete".into()),
+            ),
+        ] {
+            let reply = json(&format!(r#"{{{status}"output":[]}}"#)).unwrap();
+            assert_eq!(reply.finish, finish, "{status}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_whole_response_is_described() {
+        for (body, expected) in [
+            (r#"{"status":"in_progress","output":[]}"#, "in_progress"),
+            (r#"{"choices":[]}"#, "without output"),
+            ("", "empty"),
+            (
+                r#"data: {"type":"response.created","response":{}}"#,
+                "no whole response",
+            ),
+        ] {
+            let Err(UnreadableReply::Other(what)) = json(body) else {
+                panic!("{body}");
+            };
+            assert!(what.contains(expected), "{what}");
+        }
+        for body in [
+            r#"{"status":"failed","error":{"code":"server_error","message":"m"},"output":[]}"#,
+            r#"{"error":{"message":"m"}}"#,
+            r#"data: {"type":"error","message":"m"}"#,
+        ] {
+            let Err(UnreadableReply::Complaint(complaint)) = json(body) else {
+                panic!("{body}");
+            };
+            assert_eq!(complaint.message, "m");
+        }
+    }
+
+    #[test]
+    fn a_stream_that_nobody_asked_for_is_read_at_its_end() {
+        let stream = "event: response.output_text.delta\ndata: {\"type\":\"response.output_text.delta\",\"delta\":\"A\"}\n\n\
+            event: response.completed\ndata: {\"type\":\"response.completed\",\"response\":{\"status\":\"completed\",\"output\":[{\"type\":\"message\",\"content\":[{\"type\":\"output_text\",\"text\":\"B\"}]}]}}\n\n";
+        assert_eq!(json(stream).unwrap().text, "B");
+    }
+}

@@ -1,0 +1,226 @@
+//! Requests of OpenAI's Responses API: the JSON [`body`], and the [`fields`] that servers may refuse.
+//!
+//! The form is that of OpenAI's reference, `POST /responses`; `store` is false, so that the vendor keeps no image.
+
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+
+use super::chat_fields::PROBABILITIES;
+use super::image_places::with_images;
+use crate::ask::body::Parts;
+use crate::ask::call::Message;
+use crate::ask::constraint;
+use crate::ask::field::{AdaptableField, FieldState, RequestField, RequestFields, SentFields};
+use crate::ask::parameters::{Constrain, ImageDetail, Parameters, Temperature, TokenField};
+use crate::types::question::letter;
+
+/// The body of a request without its input, which stands at its end.
+#[derive(Serialize)]
+struct ResponsesRequest<'a> {
+    model: &'a str,
+    store: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    temperature: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    top_p: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seed: Option<u64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    max_output_tokens: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reasoning: Option<Value>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    text: Option<Value>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    structured_outputs: Option<Value>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    include: Option<[&'static str; 1]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    top_logprobs: Option<u8>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    instructions: Option<&'a str>,
+    #[serde(flatten)]
+    switch: Option<&'a Map<String, Value>>,
+}
+
+#[derive(Serialize)]
+struct Turn<'a> {
+    role: &'static str,
+    content: Vec<Part<'a>>,
+}
+
+#[derive(Serialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+enum Part<'a> {
+    InputText {
+        text: &'a str,
+    },
+    InputImage {
+        #[serde(skip_serializing_if = "Option::is_none")]
+        detail: Option<ImageDetail>,
+        image_url: &'static str,
+    },
+}
+
+/// The place of an image.
+const PLACE: &str = r#""image_url":"""#;
+
+/// The body of one request: text, images, and the text after them.
+pub(super) fn body(
+    parameters: &Parameters,
+    fields: RequestFields,
+    message: Message<'_>,
+    choices: usize,
+) -> Result<Parts, serde_json::Error> {
+    let letters: Vec<char> = (0..choices).map(letter).collect();
+    let constrain = parameters.constrain;
+    let effort = fields.effort(parameters);
+    let head = serde_json::to_string(&ResponsesRequest {
+        model: &parameters.model,
+        store: false,
+        temperature: fields.temperature,
+        top_p: parameters.top_p,
+        seed: parameters.seed,
+        max_output_tokens: limit(parameters, fields),
+        reasoning: effort.map(|effort| json!({"effort": effort})),
+        text: (constrain == Constrain::Json).then(|| format(&letters)),
+        structured_outputs: (constrain == Constrain::Choice).then(|| json!({"choice": letters})),
+        include: fields
+            .top_logprobs
+            .map(|_| ["message.output_text.logprobs"]),
+        top_logprobs: fields.top_logprobs,
+        instructions: parameters.extra.system.as_deref(),
+        switch: fields.switch(),
+    })?;
+    let head = parameters.extra.apply(head)?;
+    let input = serde_json::to_string(&[Turn {
+        role: "user",
+        content: content(message, parameters.detail),
+    }])?;
+    Ok(with_images(&head, "input", &input, PLACE, message.images))
+}
+
+/// The token limit, which has one name here.
+fn limit(parameters: &Parameters, fields: RequestFields) -> Option<u32> {
+    parameters
+        .limit()
+        .filter(|_| fields.token_field != TokenField::Omit)
+}
+
+/// The content of a message, with a place for each image.
+fn content(message: Message<'_>, detail: Option<ImageDetail>) -> Vec<Part<'_>> {
+    let words = |text| Part::InputText { text };
+    let images = message.images.iter().map(|_| Part::InputImage {
+        detail,
+        image_url: "",
+    });
+    let before = Some(message.before).filter(|text| !text.is_empty() || message.images.is_empty());
+    let behind = Some(message.behind).filter(|text| !text.is_empty());
+    let parts = before.map(words).into_iter().chain(images);
+    parts.chain(behind.map(words)).collect()
+}
+
+/// The format of an object with one of the letters, by a JSON schema.
+fn format(letters: &[char]) -> Value {
+    let schema = constraint::schema(letters);
+    json!({"format": {"type": "json_schema", "name": constraint::ANSWER, "strict": true, "schema": schema}})
+}
+
+/// The fields that a server may refuse.
+pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
+    let parameters = sent.parameters;
+    let probabilities = FieldState::until_refused(
+        sent.fields.top_logprobs.is_some(),
+        !parameters.probabilities,
+    );
+    let field = |name, state, adaptable, hint| RequestField {
+        name,
+        state,
+        hint,
+        adaptable,
+    };
+    Vec::from([
+        field(
+            "temperature",
+            FieldState::until_refused(
+                sent.fields.temperature.is_some(),
+                parameters.temperature == Temperature::Server,
+            ),
+            Some(AdaptableField::Temperature),
+            "leave the temperature to the server: --temperature default",
+        ),
+        field(
+            "top_p",
+            FieldState::set(parameters.top_p.is_some()),
+            None,
+            "leave --top-p out: the model takes no other than its own",
+        ),
+        field(
+            "seed",
+            FieldState::set(parameters.seed.is_some()),
+            None,
+            "leave --sampling-seed out: the Responses API has no seed",
+        ),
+        field(
+            "max_output_tokens",
+            FieldState::until_refused(
+                limit(parameters, sent.fields).is_some(),
+                parameters.token_field == TokenField::Omit,
+            ),
+            Some(AdaptableField::TokenField),
+            "send no limit: --token-field none, or another --max-tokens",
+        ),
+        field(
+            "effort",
+            FieldState::set(sent.fields.effort(parameters).is_some()),
+            None,
+            EFFORT,
+        ),
+        field(
+            "reasoning",
+            FieldState::set(sent.fields.effort(parameters).is_some()),
+            None,
+            EFFORT,
+        ),
+        field(
+            "detail",
+            FieldState::set(sent.has_image && parameters.detail.is_some()),
+            None,
+            "leave --detail out, or give a value the server takes",
+        ),
+        field(
+            "format",
+            FieldState::set(parameters.constrain == Constrain::Json),
+            None,
+            "leave --constrain out: the server does not take it",
+        ),
+        field(
+            "top_logprobs",
+            FieldState::set(sent.fields.top_logprobs.is_some()),
+            Some(AdaptableField::TopLogprobs),
+            PROBABILITIES,
+        ),
+        field(
+            "logprobs",
+            probabilities,
+            Some(AdaptableField::Logprobs),
+            PROBABILITIES,
+        ),
+        field(
+            "include",
+            probabilities,
+            Some(AdaptableField::Logprobs),
+            PROBABILITIES,
+        ),
+        field(
+            "structured_outputs",
+            FieldState::set(parameters.constrain == Constrain::Choice),
+            None,
+            "leave --constrain out, or try --constrain json",
+        ),
+    ])
+}
+
+/// The remedy for a reasoning effort that the model does not take.
+const EFFORT: &str =
+    "leave --reasoning-effort (or --thinking) out, or give a value the model takes";

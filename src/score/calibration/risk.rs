@@ -1,0 +1,83 @@
+//! The share of wrong replies among the most confident ones: [`RiskCoverage`].
+
+use super::confident_reply::ConfidentReply;
+
+/// Risk at some coverages, and the area under the curve (Geifman and El-Yaniv 2017, NeurIPS).
+///
+/// Replies are taken in order of falling confidence. Those of equal confidence are taken together: each counts as the mean of them,
+/// so that their order decides nothing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RiskCoverage {
+    /// The share of wrong replies among all.
+    pub at_100: f64,
+    /// The same among the most confident 80 %.
+    pub at_80: f64,
+    /// The same among the most confident 50 %.
+    pub at_50: f64,
+    /// The mean risk over all coverages.
+    pub area: f64,
+}
+
+impl RiskCoverage {
+    /// The risk of replies in order of rising confidence; there is at least one.
+    pub(super) fn of(replies: &[ConfidentReply]) -> Self {
+        let n = replies.len();
+        let mut risks = Vec::with_capacity(n);
+        let mut wrong = 0.0;
+        let ties = replies.chunk_by(|a, b| a.confidence.total_cmp(&b.confidence).is_eq());
+        for tied in ties.rev() {
+            let share = tied.iter().filter(|reply| !reply.right).count() as f64 / tied.len() as f64;
+            for _ in tied {
+                wrong += share;
+                risks.push(wrong / (risks.len() + 1) as f64);
+            }
+        }
+        let at = |share: f64| {
+            let taken = ((share * n as f64).ceil() as usize).clamp(1, n);
+            risks[taken - 1]
+        };
+        Self {
+            at_100: at(1.0),
+            at_80: at(0.8),
+            at_50: at(0.5),
+            area: risks.iter().sum::<f64>() / n as f64,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn risk(of: &[(f64, bool)]) -> RiskCoverage {
+        let replies: Vec<ConfidentReply> = of
+            .iter()
+            .map(|&(confidence, right)| ConfidentReply {
+                cluster: 0,
+                confidence,
+                right,
+                brier: 0.0,
+                guess: 0.5,
+                nll: 0.0,
+            })
+            .collect();
+        RiskCoverage::of(&replies)
+    }
+
+    #[test]
+    fn the_most_confident_come_first() {
+        let good = risk(&[(0.3, false), (0.5, true), (0.7, true), (0.9, true)]);
+        assert_eq!((good.at_100, good.at_80, good.at_50), (0.25, 0.25, 0.0));
+        assert!((good.area - 0.0625).abs() < 1e-12);
+        let bad = risk(&[(0.3, true), (0.5, true), (0.7, true), (0.9, false)]);
+        assert_eq!((bad.at_100, bad.at_50), (0.25, 0.5));
+        assert!((bad.area - (1.0 + 0.5 + 1.0 / 3.0 + 0.25) / 4.0).abs() < 1e-12);
+        // Where all are equally confident, any coverage has the risk of all.
+        for order in [[true, false, true, true], [true, true, true, false]] {
+            let tied = risk(&order.map(|right| (0.5, right)));
+            for value in [tied.at_100, tied.at_80, tied.at_50, tied.area] {
+                assert!((value - 0.25).abs() < 1e-12);
+            }
+        }
+    }
+}

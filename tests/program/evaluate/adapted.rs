@@ -1,0 +1,113 @@
+//! Requests that a server refuses for one of their fields, in whole runs.
+
+use crate::support::endpoint::{Answer, MockEndpoint};
+use crate::support::run::{Bench, model_args, records, words};
+use crate::support::table::check_rows;
+use serde_json::{Value, json};
+
+use super::text;
+
+fn refusal(param: &str, message: &str) -> Answer {
+    let error = json!({"message": message, "param": param, "code": "unsupported_value"});
+    Answer::json(400, &json!({ "error": error }))
+}
+
+fn manifest(bench: &Bench) -> Value {
+    serde_json::from_slice(&std::fs::read(bench.path("run/manifest.json")).unwrap()).unwrap()
+}
+
+/// Questions that all share one image, so that a refusal of each would be the same.
+#[test]
+fn a_refused_field_costs_one_request_and_is_said_in_the_report() {
+    let bench = Bench::with_questions(30);
+    let mock = MockEndpoint::answering(|body| match body.get("temperature") {
+        Some(_) => refusal("temperature", "`temperature` is deprecated for this model."),
+        None => Answer::text("C"),
+    });
+    let base = mock.base_url();
+    let args = "--data set.jsonl --levels L0 --out run";
+    let printed = bench.complete(&model_args(&base, args));
+    assert_eq!(mock.requests().len(), 31);
+    let noted = json!(["no temperature is sent: the server's own holds"]);
+    assert_eq!(manifest(&bench)["settings"]["adapted for m"], noted);
+    assert!(printed.contains("Requests to m were changed"), "{printed}");
+    // A run in which nothing was refused says nothing of it.
+    let other = Bench::with_questions(3);
+    let mock = MockEndpoint::start([Answer::text("C")]);
+    let printed = other.complete(&model_args(&mock.base_url(), args));
+    assert!(!printed.contains("were changed"), "{printed}");
+}
+
+/// Flags, what the server says to them, and what stands in the message: its words and the flag.
+#[test]
+fn what_the_user_asked_for_stops_the_run() {
+    let rows = [
+        (
+            "--temperature 0.5",
+            refusal("temperature", "Unsupported value: only 1 is supported."),
+            ["only 1 is supported", "--temperature"],
+        ),
+        (
+            "--reasoning-effort minimal",
+            refusal(
+                "reasoning_effort",
+                "Unsupported value: 'minimal'. Supported values are: 'none', 'low' and 'high'.",
+            ),
+            ["'none', 'low' and 'high'", "--reasoning-effort"],
+        ),
+        (
+            "--token-field max_tokens",
+            Answer::json(
+                422,
+                &json!({"detail": [{"loc": ["body", "max_tokens"], "msg": "Extra inputs are not permitted"}]}),
+            ),
+            ["Extra inputs are not permitted", "--token-field"],
+        ),
+        (
+            "--wire chat",
+            Answer::error(400, "x", "This model only support stream mode"),
+            ["only support stream mode", "--wire chat-stream"],
+        ),
+    ];
+    check_rows(rows, |(flags, answer, expected)| {
+        let bench = Bench::with_questions(30);
+        let mock = MockEndpoint::start([answer]);
+        let base = mock.base_url();
+        let args = model_args(&base, "--data set.jsonl --levels L0 --out run");
+        let called = bench.call(&[args, words(flags)].concat());
+        assert_eq!(called.code, Some(2), "{called:?}");
+        for words in expected {
+            assert!(called.stderr.contains(words), "{}", called.stderr);
+        }
+        assert_eq!(mock.requests().len(), 1, "{flags}");
+    });
+}
+
+/// The same trials by each wire, but for the Responses API where it is asked for.
+#[test]
+fn a_wire_that_is_found_out_is_no_other_trial() {
+    let bench = Bench::with_questions(3);
+    let stream_only = MockEndpoint::answering(|body| {
+        if body.get("stream").is_none() {
+            return Answer::error(400, "x", "please enable the stream parameter");
+        }
+        let piece =
+            json!({"choices": [{"index": 0, "delta": {"content": "C"}, "finish_reason": "stop"}]});
+        let body = format!("data: {piece}\n\ndata: [DONE]\n\n");
+        Answer::new(200, body).header("content-type", "text/event-stream")
+    });
+    let base = stream_only.base_url();
+    let run = |flags: &str| {
+        let args = model_args(&base, "--data set.jsonl --levels L0");
+        bench.complete(&[args, words(flags)].concat());
+    };
+    run("--out run");
+    assert_eq!(stream_only.requests().len(), 4);
+    let noted = json!(["its replies are streamed"]);
+    assert_eq!(manifest(&bench)["settings"]["adapted for m"], noted);
+    // The same trials: nothing is asked.
+    run("--out run --wire chat-stream");
+    assert_eq!(stream_only.requests().len(), 4);
+    let replies = records(&bench.path("run"));
+    assert!(replies.iter().all(|record| text(record, "reply") == "C"));
+}
