@@ -1,6 +1,7 @@
 //! The lines above a report: what differs between its runs, and what is wrong with its numbers ([`alerts`]).
 
 mod models;
+mod noise;
 mod questions;
 mod readings;
 mod replies;
@@ -47,6 +48,7 @@ pub(super) fn of_runs<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     alerts.extend(servers::of_servers(joined));
     alerts.extend(of_enhancers(&joined.runs));
     alerts.extend(of_inputs(&joined.runs));
+    alerts.extend(noise::of_noise(&joined.runs));
     if joined.runs.len() > 1 {
         alerts.extend(settings::of_settings(joined));
         alerts.extend(questions::of_questions(joined));
