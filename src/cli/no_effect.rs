@@ -26,6 +26,7 @@ pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
     match &cli.command {
         None => idle.evaluation(&cli.evaluate),
         Some(Command::Batch(BatchCommand::Export(args))) => idle.evaluation(&args.evaluate),
+        Some(Command::Batch(BatchCommand::Run(args))) => idle.evaluation(&args.evaluate),
         Some(Command::OpenEqa(args)) => idle.open(args),
         Some(Command::Synthesize(args)) if args.check.is_some() => {
             let mut others = ids::<LightArgs>();

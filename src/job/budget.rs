@@ -121,6 +121,16 @@ impl Budget {
             .then_some(self.spent)
     }
 
+    /// US dollars spent so far, by all models with a price.
+    pub(crate) fn charged(&self) -> f64 {
+        self.spent
+    }
+
+    /// Expected cost of a request to a model, in US dollars; `None` if it has no known price.
+    pub(crate) fn expected_cost(&self, model: usize, prompt: f64, reply: f64) -> Option<f64> {
+        Some(self.prices[model]?.of(prompt, reply))
+    }
+
     /// Whether one more question is within `--max-cost`, if each request in flight costs as much as the most expensive reply so
     /// far. Until the first reply, one question is asked at a time, because the length of the model's reasoning is unknown.
     pub(crate) fn can_afford(

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::path::PathBuf;
 
-use super::batch::{self, BatchFileArgs};
+use super::batch::{self, BatchFileArgs, BatchRunArgs};
 use super::dark_already;
 use super::enhancers::OpenEnhancers;
 use super::estimate;
@@ -68,6 +68,18 @@ impl<'a, E: Experiment> Job<'a, E> {
     pub(crate) fn export_batch(self, files: &BatchFileArgs) -> Result<Outcome> {
         warn_of_inputs(&input_summary(self.experiment.sources()));
         batch::export::export(self.open()?, files)
+    }
+
+    /// Asks the remaining requests in batches that are submitted here, and waits for their replies.
+    ///
+    /// # Errors
+    /// If a model is built in, or a server refuses what every further call would ask. The batches stay, and the same command goes on.
+    pub(crate) fn run_batch(self, files: &BatchFileArgs, args: &BatchRunArgs) -> Result<Outcome> {
+        warn_of_inputs(&input_summary(self.experiment.sources()));
+        if self.experiment.settings().money.dry_run {
+            return self.estimate();
+        }
+        batch::run::run(self.open()?, files, args)
     }
 
     /// An estimate of the remaining requests and their cost. Sends nothing and writes no file.

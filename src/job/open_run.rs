@@ -113,7 +113,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         }
     }
 
-    fn ask_phase(&mut self, phase: usize, remaining: Remaining<E>) -> Result<EndReason> {
+    pub(super) fn ask_phase(&mut self, phase: usize, remaining: Remaining<E>) -> Result<EndReason> {
         let Remaining { plan, stored, .. } = remaining;
         let experiment = self.experiment;
         let settings = experiment.settings();
@@ -220,7 +220,7 @@ impl<E: Experiment> OpenRun<'_, E> {
     }
 
     /// Scores the run, and writes the report into its folder.
-    fn finish(self, end: EndReason) -> Result<Outcome> {
+    pub(super) fn finish(self, end: EndReason) -> Result<Outcome> {
         let mut run = StoredRun::of(self.store.folder(), self.manifest.clone())?;
         let counts = self.counts(&run.records);
         let status = end.status(counts);

@@ -226,7 +226,7 @@ impl MockEndpoint {
     }
 
     /// Starts it on a free port of this machine.
-    fn serving(answer: Box<dyn Fn(&Request) -> Answer + Send + Sync>) -> Self {
+    pub fn serving(answer: Box<dyn Fn(&Request) -> Answer + Send + Sync>) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = listener.local_addr().unwrap();
         let shared = Arc::new(Shared {

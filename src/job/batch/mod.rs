@@ -4,10 +4,24 @@
 //! user uploads the files to the API and imports its output. Until then the run does not ask those trials. Requests that failed or
 //! expired are asked again by the next export, or directly.
 
+mod collect;
+mod driver;
 pub(super) mod export;
 mod file;
+mod journal;
+mod part;
+mod quota;
+mod recover;
 pub(crate) mod replies;
 mod requests;
+pub(super) mod run;
+mod servers;
+mod settings;
+mod submit;
+mod summary;
+mod take_over;
+
+pub(crate) use settings::{BatchRunArgs, CollectArgs};
 
 use crate::types::Decides;
 use std::num::{NonZeroU64, NonZeroUsize};

@@ -1,0 +1,166 @@
+//! One input file and its batch: [`Part`].
+
+use serde::{Deserialize, Serialize};
+
+use super::journal::Event;
+
+/// What is known of a part from its file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct PartFacts {
+    /// SHA-256 of the file, as 64 hexadecimal digits.
+    pub sha256: String,
+    /// Size of the file in bytes.
+    pub bytes: u64,
+    /// Number of requests.
+    pub requests: usize,
+    /// The model that is asked.
+    pub model: String,
+    /// Address of the model's endpoint, without secrets.
+    pub base: String,
+    /// The path of each request, as `/v1/chat/completions`.
+    pub url: String,
+    /// Expected tokens of all prompts.
+    pub tokens: f64,
+    /// Expected cost in US dollars, at the price of batches; `None` if the model has no known price.
+    pub dollars: Option<f64>,
+}
+
+impl PartFacts {
+    /// What a limit of waiting tokens holds for: address and model.
+    pub(super) fn place(&self) -> (String, String) {
+        (self.base.clone(), self.model.clone())
+    }
+}
+
+/// How far a part has come.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Stage {
+    /// Its file is written.
+    Written,
+    /// Its file may be at the server.
+    Uploading,
+    /// Its file is at the server.
+    Uploaded,
+    /// Its batch may have been made.
+    Creating,
+    /// Its batch is made, and not known to have ended.
+    Created,
+    /// Its replies are in the batch folder.
+    Fetched {
+        /// The state in which the batch ended.
+        state: String,
+    },
+    /// Its replies are in the records.
+    TakenOver,
+    /// Nothing is left to do.
+    Ended,
+}
+
+/// One input file and its batch.
+#[derive(Debug, Clone)]
+pub(crate) struct Part {
+    /// Name of the file in the batch folder.
+    pub(super) name: String,
+    pub(super) facts: PartFacts,
+    pub(super) stage: Stage,
+    /// How often a batch of this part was to be made.
+    pub(super) attempt: u32,
+    /// The server's names of its files: the input file first.
+    pub(super) files: Vec<String>,
+    /// The server's name of the batch; `None` before it is made.
+    pub(super) batch: Option<String>,
+    /// When the batch was made, in UTC; empty before.
+    pub(super) created: String,
+    /// The last state that the server named; empty before.
+    pub(super) state: String,
+    /// Whether the server was asked to cancel the batch.
+    pub(super) cancelled: bool,
+    /// Numbers of replies and of requests without a reply, after they were taken over.
+    pub(super) outcome: Option<(usize, usize)>,
+}
+
+impl Part {
+    pub(super) fn new(name: &str, facts: PartFacts) -> Self {
+        Self {
+            name: name.to_owned(),
+            facts,
+            stage: Stage::Written,
+            attempt: 0,
+            files: Vec::new(),
+            batch: None,
+            created: String::new(),
+            state: String::new(),
+            cancelled: false,
+            outcome: None,
+        }
+    }
+
+    /// The name without the extension.
+    pub(super) fn stem(&self) -> &str {
+        self.name.strip_suffix(".jsonl").unwrap_or(&self.name)
+    }
+
+    /// Whether its requests are at the server, or may be.
+    pub(super) fn is_out(&self) -> bool {
+        matches!(self.stage, Stage::Creating | Stage::Created)
+    }
+
+    /// Whether its batch still has to be made.
+    pub(super) fn is_unsubmitted(&self) -> bool {
+        matches!(
+            self.stage,
+            Stage::Written | Stage::Uploading | Stage::Uploaded
+        )
+    }
+
+    /// Changes the part by what happened to it at a time in UTC.
+    pub(super) fn apply(&mut self, event: &Event, at: &str) {
+        self.stage = match event {
+            Event::Written(facts) => {
+                self.facts = facts.clone();
+                Stage::Written
+            }
+            Event::Uploading => Stage::Uploading,
+            Event::Uploaded { id } => {
+                self.files = vec![id.clone()];
+                Stage::Uploaded
+            }
+            Event::Creating { attempt } => {
+                self.attempt = *attempt;
+                Stage::Creating
+            }
+            Event::Created { id } => {
+                self.batch = Some(id.clone());
+                self.state.clear();
+                at.clone_into(&mut self.created);
+                Stage::Created
+            }
+            Event::Refused { .. } if self.stage == Stage::Creating => Stage::Uploaded,
+            Event::Refused { .. } => Stage::Written,
+            Event::QuotaReached { .. } => {
+                self.batch = None;
+                Stage::Uploaded
+            }
+            Event::Seen { state } => {
+                self.state.clone_from(state);
+                return;
+            }
+            Event::Cancelled => {
+                self.cancelled = true;
+                return;
+            }
+            Event::Fetched { state, files } => {
+                self.state.clone_from(state);
+                self.files.extend(files.iter().cloned());
+                Stage::Fetched {
+                    state: state.clone(),
+                }
+            }
+            Event::TakenOver { answered, failed } => {
+                self.outcome = Some((*answered, *failed));
+                Stage::TakenOver
+            }
+            Event::Deleted | Event::Kept | Event::GaveUp { .. } => Stage::Ended,
+        };
+    }
+}

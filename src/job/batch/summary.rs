@@ -1,0 +1,38 @@
+//! What is known of the parts of a run, as text: [`lines`].
+
+use std::fmt::Write as _;
+
+use super::journal::Journal;
+use super::part::{Part, Stage};
+
+/// One line a part: its file, requests, batch and state.
+pub(super) fn lines(journal: &Journal) -> String {
+    let mut text = String::new();
+    for part in &journal.parts {
+        let batch = part.batch.as_deref().unwrap_or("no batch");
+        let _ = writeln!(
+            text,
+            "{}: {} requests to {}, {batch}, {}",
+            part.name,
+            part.facts.requests,
+            part.facts.model,
+            state(part)
+        );
+    }
+    text
+}
+
+/// The state of a part, in words.
+fn state(part: &Part) -> String {
+    match (&part.stage, part.outcome) {
+        (Stage::Written | Stage::Uploading | Stage::Uploaded, _) => "not submitted yet".to_owned(),
+        (Stage::Creating, _) => "being submitted".to_owned(),
+        (Stage::Created, _) if part.state.is_empty() => "submitted".to_owned(),
+        (Stage::Created, _) => part.state.clone(),
+        (Stage::Fetched { state }, _) => format!("{state}, fetched"),
+        (Stage::TakenOver | Stage::Ended, Some((answered, failed))) => {
+            format!("{}: {answered} answered, {failed} not", part.state)
+        }
+        (Stage::TakenOver | Stage::Ended, None) => "given up".to_owned(),
+    }
+}
