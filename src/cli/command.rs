@@ -8,7 +8,7 @@ use clap_complete::Shell;
 use crate::job::batch::{BatchFileArgs, BatchRunArgs};
 use crate::job::merge::MergeArgs;
 use crate::job::report::ReportArgs;
-use crate::run::batch::BatchImportArgs;
+use crate::run::batch::{BatchFolderArgs, BatchImportArgs, BatchStatusArgs};
 use crate::run::calibrate::CalibrateArgs;
 use crate::run::enhance::EnhanceArgs;
 use crate::run::evaluate::EvaluateArgs;
@@ -133,6 +133,12 @@ pub(crate) enum BatchCommand {
     /// Writes the requests as files, uploads them, makes batches of them, waits until they end, and takes the replies over. Ctrl-C leaves
     /// the batches working, and the same command goes on. What expires is asked again, up to three times.
     Run(Box<BatchRun>),
+    /// Show how far the batches of a run are; changes nothing
+    Status(BatchStatusArgs),
+    /// Look at the batches of a run once, and take over the replies of those that have ended; exit code 0 when everything is answered
+    Fetch(BatchFolderArgs),
+    /// Cancel the batches of a run, and take over the replies that there are
+    Cancel(BatchFolderArgs),
     /// Write what an evaluation has left to ask as files of a Batch API; takes the flags of the evaluation
     Export(Box<BatchExportArgs>),
     /// Import the replies of a Batch API into a run

@@ -130,6 +130,9 @@ fn carry_out(cli: Cli, progress: &Progress) -> Result<Outcome> {
         Command::Batch(BatchCommand::Run(args)) => {
             run_batch(args.evaluate, &args.files, &args.batch, progress)
         }
+        Command::Batch(BatchCommand::Status(args)) => run::batch::status(&args),
+        Command::Batch(BatchCommand::Fetch(args)) => run::batch::fetch(&args, progress),
+        Command::Batch(BatchCommand::Cancel(args)) => run::batch::cancel(&args, progress),
         Command::Batch(BatchCommand::Import(args)) => run::batch::import(&args),
         Command::Serve(args) => run::serve::serve(&args, progress),
         Command::Report(args) => report(&args),

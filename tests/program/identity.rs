@@ -395,7 +395,7 @@ fn what_decides_nothing_asks_nothing() {
 }
 
 /// Flags that the tables here leave out, and where they are held.
-const ELSEWHERE: [(&str, &str); 23] = [
+const ELSEWHERE: [(&str, &str); 32] = [
     (
         "--transfer",
         "it changes images of 16 bits: tests/program/inputs/depth.rs",
@@ -437,6 +437,15 @@ const ELSEWHERE: [(&str, &str); 23] = [
     ("--subset", "tests/program/openeqa/"),
     ("--study", "tests/program/openeqa/"),
     ("--batch", "tests/program/batch.rs"),
+    ("--batch-run", "tests/program/batch_run.rs"),
+    ("--poll", "tests/program/batch_run.rs"),
+    ("--keep-files", "tests/program/batch_run.rs"),
+    ("--detach", "tests/program/batch_run.rs"),
+    ("--no-scout", "tests/program/batch_run.rs"),
+    ("--enqueued-tokens", "tests/program/batch_run.rs"),
+    ("--window", "tests/program/batch_run.rs"),
+    ("--give-up", "tests/program/batch_run.rs"),
+    ("--purpose", "tests/program/batch_run.rs"),
 ];
 
 /// The flags of a command with what each decides, from the list that is written from the program.

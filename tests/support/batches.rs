@@ -20,6 +20,8 @@ pub struct Course {
     /// What comes of the request with this number.
     line: fn(usize) -> Line,
     order: Order,
+    /// The text of each answer.
+    text: &'static str,
 }
 
 /// What comes of one request.
@@ -55,7 +57,12 @@ impl Course {
             errors: Value::Null,
             line: |_| Line::Right,
             order: Order::AsSent,
+            text: "C",
         }
+    }
+
+    pub fn text(self, text: &'static str) -> Self {
+        Self { text, ..self }
     }
 
     pub fn lines(self, line: fn(usize) -> Line) -> Self {
@@ -302,6 +309,33 @@ impl Server {
         }
     }
 
+    /// Adds files and batches of other programs.
+    pub fn add_strangers(&mut self, count: usize) {
+        for i in 0..count {
+            self.store(format!("stranger-{i}.jsonl"), b"{}\n".to_vec());
+            let mut course = Course::of("failed");
+            course.errors = json!({"data": []});
+            self.courses.insert(0, course.clone());
+            self.batches.push(StoredBatch {
+                id: format!("stranger_{i}"),
+                body: json!({"metadata": null}),
+                requests: Vec::new(),
+                course,
+                looks: 0,
+                cancelled: false,
+                output: None,
+                errors: None,
+            });
+        }
+    }
+
+    /// All batches complete at the next look.
+    pub fn end_batches(&mut self) {
+        for batch in &mut self.batches {
+            batch.course.states = vec!["completed".to_owned()];
+        }
+    }
+
     fn with_file(&mut self, id: &str, act: impl FnOnce(&mut StoredFile) -> Answer) -> Answer {
         let mut files = self.files.iter_mut();
         match files.find(|file| id_in_path(&file.id) == id && !file.deleted) {
@@ -460,7 +494,7 @@ impl StoredBatch {
         let (mut output, mut errors) = (Vec::new(), Vec::new());
         for (i, request) in self.requests.iter().enumerate() {
             match (self.course.line)(i) {
-                Line::Right => output.push(reply(request, 200, &completion("C"))),
+                Line::Right => output.push(reply(request, 200, &completion(self.course.text))),
                 Line::Status(status, message) => {
                     let body = json!({"error": {"message": message, "type": "x", "param": null, "code": null}});
                     errors.push(reply(request, status, &body));
@@ -510,9 +544,7 @@ fn page(items: Vec<Value>, query: &str) -> Answer {
         .split('&')
         .find_map(|pair| pair.strip_prefix("after="));
     let start = after.map_or(0, |after| {
-        let place = items
-            .iter()
-            .position(|item| id_in_path(item["id"].as_str().unwrap()) == after);
+        let place = items.iter().position(|item| item["id"] == after);
         place.map_or(items.len(), |place| place + 1)
     });
     let end = (start + 2).min(items.len());

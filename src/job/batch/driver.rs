@@ -88,6 +88,8 @@ pub(super) struct Notes {
     pub(super) missing_since: BTreeMap<usize, Instant>,
     /// Until when nothing is submitted, by address and model; with the number of refusals.
     pub(super) holds: BTreeMap<(String, String), (Instant, u32)>,
+    /// How often the batch of a part was refused because too many tokens wait.
+    pub(super) refused_parts: BTreeMap<usize, u32>,
     /// Refused looks in a row, by part.
     pub(super) refused_looks: BTreeMap<usize, u32>,
     /// Parts that have been looked at since the last wait.
@@ -107,10 +109,13 @@ impl<D: Detail> Driver<'_, D> {
         loop {
             let mut moved = false;
             self.notes.looked_at.clear();
-            for part in 0..self.journal.parts.len() {
+            let mut part = 0;
+            // Parts that are divided add parts at the end.
+            while part < self.journal.parts.len() {
                 while self.step(part).await? == Step::Moved {
                     moved = true;
                 }
+                part += 1;
             }
             if self.is_reached()? {
                 return Ok(Driven::Reached);
@@ -128,6 +133,12 @@ impl<D: Detail> Driver<'_, D> {
     }
 
     async fn step(&mut self, part: usize) -> Result<Step> {
+        if self.is_elsewhere(part) {
+            let base = &self.part(part).facts.base;
+            let line = format!("batches at {base} are left alone; name that address, with its key");
+            self.warn_once(line);
+            return Ok(Step::Waiting);
+        }
         match &self.part(part).stage {
             Stage::Written | Stage::Uploading | Stage::Uploaded
                 if self.until == Until::Cancelled =>
@@ -147,7 +158,8 @@ impl<D: Detail> Driver<'_, D> {
 
     fn is_reached(&self) -> Result<bool> {
         let has_ended = |part: &Part| part.stage == Stage::Ended;
-        if self.journal.parts.iter().all(has_ended) {
+        let mut parts = 0..self.journal.parts.len();
+        if parts.all(|part| has_ended(self.part(part)) || self.is_elsewhere(part)) {
             return Ok(true);
         }
         Ok(match self.until {
@@ -162,6 +174,13 @@ impl<D: Detail> Driver<'_, D> {
                 waiting
             }
         })
+    }
+
+    /// Whether a part is at a server that the flags do not name, in a command that does not ask anything.
+    fn is_elsewhere(&self, part: usize) -> bool {
+        let only_looks = matches!(self.until, Until::LookedAt | Until::Cancelled);
+        let part = self.part(part);
+        only_looks && part.stage != Stage::Ended && !self.servers.has(&part.facts.base)
     }
 
     pub(super) fn part(&self, part: usize) -> &Part {

@@ -81,11 +81,24 @@ pub(crate) enum Event {
     Deleted,
     /// The files at the server were to be kept, or could not be deleted.
     Kept,
+    /// The part is divided, because it is larger than what the server lets wait.
+    Split {
+        /// The parts that it became.
+        into: Vec<Piece>,
+    },
     /// The part ended without a batch; its requests may be asked again.
     GaveUp {
         /// The reason.
         why: String,
     },
+}
+
+/// A part that was a piece of a larger one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Piece {
+    /// Name of its file.
+    pub(super) file: String,
+    pub(super) facts: PartFacts,
 }
 
 /// One line of the state file.
@@ -219,6 +232,12 @@ impl Journal {
             self.limits.insert(part.facts.place(), *limit);
         }
         part.apply(event, at);
+        if let Event::Split { into } = event {
+            let pieces = into
+                .iter()
+                .map(|piece| Part::new(&piece.file, piece.facts.clone()));
+            self.parts.extend(pieces);
+        }
     }
 }
 

@@ -71,7 +71,7 @@ pub(crate) struct Part {
     pub(super) batch: Option<String>,
     /// When the batch was made, in UTC; empty before.
     pub(super) created: String,
-    /// The last state that the server named; empty before.
+    /// The last state that the server named, or why the part ended without a batch; empty before.
     pub(super) state: String,
     /// Whether the server was asked to cancel the batch.
     pub(super) cancelled: bool,
@@ -160,7 +160,15 @@ impl Part {
                 self.outcome = Some((*answered, *failed));
                 Stage::TakenOver
             }
-            Event::Deleted | Event::Kept | Event::GaveUp { .. } => Stage::Ended,
+            Event::Split { .. } => {
+                "divided into smaller parts".clone_into(&mut self.state);
+                Stage::Ended
+            }
+            Event::GaveUp { why } => {
+                self.state.clone_from(why);
+                Stage::Ended
+            }
+            Event::Deleted | Event::Kept => Stage::Ended,
         };
     }
 }

@@ -7,6 +7,7 @@ use tokio::time::Instant;
 use super::driver::{Driver, Until};
 use super::journal::Event;
 use super::part::Part;
+use super::requests::SHARE_OF_QUOTA;
 use crate::ask::batch_api::QuotaRefusal;
 use crate::error::Result;
 use crate::job::budget::Budget;
@@ -14,6 +15,9 @@ use crate::types::Detail;
 
 /// How many looks long nothing is submitted after the first refusal; chosen: a minute with the default of 10 s.
 const FIRST_HOLD: u32 = 6;
+
+/// How often a part is refused before it is divided, if nothing else of this run waits; chosen.
+const REFUSALS_TO_SPLIT: u32 = 3;
 
 /// How often that time doubles; chosen: up to half an hour.
 const MOST_DOUBLINGS: u32 = 5;
@@ -36,10 +40,35 @@ impl<D: Detail> Driver<'_, D> {
         let out = |other: &&Part| other.is_out() && other.facts.place() == place;
         let waiting = self.journal.parts.iter().filter(out);
         let waiting: f64 = waiting.map(|other| other.facts.tokens).sum();
-        let flag = self.args.enqueued_tokens.map(std::num::NonZeroU64::get);
-        let limit = self.journal.limits.get(&place).copied().or(flag);
+        let limit = self.limit(part);
         let is_full = |limit: u64| waiting > 0.0 && waiting + of.facts.tokens > limit as f64;
         Ok(limit.is_some_and(is_full) || !self.is_affordable(of)?)
+    }
+
+    /// The number of tokens that may wait for batches of a part's model; `None` if it is not known.
+    fn limit(&self, part: usize) -> Option<u64> {
+        let learned = self.journal.limits.get(&self.part(part).facts.place());
+        let flag = self.args.enqueued_tokens.map(std::num::NonZeroU64::get);
+        learned.copied().or(flag)
+    }
+
+    /// Into how many pieces a part must be divided, because it is larger than what may wait, or was refused several times although
+    /// nothing of this run waits; `None` if it may stay.
+    pub(super) fn too_large(&self, part: usize) -> Option<usize> {
+        if matches!(self.until, Until::LookedAt | Until::Cancelled) {
+            return None;
+        }
+        let of = self.part(part);
+        let limit = self.limit(part)? as f64;
+        let refusals = self.notes.refused_parts.get(&part).copied().unwrap_or(0);
+        // A request alone is tried: its tokens are only estimated.
+        if of.facts.tokens > limit && (of.facts.requests > 1 || refusals > 0) {
+            return Some((of.facts.tokens / (SHARE_OF_QUOTA * limit)).ceil() as usize);
+        }
+        let place = of.facts.place();
+        let mut others = self.journal.parts.iter();
+        let is_alone = !others.any(|other| other.is_out() && other.facts.place() == place);
+        (is_alone && refusals >= REFUSALS_TO_SPLIT && of.facts.requests > 1).then_some(2)
     }
 
     /// Whether a part, with all that was charged and all that is out, is within `--max-cost`.
@@ -75,6 +104,7 @@ impl<D: Detail> Driver<'_, D> {
         let limit = quota.limit;
         self.journal.record(part, Event::QuotaReached { limit })?;
         self.hold(part, None);
+        *self.notes.refused_parts.entry(part).or_default() += 1;
         let facts = &self.part(part).facts;
         let line = match limit {
             Some(limit) => format!(

@@ -10,6 +10,7 @@ use sha2::{Digest as _, Sha256};
 use super::file::{PART, hexadecimal};
 use super::journal::{Event, Journal};
 use super::part::Stage;
+use super::split::PIECE;
 use super::take_over::{for_each_line, key_of};
 use crate::error::{Error, Result};
 use crate::store::Store;
@@ -21,6 +22,10 @@ pub(super) fn recover<D: Detail>(journal: &mut Journal, store: &Store<D>) -> Res
     for part in 0..journal.parts.len() {
         let path = journal.file(part);
         let unfinished = path.with_extension(PART);
+        let piece = path.with_extension(PIECE);
+        if piece.exists() {
+            fs::rename(&piece, &path).map_err(|e| Error::file(&path, "write", e))?;
+        }
         if journal.parts[part].stage != Stage::Written || path.exists() {
             continue;
         }
@@ -80,7 +85,9 @@ fn remove_unfinished(folder: &Path) -> Result<()> {
     for entry in entries {
         let path = entry.map_err(|e| Error::file(folder, "read", e))?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let is_unfinished = path.extension().is_some_and(|extension| extension == PART);
+        let is_unfinished = path
+            .extension()
+            .is_some_and(|extension| extension == PART || extension == PIECE);
         if is_unfinished && name.starts_with("part-") {
             fs::remove_file(&path).map_err(|e| Error::file(&path, "delete", e))?;
         }

@@ -12,7 +12,7 @@ use crate::job::trial::{Item, PreparedGroup, Stimulus, Trial};
 use crate::store::BATCH;
 
 /// The share of the tokens that may wait for batches that one part takes, so that one part can wait while another is worked on; chosen.
-const SHARE_OF_QUOTA: f64 = 0.45;
+pub(super) const SHARE_OF_QUOTA: f64 = 0.45;
 
 /// The most tokens of a part if the limit is not known; chosen.
 const PART_TOKENS: f64 = 2e6;

@@ -1,6 +1,6 @@
 //! A run through batches that the program submits itself: [`run`].
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use tokio::runtime;
 
@@ -258,7 +258,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
     /// What is out, for a command that does not wait.
     fn detached(self) -> Outcome {
         let folder = self.run.store.folder().display().to_string();
-        let mut output = summary::lines(&self.journal);
+        let mut output = summary::lines(&self.journal, &BTreeMap::new());
         output += &format!(
             "the same command, or batch fetch {folder}, takes the replies over; the same command also submits what waits\n"
         );

@@ -15,6 +15,11 @@ impl Servers {
         self.0.entry(base).or_insert(server);
     }
 
+    /// Whether there is a server at an address.
+    pub(super) fn has(&self, base: &str) -> bool {
+        self.0.contains_key(base)
+    }
+
     /// The server at an address.
     ///
     /// # Errors

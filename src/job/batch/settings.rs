@@ -47,3 +47,19 @@ pub(crate) struct BatchRunArgs {
     #[arg(long, value_name = "WORD", default_value = "batch", add = Decides::Nothing)]
     pub purpose: String,
 }
+
+impl BatchRunArgs {
+    /// The default flags, with these for looking after batches.
+    #[must_use]
+    pub(super) fn collecting(collect: &CollectArgs) -> Self {
+        Self {
+            collect: collect.clone(),
+            detach: false,
+            no_scout: true,
+            enqueued_tokens: None,
+            window: String::new(),
+            give_up: None,
+            purpose: "batch".to_owned(),
+        }
+    }
+}

@@ -9,6 +9,9 @@ use crate::types::Detail;
 impl<D: Detail> Driver<'_, D> {
     /// Uploads the file of a part, if its batch may be made.
     pub(super) async fn upload(&mut self, part: usize) -> Result<Step> {
+        if let Some(pieces) = self.too_large(part) {
+            return self.split(part, pieces).await;
+        }
         if self.is_held(part)? {
             return Ok(Step::Waiting);
         }
@@ -59,6 +62,9 @@ impl<D: Detail> Driver<'_, D> {
 
     /// Makes the batch of a part, if it may be made now and the server has read the file.
     pub(super) async fn create(&mut self, part: usize) -> Result<Step> {
+        if let Some(pieces) = self.too_large(part) {
+            return self.split(part, pieces).await;
+        }
         if self.is_held(part)? {
             return Ok(Step::Waiting);
         }
@@ -118,6 +124,8 @@ impl<D: Detail> Driver<'_, D> {
         let requests = self.part(part).facts.requests;
         self.say(part, &format!("batch {id} of {requests} requests"));
         self.journal.record(part, Event::Created { id })?;
+        // The first look is worth a wait.
+        self.notes.looked_at.insert(part);
         Ok(Step::Moved)
     }
 

@@ -1,12 +1,15 @@
 //! What is known of the parts of a run, as text: [`lines`].
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use super::journal::Journal;
 use super::part::{Part, Stage};
 
 /// One line a part: its file, requests, batch and state.
-pub(super) fn lines(journal: &Journal) -> String {
+///
+/// `states` has the states of parts that the server was just asked about, by name.
+pub(super) fn lines(journal: &Journal, states: &BTreeMap<String, String>) -> String {
     let mut text = String::new();
     for part in &journal.parts {
         let batch = part.batch.as_deref().unwrap_or("no batch");
@@ -16,7 +19,10 @@ pub(super) fn lines(journal: &Journal) -> String {
             part.name,
             part.facts.requests,
             part.facts.model,
-            state(part)
+            states
+                .get(&part.name)
+                .cloned()
+                .unwrap_or_else(|| state(part))
         );
     }
     text
@@ -33,6 +39,6 @@ fn state(part: &Part) -> String {
         (Stage::TakenOver | Stage::Ended, Some((answered, failed))) => {
             format!("{}: {answered} answered, {failed} not", part.state)
         }
-        (Stage::TakenOver | Stage::Ended, None) => "given up".to_owned(),
+        (Stage::TakenOver | Stage::Ended, None) => part.state.clone(),
     }
 }
