@@ -80,11 +80,8 @@ mod tests {
     #[test]
     fn the_limit_of_waiting_tokens_is_read_from_words() {
         let of = |code: Option<&str>, message: &str| {
-            QuotaRefusal::of(&Complaint {
-                code: code.map(str::to_owned),
-                message: message.to_owned(),
-                ..Complaint::default()
-            })
+            let error = serde_json::json!({"code": code, "message": message});
+            QuotaRefusal::of(&Complaint::of_error(&error))
         };
         let words = "Enqueued token limit reached for gpt-4o in organization o. Limit: 90,000 enqueued tokens. Please try again \
                      once some in_progress batches have been completed.";
