@@ -145,6 +145,8 @@ pub struct Server {
     most: Option<usize>,
     /// Whether a request is held.
     held: bool,
+    /// The answer to a direct request; by default the right one.
+    chat: Option<fn(&Value) -> Answer>,
 }
 
 pub struct MockBatches {
@@ -170,6 +172,11 @@ impl MockBatches {
             }
         }));
         Self { endpoint, shared }
+    }
+
+    /// Direct requests are answered so.
+    pub fn chat(&self, answer: fn(&Value) -> Answer) {
+        self.with(|server| server.chat = Some(answer));
     }
 
     pub fn base_url(&self) -> String {
@@ -304,7 +311,10 @@ impl Server {
             }
             ("GET", ["batches", id]) => self.look(id),
             ("POST", ["batches", id, "cancel"]) => self.cancel(id),
-            ("POST", ["chat", "completions"]) => Answer::text("C"),
+            ("POST", ["chat", "completions"]) => match self.chat {
+                Some(chat) => chat(&request.json()),
+                None => Answer::text("C"),
+            },
             _ => Answer::error(404, "not_found", "no such route"),
         }
     }
