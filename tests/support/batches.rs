@@ -74,7 +74,7 @@ impl Course {
     }
 
     /// A batch that fails with an error.
-    pub fn failing(code: &str, message: &str, line: Value) -> Self {
+    pub fn failing(code: &str, message: &str, line: &Value) -> Self {
         let error = json!({"code": code, "message": message, "param": null, "line": line});
         Self {
             errors: json!({"object": "list", "data": [error]}),
@@ -287,7 +287,7 @@ impl Server {
             ("POST", ["files"]) => self.upload(request),
             ("GET", ["files"]) => {
                 let files = self.files.iter().filter(|file| !file.deleted);
-                page(files.map(StoredFile::object).collect(), query)
+                page(&files.map(StoredFile::object).collect::<Vec<_>>(), query)
             }
             ("GET", ["files", id]) => self.with_file(id, |file| {
                 let object = file.object();
@@ -307,7 +307,7 @@ impl Server {
             ("POST", ["batches"]) => self.create(&request.json()),
             ("GET", ["batches"]) => {
                 let batches = self.batches.iter().map(StoredBatch::object);
-                page(batches.collect(), query)
+                page(&batches.collect::<Vec<_>>(), query)
             }
             ("GET", ["batches", id]) => self.look(id),
             ("POST", ["batches", id, "cancel"]) => self.cancel(id),
@@ -549,7 +549,7 @@ fn reply(request: &Value, status: u16, body: &Value) -> Value {
 }
 
 /// One page of a list, of two items, so that lists have several pages.
-fn page(items: Vec<Value>, query: &str) -> Answer {
+fn page(items: &[Value], query: &str) -> Answer {
     let after = query
         .split('&')
         .find_map(|pair| pair.strip_prefix("after="));

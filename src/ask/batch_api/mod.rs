@@ -111,7 +111,7 @@ impl BatchServer {
             .request(Method::GET, &path, &[])
             .timeout(LONGEST_DOWNLOAD);
         let sent = self.connection.save(request, to, most).await;
-        let answer = sent.map_err(|failed| not_answered(failed))?;
+        let answer = sent.map_err(not_answered)?;
         self.succeeded(answer).map(drop)
     }
 

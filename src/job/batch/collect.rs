@@ -7,7 +7,7 @@ use jiff::Timestamp;
 use tokio::time::sleep;
 
 use super::driver::{Driver, Step, Until};
-use super::journal::Event;
+use super::event::Event;
 use crate::ask::batch_api::{ApiResult, BatchState, RemoteBatch};
 use crate::error::{Error, Result};
 use crate::types::Detail;

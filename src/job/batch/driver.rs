@@ -3,6 +3,7 @@
 //! A step calls the server at most once, and the journal holds what is about to happen before each call that changes something. So
 //! the driver may be stopped anywhere.
 
+use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
@@ -94,6 +95,10 @@ pub(super) struct Notes {
     pub(super) refused_looks: BTreeMap<usize, u32>,
     /// Parts that have been looked at since the last wait.
     pub(super) looked_at: BTreeSet<usize>,
+    /// US dollars that the stored replies were charged; `None` if it is to be summed again.
+    pub(super) charged: Cell<Option<f64>>,
+    /// The last state of each part that was printed.
+    pub(super) printed: BTreeMap<usize, String>,
     /// Messages that have been printed.
     pub(super) said: BTreeSet<String>,
 }
@@ -194,15 +199,19 @@ impl<D: Detail> Driver<'_, D> {
 
     /// Prints a line once.
     pub(super) fn warn_once(&mut self, line: String) {
-        if self.notes.said.insert(line.clone()) {
+        if !self.notes.said.contains(&line) {
             tracing::warn!("{line}");
+            self.notes.said.insert(line);
         }
     }
 
-    /// Prints how a part goes on.
-    pub(super) fn say(&self, part: usize, what: &str) {
-        let line = format!("{}: {what}", self.part(part).name);
-        self.progress.say(&line);
+    /// Prints how a part goes on, if that is new.
+    pub(super) fn say(&mut self, part: usize, what: &str) {
+        let before = self.notes.printed.insert(part, what.to_owned());
+        if before.as_deref() != Some(what) {
+            let line = format!("{}: {what}", self.part(part).name);
+            self.progress.say(&line);
+        }
     }
 
     /// The error for a call that would fail again.

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest as _, Sha256};
 
+use super::event::PartFacts;
 use super::journal::Journal;
-use super::part::PartFacts;
 use crate::error::{Error, Result};
 use crate::store::Store;
 use crate::types::{Detail, Record};
@@ -202,7 +202,9 @@ impl<D: Detail> ModelInputFiles<D> {
 
 /// Bytes as hexadecimal digits.
 pub(super) fn hexadecimal(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+    let digit = |half: u8| char::from_digit(half.into(), 16).unwrap_or('0');
+    let digits = bytes.iter().flat_map(|byte| [byte >> 4, byte & 15]);
+    digits.map(digit).collect()
 }
 
 /// A text as a part of a file's name: other characters than letters, digits, `-`, `_` and `.` are replaced.

@@ -6,6 +6,7 @@
 
 mod collect;
 mod driver;
+mod event;
 pub(super) mod export;
 mod file;
 mod folder;

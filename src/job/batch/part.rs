@@ -1,36 +1,6 @@
 //! One input file and its batch: [`Part`].
 
-use serde::{Deserialize, Serialize};
-
-use super::journal::Event;
-
-/// What is known of a part from its file.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct PartFacts {
-    /// SHA-256 of the file, as 64 hexadecimal digits.
-    pub sha256: String,
-    /// Size of the file in bytes.
-    pub bytes: u64,
-    /// Number of requests.
-    pub requests: usize,
-    /// The model that is asked.
-    pub model: String,
-    /// Address of the model's endpoint, without secrets.
-    pub base: String,
-    /// The path of each request, as `/v1/chat/completions`.
-    pub url: String,
-    /// Expected tokens of all prompts.
-    pub tokens: f64,
-    /// Expected cost in US dollars, at the price of batches; `None` if the model has no known price.
-    pub dollars: Option<f64>,
-}
-
-impl PartFacts {
-    /// What a limit of waiting tokens holds for: address and model.
-    pub(super) fn place(&self) -> (String, String) {
-        (self.base.clone(), self.model.clone())
-    }
-}
+use super::event::{Event, PartFacts};
 
 /// How far a part has come.
 #[derive(Debug, Clone, PartialEq, Eq)]

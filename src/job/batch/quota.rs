@@ -5,7 +5,7 @@ use std::time::Duration;
 use tokio::time::Instant;
 
 use super::driver::{Driver, Until};
-use super::journal::Event;
+use super::event::Event;
 use super::part::Part;
 use super::requests::SHARE_OF_QUOTA;
 use crate::ask::batch_api::QuotaRefusal;
@@ -77,7 +77,11 @@ impl<D: Detail> Driver<'_, D> {
         let Some((money, max_cost)) = limit else {
             return Ok(true);
         };
-        let charged = Budget::new(money, &[], &self.store.records()?)?.charged();
+        let charged = match self.notes.charged.get() {
+            Some(charged) => charged,
+            None => Budget::new(money, &[], &self.store.records()?)?.charged(),
+        };
+        self.notes.charged.set(Some(charged));
         let out = self.journal.parts.iter().filter(|part| part.is_out());
         let out: f64 = out.filter_map(|part| part.facts.dollars).sum();
         Ok(charged + out + part.facts.dollars.unwrap_or(0.0) <= max_cost)

@@ -7,8 +7,9 @@ use std::path::Path;
 
 use sha2::{Digest as _, Sha256};
 
+use super::event::Event;
 use super::file::{PART, hexadecimal};
-use super::journal::{Event, Journal};
+use super::journal::Journal;
 use super::part::Stage;
 use super::split::PIECE;
 use super::take_over::{for_each_line, key_of};

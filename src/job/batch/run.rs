@@ -91,7 +91,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         for repeat in 0..=MOST_REPEATS {
             let mut remaining = self.remaining(phase)?;
             if repeat == 0 {
-                self.warn_of_other_batches(&remaining)?;
+                self.warn_of_other_batches(&remaining);
             }
             let has_parts = self.journal.has_open_parts();
             if remaining.plan.remaining() == 0 && !has_parts {
@@ -131,7 +131,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
     }
 
     /// Warns about trials in files that the user submits.
-    fn warn_of_other_batches(&self, remaining: &Remaining<E>) -> Result<()> {
+    fn warn_of_other_batches(&self, remaining: &Remaining<E>) {
         let own = self.journal.open_requests();
         if remaining.in_batch > own {
             tracing::warn!(
@@ -139,7 +139,6 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
                 remaining.in_batch - own
             );
         }
-        Ok(())
     }
 
     /// Asks one trial of each model directly, so that what the server refuses is found out before a batch is made.
@@ -258,9 +257,9 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
     /// What is out, for a command that does not wait.
     fn detached(self) -> Outcome {
         let folder = self.run.store.folder().display().to_string();
-        let mut output = summary::lines(&self.journal, &BTreeMap::new());
-        output += &format!(
-            "the same command, or batch fetch {folder}, takes the replies over; the same command also submits what waits\n"
+        let parts = summary::lines(&self.journal, &BTreeMap::new());
+        let output = format!(
+            "{parts}the same command, or batch fetch {folder}, takes the replies over; the same command also submits what waits\n"
         );
         Outcome {
             status: Status::Complete,

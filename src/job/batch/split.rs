@@ -6,9 +6,8 @@ use std::io::{BufWriter, Write as _};
 use sha2::{Digest as _, Sha256};
 
 use super::driver::{Driver, Step};
+use super::event::{Event, PartFacts, Piece};
 use super::file::hexadecimal;
-use super::journal::{Event, Piece};
-use super::part::PartFacts;
 use super::take_over::for_each_line;
 use crate::error::{Error, Result};
 use crate::types::Detail;

@@ -1,7 +1,7 @@
 //! The steps of a part until its batch is made: upload, creation, and the search for what a killed process may have made.
 
 use super::driver::{Driver, Step, Until};
-use super::journal::Event;
+use super::event::Event;
 use crate::ask::batch_api::{ApiFailure, Effect, NewBatch, Readiness};
 use crate::error::{Error, Result};
 use crate::types::Detail;

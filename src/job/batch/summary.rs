@@ -34,11 +34,10 @@ fn state(part: &Part) -> String {
         (Stage::Written | Stage::Uploading | Stage::Uploaded, _) => "not submitted yet".to_owned(),
         (Stage::Creating, _) => "being submitted".to_owned(),
         (Stage::Created, _) if part.state.is_empty() => "submitted".to_owned(),
-        (Stage::Created, _) => part.state.clone(),
         (Stage::Fetched { state }, _) => format!("{state}, fetched"),
         (Stage::TakenOver | Stage::Ended, Some((answered, failed))) => {
             format!("{}: {answered} answered, {failed} not", part.state)
         }
-        (Stage::TakenOver | Stage::Ended, None) => part.state.clone(),
+        (Stage::Created | Stage::TakenOver | Stage::Ended, _) => part.state.clone(),
     }
 }

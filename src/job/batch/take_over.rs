@@ -6,7 +6,7 @@ use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 
 use super::driver::{Driver, Step};
-use super::journal::Event;
+use super::event::Event;
 use super::part::Stage;
 use super::replies::{Imported, ReplyImport};
 use crate::ask::Wire;
@@ -49,6 +49,7 @@ impl<D: Detail> Driver<'_, D> {
             replies.fail(*key, without_line(&state))?;
         }
         let counts = replies.finish()?;
+        self.notes.charged.take();
         // After a change of the requests all of them may succeed.
         if !is_adapted {
             self.refused.append(&mut refused);

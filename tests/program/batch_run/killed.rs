@@ -1,0 +1,176 @@
+//! Runs that are killed or interrupted: nothing is submitted twice, nothing is lost.
+
+use std::fs;
+use std::process::Stdio;
+use std::time::Duration;
+
+use super::{BLIND, QUESTIONS, SCOUTED, assert_each_once, call_with};
+use crate::support::batches::{Course, Fault, MockBatches, Server};
+use crate::support::endpoint::Answer;
+use crate::support::process::{signal, wait_until};
+use crate::support::run::{Bench, words};
+
+#[test]
+fn what_was_made_before_the_connection_broke_is_found() {
+    let bench = Bench::with_questions(QUESTIONS);
+    let mock = MockBatches::start([Course::of("completed")]);
+    // Strangers fill more than one page of the lists.
+    mock.with(|server| server.add_strangers(5));
+    mock.fault("POST files", Fault::CutAfter);
+    mock.fault("POST batches", Fault::CutAfter);
+    let called = call_with(BLIND, &bench, &mock, "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_each_once(&bench, &mock, QUESTIONS);
+    assert_eq!(
+        (mock.count("POST files"), mock.count("POST batches")),
+        (1, 1)
+    );
+
+    // What was not made is made, after it was looked for.
+    let bench = Bench::with_questions(QUESTIONS);
+    let mock = MockBatches::start([Course::of("completed")]);
+    mock.fault("POST files", Fault::Instead(Answer::dropped()));
+    mock.fault(
+        "POST batches",
+        Fault::Instead(Answer::error(500, "oops", "oops")),
+    );
+    let called = call_with(BLIND, &bench, &mock, "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_each_once(&bench, &mock, QUESTIONS);
+    assert_eq!(
+        (mock.count("POST files"), mock.count("POST batches")),
+        (2, 2)
+    );
+}
+
+/// Starts the run, kills it at the request with this number, and lets the same command end. False if there is no such request.
+fn is_killed_at(number: usize, fault: Fault) -> bool {
+    let bench = Bench::with_questions(QUESTIONS);
+    let mock = MockBatches::start([Course::of("validating completed")]);
+    mock.fault_at(number, fault);
+    let base = mock.base_url();
+    let args = [words(SCOUTED), vec!["--base-url", &base]].concat();
+    let mut process = bench.spawn(&args, Stdio::null());
+    let is_held = loop {
+        if mock.wait_until_held(Duration::from_millis(20)) {
+            break true;
+        }
+        if process.try_wait().unwrap().is_some() {
+            break false;
+        }
+    };
+    if is_held {
+        signal(&process, "-9");
+        process.wait().unwrap();
+        mock.release();
+        let called = call_with(SCOUTED, &bench, &mock, "");
+        assert_eq!(called.code, Some(0), "{number}: {called:?}");
+    }
+    assert_each_once(&bench, &mock, QUESTIONS);
+    let batches = mock.count("POST batches");
+    assert!(
+        mock.asked().len() == 1,
+        "{number}: {batches} calls to make one batch"
+    );
+    is_held
+}
+
+#[test]
+fn a_kill_at_any_request_submits_nothing_twice_and_loses_nothing() {
+    for fault in [Fault::HoldBefore, Fault::HoldAfter] {
+        let killed = (0..).take_while(|number| is_killed_at(*number, fault.clone()));
+        // A direct request, an upload, a creation, two looks, two files, two deletions.
+        assert_eq!(killed.count(), 8);
+    }
+}
+
+#[test]
+fn the_state_file_may_end_anywhere() {
+    let bench = Bench::with_questions(QUESTIONS);
+    let mock = MockBatches::start([Course::of("validating completed")]);
+    let called = call_with(BLIND, &bench, &mock, "--keep-files");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    let path = bench.path("run/batch/state.jsonl");
+    let (state, log) = (
+        fs::read_to_string(&path).unwrap(),
+        bench.path("run/records.jsonl"),
+    );
+    let records = fs::read_to_string(&log).unwrap();
+    let lines: Vec<&str> = state.lines().collect();
+    assert!(lines.len() > 7, "{state}");
+    for (kept, half) in (1..lines.len()).flat_map(|kept| [(kept, 0), (kept, 9)]) {
+        // What a kill leaves: some events, perhaps a part of the next one, and some of the records.
+        let text = lines[..kept].join("\n") + "\n" + &lines[kept][..half];
+        fs::write(&path, text).unwrap();
+        let taken: Vec<&str> = records.lines().take(kept % (QUESTIONS + 1)).collect();
+        let is_fetched = lines[kept - 1].contains("fetched");
+        let taken = if is_fetched {
+            taken.join("\n") + "\n"
+        } else {
+            String::new()
+        };
+        fs::write(
+            &log,
+            if lines[kept - 1].contains("taken_over") {
+                &records
+            } else {
+                &taken
+            },
+        )
+        .unwrap();
+        // An event stands before its call, so that without it the server has nothing.
+        mock.with(|server| {
+            if !lines[..kept]
+                .iter()
+                .any(|line| line.contains("\"creating\""))
+            {
+                server.batches.clear();
+            }
+            if !lines[..kept]
+                .iter()
+                .any(|line| line.contains("\"uploading\""))
+            {
+                server.files.clear();
+            }
+        });
+        let called = call_with(BLIND, &bench, &mock, "--keep-files");
+        assert_eq!(called.code, Some(0), "{kept} {half}: {called:?}");
+        assert_each_once(&bench, &mock, QUESTIONS);
+        assert_eq!(mock.asked().len(), 1, "{kept} {half}");
+    }
+}
+
+#[test]
+fn an_interrupt_leaves_the_batches_working() {
+    let bench = Bench::with_questions(QUESTIONS);
+    let mock = MockBatches::start([Course::of(&("in_progress ".repeat(1000) + "completed"))]);
+    let base = mock.base_url();
+    let args = [words(BLIND), vec!["--base-url", &base]].concat();
+    let mut process = bench.spawn(&args, Stdio::null());
+    wait_until(|| mock.count("GET batches/id") > 2);
+    signal(&process, "-INT");
+    assert_eq!(process.wait().unwrap().code(), Some(130));
+    assert_eq!(mock.count("POST batches/id/cancel"), 0);
+    // What is out is asked nowhere else.
+    let base = mock.base_url();
+    let plain = [
+        "--data",
+        "set.jsonl",
+        "--blind-model",
+        "m",
+        "--out",
+        "run",
+        "--base-url",
+        &base,
+    ];
+    let called = bench.call(&plain);
+    assert!(
+        called.stderr.contains("4 trials are waiting for a batch"),
+        "{called:?}"
+    );
+    assert_eq!(mock.count("POST chat/completions"), 0);
+    mock.with(Server::end_batches);
+    let called = call_with(BLIND, &bench, &mock, "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_each_once(&bench, &mock, QUESTIONS);
+}
