@@ -93,8 +93,7 @@ impl<D: Detail> Driver<'_, D> {
     /// What follows from a batch that the server could not begin.
     fn failed(&mut self, part: usize, batch: &RemoteBatch) -> Result<Step> {
         if let Some(quota) = &batch.quota {
-            self.quota_reached(part, quota)?;
-            return Ok(Step::Waiting);
+            return self.quota_reached(part, quota);
         }
         let problem = match batch.problem.as_str() {
             "" => "the server does not say why",

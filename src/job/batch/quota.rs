@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use tokio::time::Instant;
 
-use super::driver::{Driver, Until};
+use super::driver::{Driver, Step, Until};
 use super::event::Event;
 use super::part::Part;
 use super::requests::SHARE_OF_QUOTA;
@@ -103,8 +103,8 @@ impl<D: Detail> Driver<'_, D> {
         Ok(true)
     }
 
-    /// Notes that a batch was refused because too many tokens wait.
-    pub(super) fn quota_reached(&mut self, part: usize, quota: &QuotaRefusal) -> Result<()> {
+    /// Notes that a batch was refused because too many tokens wait. A part that is too large goes on at once, to be divided.
+    pub(super) fn quota_reached(&mut self, part: usize, quota: &QuotaRefusal) -> Result<Step> {
         let limit = quota.limit;
         self.journal.record(part, Event::QuotaReached { limit })?;
         self.hold(part, None);
@@ -121,7 +121,10 @@ impl<D: Detail> Driver<'_, D> {
             ),
         };
         self.warn_once(line);
-        Ok(())
+        Ok(match self.too_large(part) {
+            Some(_) => Step::Moved,
+            None => Step::Waiting,
+        })
     }
 
     /// Submits nothing of the part's model for a time: as long as the server asked, else 1, 2, 4 … 30 minutes with the default `--poll`.

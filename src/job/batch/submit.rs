@@ -132,8 +132,7 @@ impl<D: Detail> Driver<'_, D> {
     /// What follows from an upload or a creation that did not succeed.
     fn not_made(&mut self, part: usize, failure: &ApiFailure) -> Result<Step> {
         if let Some(quota) = &failure.quota {
-            self.quota_reached(part, quota)?;
-            return Ok(Step::Waiting);
+            return self.quota_reached(part, quota);
         }
         if failure.effect == Effect::None {
             let why = failure.message.clone();

@@ -2,6 +2,7 @@
 
 use super::{QUESTIONS, answered, assert_each_once, blind};
 use crate::support::batches::{Course, Line};
+use crate::support::endpoint::Answer;
 use crate::support::run::{Bench, words};
 
 #[test]
@@ -84,4 +85,41 @@ fn built_in_models_and_other_folders_are_refused() {
         assert_eq!(called.code, Some(2), "{called:?}");
         assert!(called.stderr.contains(message), "{called:?}");
     }
+}
+
+#[test]
+fn what_waits_for_the_quota_is_freed_by_a_cancel() {
+    let full = Answer::error(429, "token_limit_exceeded", "too many enqueued tokens");
+    let (bench, mock, called) = blind(&[Course::refused(full)], "--detach");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert!(called.stdout.contains("no batch, not submitted yet"));
+    // A look submits nothing.
+    let looked = bench.call(&words("batch fetch run"));
+    assert_eq!((looked.code, mock.count("POST batches")), (Some(1), 1));
+    let cancelled = bench.call(&words("batch cancel run --poll 0.02"));
+    assert_eq!(cancelled.code, Some(1), "{cancelled:?}");
+    mock.with(|server| assert!(server.files.iter().all(|file| file.deleted)));
+    let base = mock.base_url();
+    let plain = [
+        "--data",
+        "set.jsonl",
+        "--blind-model",
+        "m",
+        "--resume",
+        "run",
+    ];
+    let called = bench.call(&[&plain[..], &["--base-url", &base]].concat());
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_eq!(mock.count("POST chat/completions"), QUESTIONS);
+}
+
+#[test]
+fn another_address_than_that_of_the_batches_is_left_alone() {
+    let (bench, mock, _) = blind(&[Course::of("completed")], "--detach");
+    let elsewhere = "batch cancel run --base-url http://127.0.0.1:9/v1 --poll 0.02";
+    let called = bench.call(&words(elsewhere));
+    assert!(called.stderr.contains("are left alone"), "{called:?}");
+    assert_eq!(mock.count("POST batches/id/cancel"), 0);
+    let fetched = bench.call(&words("batch fetch run"));
+    assert_eq!((fetched.code, answered(&bench).len()), (Some(0), QUESTIONS));
 }

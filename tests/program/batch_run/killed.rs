@@ -4,7 +4,7 @@ use std::fs;
 use std::process::Stdio;
 use std::time::Duration;
 
-use super::{BLIND, QUESTIONS, SCOUTED, assert_each_once, call_with};
+use super::{BLIND, QUESTIONS, SCOUTED, assert_each_once, blind, call_with};
 use crate::support::batches::{Course, Fault, MockBatches, Server};
 use crate::support::endpoint::Answer;
 use crate::support::process::{signal, wait_until};
@@ -173,4 +173,70 @@ fn an_interrupt_leaves_the_batches_working() {
     let called = call_with(BLIND, &bench, &mock, "");
     assert_eq!(called.code, Some(0), "{called:?}");
     assert_each_once(&bench, &mock, QUESTIONS);
+}
+
+/// Keeps so many lines of a file.
+fn keep_lines(bench: &Bench, file: &str, count: usize) {
+    let path = bench.path(file);
+    let text = fs::read_to_string(&path).unwrap();
+    let kept: String = text.split_inclusive('\n').take(count).collect();
+    fs::write(path, kept).unwrap();
+}
+
+#[test]
+fn a_kill_while_files_are_written_loses_nothing() {
+    // The trials that the run had recorded when it was killed.
+    for recorded in [0, 1, QUESTIONS] {
+        let (bench, mock, called) = blind(&[Course::of("completed")], "--detach");
+        assert_eq!(called.code, Some(0), "{called:?}");
+        mock.with(|server| (server.batches.clear(), server.files.clear()));
+        keep_lines(&bench, "run/batch/state.jsonl", 1);
+        keep_lines(&bench, "run/batch/trials.jsonl", recorded);
+        let file = bench.path("run/batch/part-1-m-001.jsonl");
+        fs::rename(&file, file.with_extension("part")).unwrap();
+        // One that was begun after it, and cut.
+        bench.file("run/batch/part-1-m-002.part", "{\"custom_id\":\"00");
+        let called = call_with(BLIND, &bench, &mock, "");
+        assert_eq!(called.code, Some(0), "{recorded}: {called:?}");
+        assert_each_once(&bench, &mock, QUESTIONS);
+        let sizes: Vec<usize> = mock.asked().iter().map(Vec::len).collect();
+        let expected = [recorded, QUESTIONS - recorded];
+        let expected: Vec<usize> = expected.into_iter().filter(|size| *size > 0).collect();
+        assert_eq!(sizes, expected);
+        let left = fs::read_dir(bench.path("run/batch")).unwrap();
+        let names = left.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+        let unfinished: Vec<String> = names.filter(|name| name.ends_with("part")).collect();
+        assert!(unfinished.is_empty(), "{unfinished:?}");
+    }
+}
+
+#[test]
+fn a_kill_while_a_part_is_divided_leaves_the_part_or_its_pieces() {
+    let words = "Enqueued token limit reached. Limit: 120 enqueued tokens.";
+    let small = || Course::refused(Answer::error(429, "token_limit_exceeded", words));
+    // Killed before the event that names the pieces, and before the pieces have their names.
+    for is_named in [false, true] {
+        let (bench, mock, called) = blind(&[small(), Course::of("completed")], "--detach");
+        assert_eq!(called.code, Some(0), "{called:?}");
+        mock.with(|server| server.batches.truncate(1));
+        let state = fs::read_to_string(bench.path("run/batch/state.jsonl")).unwrap();
+        let split = state.lines().position(|line| line.contains("\"split\""));
+        let split = split.unwrap();
+        keep_lines(
+            &bench,
+            "run/batch/state.jsonl",
+            split + usize::from(is_named),
+        );
+        let mut whole = String::new();
+        for number in 2..=5 {
+            let path = bench.path(&format!("run/batch/part-1-m-{number:03}.jsonl"));
+            whole += &fs::read_to_string(&path).unwrap();
+            fs::rename(&path, path.with_extension("split")).unwrap();
+        }
+        bench.file("run/batch/part-1-m-001.jsonl", whole);
+        let called = call_with(BLIND, &bench, &mock, "");
+        assert_eq!(called.code, Some(0), "{is_named}: {called:?}");
+        assert_each_once(&bench, &mock, QUESTIONS);
+        assert_eq!(mock.asked().len(), QUESTIONS);
+    }
 }
