@@ -113,6 +113,18 @@ impl Budget {
         text_tokens(&trial.prompt) + images.map(|tokens| tokens.unwrap_or(0.0)).sum::<f64>()
     }
 
+    /// Expected tokens of images for a model, which has this index; `None` if it is not known how the model counts them.
+    pub(crate) fn expected_image_tokens<'a>(
+        &self,
+        (index, model): (usize, &ModelUnderTest),
+        mut images: impl Iterator<Item = &'a ImageFacts>,
+    ) -> Option<f64> {
+        let price = self.prices[index];
+        images.try_fold(0.0, |sum, image| {
+            Some(sum + image_tokens(model, price, image.width, image.height)?)
+        })
+    }
+
     /// US dollars spent so far; `None` if no model has a price.
     pub(crate) fn spent(&self) -> Option<f64> {
         self.prices

@@ -10,6 +10,7 @@ use super::estimate;
 use super::experiment::{DetailOf, Experiment, RecordOf};
 use super::folder;
 use super::manifest;
+use super::measured_tokens::MeasuredTokens;
 use super::open_run::{OpenRun, answered, pipeline};
 use super::outcome::{Outcome, StdoutFormat};
 use super::plan::Plan;
@@ -88,9 +89,11 @@ impl<'a, E: Experiment> Job<'a, E> {
         let settings = experiment.settings();
         let stored: Vec<RecordOf<E>> = store::read_records(&self.folder)?;
         let answered = answered(&stored);
-        let mut plans = Vec::new();
+        let (mut plans, mut measured) = (Vec::new(), Vec::new());
         for phase in 0..E::PHASES.len() {
             let mut plan = Plan::new(experiment.plan(phase, &stored)?);
+            let models = experiment.models(phase).len();
+            measured.push(MeasuredTokens::of_stored(models, &plan, &stored));
             plan.exclude(|key| answered.contains(key));
             plans.push(plan);
         }
@@ -103,7 +106,7 @@ impl<'a, E: Experiment> Job<'a, E> {
         for plan in &plans {
             pipeline.probe(experiment.sources(), &plan.sources)?;
         }
-        let forecast = estimate::estimate(experiment, &plans, &stored, &mut pipeline)?;
+        let forecast = estimate::estimate(experiment, &plans, &measured, &stored, &mut pipeline)?;
         Ok(Outcome {
             status: Status::Complete,
             output: match settings.show {
