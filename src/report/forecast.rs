@@ -268,6 +268,7 @@ mod tests {
             longest_reply_tokens: None,
             dollars: None,
             most_dollars: None,
+            charged_image_tokens: None,
             readings,
         };
         let shared = cost(None, 6, Some(0.5));

@@ -144,7 +144,7 @@ impl<D: Detail> Driver<'_, D> {
         if self.args.collect.keep_files {
             event = Event::Kept;
         } else {
-            for id in self.part(part).files.clone() {
+            for id in self.files_at_server(part).await? {
                 if let Err(failure) = self.delete_file(part, &id).await? {
                     event = Event::Kept;
                     tracing::warn!("the file {id} could not be deleted at the server: {failure}");
@@ -153,6 +153,29 @@ impl<D: Detail> Driver<'_, D> {
         }
         self.journal.record(part, event)?;
         Ok(Step::Moved)
+    }
+
+    /// The server's names of a part's files. If the input file was uploaded more than once, that includes copies of it of which the
+    /// answer was lost.
+    pub(super) async fn files_at_server(&self, part: usize) -> Result<Vec<String>> {
+        let of = self.part(part);
+        let mut ids = of.files.clone();
+        if of.uploads > 1 {
+            let (name, purpose) = (self.remote_name(part), &self.args.purpose);
+            match self.server(part)?.files(purpose).await {
+                Ok(files) => {
+                    let copies = files.into_iter().filter(|file| file.name == name);
+                    ids.extend(copies.map(|file| file.id));
+                    ids.sort();
+                    ids.dedup();
+                }
+                Err(failure) => tracing::warn!(
+                    "{}: copies of its file may be at the server, as {name}: {failure}",
+                    of.name
+                ),
+            }
+        }
+        Ok(ids)
     }
 
     /// Deletes a file at the server; one that is gone is no failure.

@@ -35,6 +35,8 @@ pub(crate) struct Part {
     pub(super) stage: Stage,
     /// How often a batch of this part was to be made.
     pub(super) attempt: u32,
+    /// How often its file was to be uploaded.
+    pub(super) uploads: u32,
     /// The server's names of its files: the input file first.
     pub(super) files: Vec<String>,
     /// The server's name of the batch; `None` before it is made.
@@ -56,6 +58,7 @@ impl Part {
             facts,
             stage: Stage::Written,
             attempt: 0,
+            uploads: 0,
             files: Vec::new(),
             batch: None,
             created: String::new(),
@@ -90,7 +93,10 @@ impl Part {
                 self.facts = facts.clone();
                 Stage::Written
             }
-            Event::Uploading => Stage::Uploading,
+            Event::Uploading => {
+                self.uploads += 1;
+                Stage::Uploading
+            }
             Event::Uploaded { id } => {
                 self.files = vec![id.clone()];
                 Stage::Uploaded

@@ -33,7 +33,7 @@ impl<D: Detail> Driver<'_, D> {
                 problem,
             });
         }
-        for id in &of.files {
+        for id in &self.files_at_server(part).await? {
             // The pieces are uploaded; what stays of the whole costs nothing.
             if let Err(failure) = self.delete_file(part, id).await? {
                 tracing::warn!("the file {id} could not be deleted at the server: {failure}");

@@ -20,6 +20,15 @@ impl<D: Detail> Driver<'_, D> {
             let why = "its file is gone".to_owned();
             return self.give_up(part, why).map(|()| Step::Moved);
         }
+        let (bytes, of) = (path.metadata().map(|file| file.len()), self.part(part));
+        if bytes.is_ok_and(|bytes| bytes != of.facts.bytes) {
+            let expected = of.facts.bytes;
+            let problem = format!(
+                "the file was changed after it was written: {expected} bytes expected; batch cancel {} frees its requests",
+                self.store.folder().display()
+            );
+            return Err(Error::Run { path, problem });
+        }
         self.say(part, "uploading");
         self.journal.record(part, Event::Uploading)?;
         let sent = self.server(part)?.upload(&path, &name, &self.args.purpose);
@@ -42,7 +51,9 @@ impl<D: Detail> Driver<'_, D> {
         let files = match listed {
             Ok(files) => files,
             // A second copy of a file costs nothing.
-            Err(failure) if failure.is_unsupported() => Vec::new(),
+            Err(failure) if failure.is_unsupported() => {
+                return self.refuse(part, "the server does not list its files");
+            }
             Err(failure) => return self.look_failed(part, &failure),
         };
         let bytes = self.part(part).facts.bytes;
@@ -155,7 +166,7 @@ impl<D: Detail> Driver<'_, D> {
     }
 
     /// The name of a part's file at the server.
-    fn remote_name(&self, part: usize) -> String {
+    pub(super) fn remote_name(&self, part: usize) -> String {
         format!("darkqa-{}-{}", self.journal.run, self.part(part).name)
     }
 

@@ -96,7 +96,7 @@ impl<D: Detail> Driver<'_, D> {
     /// Ends a part whose batch was not made, because the user cancels it.
     pub(super) async fn withdraw(&mut self, part: usize) -> Result<Step> {
         if !self.args.collect.keep_files {
-            for id in self.part(part).files.clone() {
+            for id in self.files_at_server(part).await? {
                 if let Err(failure) = self.delete_file(part, &id).await? {
                     tracing::warn!("the file {id} could not be deleted at the server: {failure}");
                 }

@@ -168,3 +168,33 @@ fn a_batch_that_never_ends_is_cancelled_if_asked_for() {
     );
     assert_eq!(answered(&bench).len(), QUESTIONS);
 }
+
+#[test]
+fn a_file_that_was_edited_is_not_uploaded() {
+    let (bench, mock, called) = blind(
+        &[Course::of("completed")],
+        "--max-cost 0.0000001 --prices prices.toml",
+    );
+    assert_eq!(called.code, Some(2), "no prices yet: {called:?}");
+    bench.file(
+        "prices.toml",
+        "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 10, output = 10 }\n",
+    );
+    let limited = call_with(
+        BLIND,
+        &bench,
+        &mock,
+        "--max-cost 0.0000001 --prices prices.toml",
+    );
+    assert_eq!(limited.code, Some(3), "{limited:?}");
+    let path = bench.path("run/batch/part-1-m-001.jsonl");
+    let text = std::fs::read_to_string(&path).unwrap();
+    std::fs::write(&path, text.replace("color", "hue")).unwrap();
+    let called = call_with(BLIND, &bench, &mock, "");
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert!(
+        called.stderr.contains("was changed after it was written"),
+        "{called:?}"
+    );
+    assert_eq!(mock.count("POST files"), 0);
+}

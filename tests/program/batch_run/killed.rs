@@ -43,6 +43,27 @@ fn what_was_made_before_the_connection_broke_is_found() {
     );
 }
 
+#[test]
+fn copies_of_a_file_are_deleted_with_it() {
+    let bench = Bench::with_questions(QUESTIONS);
+    let mock = MockBatches::start([Course::of("completed")]);
+    // The answer to the first upload is lost, and the server does not list its files at first.
+    mock.fault("POST files", Fault::CutAfter);
+    let unknown = Answer::error(404, "not_found", "no such route");
+    mock.fault("GET files", Fault::Instead(unknown));
+    let called = call_with(BLIND, &bench, &mock, "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_each_once(&bench, &mock, QUESTIONS);
+    mock.with(|server| {
+        let uploaded = server
+            .files
+            .iter()
+            .filter(|file| file.name.contains("part"));
+        assert_eq!(uploaded.count(), 2);
+        assert!(server.files.iter().all(|file| file.deleted));
+    });
+}
+
 /// Starts the run, kills it at the request with this number, and lets the same command end. False if there is no such request.
 fn is_killed_at(number: usize, fault: Fault) -> bool {
     let bench = Bench::with_questions(QUESTIONS);
