@@ -261,3 +261,32 @@ fn a_kill_while_a_part_is_divided_leaves_the_part_or_its_pieces() {
         assert_eq!(mock.asked().len(), QUESTIONS);
     }
 }
+
+/// Kills at any time, also between two requests: `cargo test --test program random_kills -- --ignored`.
+#[test]
+#[ignore = "takes a minute, and tries what the other tests of this file hold one by one"]
+fn random_kills_submit_nothing_twice_and_lose_nothing() {
+    let mut random = 1_u64;
+    for round in 0..25 {
+        let bench = Bench::with_questions(6);
+        let mock = MockBatches::start([Course::of("validating in_progress completed")]);
+        let base = mock.base_url();
+        let more = ["--file-requests", "2", "--base-url", &base];
+        let args = [words(BLIND), more.to_vec()].concat();
+        for _ in 0..8 {
+            let mut process = bench.spawn(&args, Stdio::null());
+            // A linear congruential generator (Knuth, MMIX).
+            random = random
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            std::thread::sleep(Duration::from_millis(20 + (random >> 33) % 400));
+            if process.try_wait().unwrap().is_none() {
+                signal(&process, "-9");
+            }
+            process.wait().unwrap();
+        }
+        let called = call_with(BLIND, &bench, &mock, "--file-requests 2");
+        assert_eq!(called.code, Some(0), "{round}: {called:?}");
+        assert_each_once(&bench, &mock, 6);
+    }
+}
