@@ -1,9 +1,12 @@
 //! The connections to one server: [`Connection::post`] sends one request.
 
+use std::fs::File;
+use std::io::Write as _;
+use std::path::Path;
 use std::time::Duration;
 
 use reqwest::header::{CONTENT_TYPE, HeaderMap};
-use reqwest::{Client, Response, StatusCode};
+use reqwest::{Client, Method, RequestBuilder, Response, StatusCode};
 use tokio::time::Instant;
 
 use super::access::{Access, with_causes};
@@ -19,7 +22,7 @@ use crate::types::FailureKind;
 const MAX_REPLY: usize = 16 << 20;
 
 /// Pooled connections to a server, and the filter for secrets in its texts.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Connection {
     pub(super) base: BaseUrl,
     pub(super) scrub: Scrub,
@@ -62,13 +65,32 @@ impl Connection {
         headers: &HeaderMap,
         body: Parts,
     ) -> Result<HttpReply, FailedTry> {
-        let started = Instant::now();
         let request = self
             .client
             .post(self.base.join(path))
             .headers(headers.clone())
             .header(CONTENT_TYPE, "application/json")
             .body(reqwest::Body::wrap(body));
+        self.exchange(request).await
+    }
+
+    /// A request to a path below the base URL, with these fields in its query string.
+    pub(super) fn request(
+        &self,
+        method: Method,
+        path: &str,
+        query: &[(&str, &str)],
+    ) -> RequestBuilder {
+        let mut url = self.base.join(path);
+        if !query.is_empty() {
+            url.query_pairs_mut().extend_pairs(query);
+        }
+        self.client.request(method, url)
+    }
+
+    /// Sends a request once.
+    pub(super) async fn exchange(&self, request: RequestBuilder) -> Result<HttpReply, FailedTry> {
+        let started = Instant::now();
         let response = request
             .send()
             .await
@@ -79,6 +101,51 @@ impl Connection {
             Err(failed) if status.is_success() => return Err(failed),
             // The status alone says that the request was refused.
             body => body.unwrap_or_default(),
+        };
+        Ok(HttpReply {
+            status,
+            headers,
+            body,
+            took: started.elapsed(),
+        })
+    }
+
+    /// Sends a request once, and writes the body of a successful response to a file, of at most `most` bytes. The body of the returned
+    /// response is empty then. No byte for the time of a request ends it.
+    pub(super) async fn save(
+        &self,
+        request: RequestBuilder,
+        to: &Path,
+        most: u64,
+    ) -> Result<HttpReply, FailedTry> {
+        let started = Instant::now();
+        let sent = request.send().await;
+        let mut response = sent.map_err(|error| self.failed_try(error))?;
+        let (status, headers) = (response.status(), response.headers().clone());
+        let body = if status.is_success() {
+            let failed = |what: String| FailedTry::new(FailureKind::Response, what);
+            let unwritten = |e| failed(format!("{}: cannot write: {e}", to.display()));
+            let mut file = File::create(to).map_err(unwritten)?;
+            let mut written = 0;
+            loop {
+                let chunk = tokio::time::timeout(self.timeout, response.chunk());
+                let chunk = chunk
+                    .await
+                    .map_err(|_| failed(format!("{} sent no more bytes of a file", self.base)))?;
+                let Some(chunk) = chunk.map_err(|error| self.failed_try(error))? else {
+                    break;
+                };
+                written += chunk.len() as u64;
+                if written > most {
+                    let what = format!("{} sent a file of more than {most} bytes", self.base);
+                    return Err(failed(what));
+                }
+                file.write_all(&chunk).map_err(unwritten)?;
+            }
+            file.sync_all().map_err(unwritten)?;
+            Vec::new()
+        } else {
+            self.receive(response).await.unwrap_or_default()
         };
         Ok(HttpReply {
             status,

@@ -9,6 +9,7 @@ use tokio::time::{Instant, sleep};
 use tracing::debug;
 
 use super::access::Access;
+use super::batch_api::BatchServer;
 use super::body::Parts;
 use super::complaint::{Complaint, UnreadableReply};
 use super::connection::{Connection, HttpReply};
@@ -85,6 +86,16 @@ impl Endpoint {
     /// The headers of every request to an API.
     pub(super) fn headers(&self, wire: Wire) -> Result<HeaderMap> {
         self.access.headers(wire)
+    }
+
+    /// The files and batches of the server.
+    ///
+    /// # Errors
+    /// If a header value has characters that HTTP does not allow.
+    pub(crate) fn batch_server(&self) -> Result<BatchServer> {
+        let headers = self.headers(Wire::Chat)?;
+        let connection = self.connection.clone();
+        Ok(BatchServer::new(connection, headers, self.sending.timeout))
     }
 
     /// Stops further requests: those in flight are finished, those that wait fail at once.

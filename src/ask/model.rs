@@ -3,6 +3,7 @@
 use serde_json::Value;
 
 use super::batch;
+use super::batch_api::BatchServer;
 use super::call::{Call, Message};
 use super::failure::AskError;
 use super::image_tokens::image_tokens;
@@ -120,6 +121,30 @@ impl Model {
         };
         let body = model.body(message, choices)?;
         batch::line(id, url.unwrap_or(default_url), &body).map(Some)
+    }
+
+    /// The path in a line of a Batch API's file; `None` if the model cannot be asked in a batch.
+    pub(crate) fn batch_url(&self) -> Option<&'static str> {
+        self.remote()?.batch_url()
+    }
+
+    /// The files and batches of the model's endpoint; `None` if the model is built in.
+    ///
+    /// # Errors
+    /// If a header value has characters that HTTP does not allow.
+    pub(crate) fn batch_server(&self) -> Result<Option<BatchServer>> {
+        let remote = self.remote();
+        remote
+            .map(|model| model.endpoint().batch_server())
+            .transpose()
+    }
+
+    /// Adapts further requests to a refusal in the output of a batch, as after a refused request. Returns whether the request may
+    /// succeed now.
+    #[must_use]
+    pub(crate) fn adapt_to_refusal(&self, status: u16, body: &[u8]) -> bool {
+        let remote = self.remote();
+        remote.is_some_and(|model| model.adapt_to_refusal(status, body))
     }
 
     fn remote(&self) -> Option<&Remote> {

@@ -11,6 +11,7 @@ use super::call::Message;
 use super::constraint::letter_of;
 use super::endpoint::{Endpoint, Request};
 use super::failure::AskError;
+use super::failure_class::FailureClass;
 use super::field::{AdaptableField, RequestFields, SentFields};
 use super::parameters::{Constrain, Parameters, Temperature, TokenField};
 use super::wire::Wire;
@@ -209,6 +210,20 @@ impl Remote {
             }
             _ => false,
         }
+    }
+
+    /// Adapts further requests to a refused line of a batch; whether the request may succeed now.
+    pub(super) fn adapt_to_refusal(&self, status: u16, body: &[u8]) -> bool {
+        let fields = self.fields();
+        let sent = SentFields {
+            parameters: &self.parameters,
+            fields,
+            has_image: true,
+            has_key: self.endpoint.has_key(),
+        };
+        let complaint = self.wire.complaint(body);
+        let class = FailureClass::of(status, &complaint, self.wire, sent);
+        self.adapt(fields, class.refused_field)
     }
 
     /// The letter in a constrained reply, else the text. Warns once if the server does not follow the constraint.

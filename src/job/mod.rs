@@ -25,6 +25,7 @@ pub(crate) mod image_words;
 pub(crate) mod input_tally;
 pub(crate) mod interrupt;
 mod manifest;
+mod measured_tokens;
 pub(crate) mod merge;
 pub(crate) mod models;
 pub(crate) mod money;
