@@ -23,6 +23,8 @@ pub(crate) struct BatchLine {
     pub id: String,
     /// The reply, or the reason why there is none.
     pub result: Result<Reply, Failure>,
+    /// The status and the body of a refused request; `None` for a reply and for other failures.
+    pub refusal: Option<(u16, String)>,
 }
 
 impl BatchLine {
@@ -34,8 +36,24 @@ impl BatchLine {
         Some(Self {
             id,
             result: result(&line),
+            refusal: refusal(&line),
         })
     }
+}
+
+/// The status and the body of a refused request.
+fn refusal(line: &Value) -> Option<(u16, String)> {
+    let response = line.get("response")?;
+    let status = response.get("status_code")?.as_u64()?;
+    let status = u16::try_from(status).ok()?;
+    let refused = (400..500).contains(&status);
+    refused.then_some((status, text(response.get("body")?)))
+}
+
+/// A body as text: some servers write that of a failed request as a text, and not as an object.
+fn text(body: &Value) -> String {
+    body.as_str()
+        .map_or_else(|| body.to_string(), str::to_owned)
 }
 
 fn result(line: &Value) -> Result<Reply, Failure> {
@@ -67,10 +85,7 @@ fn result(line: &Value) -> Result<Reply, Failure> {
             "a line with neither a response nor an error",
         );
     };
-    // Some servers write the body of a failed request as a text.
-    let text = body
-        .as_str()
-        .map_or_else(|| body.to_string(), str::to_owned);
+    let text = text(body);
     match status {
         None | Some(200..300) => batch_reply(&text).or_else(|unreadable| match unreadable {
             UnreadableReply::Complaint(complaint) => fail(FailureKind::Server, &complaint.message),
@@ -80,7 +95,8 @@ fn result(line: &Value) -> Result<Reply, Failure> {
             let complaint = Complaint::of_body(&text);
             let kind = match code {
                 429 => FailureKind::RateLimit,
-                500.. => FailureKind::Server,
+                // Some servers write 0 if they could not send the request on.
+                0 | 500.. => FailureKind::Server,
                 _ => FailureKind::Request,
             };
             fail(kind, &format!("{code} {}", complaint.message))

@@ -1,9 +1,12 @@
 //! The connections to one server: [`Connection::post`] sends one request.
 
+use std::fs::File;
+use std::io::Write as _;
+use std::path::Path;
 use std::time::Duration;
 
 use reqwest::header::{CONTENT_TYPE, HeaderMap};
-use reqwest::{Client, Response, StatusCode};
+use reqwest::{Client, Method, RequestBuilder, Response, StatusCode};
 use serde_json::Value;
 use tokio::time::Instant;
 
@@ -34,7 +37,7 @@ pub(super) enum Deadline {
 }
 
 /// Pooled connections to a server, and the filter for secrets in its texts.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Connection {
     pub(super) base: BaseUrl,
     pub(super) scrub: Scrub,
@@ -78,7 +81,6 @@ impl Connection {
         body: Parts,
         deadline: Deadline,
     ) -> Result<HttpReply, FailedTry> {
-        let started = Instant::now();
         let request = self
             .client
             .post(self.base.join(path))
@@ -89,6 +91,30 @@ impl Connection {
             Deadline::Whole => request,
             Deadline::Silence => request.timeout(self.timeout * STREAM_TIMEOUTS),
         };
+        self.exchange(request, deadline).await
+    }
+
+    /// A request to a path below the base URL, with these fields in its query string.
+    pub(super) fn request(
+        &self,
+        method: Method,
+        path: &str,
+        query: &[(&str, &str)],
+    ) -> RequestBuilder {
+        let mut url = self.base.join(path);
+        if !query.is_empty() {
+            url.query_pairs_mut().extend_pairs(query);
+        }
+        self.client.request(method, url)
+    }
+
+    /// Sends a request once.
+    pub(super) async fn exchange(
+        &self,
+        request: RequestBuilder,
+        deadline: Deadline,
+    ) -> Result<HttpReply, FailedTry> {
+        let started = Instant::now();
         let response = self.in_time(deadline, request.send()).await?;
         let status = response.status();
         let headers = response.headers().clone();
@@ -128,6 +154,53 @@ impl Connection {
             .map(|name| own.get(name).map(|value| format!("{name} {value}")));
         let facts: Vec<String> = facts.into_iter().flatten().collect();
         Some(self.scrub.line(&facts.join(", ")))
+    }
+
+    /// Sends a request once, and writes the body of a successful response to a file, of at most `most` bytes. The body of the returned
+    /// response is empty then. No byte for the time of a request ends it.
+    pub(super) async fn save(
+        &self,
+        request: RequestBuilder,
+        to: &Path,
+        most: u64,
+    ) -> Result<HttpReply, FailedTry> {
+        let started = Instant::now();
+        let sent = request.send().await;
+        let mut response = sent.map_err(|error| self.failed_try(error))?;
+        let (status, headers) = (response.status(), response.headers().clone());
+        let body = if status.is_success() {
+            let failed = |what: String| FailedTry::new(FailureKind::Response, what);
+            let unwritten = |e| failed(format!("{}: cannot write: {e}", to.display()));
+            let mut file = File::create(to).map_err(unwritten)?;
+            let mut written = 0;
+            loop {
+                let chunk = tokio::time::timeout(self.timeout, response.chunk());
+                let chunk = chunk
+                    .await
+                    .map_err(|_| failed(format!("{} sent no more bytes of a file", self.base)))?;
+                let Some(chunk) = chunk.map_err(|error| self.failed_try(error))? else {
+                    break;
+                };
+                written += chunk.len() as u64;
+                if written > most {
+                    let what = format!("{} sent a file of more than {most} bytes", self.base);
+                    return Err(failed(what));
+                }
+                file.write_all(&chunk).map_err(unwritten)?;
+            }
+            file.sync_all().map_err(unwritten)?;
+            Vec::new()
+        } else {
+            self.receive(response, Deadline::Whole)
+                .await
+                .unwrap_or_default()
+        };
+        Ok(HttpReply {
+            status,
+            headers,
+            body,
+            took: started.elapsed(),
+        })
     }
 
     /// The body of a response, decompressed, up to [`MAX_REPLY`].

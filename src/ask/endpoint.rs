@@ -9,6 +9,7 @@ use tokio::time::{Instant, sleep, timeout};
 use tracing::{debug, warn};
 
 use super::access::Access;
+use super::batch_api::BatchServer;
 use super::failure::{Again, AskError, FailedTry, Reach};
 use super::pace::{Allowance, Gate, Quota};
 use super::replica::Replica;
@@ -106,6 +107,17 @@ impl Endpoint {
     pub(super) fn headers(&self, wire: Wire) -> Result<Vec<HeaderMap>> {
         let replicas = self.replicas.iter();
         replicas.map(|replica| replica.headers(wire)).collect()
+    }
+
+    /// The files and batches of the server, at its first replica.
+    ///
+    /// # Errors
+    /// If a header value has characters that HTTP does not allow.
+    pub(crate) fn batch_server(&self) -> Result<BatchServer> {
+        let first = &self.replicas[0];
+        let headers = first.headers(Wire::Chat)?;
+        let connection = first.connection.clone();
+        Ok(BatchServer::new(connection, headers, self.sending.timeout))
     }
 
     /// Stops further requests: those in flight are finished, those that wait fail at once.

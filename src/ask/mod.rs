@@ -9,6 +9,7 @@
 
 mod access;
 pub(crate) mod batch;
+pub(crate) mod batch_api;
 mod body;
 mod call;
 mod complaint;

@@ -3,6 +3,7 @@
 use serde_json::Value;
 
 use super::batch;
+use super::batch_api::BatchServer;
 use super::call::{Call, Message};
 use super::failure::AskError;
 use super::image_tokens::image_tokens;
@@ -137,6 +138,35 @@ impl Model {
         };
         let body = model.batch_body(message, choices)?;
         batch::line(id, url.unwrap_or(model.batch_url()), &body).map(Some)
+    }
+
+    /// The path in a line of a Batch API's file; `None` if the model cannot be asked in a batch.
+    pub(crate) fn batch_url(&self) -> Option<&'static str> {
+        Some(self.remote()?.batch_url())
+    }
+
+    /// The address of the files and batches of the model's endpoint, without secrets; `None` if the model is built in.
+    pub(crate) fn batch_base(&self) -> Option<String> {
+        Some(self.remote()?.endpoint().base().to_string())
+    }
+
+    /// The files and batches of the model's endpoint; `None` if the model is built in.
+    ///
+    /// # Errors
+    /// If a header value has characters that HTTP does not allow.
+    pub(crate) fn batch_server(&self) -> Result<Option<BatchServer>> {
+        let remote = self.remote();
+        remote
+            .map(|model| model.endpoint().batch_server())
+            .transpose()
+    }
+
+    /// Adapts further requests to a refusal in the output of a batch, as after a refused request. Returns whether the request may
+    /// succeed now.
+    #[must_use]
+    pub(crate) fn adapt_to_refusal(&self, status: u16, body: &[u8]) -> bool {
+        let remote = self.remote();
+        remote.is_some_and(|model| model.adapt_to_refusal(status, body))
     }
 
     fn remote(&self) -> Option<&Remote> {

@@ -11,6 +11,7 @@ use super::call::Message;
 use super::constraint::letter_of;
 use super::endpoint::Endpoint;
 use super::failure::{AskError, Reach};
+use super::failure_class::FailureClass;
 use super::field::{AdaptableField, RequestFields, SentFields};
 use super::parameters::{Constrain, Parameters};
 use super::request::Request;
@@ -231,6 +232,21 @@ impl Remote {
         }
         *now = adapted;
         true
+    }
+
+    /// Adapts further requests to a refused line of a batch; whether the request may succeed now.
+    pub(super) fn adapt_to_refusal(&self, status: u16, body: &[u8]) -> bool {
+        let fields = self.fields();
+        let sent = SentFields {
+            parameters: &self.parameters,
+            fields,
+            has_image: true,
+            has_key: self.endpoint.has_key(),
+        };
+        let wire = fields.wire.in_batch();
+        let complaint = wire.complaint(body);
+        let class = FailureClass::of(status, &complaint, wire, sent);
+        self.adapt(fields, class.refused_field)
     }
 
     /// The letter in a constrained reply, else the text. Warns once if the server does not follow the constraint.

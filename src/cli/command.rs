@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use clap::{Args, CommandFactory as _, Parser, Subcommand};
 use clap_complete::Shell;
 
-use crate::job::batch::BatchFileArgs;
+use crate::job::batch::{BatchFileArgs, BatchRunArgs};
 use crate::job::merge::MergeArgs;
 use crate::job::report::ReportArgs;
-use crate::run::batch::BatchImportArgs;
+use crate::run::batch::{BatchFolderArgs, BatchImportArgs, BatchStatusArgs};
 use crate::run::calibrate::CalibrateArgs;
 use crate::run::enhance::EnhanceArgs;
 use crate::run::evaluate::EvaluateArgs;
@@ -94,7 +94,7 @@ pub(crate) enum Command {
     Enhance(Box<EnhanceArgs>),
     /// Show what each model of a file comes to: endpoint, key, request and digest; sends nothing without --check
     Models(ModelsArgs),
-    /// Ask through a Batch API, at half the price: write its input files, import its output files
+    /// Ask through a Batch API, at half the price: submit batches and wait for them, or write and import their files
     #[command(subcommand)]
     Batch(BatchCommand),
     /// Ask OpenEQA's open questions about walks through dark houses, the answers marked by a judge (LLM-Match)
@@ -131,10 +131,35 @@ pub(crate) enum Command {
 /// The commands for batches.
 #[derive(Debug, Subcommand)]
 pub(crate) enum BatchCommand {
+    /// Ask what an evaluation has left to ask in batches, and wait for their replies; takes the flags of the evaluation
+    ///
+    /// Writes the requests as files, uploads them, makes batches of them, waits until they end, and takes the replies over. Ctrl-C leaves
+    /// the batches working, and the same command goes on. What expires is asked again, up to three times.
+    Run(Box<BatchRun>),
+    /// Show how far the batches of a run are; changes nothing
+    Status(BatchStatusArgs),
+    /// Look at the batches of a run once, and take over the replies of those that have ended; exit code 0 when everything is answered
+    Fetch(BatchFolderArgs),
+    /// Cancel the batches of a run, and take over the replies that there are
+    Cancel(BatchFolderArgs),
     /// Write what an evaluation has left to ask as files of a Batch API; takes the flags of the evaluation
     Export(Box<BatchExportArgs>),
     /// Import the replies of a Batch API into a run
     Import(BatchImportArgs),
+}
+
+/// The flags of `batch run`.
+#[derive(Debug, Args)]
+pub(crate) struct BatchRun {
+    /// Flags of the evaluation.
+    #[command(flatten)]
+    pub evaluate: EvaluateArgs,
+    /// Flags of the input files.
+    #[command(flatten)]
+    pub files: BatchFileArgs,
+    /// Flags of the batches.
+    #[command(flatten)]
+    pub batch: BatchRunArgs,
 }
 
 /// The flags of `batch export`.

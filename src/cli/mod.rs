@@ -22,7 +22,7 @@ use crate::job::merge::merge;
 use crate::job::progress::{Progress, Verbosity};
 use crate::job::report::report;
 use crate::job::{Outcome, image_words};
-use crate::run::evaluate::{evaluate, export_batch};
+use crate::run::evaluate::{evaluate, export_batch, run_batch};
 use crate::run::openeqa::openeqa;
 use crate::run::{self, study};
 use crate::types::manifest::Status;
@@ -101,6 +101,7 @@ fn read(parsed: &layers::Parsed) -> Result<Cli> {
     let job = match &mut cli.command {
         None => Some(&mut cli.evaluate.job),
         Some(Command::Batch(BatchCommand::Export(args))) => Some(&mut args.evaluate.job),
+        Some(Command::Batch(BatchCommand::Run(args))) => Some(&mut args.evaluate.job),
         Some(Command::OpenEqa(args)) => Some(&mut args.job),
         _ => None,
     };
@@ -129,6 +130,12 @@ fn carry_out(cli: Cli, progress: &Progress) -> Result<Outcome> {
         Command::Batch(BatchCommand::Export(args)) => {
             export_batch(args.evaluate, &args.files, progress)
         }
+        Command::Batch(BatchCommand::Run(args)) => {
+            run_batch(args.evaluate, &args.files, &args.batch, progress)
+        }
+        Command::Batch(BatchCommand::Status(args)) => run::batch::status(&args),
+        Command::Batch(BatchCommand::Fetch(args)) => run::batch::fetch(&args, progress),
+        Command::Batch(BatchCommand::Cancel(args)) => run::batch::cancel(&args, progress),
         Command::Batch(BatchCommand::Import(args)) => run::batch::import(&args),
         Command::Serve(args) => run::serve::serve(&args, progress),
         Command::Report(args) => report(&args),

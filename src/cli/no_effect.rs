@@ -10,7 +10,7 @@ use super::layers;
 use crate::ask::{AccessArgs, ImageArgs, Parameters, RequestArgs, Sending};
 use crate::dataset::CodesArgs;
 use crate::enhance::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
-use crate::job::batch::BatchFileArgs;
+use crate::job::batch::{BatchFileArgs, BatchRunArgs};
 use crate::job::models::ModelName;
 use crate::job::settings::JobArgs;
 use crate::run::evaluate::{EvaluateArgs, ShrinkArgs};
@@ -26,6 +26,7 @@ pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
     match &cli.command {
         None => idle.evaluation(&cli.evaluate),
         Some(Command::Batch(BatchCommand::Export(args))) => idle.evaluation(&args.evaluate),
+        Some(Command::Batch(BatchCommand::Run(args))) => idle.evaluation(&args.evaluate),
         Some(Command::OpenEqa(args)) => idle.open(args),
         Some(Command::Synthesize(args)) if args.check.is_some() => {
             let mut others = ids::<LightArgs>();
@@ -169,8 +170,13 @@ impl NoEffect {
         if args.judge.judge.is_none() {
             self.because("no judge is named", &ids::<JudgeArgs>());
         }
-        if !args.batch {
-            self.because("only --batch writes such files", &ids::<BatchFileArgs>());
+        if !args.batch && !args.batch_run {
+            let why = "only --batch and --batch-run write such files";
+            self.because(why, &ids::<BatchFileArgs>());
+        }
+        if !args.batch_run {
+            let why = "only --batch-run submits batches";
+            self.because(why, &ids::<BatchRunArgs>());
         }
         if args.study.is_none() {
             self.job(&args.job, &[], &[], args.judge.judge.as_ref());

@@ -111,6 +111,18 @@ impl Budget {
         text_tokens(&trial.prompt) + images.map(|tokens| tokens.unwrap_or(0.0)).sum::<f64>()
     }
 
+    /// Expected tokens of images for a model, which has this index; `None` if it is not known how the model counts them.
+    pub(crate) fn expected_image_tokens<'a>(
+        &self,
+        (index, model): (usize, &ModelUnderTest),
+        mut images: impl Iterator<Item = &'a ImageFacts>,
+    ) -> Option<f64> {
+        let price = self.prices[index];
+        images.try_fold(0.0, |sum, image| {
+            Some(sum + image_tokens(model, price, image.width, image.height)?)
+        })
+    }
+
     /// US dollars spent so far; `None` if no model has a price.
     pub(crate) fn spent(&self) -> Option<f64> {
         self.prices
@@ -122,6 +134,16 @@ impl Budget {
     /// Whether a model has a price.
     pub(crate) fn is_paid(&self, model: usize) -> bool {
         self.prices[model].is_some()
+    }
+
+    /// US dollars spent so far, by all models with a price.
+    pub(crate) fn charged(&self) -> f64 {
+        self.spent
+    }
+
+    /// Expected cost of a request to a model, in US dollars; `None` if it has no known price.
+    pub(crate) fn expected_cost(&self, model: usize, prompt: f64, reply: f64) -> Option<f64> {
+        Some(self.prices[model]?.of(prompt, reply))
     }
 
     /// Whether one more question is within `--max-cost`, if each request in flight costs as much as the most expensive reply so

@@ -7,10 +7,11 @@ use tokio::runtime;
 use tokio::sync::mpsc::{self, Receiver, Sender};
 use tokio::task::{JoinError, JoinSet};
 
-use super::budget::Budget;
+use super::budget::{Budget, text_tokens};
 use super::circuit_breaker::{CircuitBreaker, EndReason};
 use super::interrupt::Interrupt;
 use super::lanes::{Lanes, PreparedTrial};
+use super::measured_tokens::MeasuredTokens;
 use super::models::ModelUnderTest;
 use super::progress::{Progress, StepBar};
 use super::settings::JobSettings;
@@ -71,6 +72,8 @@ impl Dispatcher<'_> {
             stoppers,
             answered: counts.answered,
             truncation: TruncationCheck::default(),
+            measured: MeasuredTokens::new(self.models.len()),
+            said_difference: vec![Said::NotYet; self.models.len()],
         };
         std::thread::scope(|scope| {
             scope.spawn(move || make(&sender));
@@ -101,6 +104,17 @@ struct ReplySink<'a, I: Item> {
     /// Number of trials with a reply, including those of earlier calls.
     answered: usize,
     truncation: TruncationCheck,
+    /// What the images of the replies were charged.
+    measured: MeasuredTokens,
+    /// Of each model, whether the user knows how far the estimate is from what is charged.
+    said_difference: Vec<Said>,
+}
+
+/// Whether something was said, or need not be said any more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Said {
+    NotYet,
+    Done,
 }
 
 /// Counts replies that the token limit cut before an answer. The first replies show whether the limit is too low.
@@ -279,6 +293,37 @@ impl<I: Item> ReplySink<'_, I> {
         Ok(Vec::new())
     }
 
+    /// Compares what the images of a prompt were charged with the estimate. Says once of each model if they differ.
+    fn compare_with_estimate(&mut self, ready: &PreparedTrial<I>, reply: &Reply) {
+        let model = ready.trial.model;
+        let charged = reply.usage.and_then(|usage| usage.prompt_tokens);
+        let Some(charged) = charged.filter(|_| !ready.stimulus.images.is_empty()) else {
+            return;
+        };
+        if self.said_difference[model] == Said::Done {
+            return;
+        }
+        let text = text_tokens(&ready.trial.prompt);
+        self.measured.add(model, charged, text);
+        if self.measured.images(model).is_none() {
+            return;
+        }
+        self.said_difference[model] = Said::Done;
+        let images = ready.stimulus.images.iter().map(|image| image.facts());
+        let of_model = (model, &self.dispatcher.models[model]);
+        let expected = self.budget.expected_image_tokens(of_model, images);
+        let difference = expected.and_then(|images| self.measured.difference(model, text, images));
+        if let Some(difference) = difference {
+            tracing::warn!(
+                "{}: a prompt is charged {:.0} tokens, where {:.0} were estimated (median of the first 10 with images); --dry-run \
+                 estimates the rest of this run by what is charged",
+                self.dispatcher.models[model].name,
+                difference.charged,
+                difference.estimated
+            );
+        }
+    }
+
     /// Stores the reply or the failure of one trial.
     fn store_result(&mut self, done: Result<Finished<I>, JoinError>) -> Result<()> {
         let (ready, result) = match done {
@@ -300,6 +345,7 @@ impl<I: Item> ReplySink<'_, I> {
         if let Ok(reply) = &result {
             self.answered += 1;
             self.truncation.count(reply);
+            self.compare_with_estimate(&ready, reply);
             let (model, prompt_tokens) = (ready.trial.model, self.expected_tokens(&ready));
             let reply_tokens = ready.trial.item.reply_tokens();
             self.budget

@@ -3,13 +3,14 @@
 use std::collections::HashSet;
 use std::path::PathBuf;
 
-use super::batch::{self, BatchFileArgs};
+use super::batch::{self, BatchFileArgs, BatchRunArgs};
 use super::dark_already;
 use super::enhancers::OpenEnhancers;
 use super::estimate;
 use super::experiment::{DetailOf, Experiment, RecordOf};
 use super::folder;
 use super::manifest;
+use super::measured_tokens::MeasuredTokens;
 use super::open_run::{OpenRun, answered, pipeline};
 use super::outcome::{Outcome, StdoutFormat};
 use super::plan::Plan;
@@ -70,15 +71,29 @@ impl<'a, E: Experiment> Job<'a, E> {
         batch::export::export(self.open()?, files)
     }
 
+    /// Asks the remaining requests in batches that are submitted here, and waits for their replies.
+    ///
+    /// # Errors
+    /// If a model is built in, or a server refuses what every further call would ask. The batches stay, and the same command goes on.
+    pub(crate) fn run_batch(self, files: &BatchFileArgs, args: &BatchRunArgs) -> Result<Outcome> {
+        warn_of_inputs(&input_summary(self.experiment.sources()));
+        if self.experiment.settings().money.dry_run {
+            return self.estimate();
+        }
+        batch::run::run(self.open()?, files, args)
+    }
+
     /// An estimate of the remaining requests and their cost. Sends nothing and writes no file.
     fn estimate(self) -> Result<Outcome> {
         let experiment = self.experiment;
         let settings = experiment.settings();
         let stored: Vec<RecordOf<E>> = store::read_records(&self.folder)?;
         let answered = answered(&stored);
-        let mut plans = Vec::new();
+        let (mut plans, mut measured) = (Vec::new(), Vec::new());
         for phase in 0..E::PHASES.len() {
             let mut plan = Plan::new(experiment.plan(phase, &stored)?);
+            let models = experiment.models(phase).len();
+            measured.push(MeasuredTokens::of_stored(models, &plan, &stored));
             plan.exclude(|key| answered.contains(key));
             plans.push(plan);
         }
@@ -91,7 +106,7 @@ impl<'a, E: Experiment> Job<'a, E> {
         for plan in &plans {
             pipeline.probe(experiment.sources(), &plan.sources)?;
         }
-        let forecast = estimate::estimate(experiment, &plans, &stored, &mut pipeline)?;
+        let forecast = estimate::estimate(experiment, &plans, &measured, &stored, &mut pipeline)?;
         Ok(Outcome {
             status: Status::Complete,
             output: match settings.show {

@@ -8,6 +8,7 @@ use super::budget::{Budget, image_tokens, text_tokens};
 use super::experiment::{ExpectedRequest, Experiment, RecordOf};
 use super::frame_work::FrameWork;
 use super::image_pipeline::ImagePipeline;
+use super::measured_tokens::MeasuredTokens;
 use super::models::ModelUnderTest;
 use super::open_run::limit;
 use super::plan::Plan;
@@ -33,6 +34,7 @@ const BASE64: f64 = 4.0 / 3.0;
 pub(crate) fn estimate<E: Experiment>(
     experiment: &E,
     plans: &[Plan<E::Item>],
+    measured: &[MeasuredTokens],
     stored: &[RecordOf<E>],
     pipeline: &mut ImagePipeline<'_>,
 ) -> Result<Forecast> {
@@ -45,7 +47,8 @@ pub(crate) fn estimate<E: Experiment>(
     let mut loads = Vec::new();
     for (phase, plan) in plans.iter().enumerate() {
         let expected = if phase == 0 { &[] } else { &expected[..] };
-        for (model, line) in self::lines(experiment, phase, plan, expected) {
+        let measured = &measured[phase];
+        for (model, line) in self::lines(experiment, phase, plan, measured, expected) {
             add_load(&mut loads, &experiment.models(phase)[model], &line);
             lines.push(line);
         }
@@ -126,6 +129,7 @@ fn lines<E: Experiment>(
     experiment: &E,
     phase: usize,
     plan: &Plan<E::Item>,
+    measured: &MeasuredTokens,
     expected: &[ExpectedRequest],
 ) -> Vec<(usize, CostLine)> {
     let sources = experiment.sources();
@@ -149,17 +153,23 @@ fn lines<E: Experiment>(
             let source = &sources[place];
             if let (Some(_), Some(frame)) = (&group.condition, source.frames.first()) {
                 let (width, height) = experiment.recipe().scaling.of(frame.size);
-                let each = image_tokens(model, price, width, height);
-                let images = (source.order.len() * (tokens.requests - before)) as f64;
+                let images = source.order.len() as f64;
+                let by_rule = || Some(images * image_tokens(model, price, width, height)?);
+                let each = measured.images(index).or_else(by_rule);
+                let requests = (tokens.requests - before) as f64;
                 let known = tokens.image.zip(each);
-                tokens.image = known.map(|(sum, each)| sum + each * images);
+                tokens.image = known.map(|(sum, each)| sum + each * requests);
             }
         }
         for request in expected.iter().filter(|request| request.model == index) {
             let tokens = by_reading.entry(None).or_default();
             tokens.add(request.text_tokens, request.reply_tokens);
         }
-        (index, line(model, price, &by_reading, E::PHASES[phase]))
+        let line = CostLine {
+            charged_image_tokens: measured.images(index),
+            ..line(model, price, &by_reading, E::PHASES[phase])
+        };
+        (index, line)
     });
     lines.filter(|(_, line)| line.requests > 0).collect()
 }
@@ -265,6 +275,7 @@ fn line(
         longest_reply_tokens: longest,
         dollars: tokens.dollars(price, tokens.reply),
         most_dollars: longest.and_then(|longest| tokens.dollars(price, longest)),
+        charged_image_tokens: None,
         readings: readings
             .map(|(reading, part)| ReadingCost {
                 reading: reading.clone(),

@@ -26,6 +26,7 @@ pub(crate) mod input_tally;
 pub(crate) mod interrupt;
 mod lanes;
 mod manifest;
+mod measured_tokens;
 pub(crate) mod merge;
 pub(crate) mod models;
 pub(crate) mod money;

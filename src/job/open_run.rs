@@ -109,14 +109,15 @@ impl<E: Experiment> OpenRun<'_, E> {
         if in_batch > 0 {
             let verb = if in_batch == 1 { " is" } else { "s are" };
             tracing::warn!(
-                "{in_batch} trial{verb} waiting for a batch and not asked here; import the replies with batch import, or delete {} to \
-                 ask here",
+                "{in_batch} trial{verb} waiting for a batch and not asked here; take the replies over with batch run, batch fetch or batch \
+                 import; batch cancel {} ends what batch run has submitted, and frees it; or delete {} to ask here",
+                self.store.folder().display(),
                 self.store.folder().join(store::BATCH).display()
             );
         }
     }
 
-    fn ask_phase(&mut self, phase: usize, remaining: Remaining<E>) -> Result<EndReason> {
+    pub(super) fn ask_phase(&mut self, phase: usize, remaining: Remaining<E>) -> Result<EndReason> {
         let Remaining { plan, stored, .. } = remaining;
         let experiment = self.experiment;
         let settings = experiment.settings();
@@ -223,7 +224,7 @@ impl<E: Experiment> OpenRun<'_, E> {
     }
 
     /// Scores the run, and writes the report into its folder.
-    fn finish(self, end: EndReason) -> Result<Outcome> {
+    pub(super) fn finish(self, end: EndReason) -> Result<Outcome> {
         let mut run = StoredRun::of(self.store.folder(), self.manifest.clone())?;
         let counts = self.counts(&run.records);
         let status = end.status(counts);

@@ -66,6 +66,8 @@ pub enum AlertKind {
     Served,
     /// Another version of this program.
     Version,
+    /// Levels that differ in brightness and not in noise.
+    Noise,
     /// What the observer's numbers do not show.
     Observer,
 }

@@ -30,6 +30,9 @@ pub(crate) struct CostLine {
     pub dollars: Option<f64>,
     /// Cost in dollars if each reply is as long as `--max-tokens` allows.
     pub most_dollars: Option<f64>,
+    /// Tokens of the images of one request, as the replies so far were charged; `None` if there are too few of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub charged_image_tokens: Option<f64>,
     /// The same requests by the light reading of what is shown.
     pub readings: Vec<ReadingCost>,
 }
@@ -132,6 +135,16 @@ pub(crate) fn render(forecast: &Forecast) -> String {
         return text + ".\n";
     }
     let _ = write!(text, ".\n{table}");
+    for line in &forecast.lines {
+        if let Some(tokens) = line.charged_image_tokens {
+            let _ = writeln!(
+                text,
+                "{}: {} tokens for the images of a request, as its first replies were charged",
+                line.model,
+                count(tokens)
+            );
+        }
+    }
     text += &by_reading(&forecast.lines);
     let _ = writeln!(
         text,
@@ -255,6 +268,7 @@ mod tests {
             longest_reply_tokens: None,
             dollars: None,
             most_dollars: None,
+            charged_image_tokens: None,
             readings,
         };
         let shared = cost(None, 6, Some(0.5));

@@ -57,7 +57,7 @@ impl Motion {
     /// It is exact for a small turn to the side in the middle of the picture. The same path is taken for the whole picture.
     ///
     /// # Errors
-    /// If it is longer than 64 pixels.
+    /// If it is longer than 256 pixels.
     pub fn streak(&self, seconds: f64, view: FrameView, key: &NoiseKey) -> Result<Streak> {
         let focal = view
             .focal
@@ -172,8 +172,8 @@ mod tests {
             assert!((length(motion, 1.0 / 30.0, known) - expected).abs() < 1e-9);
         }
         assert!(length("hfov=150", 1.0 / 30.0, VIEW) < 2.0);
-        let error = read(default).streak(1.0, VIEW, &key(0, "a")).unwrap_err();
-        assert!(error.to_string().contains("at most 64"), "{error}");
+        let error = read(default).streak(2.0, VIEW, &key(0, "a")).unwrap_err();
+        assert!(error.to_string().contains("at most 256"), "{error}");
     }
 
     #[test]

@@ -228,8 +228,8 @@ fn what_the_camera_made_is_made_again() {
     let made = |condition: &str| -> Vec<String> {
         let images = crate::support::run::files(&bench.path("set"));
         let of_condition = images.iter().filter(|path| {
-            let text = path.to_str().unwrap();
-            text.contains(condition) && text.ends_with(".png")
+            let is_of_it = path.to_str().unwrap().contains(condition);
+            is_of_it && path.extension() == Some("png".as_ref())
         });
         let digests = of_condition.map(|path| blake3::hash(&fs::read(path).unwrap()).to_hex());
         let mut digests: Vec<String> = digests.map(|digest| digest.to_string()).collect();

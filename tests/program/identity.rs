@@ -412,7 +412,7 @@ fn what_decides_nothing_asks_nothing() {
 }
 
 /// Flags that the tables here leave out, and where they are held.
-const ELSEWHERE: [(&str, &str); 26] = [
+const ELSEWHERE: [(&str, &str); 35] = [
     (
         "--transfer",
         "it changes images of 16 bits: tests/program/inputs/depth.rs",
@@ -457,6 +457,15 @@ const ELSEWHERE: [(&str, &str); 26] = [
     ("--subset", "tests/program/openeqa/"),
     ("--study", "tests/program/openeqa/"),
     ("--batch", "tests/program/batch.rs"),
+    ("--batch-run", "tests/program/batch_run/"),
+    ("--poll", "tests/program/batch_run/"),
+    ("--keep-files", "tests/program/batch_run/"),
+    ("--detach", "tests/program/batch_run/"),
+    ("--no-scout", "tests/program/batch_run/"),
+    ("--enqueued-tokens", "tests/program/batch_run/"),
+    ("--window", "tests/program/batch_run/"),
+    ("--give-up", "tests/program/batch_run/"),
+    ("--purpose", "tests/program/batch_run/"),
 ];
 
 /// The flags of a command with what each decides, from the list that is written from the program.

@@ -113,16 +113,29 @@ fn levels_without_l0_have_accuracies_and_no_threshold() {
 fn one_light_reading_is_named_with_what_it_leaves_open() {
     let bench = bench(&[]);
     let line = "--model script:m.jsonl --data frames --levels L0,L3 --limit 2";
-    let said = "One reading of the paper was run (paper).";
-    for (more, readings, is_said) in [
-        ("--out one", json!(["paper"]), true),
-        ("--out ev --variant ev", json!([]), false),
+    let ratio = "signal-to-noise ratio is the same at every level";
+    for (more, readings, is_said, is_constant) in [
+        ("--out one", json!(["paper"]), true, true),
+        ("--out ev --variant ev", json!([]), false, false),
+        (
+            "--out physical --profile physical",
+            json!(["physical"]),
+            true,
+            false,
+        ),
         (
             "--out two --profile paper,physical",
             json!(["paper", "physical"]),
             false,
+            true,
         ),
     ] {
+        let reading = if more.contains("--profile physical") {
+            "physical"
+        } else {
+            "paper"
+        };
+        let said = format!("One reading of the paper was run ({reading}).");
         let text = bench.complete(&[words(line), words(more)].concat());
         let folder = bench.path(more.split(' ').nth(1).unwrap());
         let page = fs::read_to_string(folder.join("report.html")).unwrap();
@@ -130,10 +143,13 @@ fn one_light_reading_is_named_with_what_it_leaves_open() {
         let summary: Value = serde_json::from_slice(&summary).unwrap();
         assert_eq!(summary["readings"], readings);
         assert_eq!(
-            [text.matches(said).count(), page.matches(said).count()],
+            [text.matches(&said).count(), page.matches(&said).count()],
             [usize::from(is_said); 2],
             "{text}"
         );
+        let heads =
+            [&text, &page].map(|shown| shown.contains(&format!("With noise (paper) the {ratio}")));
+        assert_eq!(heads, [is_constant; 2], "{more}: {text}");
     }
 }
 

@@ -9,6 +9,7 @@ mod support;
 mod apart;
 mod ask;
 mod batch;
+mod batch_run;
 mod calibrate;
 mod camera;
 mod cli;

@@ -110,3 +110,48 @@ fn an_image_beyond_the_limit_is_found_before_anything_is_asked() {
     );
     assert!(mock.requests().is_empty());
 }
+
+#[test]
+fn the_estimate_is_corrected_by_what_prompts_are_charged() {
+    let bench = Bench::with_questions(20);
+    bench.file("prices.toml", PRICES);
+    let mock = MockEndpoint::start([Answer::message_charged("C", 900)]);
+    let base = mock.base_url();
+    let line = |more: &str| {
+        let more = format!("--out run --prices prices.toml --dry-run --json {more}");
+        let printed = bench.complete(&args(&base, &more));
+        let estimate: Value = serde_json::from_str(&printed).unwrap();
+        estimate["lines"][0].clone()
+    };
+    // By the table of prices: 70 tokens each.
+    assert_eq!(line("")["image_tokens"], 1400.0);
+    let ask = |more: &str| {
+        let more = format!("--out run --prices prices.toml {more}");
+        bench.call(&args(&base, &more))
+    };
+    // Nine replies are too few to say anything.
+    let nine = ask("--limit 9");
+    assert_eq!(nine.code, Some(0), "{nine:?}");
+    assert!(!nine.stderr.contains("were estimated"), "{nine:?}");
+    assert!(line("").get("charged_image_tokens").is_none());
+    let bench_of_ten = Bench::with_questions(15);
+    bench_of_ten.file("prices.toml", PRICES);
+    let more = "--out run --prices prices.toml";
+    let fifteen = bench_of_ten.call(&args(&base, more));
+    let said = "m: a prompt is charged 900 tokens, where";
+    assert_eq!(fifteen.stderr.matches(said).count(), 1, "{fifteen:?}");
+    // From ten on, the rest is estimated by what is charged.
+    ask("--limit 10");
+    let corrected = line("");
+    let each = corrected["charged_image_tokens"].as_f64().unwrap();
+    let text = corrected["text_tokens"].as_f64().unwrap() / 10.0;
+    assert!((each + text - 900.0).abs() < 2.0, "{corrected}");
+    let images = corrected["image_tokens"].as_f64().unwrap();
+    assert!((images - 10.0 * each).abs() < 1e-6, "{corrected}");
+    // Where the estimate is right, nothing is said.
+    let right = PRICES.replace("70", &format!("{each:.0}"));
+    bench_of_ten.file("prices.toml", right);
+    let more = "--out right --prices prices.toml";
+    let quiet = bench_of_ten.call(&args(&base, more));
+    assert_eq!((quiet.code, quiet.stderr.as_str()), (Some(0), ""));
+}

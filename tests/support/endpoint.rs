@@ -94,6 +94,18 @@ impl Answer {
         )
     }
 
+    /// A whole chat completion whose prompt is charged so many tokens.
+    pub fn message_charged(text: &str, prompt_tokens: u64) -> Self {
+        let message = json!({"role": "assistant", "content": text});
+        Self::json(
+            200,
+            &json!({
+                "model": "mock-1", "choices": [{"index": 0, "message": message, "finish_reason": "stop"}],
+                "usage": {"prompt_tokens": prompt_tokens, "completion_tokens": 1},
+            }),
+        )
+    }
+
     /// An error in OpenAI's shape.
     pub fn error(status: u16, code: &str, message: &str) -> Self {
         let error = json!({"message": message, "type": "x", "param": null, "code": code});
@@ -241,7 +253,7 @@ impl MockEndpoint {
     }
 
     /// Starts it on a free port of this machine.
-    fn serving(answer: Box<dyn Fn(&Request) -> Answer + Send + Sync>) -> Self {
+    pub fn serving(answer: Box<dyn Fn(&Request) -> Answer + Send + Sync>) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = listener.local_addr().unwrap();
         let shared = Arc::new(Shared {

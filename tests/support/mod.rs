@@ -9,6 +9,7 @@
     reason = "a test that cannot set up its scene fails where it cannot"
 )]
 
+pub mod batches;
 pub mod browser;
 pub mod endpoint;
 pub mod exr_files;

@@ -73,7 +73,7 @@ fn sample(arg: &Arg) -> String {
             Some([name])
                 if [
                     "N", "SECONDS", "PIXELS", "MB", "DOLLARS", "EV", "K", "R", "METRES", "DEGREES",
-                    "CODE",
+                    "CODE", "HOURS",
                 ]
                 .contains(&name.as_str()) =>
             {

@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use super::BatchFileArgs;
-use super::requests::{Requests, require_remote, summary};
+use super::file::{Register, RequestCost};
+use super::journal::Journal;
+use super::requests::{CostOf, Requests, require_remote, summary};
 use crate::error::{Error, Result};
 use crate::job::dark_already;
 use crate::job::experiment::Experiment;
@@ -11,8 +13,19 @@ use crate::job::open_run::{OpenRun, Remaining, limit, missing_notes, pipeline, u
 use crate::job::outcome::Outcome;
 use crate::job::plan::Plan;
 use crate::job::timings::Timings;
+use crate::job::trial::Item;
 use crate::job::workers::pool;
 use crate::types::manifest::Status;
+
+/// How input files are written.
+pub(super) struct Target<'a, I: Item> {
+    pub(super) files: &'a BatchFileArgs,
+    /// The number of tokens that may wait for batches of a model; `None` if it is not known.
+    pub(super) quota: Option<u64>,
+    /// The journal of files that the program submits; `None` for files that the user submits.
+    pub(super) journal: Option<&'a mut Journal>,
+    pub(super) cost: CostOf<'a, I>,
+}
 
 /// Writes the input files of the first phase with remaining trials, and records in the run that these trials are sent.
 pub(crate) fn export<E: Experiment>(
@@ -31,7 +44,13 @@ pub(crate) fn export<E: Experiment>(
         let Remaining { plan, in_batch, .. } = remaining;
         let trials = plan.keys.len();
         let answered = trials - plan.remaining() - in_batch;
-        let written = write(&mut run, phase, plan, files)?;
+        let target = Target {
+            files,
+            quota: None,
+            journal: None,
+            cost: &|_, _| RequestCost::default(),
+        };
+        let written = write(&mut run, phase, plan, target)?;
         let mut output = summary(&written, answered, in_batch, run.store.folder());
         if !last {
             output += "then run the same command again, for the remaining requests and the ";
@@ -48,11 +67,12 @@ pub(crate) fn export<E: Experiment>(
     })
 }
 
-fn write<E: Experiment>(
+/// Writes the trials of a plan into input files; each with its number of requests.
+pub(super) fn write<E: Experiment>(
     run: &mut OpenRun<'_, E>,
     phase: usize,
     plan: Plan<E::Item>,
-    files: &BatchFileArgs,
+    target: Target<'_, E::Item>,
 ) -> Result<Vec<(PathBuf, usize)>> {
     let (experiment, settings) = (run.experiment, run.experiment.settings());
     let workers = pool(settings.loading.threads.threads)?;
@@ -76,7 +96,12 @@ fn write<E: Experiment>(
         pipeline.largest(sources, &plan.sources)
     })?;
     let bar = run.progress.bar("writing requests", plan.remaining());
-    let mut requests = Requests::<E::Item>::new(experiment.models(phase), files, &mut run.store)?;
+    let register = Register {
+        store: &mut run.store,
+        journal: target.journal,
+    };
+    let (models, files) = (experiment.models(phase), target.files);
+    let mut requests = Requests::new(models, files, target.quota, register, target.cost)?;
     let mut problems = Vec::new();
     let plan = plan.sources.into_iter();
     workers.install(|| {

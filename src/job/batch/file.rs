@@ -4,19 +4,58 @@ use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
+use sha2::{Digest as _, Sha256};
+
+use super::event::PartFacts;
+use super::journal::Journal;
 use crate::error::{Error, Result};
 use crate::store::Store;
 use crate::types::{Detail, Record};
 
 /// Extension of a file until it is complete.
-const PART: &str = "part";
+pub(super) const PART: &str = "part";
 
-/// The input files of one model, split by bytes and by requests.
+/// The largest that a file may be.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FileLimits {
+    pub(crate) bytes: u64,
+    pub(crate) requests: usize,
+    /// Expected tokens of all prompts.
+    pub(crate) tokens: f64,
+}
+
+/// What a request is expected to take.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct RequestCost {
+    /// Tokens of the prompt.
+    pub(crate) tokens: f64,
+    /// US dollars; `None` if the model has no known price.
+    pub(crate) dollars: Option<f64>,
+}
+
+/// Where the model of the files is asked, as it enters the facts of a part.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Destination {
+    pub(crate) model: String,
+    pub(crate) base: String,
+    pub(crate) url: String,
+}
+
+/// What records the requests of a complete file: the run, and the journal if the program submits the file.
+pub(crate) struct Register<'a, D> {
+    pub(crate) store: &'a mut Store<D>,
+    /// `None` for files that the user submits.
+    pub(crate) journal: Option<&'a mut Journal>,
+}
+
+/// The input files of one model, split by bytes, requests and tokens.
 pub(crate) struct ModelInputFiles<D> {
     folder: PathBuf,
     stem: String,
-    max_bytes: u64,
-    max_requests: usize,
+    /// The first number that a file may have.
+    first: u32,
+    limits: FileLimits,
+    destination: Destination,
     open: Option<OpenFile<D>>,
     /// Finished files, each with its number of requests.
     done: Vec<(PathBuf, usize)>,
@@ -26,18 +65,29 @@ struct OpenFile<D> {
     path: PathBuf,
     file: BufWriter<File>,
     bytes: u64,
+    tokens: f64,
+    /// US dollars; `None` if the model has no known price.
+    dollars: Option<f64>,
+    hash: Sha256,
     /// The trials in the file, as records without an outcome.
     blanks: Vec<Record<D>>,
 }
 
 impl<D: Detail> ModelInputFiles<D> {
-    pub(crate) fn new(folder: &Path, model: &str, max_bytes: u64, max_requests: usize) -> Self {
-        let safe = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+    /// Files whose names begin with `stem`, with numbers from `first` on.
+    pub(crate) fn new(
+        folder: &Path,
+        stem: &str,
+        first: u32,
+        limits: FileLimits,
+        destination: Destination,
+    ) -> Self {
         Self {
             folder: folder.to_owned(),
-            stem: model.replace(|c| !safe(c), "_"),
-            max_bytes,
-            max_requests,
+            stem: stem.to_owned(),
+            first,
+            limits,
+            destination,
             open: None,
             done: Vec::new(),
         }
@@ -51,10 +101,11 @@ impl<D: Detail> ModelInputFiles<D> {
         &mut self,
         line: &[u8],
         blank: Record<D>,
-        store: &mut Store<D>,
+        cost: RequestCost,
+        register: &mut Register<'_, D>,
     ) -> Result<()> {
-        let size = line.len() as u64;
-        if size > self.max_bytes {
+        let (size, limits) = (line.len() as u64, self.limits);
+        if size > limits.bytes {
             let megabytes = size as f64 / 1e6;
             let problem = format!(
                 "one request has {megabytes:.1} MB, more than a file may have; make images smaller with --max-side or --image jpeg:95"
@@ -62,10 +113,12 @@ impl<D: Detail> ModelInputFiles<D> {
             return Err(Error::usage("--file-size", problem));
         }
         let full = self.open.as_ref().is_some_and(|open| {
-            open.bytes + size > self.max_bytes || open.blanks.len() >= self.max_requests
+            open.bytes + size > limits.bytes
+                || open.blanks.len() >= limits.requests
+                || open.tokens + cost.tokens > limits.tokens
         });
         if full {
-            self.close(store)?;
+            self.close(register)?;
         }
         let open = match self.open.take() {
             Some(open) => open,
@@ -75,20 +128,26 @@ impl<D: Detail> ModelInputFiles<D> {
         open.file
             .write_all(line)
             .map_err(|e| Error::file(&open.path, "write", e))?;
+        open.hash.update(line);
         open.bytes += size;
+        open.tokens += cost.tokens;
+        open.dollars = open.dollars.zip(cost.dollars).map(|(sum, one)| sum + one);
         open.blanks.push(blank);
         Ok(())
     }
 
     /// Closes the last file; all files, each with its number of requests.
-    pub(crate) fn finish(mut self, store: &mut Store<D>) -> Result<Vec<(PathBuf, usize)>> {
-        self.close(store)?;
+    pub(crate) fn finish(
+        mut self,
+        register: &mut Register<'_, D>,
+    ) -> Result<Vec<(PathBuf, usize)>> {
+        self.close(register)?;
         Ok(self.done)
     }
 
     /// A new file, with the first number that no file in the folder has.
     fn next(&self) -> Result<OpenFile<D>> {
-        let path = (1..=u32::MAX)
+        let path = (self.first..=u32::MAX)
             .map(|n| self.folder.join(format!("{}-{n:03}.jsonl", self.stem)))
             .find(|path| !path.exists())
             .unwrap_or_default();
@@ -98,13 +157,16 @@ impl<D: Detail> ModelInputFiles<D> {
             path,
             file: BufWriter::new(file),
             bytes: 0,
+            tokens: 0.0,
+            dollars: Some(0.0),
+            hash: Sha256::new(),
             blanks: Vec::new(),
         })
     }
 
-    /// Completes the open file. The run records its trials before the file gets its final name. So the user never uploads a file
-    /// whose replies the run would not recognize.
-    fn close(&mut self, store: &mut Store<D>) -> Result<()> {
+    /// Completes the open file. The run records its trials before the file gets its final name. So nobody uploads a file whose replies
+    /// the run would not recognize.
+    fn close(&mut self, register: &mut Register<'_, D>) -> Result<()> {
         let Some(open) = self.open.take() else {
             return Ok(());
         };
@@ -114,9 +176,39 @@ impl<D: Detail> ModelInputFiles<D> {
             .map_err(std::io::IntoInnerError::into_error)
             .and_then(|file| file.sync_all())
             .map_err(unwritten)?;
-        store.append_to_batch(&open.blanks)?;
+        if let Some(journal) = &mut register.journal {
+            let Destination { model, base, url } = self.destination.clone();
+            let name = open.path.file_name().unwrap_or_default();
+            journal.add(
+                &name.to_string_lossy(),
+                PartFacts {
+                    sha256: hexadecimal(&open.hash.finalize()),
+                    bytes: open.bytes,
+                    requests: open.blanks.len(),
+                    model,
+                    base,
+                    url,
+                    tokens: open.tokens.round(),
+                    dollars: open.dollars,
+                },
+            )?;
+        }
+        register.store.append_to_batch(&open.blanks)?;
         fs::rename(open.path.with_extension(PART), &open.path).map_err(unwritten)?;
         self.done.push((open.path.clone(), open.blanks.len()));
         Ok(())
     }
+}
+
+/// Bytes as hexadecimal digits.
+pub(super) fn hexadecimal(bytes: &[u8]) -> String {
+    let digit = |half: u8| char::from_digit(half.into(), 16).unwrap_or('0');
+    let digits = bytes.iter().flat_map(|byte| [byte >> 4, byte & 15]);
+    digits.map(digit).collect()
+}
+
+/// A text as a part of a file's name: other characters than letters, digits, `-`, `_` and `.` are replaced.
+pub(super) fn file_name(text: &str) -> String {
+    let safe = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+    text.replace(|c| !safe(c), "_")
 }

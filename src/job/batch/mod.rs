@@ -1,13 +1,31 @@
 //! Runs through the files of a Batch API, which takes a day and costs half.
 //!
-//! The remaining requests are written as input files into `RUN/batch/`, with the records of their trials, still without an outcome. The
-//! user uploads the files to the API and imports its output. Until then the run does not ask those trials. Requests that failed or
-//! expired are asked again by the next export, or directly.
+//! The remaining requests are written as input files into `RUN/batch/`, with the records of their trials, still without an outcome. Until
+//! their replies are there, the run does not ask those trials. Either the user uploads the files to the API and imports its output; or
+//! the program does ([`run`]): each file is a [`part`] then, a [`driver`] moves the parts on, and a [`journal`] holds how far they are.
 
+mod collect;
+mod driver;
+mod event;
 pub(super) mod export;
 mod file;
+mod folder;
+mod journal;
+mod part;
+mod quota;
+mod recover;
 pub(crate) mod replies;
 mod requests;
+pub(super) mod run;
+mod servers;
+mod settings;
+mod split;
+mod submit;
+mod summary;
+mod take_over;
+
+pub(crate) use folder::{FolderBatches, FolderTask};
+pub(crate) use settings::{BatchRunArgs, CollectArgs};
 
 use crate::types::Decides;
 use std::num::{NonZeroU64, NonZeroUsize};

@@ -12,17 +12,102 @@ use crate::error::{Error, Result};
 use crate::store::Store;
 use crate::types::flag::read_word;
 use crate::types::manifest::RunManifest;
-use crate::types::{Detail, Record, Reply, TrialKey};
+use crate::types::{Detail, Failure, FailureKind, Record, Reply, TrialKey};
 
 /// Numbers of lines, by what they led to.
 #[derive(Debug, Default)]
-struct ReplyCounts {
-    answered: usize,
-    failed: usize,
+pub(super) struct ReplyCounts {
+    pub(super) answered: usize,
+    pub(super) failed: usize,
     /// Lines of trials that were imported before, or answered in another way.
     imported_before: usize,
     /// Lines whose id is in no batch of this run.
     unknown: usize,
+}
+
+/// What a line led to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Imported {
+    /// Nothing: the trial is not one of this run, or does not wait for a batch.
+    Nothing,
+    /// A reply.
+    Answered,
+    /// A failure of this kind.
+    Failed(TrialKey, FailureKind),
+}
+
+/// The trials of a run that wait for a batch, and the place for their replies.
+pub(super) struct ReplyImport<'a, D> {
+    store: &'a mut Store<D>,
+    manifest: &'a RunManifest,
+    /// Trials in batches, as records without an outcome.
+    blanks: HashMap<TrialKey, Record<D>>,
+    waiting: BTreeSet<TrialKey>,
+    pub(super) counts: ReplyCounts,
+}
+
+impl<'a, D: Detail> ReplyImport<'a, D> {
+    /// The trials of a run that were sent in batches.
+    pub(super) fn new(store: &'a mut Store<D>, manifest: &'a RunManifest) -> Result<Self> {
+        let blanks = store.batch_trials()?.into_iter();
+        Ok(Self {
+            blanks: blanks.map(|blank| (blank.key, blank)).collect(),
+            waiting: store.pending_in_batches()?,
+            store,
+            manifest,
+            counts: ReplyCounts::default(),
+        })
+    }
+
+    /// Stores what a line says, if its trial waits for a batch.
+    pub(super) fn take(&mut self, line: BatchLine) -> Result<Imported> {
+        let key = line.id.parse::<TrialKey>().ok();
+        let Some(blank) = key.and_then(|key| self.blanks.get(&key)) else {
+            self.counts.unknown += 1;
+            return Ok(Imported::Nothing);
+        };
+        if !self.waiting.remove(&blank.key) {
+            self.counts.imported_before += 1;
+            return Ok(Imported::Nothing);
+        }
+        let blank = blank.clone().batched();
+        let reply = match line.result {
+            Ok(reply) => reply,
+            Err(failure) => return self.store_failure(blank, failure),
+        };
+        self.counts.answered += 1;
+        let constrain = constrain(self.manifest, &blank.model)?;
+        let choices = blank.detail.choices().len();
+        let reply = Reply {
+            attempts: 1,
+            ..with_letter(reply, constrain, choices)
+        };
+        self.store.append(&blank.answered(reply)?)?;
+        Ok(Imported::Answered)
+    }
+
+    /// Stores that a trial has no reply, if it waits for a batch.
+    pub(super) fn fail(&mut self, key: TrialKey, failure: Failure) -> Result<()> {
+        if self.waiting.remove(&key)
+            && let Some(blank) = self.blanks.get(&key)
+        {
+            self.store_failure(blank.clone().batched(), failure)?;
+        }
+        Ok(())
+    }
+
+    fn store_failure(&mut self, blank: Record<D>, failure: Failure) -> Result<Imported> {
+        self.counts.failed += 1;
+        let (key, kind) = (blank.key, failure.kind);
+        self.store.append(&blank.failed_by(failure, 1))?;
+        Ok(Imported::Failed(key, kind))
+    }
+
+    /// Forces the records to the disk; the numbers of lines.
+    pub(super) fn finish(self) -> Result<ReplyCounts> {
+        self.store.sync()?;
+        Ok(self.counts)
+    }
 }
 
 /// Imports the replies of output and error files; a summary for the user. Each reply is imported once, even if a file is named again.
@@ -34,17 +119,16 @@ pub(crate) fn import<D: Detail>(
     manifest: &RunManifest,
     files: &[PathBuf],
 ) -> Result<String> {
-    let blanks = store.batch_trials()?;
-    if blanks.is_empty() {
+    let folder = store.folder().to_owned();
+    let mut replies = ReplyImport::new(store, manifest)?;
+    if replies.blanks.is_empty() {
         let problem =
             "this run has written no requests for a batch; write them first, by batch export or openeqa --batch".to_owned();
-        let path = store.folder().to_owned();
-        return Err(Error::Run { path, problem });
+        return Err(Error::Run {
+            path: folder,
+            problem,
+        });
     }
-    let blanks: HashMap<TrialKey, Record<D>> =
-        blanks.into_iter().map(|blank| (blank.key, blank)).collect();
-    let mut waiting = store.pending_in_batches()?;
-    let mut counts = ReplyCounts::default();
     for path in files {
         let file = File::open(path).map_err(|e| Error::file(path, "read", e))?;
         for (i, line) in BufReader::new(file).lines().enumerate() {
@@ -53,54 +137,17 @@ pub(crate) fn import<D: Detail>(
                 continue;
             }
             let line = BatchLine::read(&line).ok_or_else(|| not_a_line(path, i + 1))?;
-            import_line(line, &blanks, manifest, &mut waiting, store, &mut counts)?;
+            replies.take(line)?;
         }
     }
-    store.sync()?;
-    Ok(summary(&counts, waiting.len()))
+    let waiting = replies.waiting.len();
+    Ok(summary(&replies.finish()?, waiting))
 }
 
 fn not_a_line(path: &Path, line: usize) -> Error {
     let problem =
         "not a line of a Batch API's output: {\"custom_id\", \"response\", \"error\"} expected";
     Error::line(path, line, problem)
-}
-
-fn import_line<D: Detail>(
-    line: BatchLine,
-    blanks: &HashMap<TrialKey, Record<D>>,
-    manifest: &RunManifest,
-    waiting: &mut BTreeSet<TrialKey>,
-    store: &mut Store<D>,
-    counts: &mut ReplyCounts,
-) -> Result<()> {
-    let key = line.id.parse::<TrialKey>().ok();
-    let Some(blank) = key.and_then(|key| blanks.get(&key)) else {
-        counts.unknown += 1;
-        return Ok(());
-    };
-    if !waiting.remove(&blank.key) {
-        counts.imported_before += 1;
-        return Ok(());
-    }
-    let blank = blank.clone().batched();
-    let record = match line.result {
-        Ok(reply) => {
-            counts.answered += 1;
-            let constrain = constrain(manifest, &blank.model)?;
-            let choices = blank.detail.choices().len();
-            let reply = Reply {
-                attempts: 1,
-                ..with_letter(reply, constrain, choices)
-            };
-            blank.answered(reply)?
-        }
-        Err(failure) => {
-            counts.failed += 1;
-            blank.failed_by(failure, 1)
-        }
-    };
-    store.append(&record)
 }
 
 /// The constraint on the replies of a model, from the manifest.

@@ -5,11 +5,20 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::BatchFileArgs;
-use super::file::ModelInputFiles;
+use super::file::{Destination, FileLimits, ModelInputFiles, Register, RequestCost, file_name};
 use crate::error::{Error, Result};
 use crate::job::models::ModelUnderTest;
-use crate::job::trial::{Item, PreparedGroup};
-use crate::store::{BATCH, Store};
+use crate::job::trial::{Item, PreparedGroup, Stimulus, Trial};
+use crate::store::BATCH;
+
+/// The share of the tokens that may wait for batches that one part takes, so that one part can wait while another is worked on; chosen.
+pub(super) const SHARE_OF_QUOTA: f64 = 0.45;
+
+/// The most tokens of a part if the limit is not known; chosen.
+const PART_TOKENS: f64 = 2e6;
+
+/// What a request of a trial about a stimulus is expected to take.
+pub(super) type CostOf<'a, I> = &'a (dyn Fn(&Trial<I>, &Stimulus) -> RequestCost + Sync);
 
 /// The input files of all models, while they are written.
 pub(crate) struct Requests<'a, I: Item> {
@@ -17,7 +26,8 @@ pub(crate) struct Requests<'a, I: Item> {
     url: Option<&'a str>,
     /// Files of each model, in the order of `models`.
     files: Vec<ModelInputFiles<I::Detail>>,
-    store: &'a mut Store<I::Detail>,
+    register: Register<'a, I::Detail>,
+    cost: CostOf<'a, I>,
 }
 
 impl<'a, I: Item> Requests<'a, I> {
@@ -28,28 +38,47 @@ impl<'a, I: Item> Requests<'a, I> {
     pub(crate) fn new(
         models: &'a [ModelUnderTest],
         args: &'a BatchFileArgs,
-        store: &'a mut Store<I::Detail>,
+        quota: Option<u64>,
+        register: Register<'a, I::Detail>,
+        cost: CostOf<'a, I>,
     ) -> Result<Self> {
-        let folder = store.folder().join(BATCH);
+        let folder = register.store.folder().join(BATCH);
         fs::create_dir_all(&folder).map_err(|e| Error::file(&folder, "create", e))?;
-        let bytes = args.file_size.get().saturating_mul(1_000_000);
+        let journal = register.journal.as_deref();
         let files = models.iter().enumerate().map(|(i, model)| {
             // The number is needed: two names may give the same file name, and a model may be asked with and without images.
-            let stem = format!("{}-{}", i + 1, model.name);
-            ModelInputFiles::new(&folder, &stem, bytes, args.file_requests.get())
+            let stem = file_name(&format!("{}-{}", i + 1, model.name));
+            let destination = destination(model, args);
+            let (stem, first, tokens) = match journal {
+                None => (stem, 1, f64::INFINITY),
+                Some(journal) => {
+                    let stem = format!("part-{stem}");
+                    let place = (destination.base.clone(), destination.model.clone());
+                    let limit = journal.limits.get(&place).copied().or(quota);
+                    let tokens = limit.map_or(PART_TOKENS, |limit| SHARE_OF_QUOTA * limit as f64);
+                    (stem.clone(), journal.free_number(&stem), tokens)
+                }
+            };
+            let limits = FileLimits {
+                bytes: args.file_size.get().saturating_mul(1_000_000),
+                requests: args.file_requests.get(),
+                tokens,
+            };
+            ModelInputFiles::new(&folder, &stem, first, limits, destination)
         });
         Ok(Self {
             models,
             url: args.url.as_deref(),
             files: files.collect(),
-            store,
+            register,
+            cost,
         })
     }
 
     /// Adds all requests of a group.
     pub(crate) fn add(&mut self, group: &PreparedGroup<I>) -> Result<()> {
         let stimulus = &group.stimulus;
-        group.notes.store(self.store)?;
+        group.notes.store(self.register.store)?;
         for trial in &group.trials {
             let under_test = &self.models[trial.model];
             let model = &under_test.model;
@@ -60,18 +89,29 @@ impl<'a, I: Item> Requests<'a, I> {
                 continue;
             };
             let blank = I::blank(trial, stimulus, &under_test.name);
-            self.files[trial.model].add(&line, blank, self.store)?;
+            let cost = (self.cost)(trial, stimulus);
+            self.files[trial.model].add(&line, blank, cost, &mut self.register)?;
         }
         Ok(())
     }
 
     /// Closes all files; each with its number of requests.
-    pub(crate) fn finish(self) -> Result<Vec<(PathBuf, usize)>> {
+    pub(crate) fn finish(mut self) -> Result<Vec<(PathBuf, usize)>> {
         let mut written = Vec::new();
         for files in self.files {
-            written.extend(files.finish(self.store)?);
+            written.extend(files.finish(&mut self.register)?);
         }
         Ok(written)
+    }
+}
+
+/// Where the requests of a model go.
+fn destination(model: &ModelUnderTest, args: &BatchFileArgs) -> Destination {
+    let url = args.url.as_deref().or(model.model.batch_url());
+    Destination {
+        model: model.model.name().to_owned(),
+        base: model.model.batch_base().unwrap_or_default(),
+        url: url.unwrap_or_default().to_owned(),
     }
 }
 

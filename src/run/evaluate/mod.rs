@@ -10,7 +10,7 @@ mod settings;
 mod setup;
 
 use crate::error::Result;
-use crate::job::batch::BatchFileArgs;
+use crate::job::batch::{BatchFileArgs, BatchRunArgs};
 use crate::job::progress::Progress;
 use crate::job::{Job, Outcome};
 
@@ -39,4 +39,19 @@ pub(crate) fn export_batch(
     let config = args.resolve()?;
     let (setup, models) = ChoiceSetup::open(&config, progress)?;
     Job::new(&setup, models, progress)?.export_batch(files)
+}
+
+/// Asks the remaining trials in batches that the program submits, and waits for their replies.
+///
+/// # Errors
+/// If a model is built in, or a server refuses what every further call would ask. The batches stay, and the same command goes on.
+pub(crate) fn run_batch(
+    args: EvaluateArgs,
+    files: &BatchFileArgs,
+    batch: &BatchRunArgs,
+    progress: &Progress,
+) -> Result<Outcome> {
+    let config = args.resolve()?;
+    let (setup, models) = ChoiceSetup::open(&config, progress)?;
+    Job::new(&setup, models, progress)?.run_batch(files, batch)
 }

@@ -33,6 +33,9 @@ pub(crate) fn openeqa(args: OpenEqaArgs, progress: &Progress) -> Result<Outcome>
     match &config.task {
         OpenTask::Run => Job::new(&setup, files, progress)?.run(),
         OpenTask::Batch(batch) => Job::new(&setup, files, progress)?.export_batch(batch),
+        OpenTask::BatchRun(batch, args) => {
+            Job::new(&setup, files, progress)?.run_batch(batch, args)
+        }
         OpenTask::Study(folder) => study::pack(&setup, files, folder, progress),
     }
 }

@@ -9,7 +9,7 @@ use super::judge::{Judge, JudgeArgs};
 use super::questions::OpenSelectionArgs;
 use crate::dataset::{CodesArgs, PixelLimit, ReadingRule};
 use crate::error::Result;
-use crate::job::batch::BatchFileArgs;
+use crate::job::batch::{BatchFileArgs, BatchRunArgs};
 use crate::job::models::ModelName;
 use crate::job::settings::{ExperimentSettings, JobArgs, JobSettings};
 use crate::job::walk::Walk;
@@ -53,11 +53,17 @@ pub(crate) struct OpenEqaArgs {
         long,
         value_name = "DIR",
         help_heading = "OpenEQA",
-        conflicts_with_all = ["batch", "dry_run"], add = Decides::Nothing)]
+        conflicts_with_all = ["batch", "batch_run", "dry_run"], add = Decides::Nothing)]
     pub study: Option<PathBuf>,
     /// Write what is left to ask as files of a Batch API, answers first and then marks, and ask nothing
-    #[arg(long, help_heading = "Batch", conflicts_with = "dry_run", add = Decides::Nothing)]
+    #[arg(long, help_heading = "Batch", conflicts_with_all = ["dry_run", "batch_run"], add = Decides::Nothing)]
     pub batch: bool,
+    /// Ask what is left to ask in batches, answers first and then marks, and wait for their replies, as batch run does
+    #[arg(long, help_heading = "Batch", add = Decides::Nothing)]
+    pub batch_run: bool,
+    /// The flags for batches that the program submits.
+    #[command(flatten)]
+    pub batches: BatchRunArgs,
     /// The flags for the batch files.
     #[command(flatten)]
     pub files: BatchFileArgs,
@@ -101,6 +107,8 @@ pub(super) enum OpenTask {
     Run,
     /// Write the remaining trials as files of a Batch API.
     Batch(BatchFileArgs),
+    /// Ask the remaining trials in batches.
+    BatchRun(BatchFileArgs, BatchRunArgs),
     /// Write a page on which people answer, into this folder.
     Study(PathBuf),
 }
@@ -137,6 +145,7 @@ impl OpenEqaArgs {
         let task = match (self.study, self.batch) {
             (Some(folder), _) => OpenTask::Study(folder),
             (None, true) => OpenTask::Batch(self.files),
+            (None, false) if self.batch_run => OpenTask::BatchRun(self.files, self.batches),
             (None, false) => OpenTask::Run,
         };
         let nothing_to_ask = self.job.models.is_empty() && self.answers.is_empty();

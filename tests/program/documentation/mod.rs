@@ -1,7 +1,7 @@
 //! The README and the pages in `src/docs`: their commands parse and run, their links lead somewhere, their flags exist.
 //!
 //! A block with the fence `sh` is run, one with `sh no-run` is only parsed: it needs large data, another machine or an installer.
-//! All blocks of a page are run by one shell in an empty folder, with a mock endpoint at `OPENAI_BASE_URL`, few and small rooms
+//! All blocks of a page are run by one shell in an empty folder, with a mock endpoint, which has batches, at `OPENAI_BASE_URL`, few and small rooms
 //! where no data are named, and the folder `models` at `$MODELS`. A comment `<!-- test: … -->` is a command that readers do not
 //! see. A block with the fence `text` shows what commands of its page print; `text no-run` shows what others print.
 
@@ -12,7 +12,8 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use crate::support::endpoint::{Answer, MockEndpoint};
+use crate::support::batches::{Course, MockBatches};
+use crate::support::endpoint::Answer;
 use crate::support::run::Bench;
 use crate::support::table::check_rows;
 use clap::error::ErrorKind;
@@ -103,7 +104,8 @@ const PRINTED: &str = "printed.txt";
 
 /// Runs the commands of a page in a folder.
 fn run(page: &Page, folder: &Path) -> Output {
-    let mock = MockEndpoint::answering(|body| {
+    let mock = MockBatches::start([Course::of("in_progress completed").text("A")]);
+    mock.chat(|body| {
         let is_judge = body.to_string().contains("Your mark");
         Answer::text(if is_judge { "4" } else { "A" })
     });

@@ -3,6 +3,7 @@
 mod adapted;
 mod confidence;
 mod models;
+mod noise;
 mod questions;
 mod readings;
 mod replies;
@@ -51,6 +52,7 @@ pub(super) fn of_runs<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     alerts.extend(of_enhancers(&joined.runs));
     alerts.extend(of_inputs(&joined.runs));
     alerts.extend(adapted::of_adaptations(&joined.runs));
+    alerts.extend(noise::of_noise(&joined.runs));
     if joined.runs.len() > 1 {
         alerts.extend(settings::of_settings(joined));
         alerts.extend(questions::of_questions(joined));

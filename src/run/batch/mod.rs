@@ -1,4 +1,6 @@
-//! `batch import`: reading the output of a Batch API into the records of a run.
+//! `batch import`: reading the output of a Batch API into the records of a run; and the batches of a folder.
+
+mod folder;
 
 use std::path::PathBuf;
 
@@ -10,7 +12,10 @@ use crate::job::report::{choice, open};
 use crate::job::stored::{ExperimentKind, StoredRun, manifest};
 use crate::job::{Outcome, ShowArgs, StdoutFormat, count};
 use crate::store::{AddressChange, Store};
+use crate::types::manifest::RunManifest;
 use crate::types::{ChoiceDetail, Decides, Detail, OpenDetail};
+
+pub(crate) use folder::{BatchFolderArgs, BatchStatusArgs, cancel, fetch, status};
 
 /// The flags of `batch import`.
 #[derive(Debug, Args)]
@@ -44,13 +49,23 @@ fn import_into<D: Detail>(
     let manifest = manifest(&args.run)?;
     let mut store = Store::<D>::open(&args.run, &manifest, AddressChange::Allowed)?;
     let imported = replies::import(&mut store, &manifest, &args.files)?;
-    let mut run = StoredRun::of(&args.run, manifest)?;
+    reported(&store, manifest, args.show.format(), &imported, write)
+}
+
+/// The report of a run with new replies, behind a text about them.
+fn reported<D: Detail>(
+    store: &Store<D>,
+    manifest: RunManifest,
+    show: StdoutFormat,
+    text: &str,
+    write: impl FnOnce(&Store<D>, StoredRun<D>, StdoutFormat) -> Result<Outcome>,
+) -> Result<Outcome> {
+    let mut run = StoredRun::of(store.folder(), manifest)?;
     let trials = run.manifest.counts.trials.max(run.records.len());
     run.manifest.count(count(trials, &run.records));
-    let show = args.show.format();
-    let mut outcome = write(&store, run, show)?;
+    let mut outcome = write(store, run, show)?;
     if show != StdoutFormat::Json {
-        outcome.output.insert_str(0, &imported);
+        outcome.output.insert_str(0, text);
     }
     Ok(outcome)
 }

@@ -1,0 +1,255 @@
+//! The files and batches of a server, by OpenAI's interface: [`BatchServer`].
+//!
+//! Each call is sent once. Whether it is repeated is decided by the caller, who knows what may have happened at the server.
+
+mod failure;
+mod objects;
+mod upload;
+
+use std::path::Path;
+use std::time::{Duration, SystemTime};
+
+use reqwest::header::{CONTENT_TYPE, HeaderMap};
+use reqwest::{Method, RequestBuilder};
+use serde_json::{Value, json};
+
+use super::complaint::Complaint;
+use super::connection::{Connection, Deadline, HttpReply};
+use super::failure::FailedTry;
+use super::pace::asked_wait;
+
+pub(crate) use failure::{ApiFailure, Effect, QuotaRefusal};
+use objects::MARK;
+pub(crate) use objects::{BatchState, Readiness, RemoteBatch, RemoteFile};
+use upload::FileForm;
+
+/// The slowest upload that is waited for, in bytes per second; chosen.
+const SLOWEST: u64 = 50_000;
+
+/// The longest time that a file of replies may take; chosen.
+const LONGEST_DOWNLOAD: Duration = Duration::from_hours(1);
+
+/// The most pages of a list that are read; chosen: 10,000 files or batches.
+const MOST_PAGES: usize = 100;
+
+/// The result of a call.
+pub(crate) type ApiResult<T> = Result<T, ApiFailure>;
+
+/// A server with files and batches.
+#[derive(Debug)]
+pub(crate) struct BatchServer {
+    connection: Connection,
+    headers: HeaderMap,
+    timeout: Duration,
+}
+
+/// What a batch is made of.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct NewBatch<'a> {
+    /// The server's name of the input file.
+    pub file: &'a str,
+    /// The path of the requests, as `/v1/chat/completions`.
+    pub url: &'a str,
+    /// The time within which the batch is worked on, as `24h`.
+    pub window: &'a str,
+    /// The mark by which the batch is found again.
+    pub mark: &'a str,
+}
+
+impl BatchServer {
+    /// The server behind these connections; nothing is sent yet.
+    pub(super) fn new(connection: Connection, headers: HeaderMap, timeout: Duration) -> Self {
+        Self {
+            connection,
+            headers,
+            timeout,
+        }
+    }
+
+    /// Uploads a file under a name, for a purpose.
+    pub(crate) async fn upload(
+        &self,
+        path: &Path,
+        name: &str,
+        purpose: &str,
+    ) -> ApiResult<RemoteFile> {
+        // No line of a file of requests has this text: a line is one JSON object, and the text follows no line end in it.
+        let boundary = format!("darkqa-{name}").replace(|c: char| !c.is_ascii_alphanumeric(), "-");
+        let boundary: String = boundary.chars().take(70).collect();
+        let form = FileForm::open(path, name, purpose, &boundary).map_err(|e| ApiFailure {
+            effect: Effect::None,
+            ..self.unreadable(&format!("{} could not be read: {e}", path.display()))
+        })?;
+        let bytes = path.metadata().map_or(0, |file| file.len());
+        let kind = format!("multipart/form-data; boundary={boundary}");
+        let request = self
+            .request(Method::POST, "files", &[])
+            .header(CONTENT_TYPE, kind)
+            .timeout(self.timeout + Duration::from_secs(bytes / SLOWEST))
+            .body(reqwest::Body::wrap(form));
+        let object = self.object(request).await?;
+        RemoteFile::read(&object).ok_or_else(|| self.unreadable("a file without an id"))
+    }
+
+    /// The file with this id.
+    pub(crate) async fn file(&self, id: &str) -> ApiResult<RemoteFile> {
+        let request = self.request(Method::GET, &format!("files/{}", segment(id)), &[]);
+        let object = self.object(request).await?;
+        RemoteFile::read(&object).ok_or_else(|| self.unreadable("a file without an id"))
+    }
+
+    /// All files of a purpose.
+    pub(crate) async fn files(&self, purpose: &str) -> ApiResult<Vec<RemoteFile>> {
+        let items = self.list("files", &[("purpose", purpose)]).await?;
+        Ok(items.iter().filter_map(RemoteFile::read).collect())
+    }
+
+    /// Writes the content of a file to a path, at most this number of bytes.
+    pub(crate) async fn download(&self, id: &str, to: &Path, most: u64) -> ApiResult<()> {
+        let path = format!("files/{}/content", segment(id));
+        let request = self
+            .request(Method::GET, &path, &[])
+            .timeout(LONGEST_DOWNLOAD);
+        let sent = self.connection.save(request, to, most).await;
+        let answer = sent.map_err(not_answered)?;
+        self.succeeded(answer).map(drop)
+    }
+
+    /// Deletes a file.
+    pub(crate) async fn delete(&self, id: &str) -> ApiResult<()> {
+        let request = self.request(Method::DELETE, &format!("files/{}", segment(id)), &[]);
+        self.send(request).await.map(drop)
+    }
+
+    /// Makes a batch.
+    pub(crate) async fn create(&self, new: NewBatch<'_>) -> ApiResult<RemoteBatch> {
+        let body = json!({
+            "input_file_id": new.file, "endpoint": new.url, "completion_window": new.window,
+            "metadata": { MARK: new.mark },
+        });
+        let request = self
+            .request(Method::POST, "batches", &[])
+            .header(CONTENT_TYPE, "application/json")
+            .body(body.to_string());
+        self.read_batch(request).await
+    }
+
+    /// The batch with this id.
+    pub(crate) async fn batch(&self, id: &str) -> ApiResult<RemoteBatch> {
+        let path = format!("batches/{}", segment(id));
+        self.read_batch(self.request(Method::GET, &path, &[])).await
+    }
+
+    /// All batches.
+    pub(crate) async fn batches(&self) -> ApiResult<Vec<RemoteBatch>> {
+        let items = self.list("batches", &[]).await?;
+        let read = |item| RemoteBatch::read(item, &self.connection.scrub);
+        Ok(items.iter().filter_map(read).collect())
+    }
+
+    /// Asks the server to cancel a batch.
+    pub(crate) async fn cancel(&self, id: &str) -> ApiResult<()> {
+        let path = format!("batches/{}/cancel", segment(id));
+        self.send(self.request(Method::POST, &path, &[]))
+            .await
+            .map(drop)
+    }
+
+    async fn read_batch(&self, request: RequestBuilder) -> ApiResult<RemoteBatch> {
+        let object = self.object(request).await?;
+        RemoteBatch::read(&object, &self.connection.scrub)
+            .ok_or_else(|| self.unreadable("a batch without id or status"))
+    }
+
+    /// All items of a list, page by page.
+    async fn list(&self, path: &str, query: &[(&str, &str)]) -> ApiResult<Vec<Value>> {
+        let mut items = Vec::new();
+        let mut after: Option<String> = None;
+        for _ in 0..MOST_PAGES {
+            let mut query = query.to_vec();
+            query.push(("limit", "100"));
+            query.extend(after.as_deref().map(|after| ("after", after)));
+            let page = self.object(self.request(Method::GET, path, &query)).await?;
+            // Together sends the list alone.
+            let data = page.get("data").unwrap_or(&page);
+            let data = data.as_array().cloned().unwrap_or_default();
+            let last = data.last().and_then(|item| item.get("id")?.as_str());
+            let last = last.map(str::to_owned);
+            items.extend(data);
+            let has_more = page.get("has_more").and_then(Value::as_bool) == Some(true);
+            match last {
+                Some(last) if has_more && after.as_ref() != Some(&last) => after = Some(last),
+                _ => break,
+            }
+        }
+        Ok(items)
+    }
+
+    fn request(&self, method: Method, path: &str, query: &[(&str, &str)]) -> RequestBuilder {
+        self.connection
+            .request(method, path, query)
+            .headers(self.headers.clone())
+    }
+
+    /// The JSON object in the response to a request.
+    async fn object(&self, request: RequestBuilder) -> ApiResult<Value> {
+        let answer = self.send(request).await?;
+        serde_json::from_slice(&answer.body).map_err(|_| self.unreadable("no JSON"))
+    }
+
+    /// The response to a request that succeeded.
+    async fn send(&self, request: RequestBuilder) -> ApiResult<HttpReply> {
+        let sent = self.connection.exchange(request, Deadline::Whole).await;
+        self.succeeded(sent.map_err(not_answered)?)
+    }
+
+    /// The response itself, if its status says that the call succeeded.
+    fn succeeded(&self, answer: HttpReply) -> ApiResult<HttpReply> {
+        if answer.status.is_success() {
+            return Ok(answer);
+        }
+        let status = answer.status.as_u16();
+        let complaint = Complaint::of_body(&String::from_utf8_lossy(&answer.body));
+        let (base, scrub) = (&self.connection.base, &self.connection.scrub);
+        let text = scrub.line(&complaint.message);
+        let separator = if text.is_empty() { "" } else { ": " };
+        Err(ApiFailure {
+            status: Some(status),
+            message: format!("{base} answered {status}{separator}{text}"),
+            effect: if status < 500 {
+                Effect::None
+            } else {
+                Effect::Unknown
+            },
+            wait: asked_wait(&answer.headers, SystemTime::now()).max(complaint.wait),
+            quota: QuotaRefusal::of(&complaint),
+        })
+    }
+
+    /// The failure of a call that the server answered with something else.
+    fn unreadable(&self, what: &str) -> ApiFailure {
+        ApiFailure {
+            status: None,
+            message: format!("{} answered with {what}", self.connection.base),
+            effect: Effect::Unknown,
+            wait: None,
+            quota: None,
+        }
+    }
+}
+
+/// The failure of a call without a complete response.
+fn not_answered(failed: FailedTry) -> ApiFailure {
+    ApiFailure {
+        status: failed.failure.status,
+        message: failed.failure.message,
+        effect: Effect::Unknown,
+        wait: failed.wait,
+        quota: None,
+    }
+}
+
+/// An id as a segment of a path.
+fn segment(id: &str) -> String {
+    percent_encoding::utf8_percent_encode(id, percent_encoding::NON_ALPHANUMERIC).to_string()
+}

@@ -1,0 +1,111 @@
+//! The body of an upload: [`FileForm`], a form with a file that is read while it is sent.
+
+use std::fs::File;
+use std::io::{self, Read as _};
+use std::path::Path;
+use std::pin::Pin;
+use std::task::{Context, Poll};
+
+use bytes::Bytes;
+use http_body::{Body, Frame, SizeHint};
+
+/// The number of bytes that are read at once; chosen.
+const CHUNK: usize = 256 * 1024;
+
+/// A form of type `multipart/form-data` (RFC 7578) with one text field and one file. The file is never in memory as a whole.
+pub(super) struct FileForm {
+    head: Bytes,
+    file: File,
+    /// Bytes of the file that are still to be sent.
+    left: u64,
+    tail: Bytes,
+}
+
+impl FileForm {
+    /// A form with the field `purpose` and the file `file`, under this name.
+    ///
+    /// # Errors
+    /// If the file cannot be opened.
+    pub(super) fn open(path: &Path, name: &str, purpose: &str, boundary: &str) -> io::Result<Self> {
+        let file = File::open(path)?;
+        let field =
+            |name: &str| format!("--{boundary}\r\nContent-Disposition: form-data; name=\"{name}\"");
+        let head = format!(
+            "{}\r\n\r\n{purpose}\r\n{}; filename=\"{name}\"\r\nContent-Type: application/jsonl\r\n\r\n",
+            field("purpose"),
+            field("file")
+        );
+        Ok(Self {
+            head: head.into(),
+            left: file.metadata()?.len(),
+            file,
+            tail: format!("\r\n--{boundary}--\r\n").into(),
+        })
+    }
+
+    /// The next piece; `None` at the end.
+    fn next(&mut self) -> io::Result<Option<Bytes>> {
+        if !self.head.is_empty() {
+            return Ok(Some(std::mem::take(&mut self.head)));
+        }
+        if self.left > 0 {
+            let mut chunk = vec![0; CHUNK.min(usize::try_from(self.left).unwrap_or(CHUNK))];
+            self.file.read_exact(&mut chunk)?;
+            self.left -= chunk.len() as u64;
+            return Ok(Some(chunk.into()));
+        }
+        let tail = std::mem::take(&mut self.tail);
+        Ok((!tail.is_empty()).then_some(tail))
+    }
+}
+
+impl Body for FileForm {
+    type Data = Bytes;
+    type Error = io::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        _: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, io::Error>>> {
+        Poll::Ready(self.next().map(|piece| piece.map(Frame::data)).transpose())
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.tail.is_empty()
+    }
+
+    /// The exact size, so that the request has a `Content-Length`.
+    fn size_hint(&self) -> SizeHint {
+        let texts = self.head.len() + self.tail.len();
+        SizeHint::with_exact(texts as u64 + self.left)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_file_is_framed_and_the_size_is_exact() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let content = b"{\"custom_id\":1}\n".repeat(40_000);
+        std::fs::write(file.path(), &content).unwrap();
+        let mut form = FileForm::open(file.path(), "a.jsonl", "batch", "XX").unwrap();
+        let size = form.size_hint().exact().unwrap();
+        let (mut sent, mut pieces) = (Vec::new(), 0);
+        while let Some(piece) = form.next().unwrap() {
+            assert!(piece.len() <= CHUNK);
+            sent.extend_from_slice(&piece);
+            pieces += 1;
+        }
+        assert!(form.is_end_stream());
+        assert_eq!(sent.len() as u64, size);
+        assert!(pieces > 3, "{pieces}");
+        let text = String::from_utf8(sent).unwrap();
+        let begin =
+            "--XX\r\nContent-Disposition: form-data; name=\"purpose\"\r\n\r\nbatch\r\n--XX\r\n";
+        assert!(text.starts_with(begin), "{}", &text[..200]);
+        assert!(text.ends_with("\n\r\n--XX--\r\n"));
+        assert!(text.contains("filename=\"a.jsonl\""));
+    }
+}

@@ -1,0 +1,198 @@
+//! The steps of a part after its batch is made: looking at it, fetching its replies, deleting its files.
+
+use std::fs;
+use std::path::PathBuf;
+
+use jiff::Timestamp;
+use tokio::time::sleep;
+
+use super::driver::{Driver, Step, Until};
+use super::event::Event;
+use crate::ask::batch_api::{ApiResult, BatchState, RemoteBatch};
+use crate::error::{Error, Result};
+use crate::types::Detail;
+
+/// Bytes that a reply may have; chosen: far more than the longest reply of a reasoning model.
+const MOST_REPLY_BYTES: u64 = 4 << 20;
+
+/// How often a file is tried to be deleted; chosen.
+const DELETIONS: usize = 3;
+
+impl<D: Detail> Driver<'_, D> {
+    /// Looks at the batch of a part, once between two waits.
+    pub(super) async fn look_at(&mut self, part: usize) -> Result<Step> {
+        let Some(id) = self.part(part).batch.clone() else {
+            return Ok(Step::Waiting);
+        };
+        if !self.notes.looked_at.insert(part) {
+            return Ok(Step::Waiting);
+        }
+        if self.until == Until::Cancelled && !self.part(part).cancelled {
+            self.cancel(part, &id).await?;
+        }
+        let looked = self.server(part)?.batch(&id).await;
+        let batch = match looked {
+            Ok(batch) => batch,
+            Err(failure) => return self.look_failed(part, &failure),
+        };
+        self.notes.refused_looks.remove(&part);
+        let state = batch.state.word().to_owned();
+        if state != self.part(part).state {
+            self.journal.record(part, Event::Seen { state })?;
+        }
+        let (done, total) = (batch.counts.done, batch.counts.total);
+        match &batch.state {
+            BatchState::Working(word) => {
+                self.say(part, &format!("{word}, {done} of {total}"));
+                self.cancel_if_late(part, &id).await?;
+                Ok(Step::Waiting)
+            }
+            BatchState::Unknown(word) => {
+                let name = self.part(part).name.clone();
+                self.warn_once(format!(
+                    "{name}: the server says {word:?} of its batch {id}, which is not a known state; looked at again until it has ended"
+                ));
+                Ok(Step::Waiting)
+            }
+            BatchState::Failed => self.failed(part, &batch),
+            BatchState::Completed | BatchState::Expired | BatchState::Cancelled => {
+                self.fetch(part, &batch).await
+            }
+        }
+    }
+
+    async fn cancel(&mut self, part: usize, id: &str) -> Result<()> {
+        match self.server(part)?.cancel(id).await {
+            Ok(()) => self.journal.record(part, Event::Cancelled),
+            // It may have ended meanwhile; the look that follows tells.
+            Err(failure) => {
+                let name = self.part(part).name.clone();
+                self.warn_once(format!("{name}: not cancelled yet: {failure}"));
+                Ok(())
+            }
+        }
+    }
+
+    /// Cancels a batch on which the server works for longer than `--give-up`.
+    async fn cancel_if_late(&mut self, part: usize, id: &str) -> Result<()> {
+        let created = self.part(part).created.parse::<Timestamp>().ok();
+        let (Some(hours), Some(created)) = (self.args.give_up, created) else {
+            return Ok(());
+        };
+        let worked_hours = Timestamp::now().duration_since(created).as_secs_f64() / 3600.0;
+        if worked_hours < hours || self.part(part).cancelled {
+            return Ok(());
+        }
+        self.warn_once(format!(
+            "{}: cancelled, as it has not ended after {hours} hours (--give-up)",
+            self.part(part).name
+        ));
+        self.cancel(part, id).await
+    }
+
+    /// What follows from a batch that the server could not begin.
+    fn failed(&mut self, part: usize, batch: &RemoteBatch) -> Result<Step> {
+        if let Some(quota) = &batch.quota {
+            return self.quota_reached(part, quota);
+        }
+        let problem = match batch.problem.as_str() {
+            "" => "the server does not say why",
+            problem => problem,
+        };
+        let why = format!("the batch {} failed: {problem}", batch.id);
+        self.give_up(part, why.clone())?;
+        let of = self.part(part);
+        Err(Error::Endpoint {
+            endpoint: of.facts.base.clone(),
+            problem: format!("{}: {why}; nothing of it was asked", of.name),
+        })
+    }
+
+    /// Fetches the files of a batch that has ended. Each may be missing.
+    async fn fetch(&mut self, part: usize, batch: &RemoteBatch) -> Result<Step> {
+        let most = MOST_REPLY_BYTES * (self.part(part).facts.requests as u64 + 1);
+        let files = [&batch.output_file, &batch.error_file];
+        for (id, path) in files.into_iter().zip(self.fetched(part)) {
+            let Some(id) = id else {
+                continue;
+            };
+            let unfinished = path.with_extension("download");
+            let loaded = self.server(part)?.download(id, &unfinished, most).await;
+            if let Err(failure) = loaded {
+                return self.look_failed(part, &failure);
+            }
+            fs::rename(&unfinished, &path).map_err(|e| Error::file(&path, "write", e))?;
+        }
+        let event = Event::Fetched {
+            state: batch.state.word().to_owned(),
+            files: files.into_iter().flatten().cloned().collect(),
+        };
+        self.journal.record(part, event)?;
+        self.release(part);
+        Ok(Step::Moved)
+    }
+
+    /// The paths of a part's replies and of its failures.
+    pub(super) fn fetched(&self, part: usize) -> [PathBuf; 2] {
+        let stem = self.part(part).stem();
+        ["output", "errors"].map(|kind| self.journal.folder().join(format!("{stem}.{kind}.jsonl")))
+    }
+
+    /// Deletes the files of a part at the server, unless they are to be kept.
+    pub(super) async fn delete_files(&mut self, part: usize) -> Result<Step> {
+        let mut event = Event::Deleted;
+        if self.args.collect.keep_files {
+            event = Event::Kept;
+        } else {
+            for id in self.files_at_server(part).await? {
+                if let Err(failure) = self.delete_file(part, &id).await? {
+                    event = Event::Kept;
+                    tracing::warn!("the file {id} could not be deleted at the server: {failure}");
+                }
+            }
+        }
+        self.journal.record(part, event)?;
+        Ok(Step::Moved)
+    }
+
+    /// The server's names of a part's files. If the input file was uploaded more than once, that includes copies of it of which the
+    /// answer was lost.
+    pub(super) async fn files_at_server(&self, part: usize) -> Result<Vec<String>> {
+        let of = self.part(part);
+        let mut ids = of.files.clone();
+        if of.uploads > 1 {
+            let (name, purpose) = (self.remote_name(part), &self.args.purpose);
+            match self.server(part)?.files(purpose).await {
+                Ok(files) => {
+                    let copies = files.into_iter().filter(|file| file.name == name);
+                    ids.extend(copies.map(|file| file.id));
+                    ids.sort();
+                    ids.dedup();
+                }
+                Err(failure) => tracing::warn!(
+                    "{}: copies of its file may be at the server, as {name}: {failure}",
+                    of.name
+                ),
+            }
+        }
+        Ok(ids)
+    }
+
+    /// Deletes a file at the server; one that is gone is no failure.
+    pub(super) async fn delete_file(&self, part: usize, id: &str) -> Result<ApiResult<()>> {
+        let server = self.server(part)?;
+        let mut tried = server.delete(id).await;
+        for _ in 1..DELETIONS {
+            match &tried {
+                Err(failure) if !failure.is_permanent() => {}
+                _ => break,
+            }
+            sleep(self.args.collect.poll).await;
+            tried = server.delete(id).await;
+        }
+        Ok(match tried {
+            Err(failure) if failure.status == Some(404) => Ok(()),
+            tried => tried,
+        })
+    }
+}

@@ -1,0 +1,284 @@
+//! A run through batches that the program submits itself: [`run`].
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use tokio::runtime;
+
+use super::BatchFileArgs;
+use super::driver::{Driven, Driver, Notes, Until};
+use super::export;
+use super::file::RequestCost;
+use super::journal::Journal;
+use super::recover::recover;
+use super::requests::require_remote;
+use super::servers::Servers;
+use super::settings::BatchRunArgs;
+use super::summary;
+use crate::error::Result;
+use crate::job::budget::Budget;
+use crate::job::circuit_breaker::EndReason;
+use crate::job::enhancers::{self, OpenEnhancers};
+use crate::job::experiment::Experiment;
+use crate::job::interrupt::Interrupt;
+use crate::job::models;
+use crate::job::open_run::{OpenRun, Remaining};
+use crate::job::outcome::Outcome;
+use crate::job::trial::Item as _;
+use crate::job::workers::unstarted;
+use crate::report::forecast::money;
+use crate::types::TrialKey;
+use crate::types::manifest::Status;
+
+/// How often what a batch did not answer is asked again in another one; chosen.
+const MOST_REPEATS: usize = 3;
+
+/// How a phase ended.
+enum PhaseEnd {
+    /// All was asked, as far as batches go.
+    Asked,
+    /// The batches are made, and the command returns.
+    Detached,
+    /// The command ends early.
+    Early(EndReason),
+}
+
+/// Asks the remaining trials in batches, phase by phase, and waits for their replies.
+///
+/// # Errors
+/// If a model is built in, or a server refuses what every further call would ask. The batches stay, and the same command goes on.
+pub(crate) fn run<E: Experiment>(
+    run: OpenRun<'_, E>,
+    files: &BatchFileArgs,
+    args: &BatchRunArgs,
+) -> Result<Outcome> {
+    let journal = Journal::open(run.store.folder(), &run.manifest)?;
+    let mut batches = BatchRun {
+        run,
+        journal,
+        files,
+        args,
+        refused: BTreeSet::new(),
+        enhancers_taken: false,
+    };
+    recover(&mut batches.journal, &batches.run.store)?;
+    let mut end = EndReason::AllAsked;
+    for phase in 0..E::PHASES.len() {
+        match batches.phase(phase)? {
+            PhaseEnd::Asked => {}
+            PhaseEnd::Detached => return Ok(batches.detached()),
+            PhaseEnd::Early(reason) => {
+                end = reason;
+                break;
+            }
+        }
+    }
+    batches.finish(end)
+}
+
+/// An open run with its batches.
+struct BatchRun<'a, 'b, E: Experiment> {
+    run: OpenRun<'a, E>,
+    journal: Journal,
+    files: &'b BatchFileArgs,
+    args: &'b BatchRunArgs,
+    /// Trials that were refused in a way in which they would be again.
+    refused: BTreeSet<TrialKey>,
+    enhancers_taken: bool,
+}
+
+impl<E: Experiment> BatchRun<'_, '_, E> {
+    fn phase(&mut self, phase: usize) -> Result<PhaseEnd> {
+        for repeat in 0..=MOST_REPEATS {
+            let mut remaining = self.remaining(phase)?;
+            if repeat == 0 {
+                self.warn_of_other_batches(&remaining);
+            }
+            let has_parts = self.journal.has_open_parts();
+            if remaining.plan.remaining() == 0 && !has_parts {
+                break;
+            }
+            if remaining.plan.remaining() > 0 {
+                require_remote(self.run.experiment.models(phase))?;
+                if repeat == 0 && !self.args.no_scout {
+                    match self.scout(phase, remaining)? {
+                        EndReason::AllAsked => {}
+                        early => return Ok(PhaseEnd::Early(early)),
+                    }
+                    remaining = self.remaining(phase)?;
+                }
+                self.write(phase, remaining)?;
+            }
+            match self.drive(phase)? {
+                Some(Driven::Reached) if self.args.detach && self.journal.has_open_parts() => {
+                    return Ok(PhaseEnd::Detached);
+                }
+                Some(Driven::Reached) => {}
+                Some(Driven::OverBudget) => {
+                    self.warn_of_budget();
+                    return Ok(PhaseEnd::Early(EndReason::OverBudget));
+                }
+                None => return Ok(PhaseEnd::Early(EndReason::Interrupted)),
+            }
+        }
+        Ok(PhaseEnd::Asked)
+    }
+
+    /// The trials of a phase that are to be asked in a batch.
+    fn remaining(&mut self, phase: usize) -> Result<Remaining<E>> {
+        let mut remaining = self.run.remaining(phase)?;
+        remaining.plan.exclude(|key| self.refused.contains(key));
+        Ok(remaining)
+    }
+
+    /// Warns about trials in files that the user submits.
+    fn warn_of_other_batches(&self, remaining: &Remaining<E>) {
+        let own = self.journal.open_requests();
+        if remaining.in_batch > own {
+            tracing::warn!(
+                "{} trials are in files of batch export and not asked here; import their replies with batch import",
+                remaining.in_batch - own
+            );
+        }
+    }
+
+    /// Asks one trial of each model directly, so that what the server refuses is found out before a batch is made.
+    fn scout(&mut self, phase: usize, mut remaining: Remaining<E>) -> Result<EndReason> {
+        let mut models = BTreeSet::new();
+        let mut scouts = BTreeSet::new();
+        for (_, group) in remaining.plan.groups() {
+            for trial in &group.trials {
+                if models.insert(trial.model) {
+                    scouts.insert(trial.key);
+                }
+            }
+        }
+        remaining.plan.exclude(|key| !scouts.contains(key));
+        self.reload_enhancers()?;
+        self.run.ask_phase(phase, remaining)
+    }
+
+    /// Writes the remaining trials as parts.
+    fn write(&mut self, phase: usize, remaining: Remaining<E>) -> Result<()> {
+        if remaining.plan.remaining() == 0 {
+            return Ok(());
+        }
+        self.reload_enhancers()?;
+        self.run.write_counts(&remaining.stored)?;
+        let experiment = self.run.experiment;
+        let (models, money) = (experiment.models(phase), &experiment.settings().money);
+        let budget = Budget::new(money, models, &remaining.stored)?;
+        let cost = |trial: &_, stimulus: &crate::job::trial::Stimulus| {
+            let trial: &crate::job::trial::Trial<E::Item> = trial;
+            let images = stimulus.images.iter().map(|image| image.facts());
+            let tokens = budget.expected_tokens(&models[trial.model], trial, images);
+            let reply = trial.item.reply_tokens();
+            let dollars = budget.expected_cost(trial.model, tokens, reply);
+            RequestCost {
+                tokens,
+                dollars: dollars.map(|dollars| money.prices.batch * dollars),
+            }
+        };
+        let quota = self.args.enqueued_tokens.map(std::num::NonZeroU64::get);
+        let target = export::Target {
+            files: self.files,
+            quota,
+            journal: Some(&mut self.journal),
+            cost: &cost,
+        };
+        export::write(&mut self.run, phase, remaining.plan, target)?;
+        Ok(())
+    }
+
+    /// Reads the enhancers again if they have been used.
+    fn reload_enhancers(&mut self) -> Result<()> {
+        let settings = self.run.experiment.settings();
+        if self.enhancers_taken {
+            let files = enhancers::read(&settings.enhancers.llie)?;
+            self.run.enhancers = OpenEnhancers::deferred(files, &settings.loading);
+        }
+        self.enhancers_taken = true;
+        Ok(())
+    }
+
+    /// Moves all parts on; `None` if the user interrupted it.
+    fn drive(&mut self, phase: usize) -> Result<Option<Driven>> {
+        let experiment = self.run.experiment;
+        let mut servers = Servers::default();
+        for phase in 0..E::PHASES.len() {
+            for model in experiment.models(phase) {
+                if let Some(server) = model.model.batch_server()? {
+                    servers.add(model.model.batch_base().unwrap_or_default(), server);
+                }
+            }
+        }
+        let models = experiment.models(phase).iter();
+        let models: Vec<_> = models.map(|model| &*model.model).collect();
+        let mut driver = Driver {
+            store: &mut self.run.store,
+            manifest: &self.run.manifest,
+            journal: &mut self.journal,
+            servers: &servers,
+            models: &models,
+            args: self.args,
+            money: Some(&experiment.settings().money),
+            progress: self.run.progress,
+            until: if self.args.detach {
+                Until::Submitted
+            } else {
+                Until::TakenOver
+            },
+            refused: &mut self.refused,
+            notes: Notes::default(),
+        };
+        let runtime = runtime::Builder::new_current_thread()
+            .enable_all()
+            .build()
+            .map_err(|e| unstarted(&e))?;
+        runtime.block_on(async {
+            let mut interrupt = Interrupt::listen()?;
+            tokio::select! {
+                biased;
+                () = interrupt.next() => Ok(None),
+                driven = driver.drive() => driven.map(Some),
+            }
+        })
+    }
+
+    fn warn_of_budget(&self) {
+        if let Some(max_cost) = self.run.experiment.settings().money.max_cost {
+            tracing::warn!(
+                "stopped: one more batch could exceed the {} of --max-cost; the same command with a higher limit continues, and batch \
+                 cancel frees the requests that wait",
+                money(max_cost)
+            );
+        }
+    }
+
+    /// What is out, for a command that does not wait.
+    fn detached(self) -> Outcome {
+        let folder = self.run.store.folder().display().to_string();
+        let parts = summary::lines(&self.journal, &BTreeMap::new());
+        let output = format!(
+            "{parts}the same command, or batch fetch {folder}, takes the replies over; the same command also submits what waits\n"
+        );
+        Outcome {
+            status: Status::Complete,
+            output,
+        }
+    }
+
+    fn finish(mut self, end: EndReason) -> Result<Outcome> {
+        if let EndReason::Interrupted = end {
+            let line = format!(
+                "interrupted: the batches go on working; the same command goes on, and batch cancel {} ends them",
+                self.run.store.folder().display()
+            );
+            self.run.progress.note(&line);
+        }
+        for phase in 0..E::PHASES.len() {
+            let adapted = models::adapted(self.run.experiment.models(phase));
+            self.run.manifest.settings.extend(adapted);
+        }
+        self.run.finish(end)
+    }
+}

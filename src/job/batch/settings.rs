@@ -1,0 +1,65 @@
+//! The flags for batches that the program submits itself: [`BatchRunArgs`], [`CollectArgs`].
+
+use std::num::NonZeroU64;
+use std::time::Duration;
+
+use clap::Args;
+
+use crate::types::Decides;
+use crate::types::flag::{positive, seconds};
+
+/// Flags for looking after batches.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Batch")]
+pub(crate) struct CollectArgs {
+    /// Seconds between two looks at the batches; up to 30 times as long while nothing changes
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "10", add = Decides::Nothing)]
+    pub poll: Duration,
+    /// Keep the files at the server after their replies are taken over; default: delete them, as they hold the images
+    #[arg(long, add = Decides::Nothing)]
+    pub keep_files: bool,
+}
+
+/// Flags for submitting batches.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Batch")]
+pub(crate) struct BatchRunArgs {
+    /// Flags for looking after batches.
+    #[command(flatten)]
+    pub collect: CollectArgs,
+    /// Submit the batches and return; batch fetch, or the same command, takes the replies over
+    #[arg(long, add = Decides::Nothing)]
+    pub detach: bool,
+    /// Send no request of each model directly before its batches; such a request finds out what the server refuses
+    #[arg(long, add = Decides::Nothing)]
+    pub no_scout: bool,
+    /// The tokens that the server lets wait for batches of a model; parts have at most 45 % of it; default: what the server states when
+    /// it refuses a batch, and parts of 2 million
+    #[arg(long, value_name = "N", add = Decides::Nothing)]
+    pub enqueued_tokens: Option<NonZeroU64>,
+    /// The time within which the server is to end a batch
+    #[arg(long, value_name = "TIME", default_value = "24h", add = Decides::Nothing)]
+    pub window: String,
+    /// Cancel a batch that has not ended after this time; what it has not answered is asked again; default: never
+    #[arg(long, value_name = "HOURS", value_parser = positive, add = Decides::Nothing)]
+    pub give_up: Option<f64>,
+    /// The purpose under which files are uploaded
+    #[arg(long, value_name = "WORD", default_value = "batch", add = Decides::Nothing)]
+    pub purpose: String,
+}
+
+impl BatchRunArgs {
+    /// The default flags, with these for looking after batches.
+    #[must_use]
+    pub(super) fn collecting(collect: &CollectArgs) -> Self {
+        Self {
+            collect: collect.clone(),
+            detach: false,
+            no_scout: true,
+            enqueued_tokens: None,
+            window: String::new(),
+            give_up: None,
+            purpose: "batch".to_owned(),
+        }
+    }
+}

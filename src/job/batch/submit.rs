@@ -1,0 +1,202 @@
+//! The steps of a part until its batch is made: upload, creation, and the search for what a killed process may have made.
+
+use super::driver::{Driver, Step, Until};
+use super::event::Event;
+use crate::ask::batch_api::{ApiFailure, Effect, NewBatch, Readiness};
+use crate::error::{Error, Result};
+use crate::types::Detail;
+
+impl<D: Detail> Driver<'_, D> {
+    /// Uploads the file of a part, if its batch may be made.
+    pub(super) async fn upload(&mut self, part: usize) -> Result<Step> {
+        if let Some(pieces) = self.too_large(part) {
+            return self.split(part, pieces).await;
+        }
+        if self.is_held(part)? {
+            return Ok(Step::Waiting);
+        }
+        let (path, name) = (self.journal.file(part), self.remote_name(part));
+        if !path.exists() {
+            let why = "its file is gone".to_owned();
+            return self.give_up(part, why).map(|()| Step::Moved);
+        }
+        let (bytes, of) = (path.metadata().map(|file| file.len()), self.part(part));
+        if bytes.is_ok_and(|bytes| bytes != of.facts.bytes) {
+            let expected = of.facts.bytes;
+            let problem = format!(
+                "the file was changed after it was written: {expected} bytes expected; batch cancel {} frees its requests",
+                self.store.folder().display()
+            );
+            return Err(Error::Run { path, problem });
+        }
+        self.say(part, "uploading");
+        self.journal.record(part, Event::Uploading)?;
+        let sent = self.server(part)?.upload(&path, &name, &self.args.purpose);
+        match sent.await {
+            Ok(file) => {
+                if file.readiness == Readiness::Ready {
+                    self.notes.ready.insert(file.id.clone());
+                }
+                self.journal.record(part, Event::Uploaded { id: file.id })?;
+                Ok(Step::Moved)
+            }
+            Err(failure) => self.not_made(part, &failure),
+        }
+    }
+
+    /// Looks for the file of a part that may have been uploaded.
+    pub(super) async fn find_file(&mut self, part: usize) -> Result<Step> {
+        let name = self.remote_name(part);
+        let listed = self.server(part)?.files(&self.args.purpose).await;
+        let files = match listed {
+            Ok(files) => files,
+            // A second copy of a file costs nothing.
+            Err(failure) if failure.is_unsupported() => {
+                return self.refuse(part, "the server does not list its files");
+            }
+            Err(failure) => return self.look_failed(part, &failure),
+        };
+        let bytes = self.part(part).facts.bytes;
+        let mut files = files.into_iter();
+        let found =
+            files.find(|file| file.name == name && file.bytes.is_none_or(|other| other == bytes));
+        let event = match found {
+            Some(file) => Event::Uploaded { id: file.id },
+            None if !self.is_missing(part) => return Ok(Step::Waiting),
+            None => Event::Refused {
+                why: "the file is not at the server".to_owned(),
+            },
+        };
+        self.journal.record(part, event)?;
+        Ok(Step::Moved)
+    }
+
+    /// Makes the batch of a part, if it may be made now and the server has read the file.
+    pub(super) async fn create(&mut self, part: usize) -> Result<Step> {
+        if let Some(pieces) = self.too_large(part) {
+            return self.split(part, pieces).await;
+        }
+        if self.is_held(part)? {
+            return Ok(Step::Waiting);
+        }
+        let Some(file) = self.part(part).files.first().cloned() else {
+            return self.refuse(part, "the file has no name");
+        };
+        if !self.notes.ready.contains(&file) {
+            match self.server(part)?.file(&file).await {
+                Ok(at_server) => match at_server.readiness {
+                    Readiness::Ready => self.notes.ready.insert(file.clone()),
+                    Readiness::Pending => return Ok(Step::Waiting),
+                    Readiness::Refused => return Err(self.unread(part)),
+                },
+                // It was deleted, so it is uploaded again.
+                Err(failure) if failure.status == Some(404) => {
+                    self.journal.record(part, Event::Uploading)?;
+                    return self.refuse(part, "the file is not at the server any more");
+                }
+                Err(failure) => return self.look_failed(part, &failure),
+            };
+        }
+        let attempt = self.part(part).attempt + 1;
+        self.journal.record(part, Event::Creating { attempt })?;
+        let (mark, url) = (self.mark(part), self.part(part).facts.url.clone());
+        let new = NewBatch {
+            file: &file,
+            url: &url,
+            window: &self.args.window,
+            mark: &mark,
+        };
+        match self.server(part)?.create(new).await {
+            Ok(batch) => self.created(part, batch.id),
+            Err(failure) => self.not_made(part, &failure),
+        }
+    }
+
+    /// Looks for the batch of a part that may have been made.
+    pub(super) async fn find_batch(&mut self, part: usize) -> Result<Step> {
+        let listed = self.server(part)?.batches().await;
+        let batches = match listed {
+            Ok(batches) => batches,
+            Err(failure) if failure.is_unsupported() && self.until == Until::Cancelled => {
+                return self.withdraw(part).await;
+            }
+            Err(failure) if failure.is_unsupported() => return Err(self.unknown(part)),
+            Err(failure) => return self.look_failed(part, &failure),
+        };
+        let mark = self.mark(part);
+        match batches.into_iter().find(|batch| batch.mark == mark) {
+            Some(batch) => self.created(part, batch.id),
+            None if self.is_missing(part) => self.refuse(part, "the batch is not at the server"),
+            None => Ok(Step::Waiting),
+        }
+    }
+
+    fn created(&mut self, part: usize, id: String) -> Result<Step> {
+        let requests = self.part(part).facts.requests;
+        self.say(part, &format!("batch {id} of {requests} requests"));
+        self.journal.record(part, Event::Created { id })?;
+        // The first look is worth a wait.
+        self.notes.looked_at.insert(part);
+        Ok(Step::Moved)
+    }
+
+    /// What follows from an upload or a creation that did not succeed.
+    fn not_made(&mut self, part: usize, failure: &ApiFailure) -> Result<Step> {
+        if let Some(quota) = &failure.quota {
+            return self.quota_reached(part, quota);
+        }
+        if failure.effect == Effect::None {
+            let why = failure.message.clone();
+            self.journal.record(part, Event::Refused { why })?;
+            if failure.is_permanent() {
+                return Err(self.fatal(part, failure));
+            }
+            self.hold(part, failure.wait);
+        }
+        let name = self.part(part).name.clone();
+        self.warn_once(format!("{name}: {failure}; tried again"));
+        Ok(Step::Waiting)
+    }
+
+    /// Notes that nothing was made by the last call.
+    fn refuse(&mut self, part: usize, why: &str) -> Result<Step> {
+        let why = why.to_owned();
+        self.journal.record(part, Event::Refused { why })?;
+        Ok(Step::Moved)
+    }
+
+    /// The name of a part's file at the server.
+    pub(super) fn remote_name(&self, part: usize) -> String {
+        format!("darkqa-{}-{}", self.journal.run, self.part(part).name)
+    }
+
+    /// The mark by which the batch of a part is found again.
+    fn mark(&self, part: usize) -> String {
+        let (run, part) = (&self.journal.run, self.part(part));
+        format!("{run}/{}/{}", part.stem(), part.attempt)
+    }
+
+    /// The error for a file that the server could not read.
+    fn unread(&self, part: usize) -> Error {
+        let part = self.part(part);
+        let id = part.files.first().map_or("", String::as_str);
+        let problem = format!("{}: the server could not read this file ({id})", part.name);
+        Error::Endpoint {
+            endpoint: part.facts.base.clone(),
+            problem,
+        }
+    }
+
+    /// The error for a batch that may or may not exist, at a server that lists none.
+    fn unknown(&self, part: usize) -> Error {
+        let part = self.part(part);
+        Error::Endpoint {
+            endpoint: part.facts.base.clone(),
+            problem: format!(
+                "{}: whether its batch was made is not known, and the server lists no batches; look at the server's own page: if there \
+                 is none, batch cancel frees its requests",
+                part.name
+            ),
+        }
+    }
+}

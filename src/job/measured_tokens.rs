@@ -1,0 +1,110 @@
+//! Tokens of images as the server charges them: [`MeasuredTokens`].
+//!
+//! Before the first reply, the tokens of an image follow from the rule of the model's family, which may not be that of the server. The
+//! prompts' real usage corrects it: what a prompt was charged, less the tokens of its text.
+
+use std::collections::HashMap;
+
+use super::budget::text_tokens;
+use super::plan::Plan;
+use super::trial::Item;
+use crate::types::{Record, TrialKey};
+
+/// Number of replies from which the tokens are taken; chosen.
+const REPLIES: usize = 10;
+
+/// The share by which an estimate may differ from what was charged without a word; chosen.
+const TOLERANCE: f64 = 0.1;
+
+/// What the images of requests were charged, by model of a phase.
+#[derive(Debug, Clone)]
+pub(crate) struct MeasuredTokens {
+    /// Charged tokens less those of the text, one number a reply, at most [`REPLIES`].
+    images: Vec<Vec<f64>>,
+}
+
+/// The tokens of a prompt as estimated, and as charged.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Difference {
+    pub(crate) estimated: f64,
+    pub(crate) charged: f64,
+}
+
+impl MeasuredTokens {
+    /// Nothing measured yet, of so many models.
+    pub(crate) fn new(models: usize) -> Self {
+        Self {
+            images: vec![Vec::new(); models],
+        }
+    }
+
+    /// What stored replies to trials of a plan were charged.
+    pub(crate) fn of_stored<I: Item, D>(
+        models: usize,
+        plan: &Plan<I>,
+        stored: &[Record<D>],
+    ) -> Self {
+        let charged: HashMap<TrialKey, u64> = stored
+            .iter()
+            .filter_map(|record| Some((record.key, record.usage?.prompt_tokens?)))
+            .collect();
+        let mut measured = Self::new(models);
+        for (_, group) in plan.groups().filter(|(_, group)| group.condition.is_some()) {
+            for trial in &group.trials {
+                if let Some(charged) = charged.get(&trial.key) {
+                    measured.add(trial.model, *charged, text_tokens(&trial.prompt));
+                }
+            }
+        }
+        measured
+    }
+
+    /// Adds a reply about images: the tokens that its prompt was charged, and the expected tokens of its text.
+    pub(crate) fn add(&mut self, model: usize, charged: u64, text: f64) {
+        let images = &mut self.images[model];
+        if images.len() < REPLIES {
+            images.push((charged as f64 - text).max(0.0));
+        }
+    }
+
+    /// Median tokens of the images of one request; `None` before [`REPLIES`] replies.
+    pub(crate) fn images(&self, model: usize) -> Option<f64> {
+        let mut images = self.images[model].clone();
+        images.sort_by(f64::total_cmp);
+        let middle = REPLIES / 2;
+        (images.len() == REPLIES).then(|| f64::midpoint(images[middle - 1], images[middle]))
+    }
+
+    /// By how much the estimate of a prompt with this text differs from what is charged; `None` if it differs by 10 % or less, or if too
+    /// few replies are known.
+    pub(crate) fn difference(&self, model: usize, text: f64, images: f64) -> Option<Difference> {
+        let charged = text + self.images(model)?;
+        let estimated = text + images;
+        let differs = (charged - estimated).abs() > TOLERANCE * estimated;
+        differs.then_some(Difference { estimated, charged })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_median_of_ten_replies_corrects_the_estimate() {
+        let mut measured = MeasuredTokens::new(2);
+        for i in 0..10 {
+            assert_eq!(measured.images(1), None, "{i}");
+            // One reply that was charged far more does not count.
+            let charged = if i == 3 { 90_000 } else { 100 + 1000 + i };
+            measured.add(1, charged, 100.0);
+        }
+        let images = measured.images(1).unwrap();
+        assert!((images - 1005.5).abs() < 1.0, "{images}");
+        assert_eq!(measured.images(0), None);
+        let difference = measured.difference(1, 100.0, 765.0).unwrap();
+        assert!((difference.charged - 1105.5).abs() < 1.0);
+        assert!((difference.estimated - 865.0).abs() < 1e-9);
+        // Within 10 %.
+        assert_eq!(measured.difference(1, 100.0, 1000.0), None);
+    }
+}

@@ -1,0 +1,92 @@
+//! `batch status`, `batch fetch` and `batch cancel`: the batches of a run, by its folder alone.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::reported;
+use crate::ask::AccessArgs;
+use crate::error::Result;
+use crate::job::batch::{CollectArgs, FolderBatches, FolderTask};
+use crate::job::progress::Progress;
+use crate::job::report::{choice, open};
+use crate::job::stored::{ExperimentKind, StoredRun, manifest};
+use crate::job::{Outcome, ShowArgs, StdoutFormat};
+use crate::store::{AddressChange, Store};
+use crate::types::manifest::Status;
+use crate::types::{ChoiceDetail, Decides, Detail, OpenDetail};
+
+/// The flags of `batch status`.
+#[derive(Debug, Args)]
+pub(crate) struct BatchStatusArgs {
+    /// The folder of the run
+    #[arg(value_name = "RUN", add = Decides::Nothing)]
+    pub run: PathBuf,
+    /// The endpoint and its key; by default the address at which the batches were made.
+    #[command(flatten)]
+    pub access: AccessArgs,
+}
+
+/// The flags of `batch fetch` and `batch cancel`.
+#[derive(Debug, Args)]
+pub(crate) struct BatchFolderArgs {
+    /// The run, its endpoint and key.
+    #[command(flatten)]
+    pub run: BatchStatusArgs,
+    /// The flags for looking after batches.
+    #[command(flatten)]
+    pub collect: CollectArgs,
+    /// How the report is printed.
+    #[command(flatten)]
+    pub show: ShowArgs,
+}
+
+/// Prints how far the batches of a run have come. Changes nothing, also while another process waits for them.
+///
+/// # Errors
+/// If the folder has no batches that the program submitted, or the server cannot be asked.
+pub(crate) fn status(args: &BatchStatusArgs) -> Result<Outcome> {
+    let manifest = manifest(&args.run)?;
+    let batches = FolderBatches::open(&args.run, &manifest, &args.access)?;
+    Ok(Outcome {
+        status: Status::Complete,
+        output: batches.status()?,
+    })
+}
+
+/// Looks at each batch once, and takes over the replies of those that have ended.
+///
+/// # Errors
+/// If the folder has no batches that the program submitted, or the server refuses.
+pub(crate) fn fetch(args: &BatchFolderArgs, progress: &Progress) -> Result<Outcome> {
+    carry_out(args, FolderTask::Fetch, progress)
+}
+
+/// Cancels the batches, waits until they have ended, and takes over what is there.
+///
+/// # Errors
+/// If the folder has no batches that the program submitted, or the server refuses.
+pub(crate) fn cancel(args: &BatchFolderArgs, progress: &Progress) -> Result<Outcome> {
+    carry_out(args, FolderTask::Cancel, progress)
+}
+
+fn carry_out(args: &BatchFolderArgs, task: FolderTask, progress: &Progress) -> Result<Outcome> {
+    match ExperimentKind::of(&args.run.run)? {
+        ExperimentKind::Choice => in_run::<ChoiceDetail>(args, task, progress, choice::write),
+        ExperimentKind::Open => in_run::<OpenDetail>(args, task, progress, open::write),
+    }
+}
+
+fn in_run<D: Detail>(
+    args: &BatchFolderArgs,
+    task: FolderTask,
+    progress: &Progress,
+    write: impl FnOnce(&Store<D>, StoredRun<D>, StdoutFormat) -> Result<Outcome>,
+) -> Result<Outcome> {
+    let folder = &args.run.run;
+    let manifest = manifest(folder)?;
+    let mut store = Store::<D>::open(folder, &manifest, AddressChange::Allowed)?;
+    let batches = FolderBatches::open(folder, &manifest, &args.run.access)?;
+    let text = batches.carry_out(task, &mut store, &args.collect, progress)?;
+    reported(&store, manifest, args.show.format(), &text, write)
+}

@@ -1,0 +1,200 @@
+//! The ways in which batches end, and what can go wrong on the way.
+
+use serde_json::json;
+
+use super::{BLIND, QUESTIONS, answered, assert_each_once, blind, call_with};
+use crate::support::batches::{Course, Fault, Line, MockBatches, Order};
+use crate::support::endpoint::Answer;
+use crate::support::run::Bench;
+
+#[test]
+fn output_comes_in_any_shape() {
+    for (order, batches) in [(Order::Reversed, 1), (Order::Twice, 1), (Order::Cut, 2)] {
+        let courses = [
+            Course::of("COMPLETED").order(order),
+            Course::of("completed"),
+        ];
+        let (bench, mock, called) = blind(&courses, "");
+        assert_eq!(called.code, Some(0), "{order:?}: {called:?}");
+        let answered = answered(&bench);
+        assert_eq!(answered.len(), QUESTIONS, "{order:?}");
+        assert!(answered.iter().all(|record| record["outcome"] == "right"));
+        // A cut line costs that line alone.
+        let sizes: Vec<usize> = mock.asked().iter().map(Vec::len).collect();
+        assert_eq!(sizes, [QUESTIONS, 1][..batches], "{order:?}");
+    }
+}
+
+#[test]
+fn what_failed_for_reasons_of_the_server_is_asked_again() {
+    let lines: [fn(usize) -> Line; 5] = [
+        |i| [Line::Right, Line::Status(429, "slow down")][i % 2],
+        |i| [Line::Status(500, "oops"), Line::Right][i % 2],
+        |i| [Line::Right, Line::Status(0, "")][i % 2],
+        |i| [Line::Right, Line::Absent][i % 2],
+        // No output file at all.
+        |_| Line::Status(503, "down"),
+    ];
+    for (case, line) in lines.into_iter().enumerate() {
+        let (bench, mock, called) = blind(
+            &[Course::of("completed").lines(line), Course::of("completed")],
+            "",
+        );
+        assert_eq!(called.code, Some(0), "{case}: {called:?}");
+        assert_eq!(answered(&bench).len(), QUESTIONS, "{case}");
+        let again = if case == 4 { QUESTIONS } else { QUESTIONS / 2 };
+        assert_eq!(mock.asked()[1].len(), again, "{case}");
+    }
+}
+
+#[test]
+fn what_was_refused_is_not_asked_again_by_the_same_command() {
+    let course =
+        Course::of("completed").lines(|i| [Line::Right, Line::Status(400, "bad image")][i % 2]);
+    let (bench, mock, called) = blind(&[course, Course::of("completed")], "");
+    assert_eq!(called.code, Some(1), "{called:?}");
+    assert_eq!(
+        (mock.asked().len(), answered(&bench).len()),
+        (1, QUESTIONS / 2)
+    );
+    // The next command asks it, as every evaluation does.
+    let called = call_with(BLIND, &bench, &mock, "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_eq!(mock.asked()[1].len(), QUESTIONS / 2);
+}
+
+#[test]
+fn what_expires_is_asked_again_three_times_at_most() {
+    let (bench, mock, called) = blind(
+        &[Course::of("in_progress expired").lines(|_| Line::Expired)],
+        "",
+    );
+    assert_eq!(called.code, Some(1), "{called:?}");
+    assert_eq!((mock.asked().len(), answered(&bench).len()), (4, 0));
+    // One that expires in the middle.
+    let middle = Course::of("in_progress expired")
+        .lines(|i| if i == 0 { Line::Right } else { Line::Expired });
+    let (bench, mock, called) = blind(&[middle, Course::of("completed")], "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    let sizes: Vec<usize> = mock.asked().iter().map(Vec::len).collect();
+    assert_eq!((sizes, answered(&bench).len()), (vec![4, 3], QUESTIONS));
+}
+
+#[test]
+fn a_batch_that_is_cancelled_elsewhere_is_asked_again() {
+    let states = ["cancelling"; 10].join(" ") + " cancelled";
+    let course = Course::of(&states).lines(|i| if i < 2 { Line::Right } else { Line::Absent });
+    let (bench, mock, called) = blind(&[course, Course::of("completed")], "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    let sizes: Vec<usize> = mock.asked().iter().map(Vec::len).collect();
+    assert_eq!((sizes, answered(&bench).len()), (vec![4, 2], QUESTIONS));
+}
+
+#[test]
+fn a_batch_that_the_server_cannot_begin_stops_the_run() {
+    let failing = Course::failing("invalid_json_line", "this line is no JSON", &json!(3));
+    let (bench, mock, called) = blind(&[failing, Course::of("completed")], "");
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert!(
+        called.stderr.contains("line 3: this line is no JSON"),
+        "{called:?}"
+    );
+    // Its requests are free: the same command asks them.
+    let called = call_with(BLIND, &bench, &mock, "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_each_once(&bench, &mock, QUESTIONS);
+}
+
+#[test]
+fn failures_to_look_or_to_fetch_are_no_failures_of_the_batch() {
+    let bench = Bench::with_questions(QUESTIONS);
+    let mock = MockBatches::start([Course::of("dreaming in_progress completed")]);
+    let bad = |status| Fault::Instead(Answer::error(status, "oops", "oops"));
+    mock.pending(2);
+    mock.fault("GET batches/id", bad(500));
+    mock.fault("GET batches/id", Fault::Instead(Answer::dropped()));
+    for _ in 0..4 {
+        mock.fault("GET files/id/content", bad(502));
+    }
+    mock.fault("DELETE files/id", bad(500));
+    let called = call_with(BLIND, &bench, &mock, "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_each_once(&bench, &mock, QUESTIONS);
+    assert_eq!(
+        called.stderr.matches("\"dreaming\"").count(),
+        1,
+        "{called:?}"
+    );
+    mock.with(|server| assert!(server.files.iter().all(|file| file.deleted)));
+}
+
+#[test]
+fn a_refusal_stops_the_run_and_the_same_command_goes_on() {
+    let rows = [
+        (
+            "POST files",
+            Answer::error(413, "too_large", "the file is too large"),
+        ),
+        (
+            "POST files",
+            Answer::error(401, "invalid_api_key", "Incorrect API key"),
+        ),
+        (
+            "POST batches",
+            Answer::error(400, "invalid_request", "unknown window"),
+        ),
+    ];
+    for (kind, answer) in rows {
+        let bench = Bench::with_questions(QUESTIONS);
+        let mock = MockBatches::start([Course::of("completed")]);
+        mock.fault(kind, Fault::Instead(answer.clone()));
+        let called = call_with(BLIND, &bench, &mock, "");
+        assert_eq!(called.code, Some(2), "{called:?}");
+        assert!(called.stderr.contains("part-1-m-001.jsonl: "), "{called:?}");
+        let called = call_with(BLIND, &bench, &mock, "");
+        assert_eq!(called.code, Some(0), "{called:?}");
+        assert_each_once(&bench, &mock, QUESTIONS);
+    }
+}
+
+#[test]
+fn a_batch_that_never_ends_is_cancelled_if_asked_for() {
+    let course = Course::of(&"in_progress ".repeat(1000)).lines(|_| Line::Absent);
+    let (bench, mock, called) = blind(&[course, Course::of("completed")], "--give-up 0.0003");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_eq!(
+        (mock.count("POST batches/id/cancel"), mock.asked().len()),
+        (1, 2)
+    );
+    assert_eq!(answered(&bench).len(), QUESTIONS);
+}
+
+#[test]
+fn a_file_that_was_edited_is_not_uploaded() {
+    let (bench, mock, called) = blind(
+        &[Course::of("completed")],
+        "--max-cost 0.0000001 --prices prices.toml",
+    );
+    assert_eq!(called.code, Some(2), "no prices yet: {called:?}");
+    bench.file(
+        "prices.toml",
+        "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 10, output = 10 }\n",
+    );
+    let limited = call_with(
+        BLIND,
+        &bench,
+        &mock,
+        "--max-cost 0.0000001 --prices prices.toml",
+    );
+    assert_eq!(limited.code, Some(3), "{limited:?}");
+    let path = bench.path("run/batch/part-1-m-001.jsonl");
+    let text = std::fs::read_to_string(&path).unwrap();
+    std::fs::write(&path, text.replace("color", "hue")).unwrap();
+    let called = call_with(BLIND, &bench, &mock, "");
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert!(
+        called.stderr.contains("was changed after it was written"),
+        "{called:?}"
+    );
+    assert_eq!(mock.count("POST files"), 0);
+}

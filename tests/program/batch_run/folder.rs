@@ -1,0 +1,125 @@
+//! Batches by the folder of their run.
+
+use super::{QUESTIONS, answered, assert_each_once, blind};
+use crate::support::batches::{Course, Line};
+use crate::support::endpoint::Answer;
+use crate::support::run::{Bench, words};
+
+#[test]
+fn a_detached_run_is_looked_at_fetched_and_cancelled_by_its_folder() {
+    let (bench, mock, called) = blind(
+        &[Course::of("in_progress in_progress in_progress completed")],
+        "--detach",
+    );
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert!(
+        called
+            .stdout
+            .contains("part-1-m-001.jsonl: 4 requests to m, batch_1, submitted"),
+        "{called:?}"
+    );
+    let status = bench.complete(&words("batch status run"));
+    assert!(status.contains("in_progress, 0 of 4"), "{status}");
+    // The second look, then the fourth.
+    let early = bench.call(&words("batch fetch run"));
+    assert_eq!(
+        (early.code, answered(&bench).len()),
+        (Some(1), 0),
+        "{early:?}"
+    );
+    bench.call(&words("batch fetch run"));
+    let fetched = bench.call(&words("batch fetch run"));
+    assert_eq!(fetched.code, Some(0), "{fetched:?}");
+    assert!(
+        fetched.stdout.contains("completed: 4 answered, 0 not"),
+        "{fetched:?}"
+    );
+    assert_each_once(&bench, &mock, QUESTIONS);
+    mock.with(|server| assert!(server.files.iter().all(|file| file.deleted)));
+
+    let course = Course::of(&"in_progress ".repeat(1000))
+        .lines(|i| if i < 1 { Line::Right } else { Line::Absent });
+    let (bench, mock, _) = blind(&[course, Course::of("completed")], "--detach");
+    let cancelled = bench.call(&words("batch cancel run --poll 0.02"));
+    assert_eq!(cancelled.code, Some(1), "{cancelled:?}");
+    assert!(
+        cancelled.stdout.contains("cancelled: 1 answered, 3 not"),
+        "{cancelled:?}"
+    );
+    assert_eq!(
+        (mock.count("POST batches/id/cancel"), answered(&bench).len()),
+        (1, 1)
+    );
+    // The rest may be asked directly.
+    let base = mock.base_url();
+    let plain = [
+        "--data",
+        "set.jsonl",
+        "--blind-model",
+        "m",
+        "--resume",
+        "run",
+        "--base-url",
+        &base,
+    ];
+    let called = bench.call(&plain);
+    assert_eq!(
+        (called.code, mock.count("POST chat/completions")),
+        (Some(0), 3),
+        "{called:?}"
+    );
+}
+
+#[test]
+fn built_in_models_and_other_folders_are_refused() {
+    let bench = Bench::with_questions(QUESTIONS);
+    for (args, message) in [
+        (
+            "batch run --data set.jsonl --model random --out x",
+            "built in",
+        ),
+        ("batch status nowhere", "no run in this folder"),
+        ("batch cancel x", "has submitted no batch of this run"),
+    ] {
+        let called = bench.call(&words(args));
+        assert_eq!(called.code, Some(2), "{called:?}");
+        assert!(called.stderr.contains(message), "{called:?}");
+    }
+}
+
+#[test]
+fn what_waits_for_the_quota_is_freed_by_a_cancel() {
+    let full = Answer::error(429, "token_limit_exceeded", "too many enqueued tokens");
+    let (bench, mock, called) = blind(&[Course::refused(full)], "--detach");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert!(called.stdout.contains("no batch, not submitted yet"));
+    // A look submits nothing.
+    let looked = bench.call(&words("batch fetch run"));
+    assert_eq!((looked.code, mock.count("POST batches")), (Some(1), 1));
+    let cancelled = bench.call(&words("batch cancel run --poll 0.02"));
+    assert_eq!(cancelled.code, Some(1), "{cancelled:?}");
+    mock.with(|server| assert!(server.files.iter().all(|file| file.deleted)));
+    let base = mock.base_url();
+    let plain = [
+        "--data",
+        "set.jsonl",
+        "--blind-model",
+        "m",
+        "--resume",
+        "run",
+    ];
+    let called = bench.call(&[&plain[..], &["--base-url", &base]].concat());
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_eq!(mock.count("POST chat/completions"), QUESTIONS);
+}
+
+#[test]
+fn another_address_than_that_of_the_batches_is_left_alone() {
+    let (bench, mock, _) = blind(&[Course::of("completed")], "--detach");
+    let elsewhere = "batch cancel run --base-url http://127.0.0.1:9/v1 --poll 0.02";
+    let called = bench.call(&words(elsewhere));
+    assert!(called.stderr.contains("are left alone"), "{called:?}");
+    assert_eq!(mock.count("POST batches/id/cancel"), 0);
+    let fetched = bench.call(&words("batch fetch run"));
+    assert_eq!((fetched.code, answered(&bench).len()), (Some(0), QUESTIONS));
+}

@@ -1,0 +1,108 @@
+//! Limits: tokens that may wait, and dollars.
+
+use serde_json::Value;
+
+use super::{BLIND, QUESTIONS, answered, assert_each_once, blind, call_with};
+use crate::support::batches::{Course, MockBatches};
+use crate::support::endpoint::Answer;
+use crate::support::run::Bench;
+
+const QUOTA: &str = "Enqueued token limit reached for m in organization o. Limit: 1,000,000 enqueued tokens. Please try again once some \
+    in_progress batches have been completed.";
+
+#[test]
+fn a_full_quota_is_a_wait() {
+    let refused = Course::refused(Answer::error(429, "token_limit_exceeded", QUOTA));
+    let failed = Course::failing("token_limit_exceeded", QUOTA, &Value::Null);
+    for first in [refused, failed] {
+        let (bench, mock, called) = blind(&[first, Course::of("completed")], "");
+        assert_eq!(called.code, Some(0), "{called:?}");
+        assert!(
+            called.stderr.contains("at most 1000000 tokens"),
+            "{called:?}"
+        );
+        assert_each_once(&bench, &mock, QUESTIONS);
+        // The file is not uploaded again.
+        assert_eq!(
+            (mock.count("POST files"), mock.count("POST batches")),
+            (1, 2)
+        );
+    }
+}
+
+#[test]
+fn only_as_many_tokens_wait_as_the_server_allows() {
+    let bench = Bench::with_questions(QUESTIONS);
+    let mock = MockBatches::start([Course::of("in_progress in_progress completed")]);
+    // About 60 tokens a question: one a part.
+    let called = call_with(BLIND, &bench, &mock, "--enqueued-tokens 120");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_each_once(&bench, &mock, QUESTIONS);
+    let sizes: Vec<usize> = mock.asked().iter().map(Vec::len).collect();
+    assert_eq!(sizes, [1, 1, 1, 1]);
+    // With room for one alone, each is looked at before the next is made.
+    let bench = Bench::with_questions(QUESTIONS);
+    let mock = MockBatches::start([Course::of("in_progress in_progress completed")]);
+    let called = call_with(BLIND, &bench, &mock, "--enqueued-tokens 60");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    let log = mock.with(|server| server.log.clone());
+    let calls: Vec<&str> = log
+        .iter()
+        .map(String::as_str)
+        .filter(|one| one.contains("batches"))
+        .collect();
+    let one = [
+        "POST batches",
+        "GET batches/id",
+        "GET batches/id",
+        "GET batches/id",
+    ];
+    assert_eq!(calls, one.repeat(QUESTIONS));
+}
+
+#[test]
+fn a_part_that_is_too_large_for_the_quota_is_divided() {
+    let words = "Enqueued token limit reached for m in organization o. Limit: 120 enqueued tokens.";
+    let small = Course::refused(Answer::error(429, "token_limit_exceeded", words));
+    let (bench, mock, called) = blind(&[small, Course::of("completed")], "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_each_once(&bench, &mock, QUESTIONS);
+    assert_eq!(mock.asked().len(), QUESTIONS);
+    // One that is refused again and again although nothing else waits.
+    let full = Course::failing("token_limit_exceeded", QUOTA, &Value::Null);
+    let courses = [full.clone(), full.clone(), full, Course::of("completed")];
+    let (bench, mock, called) = blind(&courses, "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_each_once(&bench, &mock, QUESTIONS);
+    let sizes: Vec<usize> = mock.asked().iter().map(Vec::len).collect();
+    assert_eq!(sizes, [2, 2]);
+    // A single request that is too large stops the run.
+    let bench = Bench::with_questions(1);
+    let tiny = Course::refused(Answer::error(429, "x", "enqueued tokens: Limit: 7 tokens"));
+    let mock = MockBatches::start([tiny]);
+    let called = call_with(BLIND, &bench, &mock, "");
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert!(called.stderr.contains("--max-side"), "{called:?}");
+}
+
+#[test]
+fn a_limit_of_cost_is_kept_at_the_price_of_batches() {
+    let prices = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 10, output = 10 }\n";
+    let bench = Bench::with_questions(QUESTIONS);
+    bench.file("prices.toml", prices);
+    let mock = MockBatches::start([Course::of("completed")]);
+    // A reply is charged 91 tokens at half of 10 dollars a million: $0.000455. A question a part.
+    let limited = |limit: &str| {
+        let more = format!(
+            "--prices prices.toml --file-requests 1 --enqueued-tokens 60 --max-cost {limit}"
+        );
+        call_with(BLIND, &bench, &mock, &more)
+    };
+    let called = limited("0.001");
+    assert_eq!(called.code, Some(3), "{called:?}");
+    assert!(called.stderr.contains("--max-cost"), "{called:?}");
+    assert_eq!(answered(&bench).len(), 2, "{called:?}");
+    let called = limited("0.01");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_each_once(&bench, &mock, QUESTIONS);
+}

@@ -1,0 +1,162 @@
+//! `batch run`: batches that the program submits and waits for, at a mock server whose batches take every course.
+
+mod ends;
+mod folder;
+mod killed;
+mod limits;
+
+use std::collections::BTreeSet;
+
+use serde_json::Value;
+
+use crate::support::batches::{Course, Fault, Line, MockBatches};
+use crate::support::endpoint::Answer;
+use crate::support::house::House;
+use crate::support::run::{Bench, Called, model_args, records, words};
+
+const QUESTIONS: usize = 4;
+
+/// The run, without its endpoint: L0, L3 in both variants, and blind, so 4 conditions of 4 questions.
+const RUN: &str =
+    "batch run --data set.jsonl --model m --blind-model m --levels L0,L3 --out run --poll 0.02";
+
+/// The number of its trials.
+const TRIALS: usize = 16;
+
+/// A run of one batch: the blind trials alone, none asked directly.
+const BLIND: &str = "batch run --data set.jsonl --blind-model m --out run --poll 0.02 --no-scout";
+
+/// The same, with one trial asked directly before.
+const SCOUTED: &str = "batch run --data set.jsonl --blind-model m --out run --poll 0.02";
+
+fn call_with(run: &str, bench: &Bench, mock: &MockBatches, more: &str) -> Called {
+    let base = mock.base_url();
+    let args = [words(run), vec!["--base-url", &base], words(more)].concat();
+    bench.call(&args)
+}
+
+/// A call of the blind run in a new folder, at a server of these courses.
+fn blind(courses: &[Course], more: &str) -> (Bench, MockBatches, Called) {
+    let bench = Bench::with_questions(QUESTIONS);
+    let mock = MockBatches::start(courses.to_vec());
+    let called = call_with(BLIND, &bench, &mock, more);
+    (bench, mock, called)
+}
+
+/// The records of a run with a reply.
+fn answered(bench: &Bench) -> Vec<Value> {
+    let mut records = records(&bench.path("run"));
+    let replies: BTreeSet<String> = records
+        .iter()
+        .filter(|record| record["outcome"] != "failed")
+        .map(|record| record["key"].to_string())
+        .collect();
+    records.retain(|record| record["outcome"] != "failed");
+    assert_eq!(replies.len(), records.len(), "a trial has two replies");
+    records
+}
+
+/// Asserts that so many trials have one right reply each, and that none was in two batches that were begun.
+fn assert_each_once(bench: &Bench, mock: &MockBatches, trials: usize) {
+    let answered = answered(bench);
+    assert_eq!(answered.len(), trials);
+    assert!(answered.iter().all(|record| record["outcome"] == "right"));
+    let asked = mock.asked().concat();
+    let distinct: BTreeSet<&String> = asked.iter().collect();
+    assert_eq!(asked.len(), distinct.len(), "a request is in two batches");
+}
+
+#[test]
+fn batches_are_submitted_and_their_replies_taken_over() {
+    let bench = Bench::with_questions(QUESTIONS);
+    let mock = MockBatches::start([Course::of("validating in_progress finalizing completed")]);
+    let called = call_with(RUN, &bench, &mock, "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_each_once(&bench, &mock, TRIALS);
+    // Two directly, one of each view, before the batches.
+    assert_eq!(mock.count("POST chat/completions"), 2);
+    assert_eq!(
+        (mock.count("POST files"), mock.count("POST batches")),
+        (2, 2)
+    );
+    let records = records(&bench.path("run"));
+    let batched = records.iter().filter(|record| record["via"] == "batch");
+    assert_eq!(batched.count(), TRIALS - 2);
+    // Nothing stays at the server.
+    mock.with(|server| assert!(server.files.iter().all(|file| file.deleted)));
+    // Nothing is asked twice.
+    let again = call_with(RUN, &bench, &mock, "");
+    assert_eq!((again.code, mock.count("POST batches")), (Some(0), 2));
+}
+
+#[test]
+fn a_refused_field_costs_one_request_or_one_batch() {
+    // Directly before the batches.
+    let bench = Bench::with_questions(QUESTIONS);
+    let mock = MockBatches::start([Course::of("completed")]);
+    let words = "'temperature' is not supported with this model: only the default (1) is supported";
+    mock.fault(
+        "POST chat/completions",
+        Fault::Instead(Answer::error(400, "unsupported_value", words)),
+    );
+    let called = call_with(SCOUTED, &bench, &mock, "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_eq!(
+        (mock.count("POST chat/completions"), mock.asked().len()),
+        (2, 1)
+    );
+    mock.with(|server| {
+        let requests = &server.batches[0].requests;
+        assert!(
+            requests
+                .iter()
+                .all(|one| one["body"].get("temperature").is_none())
+        );
+    });
+    // By the batch itself, where nothing was asked directly.
+    let refused = |_| {
+        Line::Status(
+            400,
+            "'temperature' is not supported with this model: only the default (1) is supported",
+        )
+    };
+    let (bench, mock, called) = blind(
+        &[
+            Course::of("completed").lines(refused),
+            Course::of("completed"),
+        ],
+        "",
+    );
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_eq!((mock.asked().len(), answered(&bench).len()), (2, QUESTIONS));
+    mock.with(|server| {
+        let has = |batch: usize| {
+            server.batches[batch].requests[0]["body"]
+                .get("temperature")
+                .is_some()
+        };
+        assert_eq!((has(0), has(1)), (true, false));
+    });
+}
+
+#[test]
+fn open_answers_and_their_marks_go_through_batches_one_after_the_other() {
+    let house = House::new();
+    let mock = MockBatches::start([
+        Course::of("in_progress completed").text("brown"),
+        Course::of("in_progress completed").text("Your mark: 4"),
+    ]);
+    let base = mock.base_url();
+    let more = "--judge j --levels L0,L4 --out run --batch-run --no-scout --poll 0.02";
+    let called = house.call(&model_args(&base, more));
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert!(called.stdout.contains("75.0"), "{called:?}");
+    mock.with(|server| {
+        let models = server.batches.iter();
+        let models: Vec<&Value> = models
+            .map(|one| &one.requests[0]["body"]["model"])
+            .collect();
+        assert_eq!(models, ["m", "j"]);
+    });
+    assert_eq!(mock.count("POST chat/completions"), 0);
+}
