@@ -8,7 +8,6 @@ use clap::Args;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use super::field::{FieldState, RequestField};
 use crate::error::{Error, Result};
 use crate::types::Decides;
 
@@ -176,23 +175,6 @@ impl ExtraFields {
             fields.remove(field);
         }
         serde_json::to_string(&fields)
-    }
-
-    /// The user's own fields, as a server may refuse them.
-    pub(super) fn request_fields(&self) -> impl Iterator<Item = RequestField<'_>> {
-        let of_body = self.body.keys().map(|name| RequestField {
-            name,
-            state: FieldState::Sent,
-            adaptable: None,
-            hint: "leave this field out of --extra-body, or give a value that the server takes",
-        });
-        let of_system = ["system", "instructions"].map(|name| RequestField {
-            name,
-            state: FieldState::set(self.system.is_some()),
-            adaptable: None,
-            hint: "leave --system out: the model takes no system message",
-        });
-        of_system.into_iter().chain(of_body)
     }
 }
 

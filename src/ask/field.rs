@@ -4,8 +4,9 @@
 use serde_json::{Map, Value};
 
 use super::complaint::Complaint;
-use super::parameters::{Parameters, Temperature, TokenField};
+use super::parameters::{Parameters, Temperature};
 use super::thinking::ThinkingSwitch;
+use super::token_field::TokenField;
 use super::url::BaseUrl;
 use super::vendor::Vendor;
 use super::wire_kind::{Wire, WireSetting};
@@ -182,6 +183,26 @@ pub(super) struct SentFields<'a> {
     pub(super) fields: RequestFields,
     pub(super) has_image: bool,
     pub(super) has_key: bool,
+}
+
+impl<'a> SentFields<'a> {
+    /// The user's own fields.
+    pub(super) fn own(self) -> impl Iterator<Item = RequestField<'a>> {
+        let extra = &self.parameters.extra;
+        let of_body = extra.body.keys().map(|name| RequestField {
+            name,
+            state: FieldState::Sent,
+            adaptable: None,
+            hint: "leave this field out of --extra-body, or give a value that the server takes",
+        });
+        let of_system = ["system", "instructions"].map(|name| RequestField {
+            name,
+            state: FieldState::set(extra.system.is_some()),
+            adaptable: None,
+            hint: "leave --system out: the model takes no system message",
+        });
+        of_system.into_iter().chain(of_body)
+    }
 }
 
 /// Words by which servers say that they do not support a field or its value, and not that the value is wrong.

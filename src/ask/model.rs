@@ -113,6 +113,7 @@ impl Model {
     }
 
     /// The body of a request as it would be sent now; `None` for models without requests.
+    #[must_use]
     pub fn body(
         &self,
         message: Message<'_>,

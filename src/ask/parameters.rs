@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 
 use super::extra_fields::ExtraFields;
 use super::thinking::Thinking;
+use super::token_field::TokenField;
 use super::wire_kind::WireSetting;
 use crate::error::{Error, Result};
 use crate::types::Decides;
@@ -166,21 +167,6 @@ impl FromStr for Temperature {
     }
 }
 
-/// The field in which a token limit is sent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-#[value(rename_all = "snake_case")]
-pub enum TokenField {
-    /// What is known of the endpoint, else max_tokens; the other one where the server asks for it
-    Auto,
-    /// What every other server understands
-    MaxTokens,
-    /// What reasoning models of OpenAI demand
-    MaxCompletionTokens,
-    /// No limit is sent
-    #[value(name = "none")]
-    Omit,
-}
-
 /// The resolution at which the server reads an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
@@ -210,7 +196,7 @@ pub enum Constrain {
 }
 
 written_as_text!(Temperature);
-flag_words!(TokenField, ImageDetail, Constrain);
+flag_words!(ImageDetail, Constrain);
 
 #[cfg(test)]
 mod tests {

@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 use serde::Deserialize;
 
 use super::key_header::KeyHeader;
-use super::parameters::TokenField;
+use super::token_field::TokenField;
 
 /// A vendor and the particularities of its endpoints; a field that is `None` is not known.
 #[derive(Debug, Clone, PartialEq, Deserialize)]

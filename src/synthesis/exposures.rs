@@ -314,9 +314,9 @@ mod tests {
         };
         let error = refused("L5-auto", "gain=5", "speed=30");
         assert!(error.contains("K from 0.1 to 6"), "{error}");
-        let error = refused("T133.33-motion", "gain=4", "speed=90");
+        let error = refused("T133.33-motion", "gain=4", "speed=360");
         assert!(
-            error.contains("81.30 pixels") && error.contains("at most 64"),
+            error.contains("325.20 pixels") && error.contains("at most 256"),
             "{error}"
         );
         let error = refused("L1-auto", "shutter=2", "speed=400");

@@ -1,6 +1,7 @@
 use super::*;
 use crate::ask::field::RequestFields;
-use crate::ask::parameters::{Parameters, TokenField};
+use crate::ask::parameters::Parameters;
+use crate::ask::token_field::TokenField;
 
 fn parameters() -> Parameters {
     Parameters {

@@ -8,7 +8,8 @@ use crate::ask::body::Parts;
 use crate::ask::call::Message;
 use crate::ask::constraint;
 use crate::ask::field::RequestFields;
-use crate::ask::parameters::{Constrain, ImageDetail, Parameters, TokenField};
+use crate::ask::parameters::{Constrain, ImageDetail, Parameters};
+use crate::ask::token_field::TokenField;
 use crate::ask::wire_kind::Wire;
 use crate::types::question::letter;
 

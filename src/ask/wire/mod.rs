@@ -70,7 +70,7 @@ impl Wire {
         fields.extend(sent.fields.of_switch());
         // A field that is left out is not the cause.
         fields.retain(|field| !extra.omit.iter().any(|name| name == field.name));
-        fields.extend(extra.request_fields());
+        fields.extend(sent.own());
         fields
     }
 

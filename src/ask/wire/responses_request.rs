@@ -11,7 +11,8 @@ use crate::ask::body::Parts;
 use crate::ask::call::Message;
 use crate::ask::constraint;
 use crate::ask::field::{AdaptableField, FieldState, RequestField, RequestFields, SentFields};
-use crate::ask::parameters::{Constrain, ImageDetail, Parameters, Temperature, TokenField};
+use crate::ask::parameters::{Constrain, ImageDetail, Parameters, Temperature};
+use crate::ask::token_field::TokenField;
 use crate::types::question::letter;
 
 /// The body of a request without its input, which stands at its end.

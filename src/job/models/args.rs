@@ -21,7 +21,7 @@ pub(crate) struct ModelArgs {
     /// Add a text-only baseline by this model; repeatable; default: none
     #[arg(long, value_name = "NAME", add = Decides::Trials)]
     pub blind_model: Vec<ModelName>,
-    /// A TOML file of models, each a table [[model]] with its endpoint, key and settings; default: none
+    /// A TOML file with one table a model: its endpoint, key and settings; default: none
     #[arg(long, value_name = "FILE", add = Decides::Trials)]
     pub models: Option<PathBuf>,
     /// Ask only these of the models, by their names, separated by commas; default: all

@@ -121,7 +121,7 @@ mod tests {
             "randmo",
             "obsrver",
             "observr:tiles",
-            "scrpt:a.jsonl",
+            "scrip:a.jsonl",
             "Script:x",
         ] {
             let error = near(wrong).unwrap_err().to_string();

@@ -1,0 +1,22 @@
+//! The field in which a token limit is sent: [`TokenField`].
+
+use clap::ValueEnum;
+
+use crate::types::flag::flag_words;
+
+/// The field in which a token limit is sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[value(rename_all = "snake_case")]
+pub enum TokenField {
+    /// What is known of the endpoint, else max_tokens; the other one where the server asks for it
+    Auto,
+    /// What every other server understands
+    MaxTokens,
+    /// What reasoning models of OpenAI demand
+    MaxCompletionTokens,
+    /// No limit is sent
+    #[value(name = "none")]
+    Omit,
+}
+
+flag_words!(TokenField);
