@@ -118,7 +118,7 @@ impl Standing {
 /// A claim under all readings together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Robustness {
-    /// It holds under every reading that was asked. Each test has the level 5 %, and so has their intersection.
+    /// It holds under every reading of the report. Each test has the level 5 %, and so has their intersection.
     All,
     /// It holds under some readings, after Holm's correction over the readings.
     Some,
@@ -431,7 +431,8 @@ fn corrected(mut effects: Vec<Option<TestedEffect>>) -> Vec<Option<TestedEffect>
     effects
 }
 
-/// The claim under the readings that were asked; `None` without one.
+/// The claim under the readings; `None` if it was asked under none. A reading that was not asked shows nothing, so that it cannot hold under
+/// all.
 fn robustness(effects: &[Option<TestedEffect>]) -> Option<Robustness> {
     let asked: Vec<&TestedEffect> = effects.iter().flatten().collect();
     let is = |standing: Standing| move |effect: &&&TestedEffect| effect.standing == standing;
@@ -439,7 +440,7 @@ fn robustness(effects: &[Option<TestedEffect>]) -> Option<Robustness> {
     let reversed = asked.iter().filter(is(Standing::Reversed)).count();
     Some(match holding.clone().count() {
         _ if asked.is_empty() => return None,
-        count if count == asked.len() => Robustness::All,
+        count if count == effects.len() => Robustness::All,
         0 if reversed > 0 => Robustness::None,
         _ if holding.clone().any(|effect| effect.holm < ALPHA) => Robustness::Some,
         _ => Robustness::Open,

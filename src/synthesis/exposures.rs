@@ -319,7 +319,7 @@ mod tests {
             error.contains("325.20 pixels") && error.contains("at most 256"),
             "{error}"
         );
-        let error = refused("L1-auto", "shutter=2", "speed=400");
+        let error = refused("L1-auto", "shutter=2", "speed=1200");
         assert!(error.contains("pixels during the exposure"), "{error}");
     }
 }

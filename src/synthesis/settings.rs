@@ -66,7 +66,7 @@ pub(crate) struct SensorArgs {
     #[arg(long, value_name = "N", default_value_t = 0, add = Decides::Pixels)]
     pub seed: u64,
     /// Light readings, ways to understand the paper's noise, one or several as paper,eld; the four flags below replace choices
-    /// of a single reading and make it custom
+    /// of a single reading, which is then custom, or has the name of the reading with the same choices
     ///
     /// By default the noise variant has the same signal-to-noise ratio at every level: the levels are one noisy image at five
     /// brightnesses. `--profile physical` loses photons with the light; `--profile all` asks under every reading of the paper.
@@ -103,7 +103,8 @@ pub(crate) struct SensorArgs {
     /// for sony-a7s2) for each image
     #[arg(long, value_name = "K", add = Decides::Pixels)]
     pub gain: Option<f64>,
-    /// Pin the light ratio r of the sensor noise; default: uniform in 100–300 for each image
+    /// Pin the light ratio r of the sensor noise; not with --coupling photon, where it is 2^EV; default: uniform in the camera's
+    /// range for each image (100–300 for the built-in ones)
     #[arg(long, value_name = "R", add = Decides::Pixels)]
     pub ratio: Option<f64>,
     /// Take the middle of every distribution for each image, instead of a draw

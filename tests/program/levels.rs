@@ -112,10 +112,11 @@ fn levels_without_l0_have_accuracies_and_no_threshold() {
 #[test]
 fn one_light_reading_is_named_with_what_it_leaves_open() {
     let bench = bench(&[]);
-    let line = "--model script:m.jsonl --data frames --levels L0,L3 --limit 2";
+    let line = "--model script:m.jsonl --data frames --limit 2";
     let ratio = "signal-to-noise ratio is the same at every level";
     for (more, readings, is_said, is_constant) in [
         ("--out one", json!(["paper"]), true, true),
+        ("--out single", json!(["paper"]), true, false),
         ("--out ev --variant ev", json!([]), false, false),
         (
             "--out physical --profile physical",
@@ -136,7 +137,12 @@ fn one_light_reading_is_named_with_what_it_leaves_open() {
             "paper"
         };
         let said = format!("One reading of the paper was run ({reading}).");
-        let text = bench.complete(&[words(line), words(more)].concat());
+        let levels = if more.ends_with("single") {
+            "--levels L0,L3"
+        } else {
+            "--levels L0,L3,12"
+        };
+        let text = bench.complete(&[words(line), words(more), words(levels)].concat());
         let folder = bench.path(more.split(' ').nth(1).unwrap());
         let page = fs::read_to_string(folder.join("report.html")).unwrap();
         let summary = fs::read(folder.join("summary.json")).unwrap();
@@ -150,6 +156,8 @@ fn one_light_reading_is_named_with_what_it_leaves_open() {
         let heads =
             [&text, &page].map(|shown| shown.contains(&format!("With noise (paper) the {ratio}")));
         assert_eq!(heads, [is_constant; 2], "{more}: {text}");
+        let few = [&text, &page].map(|shown| shown.contains("at most nine codes (12 EV)"));
+        assert_eq!(few, [levels.contains("12"); 2], "{more}: {text}");
     }
 }
 

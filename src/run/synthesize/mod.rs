@@ -149,8 +149,9 @@ impl ImageCounts {
                 Status::Incomplete
             },
             output: format!(
-                "{}: {written} made of {frames} frames{unchanged}{failures}\n",
-                out.display()
+                "{}: {written} made of {frames} frame{}{unchanged}{failures}\n",
+                out.display(),
+                if frames == 1 { "" } else { "s" }
             ),
         }
     }

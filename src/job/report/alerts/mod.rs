@@ -52,7 +52,8 @@ pub(super) fn of_runs<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     alerts.extend(of_enhancers(&joined.runs));
     alerts.extend(of_inputs(&joined.runs));
     alerts.extend(adapted::of_adaptations(&joined.runs));
-    alerts.extend(noise::of_noise(&joined.runs));
+    alerts.extend(noise::of_noise(joined));
+    alerts.extend(noise::of_rounding(joined));
     if joined.runs.len() > 1 {
         alerts.extend(settings::of_settings(joined));
         alerts.extend(questions::of_questions(joined));

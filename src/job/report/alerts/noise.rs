@@ -1,33 +1,89 @@
-//! What the levels of runs do to the signal-to-noise ratio of images with sensor noise: [`of_noise`].
+//! What the levels of runs do to the signal-to-noise ratio of images with sensor noise, and to their codes: [`of_noise`],
+//! [`of_rounding`].
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
-use crate::job::report::join::JoinedRun;
+use serde_json::Value;
+
+use crate::job::report::join::Joined;
 use crate::report::alert::{Alert, AlertKind};
-use crate::types::manifest::RunManifest;
+use crate::types::degradation::Kind;
+use crate::types::{Degradation, Detail, Severity};
 
-/// The light readings whose levels all have the same signal-to-noise ratio, if the runs have any.
-pub(super) fn of_noise(runs: &[JoinedRun]) -> Option<Alert> {
-    let readings: BTreeSet<&str> = runs
-        .iter()
-        .flat_map(|run| constant(&run.manifest))
-        .collect();
-    if readings.is_empty() {
+/// The exposure drop in hundredths of EV above which at most nine codes are left: white has code
+/// 255 · 2^(−EV/2.2) = 8 there.
+const FEW_CODES: u16 = 1100;
+
+/// The light readings whose levels all have the same signal-to-noise ratio, where a run has several levels with noise.
+pub(super) fn of_noise<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
+    let mut of_draws = BTreeMap::<&str, BTreeSet<&str>>::new();
+    for run in &joined.runs {
+        let mut levels = BTreeMap::<String, BTreeSet<Severity>>::new();
+        for place in &run.records {
+            let Some(degradation) = degradation(joined, *place) else {
+                continue;
+            };
+            if let Some(reading) = degradation.reading() {
+                let levels = levels.entry(reading.to_string()).or_default();
+                levels.insert(degradation.severity());
+            }
+        }
+        let contents = run.manifest.columns.get("reading").into_iter().flatten();
+        for (reading, content) in contents {
+            let several = levels.get(reading).is_some_and(|levels| levels.len() > 1);
+            if several && content["--coupling"] == "independent" {
+                let names = of_draws.entry(same_noise(content)).or_default();
+                names.insert(reading);
+            }
+        }
+    }
+    let alerts = of_draws.into_iter().map(|(why, names)| {
+        let names: Vec<&str> = names.into_iter().collect();
+        let text = format!(
+            "With noise ({}) the signal-to-noise ratio is the same at every level: {why}. --profile physical loses photons with the light.",
+            names.join(", ")
+        );
+        Alert::new(AlertKind::Noise, text)
+    });
+    alerts.collect()
+}
+
+/// In which way the levels of a light reading have the same noise, if its light ratio r does not depend on the level.
+fn same_noise(reading: &Value) -> &'static str {
+    if reading["--draws"] == "shared" {
+        "the levels are one noisy image at several brightnesses"
+    } else {
+        "each level has other noise of the same strength"
+    }
+}
+
+/// The levels at which an image has so few codes that their rounding decides.
+pub(super) fn of_rounding<D: Detail>(joined: &Joined<D>) -> Option<Alert> {
+    let shown = (0..joined.records.len()).filter_map(|place| degradation(joined, place));
+    let darkest = shown.filter(|degradation| {
+        matches!(degradation.kind(), Kind::Exposure | Kind::Sensor)
+            && degradation.severity().in_hundredths() > FEW_CODES
+    });
+    let levels: BTreeSet<Severity> = darkest.map(Degradation::severity).collect();
+    if levels.is_empty() {
         return None;
     }
-    let names: Vec<&str> = readings.into_iter().collect();
+    let names: Vec<String> = levels
+        .iter()
+        .map(|level| format!("{} EV", level.value()))
+        .collect();
     let text = format!(
-        "With noise ({}) the signal-to-noise ratio is the same at every level: the levels are one noisy image at several brightnesses. --profile physical loses photons with the light.",
+        "Above 11 EV an image has at most nine codes ({}): such levels test the rounding to 8 bits more than the model.",
         names.join(", ")
     );
     Some(Alert::new(AlertKind::Noise, text))
 }
 
-/// The light readings of a run in which the light ratio r does not depend on the level: each level is then the same noisy sample,
-/// multiplied.
-fn constant(manifest: &RunManifest) -> impl Iterator<Item = &str> {
-    let readings = manifest.columns.get("reading").into_iter().flatten();
-    readings
-        .filter(|(_, content)| content["--coupling"] == "independent")
-        .map(|(name, _)| name.as_str())
+/// How the image of a record was made; `None` if it is as the frame, or there is none.
+fn degradation<D: Detail>(joined: &Joined<D>, place: usize) -> Option<&Degradation> {
+    joined.records[place]
+        .condition
+        .as_ref()?
+        .degradation
+        .as_ref()
 }
