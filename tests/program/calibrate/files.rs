@@ -42,14 +42,14 @@ fn files_that_cannot_be_used_are_named() {
         (
             "foreign",
             |bench| fs::write(file(bench, "bias/notes.txt"), "shutter closed").unwrap(),
-            &["bias/notes.txt: not a mosaic", "dcraw -D -4 -T"],
+            &["bias/notes.txt: not a mosaic", "dcraw -D -4 -T -t 0"],
         ),
         (
             "raw",
             |bench| fs::rename(file(bench, "bias/01.pgm"), file(bench, "bias/01.dng")).unwrap(),
             &[
                 "bias/01.dng: a DNG file, the RAW format of a camera, is not read",
-                "dcraw -D -4 -T",
+                "dcraw -D -4 -T -t 0",
                 "rawpy's `raw_image`",
             ],
         ),
@@ -97,6 +97,24 @@ fn files_that_cannot_be_used_are_named() {
                 fs::copy(file(bench, "bias/00.pgm"), file(bench, "bias/01.pgm")).unwrap();
             },
             &["bias/01.pgm: the same frame as", "bias/00.pgm"],
+        ),
+        (
+            "twice in flats",
+            |bench| {
+                fs::copy(file(bench, "flat-1/00.pgm"), file(bench, "flat-2/01.pgm")).unwrap();
+            },
+            &["flat-2/01.pgm: the same frame as", "flat-1/00.pgm"],
+        ),
+        (
+            "bias frames as dark frames",
+            |bench| {
+                fs::create_dir(file(bench, "dark-3")).unwrap();
+                for name in ["00.pgm", "01.pgm"] {
+                    let from = file(bench, &format!("bias/{name}"));
+                    fs::copy(from, file(bench, &format!("dark-3/{name}"))).unwrap();
+                }
+            },
+            &["dark-3/00.pgm: the same frame as", "bias/00.pgm"],
         ),
         (
             "few",
@@ -154,6 +172,50 @@ fn white_must_be_known() {
     );
 }
 
+/// A code of white that the flats speak against is refused or named; overexposed frames may be equal.
+#[test]
+fn white_is_held_against_the_codes() {
+    let warnings = |bench: &Bench, white: u16| -> Vec<String> {
+        let found = measured(bench, &format!("cam --white {white}"));
+        let lines = found["warnings"].as_array().unwrap().iter();
+        lines
+            .map(|line| line.as_str().unwrap().to_owned())
+            .collect()
+    };
+    let bench = recording(|_| ());
+    assert_eq!(warnings(&bench, WHITE), [""; 0]);
+    let message = refused(&bench, "cam --white 5000");
+    assert!(
+        message.contains("flat-3/00.pgm and ") && message.contains("is above white, 5000"),
+        "{message}"
+    );
+    let far = warnings(&bench, 65535);
+    assert!(
+        far.iter()
+            .any(|line| line.contains("the greatest code of the flats, ")
+                && line.contains(" % of white, 65535: is white right?")),
+        "{far:?}"
+    );
+    // The brightest exposure is overexposed: its frames are equal.
+    let bench = recording(|bench| {
+        for name in ["00.pgm", "01.pgm"] {
+            let white = Form::Pgm.encode(&vec![WHITE; SIDE * SIDE], SIDE);
+            fs::write(file(bench, &format!("flat-4/{name}")), white).unwrap();
+        }
+    });
+    let left_out = warnings(&bench, WHITE);
+    assert!(
+        left_out.len() == 1 && left_out[0].ends_with("greatest code, 16383; left out"),
+        "{left_out:?}"
+    );
+    let low = warnings(&bench, 20000);
+    assert!(
+        low.iter()
+            .any(|line| line.contains("clipped at 16383, far below white, 20000")),
+        "{low:?}"
+    );
+}
+
 #[test]
 fn wrong_flags_are_named() {
     let bench = recording(|_| ());
@@ -173,7 +235,12 @@ fn wrong_flags_are_named() {
             ("cam --white 9999 --max-pixels 100", "raise --max-pixels"),
             (
                 "cam --out camera.svg",
-                "--out: the camera file must not end with .svg",
+                "--out: camera.svg has not the ending .toml",
+            ),
+            ("cam --out mycam", "--out: mycam has not the ending .toml"),
+            (
+                "cam --out out/my.cam",
+                "--out: out/my.cam has not the ending .toml",
             ),
         ],
         |(line, part)| {

@@ -106,12 +106,16 @@ fn useless_recordings_are_refused() {
         (
             "unpaired",
             unpaired,
-            &["flat-0/00.pgm: no pair with", "flat-0/01.pgm", "%"],
+            &["flat-0/00.pgm: ", "flat-0/01.pgm has ", " % more light"],
         ),
         (
             "apart",
-            flats(|_, index, sample| code(light(sample) * (1.0 + 0.06 * index as f64))),
-            &["no pair with", "+5.", "% of light, and the two of a pair"],
+            Shots::take_drifting(&SMALL.0, 4, 1, 0.06),
+            &[
+                "flat-0/00.pgm: ",
+                "flat-0/01.pgm has ",
+                " % more light than this frame; the two frames of a pair must have equal light",
+            ],
         ),
         (
             "smoothed",
@@ -139,8 +143,7 @@ fn useless_recordings_are_refused() {
             small.each(|frame| frame.iter().map(|sample| (*sample).min(1800)).collect()),
             &[
                 "2 of 5 exposures can be used, at least 3 are needed",
-                "2: ",
-                "100.0 % of a colour are at its greatest code, clipped",
+                "exposure 2: clipped, 100.0 % of a colour are at its greatest code, 1800",
             ],
         ),
         (
@@ -188,14 +191,19 @@ fn doubtful_recordings_are_named() {
     let rows: Vec<(&str, Shots, &str)> = vec![
         (
             "apart",
-            flats(|_, index, sample| code(light(sample) * (1.0 + 0.03 * index as f64))),
-            "a pair that differs by +3.0 % in light",
+            Shots::take_drifting(&SMALL.0, 4, 1, 0.03),
+            "a pair whose second frame has 3.0 % more light",
         ),
         ("compressed", compressed, "photon transfer bends by -"),
         (
             "clipped",
             flats(|_, _, sample| sample.min(7000)),
-            "4: 100.0 % of a colour are at its greatest code, clipped; left out",
+            "exposure 4: clipped, 100.0 % of a colour are at its greatest code, 7000; left out",
+        ),
+        (
+            "clipped low",
+            flats(|_, _, sample| sample.min(7000)),
+            "exposure 4: clipped at 7000, far below white, 16383",
         ),
         (
             "dark current",
