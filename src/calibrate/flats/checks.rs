@@ -106,14 +106,19 @@ impl ExposureCheck<'_> {
             |most, top| if top.0 > most.0 { top } else { most },
         );
         let Self { name, white, .. } = self;
+        let at = if code == *white {
+            format!("white, {white}")
+        } else {
+            format!("code {code}, the greatest, where white is {white}")
+        };
         (share > AT_TOP).then(|| Clipped {
             reason: format!(
-                "exposure {name}: clipped, {:.1} % of a colour are at its greatest code, {code}",
+                "exposure {name}: clipped, {:.1} % of a colour are at {at}",
                 100.0 * share
             ),
             doubt: (f64::from(code) < CLIPS_AT * f64::from(*white)).then(|| {
                 format!(
-                    "exposure {name}: clipped at {code}, far below white, {white}: if this is the greatest code of the sensor, state it with --white; the range of codes, and with it the signal, is else too large"
+                    "exposure {name} is clipped at {code}, far below white, {white}: if {code} is the greatest code of the sensor, state it with --white; with a white that is too large, the range of codes is, too"
                 )
             }),
         })

@@ -143,7 +143,7 @@ fn useless_recordings_are_refused() {
             small.each(|frame| frame.iter().map(|sample| (*sample).min(1800)).collect()),
             &[
                 "2 of 5 exposures can be used, at least 3 are needed",
-                "exposure 2: clipped, 100.0 % of a colour are at its greatest code, 1800",
+                "exposure 2: clipped, 99.9 % of a colour are at code 1800, the greatest, where white is 16383",
             ],
         ),
         (
@@ -198,12 +198,12 @@ fn doubtful_recordings_are_named() {
         (
             "clipped",
             flats(|_, _, sample| sample.min(7000)),
-            "exposure 4: clipped, 100.0 % of a colour are at its greatest code, 7000; left out",
+            "exposure 4: clipped, 100.0 % of a colour are at code 7000, the greatest, where white is 16383; left out",
         ),
         (
             "clipped low",
             flats(|_, _, sample| sample.min(7000)),
-            "exposure 4: clipped at 7000, far below white, 16383",
+            "exposure 4 is clipped at 7000, far below white, 16383",
         ),
         (
             "dark current",
