@@ -167,8 +167,8 @@ impl ExposureCheck<'_> {
             let mean = means.sum::<f64>() / (2 * self.facts.len()) as f64 - self.offset();
             let [low, high] = range.map(|share| 100.0 * share);
             format!(
-                "exposure {}: {mean:.0} ADU of light are outside of {low} to {high} % of white",
-                self.name
+                "exposure {}: {mean:.0} ADU of light are outside of {low} to {high} % of white, {}",
+                self.name, self.white
             )
         })
     }
@@ -179,12 +179,13 @@ impl ExposureCheck<'_> {
     }
 }
 
-/// A note on white, if no code of the flats comes near it.
-pub(super) fn far_below_white(greatest: u16, white: u16) -> Option<String> {
+/// A note on white, if no code of all exposures comes near it.
+pub(super) fn far_below_white(exposures: &[Vec<PairFacts>], white: u16) -> Option<String> {
+    let greatest = exposures.iter().flatten().map(|pair| pair.greatest).max()?;
     let share = f64::from(greatest) / f64::from(white);
     (share < REACHES).then(|| {
         format!(
-            "the greatest code of the flats, {greatest}, is {:.0} % of white, {white}: is white right? Flats up to 60 % show it",
+            "the greatest code of the flats, {greatest}, is {:.0} % of white, {white}: is white right? Flats of up to 60 % of white would show it",
             100.0 * share
         )
     })

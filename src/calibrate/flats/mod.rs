@@ -30,8 +30,6 @@ pub(super) struct Flats {
 struct Exposure {
     /// Tiles of each pair that are in the range of light.
     pairs: Vec<Vec<Tile>>,
-    /// Greatest code of all pairs.
-    greatest: u16,
     dark: Option<Dark>,
 }
 
@@ -89,12 +87,9 @@ impl Flats {
     ) -> Result<Self> {
         let mut exposures = Vec::new();
         let mut left_out = Vec::new();
-        for (exposure, facts) in
-            files
-                .exposures
-                .iter()
-                .zip(read(reader, files, settings.hot, inputs)?)
-        {
+        let facts = read(reader, files, settings.hot, inputs)?;
+        notes.extend(checks::far_below_white(&facts, settings.white));
+        for (exposure, facts) in files.exposures.iter().zip(facts) {
             let dark = dark(reader, exposure, settings.hot, inputs)?;
             let offsets = dark.as_ref().map_or(base.offsets, |dark| &dark.offsets[..]);
             let check = ExposureCheck {
@@ -122,12 +117,7 @@ impl Flats {
                 left_out.push(reason);
                 continue;
             }
-            let greatest = facts.iter().map(|pair| pair.greatest).max();
-            exposures.push(Exposure {
-                pairs,
-                greatest: greatest.unwrap_or(0),
-                dark,
-            });
+            exposures.push(Exposure { pairs, dark });
         }
         if exposures.len() < LEAST[1] {
             return Err(too_few(files, exposures.len(), &left_out));
@@ -137,15 +127,7 @@ impl Flats {
                 .into_iter()
                 .map(|reason| format!("{reason}; left out")),
         );
-        let flats = Self { exposures };
-        notes.extend(checks::far_below_white(flats.greatest(), settings.white));
-        Ok(flats)
-    }
-
-    /// The greatest code of all exposures that are used.
-    fn greatest(&self) -> u16 {
-        let codes = self.exposures.iter().map(|exposure| exposure.greatest);
-        codes.max().unwrap_or(0)
+        Ok(Self { exposures })
     }
 
     /// Number of exposures that are used.

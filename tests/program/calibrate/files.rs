@@ -26,9 +26,20 @@ fn file(bench: &Bench, name: &str) -> PathBuf {
     bench.path(&format!("cam/iso800/{name}"))
 }
 
+/// What is changed in the recording.
+type Change = fn(&Bench);
+
+/// A recording with one change is refused with a message of these parts.
+fn refuses((name, change, parts): (&str, Change, &[&str])) {
+    let bench = recording(change);
+    let message = refused(&bench, &format!("cam --white {WHITE}"));
+    for part in parts {
+        assert!(message.contains(part), "{name}: {message}");
+    }
+}
+
 #[test]
 fn files_that_cannot_be_used_are_named() {
-    type Change = fn(&Bench);
     let rows: Vec<(&str, Change, &[&str])> = vec![
         (
             "truncated",
@@ -92,6 +103,23 @@ fn files_that_cannot_be_used_are_named() {
             ],
         ),
         (
+            "few",
+            |bench| {
+                fs::remove_dir_all(file(bench, "flat-3")).unwrap();
+                fs::remove_dir_all(file(bench, "flat-4")).unwrap();
+                fs::remove_file(file(bench, "flat-0/01.pgm")).unwrap();
+            },
+            &["2 bias frames and 2 exposures with a pair of flats; at least 2 and 3 are needed"],
+        ),
+    ];
+    check_rows(rows, refuses);
+}
+
+/// Copies have no noise between them, whatever they are used for.
+#[test]
+fn copies_are_refused() {
+    let rows: Vec<(&str, Change, &[&str])> = vec![
+        (
             "twice",
             |bench| {
                 fs::copy(file(bench, "bias/00.pgm"), file(bench, "bias/01.pgm")).unwrap();
@@ -116,23 +144,8 @@ fn files_that_cannot_be_used_are_named() {
             },
             &["dark-3/00.pgm: the same frame as", "bias/00.pgm"],
         ),
-        (
-            "few",
-            |bench| {
-                fs::remove_dir_all(file(bench, "flat-3")).unwrap();
-                fs::remove_dir_all(file(bench, "flat-4")).unwrap();
-                fs::remove_file(file(bench, "flat-0/01.pgm")).unwrap();
-            },
-            &["2 bias frames and 2 exposures with a pair of flats; at least 2 and 3 are needed"],
-        ),
     ];
-    check_rows(rows, |(name, change, parts)| {
-        let bench = recording(change);
-        let message = refused(&bench, &format!("cam --white {WHITE}"));
-        for part in parts {
-            assert!(message.contains(part), "{name}: {message}");
-        }
-    });
+    check_rows(rows, refuses);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::sensor::{Sensor, Shots, WHITE};
-use super::{Bench, check_rows, measured, number, write};
+use super::{Bench, check_rows, measured, number, refused, write};
 
 const SIDE: usize = 256;
 
@@ -49,4 +49,23 @@ fn a_drifting_lamp_leaves_gain_as_it_is() {
             );
         }
     });
+}
+
+/// Frames whose light differs by more than 5 % are no pair.
+#[test]
+fn pairs_of_unequal_light_are_refused() {
+    for (drift, part) in [(0.06, "6.0 % more light"), (-0.06, "6.0 % less light")] {
+        let sensor = Sensor::new("sony-a7s2", 0.7513, SIDE, 3);
+        let bench = Bench::new();
+        write(&bench, "lamp", &Shots::take_drifting(&sensor, 2, 1, drift));
+        let message = refused(&bench, &format!("lamp --white {WHITE}"));
+        for part in [
+            "flat-0/00.pgm: ",
+            "flat-0/01.pgm has ",
+            part,
+            " than this frame; the two frames of a pair must have equal light (limit 5 %)",
+        ] {
+            assert!(message.contains(part), "{message}");
+        }
+    }
 }

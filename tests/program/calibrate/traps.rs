@@ -109,15 +109,6 @@ fn useless_recordings_are_refused() {
             &["flat-0/00.pgm: ", "flat-0/01.pgm has ", " % more light"],
         ),
         (
-            "apart",
-            Shots::take_drifting(&SMALL.0, 4, 1, 0.06),
-            &[
-                "flat-0/00.pgm: ",
-                "flat-0/01.pgm has ",
-                " % more light than this frame; the two frames of a pair must have equal light",
-            ],
-        ),
-        (
             "smoothed",
             small.each(smoothed),
             &[
@@ -189,11 +180,6 @@ fn doubtful_recordings_are_named() {
             .collect()
     });
     let rows: Vec<(&str, Shots, &str)> = vec![
-        (
-            "apart",
-            Shots::take_drifting(&SMALL.0, 4, 1, 0.03),
-            "a pair whose second frame has 3.0 % more light",
-        ),
         ("compressed", compressed, "photon transfer bends by -"),
         (
             "clipped",
