@@ -284,6 +284,10 @@ fn a_fixed_pattern_is_taken_off_where_there_are_frames() {
     let ratio = scale(&with_it) / scale(&plain);
     assert!((ratio - 1.0).abs() < 0.04, "{ratio}");
     assert!(warnings(&with_it)[0].contains("the mean of all bias frames is taken off"));
+    // What a mean takes with it is given back in both fits: without that, one would be 3 % smaller than the other.
+    let plot = |found: &Value| number(found, "/settings/0/plot/scale") / scale(found);
+    let ratio = plot(&with_it) / plot(&plain);
+    assert!((ratio - 1.0).abs() < 0.015, "{ratio}");
     let few = Shots {
         bias: fixed.bias[..8].to_vec(),
         ..fixed
@@ -291,6 +295,40 @@ fn a_fixed_pattern_is_taken_off_where_there_are_frames() {
     let few = found("few", &few);
     assert!(warnings(&few)[0].contains("σ_TL holds it, too; with 16 bias frames or more"));
     assert!(scale(&few) > 1.1 * scale(&plain));
+}
+
+/// Row noise that cannot be seen is said so, and the camera file says that its line is of nothing.
+#[test]
+fn row_noise_that_cannot_be_seen_is_named() {
+    let mut silent = SMALL.1.clone();
+    // The rows of both frames of a pair get one mean.
+    for pair in silent.bias.chunks_mut(2) {
+        let (first, second) = pair.split_at_mut(1);
+        for (a, b) in first[0].chunks(SIDE).zip(second[0].chunks_mut(SIDE)) {
+            let sum = |row: &[u16]| row.iter().map(|sample| i32::from(*sample)).sum::<i32>();
+            let difference = sum(a) - sum(b);
+            for site in 0..difference.unsigned_abs() as usize {
+                let sample = &mut b[site % SIDE];
+                *sample = sample.saturating_add_signed(difference.signum() as i16);
+            }
+        }
+    }
+    let bench = Bench::new();
+    write(&bench, "silent", &silent);
+    let found = measured(&bench, &format!("silent --white {WHITE}"));
+    assert_eq!(number(&found, "/settings/0/row_deviation/value"), 0.0);
+    let lines = warnings(&found);
+    assert!(
+        lines.len() == 1
+            && lines[0].contains("row noise cannot be seen below about 0.1")
+            && lines[0].contains("does not count in the line of σ_row"),
+        "{lines:?}"
+    );
+    let text = fs::read_to_string(bench.path("camera.toml")).unwrap();
+    assert!(
+        text.contains("[row-deviation]\n# No setting has noise of this kind.\nslope = "),
+        "{text}"
+    );
 }
 
 #[test]
