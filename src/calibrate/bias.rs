@@ -26,6 +26,7 @@ pub(super) struct BiasFit {
     pub(super) residuals: Residuals,
     /// Read noise by likelihood, before `widened`.
     pub(super) read: ReadNoise,
+    /// The same by the probability plot, after `widened`.
     pub(super) plot: PlotFit,
     /// Factor of σ_TL for the noise that a mean frame takes with it.
     pub(super) widened: f64,
@@ -95,10 +96,14 @@ impl BiasFit {
         for group in &residuals {
             all.add(group);
         }
+        let plot = plot_fit(&all);
         Ok(Self {
             frames: files.bias.len(),
             hot: check.hot,
-            plot: plot_fit(&all),
+            plot: PlotFit {
+                scale: widened * plot.scale,
+                ..plot
+            },
             residuals: all,
             read,
             widened,
@@ -191,7 +196,7 @@ impl FirstPass {
             |group, result| {
                 let (frames, noise) = result;
                 for (path, frame) in group.iter().zip(&frames) {
-                    inputs.add_bias(path, &frame.facts)?;
+                    inputs.add_once(path, &frame.facts)?;
                     pass.mean.add(&frame.samples);
                 }
                 pass.noises.extend(noise);
@@ -255,7 +260,10 @@ fn group_work(
         _ => None,
     };
     GroupWork {
-        correlation: pair.as_ref().map_or(0.0, PairSums::correlation),
+        correlation: pair.as_ref().map_or(0.0, |pair| {
+            let equal = vec![1.0; layout.cfa.planes()];
+            pair.neighbours().correlation(&equal)
+        }),
         group: Group {
             planes,
             noise: pair.as_ref().map(PairSums::noise),

@@ -29,8 +29,9 @@ pub(crate) fn camera_file(camera: &CameraFit) -> Result<String> {
         "# The least and the greatest K that was measured.\ngain = [{low}, {high}]"
     );
     text += "# Of the DarkQA paper, for every camera: a recording of a sensor says nothing of r.\nratio = [100.0, 300.0]\n";
-    line(&mut text, "read-scale", &camera.read_scale);
-    line(&mut text, "row-deviation", &camera.row_deviation);
+    let settings = camera.settings.len();
+    line(&mut text, "read-scale", &camera.read_scale, settings);
+    line(&mut text, "row-deviation", &camera.row_deviation, settings);
     for fit in &camera.settings {
         step(&mut text, camera, fit);
     }
@@ -71,29 +72,38 @@ fn head(camera: &CameraFit) -> String {
     text
 }
 
-/// The table of a line, with what its numbers are worth.
-fn line(text: &mut String, key: &str, line: &NoiseLine) {
-    let settings = match line.settings {
+/// The table of a line over so many settings, with what its numbers are worth.
+fn line(text: &mut String, key: &str, line: &NoiseLine, of: usize) {
+    let through = match line.settings {
         1 => "1 setting".to_owned(),
-        n => format!("{n} settings"),
+        n => format!("the mean of {n} settings"),
     };
     let source = match line.slope_from {
-        SlopeSource::Settings => format!("# Fitted to {settings}."),
+        SlopeSource::Settings => format!("# Fitted to {} settings.\n", line.settings),
         SlopeSource::Preset => format!(
-            "# The slope is that of the preset sony-a7s2, because a slope needs 3 settings; the line passes through {settings}."
+            "# The slope is that of the preset sony-a7s2, because a slope needs 3 settings; the line passes through {through}.\n"
         ),
-        SlopeSource::NoNoise => "# No setting has noise of this kind.".to_owned(),
+        SlopeSource::NoNoise => "# No setting has noise of this kind.\n".to_owned(),
     };
-    let error = match line.deviation_error() {
-        Some(error) => format!(
-            "# The deviation is known to ± {:.0} % of itself.",
+    let left_out = match of - line.settings {
+        0 => "",
+        _ if line.settings == 0 => "",
+        1 => "# 1 setting without visible noise is left out; the line holds for it, too.\n",
+        n => &format!(
+            "# {n} settings without visible noise are left out; the line holds for them, too.\n"
+        ),
+    };
+    let error = match (line.deviation_error(), line.slope_from) {
+        (Some(error), _) => format!(
+            "# The deviation is known to ± {:.0} % of itself.\n",
             100.0 * error
         ),
-        None => "# A single setting has no deviation.".to_owned(),
+        (None, SlopeSource::Preset) => "# A single setting has no deviation.\n".to_owned(),
+        (None, SlopeSource::Settings | SlopeSource::NoNoise) => String::new(),
     };
     let _ = writeln!(
         text,
-        "\n[{key}]\n{source}\nslope = {}\nintercept = {}\n{error}\ndeviation = {}",
+        "\n[{key}]\n{source}{left_out}slope = {}\nintercept = {}\n{error}deviation = {}",
         number(line.slope),
         number(line.intercept),
         number(line.deviation)

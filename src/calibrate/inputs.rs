@@ -12,8 +12,8 @@ use crate::types::Digest;
 pub(super) struct Inputs {
     /// Path and digest of each frame.
     list: Vec<(String, Digest)>,
-    /// The bias frame of each digest.
-    bias: BTreeMap<Digest, String>,
+    /// The bias frame, flat or dark frame of each digest.
+    places: BTreeMap<Digest, String>,
     /// The first and the last date that the files state.
     dates: Option<[String; 2]>,
 }
@@ -35,17 +35,30 @@ impl Inputs {
         }
     }
 
-    /// Adds a bias frame.
+    /// Adds a frame of which no copy may be used, for another purpose neither.
     ///
     /// # Errors
-    /// If the same bias frame was added before: copies have no noise between them.
-    pub(super) fn add_bias(&mut self, path: &Path, facts: &FrameFacts) -> Result<()> {
-        let place = path.display().to_string();
-        if let Some(first) = self.bias.insert(facts.digest, place.clone()) {
-            return Err(Error::data(place, same_frame(&first)));
-        }
+    /// See [`once`](Self::once).
+    pub(super) fn add_once(&mut self, path: &Path, facts: &FrameFacts) -> Result<()> {
+        self.once(&path.display().to_string(), facts.digest)?;
         self.add(path, facts);
         Ok(())
+    }
+
+    /// Checks that the frame at a place is no copy of another one. Overexposed frames are not checked: they may well be equal.
+    ///
+    /// # Errors
+    /// If the same frame was used before: copies have no noise between them.
+    pub(super) fn once(&mut self, place: &str, digest: Digest) -> Result<()> {
+        match self.places.insert(digest, place.to_owned()) {
+            Some(first) => Err(Error::data(
+                place,
+                format_args!(
+                    "the same frame as {first}; copies have no noise between them, use each frame once"
+                ),
+            )),
+            None => Ok(()),
+        }
     }
 
     /// Number of frames.
@@ -75,9 +88,4 @@ impl Inputs {
     pub(super) fn dates(&self) -> Option<&[String; 2]> {
         self.dates.as_ref()
     }
-}
-
-/// The error for a copy of a frame.
-pub(super) fn same_frame(first: &str) -> String {
-    format!("the same frame as {first}; copies have no noise between them, use each frame once")
 }

@@ -23,7 +23,6 @@ pub(super) struct MeanFrame {
 /// How far the means of tiles differ over a plane, in ADU.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Unevenness {
-    pub(super) plane: usize,
     /// The greatest mean of a tile less the smallest.
     pub(super) difference: f64,
     /// Standard error of the mean of a tile.
@@ -172,7 +171,7 @@ impl MeanFrame {
         squares / free - (noise.within + noise.row) / self.frames()
     }
 
-    /// The plane whose tiles differ most. Row noise of this variance shifts the rows of a tile together.
+    /// That of the plane whose tiles differ most. Row noise of this variance shifts the rows of a tile together.
     pub(super) fn unevenness(&self, hot: &HotPixels, noise: PairNoise) -> Unevenness {
         let [rows, columns] = self.layout.plane_size();
         let tile_of = |column: usize| {
@@ -198,8 +197,7 @@ impl MeanFrame {
         let sites = (rows / TILES * (columns / TILES)) as f64;
         let error =
             (noise.within / sites + noise.row.max(0.0) / (rows / TILES) as f64) / self.frames();
-        let planes = sums.chunks(TILES * TILES).enumerate();
-        let uneven = planes.map(|(plane, tiles)| {
+        let uneven = sums.chunks(TILES * TILES).map(|tiles| {
             let filled = tiles.iter().filter(|[count, _]| *count > 0.0);
             let means = filled.map(|[count, sum]| sum / count);
             let [low, high] = means
@@ -207,14 +205,12 @@ impl MeanFrame {
                     [mean.min(low), mean.max(high)]
                 });
             Unevenness {
-                plane,
                 difference: high - low,
                 error: error.sqrt(),
             }
         });
         let most = uneven.max_by(|a, b| a.difference.total_cmp(&b.difference));
         most.unwrap_or(Unevenness {
-            plane: 0,
             difference: 0.0,
             error: 0.0,
         })
@@ -294,7 +290,6 @@ mod tests {
             }
         });
         let found = lit.unevenness(&none, NOISE);
-        assert_eq!(found.plane, 2);
         assert!(
             (found.difference - 3.0).abs() < 6.0 * found.error,
             "{}",

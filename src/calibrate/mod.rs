@@ -52,7 +52,7 @@ use inputs::Inputs;
 use lines::NoiseKind;
 use setting::Measuring;
 
-/// What a calibration is told.
+/// Settings of a calibration.
 #[derive(Debug, Clone)]
 pub(crate) struct CalibrateSettings {
     /// How files are read as frames.

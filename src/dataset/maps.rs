@@ -10,6 +10,7 @@ use ndarray::Array2;
 
 use super::npy::Npy;
 use super::raw_png::{RawPng, SampleForm};
+use super::reading_rule::MOST_PIXELS;
 use crate::error::{Error, Result};
 use crate::types::Digest;
 
@@ -70,7 +71,7 @@ impl DepthFile {
     /// The depth in millimetres, in the size that the file has.
     pub(crate) fn decode_alone(&self, bytes: &[u8]) -> Result<Array2<u32>, String> {
         let size = match self {
-            Self::Png { .. } => RawPng::open(bytes, &[SampleForm::Grey16])?.size,
+            Self::Png { .. } => RawPng::open(bytes, &[SampleForm::Grey16], MOST_PIXELS)?.size,
             Self::Npy(_) => Npy::parse(bytes)?.size,
         };
         self.decode(bytes, size)
@@ -125,7 +126,8 @@ impl MapPaths {
             let size = if is_npy(path) {
                 Npy::parse(&bytes).map(|npy| npy.size)
             } else {
-                RawPng::open(&bytes, &SampleForm::ALL).map(|png| png.size)
+                let png = RawPng::open(&bytes, &SampleForm::ALL, MOST_PIXELS);
+                png.map(|png| png.size).map_err(String::from)
             };
             Ok((path, in_file(path, size)?))
         });
@@ -264,7 +266,7 @@ fn png<T: Clone>(
     size: Size,
     of: impl Fn(u16) -> T,
 ) -> Result<Vec<T>, String> {
-    let png = RawPng::open(bytes, forms)?;
+    let png = RawPng::open(bytes, forms, MOST_PIXELS)?;
     check_size(png.size, size)?;
     png.samples(of)
 }

@@ -3,11 +3,11 @@
 //! A label map holds ids, not colours, so a sample is used as it is stored: a palette index is not replaced by its colour,
 //! and no value is scaled to a larger range.
 
+use std::fmt;
 use std::io::Cursor;
 
 use png::{BitDepth, ColorType, Decoder, DecodingError, Reader, Transformations};
 
-use super::reading_rule::MOST_PIXELS;
 use crate::types::words::words;
 
 /// The form of the samples of a PNG file.
@@ -25,6 +25,30 @@ impl SampleForm {
 
 words!(SampleForm { Grey8 = "8-bit grey", Grey16 = "16-bit grey", Palette = "palette" });
 
+/// Why a PNG file is not read. The texts do not name the file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum RawPngError {
+    /// The bytes are no PNG file, or are damaged.
+    Broken(String),
+    /// The image has too many pixels.
+    TooLarge(String),
+    /// The samples have another form than the expected ones.
+    OtherForm(String),
+}
+
+impl fmt::Display for RawPngError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (Self::Broken(problem) | Self::TooLarge(problem) | Self::OtherForm(problem)) = self;
+        f.write_str(problem)
+    }
+}
+
+impl From<RawPngError> for String {
+    fn from(error: RawPngError) -> Self {
+        error.to_string()
+    }
+}
+
 /// A PNG file with one number per pixel, not yet decompressed.
 pub(crate) struct RawPng<'a> {
     reader: Reader<Cursor<&'a [u8]>>,
@@ -33,31 +57,38 @@ pub(crate) struct RawPng<'a> {
 }
 
 impl<'a> RawPng<'a> {
-    /// Reads the header. A file of another form than `forms`, or with too many pixels, is refused.
-    pub(crate) fn open(bytes: &'a [u8], forms: &[SampleForm]) -> Result<Self, String> {
+    /// Reads the header.
+    ///
+    /// # Errors
+    /// If the file is no PNG, has another form than `forms`, or more than `most_pixels`.
+    pub(crate) fn open(
+        bytes: &'a [u8],
+        forms: &[SampleForm],
+        most_pixels: u64,
+    ) -> Result<Self, RawPngError> {
         let mut decoder = Decoder::new(Cursor::new(bytes));
         decoder.set_transformations(Transformations::IDENTITY);
         decoder.set_ignore_text_chunk(true);
         decoder.set_ignore_iccp_chunk(true);
         let expected = forms.iter().map(SampleForm::to_string).collect::<Vec<_>>();
         let expected = expected.join(" or ");
-        let reader = decoder
-            .read_info()
-            .map_err(|e| format!("not a readable PNG ({e}); {expected} PNG expected"))?;
+        let reader = decoder.read_info().map_err(|e| {
+            RawPngError::Broken(format!("not a readable PNG ({e}); {expected} PNG expected"))
+        })?;
         let info = reader.info();
         let (width, height) = (info.width, info.height);
-        if u64::from(width) * u64::from(height) > MOST_PIXELS {
-            return Err(format!(
-                "{width} × {height} pixels are more than the {MOST_PIXELS} that are read"
-            ));
+        if u64::from(width) * u64::from(height) > most_pixels {
+            return Err(RawPngError::TooLarge(format!(
+                "{width} × {height} pixels are more than the {most_pixels} that are read"
+            )));
         }
         let form = form(info.color_type, info.bit_depth);
         if !form.is_some_and(|form| forms.contains(&form)) {
-            return Err(format!(
+            return Err(RawPngError::OtherForm(format!(
                 "{} PNG of {} bits; {expected} expected, whose samples are the values themselves",
                 color(info.color_type),
                 info.bit_depth as u8
-            ));
+            )));
         }
         Ok(Self {
             reader,

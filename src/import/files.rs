@@ -8,6 +8,7 @@ use ndarray::Array2;
 use crate::dataset::maps::DepthFile;
 use crate::dataset::npy::Npy;
 use crate::dataset::raw_png::{RawPng, SampleForm};
+use crate::dataset::reading_rule::MOST_PIXELS;
 use crate::dataset::{ImageFile, ReadingRule};
 use crate::error::{Error, Result};
 use crate::files::reading::{bytes, entries, text};
@@ -63,7 +64,7 @@ pub(super) fn file_name(path: &Path) -> String {
 pub(super) fn png(path: &Path, forms: &[SampleForm]) -> Result<Array2<u16>> {
     let bytes = bytes(path)?;
     let read = || {
-        let png = RawPng::open(&bytes, forms)?;
+        let png = RawPng::open(&bytes, forms, MOST_PIXELS)?;
         let size = png.size;
         Array2::from_shape_vec(size, png.samples(|sample| sample)?).map_err(|e| e.to_string())
     };

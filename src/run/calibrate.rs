@@ -24,11 +24,11 @@ pub(crate) struct CalibrateArgs {
     /// The recording: DIR/SETTING/ for each ISO or gain, in it bias/, flat-NAME/ for each exposure (pairs of evenly lit frames), and if
     /// you have them dark-NAME/ and white/; or DIR/frames.csv with the columns file, setting, kind (bias, flat, dark, white), exposure
     ///
-    /// Frames are mosaics of one channel as 16-bit PNG, TIFF or binary PGM, as `dcraw -D -4 -T` and rawpy's raw_image give them. RAW
+    /// Frames are mosaics of one channel as 16-bit PNG, TIFF or binary PGM, as `dcraw -D -4 -T -t 0` (`-t 0`: not turned) and rawpy's raw_image give them. RAW
     /// files of makers (DNG, CR2, NEF) are not read.
     #[arg(value_name = "DIR", add = Decides::Pixels)]
     pub recording: PathBuf,
-    /// The camera file to write, for --camera; the figure of the fits goes beside it, as FILE.svg
+    /// The camera file to write, for --camera, with the ending .toml; its figure goes beside it, with the ending .svg
     #[arg(long, value_name = "FILE", add = Decides::Nothing)]
     pub out: PathBuf,
     /// The colour filters of the upper left corner of the frames, row by row; mono for none
@@ -62,11 +62,18 @@ pub(crate) struct CalibrateArgs {
 /// # Errors
 /// If a frame cannot be used, the recording is refused, or a file cannot be written.
 pub(crate) fn calibrate(args: &CalibrateArgs, progress: &Progress) -> Result<Outcome> {
-    let figure = args.out.with_extension("svg");
-    if figure == args.out {
-        let problem = "the camera file must not end with .svg, which is the ending of its figure";
+    if args
+        .out
+        .extension()
+        .is_none_or(|ending| !ending.eq_ignore_ascii_case("toml"))
+    {
+        let problem = format!(
+            "{} has not the ending .toml, by which --camera knows a camera file; its figure gets the ending .svg",
+            args.out.display()
+        );
         return Err(Error::usage("--out", problem));
     }
+    let figure = args.out.with_extension("svg");
     let recording = Recording::open(&args.recording)?;
     let settings = settings(args)?;
     let workers = pool(args.threads.threads)?;

@@ -97,6 +97,74 @@ fn a_camera_file_is_what_was_measured() {
     }
 }
 
+/// The comments of a table.
+fn comments<'t>(text: &'t str, table: &str) -> Vec<&'t str> {
+    let table = text.split_once(&format!("\n[{table}]\n")).unwrap().1;
+    let lines = table.lines().take_while(|line| !line.is_empty());
+    lines.filter(|line| line.starts_with('#')).collect()
+}
+
+/// Settings without visible row noise are named, and what is said of a line is true of it.
+#[test]
+fn lines_say_what_they_are_made_from() {
+    let silent = |name: &str, gain: f64| SettingFit {
+        row_deviation: measured(0.0),
+        ..setting(name, gain)
+    };
+    let four = ["a", "b", "c", "d"].into_iter().zip([0.1, 0.5, 2.5, 5.0]);
+    let four: Vec<SettingFit> = four.map(|(name, gain)| setting(name, gain)).collect();
+    let with = |quiet: &[usize], settings: usize| {
+        let mut fits = four[..settings].to_vec();
+        for index in quiet {
+            fits[*index] = silent(&fits[*index].name, fits[*index].gain.value);
+        }
+        camera_file(&camera(fits)).unwrap()
+    };
+    for (quiet, settings, row) in [
+        (
+            &[][..],
+            4,
+            &[
+                "# Fitted to 4 settings.",
+                "# The deviation is known to ± 50 % of itself.",
+            ][..],
+        ),
+        (
+            &[0],
+            4,
+            &[
+                "# Fitted to 3 settings.",
+                "# 1 setting without visible noise is left out; the line holds for it, too.",
+                "# The deviation is known to ± 71 % of itself.",
+            ],
+        ),
+        (
+            &[0, 1],
+            4,
+            &[
+                "# The slope is that of the preset sony-a7s2, because a slope needs 3 settings; the line passes through the mean of 2 settings.",
+                "# 2 settings without visible noise are left out; the line holds for them, too.",
+                "# The deviation is known to ± 71 % of itself.",
+            ],
+        ),
+        (
+            &[],
+            1,
+            &[
+                "# The slope is that of the preset sony-a7s2, because a slope needs 3 settings; the line passes through 1 setting.",
+                "# A single setting has no deviation.",
+            ],
+        ),
+        (&[0, 1], 2, &["# No setting has noise of this kind."]),
+    ] {
+        let text = with(quiet, settings);
+        assert_eq!(comments(&text, "row-deviation"), row);
+        // Read noise is seen everywhere.
+        let read = comments(&text, "read-scale").concat();
+        assert!(!read.contains("left out"), "{read}");
+    }
+}
+
 #[test]
 fn what_a_camera_file_may_not_hold_is_not_written() {
     let twice = camera(vec![setting("a", 0.5), setting("b", 0.5)]);

@@ -1,12 +1,16 @@
 //! Checks of pairs of flats.
 
 use super::super::checks::correlation;
-use super::super::inputs::same_frame;
-use super::super::sums::Tile;
+use super::super::sums::{NeighbourSums, TileSums};
 use crate::error::{Error, Result};
+use crate::types::Digest;
 
 /// Largest share of samples of a plane at its greatest code (chosen).
 const AT_TOP: f64 = 1e-3;
+/// Share of white below which no exposure should be clipped (chosen).
+const CLIPS_AT: f64 = 0.9;
+/// Share of white that some code of the flats should reach (chosen: flats up to 60 % are asked for).
+const REACHES: f64 = 0.25;
 /// Differences of light between the frames of a pair, as shares: above the first a note, above the second they are no pair (chosen).
 const LIGHT: [f64; 2] = [0.01, 0.05];
 
@@ -18,15 +22,16 @@ const LEAST_IN_RANGE: f64 = 0.25;
 pub(super) struct PairFacts {
     /// Names of the two files.
     pub(super) names: [String; 2],
-    /// Largest share of samples of a plane at its greatest code.
-    pub(super) top: f64,
+    /// Digests of the two files.
+    pub(super) digests: [Digest; 2],
+    /// Greatest code of both frames.
+    pub(super) greatest: u16,
+    /// Largest share of samples of a plane at its greatest code, and this code.
+    pub(super) at_top: (f64, u16),
     /// Means of both frames, in ADU.
     pub(super) means: [f64; 2],
-    /// Correlation of neighbours in the difference.
-    pub(super) correlation: f64,
-    pub(super) tiles: Vec<Tile>,
-    /// Whether the two files are copies.
-    pub(super) are_equal: bool,
+    pub(super) neighbours: NeighbourSums,
+    pub(super) tiles: Vec<TileSums>,
 }
 
 /// The pairs of an exposure, to be checked.
@@ -34,69 +39,154 @@ pub(super) struct PairFacts {
 pub(super) struct ExposureCheck<'a> {
     pub(super) name: &'a str,
     pub(super) facts: &'a [PairFacts],
-    /// Mean offset of the planes in ADU.
-    pub(super) offset: f64,
+    /// Offsets of the planes in ADU.
+    pub(super) offsets: &'a [f64],
+    /// The code of white.
+    pub(super) white: u16,
+}
+
+/// An exposure that is overexposed.
+#[derive(Debug)]
+pub(super) struct Clipped {
+    /// Why it is left out.
+    pub(super) reason: String,
+    /// A note on white, if the exposure is clipped far below it.
+    pub(super) doubt: Option<String>,
+}
+
+impl PairFacts {
+    /// Names and digests of both files.
+    pub(super) fn files(&self) -> [(&str, Digest); 2] {
+        [0, 1].map(|frame| (&*self.names[frame], self.digests[frame]))
+    }
+
+    /// The light of the first frame over the light of the second, by plane. A plane without light has no ratio: it is kept within
+    /// twice of what a pair may differ by.
+    pub(super) fn light_ratios(&self, offsets: &[f64]) -> Vec<f64> {
+        let ratio = |(plane, offset): (usize, &f64)| {
+            let tiles = self.tiles.iter().filter(|tile| tile.plane == plane);
+            let [count, a, b] = tiles.fold([0.0; 3], |[count, a, b], tile| {
+                [count + tile.count, a + tile.sums[0], b + tile.sums[1]]
+            });
+            let [a, b] = [a, b].map(|sum| sum - count * offset);
+            if a > 0.0 && b > 0.0 {
+                (a / b).clamp(1.0 - 2.0 * LIGHT[1], 1.0 + 2.0 * LIGHT[1])
+            } else {
+                1.0
+            }
+        };
+        offsets.iter().enumerate().map(ratio).collect()
+    }
 }
 
 impl ExposureCheck<'_> {
+    /// Checks that no code is above white.
+    ///
+    /// # Errors
+    /// If one is.
+    pub(super) fn above_white(&self) -> Result<()> {
+        let white = self.white;
+        match self.facts.iter().find(|pair| pair.greatest > white) {
+            Some(pair) => Err(Error::data(
+                format_args!("{} and {}", pair.names[0], pair.names[1]),
+                format_args!(
+                    "code {} is above white, {white}: state the greatest code of the sensor with --white, or see the frames in white/",
+                    pair.greatest
+                ),
+            )),
+            None => Ok(()),
+        }
+    }
+
     /// Why the exposure is overexposed; `None` if it is not.
-    pub(super) fn clipped(&self) -> Option<String> {
-        let top = self.facts.iter().map(|pair| pair.top).fold(0.0, f64::max);
-        (top > AT_TOP).then(|| {
-            format!(
-                "exposure {}: {:.1} % of a colour are at its greatest code, clipped",
-                self.name,
-                100.0 * top
-            )
+    pub(super) fn clipped(&self) -> Option<Clipped> {
+        let tops = self.facts.iter().map(|pair| pair.at_top);
+        let (share, code) = tops.fold(
+            (0.0, 0),
+            |most, top| if top.0 > most.0 { top } else { most },
+        );
+        let Self { name, white, .. } = self;
+        let at = if code == *white {
+            format!("white, {white}")
+        } else {
+            format!("code {code}, the greatest, where white is {white}")
+        };
+        (share > AT_TOP).then(|| Clipped {
+            reason: format!(
+                "exposure {name}: clipped, {:.1} % of a colour are at {at}",
+                100.0 * share
+            ),
+            doubt: (f64::from(code) < CLIPS_AT * f64::from(*white)).then(|| {
+                format!(
+                    "exposure {name} is clipped at {code}, far below white, {white}: if {code} is the greatest code of the sensor, state it with --white; with a white that is too large, the range of codes is, too"
+                )
+            }),
         })
     }
 
     /// Notes on pairs whose light differs a little.
     ///
     /// # Errors
-    /// If the two of a pair are copies or differ much in light, or neighbours correlate.
+    /// If the two of a pair differ much in light, or neighbours correlate.
     pub(super) fn pairs(&self) -> Result<Vec<String>> {
         let mut notes = Vec::new();
+        let offset = self.offset();
         for pair in self.facts {
-            let [a, b] = pair.means.map(|mean| mean - self.offset);
+            let [a, b] = pair.means.map(|mean| mean - offset);
             let ratio = b / a - 1.0;
             let [first, second] = &pair.names;
-            if pair.are_equal {
-                return Err(Error::data(second, same_frame(first)));
-            }
-            let percent = 100.0 * ratio;
+            let percent = 100.0 * ratio.abs();
+            let word = if ratio < 0.0 { "less" } else { "more" };
             if a > 0.0 && ratio.abs() > LIGHT[1] {
                 return Err(Error::data(
                     first,
                     format_args!(
-                        "no pair with {second}: it has {percent:+.1} % of light, and the two of a pair must have the same (limit {} %); were exposures mixed, or does the lamp flicker?",
+                        "{second} has {percent:.1} % {word} light than this frame; the two frames of a pair must have equal light (limit {} %); were exposures mixed, or does the lamp flicker?",
                         100.0 * LIGHT[1]
                     ),
                 ));
             }
             if a > 0.0 && ratio.abs() > LIGHT[0] {
                 notes.push(format!(
-                    "{first} and {second}: a pair that differs by {percent:+.1} % in light; K is too large by up to half of that"
+                    "{first} and {second}: a pair whose second frame has {percent:.1} % {word} light; this is taken off, and K is right if all parts of the frame changed alike; take flats under steadier light"
                 ));
             }
-            correlation(pair.correlation).map_err(|problem| Error::data(first, problem))?;
+            let ratios = pair.light_ratios(self.offsets);
+            correlation(pair.neighbours.correlation(&ratios))
+                .map_err(|problem| Error::data(first, problem))?;
         }
         Ok(notes)
     }
 
-    /// Why too few tiles of the exposure are in the range of light; `None` if enough are.
-    pub(super) fn out_of_range(&self, used: &[Vec<Tile>], range: [f64; 2]) -> Option<String> {
+    /// Why too few tiles of the exposure are in the range of light, where so many are; `None` if enough are.
+    pub(super) fn out_of_range(&self, used: usize, range: [f64; 2]) -> Option<String> {
         let all: usize = self.facts.iter().map(|pair| pair.tiles.len()).sum();
-        let used: usize = used.iter().map(Vec::len).sum();
         let share = used as f64 / all.max(1) as f64;
         (share < LEAST_IN_RANGE).then(|| {
             let means = self.facts.iter().flat_map(|pair| pair.means);
-            let mean = means.sum::<f64>() / (2 * self.facts.len()) as f64 - self.offset;
+            let mean = means.sum::<f64>() / (2 * self.facts.len()) as f64 - self.offset();
             let [low, high] = range.map(|share| 100.0 * share);
             format!(
-                "exposure {}: {mean:.0} ADU of light are outside of {low} to {high} % of white",
-                self.name
+                "exposure {}: {mean:.0} ADU of light are outside of {low} to {high} % of white, {}",
+                self.name, self.white
             )
         })
     }
+
+    /// Mean offset of the planes in ADU.
+    fn offset(&self) -> f64 {
+        self.offsets.iter().sum::<f64>() / self.offsets.len() as f64
+    }
+}
+
+/// A note on white, if no code of all exposures comes near it.
+pub(super) fn far_below_white(exposures: &[Vec<PairFacts>], white: u16) -> Option<String> {
+    let greatest = exposures.iter().flatten().map(|pair| pair.greatest).max()?;
+    let share = f64::from(greatest) / f64::from(white);
+    (share < REACHES).then(|| {
+        format!(
+            "the greatest code of the flats, {greatest}, is {:.0} % of white, {white}: is white right? Flats of up to 60 % of white would show it",
+            100.0 * share
+        )
+    })
 }

@@ -10,7 +10,7 @@ use super::frames::{Frame, FrameReader};
 use super::hot_pixels::HotPixels;
 use super::inputs::Inputs;
 use super::recording::{ExposureFiles, LEAST, SettingFiles};
-use super::sums::{PairNoise, PairSums, PlaneSums, Tile, TopCode};
+use super::sums::{PairNoise, PairSums, PlaneSums, TileSums, TopCode};
 use crate::error::{Error, Result};
 use checks::{ExposureCheck, PairFacts};
 pub(super) use transfer::{Point, Transfer, gain};
@@ -31,6 +31,18 @@ struct Exposure {
     /// Tiles of each pair that are in the range of light.
     pairs: Vec<Vec<Tile>>,
     dark: Option<Dark>,
+}
+
+/// Light and noise of a tile of one plane of a pair.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Tile {
+    plane: usize,
+    /// Degrees of freedom of the variance.
+    free: f64,
+    /// Mean of both frames, in ADU.
+    mean: f64,
+    /// Variance of one frame at equal light of both, without row noise, in ADU².
+    variance: f64,
 }
 
 /// Frames of the exposure without light.
@@ -63,7 +75,8 @@ impl Flats {
     /// Reads the flats of a setting. What is left out, and doubts, are added to `notes`.
     ///
     /// # Errors
-    /// If a frame cannot be read, the two of a pair differ in light, neighbours correlate, or too few exposures are left.
+    /// If a frame cannot be read, is a copy or has codes above white, the two of a pair differ in light, neighbours correlate, or too
+    /// few exposures are left.
     pub(super) fn measure(
         reader: &FrameReader,
         files: &SettingFiles,
@@ -74,29 +87,33 @@ impl Flats {
     ) -> Result<Self> {
         let mut exposures = Vec::new();
         let mut left_out = Vec::new();
-        for (exposure, facts) in
-            files
-                .exposures
-                .iter()
-                .zip(read(reader, files, settings.hot, inputs)?)
-        {
+        let facts = read(reader, files, settings.hot, inputs)?;
+        notes.extend(checks::far_below_white(&facts, settings.white));
+        for (exposure, facts) in files.exposures.iter().zip(facts) {
             let dark = dark(reader, exposure, settings.hot, inputs)?;
             let offsets = dark.as_ref().map_or(base.offsets, |dark| &dark.offsets[..]);
             let check = ExposureCheck {
                 name: &exposure.name,
                 facts: &facts,
-                offset: offsets.iter().sum::<f64>() / offsets.len() as f64,
+                offsets,
+                white: settings.white,
             };
-            if let Some(reason) = check.clipped() {
-                left_out.push(reason);
+            check.above_white()?;
+            if let Some(clipped) = check.clipped() {
+                left_out.push(clipped.reason);
+                notes.extend(clipped.doubt);
                 continue;
+            }
+            for (name, digest) in facts.iter().flat_map(PairFacts::files) {
+                inputs.once(name, digest)?;
             }
             notes.extend(check.pairs()?);
             let pairs: Vec<Vec<Tile>> = facts
                 .iter()
-                .map(|pair| in_range(&pair.tiles, offsets, settings.white))
+                .map(|pair| in_range(pair, offsets, settings.white))
                 .collect();
-            if let Some(reason) = check.out_of_range(&pairs, RANGE) {
+            let used: usize = pairs.iter().map(Vec::len).sum();
+            if let Some(reason) = check.out_of_range(used, RANGE) {
                 left_out.push(reason);
                 continue;
             }
@@ -148,7 +165,7 @@ impl Flats {
                 points.extend(pair.iter().map(|tile| Point {
                     exposure: index,
                     plane: tile.plane,
-                    weight: weight * tile.count,
+                    weight: weight * tile.free,
                     signal: tile.mean - offsets[tile.plane],
                     variance: tile.variance - within,
                     within,
@@ -170,14 +187,21 @@ fn too_few(files: &SettingFiles, left: usize, reasons: &[String]) -> Error {
     Error::data(format_args!("flats of {}", files.name), problem)
 }
 
-/// The tiles whose light is in the range.
-fn in_range(tiles: &[Tile], offsets: &[f64], white: u16) -> Vec<Tile> {
-    let used = tiles.iter().filter(|tile| {
+/// The tiles of a pair whose light is in the range.
+fn in_range(pair: &PairFacts, offsets: &[f64], white: u16) -> Vec<Tile> {
+    let ratios = pair.light_ratios(offsets);
+    let used = pair.tiles.iter().filter(|tile| {
         let offset = offsets[tile.plane];
-        let share = (tile.mean - offset) / (f64::from(white) - offset);
+        let share = (tile.mean() - offset) / (f64::from(white) - offset);
         (RANGE[0]..=RANGE[1]).contains(&share)
     });
-    used.copied().collect()
+    let tile = |tile: &TileSums| Tile {
+        plane: tile.plane,
+        free: tile.free,
+        mean: tile.mean(),
+        variance: tile.variance(ratios[tile.plane]),
+    };
+    used.map(tile).collect()
 }
 
 /// Reads all pairs of all exposures.
@@ -195,14 +219,16 @@ fn read(
     let work = |(_, pair): &(usize, &[PathBuf])| {
         let [a, b] = read_pair(reader, pair)?;
         let sums = PairSums::of(layout, [&a.samples, &b.samples], hot);
-        let top = [&a, &b].map(|frame| TopCode::of(layout, &frame.samples, hot).largest_share());
+        let top = [&a, &b].map(|frame| TopCode::of(layout, &frame.samples, hot));
+        let [first, second] = [0, 1].map(|frame| top[frame].largest_share());
         let facts = PairFacts {
             names: [&pair[0], &pair[1]].map(|path| path.display().to_string()),
-            top: top[0].max(top[1]),
+            digests: [a.facts.digest, b.facts.digest],
+            greatest: top[0].greatest().max(top[1].greatest()),
+            at_top: if second.0 > first.0 { second } else { first },
             means: sums.means(),
-            correlation: sums.correlation(),
+            neighbours: sums.neighbours(),
             tiles: sums.tiles(),
-            are_equal: a.facts.digest == b.facts.digest,
         };
         Ok((facts, [a.facts, b.facts]))
     };
@@ -261,7 +287,7 @@ fn dark(
         work,
         |group, (sums, noise, facts)| {
             for (path, facts) in group.iter().zip(&facts) {
-                inputs.add(path, facts);
+                inputs.add_once(path, facts)?;
             }
             for sums in &sums {
                 for (plane, more) in planes.iter_mut().zip(sums) {

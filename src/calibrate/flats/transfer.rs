@@ -8,7 +8,7 @@
 pub(in super::super) struct Point {
     pub(in super::super) exposure: usize,
     pub(in super::super) plane: usize,
-    /// Number of sites, times the weight of the pair.
+    /// Degrees of freedom of the variance, times the weight of the pair.
     pub(in super::super) weight: f64,
     /// Light above the offset, in ADU.
     pub(in super::super) signal: f64,

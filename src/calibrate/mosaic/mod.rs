@@ -8,11 +8,11 @@ mod pgm;
 
 use std::path::Path;
 
-use crate::dataset::raw_png::{RawPng, SampleForm};
+use crate::dataset::raw_png::{RawPng, RawPngError, SampleForm};
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::types::Digest;
-use decoded::{Decoded, EXPORT, MosaicForm, developed, too_large};
+use decoded::{Decoded, EXPORT, MosaicForm, developed};
 
 /// A frame of a sensor: one number for each site.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,16 +80,19 @@ fn decode(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<Decoded, String
 }
 
 fn png(bytes: &[u8], most_pixels: u64) -> Result<Decoded, String> {
-    let png = RawPng::open(bytes, &[SampleForm::Grey16]).map_err(|problem| developed(&problem))?;
+    let again = |problem: String| format!("{problem}; copy or export it again");
+    let png =
+        RawPng::open(bytes, &[SampleForm::Grey16], most_pixels).map_err(|error| match error {
+            RawPngError::Broken(problem) => again(problem),
+            RawPngError::TooLarge(problem) => format!("{problem}; raise --max-pixels"),
+            RawPngError::OtherForm(problem) => developed(&problem),
+        })?;
     let (height, width) = png.size;
-    if let Some(problem) = too_large(width, height, most_pixels) {
-        return Err(problem);
-    }
-    let samples = png.samples(|sample| sample);
+    let samples = png.samples(|sample| sample).map_err(again)?;
     Ok(Decoded {
         height,
         width,
-        samples: samples.map_err(|problem| format!("{problem}; copy or export it again"))?,
+        samples,
         form: MosaicForm::Png,
         camera: None,
         taken: None,

@@ -132,7 +132,7 @@ fn developed_images_are_refused() {
         for part in [
             what,
             "a developed image holds no sensor noise",
-            "dcraw -D -4 -T",
+            "dcraw -D -4 -T -t 0",
         ] {
             assert!(problem.contains(part), "{what}: {problem}");
         }
@@ -152,7 +152,7 @@ fn raw_files_of_makers_say_how_to_export() {
         ("a", b"FUJIFILMCCD-RAW 0201".to_vec(), "a RAF file"),
     ] {
         let problem = problem(name, &bytes);
-        for part in [kind, "dcraw -D -4 -T", "rawpy's `raw_image`"] {
+        for part in [kind, "dcraw -D -4 -T -t 0", "rawpy's `raw_image`"] {
             assert!(problem.contains(part), "{name}: {problem}");
         }
     }
@@ -224,6 +224,40 @@ fn broken_files_are_refused() {
     ] {
         let problem = problem(name, &bytes);
         assert!(problem.contains(part), "{name}: {problem}");
+    }
+}
+
+/// A damaged or a large PNG is not called developed, and the limit is the one that was set.
+#[test]
+fn a_damaged_or_large_png_is_named_as_such() {
+    let big: Vec<u8> = samples().iter().flat_map(|s| s.to_be_bytes()).collect();
+    let small = png(png::ColorType::Grayscale, png::BitDepth::Sixteen, &big);
+    let mut large = Vec::new();
+    let mut encoder = png::Encoder::new(&mut large, 10_001, 10_000);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Sixteen);
+    let mut writer = encoder.write_header().unwrap();
+    writer.write_chunk(png::chunk::IDAT, &[]).unwrap();
+    drop(writer);
+    for (bytes, most_pixels, part) in [
+        (&small[..30], 15, "not a readable PNG"),
+        (
+            &small[..],
+            14,
+            "5 × 3 pixels are more than the 14 that are read; raise --max-pixels",
+        ),
+        (
+            &large,
+            100_000_000,
+            "10001 × 10000 pixels are more than the 100000000 that are read; raise",
+        ),
+        // It may be read now, and has no samples.
+        (&large, 200_000_000, "not a whole PNG"),
+    ] {
+        let problem = decode(Path::new("a.png"), bytes, most_pixels);
+        let problem = problem.map(|_| ()).unwrap_err();
+        assert!(problem.contains(part), "{part}: {problem}");
+        assert!(!problem.contains("developed"), "{problem}");
     }
 }
 

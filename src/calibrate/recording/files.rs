@@ -13,7 +13,7 @@ pub(super) const TABLE: &str = "frames.csv";
 /// All frames of a camera.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Recording {
-    /// The settings, in the order of the numbers in their names, then of the names.
+    /// The settings, in the order of the last numbers in their names, then of the names.
     pub(in super::super) settings: Vec<SettingFiles>,
     /// Lines about files and folders that are left out.
     pub(in super::super) notes: Vec<String>,
@@ -42,13 +42,15 @@ pub(in super::super) struct ExposureFiles {
 }
 
 impl SettingFiles {
-    /// The number in the name, as 800 in `ISO800`; `None` if there is none.
+    /// The last number in the name, as 800 in `a7s2-iso800`; `None` if there is none.
     pub(in super::super) fn number(&self) -> Option<f64> {
-        let start = self.name.find(|c: char| c.is_ascii_digit())?;
-        let rest = &self.name[start..];
-        let end = rest.find(|c: char| !c.is_ascii_digit() && c != '.');
-        rest[..end.unwrap_or(rest.len())]
-            .trim_end_matches('.')
+        let end = self.name.rfind(|c: char| c.is_ascii_digit())? + 1;
+        let start = self.name[..end].rfind(|c: char| !c.is_ascii_digit() && c != '.');
+        // A character before the number may have several bytes.
+        let before =
+            start.and_then(|start| Some(start + self.name[start..].chars().next()?.len_utf8()));
+        self.name[before.unwrap_or(0)..end]
+            .trim_start_matches('.')
             .parse()
             .ok()
     }

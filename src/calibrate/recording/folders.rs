@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use super::files::{Recording, SettingFiles, TABLE};
+use super::order::by_numbers;
 use crate::error::{Error, Result};
 use crate::files::reading::entries;
 
@@ -75,10 +76,11 @@ fn place_of<'a>(setting: &'a mut SettingFiles, path: &Path) -> Option<&'a mut Ve
     }
 }
 
-/// The files and folders in a folder by name, without hidden ones.
+/// The files and folders in a folder in the order of their names, without hidden ones.
 fn visible(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut paths = entries(folder)?;
     paths.retain(|path| !name(path).starts_with('.'));
+    paths.sort_by(|a, b| by_numbers(&name(a), &name(b)));
     Ok(paths)
 }
 

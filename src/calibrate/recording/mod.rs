@@ -2,6 +2,7 @@
 
 mod files;
 mod folders;
+mod order;
 mod table;
 
 use std::path::{Path, PathBuf};
@@ -10,6 +11,7 @@ use crate::error::Result;
 pub(crate) use files::Recording;
 use files::TABLE;
 pub(super) use files::{ExposureFiles, LEAST, SettingFiles};
+use order::by_numbers;
 
 impl Recording {
     /// Finds the frames of a folder: by its `frames.csv` if it has one, else by the names of the folders in it.
@@ -26,7 +28,7 @@ impl Recording {
         recording.settings.sort_by(|a, b| {
             let number = |setting: &SettingFiles| setting.number().unwrap_or(f64::INFINITY);
             let by_number = number(a).total_cmp(&number(b));
-            by_number.then_with(|| a.name.cmp(&b.name))
+            by_number.then_with(|| by_numbers(&a.name, &b.name))
         });
         for setting in &mut recording.settings {
             setting.pair_up(folder, &mut recording.notes)?;

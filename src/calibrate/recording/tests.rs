@@ -44,6 +44,50 @@ fn settings_are_ordered_by_number() {
     assert!(recording.first().ends_with("iso100/bias/0.png"));
 }
 
+/// The last number of a name counts, so that the number of a model does not.
+#[test]
+fn the_last_number_of_a_name_is_that_of_the_setting() {
+    for (name, number) in [
+        ("a7s2-iso800", Some(800.0)),
+        ("ISO1600", Some(1600.0)),
+        ("gain1.5x", Some(1.5)),
+        ("µ..5", Some(5.0)),
+        ("5D4.iso100", Some(100.0)),
+        ("é", None),
+        ("1.2.3", None),
+    ] {
+        let setting = SettingFiles {
+            name: name.to_owned(),
+            ..SettingFiles::default()
+        };
+        assert_eq!(setting.number(), number, "{name}");
+    }
+    let files = ["a7s2-iso800", "a7s2-iso1600", "a7s2-iso100"].map(least);
+    let (_folder, recording) = opened(&files.concat());
+    let recording = recording.unwrap();
+    let names = recording.settings.iter().map(|setting| &*setting.name);
+    assert_eq!(
+        names.collect::<Vec<_>>(),
+        ["a7s2-iso100", "a7s2-iso800", "a7s2-iso1600"]
+    );
+}
+
+/// Frames are in pairs as they were taken, with leading zeros or without.
+#[test]
+fn frames_are_ordered_by_number() {
+    let mut files = least("iso100");
+    files.extend((2..12).map(|frame| format!("iso100/flat-2/{frame}.png")));
+    files.extend((0..2).map(|frame| format!("iso100/flat-10/{frame}.png")));
+    let (_folder, recording) = opened(&files);
+    let exposures = &recording.unwrap().settings[0].exposures;
+    let names = exposures.iter().map(|exposure| &*exposure.name);
+    assert_eq!(names.collect::<Vec<_>>(), ["1", "2", "3", "10"]);
+    let frames = exposures[1].flats.iter().map(|path| path.file_stem());
+    let frames: Vec<_> = frames.map(|stem| stem.unwrap().to_str().unwrap()).collect();
+    let taken: Vec<String> = (0..12).map(|frame| frame.to_string()).collect();
+    assert_eq!(frames, taken);
+}
+
 #[test]
 fn odd_flats_and_strange_names_are_left_out_and_named() {
     let mut files = least("iso100");

@@ -29,7 +29,7 @@ pub(super) fn of(fit: &SettingFit, has_dark: bool, width: usize) -> Result<Vec<S
     let bend = 100.0 * fit.bend;
     if fit.bend.abs() > BEND[1] {
         return Err(format!(
-            "photon transfer bends by {bend:+.0} % over the range of light (limit {:.0} %): the codes are not linear in light, or the frames were processed",
+            "photon transfer bends by {bend:+.0} % over the range of light (limit {:.0} %): the codes are not linear in light, the frames were processed, or the light of pairs changed in parts of the frame alone",
             100.0 * BEND[1]
         ));
     }
@@ -43,7 +43,7 @@ pub(super) fn of(fit: &SettingFit, has_dark: bool, width: usize) -> Result<Vec<S
     doubts.extend(planes(fit));
     if fit.row_deviation.value <= 0.0 {
         doubts.push(format!(
-            "row noise is below what can be seen, σ/√W = {:.3} ADU: 0 is written",
+            "row noise cannot be seen below about {:.3} ADU: this setting does not count in the line of σ_row, which --camera takes for it, too",
             fit.read_deviation / (width as f64).sqrt()
         ));
     }

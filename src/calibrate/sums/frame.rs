@@ -61,12 +61,10 @@ impl TopCode {
         let parts = (0..layout.plane_rows()).into_par_iter().with_min_len(64);
         let rows = parts.map_init(Vec::new, |part, plane_row| {
             gather(layout, samples, plane_row, part);
-            let n = part.len();
             for (removed, column) in hot.columns(plane_row).enumerate() {
                 // Each removal moves the columns behind it by one.
                 part.remove(column - removed);
             }
-            debug_assert!(part.len() <= n);
             let top = part.iter().copied().max().unwrap_or(0);
             let with_it = part.iter().filter(|sample| **sample == top).count();
             (part.len() as u64, top, with_it as u64)
@@ -87,16 +85,24 @@ impl TopCode {
         Self { planes }
     }
 
-    /// The largest share of samples at the greatest code of their plane.
-    pub(in super::super) fn largest_share(&self) -> f64 {
-        let shares = self.planes.iter().map(|(count, _, with_it)| {
-            if *count == 0 {
-                0.0
-            } else {
-                *with_it as f64 / *count as f64
-            }
+    /// The greatest code of the frame.
+    pub(in super::super) fn greatest(&self) -> u16 {
+        let codes = self.planes.iter().map(|(_, code, _)| *code);
+        codes.max().unwrap_or(0)
+    }
+
+    /// The plane with the largest share of samples at its greatest code: this share, and the code.
+    pub(in super::super) fn largest_share(&self) -> (f64, u16) {
+        let shares = self.planes.iter().map(|(count, code, with_it)| {
+            let share = *with_it as f64 / (*count).max(1) as f64;
+            (share, *code)
         });
-        shares.fold(0.0, f64::max)
+        shares.fold(
+            (0.0, 0),
+            |most, plane| {
+                if plane.0 > most.0 { plane } else { most }
+            },
+        )
     }
 }
 
@@ -125,7 +131,7 @@ mod tests {
     fn samples_at_the_greatest_code_are_counted() {
         let top = TopCode::of(LAYOUT, &SAMPLES, &HotPixels::none(4));
         assert_eq!(top.planes, [(3, 3, 1), (3, 10, 3), (3, 9, 1), (3, 8, 1)]);
-        assert!((top.largest_share() - 1.0).abs() < 1e-15);
+        assert_eq!((top.greatest(), top.largest_share()), (10, (1.0, 10)));
         let hot = HotPixels::new(vec![vec![], vec![0, 1], vec![2], vec![]]);
         let top = TopCode::of(LAYOUT, &SAMPLES, &hot);
         assert_eq!(top.planes, [(3, 3, 1), (1, 10, 1), (2, 5, 2), (3, 8, 1)]);

@@ -5,7 +5,7 @@ mod pair;
 mod residuals;
 
 pub(super) use frame::{PlaneSums, TopCode};
-pub(super) use pair::{PairNoise, PairSums, Tile};
+pub(super) use pair::{NeighbourSums, PairNoise, PairSums, TileSums};
 pub(super) use residuals::{Centres, Residuals, STEPS};
 
 use super::layout::Layout;

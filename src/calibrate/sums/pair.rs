@@ -1,12 +1,19 @@
 //! Sums of the difference of two frames of one exposure: [`PairSums`].
 //!
-//! A difference removes everything that stands still: fixed pattern, response of the sites, fall-off of light.
+//! A difference removes everything that stands still: fixed pattern, response of the sites, fall-off of light. The light of two
+//! flats is never quite equal. So the products of A and B are kept, from which the difference at equal light follows.
+
+mod neighbours;
+mod scatter;
 
 use rayon::prelude::*;
 
 use super::super::hot_pixels::HotPixels;
 use super::super::layout::{Layout, TILES};
 use super::gather;
+pub(in super::super) use neighbours::NeighbourSums;
+use neighbours::RowNeighbours;
+use scatter::{Products, Scatter};
 
 /// Sums of two frames A and B by part of a row and tile, without hot pixels.
 #[derive(Debug)]
@@ -19,7 +26,7 @@ pub(in super::super) struct PairSums {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 struct PairRow {
     tiles: [Cell; TILES],
-    neighbours: Neighbours,
+    neighbours: RowNeighbours,
 }
 
 /// Sums of a tile in one row.
@@ -30,30 +37,36 @@ struct Cell {
     a: u64,
     /// Sum of B.
     b: u64,
-    /// Sum of (A − B)².
-    squares: u64,
-}
-
-/// Sums over neighbours d and d′ in a part of a row, where d = A − B.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-struct Neighbours {
-    count: i64,
-    /// Sum of d + d′.
-    both: i64,
-    /// Sum of d · d′.
-    products: i64,
+    products: Products,
 }
 
 /// Light and noise of a tile of one plane.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(in super::super) struct Tile {
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(in super::super) struct TileSums {
     pub(in super::super) plane: usize,
     /// Number of sites.
     pub(in super::super) count: f64,
+    /// Sums of A and of B, in ADU.
+    pub(in super::super) sums: [f64; 2],
+    /// Products about the means of the parts of rows in the tile: fall-off, and row noise, are not in them.
+    pub(in super::super) scatter: Scatter,
+    /// Degrees of freedom of `scatter`: the number of sites less that of the parts of rows.
+    pub(in super::super) free: f64,
+}
+
+impl TileSums {
     /// Mean of both frames, in ADU.
-    pub(in super::super) mean: f64,
-    /// Variance of one frame without row noise: half of the mean squared difference about its row's mean, in ADU².
-    pub(in super::super) variance: f64,
+    pub(in super::super) fn mean(&self) -> f64 {
+        (self.sums[0] + self.sums[1]) / self.count / 2.0
+    }
+
+    /// Variance of one frame without row noise, in ADU², where the light of A is `ratio` times that of B.
+    ///
+    /// A and B · ratio have equal light, so that their difference D has neither fall-off nor the response of the sites. With light S
+    /// of B its variance is K · ratio · S + ratio² · K · S = 2 ratio · K · S̄, where S̄ is the mean light of both.
+    pub(in super::super) fn variance(&self, ratio: f64) -> f64 {
+        self.scatter.of_difference(ratio) / self.free / (2.0 * ratio)
+    }
 }
 
 /// Noise of a pair without the noise of light.
@@ -155,63 +168,42 @@ impl PairSums {
         }
     }
 
-    /// Correlation of neighbours of a plane in a row of A − B, which is 0 for noise of single sites.
-    pub(in super::super) fn correlation(&self) -> f64 {
-        let [mut products, mut squares, mut length] = [0.0; 3];
-        let mut rows = 0.0;
-        for (_, row) in self.by_plane() {
-            let [count, sum, _] = row.about(0.0);
-            if count < 2.0 || row.neighbours.count == 0 {
+    /// Products of neighbours in the rows of each plane.
+    pub(in super::super) fn neighbours(&self) -> NeighbourSums {
+        let mut sums = NeighbourSums::none(self.layout.cfa.planes());
+        for (plane, row) in self.by_plane() {
+            let whole = row.whole();
+            if whole.count < 2 || row.neighbours.count == 0 {
                 continue;
             }
-            let mean = sum / count;
-            let Neighbours {
-                count: pairs,
-                both,
-                products: product,
-            } = row.neighbours;
-            let (pairs, both, product) = (pairs as f64, both as f64, product as f64);
-            products += (product - mean * both + pairs * mean * mean) * count / pairs;
-            squares += row.about(mean)[2];
-            length += count;
-            rows += 1.0;
+            let count = whole.count as f64;
+            let means = [whole.a, whole.b].map(|sum| sum as f64 / count);
+            sums.add(plane, row.neighbours, count, means, whole.scatter());
         }
-        if squares <= 0.0 {
-            return 0.0;
-        }
-        // Taking off the mean of n sites makes independent neighbours correlate by −1/(n − 1).
-        products / squares + 1.0 / (length / rows - 1.0)
+        sums
     }
 
-    /// Light and noise of all tiles of all planes; tiles without sites are left out.
-    pub(in super::super) fn tiles(&self) -> Vec<Tile> {
-        let mut tiles = vec![[0.0; 3]; self.layout.cfa.planes() * TILES * TILES];
+    /// Light and noise of all tiles of all planes; tiles without two sites in a row are left out.
+    pub(in super::super) fn tiles(&self) -> Vec<TileSums> {
+        let mut tiles = vec![TileSums::default(); self.layout.cfa.planes() * TILES * TILES];
         for (plane_row, row) in self.rows.iter().enumerate() {
             let [at, parity] = self.layout.place(plane_row);
             let plane = self.layout.cfa.plane(at, parity);
-            let [n, sum, _] = row.about(0.0);
-            if n < 2.0 {
-                continue;
-            }
-            let mean = sum / n;
             let first = (plane * TILES + self.layout.tile_row(at)) * TILES;
             for (cell, tile) in row.tiles.iter().zip(&mut tiles[first..]) {
-                tile[0] += cell.count as f64;
-                tile[1] += (cell.a + cell.b) as f64;
-                // The mean takes 1/n of the variance with it.
-                tile[2] += cell.about(mean)[2] * n / (n - 1.0);
+                if cell.count < 2 {
+                    continue;
+                }
+                tile.plane = plane;
+                tile.count += cell.count as f64;
+                tile.sums[0] += cell.a as f64;
+                tile.sums[1] += cell.b as f64;
+                tile.scatter.join(cell.scatter());
+                tile.free += cell.count as f64 - 1.0;
             }
         }
-        let tiles = tiles.into_iter().enumerate();
-        let tiles = tiles.filter(|(_, [count, ..])| *count > 0.0);
+        tiles.retain(|tile| tile.free > 0.0);
         tiles
-            .map(|(index, [count, both, squares])| Tile {
-                plane: index / (TILES * TILES),
-                count,
-                mean: both / count / 2.0,
-                variance: squares / count / 2.0,
-            })
-            .collect()
     }
 }
 
@@ -224,8 +216,14 @@ impl Cell {
     /// Number, sum and sum of squares of A − B − `mean`.
     fn about(&self, mean: f64) -> [f64; 3] {
         let (n, sum) = (self.count as f64, self.difference() as f64);
-        let squares = self.squares as f64 - 2.0 * mean * sum + n * mean * mean;
+        let squares = self.products.of_difference() as f64;
+        let squares = squares - 2.0 * mean * sum + n * mean * mean;
         [n, sum - n * mean, squares]
+    }
+
+    /// Products about the means of A and of B.
+    fn scatter(&self) -> Scatter {
+        self.products.about_means(self.count, [self.a, self.b])
     }
 }
 
@@ -237,8 +235,8 @@ impl PairRow {
             let columns = Layout::tile(a.len(), tile);
             *cell = cell_of(&a[columns.clone()], &b[columns]);
         }
-        let difference = |column: usize| i64::from(a[column]) - i64::from(b[column]);
-        row.neighbours = neighbours_of(a, b);
+        row.neighbours = RowNeighbours::of(a, b);
+        let site = |column: usize| [a[column], b[column]];
         let mut last = None;
         for column in hot {
             let tile = (0..TILES).find(|tile| Layout::tile(a.len(), *tile).contains(&column));
@@ -246,20 +244,28 @@ impl PairRow {
             cell.count -= 1;
             cell.a -= u64::from(a[column]);
             cell.b -= u64::from(b[column]);
-            cell.squares -= difference(column).unsigned_abs().pow(2);
+            cell.products.remove(a[column], b[column]);
             // The two pairs of neighbours that the column is in, each once.
             for left in column.saturating_sub(1)..=column {
                 let is_new = last.is_none_or(|last| left > last);
                 if is_new && left + 1 < a.len() {
-                    let [d, next] = [difference(left), difference(left + 1)];
-                    row.neighbours.count -= 1;
-                    row.neighbours.both -= d + next;
-                    row.neighbours.products -= d * next;
+                    row.neighbours.remove(site(left), site(left + 1));
                     last = Some(left);
                 }
             }
         }
         row
+    }
+
+    /// Sums of the whole part of the row.
+    fn whole(&self) -> Cell {
+        self.tiles.iter().fold(Cell::default(), |mut whole, cell| {
+            whole.count += cell.count;
+            whole.a += cell.a;
+            whole.b += cell.b;
+            whole.products.join(cell.products);
+            whole
+        })
     }
 
     /// Number, sum and sum of squares of A − B − `mean` over the part of the row.
@@ -277,25 +283,11 @@ fn cell_of(a: &[u16], b: &[u16]) -> Cell {
         ..Cell::default()
     };
     for (a, b) in a.iter().zip(b) {
-        let difference = u64::from(a.abs_diff(*b));
         cell.a += u64::from(*a);
         cell.b += u64::from(*b);
-        cell.squares += difference * difference;
+        cell.products.add(*a, *b);
     }
     cell
-}
-
-fn neighbours_of(a: &[u16], b: &[u16]) -> Neighbours {
-    let mut sums = Neighbours {
-        count: a.len() as i64 - 1,
-        ..Neighbours::default()
-    };
-    let differences = a.iter().zip(b).map(|(a, b)| i64::from(*a) - i64::from(*b));
-    for (d, next) in differences.clone().zip(differences.skip(1)) {
-        sums.both += d + next;
-        sums.products += d * next;
-    }
-    sums
 }
 
 #[cfg(test)]

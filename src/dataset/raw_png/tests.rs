@@ -1,5 +1,6 @@
 use proptest::prelude::*;
 
+use super::super::reading_rule::MOST_PIXELS;
 use super::*;
 
 /// A PNG file with the given packed rows.
@@ -24,7 +25,7 @@ pub(crate) fn png(
 }
 
 fn read(bytes: &[u8], forms: &[SampleForm]) -> Result<Vec<u16>, String> {
-    RawPng::open(bytes, forms)?.samples(|sample| sample)
+    RawPng::open(bytes, forms, MOST_PIXELS)?.samples(|sample| sample)
 }
 
 #[test]
@@ -70,7 +71,7 @@ fn grey_is_read_as_it_is() {
         BitDepth::Sixteen,
         &[1, 2, 255, 255],
     );
-    let opened = RawPng::open(&deep, &[SampleForm::Grey16]).unwrap();
+    let opened = RawPng::open(&deep, &[SampleForm::Grey16], 2).unwrap();
     assert_eq!(opened.size, (2, 1));
     assert_eq!(opened.samples(|sample| sample).unwrap(), [258, 65_535]);
 }
@@ -142,6 +143,28 @@ fn a_bomb_is_refused_before_it_is_decompressed() {
         problem.starts_with("65536 × 65536 pixels are more"),
         "{problem}"
     );
+}
+
+/// Each cause of a refusal is told from the others.
+#[test]
+fn refusals_have_causes() {
+    let deep = png((2, 1), ColorType::Grayscale, BitDepth::Sixteen, &[0; 4]);
+    let cause = |bytes: &[u8], form: SampleForm, most: u64| {
+        RawPng::open(bytes, &[form], most).map(|png| png.size)
+    };
+    assert_eq!(cause(&deep, SampleForm::Grey16, 2), Ok((2, 1)));
+    assert!(matches!(
+        cause(&deep[..30], SampleForm::Grey16, 2),
+        Err(RawPngError::Broken(_))
+    ));
+    assert!(matches!(
+        cause(&deep, SampleForm::Grey16, 1),
+        Err(RawPngError::TooLarge(_))
+    ));
+    assert!(matches!(
+        cause(&deep, SampleForm::Grey8, 2),
+        Err(RawPngError::OtherForm(_))
+    ));
 }
 
 /// Updates the checksum of the header after its content was changed.

@@ -26,9 +26,20 @@ fn file(bench: &Bench, name: &str) -> PathBuf {
     bench.path(&format!("cam/iso800/{name}"))
 }
 
+/// What is changed in the recording.
+type Change = fn(&Bench);
+
+/// A recording with one change is refused with a message of these parts.
+fn refuses((name, change, parts): (&str, Change, &[&str])) {
+    let bench = recording(change);
+    let message = refused(&bench, &format!("cam --white {WHITE}"));
+    for part in parts {
+        assert!(message.contains(part), "{name}: {message}");
+    }
+}
+
 #[test]
 fn files_that_cannot_be_used_are_named() {
-    type Change = fn(&Bench);
     let rows: Vec<(&str, Change, &[&str])> = vec![
         (
             "truncated",
@@ -42,14 +53,14 @@ fn files_that_cannot_be_used_are_named() {
         (
             "foreign",
             |bench| fs::write(file(bench, "bias/notes.txt"), "shutter closed").unwrap(),
-            &["bias/notes.txt: not a mosaic", "dcraw -D -4 -T"],
+            &["bias/notes.txt: not a mosaic", "dcraw -D -4 -T -t 0"],
         ),
         (
             "raw",
             |bench| fs::rename(file(bench, "bias/01.pgm"), file(bench, "bias/01.dng")).unwrap(),
             &[
                 "bias/01.dng: a DNG file, the RAW format of a camera, is not read",
-                "dcraw -D -4 -T",
+                "dcraw -D -4 -T -t 0",
                 "rawpy's `raw_image`",
             ],
         ),
@@ -92,13 +103,6 @@ fn files_that_cannot_be_used_are_named() {
             ],
         ),
         (
-            "twice",
-            |bench| {
-                fs::copy(file(bench, "bias/00.pgm"), file(bench, "bias/01.pgm")).unwrap();
-            },
-            &["bias/01.pgm: the same frame as", "bias/00.pgm"],
-        ),
-        (
             "few",
             |bench| {
                 fs::remove_dir_all(file(bench, "flat-3")).unwrap();
@@ -108,13 +112,40 @@ fn files_that_cannot_be_used_are_named() {
             &["2 bias frames and 2 exposures with a pair of flats; at least 2 and 3 are needed"],
         ),
     ];
-    check_rows(rows, |(name, change, parts)| {
-        let bench = recording(change);
-        let message = refused(&bench, &format!("cam --white {WHITE}"));
-        for part in parts {
-            assert!(message.contains(part), "{name}: {message}");
-        }
-    });
+    check_rows(rows, refuses);
+}
+
+/// Copies have no noise between them, whatever they are used for.
+#[test]
+fn copies_are_refused() {
+    let rows: Vec<(&str, Change, &[&str])> = vec![
+        (
+            "twice",
+            |bench| {
+                fs::copy(file(bench, "bias/00.pgm"), file(bench, "bias/01.pgm")).unwrap();
+            },
+            &["bias/01.pgm: the same frame as", "bias/00.pgm"],
+        ),
+        (
+            "twice in flats",
+            |bench| {
+                fs::copy(file(bench, "flat-1/00.pgm"), file(bench, "flat-2/01.pgm")).unwrap();
+            },
+            &["flat-2/01.pgm: the same frame as", "flat-1/00.pgm"],
+        ),
+        (
+            "bias frames as dark frames",
+            |bench| {
+                fs::create_dir(file(bench, "dark-3")).unwrap();
+                for name in ["00.pgm", "01.pgm"] {
+                    let from = file(bench, &format!("bias/{name}"));
+                    fs::copy(from, file(bench, &format!("dark-3/{name}"))).unwrap();
+                }
+            },
+            &["dark-3/00.pgm: the same frame as", "bias/00.pgm"],
+        ),
+    ];
+    check_rows(rows, refuses);
 }
 
 #[test]
@@ -154,6 +185,50 @@ fn white_must_be_known() {
     );
 }
 
+/// A code of white that the flats speak against is refused or named; overexposed frames may be equal.
+#[test]
+fn white_is_held_against_the_codes() {
+    let warnings = |bench: &Bench, white: u16| -> Vec<String> {
+        let found = measured(bench, &format!("cam --white {white}"));
+        let lines = found["warnings"].as_array().unwrap().iter();
+        lines
+            .map(|line| line.as_str().unwrap().to_owned())
+            .collect()
+    };
+    let bench = recording(|_| ());
+    let message = refused(&bench, "cam --white 5000");
+    assert!(
+        message.contains("flat-4/00.pgm and ") && message.contains("is above white, 5000"),
+        "{message}"
+    );
+    assert_eq!(warnings(&bench, WHITE), [""; 0]);
+    let far = warnings(&bench, 65535);
+    assert!(
+        far.iter()
+            .any(|line| line.contains("the greatest code of the flats, ")
+                && line.contains(" % of white, 65535: is white right?")),
+        "{far:?}"
+    );
+    // The brightest exposure is overexposed: its frames are equal.
+    let bench = recording(|bench| {
+        for name in ["00.pgm", "01.pgm"] {
+            let white = Form::Pgm.encode(&vec![WHITE; SIDE * SIDE], SIDE);
+            fs::write(file(bench, &format!("flat-4/{name}")), white).unwrap();
+        }
+    });
+    let left_out = warnings(&bench, WHITE);
+    assert!(
+        left_out.len() == 1 && left_out[0].ends_with("of a colour are at white, 16383; left out"),
+        "{left_out:?}"
+    );
+    let low = warnings(&bench, 20000);
+    assert!(
+        low.iter()
+            .any(|line| line.contains("is clipped at 16383, far below white, 20000")),
+        "{low:?}"
+    );
+}
+
 #[test]
 fn wrong_flags_are_named() {
     let bench = recording(|_| ());
@@ -173,7 +248,12 @@ fn wrong_flags_are_named() {
             ("cam --white 9999 --max-pixels 100", "raise --max-pixels"),
             (
                 "cam --out camera.svg",
-                "--out: the camera file must not end with .svg",
+                "--out: camera.svg has not the ending .toml",
+            ),
+            ("cam --out mycam", "--out: mycam has not the ending .toml"),
+            (
+                "cam --out out/my.cam",
+                "--out: out/my.cam has not the ending .toml",
             ),
         ],
         |(line, part)| {

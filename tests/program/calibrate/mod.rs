@@ -1,6 +1,7 @@
 //! `calibrate` from the outside, on recordings of a simulated sensor whose noise is known.
 
 mod files;
+mod lamp;
 mod measure;
 mod sensor;
 mod traps;

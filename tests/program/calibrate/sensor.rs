@@ -102,11 +102,19 @@ pub(super) struct Shots {
 impl Shots {
     /// So many bias frames, and pairs of flats at five exposures from 2 to 60 % of white.
     pub(super) fn take(sensor: &Sensor, bias: usize, pairs: usize) -> Self {
+        Self::take_drifting(sensor, bias, pairs, 0.0)
+    }
+
+    /// The same under a lamp that gives the second frame of each pair more light, by the share `drift`.
+    pub(super) fn take_drifting(sensor: &Sensor, bias: usize, pairs: usize, drift: f32) -> Self {
         let level = |exposure: i32| 0.02 * 30_f32.powf(exposure as f32 / 4.0);
         let bias = (0..bias).map(|i| sensor.shoot(&format!("bias {i}"), 0.0));
         let flats = (0..5).map(|exposure| {
             let frames = 0..2 * pairs;
-            let shoot = |i| sensor.shoot(&format!("flat {exposure} {i}"), level(exposure));
+            let shoot = |i| {
+                let light = level(exposure) * if i % 2 == 1 { 1.0 + drift } else { 1.0 };
+                sensor.shoot(&format!("flat {exposure} {i}"), light)
+            };
             frames.map(shoot).collect()
         });
         Self {

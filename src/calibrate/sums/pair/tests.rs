@@ -111,7 +111,8 @@ fn hot_pixels_are_in_no_sum() {
         .collect();
     let hot = HotPixels::new(columns);
     let clean = PairSums::of(BAYER, [&a, &b], &hot);
-    let (tiles, noise, correlation) = (clean.tiles(), clean.noise(), clean.correlation());
+    let correlation = |sums: &PairSums| sums.neighbours().correlation(&[1.0; 4]);
+    let (tiles, noise) = (clean.tiles(), clean.noise());
     for plane_row in [0, 5] {
         let [row, parity] = BAYER.place(plane_row);
         for column in hot.columns(plane_row) {
@@ -121,7 +122,7 @@ fn hot_pixels_are_in_no_sum() {
     let spoiled = PairSums::of(BAYER, [&a, &b], &hot);
     assert_eq!(spoiled.tiles(), tiles);
     assert_eq!(spoiled.noise(), noise);
-    assert!((spoiled.correlation() - correlation).abs() < 1e-15);
+    assert!((correlation(&spoiled) - correlation(&clean)).abs() < 1e-15);
     // The control: without the mask they are.
     let unmasked = PairSums::of(BAYER, [&a, &b], &HotPixels::none(BAYER.plane_rows()));
     assert!(unmasked.noise().within > 1000.0 * noise.within);
@@ -137,14 +138,18 @@ fn smoothing_shows_as_correlation() {
     };
     let hot = HotPixels::none(layout.plane_rows());
     let (a, b) = (frame(layout, 9, 500, 90), frame(layout, 10, 500, 90));
-    let plain = PairSums::of(layout, [&a, &b], &hot).correlation();
+    let correlation = |a: &[u16], b: &[u16]| {
+        let sums = PairSums::of(layout, [a, b], &hot);
+        sums.neighbours().correlation(&[1.0; 4])
+    };
+    let plain = correlation(&a, &b);
     assert!(plain.abs() < 0.015, "{plain}");
     let smooth = |frame: &[u16]| -> Vec<u16> {
         let rows = frame.chunks(layout.width);
         rows.flat_map(|row| (0..row.len()).map(|x| row[x].midpoint(row[(x + 2) % row.len()])))
             .collect()
     };
-    let smoothed = PairSums::of(layout, [&smooth(&a), &smooth(&b)], &hot).correlation();
+    let smoothed = correlation(&smooth(&a), &smooth(&b));
     assert!((smoothed - 0.5).abs() < 0.02, "{smoothed}");
 }
 
@@ -163,10 +168,59 @@ fn tiles_have_the_light_and_the_noise_of_their_place() {
     let tiles = PairSums::of(BAYER, [&lit[0], &lit[1]], &hot).tiles();
     assert_eq!(tiles.len(), 4 * TILES * TILES);
     for (index, tile) in tiles.iter().enumerate() {
-        assert_eq!((tile.plane, tile.count), (index / 64, 12.0));
+        // Four rows of three sites, of which each row has a mean of its own.
+        assert_eq!((tile.plane, tile.count, tile.free), (index / 64, 12.0, 8.0));
         let level = if index == 127 { 800.0 } else { 500.0 };
-        assert!((tile.mean - level).abs() < 5.0, "{index}: {}", tile.mean);
+        assert!(
+            (tile.mean() - level).abs() < 5.0,
+            "{index}: {}",
+            tile.mean()
+        );
     }
-    let variance = tiles.iter().map(|tile| tile.variance).sum::<f64>() / tiles.len() as f64;
+    let variance = mean_variance(&tiles, 1.0);
     assert!((variance - 30.0).abs() < 2.0, "{variance}");
+    // Offsets of rows change no variance.
+    let rows = |frame: &[u16], seed: u64| -> Vec<u16> {
+        let rows = frame.chunks(BAYER.width).zip(Numbers(seed));
+        rows.flat_map(|(row, number)| row.iter().map(move |code| code + (number % 90) as u16))
+            .collect()
+    };
+    let shifted = [rows(&lit[0], 13), rows(&lit[1], 14)];
+    let shifted = PairSums::of(BAYER, [&shifted[0], &shifted[1]], &hot).tiles();
+    for (tile, shifted) in tiles.iter().zip(&shifted) {
+        assert!((tile.variance(1.0) - shifted.variance(1.0)).abs() < 1e-6);
+    }
+}
+
+fn mean_variance(tiles: &[TileSums], ratio: f64) -> f64 {
+    tiles.iter().map(|tile| tile.variance(ratio)).sum::<f64>() / tiles.len() as f64
+}
+
+/// Two frames of the same pattern of light, of which the second has 5 % more: with the ratio of their light nothing of the pattern is
+/// left in the variance and in the correlation of neighbours; without it, most is.
+#[test]
+fn a_pattern_of_light_cancels_at_equal_light() {
+    let layout = Layout {
+        height: 256,
+        width: 256,
+        ..BAYER
+    };
+    let hot = HotPixels::none(layout.plane_rows());
+    let light = |site: usize| 4000.0 + 20.0 * (site % layout.width) as f64;
+    let lit = |seed: u64, factor: f64| -> Vec<u16> {
+        let noise = frame(layout, seed, 500, 9).into_iter().enumerate();
+        noise
+            .map(|(site, code)| code + (factor * light(site)).round() as u16)
+            .collect()
+    };
+    let (a, b) = (lit(15, 1.0), lit(16, 1.05));
+    let sums = PairSums::of(layout, [&a, &b], &hot);
+    let (tiles, neighbours) = (sums.tiles(), sums.neighbours());
+    let ratio = 1.0 / 1.05;
+    let [equal, unequal] = [ratio, 1.0].map(|ratio| mean_variance(&tiles, ratio));
+    // The noise of both frames is the same here, that of light is not: 30 · (1 + ratio²) / (2 ratio) = 30.04.
+    assert!((equal - 30.0).abs() < 0.6, "{equal}");
+    assert!(unequal > 1.5 * equal, "{unequal}");
+    let [equal, unequal] = [ratio, 1.0].map(|ratio| neighbours.correlation(&[ratio; 4]));
+    assert!(equal.abs() < 0.015 && unequal > 0.5, "{equal}, {unequal}");
 }

@@ -1,0 +1,132 @@
+//! Products of neighbours of one colour: [`NeighbourSums`].
+
+use super::scatter::Scatter;
+
+/// Sums over neighbours x and x′ in a part of a row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct RowNeighbours {
+    pub(super) count: u64,
+    /// Sums of A + A′ and of B + B′.
+    both: [u64; 2],
+    /// Sum of A · A′.
+    aa: u64,
+    /// Sum of A · B′ + A′ · B.
+    ab: u64,
+    /// Sum of B · B′.
+    bb: u64,
+}
+
+/// Products of neighbours of a pair of frames, by plane.
+#[derive(Debug)]
+pub(in crate::calibrate) struct NeighbourSums {
+    planes: Vec<PlaneSums>,
+}
+
+/// Sums of a plane about the means of its rows.
+#[derive(Debug, Clone, Copy, Default)]
+struct PlaneSums {
+    /// Products of neighbours.
+    products: Scatter,
+    squares: Scatter,
+    /// Number of sites.
+    sites: f64,
+    /// Number of parts of rows.
+    rows: f64,
+}
+
+/// A site of both frames.
+type Site = [u16; 2];
+
+impl RowNeighbours {
+    /// The neighbours in a part of a row.
+    pub(super) fn of(a: &[u16], b: &[u16]) -> Self {
+        let mut sums = Self::default();
+        let sites = a.iter().zip(b).map(|(a, b)| [*a, *b]);
+        for (site, next) in sites.clone().zip(sites.skip(1)) {
+            let more = Self::of_two(site, next);
+            sums.count += 1;
+            sums.both = [0, 1].map(|frame| sums.both[frame] + more.both[frame]);
+            sums.aa += more.aa;
+            sums.ab += more.ab;
+            sums.bb += more.bb;
+        }
+        sums
+    }
+
+    fn of_two(site: Site, next: Site) -> Self {
+        let [[a, b], [next_a, next_b]] = [site, next].map(|site| site.map(u64::from));
+        Self {
+            count: 1,
+            both: [a + next_a, b + next_b],
+            aa: a * next_a,
+            ab: a * next_b + next_a * b,
+            bb: b * next_b,
+        }
+    }
+
+    /// Takes out two neighbours that were added.
+    pub(super) fn remove(&mut self, site: Site, next: Site) {
+        let less = Self::of_two(site, next);
+        self.count -= 1;
+        self.both = [0, 1].map(|frame| self.both[frame] - less.both[frame]);
+        self.aa -= less.aa;
+        self.ab -= less.ab;
+        self.bb -= less.bb;
+    }
+
+    /// Products about these means of A and of B.
+    fn about(self, [a, b]: [f64; 2]) -> Scatter {
+        let n = self.count as f64;
+        let [both_a, both_b] = self.both.map(|sum| sum as f64);
+        let crossed = self.ab as f64 - a * both_b - b * both_a + 2.0 * n * a * b;
+        Scatter {
+            aa: self.aa as f64 - a * both_a + n * a * a,
+            ab: crossed / 2.0,
+            bb: self.bb as f64 - b * both_b + n * b * b,
+        }
+    }
+}
+
+impl NeighbourSums {
+    /// No neighbours in so many planes.
+    pub(super) fn none(planes: usize) -> Self {
+        Self {
+            planes: vec![PlaneSums::default(); planes],
+        }
+    }
+
+    /// Adds a part of a row with `count` sites, these means of A and of B and these squares about them.
+    pub(super) fn add(
+        &mut self,
+        plane: usize,
+        row: RowNeighbours,
+        count: f64,
+        means: [f64; 2],
+        squares: Scatter,
+    ) {
+        let plane = &mut self.planes[plane];
+        // As many products as there are squares.
+        let products = row.about(means).times(count / row.count as f64);
+        plane.products.join(products);
+        plane.squares.join(squares);
+        plane.sites += count;
+        plane.rows += 1.0;
+    }
+
+    /// Correlation of neighbours of a plane in a row of A − ratio · B, which is 0 for noise of single sites. `ratios` are those of
+    /// the planes: the light of A over the light of B.
+    pub(in crate::calibrate) fn correlation(&self, ratios: &[f64]) -> f64 {
+        let [mut products, mut squares, mut sites, mut rows] = [0.0; 4];
+        for (plane, ratio) in self.planes.iter().zip(ratios) {
+            products += plane.products.of_difference(*ratio);
+            squares += plane.squares.of_difference(*ratio);
+            sites += plane.sites;
+            rows += plane.rows;
+        }
+        if squares <= 0.0 {
+            return 0.0;
+        }
+        // Taking off the mean of n sites makes independent neighbours correlate by −1/(n − 1).
+        products / squares + 1.0 / (sites / rows - 1.0)
+    }
+}
