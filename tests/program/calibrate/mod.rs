@@ -217,7 +217,7 @@ fn the_table_and_the_flags() {
             "λ by PPCC",
             "bias R / G1 / G2 / B ADU",
             "iso800",
-            "fewer than 3 settings: the slope is that of sony-a7s2",
+            "fewer than 3 settings count: the slope is that of sony-a7s2",
             "checks: nothing to report",
             "camera.toml: the camera, for --camera; camera.svg: its fits",
         ],
