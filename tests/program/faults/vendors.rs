@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use super::{ask_with, sending};
 use crate::support::endpoint::Answer;
-use crate::support::table::check_rows;
+use crate::support::table::{check_rows, check_rows_at_once};
 
 fn plain() -> Parameters {
     Parameters::new("m".into())
@@ -383,7 +383,7 @@ fn each_vendor_states_its_waits() {
             0,
         ),
     ];
-    check_rows(cases, |(name, answer, least)| {
+    check_rows_at_once(cases, |(name, answer, least)| {
         let outcome = ask_with(vec![answer, Answer::text("B")], none_spent(), plain());
         let reply = outcome
             .result
