@@ -59,6 +59,10 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
             .get("model")
             .and_then(Value::as_str)
             .map(str::to_owned),
+        provider: completion
+            .get("provider")
+            .and_then(Value::as_str)
+            .map(str::to_owned),
         endpoint: None,
         latency_ms: 0,
         attempts: 0,
