@@ -21,13 +21,17 @@ pub(super) struct FailureClass {
 }
 
 /// Codes and types that mean: no credit. Some servers send them with status 429, although waiting does not help.
-const NO_CREDIT: [&str; 4] = [
+const NO_CREDIT: [&str; 6] = [
+    "Arrearage",
+    "credit_limit",
     "insufficient_quota",
     "billing_hard_limit_reached",
     "billing_not_active",
     "exceeded_current_quota_error",
 ];
-const NO_CREDIT_WORDS: [&str; 4] = [
+const NO_CREDIT_WORDS: [&str; 6] = [
+    "all available credits",
+    "spending limit",
     "credit balance",
     "insufficient credit",
     "insufficient balance",
@@ -48,7 +52,8 @@ const PERMANENT: [&str; 6] = [
 const PERMANENT_WORDS: [&str; 2] = ["no connected db", "invalid model name passed in"];
 
 /// Codes and types that mean: moderation refused the content. Another question may be accepted.
-const MODERATED: [&str; 5] = [
+const MODERATED: [&str; 6] = [
+    "DataInspectionFailed",
     "content_filter",
     "ResponsibleAIPolicyViolation",
     "content_policy_violation",
@@ -88,6 +93,12 @@ impl FailureClass {
         let no_credit = complaint.has_code(&NO_CREDIT)
             || (matches!(status, 400 | 402 | 403 | 429)
                 && complaint.mentions_any(&NO_CREDIT_WORDS));
+        // OpenAI forbids probabilities by a status that else is about the key.
+        if status == 403
+            && let Some(class) = Self::of_refused_field(complaint, wire, sent)
+        {
+            return class;
+        }
         match status {
             429 if no_credit => Self {
                 kind: FailureKind::RateLimit,
@@ -140,8 +151,9 @@ impl FailureClass {
                 ..Self::permanent(NEXT_DAY)
             },
             429 => Self::transient(FailureKind::RateLimit),
-            // 498 is Groq's status for no capacity, 499 is nginx's for a connection that the client closed.
-            409 | 498 | 499 | 500.. => Self::transient(FailureKind::Server),
+            // 424 is the status of Text Generation Inference for a generation that failed, 498 Groq's for no capacity, 499 nginx's
+            // for a connection that the client closed.
+            409 | 424 | 498 | 499 | 500.. => Self::transient(FailureKind::Server),
             _ => Self::of_field(complaint, &wire.fields(sent)),
         }
     }
@@ -187,13 +199,21 @@ impl FailureClass {
         }
     }
 
+    /// The class of a request that was refused for a field that the program can send in another way; `None` if it was not.
+    fn of_refused_field(complaint: &Complaint, wire: Wire, sent: SentFields<'_>) -> Option<Self> {
+        let class = Self::of_field(complaint, &wire.fields(sent));
+        class.refused_field.is_some().then_some(class)
+    }
+
     /// The class of a request that may have been refused for one of its fields. If the server names the field, every other
     /// request with it fails too, and so does every request if the server refuses what is not sent any more. If only the text mentions it, the
     /// cause may be this request alone.
     fn of_field(complaint: &Complaint, fields: &[RequestField<'_>]) -> Self {
         let with = |state| fields.iter().filter(move |field| field.state == state);
         let mut withdrawn = with(FieldState::Withdrawn);
-        let (reach, field) = match with(FieldState::Sent).find(|field| field.is_named(complaint)) {
+        let mut by_param = with(FieldState::Sent).filter(|field| field.is_param(complaint));
+        let mut named = with(FieldState::Sent).filter(|field| field.is_named(complaint));
+        let (reach, field) = match by_param.next().or_else(|| named.next()) {
             Some(field) => (Reach::Endpoint, field),
             None if withdrawn.any(|field| field.is_named(complaint)) => {
                 return Self::permanent("the server refuses a field that is not sent any more");

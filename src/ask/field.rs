@@ -206,10 +206,11 @@ impl<'a> SentFields<'a> {
 }
 
 /// Words by which servers say that they do not support a field or its value, and not that the value is wrong.
-const UNSUPPORTED: [&str; 18] = [
+const UNSUPPORTED: [&str; 24] = [
     "unsupported",
     "not supported",
     "does not support",
+    "doesn't support",
     "unrecognized",
     "unknown",
     "unexpected",
@@ -223,6 +224,11 @@ const UNSUPPORTED: [&str; 18] = [
     "removed",
     "cannot be set",
     "must be set to",
+    "may only be set to",
+    "valid values are",
+    "supported values are",
+    "unavailable",
+    "not available",
     "not enabled",
     "instead",
 ];
@@ -272,14 +278,19 @@ pub(super) struct RequestField<'a> {
 impl RequestField<'_> {
     /// Whether the server names the field as the cause: in the error's own field for it, or in words of refusal that name it.
     pub(super) fn is_named(&self, complaint: &Complaint) -> bool {
-        let param = complaint.param.as_deref();
-        let param = param.and_then(|param| param.rsplit(['.', '/']).next());
-        if param == Some(self.name) {
+        if self.is_param(complaint) {
             return true;
         }
         let is_ordinary = ORDINARY_WORDS.contains(&self.name);
         let in_words = self.is_mentioned(complaint) && !is_ordinary;
         is_unsupported(complaint) && (in_words || self.is_quoted(complaint))
+    }
+
+    /// Whether the error's own field for it names the field, alone or at the end of a path.
+    pub(super) fn is_param(&self, complaint: &Complaint) -> bool {
+        let param = complaint.param.as_deref();
+        let param = param.and_then(|param| param.rsplit(['.', '/']).next());
+        param == Some(self.name)
     }
 
     /// Whether the server's text mentions the field.

@@ -10,6 +10,7 @@
 mod access;
 pub(crate) mod batch;
 pub(crate) mod batch_api;
+mod batch_interface;
 mod body;
 mod call;
 mod complaint;
@@ -49,10 +50,12 @@ mod token_field;
 mod url;
 mod variable;
 mod vendor;
+mod vendor_batch;
 mod wire;
 mod wire_kind;
 
 pub use access::Access;
+pub(crate) use batch_interface::BatchInterface;
 pub use call::{Call, Message, Query};
 pub use endpoint::Endpoint;
 pub use extra_fields::ExtraFields;

@@ -130,7 +130,7 @@ impl Model {
     pub fn batch_line(
         &self,
         id: &str,
-        url: Option<&str>,
+        url: &str,
         message: Message<'_>,
         choices: usize,
     ) -> Result<Option<Vec<u8>>, serde_json::Error> {
@@ -138,7 +138,7 @@ impl Model {
             return Ok(None);
         };
         let body = model.batch_body(message, choices)?;
-        batch::line(id, url.unwrap_or(model.batch_url()), &body).map(Some)
+        batch::line(id, url, &body).map(Some)
     }
 
     /// The path in a line of a Batch API's file; `None` if the model cannot be asked in a batch.

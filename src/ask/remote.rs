@@ -286,7 +286,7 @@ fn check_own_fields(parameters: &Parameters, first: RequestFields) -> Result<()>
     Ok(())
 }
 
-/// Refuses a constraint that the vendor ignores, and warns if requests to it are not repeatable.
+/// Refuses a constraint and a request for probabilities that the vendor does not keep, and warns if requests to it are not repeatable.
 fn check_vendor(vendor: &Vendor, parameters: &Parameters) -> Result<()> {
     if vendor.ignores_constraints() && parameters.constrain != Constrain::None {
         let problem = format_args!(
@@ -294,6 +294,16 @@ fn check_vendor(vendor: &Vendor, parameters: &Parameters) -> Result<()> {
             vendor.name
         );
         return Err(Error::usage("--constrain", problem));
+    }
+    if let Some(instead) = vendor
+        .without_probabilities()
+        .filter(|_| parameters.probabilities)
+    {
+        let problem = format_args!(
+            "{} {instead}, so the confidence of {} would not be known; leave it out",
+            vendor.name, parameters.model
+        );
+        return Err(Error::usage("--probabilities", problem));
     }
     if let Some(field) = vendor
         .pin

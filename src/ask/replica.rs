@@ -133,6 +133,7 @@ impl Replica {
             text: scrubbed(reply.text),
             refusal: reply.refusal.map(scrubbed),
             served_model: reply.served_model.map(scrubbed),
+            provider: reply.provider.map(scrubbed),
             finish: match reply.finish {
                 // Shortened last: otherwise the first half of a key could remain.
                 Finish::Other(reason) => Finish::Other(self.connection.scrub.line(&reason)),

@@ -7,6 +7,7 @@ use serde::Deserialize;
 
 use super::key_header::KeyHeader;
 use super::token_field::TokenField;
+use super::vendor_batch::VendorBatch;
 
 /// A vendor and the particularities of its endpoints; a field that is `None` is not known.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -28,6 +29,16 @@ pub(crate) struct Vendor {
     pub(super) image_bytes: Option<usize>,
     /// The longest side of an image, in pixels.
     pub(super) image_side: Option<u32>,
+    /// The most images in a request.
+    pub(super) images: Option<usize>,
+    /// The longest side of an image, in pixels, in a request with more than 20.
+    pub(super) image_side_many: Option<u32>,
+    /// The largest body of a request, in bytes.
+    pub(super) request_bytes: Option<usize>,
+    /// Whether the probabilities of tokens are stated; `None` if they are, by some models, or that is not known.
+    logprobs: Option<Logprobs>,
+    /// The Batch API; `None` if nothing is known of it.
+    pub(super) batch: Option<VendorBatch>,
     /// What the vendor does with a constraint on replies; `None` if it keeps it, or that is not known.
     constrain: Option<Constraining>,
     /// A field of the body without which requests are not repeatable.
@@ -52,6 +63,13 @@ enum Header {
 #[serde(rename_all = "kebab-case")]
 enum Constraining {
     Ignored,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Logprobs {
+    Ignored,
+    No,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
@@ -86,6 +104,14 @@ impl Vendor {
     /// Whether a constraint on replies has no effect.
     pub(super) fn ignores_constraints(&self) -> bool {
         self.constrain == Some(Constraining::Ignored)
+    }
+
+    /// What the vendor does instead of stating probabilities of tokens, in words; `None` if it may state them.
+    pub(super) fn without_probabilities(&self) -> Option<&'static str> {
+        self.logprobs.map(|logprobs| match logprobs {
+            Logprobs::Ignored => "takes the request for probabilities and ignores it",
+            Logprobs::No => "states no probabilities of tokens",
+        })
     }
 
     /// The header in which this vendor expects the key.

@@ -12,8 +12,9 @@ use super::measured_tokens::MeasuredTokens;
 use super::models::ModelUnderTest;
 use super::open_run::limit;
 use super::plan::Plan;
+use super::source::Source;
 use super::trial::Item as _;
-use crate::ask::{Price, Server};
+use crate::ask::{ImageLimit, Price, Server};
 use crate::error::Result;
 use crate::report::forecast::{CostLine, Forecast, ReadingCost};
 use crate::types::{Condition, Degradation, ImageFacts, ReadingName, View};
@@ -109,8 +110,7 @@ pub(crate) fn estimate<E: Experiment>(
         sampled: sample.images.len(),
         too_large: limit
             .zip(largest)
-            .and_then(|(limit, image)| limit.check(image).err())
-            .map(|problem| problem.to_string()),
+            .and_then(|(limit, image)| too_large(limit, image, sources)),
         making_seconds: seconds,
         asking_seconds,
         pace,
@@ -122,6 +122,16 @@ pub(crate) fn estimate<E: Experiment>(
             .any(|source| source.order.len() > 1)
             .then_some(largest_request),
     })
+}
+
+/// What is too large for an endpoint: the largest image, or the request with the most of them.
+fn too_large(limit: ImageLimit, image: &ImageFacts, sources: &[Source]) -> Option<String> {
+    let shown = sources.iter().map(|source| source.order.len());
+    let most = shown.max().unwrap_or(0);
+    let checked = limit.check(image);
+    let checked = checked.and_then(|()| limit.check_request(most, Some(image)));
+    let problem = checked.err().map(|problem| problem.to_string());
+    problem.or_else(|| limit.may_exceed(most, image))
 }
 
 /// The cost line of each model of a phase that is asked at an endpoint.

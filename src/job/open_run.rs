@@ -30,7 +30,7 @@ use crate::error::Result;
 use crate::report::forecast::money;
 use crate::store::{self, Store};
 use crate::types::manifest::{Counts, RunManifest};
-use crate::types::{Record, TrialKey};
+use crate::types::{Record, TrialKey, View};
 
 /// A run folder that no other process writes to, with all that asking needs.
 pub(crate) struct OpenRun<'a, E: Experiment> {
@@ -288,7 +288,15 @@ pub(crate) fn limit(settings: &JobSettings) -> Option<ImageLimit> {
             .map(|replica| ImageLimit::of(&replica.base));
         stated.or_else(|| known.reduce(ImageLimit::stricter))
     });
-    limits.flatten().reduce(ImageLimit::stricter)
+    let limit = limits.flatten().reduce(ImageLimit::stricter)?;
+    // A model that is shown none may have any.
+    let models = settings.ask.models.iter();
+    let seeing = models.filter(|model| model.view == View::Image);
+    let servers = seeing.filter_map(|model| model.server.as_ref());
+    let replicas = servers.flat_map(|server| &server.replicas);
+    Some(replicas.fold(limit, |limit, replica| {
+        limit.with_requests_to(&replica.base)
+    }))
 }
 
 /// The notes about images that a run folder does not have yet.

@@ -58,7 +58,7 @@ pub enum AlertKind {
     Prompts,
     /// Other parameters of the models.
     Parameters,
-    /// A constraint on the replies of one side.
+    /// A constraint on the replies of one side, or replies that do not keep it.
     Constrain,
     /// A model that stands apart from itself, because runs asked it in different ways or got other replies.
     Models,

@@ -40,6 +40,8 @@ macro_rules! details {
             usage: Option<Usage>,
             served_model: Option<String>,
             #[serde(default)]
+            provider: Option<String>,
+            #[serde(default)]
             endpoint: Option<usize>,
             latency_ms: Option<u64>,
             attempts: u32,
@@ -61,6 +63,7 @@ macro_rules! details {
                     failure: line.failure,
                     usage: line.usage,
                     served_model: line.served_model,
+                    provider: line.provider,
                     endpoint: line.endpoint,
                     latency_ms: line.latency_ms,
                     attempts: line.attempts,

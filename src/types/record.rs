@@ -41,6 +41,9 @@ pub struct Record<D> {
     pub usage: Option<Usage>,
     /// The model's name in the server's reply.
     pub served_model: Option<String>,
+    /// The provider that a router passed the request on to; not in the file if the server names none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub provider: Option<String>,
     /// The replica of the endpoint that replied, by its place among the addresses; not in the file if there is one address.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub endpoint: Option<usize>,
@@ -112,6 +115,7 @@ impl<D> Record<D> {
             failure: None,
             usage: None,
             served_model: None,
+            provider: None,
             endpoint: None,
             latency_ms: None,
             attempts: 0,
@@ -157,6 +161,7 @@ impl<D: Detail> Record<D> {
         self.finish = Some(reply.finish);
         self.usage = reply.usage;
         self.served_model = reply.served_model;
+        self.provider = reply.provider;
         self.endpoint = reply.endpoint;
         self.latency_ms = Some(reply.latency_ms);
         self.attempts = reply.attempts;

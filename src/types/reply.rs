@@ -73,6 +73,8 @@ pub struct Reply {
     pub usage: Option<Usage>,
     /// The model's name in the server's reply.
     pub served_model: Option<String>,
+    /// The provider that a router passed the request on to; `None` if the server names none.
+    pub provider: Option<String>,
     /// The replica of the endpoint that replied; `None` if there is one address.
     pub endpoint: Option<usize>,
     /// The time from the first byte sent to the last byte received in the last try, in milliseconds.
@@ -95,6 +97,7 @@ impl Reply {
             finish: Finish::Stop,
             usage: None,
             served_model: None,
+            provider: None,
             endpoint: None,
             latency_ms: 0,
             attempts: 1,

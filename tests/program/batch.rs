@@ -4,7 +4,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use crate::support::endpoint::{Answer, MockEndpoint};
-use crate::support::run::{Bench, files, records, words};
+use crate::support::run::{Bench, called, files, records, words};
 use crate::support::table::check_rows;
 use serde_json::{Value, json};
 
@@ -213,5 +213,23 @@ fn probabilities_and_responses_come_through_a_batch() {
     for request in self::requests(&bench) {
         assert_eq!(request["url"], "/v1/chat/completions");
         assert!(request["body"].get("stream").is_none());
+    }
+}
+
+/// What is known of a vendor's lines: Azure has a path of its own for chat completions.
+#[test]
+fn the_path_in_a_line_is_that_of_the_vendor() {
+    for (more, url) in [
+        ("", "/chat/completions"),
+        ("--wire responses", "/v1/responses"),
+        ("--url /v1/x", "/v1/x"),
+    ] {
+        let bench = Bench::with_questions(QUESTIONS);
+        let place = words("--out run --base-url https://r.openai.azure.com/openai/v1");
+        let line = [words("batch export"), words(RUN), place, words(more)].concat();
+        let exported = called(bench.command(&line).env("AZURE_OPENAI_API_KEY", "none"));
+        assert_eq!(exported.code, Some(0), "{exported:?}");
+        let requests = requests(&bench);
+        assert!(!requests.is_empty() && requests.iter().all(|one| one["url"] == url));
     }
 }

@@ -141,6 +141,8 @@ fn a_constraint_is_sent_and_its_object_is_read() {
             (&"C".into(), &"right".into())
         );
     }
+    let of = |run: &str| bench.complete(&["report", run, "--full"]);
+    assert!(!of("run").contains("Constraint not kept"));
     // It measures something else, so it is another run.
     let other = [args("--out run"), words(&model)].concat();
     assert!(bench.call(&other).stderr.contains("--constrain"));
@@ -158,6 +160,11 @@ fn a_constraint_is_sent_and_its_object_is_read() {
         "said once: {called:?}"
     );
     assert_eq!(called.stderr.matches("--constrain choice").count(), 1);
+    let report = of("free");
+    let report = report.split_whitespace().collect::<Vec<_>>().join(" ");
+    let counted = records(&bench.path("free")).len();
+    let expected = format!("Constraint not kept: {counted} of {counted} replies of m");
+    assert!(report.contains(&expected), "{report}");
 }
 
 #[test]

@@ -543,6 +543,27 @@ fn what_is_known_of_a_vendor_is_said_before_anything_is_sent() {
         error.contains("--constrain: Anthropic takes a constraint and ignores it"),
         "{error}"
     );
+    for (base, name) in [
+        (
+            "https://api.anthropic.com/v1",
+            "Anthropic takes the request",
+        ),
+        (
+            "https://generativelanguage.googleapis.com/v1beta/openai",
+            "Gemini states no",
+        ),
+        ("https://api.mistral.ai/v1", "Mistral states no"),
+        ("https://api.groq.com/openai/v1", "Groq states no"),
+    ] {
+        let error = refusal(&table("m", base, "probabilities = true"), "--dry-run");
+        assert!(
+            error.contains(&format!("--probabilities: {name}")),
+            "{error}"
+        );
+    }
+    let some = table("m", "https://api.openai.com/v1", "probabilities = true");
+    let called = call(&bench(1, &some), "--dry-run");
+    assert_eq!(called.code, Some(0), "{called:?}");
     let mixed = table("q/m", "https://openrouter.ai/api/v1", "");
     let pinned = table(
         "q/n",

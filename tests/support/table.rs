@@ -1,7 +1,8 @@
 //! Tables of cases: every row is checked, and all rows that fail are reported.
 
 use std::any::Any;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::thread;
 
 /// Checks every row of a table. Fails at the end with the number and the message of each row that failed.
 pub(crate) fn check_rows<T>(rows: impl IntoIterator<Item = T>, mut check: impl FnMut(T)) {
@@ -17,6 +18,21 @@ pub(crate) fn check_rows<T>(rows: impl IntoIterator<Item = T>, mut check: impl F
         failures.len(),
         failures.join("\n")
     );
+}
+
+/// Checks every row of a table at once, for rows that mostly wait; reports them as [`check_rows`] does.
+pub(crate) fn check_rows_at_once<T: Send>(
+    rows: impl IntoIterator<Item = T>,
+    check: impl Fn(T) + Sync,
+) {
+    let check = &check;
+    thread::scope(|scope| {
+        let rows = rows.into_iter();
+        let checks: Vec<_> = rows.map(|row| scope.spawn(move || check(row))).collect();
+        check_rows(checks, |row| {
+            row.join().unwrap_or_else(|panic| resume_unwind(panic));
+        });
+    });
 }
 
 /// The message of a panic.

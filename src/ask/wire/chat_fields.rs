@@ -8,6 +8,9 @@ use crate::ask::wire_kind::Wire;
 /// The remedy for a server that states no probabilities.
 pub(super) const PROBABILITIES: &str = "leave --probabilities out: the server states none";
 
+/// The number of likeliest tokens, as Text Generation Inference calls it in its refusals.
+const TOP_TOKENS: &str = "top_n_tokens";
+
 /// The fields that a server may refuse.
 pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
     [&sampling(sent)[..], &form(sent)].concat()
@@ -79,18 +82,24 @@ fn form(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
             hint: "leave --constrain out, or try --constrain json",
         },
         RequestField {
-            name: "top_logprobs",
-            state: FieldState::set(sent.fields.top_logprobs.is_some()),
-            adaptable: Some(AdaptableField::TopLogprobs),
-            hint: PROBABILITIES,
-        },
-        RequestField {
             name: "logprobs",
             state: FieldState::until_refused(
                 sent.fields.top_logprobs.is_some(),
                 !parameters.probabilities,
             ),
             adaptable: Some(AdaptableField::Logprobs),
+            hint: PROBABILITIES,
+        },
+        RequestField {
+            name: "top_logprobs",
+            state: FieldState::set(sent.fields.top_logprobs.is_some()),
+            adaptable: Some(AdaptableField::TopLogprobs),
+            hint: PROBABILITIES,
+        },
+        RequestField {
+            name: TOP_TOKENS,
+            state: FieldState::set(sent.fields.top_logprobs.is_some()),
+            adaptable: Some(AdaptableField::TopLogprobs),
             hint: PROBABILITIES,
         },
         RequestField {

@@ -59,6 +59,10 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
             .get("model")
             .and_then(Value::as_str)
             .map(str::to_owned),
+        provider: completion
+            .get("provider")
+            .and_then(Value::as_str)
+            .map(str::to_owned),
         endpoint: None,
         latency_ms: 0,
         attempts: 0,
@@ -116,7 +120,8 @@ fn finish(reason: Option<&str>) -> Finish {
         "" => Finish::Unknown,
         "stop" | "eos" | "eos_token" | "end_turn" | "stop_sequence" => Finish::Stop,
         "length" | "max_tokens" => Finish::Length,
-        "content_filter" | "safety" => Finish::Filter,
+        // Claude stops with "refusal" if its classifiers do.
+        "content_filter" | "safety" | "refusal" => Finish::Filter,
         _ => Finish::Other(reason.to_owned()),
     }
 }
@@ -129,7 +134,9 @@ fn usage(usage: Option<&Value>) -> Option<Usage> {
             .get("cached_tokens")?
             .as_u64()
     };
-    let cached = details().filter(|cached| *cached > 0);
+    // OpenAI's place for it, and Anthropic's name.
+    let cached = details().or_else(|| tokens("cache_read_input_tokens"));
+    let cached = cached.filter(|cached| *cached > 0);
     let usage = Usage {
         prompt_tokens: tokens("prompt_tokens"),
         completion_tokens: tokens("completion_tokens"),
@@ -200,6 +207,12 @@ mod tests {
             "\"prompt_tokens\":9,\"prompt_tokens_details\":{\"cached_tokens\":5}",
         );
         assert_eq!(json(&cached).unwrap().usage.unwrap().cached_tokens, Some(5));
+        let anthropic = whole.replace(
+            "\"prompt_tokens\":9",
+            "\"prompt_tokens\":9,\"cache_read_input_tokens\":6",
+        );
+        let usage = json(&anthropic).unwrap().usage.unwrap();
+        assert_eq!(usage.cached_tokens, Some(6));
         assert_eq!(reply.usage.unwrap().completion_tokens, None);
         let bare = r#"{"model":7,"choices":[{"finish_reason":null,"message":{"content":"B"}}],"usage":null}"#;
         let reply = json(bare).unwrap();
@@ -211,6 +224,7 @@ mod tests {
             ("STOP", Finish::Stop),
             ("MAX_TOKENS", Finish::Length),
             ("content_filter", Finish::Filter),
+            ("refusal", Finish::Filter),
             ("abort\u{7}", Finish::Other("abort".into())),
         ] {
             assert_eq!(finish(Some(reason)).shortened(), finish_);

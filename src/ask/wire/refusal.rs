@@ -4,12 +4,14 @@ use crate::ask::complaint::Complaint;
 use crate::ask::wire_kind::Wire;
 
 /// The words by which servers say that they answer by event streams alone (Alibaba's model studio, ModelScope).
-const STREAM_ONLY: [&str; 7] = [
+const STREAM_ONLY: [&str; 8] = [
     "only support stream",
     "only supports stream",
     "enable the stream parameter",
     "does not support http call",
     "for non-streaming call",
+    // "not streaming", in Chinese: the same servers answer in either language.
+    "非流式",
     "stream=false",
     "stream must be set to true",
 ];
@@ -56,6 +58,10 @@ mod tests {
             ),
             (
                 "enable thinking can not be support when `stream=False`",
+                Some(ChatStream),
+            ),
+            (
+                "parameter.enable_thinking 必须在非流式调用中设置为 false",
                 Some(ChatStream),
             ),
             (

@@ -42,6 +42,10 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
             .get("model")
             .and_then(Value::as_str)
             .map(str::to_owned),
+        provider: response
+            .get("provider")
+            .and_then(Value::as_str)
+            .map(str::to_owned),
         latency_ms: 0,
         attempts: 0,
         endpoint: None,

@@ -32,7 +32,7 @@ pub(super) fn assemble(stream: &str) -> Option<Value> {
         if let Some(error) = error(&event) {
             return Some(error);
         }
-        for field in ["model", "usage"] {
+        for field in ["model", "provider", "usage"] {
             if let Some(value) = event.get(field).filter(|value| !value.is_null()) {
                 completion.insert(field.to_owned(), value.clone());
             }

@@ -161,8 +161,8 @@ impl<D: Detail> Driver<'_, D> {
         let of = self.part(part);
         let mut ids = of.files.clone();
         if of.uploads > 1 {
-            let (name, purpose) = (self.remote_name(part), &self.args.purpose);
-            match self.server(part)?.files(purpose).await {
+            let (name, purpose) = (self.remote_name(part), self.purpose(part));
+            match self.server(part)?.files(&purpose).await {
                 Ok(files) => {
                     let copies = files.into_iter().filter(|file| file.name == name);
                     ids.extend(copies.map(|file| file.id));

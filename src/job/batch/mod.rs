@@ -32,17 +32,17 @@ use std::num::{NonZeroU64, NonZeroUsize};
 
 use clap::Args;
 
-/// Flags of the input files of a Batch API. The default limits are those of OpenAI and Azure.
+/// Flags of the input files of a Batch API. The default limits are those of the vendor, else those of OpenAI and Azure.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Batch")]
 pub(crate) struct BatchFileArgs {
-    /// The largest size of a file, in MB
-    #[arg(long, value_name = "MB", default_value = "200", add = Decides::Nothing)]
-    pub file_size: NonZeroU64,
-    /// The largest number of requests in a file
-    #[arg(long, value_name = "N", default_value = "50000", add = Decides::Nothing)]
-    pub file_requests: NonZeroUsize,
-    /// The URL path of each request; default: that of the model's API, /v1/chat/completions
+    /// The largest size of a file, in MB; default: what is known of the endpoint, else 200
+    #[arg(long, value_name = "MB", add = Decides::Nothing)]
+    pub file_size: Option<NonZeroU64>,
+    /// The largest number of requests in a file; default: what is known of the endpoint, else 50000
+    #[arg(long, value_name = "N", add = Decides::Nothing)]
+    pub file_requests: Option<NonZeroUsize>,
+    /// The URL path of each request; default: what is known of the endpoint, else that of the model's API, /v1/chat/completions
     #[arg(long, value_name = "PATH", value_parser = path, add = Decides::Nothing)]
     pub url: Option<String>,
 }

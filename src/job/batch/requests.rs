@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::BatchFileArgs;
 use super::file::{Destination, FileLimits, ModelInputFiles, Register, RequestCost, file_name};
+use crate::ask::BatchInterface;
 use crate::error::{Error, Result};
 use crate::job::models::ModelUnderTest;
 use crate::job::trial::{Item, PreparedGroup, Stimulus, Trial};
@@ -23,7 +24,8 @@ pub(super) type CostOf<'a, I> = &'a (dyn Fn(&Trial<I>, &Stimulus) -> RequestCost
 /// The input files of all models, while they are written.
 pub(crate) struct Requests<'a, I: Item> {
     models: &'a [ModelUnderTest],
-    url: Option<&'a str>,
+    /// The path in each line, by model.
+    urls: Vec<String>,
     /// Files of each model, in the order of `models`.
     files: Vec<ModelInputFiles<I::Detail>>,
     register: Register<'a, I::Detail>,
@@ -49,6 +51,7 @@ impl<'a, I: Item> Requests<'a, I> {
             // The number is needed: two names may give the same file name, and a model may be asked with and without images.
             let stem = file_name(&format!("{}-{}", i + 1, model.name));
             let destination = destination(model, args);
+            let known = BatchInterface::at(&destination.base);
             let (stem, first, tokens) = match journal {
                 None => (stem, 1, f64::INFINITY),
                 Some(journal) => {
@@ -60,15 +63,22 @@ impl<'a, I: Item> Requests<'a, I> {
                 }
             };
             let limits = FileLimits {
-                bytes: args.file_size.get().saturating_mul(1_000_000),
-                requests: args.file_requests.get(),
+                bytes: args
+                    .file_size
+                    .unwrap_or(known.file_size())
+                    .get()
+                    .saturating_mul(1_000_000),
+                requests: args.file_requests.unwrap_or(known.requests()).get(),
                 tokens,
             };
             ModelInputFiles::new(&folder, &stem, first, limits, destination)
         });
         Ok(Self {
             models,
-            url: args.url.as_deref(),
+            urls: models
+                .iter()
+                .map(|model| destination(model, args).url)
+                .collect(),
             files: files.collect(),
             register,
             cost,
@@ -84,7 +94,7 @@ impl<'a, I: Item> Requests<'a, I> {
             let model = &under_test.model;
             let (id, query) = (trial.key.to_string(), trial.item.query());
             let message = trial.prompt.message(&stimulus.images);
-            let line = model.batch_line(&id, self.url, message, query.choices());
+            let line = model.batch_line(&id, &self.urls[trial.model], message, query.choices());
             let Some(line) = line.map_err(|e| Error::data(query.id(), e))? else {
                 continue;
             };
@@ -107,11 +117,14 @@ impl<'a, I: Item> Requests<'a, I> {
 
 /// Where the requests of a model go.
 fn destination(model: &ModelUnderTest, args: &BatchFileArgs) -> Destination {
-    let url = args.url.as_deref().or(model.model.batch_url());
+    let base = model.model.batch_base().unwrap_or_default();
+    let known = BatchInterface::at(&base);
+    let usual = model.model.batch_url().unwrap_or_default();
+    let url = args.url.as_deref().unwrap_or_else(|| known.url(usual));
     Destination {
         model: model.model.name().to_owned(),
-        base: model.model.batch_base().unwrap_or_default(),
-        url: url.unwrap_or_default().to_owned(),
+        url: url.to_owned(),
+        base,
     }
 }
 
@@ -130,6 +143,15 @@ pub(crate) fn require_remote(models: &[ModelUnderTest]) -> Result<()> {
             Err(Error::usage("--model", problem))
         }
     }
+}
+
+/// Checks that the endpoints of all models have files and batches of the form that the program submits.
+///
+/// # Errors
+/// If the vendor of one has none, or others.
+pub(super) fn require_files(models: &[ModelUnderTest]) -> Result<()> {
+    let mut bases = models.iter().filter_map(|model| model.model.batch_base());
+    bases.try_for_each(|base| BatchInterface::at(&base).require_files())
 }
 
 /// The files written, with the next step for the user.

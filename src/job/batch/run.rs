@@ -10,7 +10,7 @@ use super::export;
 use super::file::RequestCost;
 use super::journal::Journal;
 use super::recover::recover;
-use super::requests::require_remote;
+use super::requests::{require_files, require_remote};
 use super::servers::Servers;
 use super::settings::BatchRunArgs;
 use super::summary;
@@ -98,7 +98,9 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
                 break;
             }
             if remaining.plan.remaining() > 0 {
-                require_remote(self.run.experiment.models(phase))?;
+                let models = self.run.experiment.models(phase);
+                require_remote(models)?;
+                require_files(models)?;
                 if repeat == 0 && !self.args.no_scout {
                     match self.scout(phase, remaining)? {
                         EndReason::AllAsked => {}

@@ -43,9 +43,9 @@ pub(crate) struct BatchRunArgs {
     /// Cancel a batch that has not ended after this time; what it has not answered is asked again; default: never
     #[arg(long, value_name = "HOURS", value_parser = positive, add = Decides::Nothing)]
     pub give_up: Option<f64>,
-    /// The purpose under which files are uploaded
-    #[arg(long, value_name = "WORD", default_value = "batch", add = Decides::Nothing)]
-    pub purpose: String,
+    /// The purpose under which files are uploaded; default: what is known of the endpoint, else batch
+    #[arg(long, value_name = "WORD", add = Decides::Nothing)]
+    pub purpose: Option<String>,
 }
 
 impl BatchRunArgs {
@@ -59,7 +59,7 @@ impl BatchRunArgs {
             enqueued_tokens: None,
             window: String::new(),
             give_up: None,
-            purpose: "batch".to_owned(),
+            purpose: None,
         }
     }
 }

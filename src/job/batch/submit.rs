@@ -2,6 +2,7 @@
 
 use super::driver::{Driver, Step, Until};
 use super::event::Event;
+use crate::ask::BatchInterface;
 use crate::ask::batch_api::{ApiFailure, Effect, NewBatch, Readiness};
 use crate::error::{Error, Result};
 use crate::types::Detail;
@@ -31,7 +32,8 @@ impl<D: Detail> Driver<'_, D> {
         }
         self.say(part, "uploading");
         self.journal.record(part, Event::Uploading)?;
-        let sent = self.server(part)?.upload(&path, &name, &self.args.purpose);
+        let purpose = self.purpose(part);
+        let sent = self.server(part)?.upload(&path, &name, &purpose);
         match sent.await {
             Ok(file) => {
                 if file.readiness == Readiness::Ready {
@@ -47,7 +49,7 @@ impl<D: Detail> Driver<'_, D> {
     /// Looks for the file of a part that may have been uploaded.
     pub(super) async fn find_file(&mut self, part: usize) -> Result<Step> {
         let name = self.remote_name(part);
-        let listed = self.server(part)?.files(&self.args.purpose).await;
+        let listed = self.server(part)?.files(&self.purpose(part)).await;
         let files = match listed {
             Ok(files) => files,
             // A second copy of a file costs nothing.
@@ -168,6 +170,13 @@ impl<D: Detail> Driver<'_, D> {
     /// The name of a part's file at the server.
     pub(super) fn remote_name(&self, part: usize) -> String {
         format!("darkqa-{}-{}", self.journal.run, self.part(part).name)
+    }
+
+    /// The purpose of a part's file at the server.
+    pub(super) fn purpose(&self, part: usize) -> String {
+        let known = BatchInterface::at(&self.part(part).facts.base);
+        let stated = self.args.purpose.as_deref();
+        stated.unwrap_or(known.purpose()).to_owned()
     }
 
     /// The mark by which the batch of a part is found again.

@@ -103,6 +103,13 @@ impl ImagePipeline<'_> {
             let source = &sources[part.source];
             source.frames.iter().map(move |frame| (part, source, frame))
         });
+        if let Some(limit) = self.steps.limit {
+            let seen = plan
+                .iter()
+                .filter(|part| part.conditions().next().is_some());
+            let shown = seen.map(|part| sources[part.source].order.len());
+            limit.check_request(shown.max().unwrap_or(0), None)?;
+        }
         let pixels = |frame: &SourceFrame| u64::from(frame.size.0) * u64::from(frame.size.1);
         let Some((part, source, frame)) = frames.max_by_key(|(.., frame)| pixels(frame)) else {
             return Ok(None);
@@ -122,6 +129,13 @@ impl ImagePipeline<'_> {
                 .is_none_or(|known| facts.bytes > known.bytes)
             {
                 largest = Some(facts.clone());
+            }
+        }
+        if let (Some(limit), Some(image)) = (self.steps.limit, &largest) {
+            let shown = source.order.len();
+            limit.check_request(shown, Some(image))?;
+            if let Some(problem) = limit.may_exceed(shown, image) {
+                tracing::warn!("{problem}");
             }
         }
         Ok(largest)

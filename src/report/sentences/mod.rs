@@ -9,6 +9,7 @@
 
 mod answers;
 mod baseline;
+mod confidence;
 mod darkness;
 mod hallucination;
 mod lights;
@@ -26,6 +27,7 @@ pub(crate) use sentence::Sentence;
 
 use std::collections::BTreeSet;
 
+use self::confidence::Confidence;
 use self::hallucination::TopAnswer;
 use self::lights::{in_each_light, of_set};
 use crate::score::confusion::FalseAnswer;
@@ -85,7 +87,7 @@ fn about_clean(findings: &Findings<'_>) -> Vec<Sentence> {
     sentences.collect()
 }
 
-/// Sentences about false answers, one answer to everything, and the families.
+/// Sentences about false answers, one answer to everything, confidence, and the families.
 fn about_answers(findings: &Findings<'_>, variant: &KindReading) -> Vec<Sentence> {
     let unit = findings.unit;
     let mut sentences = Vec::new();
@@ -99,6 +101,8 @@ fn about_answers(findings: &Findings<'_>, variant: &KindReading) -> Vec<Sentence
         answers.retain(|answer| *answer.family != Family::Presence);
     }
     sentences.extend(hallucination::collapse(&answers, unit));
+    let confidence = Confidence::all(findings, variant);
+    sentences.extend(confidence::confidence(&confidence, unit));
     sentences.extend(models::families(findings, variant));
     sentences
 }

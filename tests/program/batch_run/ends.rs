@@ -5,7 +5,8 @@ use serde_json::json;
 use super::{BLIND, QUESTIONS, answered, assert_each_once, blind, call_with};
 use crate::support::batches::{Course, Fault, Line, MockBatches, Order};
 use crate::support::endpoint::Answer;
-use crate::support::run::Bench;
+use crate::support::run::{Bench, called, words};
+use crate::support::table::check_rows;
 
 #[test]
 fn output_comes_in_any_shape() {
@@ -197,4 +198,42 @@ fn a_file_that_was_edited_is_not_uploaded() {
         "{called:?}"
     );
     assert_eq!(mock.count("POST files"), 0);
+}
+
+/// The form of a vendor's Batch API is known before anything is sent.
+#[test]
+fn a_batch_api_of_another_form_is_refused_before_anything_is_sent() {
+    let rows = [
+        (
+            "https://api.mistral.ai/v1",
+            "MISTRAL_API_KEY",
+            "Mistral has another form",
+        ),
+        (
+            "https://api.deepseek.com",
+            "DEEPSEEK_API_KEY",
+            "DeepSeek has no Batch API",
+        ),
+    ];
+    check_rows(rows, |(base, key, expected)| {
+        let bench = Bench::with_questions(1);
+        let args = [words(BLIND), vec!["--base-url", base]].concat();
+        let called = called(bench.command(&args).env(key, "none"));
+        assert_eq!(called.code, Some(2), "{called:?}");
+        assert!(called.stderr.contains(expected), "{called:?}");
+    });
+}
+
+/// What the user says of files goes before what is known of the server: this one takes the purpose "batch" alone.
+#[test]
+fn the_purpose_of_files_is_that_of_the_server_unless_it_is_stated() {
+    let (_, mock, called) = blind(&[Course::of("completed")], "--purpose batch-api");
+    assert_ne!(called.code, Some(0), "{called:?}");
+    assert!(
+        called.stderr.contains("the purpose must be batch"),
+        "{called:?}"
+    );
+    assert_eq!(mock.count("POST batches"), 0);
+    let (_, mock, called) = blind(&[Course::of("completed")], "");
+    assert_eq!((called.code, mock.count("POST batches")), (Some(0), 1));
 }

@@ -1,5 +1,7 @@
 //! Requests that a server refuses for one of their fields, in whole runs.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::run::{Bench, model_args, records, words};
 use crate::support::table::check_rows;
@@ -110,4 +112,30 @@ fn a_wire_that_is_found_out_is_no_other_trial() {
     assert_eq!(stream_only.requests().len(), 4);
     let replies = records(&bench.path("run"));
     assert!(replies.iter().all(|record| text(record, "reply") == "C"));
+}
+
+/// A router may pass a later request on to a provider that takes less: no trial and no retry is lost by it.
+#[test]
+fn a_field_that_is_refused_later_costs_no_trial() {
+    let bench = Bench::with_questions(40);
+    let asked = AtomicUsize::new(0);
+    let mock = MockEndpoint::answering(move |body| {
+        let before = asked.fetch_add(1, Ordering::SeqCst);
+        if before >= 10 && body.get("temperature").is_some() {
+            return refusal("temperature", "'temperature' is deprecated for this model.");
+        }
+        Answer::text("C")
+    });
+    let line = "--data set.jsonl --levels L0 --out run --retries 0 --concurrency 8";
+    bench.complete(&model_args(&mock.base_url(), line));
+    let records = records(&bench.path("run"));
+    assert_eq!(records.len(), 40);
+    assert!(records.iter().all(|record| record["outcome"] == "right"));
+    // Each of those in flight was refused once at most.
+    let refused = mock.requests().len() - 40;
+    assert!((1..=8).contains(&refused), "{refused}");
+    assert_eq!(
+        manifest(&bench)["settings"]["adapted for m"],
+        json!(["no temperature is sent: the server's own holds"])
+    );
 }

@@ -5,7 +5,8 @@ use std::fs;
 use serde_json::{Value, json};
 
 use super::text;
-use crate::support::run::{Bench, records, words};
+use crate::support::endpoint::{Answer, MockEndpoint};
+use crate::support::run::{Bench, model_args, records, words};
 use crate::support::table::check_rows;
 
 #[test]
@@ -111,4 +112,31 @@ fn json_is_the_summary() {
     let stored = fs::read(bench.path("run/summary.json")).unwrap();
     let stored: Value = serde_json::from_slice(&stored).unwrap();
     assert_eq!(summary["rows"], stored["rows"]);
+}
+
+/// A router names the provider that it passed a request on to: kept in the record, and said if there are several.
+#[test]
+fn the_providers_of_a_router_are_kept_and_counted() {
+    let reply = |provider: &str| {
+        let message = json!({"role": "assistant", "content": "A"});
+        Answer::json(
+            200,
+            &json!({"model": "mock-1", "provider": provider, "choices": [{"message": message, "finish_reason": "stop"}]}),
+        )
+    };
+    for (providers, several) in [(["a", "b"], true), (["a", "a"], false)] {
+        let bench = Bench::with_questions(3);
+        let mock = MockEndpoint::start(providers.map(reply));
+        let line = "--data set.jsonl --levels L0 --out run --full";
+        let printed = bench.complete(&model_args(&mock.base_url(), line));
+        let mut kept: Vec<String> = records(&bench.path("run"))
+            .iter()
+            .map(|record| text(record, "provider").to_owned())
+            .collect();
+        kept.sort();
+        assert_eq!(kept, ["a", providers[1], providers[1]]);
+        let printed = printed.split_whitespace().collect::<Vec<_>>().join(" ");
+        let said = "m was served by a (1 reply), b (2 replies)";
+        assert_eq!(printed.contains(said), several, "{printed}");
+    }
 }

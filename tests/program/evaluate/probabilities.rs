@@ -166,6 +166,16 @@ fn the_report_sets_confidence_against_accuracy() {
     let page = std::fs::read_to_string(bench.path("run/report.html")).unwrap();
     assert!(page.contains("Confidence against accuracy"));
     assert!(bench.path("run/figures/confidence.svg").exists());
+    let not_shown = "It is not shown that m is surer than it is right at L3: its mean confidence is 77.8 %, and 100.0 % of its replies";
+    let said = |bench: &Bench| std::fs::read_to_string(bench.path("run/summary.json")).unwrap();
+    assert!(said(&bench).contains(not_shown), "{printed}");
+    // One that is as sure, and wrong, in the light as in the dark.
+    let bench = Bench::with_questions(120);
+    let wrong = likely("A", &[("A", 0.6), (" A", 0.1), ("C", 0.2), ("The", 0.05)]);
+    let mock = MockEndpoint::start([Answer::json(200, &wrong)]);
+    bench.complete(&model_args(&mock.base_url(), &asked));
+    let surer = "At L3 m is surer than it is right: its mean confidence is 77.8 %, and 0.0 % of its replies are right.";
+    assert!(said(&bench).contains(surer), "{}", said(&bench));
     // A server that states none: said, and no table of it.
     let bench = Bench::with_questions(3);
     let mock = MockEndpoint::start([Answer::text("C")]);

@@ -4,6 +4,7 @@ mod failures;
 mod fields;
 mod replies;
 mod retries;
+mod vendors;
 mod wires;
 
 use std::io::Write as _;

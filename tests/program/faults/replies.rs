@@ -75,6 +75,12 @@ fn a_message_is_found_in_every_shape() {
             Finish::Filter,
         ),
         (
+            "refused, as Claude says it",
+            Answer::message(&json!({"content": ""}), "refusal"),
+            "",
+            Finish::Filter,
+        ),
+        (
             "a tool call",
             Answer::message(&json!({"content": null, "tool_calls": []}), "tool_calls"),
             "",
@@ -192,4 +198,42 @@ fn a_message_is_found_in_every_shape() {
     let reply = ask(vec![Answer::message(&refused, "stop")]).result.unwrap();
     assert_eq!(reply.text, "");
     assert!(reply.refusal.unwrap().starts_with("The answer"));
+}
+
+/// Tokens in the names of each vendor: of prompt, reply and cache.
+#[test]
+fn tokens_are_read_in_every_shape() {
+    let cases = [
+        (
+            "OpenAI",
+            json!({"prompt_tokens": 90, "completion_tokens": 1, "prompt_tokens_details": {"cached_tokens": 64}}),
+            (Some(90), Some(1), Some(64)),
+        ),
+        (
+            "Anthropic",
+            json!({"prompt_tokens": 90, "completion_tokens": 1, "cache_read_input_tokens": 80}),
+            (Some(90), Some(1), Some(80)),
+        ),
+        (
+            "nothing from a cache",
+            json!({"prompt_tokens": 90, "prompt_tokens_details": {"cached_tokens": 0}}),
+            (Some(90), None, None),
+        ),
+        (
+            "no numbers",
+            json!({"prompt_tokens": "many"}),
+            (None, None, None),
+        ),
+    ];
+    check_rows(cases, |(name, usage, expected)| {
+        let completion = json!({"choices": [{"message": {"content": "B"}}], "usage": usage});
+        let reply = ask(vec![Answer::json(200, &completion)]).result.unwrap();
+        let usage = reply.usage.unwrap_or_default();
+        let tokens = (
+            usage.prompt_tokens,
+            usage.completion_tokens,
+            usage.cached_tokens,
+        );
+        assert_eq!(tokens, expected, "{name}");
+    });
 }

@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::{PIECE, ask, ask_with, completion, gzip, sending, stream};
 use crate::support::endpoint::Answer;
-use crate::support::table::check_rows;
+use crate::support::table::{check_rows, check_rows_at_once};
 
 /// Failures that pass: the same request is sent again, and answered then.
 #[test]
@@ -211,7 +211,7 @@ fn waits_are_kept_and_capped() {
         ("none", limited("retry-after", "0"), 0),
         ("less than none", limited("retry-after", "-5"), 0),
     ];
-    check_rows(cases, |(name, answer, least)| {
+    check_rows_at_once(cases, |(name, answer, least)| {
         let outcome = ask(vec![answer, Answer::text("B")]);
         assert_eq!(outcome.result.unwrap().attempts, 2, "{name}");
         let waited = outcome.time.as_millis();

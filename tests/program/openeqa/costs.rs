@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::house::House;
-use crate::support::run::words;
+use crate::support::run::{called, words};
 
 #[test]
 fn a_dry_run_says_what_it_would_take_and_sends_nothing() {
@@ -54,4 +54,30 @@ fn a_budget_holds_for_answers_and_marks_together() {
     assert_eq!(called.code, Some(0), "{called:?}");
     // Three answers and, as they are alike but about three questions, three marks.
     assert_eq!(mock.requests().len(), 6);
+}
+
+/// Groq takes 5 images in a request: said by the estimate, and refused before anything is sent. A blind model is shown none.
+#[test]
+fn more_images_than_a_vendor_takes_are_refused() {
+    let house = House::new();
+    let call = |frames: &str, more: &str| {
+        let line = format!(
+            "openeqa --questions questions.json --frames walks --image-size 48 --judge m --base-url https://api.groq.com/openai/v1 \
+             --num-frames {frames} --out run {more}"
+        );
+        called(house.0.command(&words(&line)).env("GROQ_API_KEY", "none"))
+    };
+    let six = "6 images in a request are more than the 5 of Groq";
+    let estimate = call("6", "--model m --dry-run");
+    assert_eq!(estimate.code, Some(0), "{estimate:?}");
+    assert!(estimate.stdout.contains(six), "{estimate:?}");
+    for more in ["--dry-run --model m", "--dry-run --blind-model m"] {
+        let frames = if more.contains("blind") { "6" } else { "5" };
+        let fits = call(frames, more);
+        assert_eq!(fits.code, Some(0), "{fits:?}");
+        assert!(!fits.stdout.contains("more than the 5"), "{fits:?}");
+    }
+    let refused = call("6", "--model m --retries 0");
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    assert!(refused.stderr.contains(six), "{refused:?}");
 }

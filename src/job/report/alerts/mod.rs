@@ -2,8 +2,10 @@
 
 mod adapted;
 mod confidence;
+mod constraints;
 mod models;
 mod noise;
+mod providers;
 mod questions;
 mod readings;
 mod replies;
@@ -31,6 +33,10 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
     alerts.extend(replies::of_people(combined));
     alerts.extend(readings::of_readings(combined));
     alerts.extend(confidence::of_confidence(&combined.runs, &combined.records));
+    alerts.extend(constraints::of_constraints(
+        &combined.runs,
+        &combined.records,
+    ));
     alerts.extend(questions::of_repeats(combined));
     alerts.extend(questions::of_items(findings));
     if findings.grid.clusters < MIN_SCENES {
@@ -49,6 +55,7 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
 pub(super) fn of_runs<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut alerts = of_progress(&joined.runs);
     alerts.extend(servers::of_servers(joined));
+    alerts.extend(providers::of_providers(&joined.records));
     alerts.extend(of_enhancers(&joined.runs));
     alerts.extend(of_inputs(&joined.runs));
     alerts.extend(adapted::of_adaptations(&joined.runs));

@@ -1,5 +1,6 @@
 //! Golden sentences of each kind and verdict, and the check that each number in a sentence is one of its values.
 
+mod confidence;
 mod hallucination;
 mod made;
 mod words_alone;

@@ -1,0 +1,45 @@
+//! The line about replies that do not keep the constraint that was asked for: [`of_constraints`].
+
+use std::collections::BTreeMap;
+
+use super::words::plural;
+use crate::job::report::join::JoinedRun;
+use crate::report::alert::{Alert, AlertKind};
+use crate::types::Record;
+use crate::types::question::letter;
+
+/// One alert for each model that was asked with `--constrain` and has replies of another form. A reply that keeps it is stored as its
+/// letter alone.
+pub(super) fn of_constraints(runs: &[JoinedRun], records: &[Record]) -> Vec<Alert> {
+    let columns = runs
+        .iter()
+        .filter_map(|run| run.manifest.columns.get("model"));
+    let models = columns.flat_map(BTreeMap::iter);
+    let constrained: BTreeMap<&String, &str> = models
+        .filter_map(|(name, content)| Some((name, content["--constrain"].as_str()?)))
+        .filter(|(_, constraint)| *constraint != "none")
+        .collect();
+    let alerts = constrained.iter().filter_map(|(model, constraint)| {
+        let replied = records
+            .iter()
+            .filter(|record| record.model == **model && !record.failed());
+        let (all, other) = replied.fold((0_usize, 0_usize), |(all, other), record| {
+            (all + 1, other + usize::from(!is_letter(record)))
+        });
+        (other > 0).then(|| {
+            let replies = plural(all, "reply", "replies");
+            let text = format!(
+                "Constraint not kept: {other} of {replies} of {model} have another form than --constrain {constraint} asks for, \
+                 and are read as any reply."
+            );
+            Alert::new(AlertKind::Constrain, text)
+        })
+    });
+    alerts.collect()
+}
+
+/// Whether a reply is the letter of a choice and nothing else.
+fn is_letter(record: &Record) -> bool {
+    let mut letters = (0..record.detail.choices.len()).map(|index| letter(index).to_string());
+    letters.any(|letter| record.reply.as_ref() == Some(&letter))
+}

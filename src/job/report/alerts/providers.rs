@@ -1,0 +1,31 @@
+//! The line about models that a router passed on to several providers: [`of_providers`].
+
+use std::collections::BTreeMap;
+
+use super::words::plural;
+use crate::report::alert::{Alert, AlertKind};
+use crate::types::{Detail, Record};
+
+/// One alert for each model whose replies name several providers, with the number of replies of each.
+pub(super) fn of_providers<D: Detail>(records: &[Record<D>]) -> Vec<Alert> {
+    let mut counts = BTreeMap::<&str, BTreeMap<&str, usize>>::new();
+    for record in records {
+        if let Some(provider) = &record.provider {
+            let of_model = counts.entry(&record.model).or_default();
+            *of_model.entry(provider).or_default() += 1;
+        }
+    }
+    let several = counts.iter().filter(|(_, providers)| providers.len() > 1);
+    let alerts = several.map(|(model, providers)| {
+        let named = providers
+            .iter()
+            .map(|(name, count)| format!("{name} ({})", plural(*count, "reply", "replies")));
+        let named: Vec<String> = named.collect();
+        let text = format!(
+            "{model} was served by {}: providers and quantisations are mixed. --extra-body with provider names one.",
+            named.join(", ")
+        );
+        Alert::new(AlertKind::Served, text)
+    });
+    alerts.collect()
+}

@@ -1,0 +1,119 @@
+//! The sentence about what models know of their own sight: whether their confidence falls with their accuracy.
+
+use super::sentence::{Numbers, Sentence, Tone};
+use crate::score::calibration::Calibration;
+use crate::score::cluster::{ClusterUnit, MIN_SCENES};
+use crate::score::findings::Findings;
+use crate::score::pooled::pool;
+use crate::score::subject::Subject;
+use crate::types::{AxisLevel, KindReading};
+
+/// The least number of replies with probabilities that a sentence is about (chosen): that of a calibration error.
+const LEAST_REPLIES: usize = 100;
+
+/// The confidence of a model in the images of a light: at the darkest level, and at L0 if that was asked.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Confidence<'f> {
+    pub(super) model: &'f str,
+    pub(super) level: AxisLevel,
+    pub(super) dark: &'f Calibration,
+    pub(super) clean: Option<&'f Calibration>,
+}
+
+impl<'f> Confidence<'f> {
+    /// The confidence in raw images of the darkest level of a variant, of the models over which findings are pooled. Without those of
+    /// few replies or clusters, whose intervals say little.
+    pub(super) fn all(findings: &'f Findings<'_>, variant: &KindReading) -> Vec<Self> {
+        if findings.grid.clusters < MIN_SCENES {
+            return Vec::new();
+        }
+        let models = pool(&findings.grid);
+        let rows = || {
+            let rows = findings.calibrations.iter();
+            rows.filter(|row| row.replies >= LEAST_REPLIES)
+        };
+        let dark = rows().filter(|row| {
+            let subject = &row.subject;
+            subject.variant == *variant
+                && subject.enhancer.is_none()
+                && models.contains(&&*subject.model)
+        });
+        let Some(level) = dark.clone().filter_map(|row| row.subject.level).max() else {
+            return Vec::new();
+        };
+        let darkest = dark.filter(|row| row.subject.level == Some(level));
+        let all = darkest.map(|dark| {
+            let model = &*dark.subject.model;
+            let clean = Subject::seeing(model, AxisLevel::L0, variant, None);
+            Self {
+                model,
+                level,
+                dark,
+                clean: rows().find(|row| row.subject.is_for(&clean)),
+            }
+        });
+        all.collect()
+    }
+
+    /// Whether the confidence is shown to be above the accuracy.
+    fn is_above(&self) -> bool {
+        self.dark.overconfidence.low > 0.0
+    }
+
+    /// Whether the confidence is further above the accuracy than at L0: the intervals of the two do not meet.
+    fn is_grown(&self) -> bool {
+        let clean = self.clean.map(|clean| clean.overconfidence);
+        clean.is_some_and(|clean| self.dark.overconfidence.low > clean.high)
+    }
+}
+
+/// Whether the models know how little they see, of the one whose confidence is furthest above its accuracy. What is shown is that the
+/// 95 % interval of the difference is above 0, and, against L0, that the two intervals do not meet.
+pub(super) fn confidence(all: &[Confidence<'_>], unit: ClusterUnit) -> Option<Sentence> {
+    let above = |one: &Confidence<'_>| one.dark.overconfidence.value;
+    let most = all
+        .iter()
+        .copied()
+        .max_by(|a, b| above(a).total_cmp(&above(b)))?;
+    let mut numbers = Numbers::of(unit);
+    let (model, level) = (most.model, most.level);
+    let sure = numbers.percent("confidence", most.dark.confidence.value);
+    let right = numbers.percent("accuracy", most.dark.accuracy.value);
+    let (tone, text) = if most.is_above() && most.is_grown() {
+        let text = format!(
+            "{model} does not know how little it sees at {level}: its mean confidence is {sure} %, and {right} % of its replies are \
+             right."
+        );
+        (Tone::Worse, text)
+    } else if most.is_above() {
+        let text = format!(
+            "At {level} {model} is surer than it is right: its mean confidence is {sure} %, and {right} % of its replies are right."
+        );
+        (Tone::Worse, text)
+    } else {
+        let text = format!(
+            "It is not shown that {model} is surer than it is right at {level}: its mean confidence is {sure} %, and {right} % of its \
+             replies are right."
+        );
+        (Tone::NotShown, text)
+    };
+    let difference = numbers.difference("", most.dark.overconfidence);
+    let clean = most.clean.map(|clean| {
+        let difference = numbers.difference("_L0", clean.overconfidence);
+        format!(", {difference} at L0")
+    });
+    let replies = numbers.count("n", most.dark.replies);
+    let others = if all.len() > 1 {
+        let shown = all.iter().filter(|one| one.is_above()).count();
+        let shown = numbers.count("shown", shown);
+        let models = numbers.count("models", all.len());
+        format!("; shown of {shown} of {models} models")
+    } else {
+        String::new()
+    };
+    let detail = format!(
+        "confidence less accuracy: {difference} points{}{others}; n = {replies} replies with probabilities",
+        clean.unwrap_or_default()
+    );
+    Some(numbers.sentence("confidence", tone, text, detail))
+}
