@@ -163,6 +163,12 @@ impl ExtraFields {
         self.body.contains_key(field)
     }
 
+    /// Whether the user adds a field of an object at the top of the body.
+    pub(super) fn adds_below(&self, object: &str, field: &str) -> bool {
+        let object = self.body.get(object).and_then(Value::as_object);
+        object.is_some_and(|object| object.contains_key(field))
+    }
+
     /// A body, given as JSON without its messages, with the user's fields: the body is merged by JSON merge patch (RFC 7396), then
     /// the omitted fields are removed. Unchanged to the byte if the user sets nothing; else keys are sorted.
     pub(super) fn apply(&self, json: String) -> Result<String, serde_json::Error> {

@@ -271,17 +271,30 @@ impl Remote {
 /// Refuses fields of the user's own that say the same as a flag.
 fn check_own_fields(parameters: &Parameters, first: RequestFields) -> Result<()> {
     let own = &parameters.extra;
+    let refused = |field: &str, flag: &str| {
+        let problem = format_args!("{field} is set by {flag}; leave one of them out");
+        Err(Error::usage("--extra-body", problem))
+    };
     let mut formats = ["response_format", "structured_outputs", "text"].into_iter();
     if parameters.constrain != Constrain::None
         && let Some(field) = formats.find(|field| own.adds(field))
     {
-        let problem = format_args!("{field} is set by --constrain; leave one of them out");
-        return Err(Error::usage("--extra-body", problem));
+        return refused(field, "--constrain");
     }
     let mut switch = first.switch().into_iter().flat_map(Map::keys);
     if let Some(field) = switch.find(|field| own.adds(field)) {
-        let problem = format_args!("{field} is set by --thinking; leave one of them out");
-        return Err(Error::usage("--extra-body", problem));
+        return refused(field, "--thinking");
+    }
+    // The Responses API has it there, and OpenRouter takes it there.
+    if first.effort(parameters).is_some() && own.adds_below("reasoning", "effort") {
+        let flag = match parameters.reasoning_effort {
+            Some(_) => "--reasoning-effort",
+            None => "--thinking",
+        };
+        return refused("reasoning.effort", flag);
+    }
+    if parameters.probabilities && own.adds("include") {
+        return refused("include", "--probabilities");
     }
     Ok(())
 }

@@ -48,8 +48,10 @@ impl CurvePoints {
         let mut keys: Vec<(&str, &KindReading, Option<&EnhancerName>)> = degraded
             .map(|subject| (&*subject.model, &subject.variant, subject.enhancer.as_ref()))
             .collect();
+        // Equal keys stand together, and models in their order.
         keys.sort_unstable();
         keys.dedup();
+        keys.sort_by_cached_key(|(model, ..)| grid.order.place(model));
         let points = keys.into_iter().map(|(model, variant, enhancer)| {
             let on_curve = |subject: &Subject| {
                 subject.view == Some(View::Image)

@@ -22,7 +22,7 @@ use super::observed::ObserverSummary;
 use super::pooled::{LevelsLeftOut, PooledFinding, levels_left_out, pooled};
 use super::significance::Significance;
 use super::subject::{Subject, is_control, is_observer};
-use crate::types::{Family, FrameId, ImageFidelity, Record};
+use crate::types::{Family, FrameId, ImageFidelity, ModelOrder, Record};
 
 /// All results that are computed from the records of a run.
 #[derive(Debug)]
@@ -77,6 +77,19 @@ impl<'a> Findings<'a> {
         questions: impl IntoIterator<Item = OfferedChoices>,
         measured: &[ImageFidelity],
     ) -> Self {
+        let order = ModelOrder::default();
+        Self::in_order(records, scenes, questions, measured, &order)
+    }
+
+    /// The same results with the models in an order.
+    #[must_use]
+    pub fn in_order(
+        records: &'a [Record],
+        scenes: &BTreeMap<FrameId, String>,
+        questions: impl IntoIterator<Item = OfferedChoices>,
+        measured: &[ImageFidelity],
+        order: &ModelOrder,
+    ) -> Self {
         let pairs = records
             .iter()
             .map(|record| (&record.question, &record.detail.frame));
@@ -86,7 +99,7 @@ impl<'a> Findings<'a> {
         let is_model = |model: &str| !is_control(model);
         let is_shown = |model: &str| is_model(model) && !is_observer(model);
         let without_observer = observer.is_hidden().then(|| {
-            let grid = Grid::of_models(records, &clusters, is_shown);
+            let grid = Grid::of_models(records, &clusters, order, is_shown);
             Box::new(Self::of(
                 grid,
                 &clusters,
@@ -95,7 +108,7 @@ impl<'a> Findings<'a> {
                 measured,
             ))
         });
-        let grid = Grid::of_models(records, &clusters, is_model);
+        let grid = Grid::of_models(records, &clusters, order, is_model);
         Self {
             without_observer,
             ..Self::of(grid, &clusters, &questions, observer, measured)

@@ -6,7 +6,9 @@ use super::choice::ReadingMode;
 use super::cluster::Clusters;
 use super::subject::Subject;
 use crate::types::degradation::Kind;
-use crate::types::{AnswerReading, Family, KindReading, QuestionId, Record, TrialOutcome};
+use crate::types::{
+    AnswerReading, Family, KindReading, ModelOrder, QuestionId, Record, TrialOutcome,
+};
 
 /// Result of one item for one subject.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,14 +77,18 @@ impl GridItem<'_> {
 /// Results of every subject on every item.
 #[derive(Debug)]
 pub struct Grid<'a> {
-    /// Subjects (model and condition), sorted.
+    /// Subjects (model and condition), the models in their order, else sorted.
     pub subjects: Vec<Subject>,
+    /// The order of the models.
+    pub order: ModelOrder,
     /// Items, sorted by frame, question, repeat and order of choices.
     pub items: Vec<GridItem<'a>>,
     /// Number of clusters of all items.
     pub clusters: usize,
     /// Results, subject by subject.
     results: Vec<TrialResult>,
+    /// Index of each subject.
+    indices: BTreeMap<Subject, usize>,
     records: &'a [Record],
     /// Index in `records` of the record behind each result; [`u32::MAX`] if there is none.
     record_indices: Vec<u32>,
@@ -102,14 +108,15 @@ impl<'a> Grid<'a> {
     /// cluster are ignored.
     #[must_use]
     pub fn new(records: &'a [Record], clusters: &Clusters) -> Self {
-        Self::of_models(records, clusters, |_| true)
+        Self::of_models(records, clusters, &ModelOrder::default(), |_| true)
     }
 
-    /// Table of the records of some models, as [`Grid::new`].
+    /// Table of the records of some models in their order, else as [`Grid::new`].
     #[must_use]
     pub fn of_models(
         records: &'a [Record],
         clusters: &Clusters,
+        order: &ModelOrder,
         is_shown: impl Fn(&str) -> bool,
     ) -> Self {
         let mut subjects = BTreeMap::<Subject, usize>::new();
@@ -125,8 +132,12 @@ impl<'a> Grid<'a> {
                 items.len() - 1
             });
         }
-        for (number, (_, index)) in subjects.iter_mut().enumerate() {
-            *index = number;
+        let mut indices = subjects;
+        let mut subjects: Vec<Subject> = indices.keys().cloned().collect();
+        // Subjects of one model stay sorted: the sort is stable.
+        subjects.sort_by_cached_key(|subject| order.place(&subject.model));
+        for (number, subject) in subjects.iter().enumerate() {
+            indices.insert(subject.clone(), number);
         }
         items.sort_by(|a, b| sort_key(a.record).cmp(&sort_key(b.record)));
         for (index, item) in items.iter().enumerate() {
@@ -137,7 +148,7 @@ impl<'a> Grid<'a> {
             (vec![TrialResult::Absent; size], vec![u32::MAX; size]);
         for (index, record) in records.iter().enumerate() {
             let (subject, item) = (
-                subjects.get(&Subject::of(record)),
+                indices.get(&Subject::of(record)),
                 item_indices.get(&key(record)),
             );
             if let (Some(subject), Some(item)) = (subject, item) {
@@ -147,7 +158,9 @@ impl<'a> Grid<'a> {
             }
         }
         Self {
-            subjects: subjects.into_keys().collect(),
+            subjects,
+            order: order.clone(),
+            indices,
             items,
             clusters: clusters.count(),
             results,
@@ -172,7 +185,7 @@ impl<'a> Grid<'a> {
     /// Index of a subject, if the grid has it.
     #[must_use]
     pub fn find(&self, subject: &Subject) -> Option<usize> {
-        self.subjects.binary_search(subject).ok()
+        self.indices.get(subject).copied()
     }
 
     /// The variants that were asked, sorted: kinds of degradation in each light reading.

@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use super::enhancer_note::EnhancerNote;
 use super::input_note::InputSummary;
+use super::model_order::ListedModel;
 
 /// The progress of a run, and how it ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -150,6 +151,9 @@ pub struct RunManifest {
     /// get further values; the meaning of an existing value never changes.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub columns: BTreeMap<String, BTreeMap<String, Value>>,
+    /// The models of the file of models, in its order; empty without a file.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub models: Vec<ListedModel>,
     /// How each enhancer was used, by its name; empty in runs of earlier versions.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub enhancers: BTreeMap<String, EnhancerNote>,

@@ -342,6 +342,7 @@ fn note(entry: &Entry, resolved: &ModelSettings) -> Value {
         "name": entry.name,
         "id": entry.id.label(),
         "view": views,
+        "wire": resolved.parameters.wire.to_string(),
         "settings": resolved.parameters,
         "price": entry.price.map(|price| json!({"input": price.input, "output": price.output, "cached-input": price.cached_input})),
         "limit": entry.limit,

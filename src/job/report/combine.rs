@@ -21,11 +21,12 @@ impl Combined {
     /// The results that follow from the records.
     pub(super) fn findings(&self) -> Findings<'_> {
         let offers = offers(&self.records, &self.questions);
-        let findings = Findings::new(
+        let findings = Findings::in_order(
             &self.records,
             &scenes(&self.questions),
             offers,
             &self.fidelity,
+            &self.order,
         );
         // Replies differ from time to time: that is no other model.
         let apart = self.models.apart.iter();

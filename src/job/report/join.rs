@@ -10,7 +10,8 @@ use crate::error::Result;
 use crate::job::stored::StoredRun;
 use crate::types::manifest::RunManifest;
 use crate::types::{
-    Condition, Detail, FrameId, ImageFidelity, QuestionId, Record, RunQuestion, Thumbnail, TrialKey,
+    Condition, Detail, FrameId, ImageFidelity, ListedModel, ModelOrder, QuestionId, Record,
+    RunQuestion, Thumbnail, TrialKey,
 };
 
 /// The runs, with all records, questions and thumbnails.
@@ -25,6 +26,8 @@ pub(super) struct Joined<D> {
     pub(super) lights: Lights,
     /// The models that stand apart.
     pub(super) models: Names,
+    /// The order of the models: that of the files of models of all runs, one after the other.
+    pub(super) order: ModelOrder,
 }
 
 /// One of the joined runs.
@@ -70,6 +73,8 @@ pub(super) fn join<D: Detail>(
         }
     }
     let models = Names::of(&runs, &names, &order, &compared);
+    let listed = order.iter().flat_map(|index| runs[*index].manifest.models.clone());
+    let listed: Vec<ListedModel> = listed.collect();
     let mut joined = Joined {
         runs: Vec::new(),
         records: Vec::new(),
@@ -78,6 +83,7 @@ pub(super) fn join<D: Detail>(
         fidelity: Vec::new(),
         lights,
         models,
+        order: ModelOrder::new(listed),
     };
     let mut known = Known::default();
     let mut runs: Vec<Option<StoredRun<D>>> = runs.into_iter().map(Some).collect();

@@ -54,7 +54,7 @@ const ACCURACY: &str = "accuracy in %";
 /// The findings, with the models, enhancers and levels that occur in them.
 struct Overview<'a> {
     findings: &'a Findings<'a>,
-    /// Models with images, sorted. The index of a model is its line style.
+    /// Models with images, in their order. The index of a model is its line style.
     models: Vec<&'a str>,
     enhancers: Vec<&'a EnhancerName>,
     levels: BTreeSet<AxisLevel>,
@@ -64,14 +64,16 @@ impl<'a> Overview<'a> {
     fn new(findings: &'a Findings<'a>) -> Self {
         let subjects = &findings.grid.subjects;
         let seeing = subjects.iter().filter(|s| s.view == Some(View::Image));
-        let models: BTreeSet<&str> = seeing.map(|subject| &*subject.model).collect();
+        // Subjects of one model stand together, and models in their order.
+        let mut models: Vec<&str> = seeing.map(|subject| &*subject.model).collect();
+        models.dedup();
         let enhancers: BTreeSet<&EnhancerName> = subjects
             .iter()
             .filter_map(|s| s.enhancer.as_ref())
             .collect();
         Self {
             findings,
-            models: models.into_iter().collect(),
+            models,
             enhancers: enhancers.into_iter().collect(),
             levels: subjects.iter().filter_map(|s| s.level).collect(),
         }
