@@ -148,7 +148,7 @@ pub(crate) fn settings(job: &JobSettings) -> BTreeMap<String, Value> {
         ("--threads", json!(job.loading.threads.threads)),
     ];
     if let Some(models) = &job.ask.file {
-        settings.push(("models", models.clone()));
+        settings.push(("models", models.resolved.clone()));
     } else if let Some(server) = job.ask.servers().first() {
         let sending = server.sending;
         settings.extend([

@@ -9,9 +9,10 @@ use super::folder::now;
 use super::identity;
 use super::image_words::ImageWords;
 use super::renamed;
+use super::settings::JobSettings;
 use super::source::input_summary;
 use crate::types::manifest::{Counts, RunManifest, Status};
-use crate::types::{Detail as _, InputSummary, Record};
+use crate::types::{Detail as _, InputSummary, ListedModel, Record};
 
 /// The manifest of a run. A stored one passes on its date, columns and image flags; one of a complete run all but its identity.
 pub(crate) fn of<E: Experiment>(experiment: &E, stored: Option<RunManifest>) -> RunManifest {
@@ -36,6 +37,7 @@ pub(crate) fn of<E: Experiment>(experiment: &E, stored: Option<RunManifest>) -> 
         platform: identity::platform(),
         identity: experiment.identity(),
         columns,
+        models: listed(job, stored.as_ref()),
         enhancers: BTreeMap::new(),
         inputs: inputs(experiment),
         shard: job.shard.is_part().then(|| job.shard.to_string()),
@@ -66,10 +68,19 @@ pub(crate) fn of<E: Experiment>(experiment: &E, stored: Option<RunManifest>) -> 
     RunManifest {
         identity: manifest.identity,
         columns: manifest.columns,
+        models: manifest.models,
         inputs: manifest.inputs.or(stored.inputs),
         shard: manifest.shard,
         images,
         ..stored
+    }
+}
+
+/// The models of the file of models; without one those of the command before.
+fn listed(job: &JobSettings, stored: Option<&RunManifest>) -> Vec<ListedModel> {
+    match &job.ask.file {
+        Some(file) => file.listed.clone(),
+        None => stored.map_or_else(Vec::new, |stored| stored.models.clone()),
     }
 }
 

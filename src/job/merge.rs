@@ -15,8 +15,8 @@ use crate::error::{Error, Result};
 use crate::store::{self, AddressChange, Store};
 use crate::types::manifest::{RunManifest, Status, differences};
 use crate::types::{
-    ChoiceDetail, Decides, Detail, ImageFidelity, InputSummary, OpenDetail, Record, RunQuestion,
-    Thumbnail, TrialKey,
+    ChoiceDetail, Decides, Detail, ImageFidelity, InputSummary, ListedModel, OpenDetail, Record,
+    RunQuestion, Thumbnail, TrialKey,
 };
 
 /// The flags of `merge`.
@@ -104,7 +104,7 @@ fn merge_all<D: Detail + PartialEq>(
     questions.sort_by_key(|question| question.place);
     // A control of the observer asks a question of one shard with an image of another.
     questions.dedup_by(|later, question| later.id == question.id);
-    let merged = MergedParts::of(parts, &questions)?;
+    let merged = MergedParts::of(parts, &questions, &manifest.models)?;
     manifest.count(count(manifest.counts.trials, &merged.records));
     if missing > 0 {
         manifest.status = Status::Incomplete;
@@ -318,7 +318,11 @@ struct MergedParts<D> {
 }
 
 impl<D: Detail> MergedParts<D> {
-    fn of(parts: Vec<MergePart<D>>, questions: &[RunQuestion]) -> Result<Self> {
+    fn of(
+        parts: Vec<MergePart<D>>,
+        questions: &[RunQuestion],
+        listed: &[ListedModel],
+    ) -> Result<Self> {
         let frames = questions.iter().map(|question| &question.frame);
         let wanted = MissingThumbnails::new(frames, Vec::new());
         let mut merged = Self {
@@ -345,7 +349,7 @@ impl<D: Detail> MergedParts<D> {
             merged.thumbnails.extend(wanted);
             merged.fidelity.extend(run.fidelity);
         }
-        merged.records = in_order(merged.records, questions);
+        merged.records = in_order(merged.records, questions, listed);
         Ok(merged)
     }
 }

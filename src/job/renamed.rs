@@ -38,6 +38,11 @@ pub(super) fn note(manifest: &mut RunManifest, stored: &RunManifest, now: &Colum
             name.clone_from(newer);
         }
     }
+    for model in &mut manifest.models {
+        if let Some(name) = names.get(&model.name) {
+            model.name.clone_from(name);
+        }
+    }
     if names.is_empty() {
         manifest.settings.remove(RENAMED);
     } else {

@@ -8,7 +8,8 @@ use crate::error::{Error, Result};
 use crate::store;
 use crate::types::manifest::RunManifest;
 use crate::types::{
-    ChoiceDetail, Detail, ImageFidelity, OpenDetail, QuestionId, Record, RunQuestion, Thumbnail,
+    ChoiceDetail, Detail, ImageFidelity, ListedModel, ModelOrder, OpenDetail, QuestionId, Record,
+    RunQuestion, Thumbnail,
 };
 
 /// A run as read from its folder.
@@ -38,7 +39,7 @@ impl<D: Detail> StoredRun<D> {
         let mut records = store::read_records(folder)?;
         renamed::rename(&mut records, &manifest);
         Ok(Self {
-            records: in_order(records, &questions),
+            records: in_order(records, &questions, &manifest.models),
             questions,
             thumbnails: store::read_thumbnails(folder)?,
             fidelity: store::read_fidelity(folder)?,
@@ -53,11 +54,13 @@ impl<D: Detail> StoredRun<D> {
     }
 }
 
-/// Records in the order of the questions, conditions and models, whatever order the replies came in.
+/// Records in the order of the questions, conditions and models (those that are listed first), whatever order the replies came in.
 pub(crate) fn in_order<D: Detail>(
     records: Vec<Record<D>>,
     questions: &[RunQuestion],
+    listed: &[ListedModel],
 ) -> Vec<Record<D>> {
+    let models = ModelOrder::new(listed.iter().cloned());
     let ids = questions.iter().map(|question| &question.id);
     let places: HashMap<&QuestionId, usize> = ids.zip(0..).collect();
     let place = |record: &Record<D>| places.get(&record.question).copied();
@@ -67,12 +70,12 @@ pub(crate) fn in_order<D: Detail>(
         .collect();
     ordered.sort_by(|(place, record), (other_place, other)| {
         let trial = |record: &Record<D>| (record.detail.repeat(), record.key);
-        (place, &record.condition, &record.model, trial(record)).cmp(&(
-            other_place,
-            &other.condition,
-            &other.model,
-            trial(other),
-        ))
+        let model = |name: &str| models.place(name);
+        (place, &record.condition)
+            .cmp(&(other_place, &other.condition))
+            .then_with(|| model(&record.model).cmp(&model(&other.model)))
+            .then_with(|| record.model.cmp(&other.model))
+            .then_with(|| trial(record).cmp(&trial(other)))
     });
     ordered.into_iter().map(|(_, record)| record).collect()
 }

@@ -123,5 +123,8 @@ pub(crate) fn summary(report: &ChoiceReport<'_>, runs: RunList<'_>) -> Result<St
         findings: &report.sentences,
         baseline: tables.iter().find(|table| table.name == BASELINE).map(Rows),
     };
-    document(head, &summary_rows(&report.findings.summary))
+    document(
+        head,
+        &summary_rows(&report.findings.summary, &report.findings.grid.order),
+    )
 }

@@ -7,19 +7,22 @@ use super::table::{ColumnKind, TableBuilder, TableCell, TableFormat};
 use super::words::light;
 use crate::score::subject::Subject;
 use crate::types::degradation::{Axis, Kind};
-use crate::types::{AxisLevel, EnhancerName, KindReading, LightGroup, View};
+use crate::types::{AxisLevel, EnhancerName, KindReading, LightGroup, ModelOrder, View};
 
 /// A model in one variant, raw or with one enhancer.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Series<'a> {
+    /// The place of the model among those of the ladder.
+    place: usize,
     pub(super) model: &'a str,
     enhancer: Option<&'a EnhancerName>,
     variant: &'a KindReading,
 }
 
 impl<'a> Series<'a> {
-    fn of(subject: &'a Subject) -> Self {
+    fn of(subject: &'a Subject, place: usize) -> Self {
         Self {
+            place,
             model: &subject.model,
             enhancer: subject.enhancer.as_ref(),
             variant: &subject.variant,
@@ -42,6 +45,8 @@ pub(super) type SeriesByLevel<'a, C> = BTreeMap<AxisLevel, &'a C>;
 
 /// The cells of all subjects.
 pub(super) struct Ladder<'a, C> {
+    /// The models in the order of their first cells.
+    models: Vec<&'a str>,
     /// The levels of all series.
     pub(super) levels: BTreeSet<AxisLevel>,
     /// Cells of models with images.
@@ -53,21 +58,31 @@ pub(super) struct Ladder<'a, C> {
 impl<'a, C> Ladder<'a, C> {
     pub(super) fn new(cells: impl Iterator<Item = (&'a Subject, &'a C)>) -> Self {
         let mut ladder = Self {
+            models: Vec::new(),
             levels: BTreeSet::new(),
             series: BTreeMap::new(),
             without_level: Vec::new(),
         };
         for (subject, cell) in cells {
+            let place = ladder.place(&subject.model).unwrap_or_else(|| {
+                ladder.models.push(&subject.model);
+                ladder.models.len() - 1
+            });
             match (subject.view, subject.level) {
                 (Some(View::Image), Some(level)) => {
                     ladder.levels.insert(level);
-                    let series = ladder.series.entry(Series::of(subject));
+                    let series = ladder.series.entry(Series::of(subject, place));
                     series.or_default().insert(level, cell);
                 }
                 _ => ladder.without_level.push((subject, cell)),
             }
         }
         ladder
+    }
+
+    /// The place of a model among those of the ladder.
+    fn place(&self, model: &str) -> Option<usize> {
+        self.models.iter().position(|known| *known == model)
     }
 
     /// Adds the cells of the clean frames to every series of the same model without an enhancer, and those of the enhanced clean
@@ -114,6 +129,7 @@ impl<'a, C> Ladder<'a, C> {
             let series = series.filter(|(series, _)| series.axis().is_none_or(|on| on == axis));
             let levels = self.levels.iter().copied();
             let ladder = Self {
+                models: self.models.clone(),
                 levels: levels
                     .filter(|level| level.axis().is_none_or(|on| on == axis))
                     .collect(),
@@ -142,22 +158,34 @@ impl<'a, C> Ladder<'a, C> {
         cells.find_map(|cells| cells.get(&AxisLevel::L0).copied())
     }
 
-    /// A table with a row for each series and a column for each level. The page and LaTeX also have a row for each subject
+    /// The rows of a table: the series of each model, and below them the model without images; chance at the end.
+    pub(super) fn rows(&'a self) -> Vec<LadderRow<'a, C>> {
+        let series = self.series.iter();
+        let series = series.map(|(series, cells)| (series.place, LadderRow::Series(series, cells)));
+        let without_level = self.without_level.iter().map(|&(subject, cell)| {
+            let place = subject.view.and_then(|_| self.place(&subject.model));
+            let row = LadderRow::WithoutLevel(subject, cell);
+            (place.unwrap_or(usize::MAX), row)
+        });
+        let mut rows: Vec<(usize, LadderRow<'a, C>)> = series.chain(without_level).collect();
+        // Stable: the rows of a model stay in their order.
+        rows.sort_by_key(|(place, _)| *place);
+        rows.into_iter().map(|(_, row)| row).collect()
+    }
+
+    /// A table with a row for each series and a column for each level, divided by the groups of models. The page and LaTeX also have a row for each subject
     /// without a level.
     pub(super) fn table(
         &'a self,
         name: &'static str,
+        order: &ModelOrder,
         cell: impl Fn(Option<&C>) -> TableCell,
     ) -> TableBuilder<LadderRow<'a, C>> {
-        let series = self.series.iter();
-        let series = series.map(|(series, cells)| LadderRow::Series(series, cells));
-        let without_level = self.without_level.iter();
-        let without_level =
-            without_level.map(|&(subject, cell)| LadderRow::WithoutLevel(subject, cell));
-        let mut table = TableBuilder::new(name, series.chain(without_level))
+        let mut table = TableBuilder::new(name, self.rows())
             .hide(TableFormat::Terminal, |line| {
                 matches!(line, LadderRow::WithoutLevel(..))
             })
+            .group(|line| order.group(line.model()).map(str::to_owned))
             .column(Text, "page model | terminal model", |line| {
                 line.model().to_owned()
             })

@@ -72,7 +72,20 @@ fn table(caption: &str, table: &Table) -> String {
     let _ = writeln!(text, "  \\begin{{tabular}}{{{alignments}}}\n    \\toprule");
     text += &line(heads.collect());
     text += "    \\midrule\n";
-    for row in table.rows_in(TableFormat::Latex) {
+    let width = alignments.len();
+    for (index, (heading, row)) in table.headed_rows_in(TableFormat::Latex).enumerate() {
+        if let Some(heading) = heading {
+            if index > 0 {
+                text += "    \\midrule\n";
+            }
+            if !heading.is_empty() {
+                let heading = escaped(heading);
+                let _ = writeln!(
+                    text,
+                    "    \\multicolumn{{{width}}}{{l}}{{\\textit{{{heading}}}}} \\\\"
+                );
+            }
+        }
         let cells = table.cells(row).filter(|(column, _)| named(column));
         text += &line(
             cells

@@ -162,8 +162,16 @@ fn wrapped(first: &str, text: &str, rest: &str) -> String {
     lines + line.trim_end() + "\n"
 }
 
-/// Title of the block, name of the row, and the cells by level.
-type TableLine<'a> = (String, String, &'a SeriesByLevel<'a, AccuracyCell>);
+/// A row of the table.
+#[derive(Clone)]
+struct TableLine<'a> {
+    /// Title of the block.
+    block: String,
+    name: String,
+    /// The group of its model; `None` without one, and with one model.
+    group: Option<&'a str>,
+    cells: &'a SeriesByLevel<'a, AccuracyCell>,
+}
 
 /// Accuracies by level: a block for each light with a row for each model, or one block if there is one model.
 fn table(report: &ChoiceReport<'_>) -> String {
@@ -177,15 +185,21 @@ fn table(report: &ChoiceReport<'_>) -> String {
     let one = models.len() == 1;
     for (series, cells) in &ladder.series {
         let (block, name) = block_and_name(series, one);
-        rows.push((block, name, cells));
+        let group = report.findings.grid.order.group(series.model);
+        rows.push(TableLine {
+            block,
+            name,
+            group: group.filter(|_| !one),
+            cells,
+        });
     }
     // The models of one light stand together.
-    rows.sort_by(|a, b| a.0.cmp(&b.0));
+    rows.sort_by(|a, b| a.block.cmp(&b.block));
     let hidden = rows.len().saturating_sub(MAX_ROWS);
     rows.truncate(MAX_ROWS);
     let levels: Vec<AxisLevel> = ladder.levels.iter().copied().collect();
-    let longest = rows.iter().map(|(_, name, _)| name.chars().count()).max();
-    let titles = rows.iter().map(|(block, ..)| block.chars().count()).max();
+    let longest = rows.iter().map(|row| row.name.chars().count()).max();
+    let titles = rows.iter().map(|row| row.block.chars().count()).max();
     let most = Axis::ALL.map(|axis| {
         let on = levels
             .iter()
@@ -202,11 +216,11 @@ fn table(report: &ChoiceReport<'_>) -> String {
         format!(" on the {questions} that all models with images answered")
     });
     let mut text = format!(" accuracy in %{}\n", shared.unwrap_or_default());
-    for block in rows.chunk_by(|a, b| a.0 == b.0) {
+    for block in rows.chunk_by(|a, b| a.block == b.block) {
         for axis in Axis::ALL {
             let is_on = |level: &AxisLevel| level.axis().is_none_or(|on| on == axis);
-            let has_level = |(.., cells): &&TableLine<'_>| {
-                let mut axes = cells.keys().filter_map(|level| level.axis());
+            let has_level = |row: &&TableLine<'_>| {
+                let mut axes = row.cells.keys().filter_map(|level| level.axis());
                 axes.next().unwrap_or(Axis::LIGHT) == axis
             };
             let block: Vec<TableLine<'_>> = block.iter().filter(has_level).cloned().collect();
@@ -230,17 +244,27 @@ fn block_lines(
     width: usize,
 ) -> String {
     let mut text = String::new();
-    for (title, name, cells) in block {
-        let here = || levels.iter().map(|level| cells.get(level).copied());
+    let mut above = None;
+    for row in block {
+        let here = || levels.iter().map(|level| row.cells.get(level).copied());
         if here().all(|cell| cell.is_none()) {
             continue;
         }
         if text.is_empty() {
             let heads = levels.iter().map(|level| format!("{level} "));
-            text += &line(title, width, heads, "95 %");
+            text += &line(&row.block, width, heads, "95 %");
+        }
+        if row.group != above {
+            above = row.group;
+            let _ = writeln!(text, " — {}", above.unwrap_or_default());
         }
         let reach = reach_of(here().flatten().filter_map(|cell| cell.accuracy));
-        text += &line(name, width, here().map(|cell| value(report, cell)), &reach);
+        text += &line(
+            &row.name,
+            width,
+            here().map(|cell| value(report, cell)),
+            &reach,
+        );
     }
     text
 }

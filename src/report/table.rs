@@ -32,6 +32,8 @@ pub struct Table {
 pub struct TableRow {
     /// A cell for each column.
     pub cells: Vec<TableCell>,
+    /// The heading above it and the rows after it with the same one; `None` without one.
+    pub group: Option<String>,
     /// Formats that leave the row out.
     pub hidden_in: Vec<TableFormat>,
 }
@@ -41,6 +43,7 @@ impl TableRow {
     fn wide() -> Self {
         Self {
             cells: Vec::with_capacity(12),
+            group: None,
             hidden_in: Vec::new(),
         }
     }
@@ -226,6 +229,14 @@ impl<T> TableBuilder<T> {
         self
     }
 
+    /// Divides the rows by the headings of items.
+    pub(super) fn group(mut self, heading: impl Fn(&T) -> Option<String>) -> Self {
+        for (row, item) in self.table.rows.iter_mut().zip(&self.items) {
+            row.group = heading(item);
+        }
+        self
+    }
+
     /// Hides the rows of some items in a format.
     pub(super) fn hide(mut self, format: TableFormat, is_hidden: impl Fn(&T) -> bool) -> Self {
         for (row, item) in self.table.rows.iter_mut().zip(&self.items) {
@@ -261,6 +272,21 @@ impl Table {
     pub(super) fn rows_in(&self, format: TableFormat) -> impl Iterator<Item = &TableRow> {
         let rows = self.rows.iter();
         rows.filter(move |row| !row.hidden_in.contains(&format))
+    }
+
+    /// The rows that a format shows, each with the heading that stands above it: empty where the rows of a group end, `None` within
+    /// one.
+    pub(super) fn headed_rows_in(
+        &self,
+        format: TableFormat,
+    ) -> impl Iterator<Item = (Option<&str>, &TableRow)> {
+        let mut above: Option<&str> = None;
+        self.rows_in(format).map(move |row| {
+            let group = row.group.as_deref();
+            let heading = (group != above).then(|| group.unwrap_or_default());
+            above = group;
+            (heading, row)
+        })
     }
 
     /// The cells of a row with their columns.

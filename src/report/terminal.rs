@@ -75,7 +75,10 @@ pub(super) fn table(parts: &[Table]) -> String {
     let reach = has_reach.then(|| REACH.to_owned());
     grid.set_header(names.cloned().chain(reach));
     for table in parts {
-        for row in table.rows_in(TableFormat::Terminal) {
+        for (heading, row) in table.headed_rows_in(TableFormat::Terminal) {
+            if let Some(heading) = heading.filter(|heading| !heading.is_empty()) {
+                grid.add_row([format!("— {heading}")]);
+            }
             let cells = table.cells(row);
             let cells = cells.filter(|(column, _)| !column.heads.terminal.is_empty());
             let reach = has_reach.then(|| widest_reach(cells.clone()));

@@ -258,6 +258,8 @@ impl<'a> Grid<'a> {
         let items = self.items.iter().zip(kept);
         Self {
             subjects: self.subjects.clone(),
+            order: self.order.clone(),
+            indices: self.indices.clone(),
             items: items
                 .filter(|(_, kept)| **kept)
                 .map(|(item, _)| *item)

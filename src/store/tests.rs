@@ -19,6 +19,7 @@ fn manifest(seed: u64) -> RunManifest {
         settings: BTreeMap::new(),
         images: BTreeMap::new(),
         columns: BTreeMap::new(),
+        models: Vec::new(),
         enhancers: BTreeMap::new(),
         inputs: None,
         shard: None,

@@ -29,6 +29,7 @@ mod import;
 mod inputs;
 mod levels;
 mod models_file;
+mod models_order;
 mod models_wires;
 mod money;
 mod observer;

@@ -183,7 +183,9 @@ fn a_model_is_above_the_flag_for_probabilities() {
     let refused = call(&bench, "--dry-run");
     assert_eq!(refused.code, Some(2), "{refused:?}");
     assert!(
-        refused.stderr.contains("models.toml, line 2: hot: --probabilities"),
+        refused
+            .stderr
+            .contains("models.toml, line 2: hot: --probabilities"),
         "{}",
         refused.stderr
     );
@@ -227,7 +229,11 @@ fn fields_that_say_a_flag_again_are_refused() {
         assert_eq!(refused.code, Some(2), "{more}: {refused:?}");
         assert!(refused.stderr.contains(part), "{more}: {}", refused.stderr);
     }
-    assert!(mock.requests().iter().all(|request| request.body.is_empty()));
+    assert!(
+        mock.requests()
+            .iter()
+            .all(|request| request.body.is_empty())
+    );
     // Alone, each of them is taken.
     for alone in [switch, "thinking = \"off\"", "body = { include = [] }"] {
         let bench = bench(&table("m", &url, alone));

@@ -23,7 +23,7 @@ const WORDS: &str = "Reply with the word OK.";
 /// If a model cannot be opened.
 pub(crate) fn describe(ask: &AskSettings) -> Result<String> {
     let mut text = String::new();
-    let notes = ask.file.as_ref().and_then(Value::as_array);
+    let notes = ask.file.as_ref().and_then(|file| file.resolved.as_array());
     for model in &ask.models {
         let note = notes
             .into_iter()

@@ -14,10 +14,11 @@ use crate::error::{Error, Result};
 use crate::types::View;
 
 /// Keys of a model that are no flags, or have another form than the flag.
-const OWN: [&str; 9] = [
+const OWN: [&str; 10] = [
     "name",
     "id",
     "deployment",
+    "group",
     "view",
     "price",
     "limit",
@@ -60,6 +61,8 @@ pub(super) struct Entry {
     /// What the model is shown; both for one with and one without images.
     pub(super) views: Vec<View>,
     pub(super) deployment: Option<String>,
+    /// The heading under which tables show it; `None` without one.
+    pub(super) group: Option<String>,
     pub(super) asking: AskingArgs,
     /// The price, if it is not that of the table of prices.
     pub(super) price: Option<Price>,
@@ -80,6 +83,7 @@ impl Entry {
             id,
             views: vec![view],
             deployment: None,
+            group: None,
             asking,
             price: None,
             limit: None,
@@ -124,6 +128,7 @@ impl Entry {
             match &**key {
                 "name" => id_text(located, key)?.clone_into(&mut self.name),
                 "deployment" => self.deployment = Some(id_text(located, key)?.to_owned()),
+                "group" => self.group = Some(id_text(located, key)?.to_owned()),
                 "view" => self.views = views(located)?,
                 "price" => self.price = Some(price(located)?),
                 "limit" => self.limit = Some(limit(located)?),

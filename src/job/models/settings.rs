@@ -13,7 +13,7 @@ use super::name::ModelName;
 use crate::ask::{AccessArgs, Parameters, Price, Sending, Server};
 use crate::error::{Error, Result};
 use crate::job::shard::Shard;
-use crate::types::View;
+use crate::types::{ListedModel, View};
 
 /// One model of a run, with all that its requests need.
 #[derive(Debug, Clone)]
@@ -38,8 +38,17 @@ pub(crate) struct ModelSettings {
 pub(crate) struct AskSettings {
     /// The models: those of the file in its order, then those that flags name.
     pub(crate) models: Vec<ModelSettings>,
-    /// The file of models as resolved, without secrets; `None` without one.
-    pub(crate) file: Option<Value>,
+    /// What the file of models comes to; `None` without one.
+    pub(crate) file: Option<FileNote>,
+}
+
+/// What a file of models comes to, for the manifest.
+#[derive(Debug)]
+pub(crate) struct FileNote {
+    /// The models that are asked, as resolved, without secrets.
+    pub(crate) resolved: Value,
+    /// All models of the file in its order, then those that flags name.
+    pub(crate) listed: Vec<ListedModel>,
 }
 
 /// What the resolution of models needs besides their flags.
@@ -83,6 +92,11 @@ impl AskSettings {
         for text in &args.set {
             set(&mut entries, text)?;
         }
+        let listed = entries.iter().map(|entry| ListedModel {
+            name: entry.name.clone(),
+            group: entry.group.clone(),
+        });
+        let listed: Vec<ListedModel> = listed.collect();
         select(&mut entries, &args.only)?;
         if asking.access.base_url.is_empty() {
             let of_flags = entries.iter().filter(|entry| entry.place.is_none());
@@ -102,7 +116,10 @@ impl AskSettings {
         refuse_same_names(&models)?;
         Ok(Self {
             models,
-            file: file.map(|_| json!(notes)),
+            file: file.map(|_| FileNote {
+                resolved: json!(notes),
+                listed,
+            }),
         })
     }
 
@@ -341,6 +358,7 @@ fn note(entry: &Entry, resolved: &ModelSettings) -> Value {
     let mut note = json!({
         "name": entry.name,
         "id": entry.id.label(),
+        "group": entry.group,
         "view": views,
         "wire": resolved.parameters.wire.to_string(),
         "settings": resolved.parameters,

@@ -73,7 +73,9 @@ pub(super) fn join<D: Detail>(
         }
     }
     let models = Names::of(&runs, &names, &order, &compared);
-    let listed = order.iter().flat_map(|index| runs[*index].manifest.models.clone());
+    let listed = order
+        .iter()
+        .flat_map(|index| runs[*index].manifest.models.clone());
     let listed: Vec<ListedModel> = listed.collect();
     let mut joined = Joined {
         runs: Vec::new(),

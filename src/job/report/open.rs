@@ -18,11 +18,13 @@ use crate::report::openeqa::{OpenReport, ReportedAnswer, products, render, summa
 use crate::report::table::Table;
 use crate::report::tables::EnhancerRow;
 use crate::score::llm_match::{Protocol, mark};
-use crate::score::open::{AnswerOutcome, OpenSummary, QuestionGroups, ScoredAnswer, open_summary};
+use crate::score::open::{
+    AnswerOutcome, OpenSummary, QuestionGroups, ScoredAnswer, open_summary_in_order,
+};
 use crate::store::Store;
 use crate::types::flag::read_word;
 use crate::types::manifest::Status;
-use crate::types::{OpenDetail, QuestionId, Record, RunQuestion, Step};
+use crate::types::{ModelOrder, OpenDetail, QuestionId, Record, RunQuestion, Step};
 
 /// Setting in the manifest with the name of the judge.
 pub(crate) const JUDGE: &str = "--judge";
@@ -47,6 +49,7 @@ impl Scores {
             run,
             alerts,
             enhancers,
+            order,
         } = joined;
         let setting = |name| run.manifest.settings.get(name).and_then(Value::as_str);
         let judge = setting(JUDGE).map(str::to_owned);
@@ -72,7 +75,7 @@ impl Scores {
         }
         let topics: Vec<QuestionGroups> = run.questions.iter().map(topic).collect();
         Ok(Self {
-            summary: open_summary(&scored, &topics),
+            summary: open_summary_in_order(&scored, &topics, &order),
             run,
             judge,
             protocol,
@@ -149,6 +152,8 @@ pub(super) struct JoinedRuns {
     pub(super) alerts: Vec<Alert>,
     /// How their enhancers were used.
     enhancers: Vec<EnhancerRow>,
+    /// The order of the models.
+    order: ModelOrder,
 }
 
 /// Several runs, joined to one by [`join`], with what differs between them.
@@ -202,7 +207,7 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
     let first = joined.runs.into_iter().next();
     let first = first.ok_or_else(|| Error::usage("RUN", "no run is named"))?;
     let run = StoredRun {
-        records: in_order(joined.records, &joined.questions),
+        records: in_order(joined.records, &joined.questions, &first.manifest.models),
         folder: first.folder,
         manifest: first.manifest,
         questions: joined.questions,
@@ -213,6 +218,7 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
         run,
         alerts,
         enhancers,
+        order: joined.order,
     })
 }
 

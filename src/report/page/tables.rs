@@ -16,7 +16,14 @@ pub(in crate::report) struct PageTable<'a> {
     /// Whether the table is closed until the reader opens it.
     folded: bool,
     head: Vec<&'a str>,
-    rows: Vec<Vec<PageCell>>,
+    rows: Vec<PageRow<'a>>,
+}
+
+#[derive(Serialize)]
+struct PageRow<'a> {
+    /// The heading above the row; `None` without one.
+    heading: Option<&'a str>,
+    cells: Vec<PageCell>,
 }
 
 #[derive(Serialize)]
@@ -32,14 +39,17 @@ pub(in crate::report) fn page_tables<'a>(tables: &'a [Table], section: &str) -> 
     let in_section = tables.iter().filter(|table| table.section == section);
     let tables = in_section.map(|table| {
         let head = table.columns.iter();
-        let rows = table.rows_in(TableFormat::Page).map(|row| {
+        let rows = table.headed_rows_in(TableFormat::Page);
+        let rows = rows.map(|(heading, row)| {
             let cells = table.cells(row);
             let cells = cells.filter(|(column, _)| column.heads.page.is_some());
-            cells
-                .map(|(column, cell)| text(column.kind, cell))
-                .collect()
+            let cells = cells.map(|(column, cell)| text(column.kind, cell));
+            PageRow {
+                heading,
+                cells: cells.collect(),
+            }
         });
-        let rows: Vec<Vec<PageCell>> = rows.collect();
+        let rows: Vec<PageRow<'_>> = rows.collect();
         PageTable {
             caption: &table.caption,
             folded: table.is_folded || rows.len() > MAX_OPEN_ROWS,

@@ -55,7 +55,7 @@ fn of_axis(
         (_, false) => format!("Accuracy in % by {} of {}{what}", axis.title, axis.cause),
     };
     let mut table = ladder
-        .table("levels", |cell| {
+        .table("levels", &findings.grid.order, |cell| {
             cell.map_or(TableCell::Blank, |cell| accuracy(summary, cell))
         })
         .page("accuracy", &caption)
@@ -130,7 +130,10 @@ fn always(cell: &AccuracyCell) -> Option<String> {
 /// Adds a row below each series whose questions were asked more than once, for the terminal only: the share that was right
 /// every time.
 fn add_always(table: &mut Table, ladder: &Ladder<'_, AccuracyCell>) {
-    for (index, cells) in ladder.series.values().enumerate().rev() {
+    for (index, row) in ladder.rows().iter().enumerate().rev() {
+        let LadderRow::Series(_, cells) = row else {
+            continue;
+        };
         if cells.values().all(|cell| cell.always.is_none()) {
             continue;
         }
@@ -149,6 +152,7 @@ fn add_always(table: &mut Table, ladder: &Ladder<'_, AccuracyCell>) {
         ];
         let row = TableRow {
             cells: names.into_iter().chain(shares).collect(),
+            group: table.rows[index].group.clone(),
             hidden_in: vec![TableFormat::Page, TableFormat::Latex],
         };
         table.rows.insert(index + 1, row);

@@ -25,7 +25,7 @@ use super::table::{Table, TableBuilder, TableCell};
 use super::words::{family, name};
 use crate::score::findings::Findings;
 use crate::score::subject::Subject;
-use crate::types::{EnhancerName, Family, KindReading};
+use crate::types::{EnhancerName, Family, KindReading, ModelOrder};
 
 pub(super) use baseline::BASELINE;
 pub(crate) use baseline::baseline;
@@ -50,7 +50,7 @@ pub(crate) fn tables(findings: &Findings<'_>) -> Vec<Table> {
 
 fn all(findings: &Findings<'_>) -> Vec<Table> {
     [
-        vec![summary::summary(&findings.summary)],
+        vec![summary::summary(&findings.summary, &findings.grid.order)],
         levels::levels(findings),
         observer::observer(findings),
         vec![subjects::subjects(&findings.summary)],
@@ -92,6 +92,20 @@ impl<T> TableBuilder<T> {
                 cell(of(row).enhancer.as_ref().map(ToString::to_string))
             })
             .column(Text, "page subject", |row| name(of(row)))
+    }
+
+    /// Adds the column of the models' group in files, if any model has one.
+    pub(in crate::report) fn model_group(
+        self,
+        order: &ModelOrder,
+        of: impl Fn(&T) -> &Subject,
+    ) -> Self {
+        if !order.has_groups() {
+            return self;
+        }
+        self.column(Text, "csv model_group", |row| {
+            TableCell::from(order.group(&of(row).model).map(str::to_owned))
+        })
     }
 
     /// Adds the columns of the curve of a row: model, variant and enhancer.

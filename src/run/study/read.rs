@@ -221,6 +221,7 @@ fn of_people(run: &RunManifest, args: &ReadArgs) -> RunManifest {
             .map(|(name, value)| (name.to_owned(), value))
             .into(),
         columns: BTreeMap::new(),
+        models: Vec::new(),
         enhancers: BTreeMap::new(),
         inputs: run.inputs.clone(),
         shard: None,

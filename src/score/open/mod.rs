@@ -16,6 +16,7 @@ use self::cell::cell;
 use self::change::{baselines, change};
 use self::group::groups;
 use super::subject::Subject;
+use crate::types::ModelOrder;
 
 pub use answer::{AnswerOutcome, ScoredAnswer};
 pub(crate) use cell::OpenCell;
@@ -30,10 +31,12 @@ pub struct OpenSummary {
     pub unit: &'static str,
     /// Number of clusters of all questions.
     pub clusters: usize,
-    /// Scores, ordered by subject, then by group.
+    /// Scores, ordered by subject with the models in their order, then by group.
     pub cells: Vec<OpenCell>,
     /// Differences of scores, ordered by subject, baseline and group.
     pub changes: Vec<ScoreChange>,
+    /// The order of the models.
+    pub order: ModelOrder,
 }
 
 impl OpenSummary {
@@ -67,6 +70,16 @@ impl OpenSummary {
 /// Scores of the answers; `questions` holds the groups of each question.
 #[must_use]
 pub fn open_summary(answers: &[ScoredAnswer], questions: &[QuestionGroups]) -> OpenSummary {
+    open_summary_in_order(answers, questions, &ModelOrder::default())
+}
+
+/// The same scores with the models in an order.
+#[must_use]
+pub(crate) fn open_summary_in_order(
+    answers: &[ScoredAnswer],
+    questions: &[QuestionGroups],
+    order: &ModelOrder,
+) -> OpenSummary {
     let episodes: BTreeMap<&str, usize> = questions
         .iter()
         .map(|question| &*question.episode)
@@ -87,6 +100,8 @@ pub fn open_summary(answers: &[ScoredAnswer], questions: &[QuestionGroups]) -> O
         by_subject.entry(&answer.subject).or_default().push(answer);
     }
     let groups = groups(questions);
+    let mut by_subject: Vec<(&Subject, Vec<&ScoredAnswer>)> = by_subject.into_iter().collect();
+    by_subject.sort_by_cached_key(|(subject, _)| order.place(&subject.model));
     let (mut cells, mut changes) = (Vec::new(), Vec::new());
     for (subject, answers) in &by_subject {
         for group in &groups {
@@ -122,5 +137,6 @@ pub fn open_summary(answers: &[ScoredAnswer], questions: &[QuestionGroups]) -> O
         },
         cells,
         changes,
+        order: order.clone(),
     }
 }
