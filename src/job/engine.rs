@@ -135,7 +135,7 @@ impl<'a, E: Experiment> Job<'a, E> {
         } else {
             OpenEnhancers::load(files, &settings.loading)?
         };
-        let manifest = manifest::of(experiment, stored);
+        let manifest = manifest::of(experiment, stored)?;
         let mut store = Store::open(&folder, &manifest, folder::address_change(&settings.place))?;
         store.add_questions(experiment.questions())?;
         let present: HashSet<TrialKey> = if experiment.imported_records().is_empty() {

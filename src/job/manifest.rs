@@ -8,14 +8,21 @@ use super::experiment::{DetailOf, Experiment};
 use super::folder::now;
 use super::identity;
 use super::image_words::ImageWords;
-use super::renamed;
+use super::renamed::{self, OtherSettings};
 use super::settings::JobSettings;
 use super::source::input_summary;
+use crate::error::Result;
 use crate::types::manifest::{Counts, RunManifest, Status};
 use crate::types::{Detail as _, InputSummary, ListedModel, Record};
 
 /// The manifest of a run. A stored one passes on its date, columns and image flags; one of a complete run all but its identity.
-pub(crate) fn of<E: Experiment>(experiment: &E, stored: Option<RunManifest>) -> RunManifest {
+///
+/// # Errors
+/// If a number in the settings of a model is not finite.
+pub(crate) fn of<E: Experiment>(
+    experiment: &E,
+    stored: Option<RunManifest>,
+) -> Result<RunManifest> {
     let job = experiment.settings();
     let mut settings = identity::settings(job);
     let notes = experiment.notes().into_iter();
@@ -47,13 +54,18 @@ pub(crate) fn of<E: Experiment>(experiment: &E, stored: Option<RunManifest>) -> 
         counts: Counts::default(),
     };
     let Some(mut stored) = stored else {
-        return manifest;
+        return Ok(manifest);
+    };
+    let other_settings = match job.ask.file {
+        Some(_) => OtherSettings::Allowed,
+        None => OtherSettings::Refused,
     };
     let before = stored.clone();
-    renamed::note(&mut manifest, &before, &experiment.columns());
+    let now = experiment.columns();
+    renamed::note(&mut manifest, &before, &now, other_settings)?;
     let images = merged_flags(&stored.images, manifest.images);
     if stored.status != Status::Complete {
-        return RunManifest {
+        return Ok(RunManifest {
             created: stored.created,
             enhancers: stored.enhancers,
             inputs: manifest.inputs.or(stored.inputs),
@@ -61,11 +73,12 @@ pub(crate) fn of<E: Experiment>(experiment: &E, stored: Option<RunManifest>) -> 
             // Stored records keep their readings until they are read again.
             reply_reading: stored.reply_reading,
             ..manifest
-        };
+        });
     }
     stored.settings.extend(notes);
-    renamed::note(&mut stored, &before, &experiment.columns());
-    RunManifest {
+    stored.models.clone_from(&manifest.models);
+    renamed::note(&mut stored, &before, &now, other_settings)?;
+    Ok(RunManifest {
         identity: manifest.identity,
         columns: manifest.columns,
         models: manifest.models,
@@ -73,7 +86,7 @@ pub(crate) fn of<E: Experiment>(experiment: &E, stored: Option<RunManifest>) -> 
         shard: manifest.shard,
         images,
         ..stored
-    }
+    })
 }
 
 /// The models of the file of models; without one those of the command before.

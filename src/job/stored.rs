@@ -8,9 +8,18 @@ use crate::error::{Error, Result};
 use crate::store;
 use crate::types::manifest::RunManifest;
 use crate::types::{
-    ChoiceDetail, Detail, ImageFidelity, ListedModel, ModelOrder, OpenDetail, QuestionId, Record,
+    ChoiceDetail, Detail, ImageFidelity, ListedModel, ModelListing, OpenDetail, QuestionId, Record,
     RunQuestion, Thumbnail,
 };
+
+/// The models of a run that a report shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ShownModels {
+    /// Those of the file of models, and those that the last command asked.
+    Current,
+    /// Also those that the file of models no longer has, or had with other settings.
+    All,
+}
 
 /// A run as read from its folder.
 #[derive(Clone)]
@@ -18,6 +27,8 @@ pub(crate) struct StoredRun<D> {
     pub(crate) folder: PathBuf,
     pub(crate) manifest: RunManifest,
     pub(crate) records: Vec<Record<D>>,
+    /// The records of models that a report leaves out.
+    pub(crate) left_out: Vec<Record<D>>,
     pub(crate) questions: Vec<RunQuestion>,
     pub(crate) thumbnails: Vec<Thumbnail>,
     pub(crate) fidelity: Vec<ImageFidelity>,
@@ -40,12 +51,20 @@ impl<D: Detail> StoredRun<D> {
         renamed::rename(&mut records, &manifest);
         Ok(Self {
             records: in_order(records, &questions, &manifest.models),
+            left_out: Vec::new(),
             questions,
             thumbnails: store::read_thumbnails(folder)?,
             fidelity: store::read_fidelity(folder)?,
             folder: folder.to_owned(),
             manifest,
         })
+    }
+
+    /// Takes the records apart that a report does not show.
+    pub(crate) fn leave_out(&mut self, shown: ShownModels) {
+        if shown == ShownModels::Current {
+            self.left_out = renamed::leave_out(&mut self.records, &self.manifest);
+        }
     }
 
     /// Name of the run: that of its folder.
@@ -60,7 +79,7 @@ pub(crate) fn in_order<D: Detail>(
     questions: &[RunQuestion],
     listed: &[ListedModel],
 ) -> Vec<Record<D>> {
-    let models = ModelOrder::new(listed.iter().cloned());
+    let models = ModelListing::new(listed.iter().cloned());
     let ids = questions.iter().map(|question| &question.id);
     let places: HashMap<&QuestionId, usize> = ids.zip(0..).collect();
     let place = |record: &Record<D>| places.get(&record.question).copied();

@@ -125,6 +125,6 @@ pub(crate) fn summary(report: &ChoiceReport<'_>, runs: RunList<'_>) -> Result<St
     };
     document(
         head,
-        &summary_rows(&report.findings.summary, &report.findings.grid.order),
+        &summary_rows(&report.findings.summary, &report.findings.grid.listing),
     )
 }

@@ -7,7 +7,7 @@ use super::table::{ColumnKind, TableBuilder, TableCell, TableFormat};
 use super::words::light;
 use crate::score::subject::Subject;
 use crate::types::degradation::{Axis, Kind};
-use crate::types::{AxisLevel, EnhancerName, KindReading, LightGroup, ModelOrder, View};
+use crate::types::{AxisLevel, EnhancerName, KindReading, LightGroup, ModelListing, View};
 
 /// A model in one variant, raw or with one enhancer.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -46,7 +46,7 @@ pub(super) type SeriesByLevel<'a, C> = BTreeMap<AxisLevel, &'a C>;
 /// The cells of all subjects.
 pub(super) struct Ladder<'a, C> {
     /// The models in the order of their first cells.
-    models: Vec<&'a str>,
+    pub(super) models: Vec<&'a str>,
     /// The levels of all series.
     pub(super) levels: BTreeSet<AxisLevel>,
     /// Cells of models with images.
@@ -173,24 +173,24 @@ impl<'a, C> Ladder<'a, C> {
         rows.into_iter().map(|(_, row)| row).collect()
     }
 
-    /// A table with a row for each series and a column for each level, divided by the groups of models. The page and LaTeX also have a row for each subject
+    /// A table with a row for each series and a column for each level, divided by the groups of models, and with their marks and further columns. The page and LaTeX also have a row for each subject
     /// without a level.
     pub(super) fn table(
         &'a self,
         name: &'static str,
-        order: &ModelOrder,
+        listing: &ModelListing,
         cell: impl Fn(Option<&C>) -> TableCell,
     ) -> TableBuilder<LadderRow<'a, C>> {
         let mut table = TableBuilder::new(name, self.rows())
             .hide(TableFormat::Terminal, |line| {
                 matches!(line, LadderRow::WithoutLevel(..))
             })
-            .group(|line| order.group(line.model()).map(str::to_owned))
+            .group(|line| listing.group(line.model()).map(str::to_owned))
             .column(Text, "page model | terminal model", |line| {
-                line.model().to_owned()
+                listing.label(line.model())
             })
             .column(Text, "page light | terminal light", LadderRow::light)
-            .column(Text, "latex Model", LadderRow::label)
+            .column(Text, "latex Model", |line| line.label(listing))
             .column(Text, "latex Light", |line| match line {
                 LadderRow::Series(series, _) => TableCell::from(series.light()),
                 LadderRow::WithoutLevel(..) => TableCell::Blank,
@@ -209,7 +209,14 @@ impl<'a, C> Ladder<'a, C> {
                 LadderRow::Series(..) => TableCell::Blank,
             });
         }
-        table
+        for column in listing.columns() {
+            let head = column.head();
+            let heads = format!("page {head} | terminal {head} | latex {head}");
+            table = table.column(Text, &*heads, |line| {
+                listing.fact(*column, line.model()).to_owned()
+            });
+        }
+        table.foot(listing.foot(self.models.iter().copied()))
     }
 }
 
@@ -238,12 +245,13 @@ impl<C> LadderRow<'_, C> {
     }
 
     /// The model, with "without images" in the same cell if it saw none.
-    pub(super) fn label(&self) -> String {
+    fn label(&self, listing: &ModelListing) -> String {
+        let model = listing.label(self.model());
         match self {
             Self::WithoutLevel(subject, _) if subject.view.is_some() => {
-                format!("{} without images", subject.model)
+                format!("{model} without images")
             }
-            _ => self.model().to_owned(),
+            _ => model,
         }
     }
 

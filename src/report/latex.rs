@@ -48,6 +48,7 @@ pub(super) fn escaped(text: &str) -> String {
             '~' => escaped.push_str("\\textasciitilde{}"),
             '^' => escaped.push_str("\\textasciicircum{}"),
             '−' => escaped.push_str("$-$"),
+            '†' => escaped.push_str("$\\dagger$"),
             '<' | '>' => {
                 let _ = write!(escaped, "${c}$");
             }
@@ -93,7 +94,11 @@ fn table(caption: &str, table: &Table) -> String {
                 .collect(),
         );
     }
-    text + "    \\bottomrule\n  \\end{tabular}\n\\end{table}\n"
+    text += "    \\bottomrule\n  \\end{tabular}\n";
+    if let Some(foot) = &table.foot {
+        let _ = writeln!(text, "\n  {{\\footnotesize {}}}", escaped(foot));
+    }
+    text + "\\end{table}\n"
 }
 
 /// A number above its interval.
@@ -130,8 +135,8 @@ mod tests {
     #[test]
     fn special_characters_are_escaped() {
         assert_eq!(
-            escaped("50% a_b & {c} \\ ^~#$ −1 <"),
-            "50\\% a\\_b \\& \\{c\\} \\textbackslash{} \\textasciicircum{}\\textasciitilde{}\\#\\$ $-$1 $<$"
+            escaped("50% a_b & {c} \\ ^~#$ −1 < †"),
+            "50\\% a\\_b \\& \\{c\\} \\textbackslash{} \\textasciicircum{}\\textasciitilde{}\\#\\$ $-$1 $<$ $\\dagger$"
         );
     }
 }

@@ -14,7 +14,7 @@ use super::words::{counted, percent, reach_of, with_interval};
 use crate::score::accuracy::AccuracyCell;
 use crate::score::choice::ReadingMode;
 use crate::score::health::Health;
-use crate::score::subject::{is_observer, without_run};
+use crate::score::subject::{CHANCE, is_observer, without_run};
 use crate::types::control::OBSERVER;
 use crate::types::manifest::RunManifest;
 use crate::types::{Axis, AxisLevel};
@@ -184,8 +184,9 @@ fn table(report: &ChoiceReport<'_>) -> String {
     let mut rows: Vec<TableLine<'_>> = Vec::new();
     let one = models.len() == 1;
     for (series, cells) in &ladder.series {
-        let (block, name) = block_and_name(series, one);
-        let group = report.findings.grid.order.group(series.model);
+        let listing = &report.findings.grid.listing;
+        let (block, name) = block_and_name(series, &listing.label(series.model), one);
+        let group = listing.group(series.model);
         rows.push(TableLine {
             block,
             name,
@@ -233,7 +234,26 @@ fn table(report: &ChoiceReport<'_>) -> String {
     if hidden > 0 {
         let _ = writeln!(text, " {} --full", counted(hidden, "more row"));
     }
-    text + &baselines(report, &ladder)
+    text += &baselines(report, &ladder);
+    text + &about_models(report, &ladder.models)
+}
+
+/// What the marks of models mean, and a line for each model with what its further columns hold.
+fn about_models(report: &ChoiceReport<'_>, models: &[&str]) -> String {
+    let listing = &report.findings.grid.listing;
+    let foot = listing.foot(models.iter().copied());
+    let mut text = foot.map_or_else(String::new, |foot| wrapped(" ", &foot, "   "));
+    for model in models.iter().filter(|model| **model != CHANCE) {
+        let facts = listing.columns().iter().map(|column| {
+            let fact = Some(listing.fact(*column, model)).filter(|fact| !fact.is_empty());
+            format!("{} {}", column.head(), fact.unwrap_or("–"))
+        });
+        let facts: Vec<String> = facts.collect();
+        if !facts.is_empty() {
+            text += &wrapped(" ", &format!("{model}: {}", facts.join(" · ")), "   ");
+        }
+    }
+    text
 }
 
 /// The rows of a block at some levels, below a line with its title and the levels; empty if no row has a cell there.
@@ -270,11 +290,11 @@ fn block_lines(
 }
 
 /// The title of the block and the name of the row of a series.
-fn block_and_name(series: &Series<'_>, is_single: bool) -> (String, String) {
+fn block_and_name(series: &Series<'_>, model: &str, is_single: bool) -> (String, String) {
     if is_single {
-        (series.model.to_owned(), series.light())
+        (model.to_owned(), series.light())
     } else {
-        (series.light(), series.model.to_owned())
+        (series.light(), model.to_owned())
     }
 }
 

@@ -21,6 +21,8 @@ pub struct Table {
     pub heading: Option<String>,
     /// Lines below it in the terminal.
     pub notes: Vec<String>,
+    /// A line below it in the terminal, on the page and in LaTeX that explains its marks; `None` without marks.
+    pub foot: Option<String>,
     /// Caption in LaTeX syntax; `None` if it is not written as LaTeX.
     pub latex: Option<String>,
     pub columns: Vec<Column>,
@@ -200,6 +202,7 @@ impl<T> TableBuilder<T> {
             is_folded: false,
             heading: None,
             notes: Vec::new(),
+            foot: None,
             latex: None,
             columns: Vec::new(),
             rows: items.iter().map(|_| TableRow::wide()).collect(),
@@ -234,6 +237,12 @@ impl<T> TableBuilder<T> {
         for (row, item) in self.table.rows.iter_mut().zip(&self.items) {
             row.group = heading(item);
         }
+        self
+    }
+
+    /// Adds the line that explains the marks.
+    pub(super) fn foot(mut self, foot: Option<String>) -> Self {
+        self.table.foot = foot;
         self
     }
 

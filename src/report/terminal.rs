@@ -51,7 +51,9 @@ pub(super) fn render(tables: &[Table]) -> String {
             let _ = writeln!(text, "{heading}");
         }
         text += &table(parts);
-        for note in parts.iter().flat_map(|table| &table.notes) {
+        let notes = parts.iter().flat_map(|table| &table.notes);
+        let foot = parts.iter().filter_map(|table| table.foot.as_ref()).take(1);
+        for note in notes.chain(foot) {
             let _ = writeln!(text, "{note}");
         }
     }

@@ -198,7 +198,7 @@ pub(crate) fn by_reading(grid: &Grid<'_>) -> Vec<FindingByReading> {
         .map(|subject| (&*subject.model, subject.variant.group.as_ref()))
         .collect();
     let mut models: Vec<(&str, Option<&LightGroup>)> = models.into_iter().collect();
-    models.sort_by_cached_key(|(model, _)| grid.order.place(model));
+    models.sort_by_cached_key(|(model, _)| grid.listing.place(model));
     let jobs: Vec<(&str, Option<&LightGroup>, LightClaim)> = models
         .into_iter()
         .flat_map(|(model, group)| {

@@ -51,7 +51,7 @@ impl CurvePoints {
         // Equal keys stand together, and models in their order.
         keys.sort_unstable();
         keys.dedup();
-        keys.sort_by_cached_key(|(model, ..)| grid.order.place(model));
+        keys.sort_by_cached_key(|(model, ..)| grid.listing.place(model));
         let points = keys.into_iter().map(|(model, variant, enhancer)| {
             let on_curve = |subject: &Subject| {
                 subject.view == Some(View::Image)

@@ -22,7 +22,7 @@ use super::observed::ObserverSummary;
 use super::pooled::{LevelsLeftOut, PooledFinding, levels_left_out, pooled};
 use super::significance::Significance;
 use super::subject::{Subject, is_control, is_observer};
-use crate::types::{Family, FrameId, ImageFidelity, ModelOrder, Record};
+use crate::types::{Family, FrameId, ImageFidelity, ModelListing, Record};
 
 /// All results that are computed from the records of a run.
 #[derive(Debug)]
@@ -77,18 +77,18 @@ impl<'a> Findings<'a> {
         questions: impl IntoIterator<Item = OfferedChoices>,
         measured: &[ImageFidelity],
     ) -> Self {
-        let order = ModelOrder::default();
-        Self::in_order(records, scenes, questions, measured, &order)
+        let listing = ModelListing::default();
+        Self::listed(records, scenes, questions, measured, &listing)
     }
 
-    /// The same results with the models in an order.
+    /// The same results with the models as listed.
     #[must_use]
-    pub fn in_order(
+    pub fn listed(
         records: &'a [Record],
         scenes: &BTreeMap<FrameId, String>,
         questions: impl IntoIterator<Item = OfferedChoices>,
         measured: &[ImageFidelity],
-        order: &ModelOrder,
+        listing: &ModelListing,
     ) -> Self {
         let pairs = records
             .iter()
@@ -99,7 +99,7 @@ impl<'a> Findings<'a> {
         let is_model = |model: &str| !is_control(model);
         let is_shown = |model: &str| is_model(model) && !is_observer(model);
         let without_observer = observer.is_hidden().then(|| {
-            let grid = Grid::of_models(records, &clusters, order, is_shown);
+            let grid = Grid::of_models(records, &clusters, listing, is_shown);
             Box::new(Self::of(
                 grid,
                 &clusters,
@@ -108,7 +108,7 @@ impl<'a> Findings<'a> {
                 measured,
             ))
         });
-        let grid = Grid::of_models(records, &clusters, order, is_model);
+        let grid = Grid::of_models(records, &clusters, listing, is_model);
         Self {
             without_observer,
             ..Self::of(grid, &clusters, &questions, observer, measured)

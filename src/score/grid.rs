@@ -7,7 +7,7 @@ use super::cluster::Clusters;
 use super::subject::Subject;
 use crate::types::degradation::Kind;
 use crate::types::{
-    AnswerReading, Family, KindReading, ModelOrder, QuestionId, Record, TrialOutcome,
+    AnswerReading, Family, KindReading, ModelListing, QuestionId, Record, TrialOutcome,
 };
 
 /// Result of one item for one subject.
@@ -79,8 +79,8 @@ impl GridItem<'_> {
 pub struct Grid<'a> {
     /// Subjects (model and condition), the models in their order, else sorted.
     pub subjects: Vec<Subject>,
-    /// The order of the models.
-    pub order: ModelOrder,
+    /// The order, groups and marks of the models.
+    pub listing: ModelListing,
     /// Items, sorted by frame, question, repeat and order of choices.
     pub items: Vec<GridItem<'a>>,
     /// Number of clusters of all items.
@@ -108,7 +108,7 @@ impl<'a> Grid<'a> {
     /// cluster are ignored.
     #[must_use]
     pub fn new(records: &'a [Record], clusters: &Clusters) -> Self {
-        Self::of_models(records, clusters, &ModelOrder::default(), |_| true)
+        Self::of_models(records, clusters, &ModelListing::default(), |_| true)
     }
 
     /// Table of the records of some models in their order, else as [`Grid::new`].
@@ -116,7 +116,7 @@ impl<'a> Grid<'a> {
     pub fn of_models(
         records: &'a [Record],
         clusters: &Clusters,
-        order: &ModelOrder,
+        listing: &ModelListing,
         is_shown: impl Fn(&str) -> bool,
     ) -> Self {
         let mut subjects = BTreeMap::<Subject, usize>::new();
@@ -135,7 +135,7 @@ impl<'a> Grid<'a> {
         let mut indices = subjects;
         let mut subjects: Vec<Subject> = indices.keys().cloned().collect();
         // Subjects of one model stay sorted: the sort is stable.
-        subjects.sort_by_cached_key(|subject| order.place(&subject.model));
+        subjects.sort_by_cached_key(|subject| listing.place(&subject.model));
         for (number, subject) in subjects.iter().enumerate() {
             indices.insert(subject.clone(), number);
         }
@@ -159,7 +159,7 @@ impl<'a> Grid<'a> {
         }
         Self {
             subjects,
-            order: order.clone(),
+            listing: listing.clone(),
             indices,
             items,
             clusters: clusters.count(),
@@ -258,7 +258,7 @@ impl<'a> Grid<'a> {
         let items = self.items.iter().zip(kept);
         Self {
             subjects: self.subjects.clone(),
-            order: self.order.clone(),
+            listing: self.listing.clone(),
             indices: self.indices.clone(),
             items: items
                 .filter(|(_, kept)| **kept)

@@ -29,6 +29,9 @@ pub(crate) enum AddressChange {
     Refused,
 }
 
+/// The column of models.
+const MODEL: &str = "model";
+
 /// The field of a model's entry in the manifest that holds the address.
 const ADDRESS: &str = "--base-url";
 
@@ -195,6 +198,16 @@ pub(super) fn check_same_run(
             first: before,
             second: after,
         } = difference;
+        // A model of this name with other settings; the stored one has another name in the requested run.
+        let renamed = requested.columns.get(column).into_iter().flatten();
+        let mut renamed = renamed.filter(|(name, _)| *name != value);
+        let content = stored
+            .columns
+            .get(column)
+            .and_then(|values| values.get(value));
+        if column == MODEL && renamed.any(|(_, other)| Some(other) == content) {
+            continue;
+        }
         let is_address = field == ADDRESS;
         if is_address && address_change == AddressChange::Allowed {
             tracing::warn!(

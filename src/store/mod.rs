@@ -7,6 +7,7 @@
 mod folder;
 mod lines;
 
+use std::borrow::Cow;
 use std::collections::{BTreeSet, HashMap};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::Write;
@@ -16,6 +17,7 @@ use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
 use crate::types::manifest::RunManifest;
+use crate::types::recorded_names::RecordedNames;
 use crate::types::{
     ChoiceDetail, Detail, ImageFidelity, QuestionId, Record, RunQuestion, Thumbnail, TrialKey, Via,
 };
@@ -48,6 +50,8 @@ pub(crate) struct Store<D = ChoiceDetail> {
     folder: PathBuf,
     records: File,
     synced: Instant,
+    /// The names of models in the records.
+    names: RecordedNames,
     kind: PhantomData<D>,
 }
 
@@ -91,19 +95,48 @@ impl<D: Detail> Store<D> {
             folder: folder.to_owned(),
             records,
             synced: Instant::now(),
+            names: RecordedNames::of(manifest),
             kind: PhantomData,
         })
     }
 
     /// The last record of each trial, in the order of each trial's first record.
     pub(crate) fn records(&self) -> Result<Vec<Record<D>>> {
-        read_records(&self.folder)
+        read_records(&self.folder).map(|records| self.shown(records))
+    }
+
+    /// The records with the names that their models have now.
+    fn shown(&self, mut records: Vec<Record<D>>) -> Vec<Record<D>> {
+        for record in &mut records {
+            let name = self.names.shown(&record.model);
+            if name != record.model {
+                record.model = name.to_owned();
+            }
+        }
+        records
+    }
+
+    /// A record with the name that its model has in the file.
+    fn recorded<'r>(&self, record: &'r Record<D>) -> Cow<'r, Record<D>> {
+        let name = self.names.recorded(&record.model);
+        if name == record.model {
+            return Cow::Borrowed(record);
+        }
+        let model = name.to_owned();
+        Cow::Owned(Record {
+            model,
+            ..record.clone()
+        })
     }
 
     /// Appends trials that are sent in a batch to the list of such trials.
     pub(crate) fn append_to_batch(&mut self, records: &[Record<D>]) -> Result<()> {
         let path = self.folder.join(BATCH).join(TRIALS);
-        append(&path, records)?
+        let records: Vec<Record<D>> = records
+            .iter()
+            .map(|record| self.recorded(record).into_owned())
+            .collect();
+        append(&path, &records)?
             .sync_all()
             .map_err(|e| Error::file(&path, "write", e))
     }
@@ -161,7 +194,7 @@ impl<D: Detail> Store<D> {
 
     /// The trials that were sent in batches, without replies; a trial that was sent again is in the list again.
     pub(crate) fn batch_trials(&self) -> Result<Vec<Record<D>>> {
-        lines(&self.folder.join(BATCH).join(TRIALS))
+        lines(&self.folder.join(BATCH).join(TRIALS)).map(|records| self.shown(records))
     }
 
     /// The trials whose batch has no result yet: they have no reply, and were sent more often than they failed.
@@ -194,8 +227,8 @@ impl<D: Detail> Store<D> {
     /// Appends one record. After this returns, a killed process cannot lose it.
     pub(crate) fn append(&mut self, record: &Record<D>) -> Result<()> {
         let path = || self.folder.join(RECORDS);
-        let mut line =
-            serde_json::to_vec(record).map_err(|e| Error::file(path(), "write", e.into()))?;
+        let mut line = serde_json::to_vec(&*self.recorded(record))
+            .map_err(|e| Error::file(path(), "write", e.into()))?;
         line.push(b'\n');
         self.records
             .write_all(&line)

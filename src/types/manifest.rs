@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::enhancer_note::EnhancerNote;
 use super::input_note::InputSummary;
-use super::model_order::ListedModel;
+use super::model_listing::ListedModel;
 
 /// The progress of a run, and how it ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -56,7 +56,7 @@ impl Baseline {
         }));
         let questions = combined.questions.iter().chain(&old.questions);
         let clusters = clusters(&records, questions);
-        let grid = Grid::of_models(&records, &clusters, &combined.order, |_| true);
+        let grid = Grid::of_models(&records, &clusters, &combined.listing, |_| true);
         let pairs = grid
             .subjects
             .iter()

@@ -8,7 +8,7 @@ use super::enhancers;
 use crate::error::Result;
 use crate::job::outcome::Outcome;
 use crate::job::outcome::StdoutFormat;
-use crate::job::stored::StoredRun;
+use crate::job::stored::{ShownModels, StoredRun};
 use crate::report::choice_report::ChoiceReport;
 use crate::report::json::{RunList, summary};
 use crate::report::products::{PAGE, products};
@@ -26,6 +26,7 @@ pub(crate) fn write(
     let manifest = run.manifest.clone();
     let records = run.records.into_iter().map(Record::reread);
     run.records = records.collect::<Result<_>>()?;
+    run.leave_out(ShownModels::Current);
     Ok(Outcome {
         status: manifest.status,
         output: in_its_folder(store, &manifest, &combine(vec![run])?, show)?,

@@ -21,12 +21,12 @@ impl Combined {
     /// The results that follow from the records.
     pub(super) fn findings(&self) -> Findings<'_> {
         let offers = offers(&self.records, &self.questions);
-        let findings = Findings::in_order(
+        let findings = Findings::listed(
             &self.records,
             &scenes(&self.questions),
             offers,
             &self.fidelity,
-            &self.order,
+            &self.listing,
         );
         // Replies differ from time to time: that is no other model.
         let apart = self.models.apart.iter();

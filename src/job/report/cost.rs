@@ -50,10 +50,13 @@ fn price(prices: &Prices, manifest: &RunManifest, model: &str) -> Option<Price> 
 }
 
 /// The cost of a run's replies at list prices, as text; `None` if no model of the run has a known price.
-pub(super) fn cost<D>(records: &[Record<D>], manifest: &RunManifest) -> Result<Option<String>> {
+pub(super) fn cost<'a, D: 'a>(
+    records: impl Iterator<Item = &'a Record<D>>,
+    manifest: &RunManifest,
+) -> Result<Option<String>> {
     let prices = Prices::built_in()?;
     let (mut dollars, mut counted, mut unknown) = (0.0, 0_usize, 0_usize);
-    for record in records.iter().filter(|record| record.reply.is_some()) {
+    for record in records.filter(|record| record.reply.is_some()) {
         let price = price(&prices, manifest, &record.model);
         match price.and_then(|price| charged_at(price, prices.batch, record)) {
             Some(cost) => {

@@ -5,13 +5,14 @@ use std::path::PathBuf;
 
 use super::cost::cost;
 use super::lights::Lights;
+use super::listing::listing;
 use super::models::Names;
 use crate::error::Result;
 use crate::job::stored::StoredRun;
 use crate::types::manifest::RunManifest;
 use crate::types::{
-    Condition, Detail, FrameId, ImageFidelity, ListedModel, ModelOrder, QuestionId, Record,
-    RunQuestion, Thumbnail, TrialKey,
+    Condition, Detail, FrameId, ImageFidelity, ModelListing, QuestionId, Record, RunQuestion,
+    Thumbnail, TrialKey,
 };
 
 /// The runs, with all records, questions and thumbnails.
@@ -26,8 +27,8 @@ pub(super) struct Joined<D> {
     pub(super) lights: Lights,
     /// The models that stand apart.
     pub(super) models: Names,
-    /// The order of the models: that of the files of models of all runs, one after the other.
-    pub(super) order: ModelOrder,
+    /// The order, groups and marks of the models.
+    pub(super) listing: ModelListing,
 }
 
 /// One of the joined runs.
@@ -46,6 +47,8 @@ pub(super) struct JoinedRun {
     pub(super) added: usize,
     /// The names that servers gave for each model, by the name under which it was asked.
     pub(super) served: BTreeMap<String, BTreeSet<String>>,
+    /// The models whose records are not shown.
+    pub(super) left_out: BTreeSet<String>,
 }
 
 /// Joins runs. Conditions whose images differ between runs are kept apart ([`Lights`]), and so are models that were asked in
@@ -73,10 +76,6 @@ pub(super) fn join<D: Detail>(
         }
     }
     let models = Names::of(&runs, &names, &order, &compared);
-    let listed = order
-        .iter()
-        .flat_map(|index| runs[*index].manifest.models.clone());
-    let listed: Vec<ListedModel> = listed.collect();
     let mut joined = Joined {
         runs: Vec::new(),
         records: Vec::new(),
@@ -85,7 +84,7 @@ pub(super) fn join<D: Detail>(
         fidelity: Vec::new(),
         lights,
         models,
-        order: ModelOrder::new(listed),
+        listing: ModelListing::default(),
     };
     let mut known = Known::default();
     let mut runs: Vec<Option<StoredRun<D>>> = runs.into_iter().map(Some).collect();
@@ -98,6 +97,7 @@ pub(super) fn join<D: Detail>(
     }
     by_name.sort_by_key(|(index, _)| *index);
     joined.runs = by_name.into_iter().map(|(_, run)| run).collect();
+    joined.listing = listing(&joined);
     Ok(joined)
 }
 
@@ -119,7 +119,13 @@ impl<D: Detail> Joined<D> {
         name: String,
         known: &mut Known,
     ) -> Result<JoinedRun> {
-        let cost = cost(&run.records, &run.manifest)?;
+        let charged = run.records.iter().chain(&run.left_out);
+        let cost = cost(charged, &run.manifest)?;
+        let left_out: BTreeSet<String> = run
+            .left_out
+            .into_iter()
+            .map(|record| record.model)
+            .collect();
         let mut records = Vec::with_capacity(run.records.len());
         let (mut replies, mut added) = (0, 0);
         let served = served(&run.records);
@@ -165,6 +171,7 @@ impl<D: Detail> Joined<D> {
             replies,
             added,
             served,
+            left_out,
         })
     }
 }

@@ -9,6 +9,7 @@ mod cost;
 mod enhancers;
 mod join;
 mod lights;
+mod listing;
 mod models;
 pub(crate) mod open;
 mod rereading;

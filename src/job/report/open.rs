@@ -12,19 +12,19 @@ use crate::error::{Error, Result};
 use crate::job::outcome::Outcome;
 use crate::job::outcome::StdoutFormat;
 use crate::job::predictions::{AnswerState, Prediction, predictions};
-use crate::job::stored::{StoredRun, in_order};
+use crate::job::stored::{ShownModels, StoredRun, in_order};
 use crate::report::alert::{Alert, AlertKind};
 use crate::report::openeqa::{OpenReport, ReportedAnswer, products, render, summary_json, tables};
 use crate::report::table::Table;
 use crate::report::tables::EnhancerRow;
 use crate::score::llm_match::{Protocol, mark};
 use crate::score::open::{
-    AnswerOutcome, OpenSummary, QuestionGroups, ScoredAnswer, open_summary_in_order,
+    AnswerOutcome, OpenSummary, QuestionGroups, ScoredAnswer, open_summary_listed,
 };
 use crate::store::Store;
 use crate::types::flag::read_word;
 use crate::types::manifest::Status;
-use crate::types::{ModelOrder, OpenDetail, QuestionId, Record, RunQuestion, Step};
+use crate::types::{ModelListing, OpenDetail, QuestionId, Record, RunQuestion, Step};
 
 /// Setting in the manifest with the name of the judge.
 pub(crate) const JUDGE: &str = "--judge";
@@ -49,7 +49,7 @@ impl Scores {
             run,
             alerts,
             enhancers,
-            order,
+            listing,
         } = joined;
         let setting = |name| run.manifest.settings.get(name).and_then(Value::as_str);
         let judge = setting(JUDGE).map(str::to_owned);
@@ -75,7 +75,7 @@ impl Scores {
         }
         let topics: Vec<QuestionGroups> = run.questions.iter().map(topic).collect();
         Ok(Self {
-            summary: open_summary_in_order(&scored, &topics, &order),
+            summary: open_summary_listed(&scored, &topics, &listing),
             run,
             judge,
             protocol,
@@ -152,8 +152,8 @@ pub(super) struct JoinedRuns {
     pub(super) alerts: Vec<Alert>,
     /// How their enhancers were used.
     enhancers: Vec<EnhancerRow>,
-    /// The order of the models.
-    order: ModelOrder,
+    /// The order, groups and marks of the models.
+    pub(super) listing: ModelListing,
 }
 
 /// Several runs, joined to one by [`join`], with what differs between them.
@@ -207,6 +207,7 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
     let first = joined.runs.into_iter().next();
     let first = first.ok_or_else(|| Error::usage("RUN", "no run is named"))?;
     let run = StoredRun {
+        left_out: Vec::new(),
         records: in_order(joined.records, &joined.questions, &first.manifest.models),
         folder: first.folder,
         manifest: first.manifest,
@@ -218,16 +219,17 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
         run,
         alerts,
         enhancers,
-        order: joined.order,
+        listing: joined.listing,
     })
 }
 
 /// Scores a run, and writes its report and manifest into its folder. The run is incomplete if a mark cannot be read.
 pub(crate) fn write(
     store: &Store<OpenDetail>,
-    run: StoredRun<OpenDetail>,
+    mut run: StoredRun<OpenDetail>,
     show: StdoutFormat,
 ) -> Result<Outcome> {
+    run.leave_out(ShownModels::Current);
     let mut scores = Scores::new(combine(vec![run])?)?;
     if scores.run.manifest.status == Status::Complete && scores.has_unmarked() {
         scores.run.manifest.status = Status::Incomplete;

@@ -16,7 +16,7 @@ use super::rereading::LenientChange;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::job::folder::now;
-use crate::job::stored::{AnyRun, StoredRun, name};
+use crate::job::stored::{AnyRun, ShownModels, StoredRun, name};
 use crate::job::{Outcome, ShowArgs, StdoutFormat, count};
 use crate::report::alert::Alert;
 use crate::report::choice_report::ChoiceReport;
@@ -24,7 +24,7 @@ use crate::report::json::{RunList, summary};
 use crate::report::products::{PAGE, products};
 use crate::store::{AddressChange, Store};
 use crate::types::manifest::Status;
-use crate::types::{ChoiceDetail, Decides, Detail as _, OpenDetail};
+use crate::types::{ChoiceDetail, Decides, Detail as _, ModelColumn, OpenDetail};
 
 /// The flags of `report`.
 #[derive(Debug, Args)]
@@ -42,6 +42,12 @@ pub(crate) struct ReportArgs {
     /// Report only on the items that all models with images answered
     #[arg(long, add = Decides::Nothing)]
     pub common: bool,
+    /// Show also the models that the file of models no longer has, and those that it had with other settings
+    #[arg(long, add = Decides::Nothing)]
+    pub all: bool,
+    /// Further columns about models in tables, separated by commas; default: none
+    #[arg(long, value_name = "COLUMNS", value_enum, value_delimiter = ',', add = Decides::Nothing)]
+    pub columns: Vec<ModelColumn>,
     /// An old run to compare with.
     #[command(flatten)]
     pub baseline: BaselineArgs,
@@ -61,6 +67,16 @@ pub(crate) struct BaselineArgs {
     /// random and the observer are no models
     #[arg(long, add = Decides::Nothing)]
     pub fail_if_worse: bool,
+}
+
+impl ReportArgs {
+    fn shown(&self) -> ShownModels {
+        if self.all {
+            ShownModels::All
+        } else {
+            ShownModels::Current
+        }
+    }
 }
 
 /// The report of a run, or a comparison of several of the same kind. With `--rescore`, changed readings are stored in their run.
@@ -126,13 +142,15 @@ fn of_choices(
             output += &reread(run)?;
             run.manifest.counts = count(run.manifest.counts.trials, &run.records);
         }
+        run.leave_out(args.shown());
     }
     if args.show.format() == StdoutFormat::Json {
         output.clear();
     }
     let old = args.baseline.baseline.as_ref().map(|folder| {
-        let old =
+        let mut old =
             StoredRun::of_choices(folder, "--baseline compares runs of questions with choices")?;
+        old.leave_out(args.shown());
         Ok::<_, Error>((runs.clone(), old))
     });
     let old = old.transpose()?;
@@ -140,6 +158,7 @@ fn of_choices(
     if args.common {
         combined = restrict(combined)?;
     }
+    combined.listing.show(&args.columns);
     let baseline = old.map(|(new, old)| Baseline::new(&combined, new, old));
     let baseline = baseline.transpose()?;
     let judged = baseline.as_ref().filter(|_| args.baseline.fail_if_worse);
@@ -217,7 +236,11 @@ fn write_files(
     Ok(text)
 }
 
-fn of_open(args: &ReportArgs, runs: Vec<StoredRun<OpenDetail>>, again: &[Alert]) -> Result<String> {
+fn of_open(
+    args: &ReportArgs,
+    mut runs: Vec<StoredRun<OpenDetail>>,
+    again: &[Alert],
+) -> Result<String> {
     let flags = [
         ("--common", args.common),
         ("--baseline", args.baseline.baseline.is_some()),
@@ -229,9 +252,11 @@ fn of_open(args: &ReportArgs, runs: Vec<StoredRun<OpenDetail>>, again: &[Alert])
     if let Some(run) = runs.iter().find(|run| run.records.is_empty()) {
         return Err(no_records(run.folder.clone()));
     }
+    runs.iter_mut().for_each(|run| run.leave_out(args.shown()));
     let is_single = runs.len() == 1 && again.is_empty();
     let mut joined = open::combine(runs)?;
     joined.alerts.splice(..0, again.iter().cloned());
+    joined.listing.show(&args.columns);
     let scores = open::Scores::new(joined)?;
     let run = &scores.run;
     if is_single && args.out.is_none() {

@@ -81,7 +81,7 @@ fn summary(summary: &OpenSummary) -> Table {
             change(cell, Baseline::Raw)
         })
         .column(Text, "csv reading", |cell| reading(&cell.subject))
-        .model_group(&summary.order, |cell| &cell.subject)
+        .model_facts(&summary.listing, |cell| &cell.subject)
         .build()
 }
 
@@ -106,7 +106,7 @@ fn of_axis(report: &OpenReport<'_>, axis: Axis, ladder: &Ladder<'_, OpenCell>) -
         format!(" by {} of {}", axis.title, axis.cause)
     };
     let mut table = ladder
-        .table("levels", &summary.order, |cell| score(summary, cell))
+        .table("levels", &summary.listing, |cell| score(summary, cell))
         .page(
             SECTION,
             &format!("Score in %{of} with 95 % intervals (difference from L0)"),

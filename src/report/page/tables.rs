@@ -15,6 +15,8 @@ pub(in crate::report) struct PageTable<'a> {
     caption: &'a str,
     /// Whether the table is closed until the reader opens it.
     folded: bool,
+    /// The line below it; `None` without one.
+    foot: Option<&'a str>,
     head: Vec<&'a str>,
     rows: Vec<PageRow<'a>>,
 }
@@ -53,6 +55,7 @@ pub(in crate::report) fn page_tables<'a>(tables: &'a [Table], section: &str) -> 
         PageTable {
             caption: &table.caption,
             folded: table.is_folded || rows.len() > MAX_OPEN_ROWS,
+            foot: table.foot.as_deref(),
             head: head
                 .filter_map(|column| column.heads.page.as_deref())
                 .collect(),

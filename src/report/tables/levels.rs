@@ -55,7 +55,7 @@ fn of_axis(
         (_, false) => format!("Accuracy in % by {} of {}{what}", axis.title, axis.cause),
     };
     let mut table = ladder
-        .table("levels", &findings.grid.order, |cell| {
+        .table("levels", &findings.grid.listing, |cell| {
             cell.map_or(TableCell::Blank, |cell| accuracy(summary, cell))
         })
         .page("accuracy", &caption)

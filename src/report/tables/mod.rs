@@ -25,7 +25,7 @@ use super::table::{Table, TableBuilder, TableCell};
 use super::words::{family, name};
 use crate::score::findings::Findings;
 use crate::score::subject::Subject;
-use crate::types::{EnhancerName, Family, KindReading, ModelOrder};
+use crate::types::{EnhancerName, Family, KindReading, ModelListing};
 
 pub(super) use baseline::BASELINE;
 pub(crate) use baseline::baseline;
@@ -50,7 +50,7 @@ pub(crate) fn tables(findings: &Findings<'_>) -> Vec<Table> {
 
 fn all(findings: &Findings<'_>) -> Vec<Table> {
     [
-        vec![summary::summary(&findings.summary, &findings.grid.order)],
+        vec![summary::summary(&findings.summary, &findings.grid.listing)],
         levels::levels(findings),
         observer::observer(findings),
         vec![subjects::subjects(&findings.summary)],
@@ -94,18 +94,29 @@ impl<T> TableBuilder<T> {
             .column(Text, "page subject", |row| name(of(row)))
     }
 
-    /// Adds the column of the models' group in files, if any model has one.
-    pub(in crate::report) fn model_group(
-        self,
-        order: &ModelOrder,
+    /// Adds the column of the models' group in files, if any model has one, and the further columns of models.
+    pub(in crate::report) fn model_facts(
+        mut self,
+        listing: &ModelListing,
         of: impl Fn(&T) -> &Subject,
     ) -> Self {
-        if !order.has_groups() {
-            return self;
+        if listing.has_groups() {
+            self = self.column(Text, "csv model_group", |row| {
+                TableCell::from(listing.group(&of(row).model).map(str::to_owned))
+            });
         }
-        self.column(Text, "csv model_group", |row| {
-            TableCell::from(order.group(&of(row).model).map(str::to_owned))
-        })
+        for column in listing.columns() {
+            let head = format!("csv {}", column.word());
+            self = self.column(Text, &*head, |row| {
+                let fact = listing.fact(*column, &of(row).model);
+                TableCell::from(
+                    Some(fact)
+                        .filter(|fact| !fact.is_empty())
+                        .map(str::to_owned),
+                )
+            });
+        }
+        self
     }
 
     /// Adds the columns of the curve of a row: model, variant and enhancer.

@@ -5,13 +5,13 @@ use crate::report::table::{Table, TableBuilder, TableCell};
 use crate::score::accuracy::{AccuracyCell, AccuracySummary};
 use crate::score::choice::ReadingMode;
 use crate::score::subject::Subject;
-use crate::types::{LightGroup, ModelOrder};
+use crate::types::{LightGroup, ModelListing};
 
 /// Name of the summary table.
 pub(in crate::report) const SUMMARY: &str = "summary";
 
 /// A row for each accuracy.
-pub(in crate::report) fn summary(summary: &AccuracySummary, order: &ModelOrder) -> Table {
+pub(in crate::report) fn summary(summary: &AccuracySummary, listing: &ModelListing) -> Table {
     let builder = TableBuilder::new(SUMMARY, &summary.cells)
         .subject(|cell| &cell.subject, |variant| variant.word().to_owned())
         .family(|cell| cell.family.as_ref())
@@ -32,7 +32,7 @@ pub(in crate::report) fn summary(summary: &AccuracySummary, order: &ModelOrder) 
         builder
     };
     let builder = builder.column(Text, "csv reading", |cell| reading(&cell.subject));
-    let builder = builder.model_group(order, |cell| &cell.subject);
+    let builder = builder.model_facts(listing, |cell| &cell.subject);
     if summary.cells.iter().any(|cell| group(cell).is_some()) {
         // The run whose images these are, where runs show different ones under one name.
         return builder

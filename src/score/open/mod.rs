@@ -16,7 +16,7 @@ use self::cell::cell;
 use self::change::{baselines, change};
 use self::group::groups;
 use super::subject::Subject;
-use crate::types::ModelOrder;
+use crate::types::ModelListing;
 
 pub use answer::{AnswerOutcome, ScoredAnswer};
 pub(crate) use cell::OpenCell;
@@ -35,8 +35,8 @@ pub struct OpenSummary {
     pub cells: Vec<OpenCell>,
     /// Differences of scores, ordered by subject, baseline and group.
     pub changes: Vec<ScoreChange>,
-    /// The order of the models.
-    pub order: ModelOrder,
+    /// The order, groups and marks of the models.
+    pub listing: ModelListing,
 }
 
 impl OpenSummary {
@@ -70,15 +70,15 @@ impl OpenSummary {
 /// Scores of the answers; `questions` holds the groups of each question.
 #[must_use]
 pub fn open_summary(answers: &[ScoredAnswer], questions: &[QuestionGroups]) -> OpenSummary {
-    open_summary_in_order(answers, questions, &ModelOrder::default())
+    open_summary_listed(answers, questions, &ModelListing::default())
 }
 
-/// The same scores with the models in an order.
+/// The same scores with the models as listed.
 #[must_use]
-pub(crate) fn open_summary_in_order(
+pub(crate) fn open_summary_listed(
     answers: &[ScoredAnswer],
     questions: &[QuestionGroups],
-    order: &ModelOrder,
+    listing: &ModelListing,
 ) -> OpenSummary {
     let episodes: BTreeMap<&str, usize> = questions
         .iter()
@@ -101,7 +101,7 @@ pub(crate) fn open_summary_in_order(
     }
     let groups = groups(questions);
     let mut by_subject: Vec<(&Subject, Vec<&ScoredAnswer>)> = by_subject.into_iter().collect();
-    by_subject.sort_by_cached_key(|(subject, _)| order.place(&subject.model));
+    by_subject.sort_by_cached_key(|(subject, _)| listing.place(&subject.model));
     let (mut cells, mut changes) = (Vec::new(), Vec::new());
     for (subject, answers) in &by_subject {
         for group in &groups {
@@ -137,6 +137,6 @@ pub(crate) fn open_summary_in_order(
         },
         cells,
         changes,
-        order: order.clone(),
+        listing: listing.clone(),
     }
 }

@@ -84,6 +84,7 @@ pub(super) fn of_joining<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
         Alert::new(AlertKind::Runs, text)
     });
     let mut alerts: Vec<Alert> = repeated.collect();
+    alerts.extend(models::of_left_out(&joined.runs));
     alerts.extend(models::of_models(joined));
     alerts
 }

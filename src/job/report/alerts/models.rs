@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::words::names;
-use crate::job::report::join::Joined;
+use crate::job::report::join::{Joined, JoinedRun};
 use crate::job::report::models::ModelApart;
 use crate::job::report::settings::{Setting, listed};
 use crate::report::alert::{Alert, AlertKind};
@@ -30,6 +30,23 @@ pub(super) fn of_models<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     }
     let alerts = by_reason.into_iter().map(|((reason, _), models)| {
         let text = format!("{}: {reason}.", stand_apart(&models));
+        Alert::new(AlertKind::Models, text)
+    });
+    alerts.collect()
+}
+
+/// The models of each run whose replies are not shown.
+pub(super) fn of_left_out(runs: &[JoinedRun]) -> Vec<Alert> {
+    let left = runs.iter().filter(|run| !run.left_out.is_empty());
+    let alerts = left.map(|run| {
+        let names: Vec<&String> = run.left_out.iter().collect();
+        let are = if names.len() == 1 { "is" } else { "are" };
+        let text = format!(
+            "{} {are} left out of {}: the file of models has no such model any more, or has it with other settings; report --all shows \
+             all.",
+            listed(&names),
+            run.name
+        );
         Alert::new(AlertKind::Models, text)
     });
     alerts.collect()
