@@ -29,6 +29,8 @@ pub struct Access {
     pub key_header: KeyHeader,
     /// Further headers that name the account and are not secret: `OpenAI-Organization`, `OpenAI-Project`.
     pub account: Vec<(String, String)>,
+    /// What is known of the vendor; `None` for hosts that no table has.
+    pub vendor: Option<&'static Vendor>,
     /// Headers that the user adds.
     pub headers: OwnHeaders,
     /// Certificate authorities that are trusted in addition to those of the system.
@@ -42,6 +44,7 @@ impl Access {
     #[must_use]
     pub fn new(base: BaseUrl) -> Self {
         Self {
+            vendor: Vendor::of(base.host()),
             base,
             key: None,
             key_header: KeyHeader::Auto,
@@ -85,10 +88,7 @@ impl Access {
     /// The headers of every request to an API.
     pub(super) fn headers(&self, wire: Wire) -> Result<HeaderMap> {
         let form = match self.key_header {
-            KeyHeader::Auto => {
-                let vendor = Vendor::of(self.base.host());
-                vendor.map_or(KeyHeader::Bearer, Vendor::key_header)
-            }
+            KeyHeader::Auto => self.vendor.map_or(KeyHeader::Bearer, Vendor::key_header),
             named => named,
         };
         let mut headers = wire.headers(self.key.as_ref(), form)?;

@@ -17,6 +17,7 @@ use super::request::Request;
 use super::sending::Sending;
 use super::service::{Choice, Effect, Services};
 use super::url::BaseUrl;
+use super::vendor::Vendor;
 use super::wire_kind::Wire;
 use crate::error::{Error, Result};
 use crate::types::{FailureKind, Reply};
@@ -97,6 +98,11 @@ impl Endpoint {
     #[must_use]
     pub fn base(&self) -> &BaseUrl {
         self.replicas[0].base()
+    }
+
+    /// What is known of the vendor of the first replica; `None` if no table has its host.
+    pub(super) fn vendor(&self) -> Option<&'static Vendor> {
+        self.replicas[0].vendor()
     }
 
     pub(super) fn has_key(&self) -> bool {

@@ -57,7 +57,11 @@ impl RequestFields {
     ///
     /// # Errors
     /// If `--thinking` cannot be said to the server, or is said twice.
-    pub(super) fn first(parameters: &Parameters, base: &BaseUrl) -> Result<Self> {
+    pub(super) fn first(
+        parameters: &Parameters,
+        base: &BaseUrl,
+        vendor: Option<&Vendor>,
+    ) -> Result<Self> {
         let thinking = parameters.thinking.map(|thinking| thinking.at(base));
         let thinking = thinking.transpose()?;
         let says_effort = thinking.is_some_and(|switch| switch.effort.is_some());
@@ -67,7 +71,7 @@ impl RequestFields {
         }
         Ok(Self {
             wire: parameters.wire.first(),
-            token_field: Vendor::token_field_at(base.host(), parameters.token_field),
+            token_field: Vendor::token_field_at(vendor, parameters.token_field),
             temperature: match parameters.temperature {
                 Temperature::Auto => Some(0.0),
                 Temperature::Server => None,

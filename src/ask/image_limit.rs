@@ -1,7 +1,6 @@
 //! The maximum size of an image that an endpoint accepts: [`ImageLimit`].
 
-use super::url::BaseUrl;
-use super::vendor::Vendor;
+use super::access::Access;
 use crate::error::{Error, Result};
 use crate::types::ImageFacts;
 
@@ -58,8 +57,8 @@ impl ImageLimit {
 
     /// The limit of an endpoint.
     #[must_use]
-    pub(crate) fn of(base: &BaseUrl) -> Self {
-        let Some(vendor) = Vendor::of(base.host()) else {
+    pub(crate) fn of(access: &Access) -> Self {
+        let Some(vendor) = access.vendor else {
             return Self::UNKNOWN;
         };
         match (vendor.image_bytes, vendor.image_side) {
@@ -70,8 +69,8 @@ impl ImageLimit {
 
     /// This limit, and that of requests with several images to a model at an endpoint that sees them.
     #[must_use]
-    pub(crate) fn with_requests_to(mut self, base: &BaseUrl) -> Self {
-        let Some(vendor) = Vendor::of(base.host()) else {
+    pub(crate) fn with_requests_to(mut self, access: &Access) -> Self {
+        let Some(vendor) = access.vendor else {
             return self;
         };
         let (origin, own) = (&*vendor.name, &mut self.request);
@@ -198,7 +197,7 @@ mod tests {
 
     #[test]
     fn limits_are_known_by_host() {
-        let of = |base: &str| ImageLimit::of(&base.parse().unwrap());
+        let of = |base: &str| ImageLimit::of(&Access::new(base.parse().unwrap()));
         assert_eq!(of("https://api.anthropic.com/v1").side, Some(8000));
         assert_eq!(of("https://r.openai.azure.com/openai/v1").origin, "Azure");
         assert_eq!(of("http://127.0.0.1:8000/v1"), ImageLimit::UNKNOWN);
@@ -215,7 +214,9 @@ mod tests {
             orientation: None,
             exposure: None,
         };
-        let limit = ImageLimit::of(&"https://api.anthropic.com/v1".parse().unwrap());
+        let limit = ImageLimit::of(&Access::new(
+            "https://api.anthropic.com/v1".parse().unwrap(),
+        ));
         assert!(limit.check(&image(7_500_000, 8000)).is_ok());
         for beyond in [image(7_500_001, 10), image(10, 8001)] {
             let error = limit.check(&beyond).unwrap_err().to_string();
@@ -243,7 +244,9 @@ mod tests {
             orientation: None,
             exposure: None,
         };
-        let at = |base: &str| ImageLimit::stated(1).with_requests_to(&base.parse().unwrap());
+        let at = |base: &str| {
+            ImageLimit::stated(1).with_requests_to(&Access::new(base.parse().unwrap()))
+        };
         let groq = at("https://api.groq.com/openai/v1");
         assert!(groq.check_request(5, None).is_ok());
         let error = groq.check_request(6, None).unwrap_err().to_string();

@@ -51,6 +51,7 @@ mod url;
 mod variable;
 mod vendor;
 mod vendor_batch;
+mod vendor_table;
 mod wire;
 mod wire_kind;
 

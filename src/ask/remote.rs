@@ -55,9 +55,9 @@ impl Remote {
     /// If a header value has characters that HTTP does not allow, if `--thinking` cannot be said to the server, or if the user's own
     /// fields contradict `--constrain` or `--thinking`.
     pub fn open(endpoint: Arc<Endpoint>, parameters: Parameters) -> Result<Self> {
-        let first = RequestFields::first(&parameters, endpoint.base())?;
+        let first = RequestFields::first(&parameters, endpoint.base(), endpoint.vendor())?;
         check_own_fields(&parameters, first)?;
-        if let Some(vendor) = Vendor::of(endpoint.base().host()) {
+        if let Some(vendor) = endpoint.vendor() {
             check_vendor(vendor, &parameters)?;
         }
         Ok(Self {

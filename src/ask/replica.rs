@@ -15,6 +15,7 @@ use super::pace::{Allowance, Gate, Window, asked_wait};
 use super::request::Request;
 use super::sending::Sending;
 use super::url::BaseUrl;
+use super::vendor::Vendor;
 use super::wire_kind::Wire;
 use crate::error::Result;
 use crate::types::{Failure, FailureKind, Finish, Reply, TokenChances, TokenPosition};
@@ -54,6 +55,11 @@ impl Replica {
     /// The base URL; its text has no user, password and query string.
     pub(super) fn base(&self) -> &BaseUrl {
         &self.access.base
+    }
+
+    /// What is known of the vendor.
+    pub(super) fn vendor(&self) -> Option<&'static Vendor> {
+        self.access.vendor
     }
 
     pub(super) fn has_key(&self) -> bool {

@@ -14,6 +14,7 @@ use super::sending::Sending;
 use super::url::BaseUrl;
 use super::variable::variable;
 use super::vendor::Vendor;
+use super::vendor_table::VendorTable;
 use crate::error::{Error, Result};
 use crate::types::Decides;
 
@@ -47,6 +48,9 @@ pub(crate) struct AccessArgs {
     /// A file that holds the API key; default: none, a variable holds it
     #[arg(long, value_name = "FILE", add = Decides::Nothing)]
     pub api_key_file: Option<PathBuf>,
+    /// A TOML file of vendors above the built-in table, in its form; default: the built-in table alone
+    #[arg(long, value_name = "FILE", add = Decides::Nothing)]
+    pub vendor: Option<PathBuf>,
     /// The header that carries the key; auto is what is known of the vendor (api-key at Azure), else bearer
     #[arg(long, value_name = "HEADER", value_enum, default_value_t, add = Decides::Nothing)]
     pub key_header: KeyHeader,
@@ -106,6 +110,7 @@ impl AccessArgs {
             base_url: vec![base_url],
             ca_file: self.ca_file.clone(),
             allow_http: self.allow_http,
+            vendor: self.vendor.clone(),
             ..Self::default()
         }
     }
@@ -117,16 +122,20 @@ impl AccessArgs {
     pub(crate) fn server(&self, sending: Sending) -> Result<Server> {
         let authorities = self.ca_file.as_deref().map(Authorities::load).transpose()?;
         let authorities = authorities.unwrap_or_default();
+        let vendors = self.vendors()?;
         let mut replicas: Vec<Access> = Vec::new();
         for base in self.addresses()? {
             if replicas.iter().any(|other| other.base == base) {
                 let problem = format_args!("{base} is named twice");
                 return Err(Error::usage("--base-url", problem));
             }
+            let vendor = vendors.of(base.host());
+            vendor.map_or(Ok(()), |vendor| vendor.check_address(&base))?;
             replicas.push(Access {
-                key: self.key(&base)?,
+                vendor,
+                key: self.key(&base, vendor)?,
                 key_header: self.key_header,
-                account: account_headers(&base),
+                account: account_headers(vendor),
                 headers: OwnHeaders::read(&self.header, &self.header_env)?,
                 authorities: authorities.clone(),
                 allow_http: self.allow_http,
@@ -134,6 +143,12 @@ impl AccessArgs {
             });
         }
         Ok(Server { replicas, sending })
+    }
+
+    /// The user's own vendors.
+    fn vendors(&self) -> Result<VendorTable> {
+        let own = self.vendor.as_deref().map(VendorTable::read);
+        Ok(own.transpose()?.unwrap_or_default())
     }
 
     /// The addresses that flags or the environment name, else OpenAI's.
@@ -146,14 +161,14 @@ impl AccessArgs {
     }
 
     /// Where the key comes from, for people: never the key itself.
-    pub(crate) fn key_source(&self, base: &BaseUrl) -> String {
+    pub(crate) fn key_source(&self, replica: &Access) -> String {
         if let Some(path) = &self.api_key_file {
             return format!("the file {}", path.display());
         }
         let names = match self.api_key_env.as_deref() {
             Some(NO_KEY) => return "none".to_owned(),
             Some(name) => vec![name],
-            None => key_variables(base),
+            None => key_variables(&replica.base, replica.vendor),
         };
         match names.iter().find(|name| variable(name).is_some()) {
             Some(name) => format!("the variable {name}"),
@@ -162,7 +177,7 @@ impl AccessArgs {
     }
 
     /// The key from a file or a variable. For an endpoint on another machine a key is required, except with `none`.
-    fn key(&self, base: &BaseUrl) -> Result<Option<Secret>> {
+    fn key(&self, base: &BaseUrl, vendor: Option<&'static Vendor>) -> Result<Option<Secret>> {
         if let Some(path) = &self.api_key_file {
             let text = fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))?;
             return Secret::new(&text, "--api-key-file").map(Some);
@@ -183,7 +198,7 @@ impl AccessArgs {
             let text = text.ok_or_else(|| wrong(format!("the variable {name} is not set")))?;
             return Secret::new(&text, name).map(Some);
         }
-        let names = key_variables(base);
+        let names = key_variables(base, vendor);
         let mut set = names
             .iter()
             .filter_map(|name| Some((*name, variable(name)?)));
@@ -199,8 +214,8 @@ impl AccessArgs {
 
 /// The variables that may hold the key of an endpoint, in order. OpenAI's key goes to another vendor only if `OPENAI_BASE_URL`
 /// names the host.
-fn key_variables(base: &BaseUrl) -> Vec<&'static str> {
-    let Some(vendor) = Vendor::of(base.host()) else {
+fn key_variables(base: &BaseUrl, vendor: Option<&'static Vendor>) -> Vec<&'static str> {
+    let Some(vendor) = vendor else {
         return vec![KEY_VARIABLE];
     };
     let mut names: Vec<&str> = vendor.key.iter().map(String::as_str).collect();
@@ -235,10 +250,8 @@ fn no_key(base: &BaseUrl, names: &[&str]) -> Error {
 }
 
 /// The headers for accounts with several organizations or projects, from the variables that the vendor's clients use.
-fn account_headers(base: &BaseUrl) -> Vec<(String, String)> {
-    let headers = Vendor::of(base.host())
-        .into_iter()
-        .flat_map(|vendor| &vendor.account);
+fn account_headers(vendor: Option<&Vendor>) -> Vec<(String, String)> {
+    let headers = vendor.into_iter().flat_map(|vendor| &vendor.account);
     headers
         .filter_map(|(header, name)| Some((header.clone(), variable(name)?)))
         .collect()

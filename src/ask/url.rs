@@ -9,7 +9,6 @@ use base64::engine::general_purpose::STANDARD;
 use percent_encoding::percent_decode_str;
 use reqwest::Url;
 
-use super::vendor::Vendor;
 use super::wire_kind::Wire;
 use crate::error::{Error, Result};
 
@@ -51,6 +50,11 @@ impl BaseUrl {
     #[must_use]
     pub fn is_plain(&self) -> bool {
         self.0.scheme() == "http"
+    }
+
+    /// Whether anything stands behind the host's name.
+    pub(super) fn has_path(&self) -> bool {
+        !self.0.path().trim_matches('/').is_empty()
     }
 
     /// Whether the URL has a user name or password.
@@ -115,17 +119,7 @@ impl FromStr for BaseUrl {
                 )));
             }
         }
-        let base = Self(url);
-        if let Some(vendor) = Vendor::of(base.host()).filter(|vendor| !vendor.addresses.is_empty())
-            && base.0.path().trim_matches('/').is_empty()
-        {
-            let forms = vendor.addresses.join(", or ");
-            return Err(wrong(&format!(
-                "an address of {} needs a path: {forms}",
-                vendor.name
-            )));
-        }
-        Ok(base)
+        Ok(Self(url))
     }
 }
 
@@ -187,7 +181,6 @@ mod tests {
             "http://",
             "https://a/v1#x",
             "https://a/v1/chat/completions/",
-            "https://r.openai.azure.com/?api-version=2024-10-21",
         ] {
             assert!(wrong.parse::<BaseUrl>().is_err(), "{wrong}");
         }

@@ -7,12 +7,14 @@ use serde::Deserialize;
 
 use super::key_header::KeyHeader;
 use super::token_field::TokenField;
+use super::url::BaseUrl;
 use super::vendor_batch::VendorBatch;
+use crate::error::Error;
 
 /// A vendor and the particularities of its endpoints; a field that is `None` is not known.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
-pub(crate) struct Vendor {
+pub struct Vendor {
     /// The vendor's name, for messages.
     pub(crate) name: String,
     /// Ends of the host names of its endpoints.
@@ -98,7 +100,43 @@ impl Vendor {
     /// The vendor of a host; `None` if the host is not in the table.
     pub(crate) fn of(host: &str) -> Option<&'static Self> {
         let mut vendors = VENDORS.vendor.iter();
-        vendors.find(|vendor| vendor.hosts.iter().any(|end| is_below(host, end)))
+        vendors.find(|vendor| vendor.is_of(host))
+    }
+
+    /// Whether a host is one of the vendor's.
+    pub(super) fn is_of(&self, host: &str) -> bool {
+        self.hosts.iter().any(|end| is_below(host, end))
+    }
+
+    /// Checks what no type can say: that ends of host names are given, and nothing else in their place.
+    ///
+    /// # Errors
+    /// The text names the field.
+    pub(super) fn check(&self) -> Result<(), String> {
+        let is_end = |end: &String| {
+            let mut letters = end.chars();
+            !end.is_empty() && letters.all(|c| c.is_ascii_alphanumeric() || matches!(c, '.' | '-'))
+        };
+        if self.hosts.is_empty() || !self.hosts.iter().all(is_end) {
+            return Err(
+                "hosts: ends of host names expected, such as \"api.example.com\" or \".example.com\""
+                    .to_owned(),
+            );
+        }
+        Ok(())
+    }
+
+    /// Checks that an address has a path, if the vendor's addresses need one.
+    ///
+    /// # Errors
+    /// The error names the forms of its addresses.
+    pub(super) fn check_address(&self, base: &BaseUrl) -> Result<(), Error> {
+        if self.addresses.is_empty() || base.has_path() {
+            return Ok(());
+        }
+        let forms = self.addresses.join(", or ");
+        let problem = format_args!("{base}: an address of {} needs a path: {forms}", self.name);
+        Err(Error::usage("--base-url", problem))
     }
 
     /// Whether a constraint on replies has no effect.
@@ -122,10 +160,10 @@ impl Vendor {
         }
     }
 
-    /// The field that carries the token limit at a host: never `Auto`.
-    pub(super) fn token_field_at(host: &str, field: TokenField) -> TokenField {
+    /// The field that carries the token limit at a vendor: never `Auto`.
+    pub(super) fn token_field_at(vendor: Option<&Self>, field: TokenField) -> TokenField {
         match field {
-            TokenField::Auto => Self::of(host).map_or(TokenField::MaxTokens, Self::token_field),
+            TokenField::Auto => vendor.map_or(TokenField::MaxTokens, Self::token_field),
             field => field,
         }
     }
@@ -162,7 +200,7 @@ mod tests {
         let mut hosts = Vec::new();
         for vendor in &VENDORS.vendor {
             assert!(!vendor.key.is_empty(), "{}", vendor.name);
-            assert!(!vendor.hosts.is_empty(), "{}", vendor.name);
+            assert_eq!(vendor.check(), Ok(()), "{}", vendor.name);
             hosts.extend(&vendor.hosts);
             let variable = |name: &String| !super::super::key_form::looks_like_key(name);
             assert!(vendor.key.iter().all(variable), "{}", vendor.name);
@@ -175,12 +213,32 @@ mod tests {
 
     #[test]
     fn the_token_field_depends_on_the_host() {
-        let at = |host, field| Vendor::token_field_at(host, field);
+        let at = |host, field| Vendor::token_field_at(Vendor::of(host), field);
         let auto = TokenField::Auto;
         assert_eq!(at("api.openai.com", auto), TokenField::MaxCompletionTokens);
         assert_eq!(at("localhost", auto), TokenField::MaxTokens);
         assert_eq!(at("api.mistral.ai", auto), TokenField::MaxTokens);
         assert_eq!(at("api.openai.com", TokenField::Omit), TokenField::Omit);
+    }
+
+    #[test]
+    fn an_address_needs_the_path_that_its_vendor_has() {
+        let check = |text: &str| {
+            let base: BaseUrl = text.parse().unwrap();
+            Vendor::of(base.host()).map(|vendor| vendor.check_address(&base))
+        };
+        let bare = "https://r.openai.azure.com/?api-version=2024-10-21";
+        let error = check(bare).unwrap().unwrap_err().to_string();
+        assert!(
+            error.contains("Azure needs a path: https://RESOURCE"),
+            "{error}"
+        );
+        for base in [
+            "https://r.openai.azure.com/openai/v1",
+            "https://api.openai.com",
+        ] {
+            assert!(check(base).unwrap().is_ok(), "{base}");
+        }
     }
 
     #[test]

@@ -282,10 +282,7 @@ pub(crate) fn limit(settings: &JobSettings) -> Option<ImageLimit> {
     let limits = servers.map(|server| {
         let stated = server.sending.max_image;
         let stated = stated.map(|megabytes| ImageLimit::stated((megabytes * 1e6) as usize));
-        let known = server
-            .replicas
-            .iter()
-            .map(|replica| ImageLimit::of(&replica.base));
+        let known = server.replicas.iter().map(ImageLimit::of);
         stated.or_else(|| known.reduce(ImageLimit::stricter))
     });
     let limit = limits.flatten().reduce(ImageLimit::stricter)?;
@@ -294,9 +291,7 @@ pub(crate) fn limit(settings: &JobSettings) -> Option<ImageLimit> {
     let seeing = models.filter(|model| model.view == View::Image);
     let servers = seeing.filter_map(|model| model.server.as_ref());
     let replicas = servers.flat_map(|server| &server.replicas);
-    Some(replicas.fold(limit, |limit, replica| {
-        limit.with_requests_to(&replica.base)
-    }))
+    Some(replicas.fold(limit, |limit, replica| limit.with_requests_to(replica)))
 }
 
 /// The notes about images that a run folder does not have yet.

@@ -368,7 +368,7 @@ fn note(entry: &Entry, resolved: &ModelSettings) -> Value {
     if let Some(server) = &resolved.server {
         let sending = &server.sending;
         note["endpoints"] = json!(server.addresses());
-        note["key"] = json!(access.key_source(&server.replicas[0].base));
+        note["key"] = json!(access.key_source(&server.replicas[0]));
         note["headers"] = json!([names(&access.header), names(&access.header_env)].concat());
         note["pace"] = json!({
             "concurrency": sending.concurrency.to_string(), "rpm": sending.quota.requests, "tpm": sending.quota.tokens,

@@ -110,7 +110,9 @@ fn line(name: &str, line: &NoiseLine) -> String {
     );
     let source = match line.slope_from {
         SlopeSource::Settings => String::new(),
-        SlopeSource::Preset => "; fewer than 3 settings count: the slope is that of sony-a7s2".to_owned(),
+        SlopeSource::Preset => {
+            "; fewer than 3 settings count: the slope is that of sony-a7s2".to_owned()
+        }
         SlopeSource::NoNoise => return format!("{name}: no setting has any\n"),
     };
     let deviation = match line.deviation_error() {
