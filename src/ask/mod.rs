@@ -79,7 +79,7 @@ pub use remote::Remote;
 pub use script::Script;
 pub use secret::Secret;
 pub use sending::Sending;
-pub(crate) use server::{AccessArgs, Server};
+pub(crate) use server::{AccessArgs, OPENAI_KEY, Server, own_variables};
 pub use thinking::Thinking;
 pub use token_field::TokenField;
 pub use url::BaseUrl;

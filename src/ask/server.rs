@@ -25,7 +25,7 @@ const BASE_URL: &str = "https://api.openai.com/v1";
 const BASE_URL_VARIABLE: &str = "OPENAI_BASE_URL";
 
 /// The variable that holds the key of endpoints that the table of vendors does not have.
-const KEY_VARIABLE: &str = "OPENAI_API_KEY";
+pub(crate) const OPENAI_KEY: &str = "OPENAI_API_KEY";
 
 /// The value of `--api-key-env` for an endpoint without keys.
 const NO_KEY: &str = "none";
@@ -152,7 +152,10 @@ impl AccessArgs {
     }
 
     /// The addresses that flags or the environment name, else OpenAI's.
-    fn addresses(&self) -> Result<Vec<BaseUrl>> {
+    ///
+    /// # Errors
+    /// If one is not valid.
+    pub(crate) fn addresses(&self) -> Result<Vec<BaseUrl>> {
         if self.base_url.is_empty() {
             let named = variable(BASE_URL_VARIABLE);
             return Ok(vec![named.as_deref().unwrap_or(BASE_URL).parse()?]);
@@ -216,20 +219,27 @@ impl AccessArgs {
 /// names the host.
 fn key_variables(base: &BaseUrl, vendor: Option<&'static Vendor>) -> Vec<&'static str> {
     let Some(vendor) = vendor else {
-        return vec![KEY_VARIABLE];
+        return vec![OPENAI_KEY];
     };
     let mut names: Vec<&str> = vendor.key.iter().map(String::as_str).collect();
     let named = variable(BASE_URL_VARIABLE).and_then(|text| text.parse::<BaseUrl>().ok());
     let is_named = named.is_some_and(|named| named.host() == base.host());
-    if is_named && !names.contains(&KEY_VARIABLE) {
-        names.push(KEY_VARIABLE);
+    if is_named && !names.contains(&OPENAI_KEY) {
+        names.push(OPENAI_KEY);
     }
     names
 }
 
+/// The variables of the tools of a host's vendor; none if the built-in table does not have the host.
+pub(crate) fn own_variables(host: &str) -> Vec<&'static str> {
+    let vendors = Vendor::of(host).into_iter();
+    let variables = vendors.flat_map(|vendor| vendor.key.iter().chain(vendor.account.values()));
+    variables.map(String::as_str).collect()
+}
+
 /// The error about an endpoint without a key.
 fn no_key(base: &BaseUrl, names: &[&str]) -> Error {
-    let foreign = !names.contains(&KEY_VARIABLE) && variable(KEY_VARIABLE).is_some();
+    let foreign = !names.contains(&OPENAI_KEY) && variable(OPENAI_KEY).is_some();
     let foreign = if foreign {
         " (OPENAI_API_KEY is set, and is not sent to another vendor unless --api-key-env names it)"
     } else {

@@ -1,8 +1,10 @@
-//! The sources of a setting: flag, environment, file.
+//! The sources of a setting: flag, file of models, environment, file of flags.
 //!
-//! Values from the environment and a file, for flags that were not typed, are turned into words and appended to the typed words. All of
+//! Values from the environment and files, for flags that were not typed, are turned into words and appended to the typed words. All of
 //! them are parsed together, once. So a value is read in the same way wherever it comes from. ripgrep does so with its configuration
 //! file (`crates/core/flags/parse.rs`).
+
+mod models_file;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::{OsStr, OsString};
@@ -49,7 +51,8 @@ struct LayeredValue {
     values: Vec<OsString>,
 }
 
-/// The matches of the typed words, with values from the environment and the `--config` file for flags that were not typed.
+/// The matches of the typed words, with values from the file of models, the environment and the `--config` file for flags that were
+/// not typed.
 ///
 /// # Errors
 /// Names the flag, the variable or the entry of the file that cannot be used.
@@ -84,8 +87,9 @@ pub(super) fn parse(
         Some(file) => file_values(&file, &all, command, &path)?,
         None => BTreeMap::new(),
     };
+    let models = models_file::values(own, command, [&environment, &file])?;
     let (mut words, mut origins) = (Vec::new(), BTreeMap::new());
-    for layer in [environment, file] {
+    for layer in [models, environment, file] {
         let mut newly_set = Vec::new();
         for arg in settable_flags(command) {
             let hidden = || set.iter().any(|other| hides(command, other, arg));

@@ -8,7 +8,10 @@ mod describe;
 mod entry;
 mod file;
 mod name;
+mod run_defaults;
+mod selection;
 mod settings;
+mod trust;
 
 use std::sync::Arc;
 
@@ -22,6 +25,7 @@ pub(crate) use args::ModelArgs;
 pub(crate) use asking::AskingArgs;
 pub(crate) use describe::{check, describe};
 pub(crate) use name::ModelName;
+pub(crate) use run_defaults::{RunDefault, run_defaults};
 pub(crate) use settings::{AskSettings, KeyUse, ResolveContext};
 
 /// Name of the endpoint of built-in models in messages.

@@ -138,6 +138,8 @@ pub(crate) struct ExperimentSettings {
     pub sampling_seed: Option<u64>,
     /// Longest side of an image as sent, in pixels; `None` for no limit.
     pub max_side: Option<NonZeroU32>,
+    /// The file or folder of the data; `None` for the built-in rooms.
+    pub data: Option<PathBuf>,
 }
 
 impl JobSettings {
@@ -199,6 +201,7 @@ impl JobArgs {
             } else {
                 KeyUse::Needed
             },
+            data: experiment.data.as_deref(),
         };
         Ok(JobSettings {
             light: LightSettings::resolve(&self.light)?,

@@ -1,5 +1,7 @@
 //! The text of a report of questions with choices: [`short`] for 80 columns, [`findings`] alone, and [`full`] with all tables.
 
+mod foot;
+
 use std::fmt::Write;
 use std::path::Path;
 
@@ -8,14 +10,11 @@ use super::choice_report::ChoiceReport;
 use super::ladder::{Ladder, Series, SeriesByLevel};
 use super::light_readings::LightReadings;
 use super::sentences::{FIRST, HOW_TO_READ, Sentence};
-use super::tables::{unread, what_it_is};
 use super::terminal::render;
-use super::words::{counted, percent, reach_of, with_interval};
+use super::words::{counted, percent, reach_of};
 use crate::score::accuracy::AccuracyCell;
 use crate::score::choice::ReadingMode;
 use crate::score::health::Health;
-use crate::score::subject::{CHANCE, is_observer, without_run};
-use crate::types::control::OBSERVER;
 use crate::types::manifest::RunManifest;
 use crate::types::{Axis, AxisLevel};
 
@@ -234,26 +233,8 @@ fn table(report: &ChoiceReport<'_>) -> String {
     if hidden > 0 {
         let _ = writeln!(text, " {} --full", counted(hidden, "more row"));
     }
-    text += &baselines(report, &ladder);
-    text + &about_models(report, &ladder.models)
-}
-
-/// What the marks of models mean, and a line for each model with what its further columns hold.
-fn about_models(report: &ChoiceReport<'_>, models: &[&str]) -> String {
-    let listing = &report.findings.grid.listing;
-    let foot = listing.foot(models.iter().copied());
-    let mut text = foot.map_or_else(String::new, |foot| wrapped(" ", &foot, "   "));
-    for model in models.iter().filter(|model| **model != CHANCE) {
-        let facts = listing.columns().iter().map(|column| {
-            let fact = Some(listing.fact(*column, model)).filter(|fact| !fact.is_empty());
-            format!("{} {}", column.head(), fact.unwrap_or("–"))
-        });
-        let facts: Vec<String> = facts.collect();
-        if !facts.is_empty() {
-            text += &wrapped(" ", &format!("{model}: {}", facts.join(" · ")), "   ");
-        }
-    }
-    text
+    text += &foot::baselines(report, &ladder);
+    text + &foot::about_models(report, &ladder.models)
 }
 
 /// The rows of a block at some levels, below a line with its title and the levels; empty if no row has a cell there.
@@ -332,79 +313,4 @@ fn value(report: &ChoiceReport<'_>, cell: Option<&AccuracyCell>) -> String {
     let is_below = !report.findings.below_blind(&cell.subject, None).is_empty();
     let mark = if is_below { BELOW } else { ' ' };
     format!("{}{mark}", percent(accuracy.value))
-}
-
-/// Lines below the table: what the last column means, models without images, chance, and the mark.
-fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyCell>) -> String {
-    let mut parts = Vec::new();
-    for (subject, cell) in &ladder.without_level {
-        let Some(share) = cell.accuracy else {
-            continue;
-        };
-        parts.push(match subject.view {
-            None => format!("chance {}", percent(share.value)),
-            Some(_) if parts.is_empty() => {
-                format!("without images: {} {}", subject.model, with_interval(share))
-            }
-            Some(_) => format!("{} {}", subject.model, with_interval(share)),
-        });
-    }
-    let cells = report.findings.summary.of(None, ReadingMode::Strict);
-    let mut cells = cells.filter(|cell| cell.subject.level.is_some());
-    if cells.any(|cell| !report.findings.below_blind(&cell.subject, None).is_empty()) {
-        parts.push(format!("{BELOW} shown to be below the words alone"));
-    }
-    let mut text = String::new();
-    if !ladder.series.is_empty() {
-        let line = "95 %: how far the widest interval of the row reaches down and up";
-        text += &wrapped(" ", line, " ");
-    }
-    let lenient: usize = report
-        .findings
-        .health
-        .iter()
-        .map(|health| health.lenient_only)
-        .sum();
-    if lenient > 0 {
-        let replies = if lenient == 1 {
-            "reply is"
-        } else {
-            "replies are"
-        };
-        let line = format!("{lenient} more {replies} read by the lenient reading alone: --full");
-        text += &wrapped(" ", &line, " ");
-    }
-    if !parts.is_empty() {
-        text += &wrapped(" ", &parts.join(" · "), " ");
-    }
-    text += &observer_control(report);
-    if let Some(reasons) = unread(&report.findings.summary) {
-        text += &wrapped(" ", &reasons, " ");
-    }
-    text
-}
-
-/// What the observer is, and the score of its standing control, for each run that has its own; empty if it is not shown.
-fn observer_control(report: &ChoiceReport<'_>) -> String {
-    let findings = report.findings;
-    let is_shown = findings
-        .grid
-        .subjects
-        .iter()
-        .any(|subject| is_observer(&subject.model));
-    let controls = findings.observer.standing_controls();
-    let Some(first) = controls.first().filter(|_| is_shown) else {
-        return String::new();
-    };
-    let scores = controls.iter().map(|cell| {
-        let run = &cell.subject.model[without_run(&cell.subject.model).len()..];
-        with_interval(cell.score) + run
-    });
-    let line = format!(
-        "{OBSERVER}: known-signal observer, given the untouched frame; not a model. Control: {}, scores {}; chance is {}",
-        what_it_is(first),
-        scores.collect::<Vec<_>>().join(" and "),
-        percent(first.chance)
-    );
-    wrapped(" ", &line, " ")
 }

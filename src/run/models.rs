@@ -52,6 +52,7 @@ pub(crate) fn models(args: &ModelsArgs, progress: &Progress) -> Result<Outcome> 
         } else {
             KeyUse::NotNeeded
         },
+        data: None,
     };
     let ask = AskSettings::resolve(&named, &AskingArgs::defaults()?, context)?;
     let mut output = describe(&ask)?;

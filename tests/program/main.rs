@@ -31,6 +31,7 @@ mod levels;
 mod models_changed;
 mod models_file;
 mod models_listing;
+mod models_trust;
 mod models_wires;
 mod money;
 mod observer;

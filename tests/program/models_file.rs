@@ -211,7 +211,7 @@ fn what_is_wrong_in_a_file_is_named_by_line() {
         ("limit = 0", "line 4: limit: "),
         ("headers = { X-A = 3 }", "line 4: headers: "),
         ("body = { temperature = 1 }", "use --temperature"),
-        ("max-side = 300", "use --max-side"),
+        ("max-side = 300", "set it in [defaults], or use --max-side"),
         ("name = \"\"", "line 4: name: a text expected"),
         ("key-env = \"NOWHERE_KEY\"", "NOWHERE_KEY is not set"),
     ] {

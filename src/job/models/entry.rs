@@ -39,8 +39,8 @@ const RENAMED: [(&str, &str); 5] = [
 /// Keys that only one model can have.
 const NOT_IN_DEFAULTS: [&str; 4] = ["name", "id", "deployment", "endpoints"];
 
-/// Keys of settings that hold for all models, because each image is made once for all of them.
-const OF_THE_RUN: [&str; 2] = ["image", "max-side"];
+/// Keys of settings that hold for all models, because each image is made once for all of them, and shown at one place.
+const OF_THE_RUN: [&str; 3] = ["image", "max-side", "image-first"];
 
 /// Names that users of other tools may write, with the key.
 const ELSEWHERE: [(&str, &str); 6] = [
@@ -133,6 +133,7 @@ impl Entry {
                 "price" => self.price = Some(price(located)?),
                 "limit" => self.limit = Some(limit(located)?),
                 "id" => {}
+                key if is_of_the_run(key) => {}
                 key => {
                     let words = words(key, located)?;
                     let wrong = |problem: String| located.error(format_args!("{key}: {problem}"));
@@ -156,9 +157,12 @@ pub(super) fn check_keys(keys: &Keys, is_defaults: bool) -> Result<()> {
                 "{key} is of one model: it cannot stand in [defaults]"
             )));
         }
-        if OF_THE_RUN.contains(&&**key) {
+        if is_of_the_run(key) {
+            if is_defaults {
+                continue;
+            }
             let problem = format_args!(
-                "{key} holds for all models, because each image is made once: use --{key}"
+                "{key} holds for all models, because each image is made once: set it in [defaults], or use --{key}"
             );
             return Err(located.error(problem));
         }
@@ -175,6 +179,11 @@ pub(super) fn check_keys(keys: &Keys, is_defaults: bool) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Whether a key is of the run, and of no model.
+pub(super) fn is_of_the_run(key: &str) -> bool {
+    OF_THE_RUN.contains(&key)
 }
 
 /// All keys of a model.

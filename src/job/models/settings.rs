@@ -1,6 +1,7 @@
 //! The models of a run, resolved: [`AskSettings`], one [`ModelSettings`] a model.
 
 use std::collections::BTreeSet;
+use std::path::Path;
 use std::sync::Arc;
 
 use serde_json::{Value, json};
@@ -8,8 +9,10 @@ use serde_json::{Value, json};
 use super::args::ModelArgs;
 use super::asking::AskingArgs;
 use super::entry::{Entry, check_keys, flag_of};
-use super::file::{Keys, Located, ModelsFile};
+use super::file::{Keys, ModelsFile};
 use super::name::ModelName;
+use super::selection::{select, set};
+use super::trust::{self, Trust};
 use crate::ask::{AccessArgs, Parameters, Price, Sending, Server};
 use crate::error::{Error, Result};
 use crate::job::shard::Shard;
@@ -59,6 +62,8 @@ pub(crate) struct ResolveContext<'a> {
     pub(crate) shard: Shard,
     /// Whether keys are read.
     pub(crate) keys: KeyUse,
+    /// The file or folder of the data, if a file of models may have come with it.
+    pub(crate) data: Option<&'a Path>,
 }
 
 /// Whether the keys of endpoints are needed.
@@ -86,6 +91,14 @@ impl AskSettings {
             Some(file) => of_file(file, view, asking, context.typed)?,
             None => Vec::new(),
         };
+        if let Some(file) = &file {
+            let trust = if args.trust_models {
+                Trust::Own
+            } else {
+                Trust::ByPlace
+            };
+            trust::check(file, &entries, context.data, trust)?;
+        }
         let flag = |name: &ModelName, view| Entry::of_flag(name.clone(), view, asking.clone());
         entries.extend(args.model.iter().map(|name| flag(name, view)));
         entries.extend(args.blind_model.iter().map(|name| flag(name, View::Blind)));
@@ -182,70 +195,6 @@ fn of_file(
         );
     }
     Ok(entries)
-}
-
-/// Carries out one `--set NAME.KEY=VALUE`.
-fn set(entries: &mut [Entry], text: &str) -> Result<()> {
-    let wrong = |problem: String| Error::usage("--set", problem);
-    let (place, value) = text
-        .split_once('=')
-        .ok_or_else(|| wrong("NAME.KEY=VALUE expected, as GPT-4o.rpm=60".to_owned()))?;
-    let of_name = |entry: &Entry| {
-        place
-            .strip_prefix(&*entry.name)?
-            .strip_prefix('.')
-            .map(str::to_owned)
-    };
-    // The longest name first: a name may begin as another one does.
-    let longest = entries.iter().filter(|entry| of_name(entry).is_some());
-    let longest = longest
-        .map(|entry| entry.name.clone())
-        .max_by_key(String::len);
-    let Some(name) = longest else {
-        let names: Vec<&str> = entries.iter().map(|entry| &*entry.name).collect();
-        let problem = format!(
-            "{place}: no model of this name; the models are {}",
-            names.join(", ")
-        );
-        return Err(wrong(problem));
-    };
-    // What is no value of TOML is a text.
-    let mut parsed: toml::Table = format!("value = {value}").parse().unwrap_or_default();
-    let as_text = || toml::Value::String(value.to_owned());
-    let value = parsed.remove("value").unwrap_or_else(as_text);
-    let key = place[name.len() + 1..].replace('_', "-");
-    if matches!(&*key, "name" | "id") {
-        return Err(wrong(format!(
-            "{key} is what a model is, and cannot be set"
-        )));
-    }
-    let located = Located {
-        value,
-        place: "--set".to_owned(),
-    };
-    let keys = Keys::from([(key, located)]);
-    check_keys(&keys, false)?;
-    let mut named = entries.iter_mut().filter(|entry| entry.name == name);
-    named.try_for_each(|entry| entry.apply(&keys))
-}
-
-/// Keeps only the models that `--only` names.
-fn select(entries: &mut Vec<Entry>, only: &[String]) -> Result<()> {
-    if only.is_empty() {
-        return Ok(());
-    }
-    for name in only {
-        if !entries.iter().any(|entry| entry.name == *name) {
-            let names: Vec<&str> = entries.iter().map(|entry| &*entry.name).collect();
-            let problem = format_args!(
-                "{name}: no model of this name; the models are {}",
-                names.join(", ")
-            );
-            return Err(Error::usage("--only", problem));
-        }
-    }
-    entries.retain(|entry| only.contains(&entry.name));
-    Ok(())
 }
 
 /// The endpoints of a run, each made once for its flags.

@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::choice_order::ChoiceOrder;
 use crate::ask::{Constrain, Prompts};
-use crate::dataset::{CodesArgs, DataArgs, PixelLimit, ReadingRule, SelectionArgs};
+use crate::dataset::{CodesArgs, DataArgs, DataPlace, PixelLimit, ReadingRule, SelectionArgs};
 use crate::error::Result;
 use crate::job::questions::rules;
 use crate::job::settings::{ExperimentSettings, JobArgs, JobSettings};
@@ -111,6 +111,10 @@ impl EvaluateArgs {
             return Err(self.job.no_model_error());
         }
         let prompts = self.choice.prompts.as_deref();
+        let data = match &self.data.data {
+            DataPlace::Path(path) => Some(path.clone()),
+            DataPlace::Rooms(_) => None,
+        };
         Ok(Evaluation {
             rules: rules(self.selection.rules.as_deref())?,
             observer_controls: self.choice.observer_controls,
@@ -129,6 +133,7 @@ impl EvaluateArgs {
                 probabilities: self.choice.probabilities,
                 max_side: self.shrink.max_side,
                 sampling_seed: None,
+                data,
             })?,
         })
     }

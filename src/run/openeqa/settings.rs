@@ -8,7 +8,7 @@ use clap::{Arg, Args};
 use super::judge::{Judge, JudgeArgs};
 use super::questions::OpenSelectionArgs;
 use crate::dataset::{CodesArgs, PixelLimit, ReadingRule};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::job::batch::{BatchFileArgs, BatchRunArgs};
 use crate::job::models::ModelName;
 use crate::job::settings::{ExperimentSettings, JobArgs, JobSettings};
@@ -159,6 +159,21 @@ impl OpenEqaArgs {
         let SamplingSeed(seed) = self.sampling_seed;
         let protocol = self.judge.protocol;
         let judge = self.judge.resolve(&self.job, seed)?;
+        let data = self.walk.folder.clone();
+        let job = self.job.resolve(&ExperimentSettings {
+            sampling_seed: seed,
+            data: Some(data),
+            ..ExperimentSettings::default()
+        })?;
+        if let Some(model) = job
+            .ask
+            .models
+            .iter()
+            .find(|model| model.parameters.probabilities)
+        {
+            let problem = format_args!("{}: open questions have no choices", model.name);
+            return Err(Error::usage("probabilities", problem));
+        }
         Ok(OpenEqa {
             questions: self.questions,
             chosen: self.chosen,
@@ -168,10 +183,7 @@ impl OpenEqaArgs {
             judge,
             protocol,
             task,
-            job: self.job.resolve(&ExperimentSettings {
-                sampling_seed: seed,
-                ..ExperimentSettings::default()
-            })?,
+            job,
         })
     }
 }

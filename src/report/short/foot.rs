@@ -1,0 +1,105 @@
+//! The lines below the short table: models without images and chance ([`baselines`]), and marks and facts of models
+//! ([`about_models`]).
+
+use super::{BELOW, wrapped};
+use crate::report::choice_report::ChoiceReport;
+use crate::report::ladder::Ladder;
+use crate::report::tables::{unread, what_it_is};
+use crate::report::words::{percent, with_interval};
+use crate::score::accuracy::AccuracyCell;
+use crate::score::choice::ReadingMode;
+use crate::score::subject::{CHANCE, is_observer, without_run};
+use crate::types::control::OBSERVER;
+
+/// Lines below the table: what the last column means, models without images, chance, and the mark.
+pub(super) fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyCell>) -> String {
+    let mut parts = Vec::new();
+    for (subject, cell) in &ladder.without_level {
+        let Some(share) = cell.accuracy else {
+            continue;
+        };
+        parts.push(match subject.view {
+            None => format!("chance {}", percent(share.value)),
+            Some(_) if parts.is_empty() => {
+                format!("without images: {} {}", subject.model, with_interval(share))
+            }
+            Some(_) => format!("{} {}", subject.model, with_interval(share)),
+        });
+    }
+    let cells = report.findings.summary.of(None, ReadingMode::Strict);
+    let mut cells = cells.filter(|cell| cell.subject.level.is_some());
+    if cells.any(|cell| !report.findings.below_blind(&cell.subject, None).is_empty()) {
+        parts.push(format!("{BELOW} shown to be below the words alone"));
+    }
+    let mut text = String::new();
+    if !ladder.series.is_empty() {
+        let line = "95 %: how far the widest interval of the row reaches down and up";
+        text += &wrapped(" ", line, " ");
+    }
+    let lenient: usize = report
+        .findings
+        .health
+        .iter()
+        .map(|health| health.lenient_only)
+        .sum();
+    if lenient > 0 {
+        let replies = if lenient == 1 {
+            "reply is"
+        } else {
+            "replies are"
+        };
+        let line = format!("{lenient} more {replies} read by the lenient reading alone: --full");
+        text += &wrapped(" ", &line, " ");
+    }
+    if !parts.is_empty() {
+        text += &wrapped(" ", &parts.join(" · "), " ");
+    }
+    text += &observer_control(report);
+    if let Some(reasons) = unread(&report.findings.summary) {
+        text += &wrapped(" ", &reasons, " ");
+    }
+    text
+}
+
+/// What the observer is, and the score of its standing control, for each run that has its own; empty if it is not shown.
+fn observer_control(report: &ChoiceReport<'_>) -> String {
+    let findings = report.findings;
+    let is_shown = findings
+        .grid
+        .subjects
+        .iter()
+        .any(|subject| is_observer(&subject.model));
+    let controls = findings.observer.standing_controls();
+    let Some(first) = controls.first().filter(|_| is_shown) else {
+        return String::new();
+    };
+    let scores = controls.iter().map(|cell| {
+        let run = &cell.subject.model[without_run(&cell.subject.model).len()..];
+        with_interval(cell.score) + run
+    });
+    let line = format!(
+        "{OBSERVER}: known-signal observer, given the untouched frame; not a model. Control: {}, scores {}; chance is {}",
+        what_it_is(first),
+        scores.collect::<Vec<_>>().join(" and "),
+        percent(first.chance)
+    );
+    wrapped(" ", &line, " ")
+}
+
+/// What the marks of models mean, and a line for each model with what its further columns hold.
+pub(super) fn about_models(report: &ChoiceReport<'_>, models: &[&str]) -> String {
+    let listing = &report.findings.grid.listing;
+    let foot = listing.foot(models.iter().copied());
+    let mut text = foot.map_or_else(String::new, |foot| wrapped(" ", &foot, "   "));
+    for model in models.iter().filter(|model| **model != CHANCE) {
+        let facts = listing.columns().iter().map(|column| {
+            let fact = Some(listing.fact(*column, model)).filter(|fact| !fact.is_empty());
+            format!("{} {}", column.head(), fact.unwrap_or("–"))
+        });
+        let facts: Vec<String> = facts.collect();
+        if !facts.is_empty() {
+            text += &wrapped(" ", &format!("{model}: {}", facts.join(" · ")), "   ");
+        }
+    }
+    text
+}

@@ -1,0 +1,270 @@
+//! What a file of models that came with data may not do, tables of vendors of the user's own, and settings of the run in `[defaults]`.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::support::endpoint::{Answer, MockEndpoint};
+use crate::support::house::House;
+use crate::support::run::{Bench, Called, called, records, words};
+
+fn table(id: &str, url: &str, more: &str) -> String {
+    format!("[[model]]\nid = \"{id}\"\nendpoints = [\"{url}\"]\n{more}\n")
+}
+
+/// A set of questions in a folder `data`, with a file of models in it, called from outside.
+fn strange(models: &str, line: &str, variables: &[(&str, &str)]) -> Called {
+    let bench = Bench::with_questions(1);
+    for name in ["set.jsonl", "a.png"] {
+        let content = fs::read(bench.path(name)).unwrap();
+        bench.file(&format!("data/{name}"), content);
+    }
+    bench.file("data/models.toml", models);
+    bench.file("data/inside.txt", "Be brief.");
+    bench.file("outside.txt", "private");
+    fs::create_dir_all(bench.path("work")).unwrap();
+    let line = format!(
+        "--data ../data/set.jsonl --models ../data/models.toml --levels L0 --dry-run --out run {line}"
+    );
+    let mut command = bench.command(&words(&line));
+    command.current_dir(bench.path("work"));
+    for (name, value) in variables {
+        command.env(name, value);
+    }
+    called(&mut command)
+}
+
+#[test]
+fn a_file_that_came_with_the_data_takes_nothing_that_is_not_its_own() {
+    const ELSEWHERE: &str = "https://evil.example/v1";
+    const OPENAI: &str = "https://api.openai.com/v1";
+    let key = [("OPENAI_API_KEY", "sk-0123456789")];
+    let header = "headers = { X-A = { env = \"GATEWAY\" } }";
+    let cases = [
+        (
+            ELSEWHERE,
+            "key-env = \"OPENAI_API_KEY\"",
+            "line 3: key-env: OPENAI_API_KEY is no variable of evil.example's own tools",
+        ),
+        (
+            OPENAI,
+            "key-env = \"AWS_SECRET\"",
+            "line 3: key-env: AWS_SECRET is no variable of api.openai.com's",
+        ),
+        (ELSEWHERE, header, "line 3: headers: GATEWAY is no variable"),
+        (
+            ELSEWHERE,
+            "",
+            "line 2: endpoints: OPENAI_API_KEY would be sent to evil.example",
+        ),
+        (
+            OPENAI,
+            "key-file = \"../outside.txt\"",
+            "line 3: key-file: ../outside.txt is outside its folder",
+        ),
+        (
+            OPENAI,
+            "system-file = \"../outside.txt\"",
+            "line 3: system-file: ../outside.txt is outside",
+        ),
+        (
+            OPENAI,
+            "body = \"@../outside.txt\"",
+            "line 3: body: ../outside.txt is outside",
+        ),
+        (
+            OPENAI,
+            "vendor = \"../data/inside.txt\"",
+            "line 3: vendor: such a table says",
+        ),
+    ];
+    for (url, more, part) in cases {
+        // The lines of the file are those of the table, which begins with its head.
+        let part = part.replace("line 3", "line 4").replace("line 2", "line 3");
+        let refused = strange(&table("m", url, more), "", &key);
+        assert_eq!(refused.code, Some(2), "{more}: {refused:?}");
+        assert!(refused.stderr.contains(&part), "{more}: {}", refused.stderr);
+        assert!(
+            refused
+                .stderr
+                .contains("--trust-models says that it is yours"),
+            "{refused:?}"
+        );
+    }
+    let taken = [
+        (ELSEWHERE, "key-env = \"none\"", ""),
+        (OPENAI, "", ""),
+        (OPENAI, "key-env = \"OPENAI_API_KEY\"", ""),
+        (OPENAI, "system-file = \"../data/inside.txt\"", ""),
+        ("http://127.0.0.1:9/v1", "", ""),
+        (ELSEWHERE, "key-env = \"OPENAI_API_KEY\"", "--trust-models"),
+        (OPENAI, "system-file = \"../outside.txt\"", "--trust-models"),
+    ];
+    for (url, more, line) in taken {
+        let called = strange(&table("m", url, more), line, &key);
+        assert_eq!(called.code, Some(0), "{more}: {called:?}");
+    }
+    // What [defaults] names is refused in the same way, and a variable that is not set cannot be sent.
+    let defaults = format!(
+        "[defaults]\nkey-env = \"AWS_SECRET\"\n{}",
+        table("m", OPENAI, "")
+    );
+    let refused = strange(&defaults, "", &key);
+    assert!(
+        refused.stderr.contains("line 2: key-env: AWS_SECRET"),
+        "{refused:?}"
+    );
+    assert_eq!(strange(&table("m", ELSEWHERE, ""), "", &[]).code, Some(0));
+}
+
+#[test]
+fn a_table_of_vendors_says_how_a_host_is_asked() {
+    let mock = MockEndpoint::start([Answer::text("C")]);
+    let bench = Bench::with_questions(1);
+    let row = "[[vendor]]\nname = \"Mine\"\nhosts = [\"127.0.0.1\"]\nkey = [\"MY_KEY\"]\nheader = \"api-key\"\ntoken-field = \"max_completion_tokens\"\n";
+    bench.file("vendors.toml", row);
+    let url = mock.base_url();
+    let line = format!(
+        "--model m --base-url {url} --data set.jsonl --levels L0 --out run --vendor vendors.toml"
+    );
+    let mut command = bench.command(&words(&line));
+    command
+        .env("MY_KEY", "secret-0123456789")
+        .env("OPENAI_API_KEY", "sk-other-0123");
+    let run = called(&mut command);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    let request = mock.requests().remove(0);
+    assert_eq!(request.header("api-key"), Some("secret-0123456789"));
+    assert_eq!(request.header("authorization"), None);
+    assert_eq!(request.json()["max_completion_tokens"], 1024);
+    // It decides no reply: without it nothing is asked again.
+    let line = line.replace(" --vendor vendors.toml", "");
+    bench.complete(&words(&line));
+    assert_eq!(mock.requests().len(), 1);
+    // Of one model in a file; what it knows is said before anything is sent.
+    let ignoring = format!("{row}constrain = \"ignored\"\nimage-bytes = 10\n");
+    bench.file("ignoring.toml", ignoring);
+    let vendor = "vendor = \"ignoring.toml\"";
+    for (more, part) in [
+        (
+            "constrain = \"json\"",
+            "Mine takes a constraint and ignores it",
+        ),
+        ("", "more than the 0.00001 MB of Mine"),
+    ] {
+        bench.file(
+            "models.toml",
+            table("m", &url, &format!("{vendor}\n{more}")),
+        );
+        let refused = bench.call(&words(
+            "--models models.toml --data set.jsonl --levels L0 --out other",
+        ));
+        assert_eq!(refused.code, Some(2), "{refused:?}");
+        assert!(refused.stderr.contains(part), "{}", refused.stderr);
+    }
+    assert_eq!(mock.requests().len(), 1);
+    bench.file("vendors.toml", row.replace("header", "headr"));
+    let line = format!("{line} --vendor vendors.toml");
+    let refused = bench.call(&words(&line));
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    assert!(
+        refused
+            .stderr
+            .contains("--vendor: vendors.toml: line 5: unknown field `headr`"),
+        "{refused:?}"
+    );
+}
+
+#[test]
+fn settings_of_the_run_may_stand_in_the_defaults() {
+    let mock = MockEndpoint::start([Answer::text("C")]);
+    let url = mock.base_url();
+    let bench = Bench::with_questions(1);
+    let image = |run: &str| records(&bench.path(run))[0]["image"].clone();
+    let models = |defaults: &str| format!("[defaults]\n{defaults}\n{}", table("m", &url, ""));
+    let line = "--models models.toml --data set.jsonl --levels L0 --out";
+    let run = |out: &str, more: &str, variables: &[(&str, &str)]| {
+        let line = format!("{line} {out} {more}");
+        let mut command = bench.command(&words(&line));
+        for (name, value) in variables {
+            command.env(name, value);
+        }
+        let called = called(&mut command);
+        assert_eq!(called.code, Some(0), "{called:?}");
+    };
+    bench.file(
+        "models.toml",
+        models("image = \"jpeg:90\"\nmax_side = 32\nimage-first = true"),
+    );
+    run("file", "", &[("DARKQA_MAX_SIDE", "16")]);
+    let sent = image("file");
+    assert_eq!(
+        (&sent["format"], &sent["width"]),
+        (&"jpeg".into(), &32.into()),
+        "{sent}"
+    );
+    let content = mock.requests()[0].json()["messages"][0]["content"].clone();
+    assert_eq!(content[0]["type"], "image_url");
+    // The manifest has them, so that the images can be made again.
+    let manifest: Value =
+        serde_json::from_slice(&fs::read(bench.path("file/manifest.json")).unwrap()).unwrap();
+    assert_eq!(
+        (
+            &manifest["images"]["image"],
+            &manifest["images"]["max-side"]
+        ),
+        (&"jpeg:90".into(), &"32".into())
+    );
+    // A flag is above them, and they are above a variable.
+    run("flag", "--max-side 24 --image png", &[]);
+    let sent = image("flag");
+    assert_eq!(
+        (&sent["format"], &sent["width"]),
+        (&"png".into(), &24.into()),
+        "{sent}"
+    );
+    bench.file("models.toml", models("max-tokens = 9"));
+    run("variable", "", &[("DARKQA_MAX_SIDE", "16")]);
+    assert_eq!(image("variable")["width"], 16);
+    for (defaults, more, part) in [
+        (
+            "max-side = \"wide\"",
+            "",
+            "models.toml, line 2: invalid value 'wide'",
+        ),
+        (
+            "max-side = [3]",
+            "",
+            "models.toml, line 2: max-side: a text, a number or a switch expected",
+        ),
+        (
+            "",
+            "max-side = 3",
+            "max-side holds for all models, because each image is made once: set it in [defaults], or use --max-side",
+        ),
+        ("", "image = \"png\"", "image holds for all models"),
+    ] {
+        bench.file("models.toml", models(defaults) + more);
+        let refused = bench.call(&words(&format!("{line} wrong")));
+        assert_eq!(refused.code, Some(2), "{refused:?}");
+        assert!(refused.stderr.contains(part), "{}", refused.stderr);
+    }
+    // Where the command has no such flag, the line says so; and open questions have no choices.
+    let house = House::new();
+    let line = "openeqa --questions questions.json --frames walks --num-frames 2 --levels L0 --models models.toml --out run";
+    for (defaults, part) in [
+        (
+            "max-side = 32",
+            "models.toml, line 2: max-side: this command has no --max-side",
+        ),
+        (
+            "temperature = 0\nprobabilities = true",
+            "open questions have no choices",
+        ),
+    ] {
+        house.0.file("models.toml", models(defaults));
+        let refused = house.0.call(&words(line));
+        assert_eq!(refused.code, Some(2), "{refused:?}");
+        assert!(refused.stderr.contains(part), "{}", refused.stderr);
+    }
+}
