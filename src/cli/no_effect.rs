@@ -203,6 +203,9 @@ impl NoEffect {
             let shown = [shown.concat(), vec!["detail".into(), "max_image".into()]].concat();
             self.because("no model is shown an image", &shown);
         }
+        if models.models.is_none() {
+            self.because("no file of models is named", &["trust_models".into()]);
+        }
         self.light(&args.light);
         self.enhancement(&args.enhancers);
         let mut names = models.model.iter().chain(&models.blind_model).chain(judge);
@@ -316,6 +319,10 @@ mod tests {
         (
             "--model random --observer-controls",
             "--observer-controls: no effect: the observer is not asked",
+        ),
+        (
+            "--model m --trust-models",
+            "--trust-models: no effect: no file of models is named",
         ),
         (
             "--model m --dry-run --timings",

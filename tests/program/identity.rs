@@ -364,13 +364,15 @@ const OPEN_ADDITIONS: [Addition; 10] = [
 ];
 
 /// What changes no answer: given on the folder of a run, it asks nothing.
-const NOTHING: [&str; 29] = [
+const NOTHING: [&str; 31] = [
     "--max-pixels 1000000",
     "--threads 1",
     "--offline",
     "--llie-timeout 60",
     "--api-key-env none",
     "--api-key-file key.txt",
+    "--vendor vendors.toml",
+    "--trust-models",
     "--key-header api-key",
     "--header X-Team:vision",
     "--header-env X-Auth=PATH",
@@ -401,6 +403,8 @@ fn what_decides_nothing_asks_nothing() {
     let scene = Scene::new();
     let bench = &scene.house.0;
     bench.file("key.txt", "k\n");
+    let vendor = "[[vendor]]\nname = \"Mine\"\nhosts = [\"127.0.0.1\"]\nkey = []\ntoken-field = \"max_completion_tokens\"\n";
+    bench.file("vendors.toml", vendor);
     bench.file("other.toml", "retries = 3\n");
     let prices = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 1, output = 1 }\n";
     bench.file("prices.toml", prices);
