@@ -4,7 +4,9 @@
 //! them are parsed together, once. So a value is read in the same way wherever it comes from. ripgrep does so with its configuration
 //! file (`crates/core/flags/parse.rs`).
 
+mod messages;
 mod models_file;
+mod value_text;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::{OsStr, OsString};
@@ -15,11 +17,16 @@ use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command};
 use toml::{Table, Value};
 
+use self::messages::{invalid_toml, suggestion};
+use self::value_text::text_of;
 use crate::error::{Error, Result};
 use crate::files::reading;
 
 /// Prefix of this program's environment variables.
 const PREFIX: &str = "DARKQA_";
+
+/// Name of the flag for the file of models.
+const MODELS: &str = "models";
 
 /// Name of the flag for the configuration file.
 const CONFIG: &str = "config";
@@ -87,7 +94,7 @@ pub(super) fn parse(
         Some(file) => file_values(&file, &all, command, &path)?,
         None => BTreeMap::new(),
     };
-    let models = models_file::values(own, command, [&environment, &file])?;
+    let models = models_values(own, command, [&environment, &file])?;
     let (mut words, mut origins) = (Vec::new(), BTreeMap::new());
     for layer in [models, environment, file] {
         let mut newly_set = Vec::new();
@@ -204,16 +211,6 @@ fn every_flag(command: &Command) -> Vec<String> {
     all
 }
 
-/// The most similar of the known names, as a question; empty if none is similar.
-fn suggestion(name: &str, known: &[String], prefix: &str) -> String {
-    let alike = |other: &&String| strsim::jaro_winkler(name, other);
-    let nearest = known.iter().max_by(|a, b| alike(a).total_cmp(&alike(b)));
-    let nearest = nearest.filter(|other| alike(other) > 0.8);
-    nearest.map_or_else(String::new, |other| {
-        format!("; did you mean {prefix}{other}?")
-    })
-}
-
 /// The flags that a TOML file sets: `max-tokens = 16`, `model = ["a", "b"]`, `blind = true`. A table with the name
 /// of a command is for this command alone, and overrides the flags at the top of the file.
 fn file_values(
@@ -293,24 +290,28 @@ fn read_table(
     Ok(())
 }
 
-/// The error about invalid TOML, on one line and with its line number.
-fn invalid_toml(path: &Path, text: &str, error: &toml::de::Error) -> Error {
-    let before = error.span().and_then(|span| text.get(..span.start));
-    let line = before.unwrap_or_default().matches('\n').count() + 1;
-    let problem: Vec<&str> = error.message().lines().map(str::trim).collect();
-    Error::line(
-        path,
-        line,
-        format_args!("not valid TOML: {}", problem.join(", ")),
-    )
-}
-
-fn text_of(value: &Value) -> Option<OsString> {
-    match value {
-        Value::String(text) => Some(text.into()),
-        Value::Integer(_) | Value::Float(_) | Value::Boolean(_) => Some(value.to_string().into()),
-        _ => None,
+/// The flags that the file of models sets, which the call or a lower layer names.
+fn models_values(
+    own: &ArgMatches,
+    command: &Command,
+    layers: [&BTreeMap<String, LayeredValue>; 2],
+) -> Result<BTreeMap<String, LayeredValue>> {
+    let flags: Vec<String> = settable_flags(command).map(key).collect();
+    if !flags.iter().any(|flag| flag == MODELS) {
+        return Ok(BTreeMap::new());
     }
+    let typed = own.get_one::<PathBuf>(MODELS).cloned();
+    let mut layered = layers.into_iter().filter_map(|layer| layer.get(MODELS));
+    let layered = || layered.next()?.values.first().map(PathBuf::from);
+    let Some(path) = typed.or_else(layered) else {
+        return Ok(BTreeMap::new());
+    };
+    let values = models_file::values(&path, &flags)?.into_iter();
+    let values = values.map(|(flag, origin, value)| {
+        let values = vec![value];
+        (flag, LayeredValue { origin, values })
+    });
+    Ok(values.collect())
 }
 
 /// The words that set a flag on the command line; none for a switch that is turned off.

@@ -1,10 +1,13 @@
 //! The text of a report of questions with choices: [`short`] for 80 columns, [`findings`] alone, and [`full`] with all tables.
 
 mod foot;
+mod wrapped;
 
 use std::fmt::Write;
 use std::path::Path;
 
+use self::foot::BELOW;
+use self::wrapped::{WIDTH, wrapped};
 use super::alert::lines;
 use super::choice_report::ChoiceReport;
 use super::ladder::{Ladder, Series, SeriesByLevel};
@@ -18,9 +21,6 @@ use crate::score::health::Health;
 use crate::types::manifest::RunManifest;
 use crate::types::{Axis, AxisLevel};
 
-/// Width of the text in characters.
-const WIDTH: usize = 80;
-
 /// Width of the column of a level, and of the column of intervals, in characters.
 const LEVEL: usize = 7;
 const REACH: usize = 15;
@@ -33,9 +33,6 @@ const MAX_ROWS: usize = 24;
 
 /// Maximum number of levels side by side in the table: so many leave room for names.
 const MAX_LEVELS: usize = 7;
-
-/// Mark of an accuracy that is shown to be below that without images.
-const BELOW: char = '▼';
 
 /// The alerts, the findings and one table. `runs` are the runs with their folders.
 #[must_use]
@@ -138,27 +135,6 @@ fn head(report: &ChoiceReport<'_>) -> String {
         counted(frames.len(), "frame"),
         findings.unit
     )
-}
-
-/// Text in lines of [`WIDTH`] characters; the first begins with `first`, the others with `rest`.
-fn wrapped(first: &str, text: &str, rest: &str) -> String {
-    let mut lines = String::new();
-    let mut line = first.to_owned();
-    let mut is_empty = true;
-    for word in text.split(' ') {
-        if !is_empty && line.chars().count() + 1 + word.chars().count() > WIDTH {
-            lines += line.trim_end();
-            lines.push('\n');
-            rest.clone_into(&mut line);
-            is_empty = true;
-        }
-        if !is_empty {
-            line.push(' ');
-        }
-        line += word;
-        is_empty = false;
-    }
-    lines + line.trim_end() + "\n"
 }
 
 /// A row of the table.

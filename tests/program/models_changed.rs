@@ -71,7 +71,7 @@ fn a_model_that_is_taken_out_is_left_out_and_kept() {
     assert!(!run.stdout.contains("left out"), "{}", run.stdout);
     assert_eq!(names(&bench), all);
     let asked = mock.requests().len();
-    let run = complete(&bench, &[two.clone()], "");
+    let run = complete(&bench, std::slice::from_ref(&two), "");
     let line = "! one and random are left out of run:";
     assert!(run.stdout.contains(line), "{}", run.stdout);
     assert_eq!(names(&bench), ["two"]);

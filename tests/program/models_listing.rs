@@ -8,6 +8,9 @@ use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::house::House;
 use crate::support::run::{Bench, Called, records, words};
 
+/// Names in another order than that of the alphabet.
+const NAMES: [&str; 3] = ["zebra", "mole", "cow"];
+
 const RUN: &str = "--models models.toml --data set.jsonl --levels L0,L3 --retries 0 --out run";
 
 fn table(name: &str, url: &str, more: &str) -> String {
@@ -48,7 +51,6 @@ fn between<'a>(text: &'a str, start: &str, end: &str) -> &'a str {
 fn rows_stand_in_the_order_of_the_file() {
     let mock = MockEndpoint::start([Answer::text("C")]);
     let url = mock.base_url();
-    const NAMES: [&str; 3] = ["zebra", "mole", "cow"];
     let tables = NAMES.map(|name| table(name, &url, ""));
     let bench = Bench::with_questions(2);
     bench.file("models.toml", tables.concat());

@@ -1,52 +1,30 @@
-//! The layer of the file of models: the flags of the run that its `[defaults]` set ([`values`]).
+//! The flags of the run that the `[defaults]` of a file of models set: [`values`].
 
-use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::ffi::OsString;
+use std::path::Path;
 
-use clap::{ArgMatches, Command};
-
-use super::{LayeredValue, key, settable_flags, text_of};
+use super::value_text::text_of;
 use crate::error::{Error, Result};
 use crate::job::models::{RunDefault, run_defaults};
 
-/// The flag for the file of models.
-const MODELS: &str = "models";
-
-/// The flags of the run that the `[defaults]` of the file of models set, which the call or a lower layer names.
+/// The flags of the run that a file of models sets, each with its place and its text; `flags` are those of the command.
 ///
 /// # Errors
 /// If the command has no such flag, or the value has a form that no flag has.
-pub(super) fn values(
-    own: &ArgMatches,
-    command: &Command,
-    layers: [&BTreeMap<String, LayeredValue>; 2],
-) -> Result<BTreeMap<String, LayeredValue>> {
-    if !settable_flags(command).any(|arg| arg.get_id() == MODELS) {
-        return Ok(BTreeMap::new());
-    }
-    let typed = own.get_one::<PathBuf>(MODELS).cloned();
-    let layered = layers.into_iter().find_map(|layer| {
-        let value = layer.get(MODELS)?;
-        value.values.first().map(PathBuf::from)
-    });
-    let Some(path) = typed.or(layered) else {
-        return Ok(BTreeMap::new());
-    };
+pub(super) fn values(path: &Path, flags: &[String]) -> Result<Vec<(String, String, OsString)>> {
     // A file that cannot be used is an error where its models are read.
-    let defaults = run_defaults(&path).unwrap_or_default();
+    let defaults = run_defaults(path).unwrap_or_default();
     let values = defaults.into_iter().map(|default| {
         let RunDefault { flag, value, place } = default;
-        if !settable_flags(command).any(|arg| key(arg) == flag) {
+        if !flags.contains(&flag) {
             let problem = format_args!("{flag}: this command has no --{flag}");
             return Err(Error::usage(place, problem));
         }
-        let text = text_of(&value).ok_or_else(|| {
+        let Some(text) = text_of(&value) else {
             let problem = format_args!("{flag}: a text, a number or a switch expected");
-            Error::usage(place.clone(), problem)
-        })?;
-        let origin = place;
-        let values = vec![text];
-        Ok((flag, LayeredValue { origin, values }))
+            return Err(Error::usage(place, problem));
+        };
+        Ok((flag, place, text))
     });
     values.collect()
 }

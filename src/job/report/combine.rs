@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use super::join::{Joined, join};
+use super::listing::listing;
 use crate::error::{Error, Result};
 use crate::job::stored::StoredRun;
 use crate::report::page::{self, PageInputs};
@@ -99,7 +100,9 @@ pub(super) fn combine(runs: Vec<StoredRun<ChoiceDetail>>) -> Result<Combined> {
     if runs.len() > 1 {
         check_comparable(&runs)?;
     }
-    join(runs, |_| true)
+    let mut combined = join(runs, |_| true)?;
+    combined.listing = listing(&combined);
+    Ok(combined)
 }
 
 /// The choices of all questions, for the chance line. A question is repeated for each order of its choices, since the answer to each

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 
 use super::cost::cost;
 use super::lights::Lights;
-use super::listing::listing;
 use super::models::Names;
 use crate::error::Result;
 use crate::job::stored::StoredRun;
@@ -27,7 +26,7 @@ pub(super) struct Joined<D> {
     pub(super) lights: Lights,
     /// The models that stand apart.
     pub(super) models: Names,
-    /// The order, groups and marks of the models.
+    /// The order, groups and marks of the models; by default none.
     pub(super) listing: ModelListing,
 }
 
@@ -97,7 +96,6 @@ pub(super) fn join<D: Detail>(
     }
     by_name.sort_by_key(|(index, _)| *index);
     joined.runs = by_name.into_iter().map(|(_, run)| run).collect();
-    joined.listing = listing(&joined);
     Ok(joined)
 }
 

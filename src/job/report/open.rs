@@ -8,6 +8,7 @@ use serde_json::Value;
 use super::alerts::{of_joining, of_runs};
 use super::enhancers;
 use super::join::join;
+use super::listing::listing;
 use crate::error::{Error, Result};
 use crate::job::outcome::Outcome;
 use crate::job::outcome::StdoutFormat;
@@ -204,6 +205,7 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
         alerts.retain(|alert| alert.kind != AlertKind::NotComplete);
     }
     let enhancers = enhancers::rows(&joined.runs);
+    let listing = listing(&joined);
     let first = joined.runs.into_iter().next();
     let first = first.ok_or_else(|| Error::usage("RUN", "no run is named"))?;
     let run = StoredRun {
@@ -219,7 +221,7 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
         run,
         alerts,
         enhancers,
-        listing: joined.listing,
+        listing,
     })
 }
 

@@ -252,7 +252,9 @@ fn of_open(
     if let Some(run) = runs.iter().find(|run| run.records.is_empty()) {
         return Err(no_records(run.folder.clone()));
     }
-    runs.iter_mut().for_each(|run| run.leave_out(args.shown()));
+    for run in &mut runs {
+        run.leave_out(args.shown());
+    }
     let is_single = runs.len() == 1 && again.is_empty();
     let mut joined = open::combine(runs)?;
     joined.alerts.splice(..0, again.iter().cloned());

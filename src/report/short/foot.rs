@@ -1,7 +1,7 @@
 //! The lines below the short table: models without images and chance ([`baselines`]), and marks and facts of models
 //! ([`about_models`]).
 
-use super::{BELOW, wrapped};
+use super::wrapped::wrapped;
 use crate::report::choice_report::ChoiceReport;
 use crate::report::ladder::Ladder;
 use crate::report::tables::{unread, what_it_is};
@@ -10,6 +10,9 @@ use crate::score::accuracy::AccuracyCell;
 use crate::score::choice::ReadingMode;
 use crate::score::subject::{CHANCE, is_observer, without_run};
 use crate::types::control::OBSERVER;
+
+/// Mark of an accuracy that is shown to be below that without images.
+pub(super) const BELOW: char = '▼';
 
 /// Lines below the table: what the last column means, models without images, chance, and the mark.
 pub(super) fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyCell>) -> String {

@@ -140,7 +140,7 @@ impl OpenEqaArgs {
     /// The settings, after reading the files and environment variables that the flags name.
     ///
     /// # Errors
-    /// [`Error::Usage`](crate::error::Error::Usage), which names the flag with the invalid value.
+    /// [`Error::Usage`], which names the flag with the invalid value.
     pub(super) fn resolve(self) -> Result<OpenEqa> {
         let task = match (self.study, self.batch) {
             (Some(folder), _) => OpenTask::Study(folder),

@@ -1,0 +1,25 @@
+//! Text in lines of one width: [`wrapped`].
+
+/// Width of the text in characters.
+pub(super) const WIDTH: usize = 80;
+
+/// Text in lines of [`WIDTH`] characters; the first begins with `first`, the others with `rest`.
+pub(super) fn wrapped(first: &str, text: &str, rest: &str) -> String {
+    let mut lines = String::new();
+    let mut line = first.to_owned();
+    let mut is_empty = true;
+    for word in text.split(' ') {
+        if !is_empty && line.chars().count() + 1 + word.chars().count() > WIDTH {
+            lines += line.trim_end();
+            lines.push('\n');
+            rest.clone_into(&mut line);
+            is_empty = true;
+        }
+        if !is_empty {
+            line.push(' ');
+        }
+        line += word;
+        is_empty = false;
+    }
+    lines + line.trim_end() + "\n"
+}
