@@ -291,7 +291,7 @@ pub(crate) fn limit(settings: &JobSettings) -> Option<ImageLimit> {
     let seeing = models.filter(|model| model.view == View::Image);
     let servers = seeing.filter_map(|model| model.server.as_ref());
     let replicas = servers.flat_map(|server| &server.replicas);
-    Some(replicas.fold(limit, |limit, replica| limit.with_requests_to(replica)))
+    Some(replicas.fold(limit, ImageLimit::with_requests_to))
 }
 
 /// The notes about images that a run folder does not have yet.
