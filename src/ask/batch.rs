@@ -5,6 +5,7 @@ use serde_json::Value;
 use super::complaint::{Complaint, UnreadableReply};
 use super::constraint::letter_of;
 use super::parameters::Constrain;
+use super::reply_secrets::without_secrets;
 use super::secret::Scrub;
 use super::wire::batch_reply;
 use crate::types::{Failure, FailureKind, Reply};
@@ -23,19 +24,27 @@ pub(crate) struct BatchLine {
     pub id: String,
     /// The reply, or the reason why there is none.
     pub result: Result<Reply, Failure>,
-    /// The status and the body of a refused request; `None` for a reply and for other failures.
+    /// The status and the body of a refused request; `None` for a reply and for other failures. It is classified and not kept, so secrets
+    /// are not removed from it.
     pub refusal: Option<(u16, String)>,
 }
 
 impl BatchLine {
-    /// Reads a line; `None` if the line is not one of such a file.
+    /// Reads a line of a file that the user names; `None` if the line is not one of such a file. No server is asked for it, so no
+    /// secret is known that could be removed: texts stay as they stand in the user's own file. Lines that a server sent to the program
+    /// are read by [`BatchServer::line`](super::batch_api::BatchServer::line).
     #[must_use]
     pub(crate) fn read(line: &str) -> Option<Self> {
+        Self::without_secrets(line, &Scrub::default())
+    }
+
+    /// Reads a line, and removes secrets from the reply or the failure; `None` if the line is not one of such a file.
+    pub(super) fn without_secrets(line: &str, scrub: &Scrub) -> Option<Self> {
         let line: Value = serde_json::from_str(line).ok()?;
         let id = line.get("custom_id")?.as_str()?.to_owned();
         Some(Self {
             id,
-            result: result(&line),
+            result: result(&line, scrub).map(|reply| without_secrets(reply, scrub)),
             refusal: refusal(&line),
         })
     }
@@ -56,13 +65,13 @@ fn text(body: &Value) -> String {
         .map_or_else(|| body.to_string(), str::to_owned)
 }
 
-fn result(line: &Value) -> Result<Reply, Failure> {
+fn result(line: &Value, scrub: &Scrub) -> Result<Reply, Failure> {
     let response = line.get("response").filter(|response| !response.is_null());
     let status = response.and_then(|response| response.get("status_code")?.as_u64());
     let status = status.and_then(|status| u16::try_from(status).ok());
     let error = line.get("error").filter(|error| !error.is_null());
     let fail = |kind, text: &str| {
-        let text = Scrub::default().line(text);
+        let text = scrub.line(text);
         Err(Failure {
             kind,
             status: status.filter(|status| (100..1000).contains(status)),
@@ -117,6 +126,32 @@ pub(crate) fn with_letter(reply: Reply, constrain: Constrain, choices: usize) ->
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A key that a server repeats in a line is in no text that a record keeps. Without knowing it, nothing is removed.
+    #[test]
+    fn keys_are_removed_from_replies_and_failures() {
+        const KEY: &str = "sk-0123456789abcdef";
+        let scrub = Scrub::new([KEY.to_owned()]);
+        let choice =
+            r#"{"message":{"content":"B, KEY","refusal":"no KEY"},"finish_reason":"KEY is over"}"#;
+        let answered = format!(
+            r#"{{"custom_id":"k","response":{{"status_code":200,"body":{{"model":"m-KEY","choices":[{choice}]}}}}}}"#
+        );
+        let lines = [
+            answered.as_str(),
+            r#"{"custom_id":"k","response":{"status_code":401,"body":{"error":{"message":"no such key: KEY"}}}}"#,
+            r#"{"custom_id":"k","error":{"code":"bad","message":"KEY"}}"#,
+            r#"{"custom_id":"k","response":{"status_code":200,"body":{"error":{"message":"KEY"}}}}"#,
+        ];
+        for line in lines {
+            let line = line.replace("KEY", KEY);
+            let read = BatchLine::without_secrets(&line, &scrub).unwrap();
+            let kept = format!("{:?}", read.result);
+            assert!(kept.contains("[secret]") && !kept.contains("sk-"), "{kept}");
+            let unknown = BatchLine::read(&line).unwrap();
+            assert!(format!("{:?}", unknown.result).contains(KEY));
+        }
+    }
 
     #[test]
     fn lines_with_replies_and_failures_are_read() {

@@ -1,5 +1,7 @@
 //! A server, at one or several addresses, and the way questions are put to it: [`Endpoint`].
 
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use backon::{BackoffBuilder as _, ExponentialBuilder};
@@ -15,7 +17,7 @@ use super::pace::{Allowance, Gate, Quota};
 use super::replica::Replica;
 use super::request::Request;
 use super::sending::Sending;
-use super::service::{Choice, Effect, Services};
+use super::service::{Choice, Effect, ModelNumber, Services};
 use super::url::BaseUrl;
 use super::vendor::Vendor;
 use super::wire_kind::Wire;
@@ -39,8 +41,8 @@ pub struct Endpoint {
     /// The user's limits per minute, which hold for all replicas together; `None` if the only replica keeps them.
     quota: Option<Gate>,
     services: Services,
-    /// Whether what the replicas say of their models was compared.
-    compared: OnceCell<()>,
+    /// Whether what the replicas say of a model was compared, by its id.
+    compared: Mutex<HashMap<String, Arc<OnceCell<()>>>>,
     closing: watch::Sender<bool>,
 }
 
@@ -80,18 +82,27 @@ impl Endpoint {
             quota: (count > 1).then(|| Gate::new(sending.quota)),
             replicas,
             sending,
-            compared: OnceCell::new(),
+            compared: Mutex::default(),
             closing: watch::Sender::new(false),
         })
     }
 
-    /// The number of requests that may be in flight now, within [`Sending::concurrency`].
-    #[must_use]
-    pub fn width(&self) -> usize {
-        let replicas = self.replicas.iter().enumerate();
-        let working = replicas.filter(|(index, _)| self.services.is_working(*index));
-        let width: usize = working.map(|(_, replica)| replica.width()).sum();
+    /// Adds a model that is asked by this id. What the replicas are for it is known apart from the other models.
+    pub(super) fn add_model(&self, id: &str) -> ModelNumber {
+        self.services.add_model(id.to_owned())
+    }
+
+    /// The number of requests that may be in flight now at the replicas that take this model, within [`Sending::concurrency`].
+    pub(super) fn width(&self, model: ModelNumber) -> usize {
+        let width: usize = self.taking(model).map(Replica::width).sum();
         width.max(1)
+    }
+
+    /// The replicas that take requests to a model.
+    fn taking(&self, model: ModelNumber) -> impl Iterator<Item = &Replica> {
+        let replicas = self.replicas.iter().enumerate();
+        let taking = replicas.filter(move |(index, _)| self.services.takes(model, *index));
+        taking.map(|(_, replica)| replica)
     }
 
     /// The base URL of the first replica; its text has no user, password and query string.
@@ -158,7 +169,8 @@ impl Endpoint {
                 // What takes longer is not waited for.
                 let _ = timeout(COMPARING, self.compare(request)).await;
             };
-            self.compared.get_or_init(compare).await;
+            let compared = self.compared(&request.sent.parameters.model);
+            compared.get_or_init(compare).await;
         }
         let mut tries = ExponentialBuilder::new()
             .with_jitter()
@@ -176,11 +188,11 @@ impl Endpoint {
                 Err(failed) => failed,
             };
             avoided.push(turn.replica);
-            if effect == Effect::Elsewhere && self.services.has_other(&avoided) {
+            if effect == Effect::Elsewhere && self.services.has_other(request.model, &avoided) {
                 last = Some(failed);
                 continue;
             }
-            let (delay, failed) = self.delay(failed, &mut tries);
+            let (delay, failed) = self.delay(request.model, failed, &mut tries);
             let Some(delay) = delay else {
                 return Err(failed.after(attempts));
             };
@@ -194,14 +206,15 @@ impl Endpoint {
     /// The time until a request is sent again; `None` if it is not. A failure after which no request is taken says so.
     fn delay(
         &self,
+        model: ModelNumber,
         mut failed: FailedTry,
         tries: &mut impl Iterator<Item = Duration>,
     ) -> (Option<Duration>, FailedTry) {
         let delay = match failed.again {
             Again::Never => None,
             Again::Later => tries.next().map(|delay| failed.wait.unwrap_or(delay)),
-            Again::WhenTaken if self.refused_for() > self.sending.patience => {
-                failed = self.out_of_patience(failed);
+            Again::WhenTaken if self.refused_for(model) > self.sending.patience => {
+                failed = self.out_of_patience(model, failed);
                 None
             }
             // The gate holds all requests for as long as the server asked.
@@ -222,12 +235,15 @@ impl Endpoint {
             let room = self.services.in_flight(index) < replica.width();
             room && replica.gate.ready_at() <= Instant::now() + SOON
         };
-        let Choice::Replica(replica) = self.services.choose(request.affinity, avoided, ready)
-        else {
-            let message = "no replica of this endpoint can be asked any further";
+        let chosen = self
+            .services
+            .choose(request.model, request.affinity, avoided, ready);
+        let Choice::Replica(replica) = chosen else {
+            let id = &request.sent.parameters.model;
+            let message = format!("no replica of this endpoint can be asked any further for {id}");
             return Err(FailedTry {
                 reach: Reach::Endpoint,
-                ..FailedTry::new(FailureKind::Connection, message.to_owned())
+                ..FailedTry::new(FailureKind::Connection, message)
             });
         };
         let passed = self.unless_closed(self.replicas[replica].gate.pass()).await;
@@ -259,7 +275,7 @@ impl Endpoint {
             Ok(reply) => reply,
             Err(failed) if self.replicas.len() == 1 => return Err((failed, Effect::Own)),
             Err(failed) => {
-                let effect = self.services.failed(index, &failed);
+                let effect = self.services.failed(request.model, index, &failed);
                 return Err((failed, effect));
             }
         };
@@ -267,10 +283,9 @@ impl Endpoint {
             let tokens = reply.usage.and_then(|usage| usage.total());
             gate.succeeded(sent, tokens, Allowance::default(), self.sending.max_wait);
         }
+        let served = reply.served_model.as_deref();
         if self.replicas.len() > 1
-            && let Err(effect) = self
-                .services
-                .succeeded(index, reply.served_model.as_deref(), sent)
+            && let Err(effect) = self.services.succeeded(request.model, index, served, sent)
         {
             let served = reply.served_model.unwrap_or_default();
             let message = format!("{} served the model {served}", replica.base());
@@ -282,6 +297,12 @@ impl Endpoint {
         }
         let endpoint = (self.replicas.len() > 1).then_some(index);
         Ok(Reply { endpoint, ..reply })
+    }
+
+    /// Whether what the replicas say of the model with this id was compared.
+    fn compared(&self, id: &str) -> Arc<OnceCell<()>> {
+        let mut all = self.compared.lock().unwrap_or_else(PoisonError::into_inner);
+        Arc::clone(all.entry(id.to_owned()).or_default())
     }
 
     /// Warns if the replicas say different things of the model. What cannot be asked for is ignored.
@@ -300,7 +321,8 @@ impl Endpoint {
         };
         for (other, different) in said.iter().filter(|(_, other)| other != facts) {
             warn!(
-                "the replicas {first} and {other} serve the model differently ({facts} and {different}): their replies may differ"
+                "the replicas {first} and {other} serve the model {} differently ({facts} and {different}): their replies may differ",
+                request.sent.parameters.model
             );
         }
     }
@@ -313,21 +335,19 @@ impl Endpoint {
         }
     }
 
-    /// The time for which no working replica has taken a request.
-    fn refused_for(&self) -> Duration {
-        let replicas = self.replicas.iter().enumerate();
-        let working = replicas.filter(|(index, _)| self.services.is_working(*index));
-        let times = working.map(|(_, replica)| replica.gate.refused_for());
+    /// The time for which no replica that takes this model has taken a request.
+    fn refused_for(&self, model: ModelNumber) -> Duration {
+        let times = self.taking(model).map(|replica| replica.gate.refused_for());
         times.min().unwrap_or_default()
     }
 
     /// The failure of a request that was turned away for too long: every other one is, too.
-    fn out_of_patience(&self, mut failed: FailedTry) -> FailedTry {
+    fn out_of_patience(&self, model: ModelNumber, mut failed: FailedTry) -> FailedTry {
         failed.reach = Reach::Endpoint;
         failed.failure.message = format!(
             "{} (nothing was taken for {:.0} s, beyond --patience; go on later with --resume)",
             failed.failure.message,
-            self.refused_for().as_secs_f64()
+            self.refused_for(model).as_secs_f64()
         );
         failed
     }

@@ -39,6 +39,7 @@ mod prompt;
 mod random;
 mod remote;
 mod replica;
+mod reply_secrets;
 mod request;
 mod script;
 mod secret;

@@ -63,7 +63,7 @@ impl Model {
     #[must_use]
     pub fn width(&self) -> Option<usize> {
         match self {
-            Self::Remote(model) => Some(model.endpoint().width()),
+            Self::Remote(model) => Some(model.width()),
             // It computes on the cores of this machine.
             Self::Local(_) => std::thread::available_parallelism().ok().map(usize::from),
             Self::Random(_) | Self::Script(_) => None,

@@ -15,6 +15,7 @@ use super::failure_class::FailureClass;
 use super::field::{AdaptableField, RequestFields, SentFields};
 use super::parameters::{Constrain, Parameters};
 use super::request::Request;
+use super::service::ModelNumber;
 use super::vendor::Vendor;
 use crate::error::{Error, Result};
 use crate::types::{FailureKind, Reply};
@@ -23,6 +24,8 @@ use crate::types::{FailureKind, Reply};
 #[derive(Debug)]
 pub struct Remote {
     endpoint: Arc<Endpoint>,
+    /// The model at the endpoint.
+    number: ModelNumber,
     /// Headers for each replica of the endpoint.
     headers: Vec<HeaderMap>,
     parameters: Parameters,
@@ -64,6 +67,7 @@ impl Remote {
             headers: endpoint.headers(parameters.wire.first())?,
             fields: Mutex::new(first),
             first,
+            number: endpoint.add_model(&parameters.model),
             endpoint,
             parameters,
             scout: tokio::sync::Mutex::new(Scout::Waiting),
@@ -81,6 +85,12 @@ impl Remote {
     #[must_use]
     pub fn endpoint(&self) -> &Endpoint {
         &self.endpoint
+    }
+
+    /// The number of requests that may be in flight now at the endpoint, within [`Sending::concurrency`](super::Sending).
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.endpoint.width(self.number)
     }
 
     /// The parameters of every request.
@@ -193,6 +203,7 @@ impl Remote {
             AskError::new(FailureKind::Request, message, 0)
         })?;
         let request = Request {
+            model: self.number,
             wire: fields.wire,
             headers: &self.headers,
             body,

@@ -12,13 +12,14 @@ use super::connection::{Connection, Deadline, HttpReply};
 use super::failure::{Again, FailedTry, Reach};
 use super::failure_class::FailureClass;
 use super::pace::{Allowance, Gate, Window, asked_wait};
+use super::reply_secrets::without_secrets;
 use super::request::Request;
 use super::sending::Sending;
 use super::url::BaseUrl;
 use super::vendor::Vendor;
 use super::wire_kind::Wire;
 use crate::error::Result;
-use crate::types::{Failure, FailureKind, Finish, Reply, TokenChances, TokenPosition};
+use crate::types::{Failure, FailureKind, Reply};
 
 /// One address of an endpoint: its key, pooled connections, and the pauses that it asked for.
 #[derive(Debug)]
@@ -134,21 +135,9 @@ impl Replica {
         let tokens = reply.usage.and_then(|usage| usage.total());
         self.gate
             .succeeded(sent, tokens, allowance, self.sending.max_wait);
-        let scrubbed = |text: String| self.connection.scrub.reply(text);
         Reply {
-            text: scrubbed(reply.text),
-            refusal: reply.refusal.map(scrubbed),
-            served_model: reply.served_model.map(scrubbed),
-            provider: reply.provider.map(scrubbed),
-            finish: match reply.finish {
-                // Shortened last: otherwise the first half of a key could remain.
-                Finish::Other(reason) => Finish::Other(self.connection.scrub.line(&reason)),
-                finish => finish,
-            }
-            .shortened(),
-            chances: reply.chances.map(|chances| without_keys(chances, scrubbed)),
             latency_ms: answer.took.as_millis() as u64,
-            ..reply
+            ..without_secrets(reply, &self.connection.scrub)
         }
     }
 
@@ -249,22 +238,6 @@ impl Replica {
     /// The server's id of a request, without secrets; empty if it sent none.
     fn request_id(&self, answer: &HttpReply) -> String {
         self.connection.scrub.line(answer.header("x-request-id"))
-    }
-}
-
-/// The likeliest tokens without keys.
-fn without_keys(chances: TokenChances, scrubbed: impl Fn(String) -> String) -> TokenChances {
-    let position = |position: TokenPosition| {
-        let likeliest = position.likeliest.into_iter();
-        let likeliest = likeliest.map(|(token, logprob)| (scrubbed(token), logprob));
-        TokenPosition {
-            likeliest: likeliest.collect(),
-            token: scrubbed(position.token),
-        }
-    };
-    TokenChances {
-        positions: chances.positions.into_iter().map(position).collect(),
-        ..chances
     }
 }
 

@@ -4,10 +4,13 @@ use reqwest::header::HeaderMap;
 
 use super::body::Parts;
 use super::field::SentFields;
+use super::service::ModelNumber;
 use super::wire_kind::Wire;
 
 /// One request, which may be sent several times.
 pub(super) struct Request<'a> {
+    /// The model at the endpoint.
+    pub(super) model: ModelNumber,
     pub(super) wire: Wire,
     /// The headers for each replica.
     pub(super) headers: &'a [HeaderMap],

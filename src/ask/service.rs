@@ -1,5 +1,6 @@
 //! Which replica of an endpoint takes a request: [`Services`].
 
+use std::collections::BTreeSet;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tokio::time::{Duration, Instant};
@@ -21,15 +22,48 @@ const FIRST_OUT: Duration = Duration::from_secs(5);
 /// The longest time for which a replica is out; chosen.
 const LONGEST_OUT: Duration = Duration::from_mins(1);
 
-/// The state of each replica of an endpoint.
+/// The state of each replica of an endpoint: what holds for all models that are asked there, and what holds for one of them.
 #[derive(Debug)]
 pub(super) struct Services(Mutex<State>);
+
+/// The number of a model among those that were opened at an endpoint. Two of them may have one id: what a server refuses may be due to
+/// the other settings of a model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct ModelNumber(usize);
 
 #[derive(Debug)]
 struct State {
     replicas: Vec<Service>,
-    /// The model that replies name; the first reply decides.
-    served: Option<String>,
+    /// By [`ModelNumber`].
+    models: Vec<Served>,
+}
+
+impl State {
+    /// Whether a replica takes requests to a model.
+    fn takes(&self, model: ModelNumber, index: usize) -> bool {
+        self.replicas[index].health == Health::Working && !self.is_gone(model, index)
+    }
+
+    /// Whether a replica is asked nothing more for a model in this run.
+    fn is_gone(&self, model: ModelNumber, index: usize) -> bool {
+        self.models[model.0].gone.contains(&index)
+    }
+
+    /// Whether one of the replicas that `is_wanted` names takes requests to a model.
+    fn any_takes(&self, model: ModelNumber, is_wanted: impl Fn(usize) -> bool) -> bool {
+        (0..self.replicas.len()).any(|index| is_wanted(index) && self.takes(model, index))
+    }
+}
+
+/// What is known of one model at the replicas.
+#[derive(Debug)]
+struct Served {
+    /// The id by which it is asked, for messages.
+    id: String,
+    /// The model that its replies name; the first reply decides.
+    replies_as: Option<String>,
+    /// The replicas that are asked nothing more for it in this run.
+    gone: BTreeSet<usize>,
 }
 
 #[derive(Debug)]
@@ -52,8 +86,6 @@ enum Health {
     OutUntil(Instant),
     /// One request tries it.
     OnTrial,
-    /// It takes nothing more in this run.
-    Gone,
 }
 
 /// The replica for a request.
@@ -96,13 +128,24 @@ impl Services {
         });
         Self(Mutex::new(State {
             replicas: replicas.collect(),
-            served: None,
+            models: Vec::new(),
         }))
     }
 
-    /// Whether a replica takes requests, so that its window counts.
-    pub(super) fn is_working(&self, index: usize) -> bool {
-        self.state().replicas[index].health == Health::Working
+    /// Adds a model that is asked by this id.
+    pub(super) fn add_model(&self, id: String) -> ModelNumber {
+        let mut state = self.state();
+        state.models.push(Served {
+            id,
+            replies_as: None,
+            gone: BTreeSet::new(),
+        });
+        ModelNumber(state.models.len() - 1)
+    }
+
+    /// Whether a replica takes requests to a model, so that its window counts.
+    pub(super) fn takes(&self, model: ModelNumber, index: usize) -> bool {
+        self.state().takes(model, index)
     }
 
     /// The number of requests in flight at a replica.
@@ -110,11 +153,12 @@ impl Services {
         self.state().replicas[index].in_flight
     }
 
-    /// The replica for a request: the one that prefers it by rendezvous hashing (Thaler and Ravishankar 1998, IEEE/ACM Trans. Netw. 6:1)
+    /// The replica for a request to a model: the one that prefers it by rendezvous hashing (Thaler and Ravishankar 1998, IEEE/ACM Trans. Netw. 6:1)
     /// while it has at most [`LEANING`] more in flight than the one with the fewest; else the one with the fewest. Those that `is_ready`
     /// names come first, as the others wait for their pace.
     pub(super) fn choose(
         &self,
+        model: ModelNumber,
         affinity: u64,
         avoided: &[usize],
         is_ready: impl Fn(usize) -> bool,
@@ -126,13 +170,14 @@ impl Services {
         let working = |index: &usize| match state.replicas[*index].health {
             Health::Working => true,
             Health::OutUntil(time) => time <= now,
-            Health::OnTrial | Health::Gone => false,
+            Health::OnTrial => false,
         };
-        let mut open: Vec<usize> = (0..count).filter(working).collect();
+        let left = (0..count).filter(|index| !state.is_gone(model, *index));
+        let left: Vec<usize> = left.collect();
+        let mut open: Vec<usize> = left.iter().copied().filter(working).collect();
         if open.is_empty() {
             // None works: those that are out are tried as a single endpoint would be, with its retries and their waits.
-            let left = |index: &usize| state.replicas[*index].health != Health::Gone;
-            open = (0..count).filter(left).collect();
+            open = left;
         }
         if open.iter().any(|index| !avoided.contains(index)) {
             open.retain(|index| !avoided.contains(index));
@@ -177,117 +222,120 @@ impl Services {
         }
     }
 
-    /// Notes a reply of a replica to a request that was sent at a time; the reply names this model.
+    /// Notes a reply of a replica to a request to a model that was sent at a time; the reply names the model `replies_as`.
     ///
     /// # Errors
-    /// If it is another model than that of the other replicas: the reply does not count, and the replica is asked nothing more.
+    /// If it is another model than that of the other replicas: the reply does not count, and the replica is asked nothing more for this
+    /// model.
     pub(super) fn succeeded(
         &self,
+        model: ModelNumber,
         index: usize,
-        served: Option<&str>,
+        replies_as: Option<&str>,
         sent: Instant,
     ) -> Result<(), Effect> {
         let mut state = self.state();
-        let known = state.served.clone();
-        if let (Some(known), Some(served)) = (&known, served)
-            && known != served
-        {
-            let replica = &mut state.replicas[index];
-            if replica.health != Health::Gone {
-                replica.health = Health::Gone;
-                warn!(
-                    "{}: it serves the model {served}, and the others serve {known}: it is asked nothing more",
-                    replica.address
-                );
-            }
-            return Err(Effect::Elsewhere);
-        }
-        if known.is_none() {
-            state.served = served.map(str::to_owned);
-        }
-        let replica = &mut state.replicas[index];
-        if replica.failed_at.is_some_and(|failed| sent < failed) {
+        let State { replicas, models } = &mut *state;
+        let (replica, served) = (&mut replicas[index], &mut models[model.0]);
+        replica.answered(sent);
+        let Some(name) = replies_as else {
+            return Ok(());
+        };
+        let known = served.replies_as.get_or_insert_with(|| name.to_owned());
+        if known == name {
             return Ok(());
         }
-        if matches!(replica.health, Health::OnTrial | Health::OutUntil(_)) {
-            warn!("{}: it answers again", replica.address);
-            replica.health = Health::Working;
+        if served.gone.insert(index) {
+            warn!(
+                "{}: it replies as the model {name}, and the others as {known}: it is asked nothing more for {}",
+                replica.address, served.id
+            );
         }
-        (replica.failures, replica.outs) = (0, 0);
-        Ok(())
+        Err(Effect::Elsewhere)
     }
 
-    /// Notes a failure at a replica, and tells whether the request goes elsewhere.
-    pub(super) fn failed(&self, index: usize, failed: &FailedTry) -> Effect {
+    /// Notes a failure of a request to a model at a replica, and tells whether the request goes elsewhere.
+    pub(super) fn failed(&self, model: ModelNumber, index: usize, failed: &FailedTry) -> Effect {
         let (now, mut state) = (Instant::now(), self.state());
-        let replica = &mut state.replicas[index];
+        let effect = |is_left: bool| {
+            if is_left {
+                Effect::Elsewhere
+            } else {
+                Effect::Own
+            }
+        };
         let status = failed.failure.status;
         let refused = matches!(status, Some(401 | 403 | 404 | 405 | 410));
-        if failed.reach == Reach::Endpoint && refused {
-            if replica.health != Health::Gone {
-                replica.health = Health::Gone;
+        // After a refusal of one field the replica is asked without it.
+        if failed.reach == Reach::Endpoint && refused && failed.refused_field.is_none() {
+            let State { replicas, models } = &mut *state;
+            let served = &mut models[model.0];
+            if served.gone.insert(index) {
                 warn!(
-                    "{}: it is asked nothing more: {}",
-                    replica.address, failed.failure.message
+                    "{}: it is asked nothing more for {}: {}",
+                    replicas[index].address, served.id, failed.failure.message
                 );
             }
             // If no other is left, the failure stands.
-            let left = state
-                .replicas
-                .iter()
-                .any(|replica| replica.health != Health::Gone);
-            return if left { Effect::Elsewhere } else { Effect::Own };
+            return effect(served.gone.len() < replicas.len());
         }
+        let replica = &mut state.replicas[index];
         // A limit of a day or an hour: the others may have none.
         if let (Reach::Endpoint, Some(429), Some(wait)) = (failed.reach, status, failed.wait) {
             replica.health = Health::OutUntil(now + wait);
-            let left = state
-                .replicas
-                .iter()
-                .any(|replica| replica.health == Health::Working);
-            return if left { Effect::Elsewhere } else { Effect::Own };
+            return effect(state.any_takes(model, |_| true));
         }
         let kind = failed.failure.kind;
         let broken = matches!(kind, FailureKind::Connection | FailureKind::Server);
         if !broken || failed.again != Again::Later || failed.reach == Reach::Interrupted {
             return Effect::Own;
         }
-        replica.failures += 1;
-        replica.failed_at = Some(now);
-        let was_trial = replica.health == Health::OnTrial;
-        if was_trial || (replica.failures >= FAILURES_IN_A_ROW && replica.health == Health::Working)
-        {
-            replica.outs += 1;
-            let time = (FIRST_OUT * replica.outs).min(LONGEST_OUT);
-            replica.health = Health::OutUntil(now + time);
-            if replica.outs == 1 {
-                warn!(
-                    "{}: {} failures in a row; the other replicas take its requests: {}",
-                    replica.address, replica.failures, failed.failure.message
-                );
-            }
-        }
+        replica.broke(now, &failed.failure.message);
         // What the server itself could not do may be due to the request, which then spends a retry.
         let elsewhere = kind == FailureKind::Connection || replica.health != Health::Working;
-        let left = state.replicas.iter().enumerate();
-        let mut left = left.filter(|(_, replica)| replica.health == Health::Working);
-        if elsewhere && left.any(|(other, _)| other != index) {
-            Effect::Elsewhere
-        } else {
-            Effect::Own
-        }
+        effect(elsewhere && state.any_takes(model, |other| other != index))
     }
 
-    /// Whether a replica works that a request has not tried.
-    pub(super) fn has_other(&self, avoided: &[usize]) -> bool {
-        let state = self.state();
-        let mut replicas = state.replicas.iter().enumerate();
-        replicas
-            .any(|(index, replica)| replica.health == Health::Working && !avoided.contains(&index))
+    /// Whether a replica takes requests to a model that a request has not tried.
+    pub(super) fn has_other(&self, model: ModelNumber, avoided: &[usize]) -> bool {
+        self.state()
+            .any_takes(model, |index| !avoided.contains(&index))
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Service {
+    /// Notes a reply to a request that was sent at a time.
+    fn answered(&mut self, sent: Instant) {
+        if self.failed_at.is_some_and(|failed| sent < failed) {
+            return;
+        }
+        if self.health != Health::Working {
+            warn!("{}: it answers again", self.address);
+            self.health = Health::Working;
+        }
+        (self.failures, self.outs) = (0, 0);
+    }
+
+    /// Notes a failure to connect, or of the server.
+    fn broke(&mut self, now: Instant, message: &str) {
+        self.failures += 1;
+        self.failed_at = Some(now);
+        let was_trial = self.health == Health::OnTrial;
+        if was_trial || (self.failures >= FAILURES_IN_A_ROW && self.health == Health::Working) {
+            self.outs += 1;
+            let time = (FIRST_OUT * self.outs).min(LONGEST_OUT);
+            self.health = Health::OutUntil(now + time);
+            if self.outs == 1 {
+                warn!(
+                    "{}: {} failures in a row; the other replicas take its requests: {message}",
+                    self.address, self.failures
+                );
+            }
+        }
     }
 }
 

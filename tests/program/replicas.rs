@@ -14,15 +14,25 @@ const RUN: &str = "--data set.jsonl --levels L0 --out run --models models.toml";
 
 /// A run of one model at these replicas.
 fn run(bench: &Bench, replicas: &[&MockEndpoint], more: &str, line: &str) -> Called {
+    run_models(bench, replicas, &[("m", more)], line)
+}
+
+/// A run of models, each with more lines of its table, that all have these replicas.
+fn run_models(
+    bench: &Bench,
+    replicas: &[&MockEndpoint],
+    models: &[(&str, &str)],
+    line: &str,
+) -> Called {
     let urls: Vec<String> = replicas
         .iter()
         .map(|mock| format!("\"{}\"", mock.base_url()))
         .collect();
     let endpoints = urls.join(", ");
-    bench.file(
-        "models.toml",
-        format!("[[model]]\nid = \"m\"\nendpoints = [{endpoints}]\n{more}\n"),
-    );
+    let tables = models
+        .iter()
+        .map(|(id, more)| format!("[[model]]\nid = \"{id}\"\nendpoints = [{endpoints}]\n{more}\n"));
+    bench.file("models.toml", tables.collect::<String>());
     bench.call(&words(&format!("{RUN} {line}")))
 }
 
@@ -138,6 +148,123 @@ fn a_replica_of_another_model_gives_no_reply() {
         1,
         "{called:?}"
     );
+}
+
+/// A server of these models alone, each of which it names in its replies.
+fn serving_models(known: &'static [&'static str]) -> MockEndpoint {
+    MockEndpoint::answering(move |request| {
+        std::thread::sleep(Duration::from_millis(5));
+        let model = request["model"].as_str().unwrap();
+        if !known.contains(&model) {
+            return Answer::error(404, "model_not_found", "no such model");
+        }
+        let choice = json!({"index": 0, "message": {"content": "A"}, "finish_reason": "stop"});
+        Answer::json(200, &json!({"model": model, "choices": [choice]}))
+    })
+}
+
+/// The numbers of replies and failures of a model, and how many replies each of two replicas gave.
+fn outcomes(bench: &Bench, model: &str) -> (usize, usize, [usize; 2]) {
+    let records = records(&bench.path("run"));
+    let own = records.iter().filter(|record| record["model"] == model);
+    let (failed, answered): (Vec<_>, Vec<_>) =
+        own.partition(|record| record["outcome"] == "failed");
+    let at = |index: u64| {
+        answered
+            .iter()
+            .filter(move |record| record["endpoint"] == index)
+    };
+    (answered.len(), failed.len(), [at(0).count(), at(1).count()])
+}
+
+#[test]
+fn two_models_at_the_same_replicas_do_not_take_them_from_each_other() {
+    let bench = Bench::with_questions(40);
+    let mocks = [
+        serving_models(&["qwen", "internvl"]),
+        serving_models(&["qwen", "internvl"]),
+    ];
+    let called = run_models(
+        &bench,
+        &mocks.each_ref(),
+        &[("qwen", ""), ("internvl", "")],
+        "",
+    );
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert!(!called.stderr.contains("asked nothing more"), "{called:?}");
+    for model in ["qwen", "internvl"] {
+        let (answered, failed, shares) = outcomes(&bench, model);
+        assert_eq!((answered, failed), (40, 0), "{model}");
+        assert!(shares.iter().all(|share| *share > 0), "{model}: {shares:?}");
+    }
+}
+
+#[test]
+fn a_model_that_no_replica_has_leaves_them_to_the_others() {
+    let bench = Bench::with_questions(40);
+    let mocks = [serving_models(&["m"]), serving_models(&["m"])];
+    let called = run_models(
+        &bench,
+        &mocks.each_ref(),
+        &[("mistyped", ""), ("m", "")],
+        "",
+    );
+    assert_eq!(
+        called.code,
+        Some(1),
+        "the mistyped one was stopped: {called:?}"
+    );
+    let (answered, failed, shares) = outcomes(&bench, "m");
+    assert_eq!((answered, failed), (40, 0));
+    assert!(shares.iter().all(|share| *share > 0), "{shares:?}");
+    let (answered, _, _) = outcomes(&bench, "mistyped");
+    assert_eq!(answered, 0);
+    assert_eq!(
+        called
+            .stderr
+            .matches("asked nothing more for mistyped")
+            .count(),
+        2,
+        "{called:?}"
+    );
+    // One replica that lacks a model is left out for that model alone.
+    let bench = Bench::with_questions(40);
+    let mocks = [serving_models(&["m"]), serving_models(&["m", "n"])];
+    let called = run_models(&bench, &mocks.each_ref(), &[("n", ""), ("m", "")], "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    let (answered, failed, shares) = outcomes(&bench, "n");
+    assert_eq!((answered, failed, shares), (40, 0, [0, 40]));
+    let (answered, failed, shares) = outcomes(&bench, "m");
+    assert_eq!((answered, failed), (40, 0));
+    assert!(shares.iter().all(|share| *share > 0), "{shares:?}");
+}
+
+/// What the program can send in another way takes no replica from a model.
+#[test]
+fn a_refused_api_takes_no_replica_from_a_model() {
+    let bench = Bench::with_questions(4);
+    let responses_alone = || {
+        MockEndpoint::watching(|request| {
+            if request.line.starts_with("GET ") {
+                return Answer::new(404, "");
+            }
+            if request.line.contains("/chat/completions") {
+                let message =
+                    "This model is only supported in v1/responses and not in v1/chat/completions.";
+                return Answer::error(404, "unsupported", message);
+            }
+            let content = json!([{"type": "output_text", "text": "A"}]);
+            let output = json!([{"type": "message", "role": "assistant", "content": content}]);
+            Answer::json(
+                200,
+                &json!({"model": "m", "status": "completed", "output": output}),
+            )
+        })
+    };
+    let mocks = [responses_alone(), responses_alone()];
+    let called = run(&bench, &mocks.each_ref(), "", "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert!(!called.stderr.contains("asked nothing more"), "{called:?}");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use crate::ask::complaint::Complaint;
+use crate::ask::secret::Scrub;
 
 /// Whether a call that did not succeed may have changed something at the server.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,18 +19,18 @@ pub(crate) enum Effect {
 pub(crate) struct QuotaRefusal {
     /// The number of tokens that may wait; `None` if the server does not say.
     pub limit: Option<u64>,
-    /// The server's words.
+    /// The server's words, without secrets.
     pub message: String,
 }
 
 impl QuotaRefusal {
     /// The refusal in an error; `None` if the error is about something else.
-    pub(super) fn of(complaint: &Complaint) -> Option<Self> {
+    pub(super) fn of(complaint: &Complaint, scrub: &Scrub) -> Option<Self> {
         let is_quota = complaint.has_code(&["token_limit_exceeded"])
             || complaint.mentions_any(&["enqueued token"]);
         is_quota.then(|| Self {
             limit: stated_limit(&complaint.message),
-            message: complaint.message.clone(),
+            message: scrub.line(&complaint.message),
         })
     }
 }
@@ -81,7 +82,7 @@ mod tests {
     fn the_limit_of_waiting_tokens_is_read_from_words() {
         let of = |code: Option<&str>, message: &str| {
             let error = serde_json::json!({"code": code, "message": message});
-            QuotaRefusal::of(&Complaint::of_error(&error))
+            QuotaRefusal::of(&Complaint::of_error(&error), &Scrub::default())
         };
         let words = "Enqueued token limit reached for gpt-4o in organization o. Limit: 90,000 enqueued tokens. Please try again \
                      once some in_progress batches have been completed.";

@@ -2,6 +2,7 @@
 //!
 //! Each call is sent once. Whether it is repeated is decided by the caller, who knows what may have happened at the server.
 
+mod download;
 mod failure;
 mod objects;
 mod upload;
@@ -13,11 +14,13 @@ use reqwest::header::{CONTENT_TYPE, HeaderMap};
 use reqwest::{Method, RequestBuilder};
 use serde_json::{Value, json};
 
+use super::batch::BatchLine;
 use super::complaint::Complaint;
 use super::connection::{Connection, Deadline, HttpReply};
 use super::failure::FailedTry;
 use super::pace::asked_wait;
 
+use download::remove_secrets;
 pub(crate) use failure::{ApiFailure, Effect, QuotaRefusal};
 use objects::MARK;
 pub(crate) use objects::{BatchState, Readiness, RemoteBatch, RemoteFile};
@@ -104,7 +107,7 @@ impl BatchServer {
         Ok(items.iter().filter_map(RemoteFile::read).collect())
     }
 
-    /// Writes the content of a file to a path, at most this number of bytes.
+    /// Writes the content of a file to a path, at most this number of bytes, without keys that the server repeats in it.
     pub(crate) async fn download(&self, id: &str, to: &Path, most: u64) -> ApiResult<()> {
         let path = format!("files/{}/content", segment(id));
         let request = self
@@ -112,7 +115,21 @@ impl BatchServer {
             .timeout(LONGEST_DOWNLOAD);
         let sent = self.connection.save(request, to, most).await;
         let answer = sent.map_err(not_answered)?;
-        self.succeeded(answer).map(drop)
+        self.succeeded(answer)?;
+        remove_secrets(to, &self.connection.scrub).map_err(|e| ApiFailure {
+            status: None,
+            message: format!("{}: keys in it could not be removed: {e}", to.display()),
+            effect: Effect::None,
+            wait: None,
+            quota: None,
+        })
+    }
+
+    /// Reads a line of a file that this server sent; `None` if the line is not one of a file of replies. Keys that are sent to the server
+    /// are removed from it.
+    #[must_use]
+    pub(crate) fn line(&self, line: &str) -> Option<BatchLine> {
+        BatchLine::without_secrets(line, &self.connection.scrub)
     }
 
     /// Deletes a file.
@@ -222,7 +239,7 @@ impl BatchServer {
                 Effect::Unknown
             },
             wait: asked_wait(&answer.headers, SystemTime::now()).max(complaint.wait),
-            quota: QuotaRefusal::of(&complaint),
+            quota: QuotaRefusal::of(&complaint, scrub),
         })
     }
 

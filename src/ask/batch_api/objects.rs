@@ -134,7 +134,7 @@ impl RemoteBatch {
         let mark = object.get("metadata").and_then(|data| text(data, MARK));
         Some(Self {
             id: text(object, "id")?,
-            state: BatchState::read(&text(object, "status")?),
+            state: BatchState::read(&scrub.line(&text(object, "status")?)),
             output_file: text(object, "output_file_id"),
             error_file: text(object, "error_file_id"),
             counts: RequestCounts {
@@ -146,7 +146,7 @@ impl RemoteBatch {
                 .map_or_else(String::new, |e| problem(e, scrub)),
             quota: errors.iter().find_map(|error| {
                 let complaint = Complaint::of_error(error);
-                QuotaRefusal::of(&complaint)
+                QuotaRefusal::of(&complaint, scrub)
             }),
             mark: mark.unwrap_or_default(),
         })

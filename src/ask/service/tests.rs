@@ -1,9 +1,15 @@
 use super::*;
+use crate::ask::field::AdaptableField;
 use crate::types::Failure;
 
 fn services(count: usize) -> Services {
-    Services::new((0..count).map(|index| format!("r{index}")))
+    let all = Services::new((0..count).map(|index| format!("r{index}")));
+    assert_eq!(all.add_model("a".to_owned()), ONE);
+    all
 }
+
+/// The first model at the replicas, which every test has.
+const ONE: ModelNumber = ModelNumber(0);
 
 fn failed(kind: FailureKind, status: Option<u16>, reach: Reach) -> FailedTry {
     FailedTry {
@@ -24,7 +30,7 @@ fn refused_connection() -> FailedTry {
 }
 
 fn choose(services: &Services, affinity: u64) -> usize {
-    match services.choose(affinity, &[], |_| true) {
+    match services.choose(ONE, affinity, &[], |_| true) {
         Choice::Replica(index) => index,
         Choice::None => panic!("none"),
     }
@@ -87,16 +93,16 @@ async fn a_replica_that_fails_three_times_is_out_for_longer_each_time() {
     let all = services(2);
     let mut out = Vec::new();
     for _ in 0..2 {
-        assert_eq!(all.failed(0, &refused_connection()), Effect::Elsewhere);
-        assert!(all.is_working(0));
+        assert_eq!(all.failed(ONE, 0, &refused_connection()), Effect::Elsewhere);
+        assert!(all.takes(ONE, 0));
     }
-    assert_eq!(all.failed(0, &refused_connection()), Effect::Elsewhere);
-    assert!(!all.is_working(0));
+    assert_eq!(all.failed(ONE, 0, &refused_connection()), Effect::Elsewhere);
+    assert!(!all.takes(ONE, 0));
     for _ in 0..14 {
         let start = Instant::now();
         // Until it may be tried, everything goes to the other; then one request alone tries it.
         loop {
-            let taken = all.choose(0, &[1], |_| true);
+            let taken = all.choose(ONE, 0, &[1], |_| true);
             let Choice::Replica(index) = taken else {
                 panic!()
             };
@@ -107,43 +113,47 @@ async fn a_replica_that_fails_three_times_is_out_for_longer_each_time() {
             tokio::time::advance(Duration::from_secs(1)).await;
         }
         out.push(start.elapsed().as_secs());
-        let second = all.choose(0, &[], |_| true);
+        let second = all.choose(ONE, 0, &[], |_| true);
         assert_eq!(second, Choice::Replica(1), "one request tries it");
         all.released(1);
-        all.failed(0, &refused_connection());
+        all.failed(ONE, 0, &refused_connection());
         all.released(0);
     }
     assert_eq!(out[..4], [5, 10, 15, 20]);
     assert_eq!(out[13], 60);
     // One reply brings it back, with a clean record.
     tokio::time::advance(Duration::from_mins(2)).await;
-    assert_eq!(all.choose(0, &[1], |_| true), Choice::Replica(0));
-    assert!(all.succeeded(0, None, Instant::now()).is_ok());
-    assert!(all.is_working(0));
-    all.failed(0, &refused_connection());
-    assert!(all.is_working(0));
+    assert_eq!(all.choose(ONE, 0, &[1], |_| true), Choice::Replica(0));
+    assert!(all.succeeded(ONE, 0, None, Instant::now()).is_ok());
+    assert!(all.takes(ONE, 0));
+    all.failed(ONE, 0, &refused_connection());
+    assert!(all.takes(ONE, 0));
 }
 
 #[tokio::test(start_paused = true)]
 async fn what_the_request_may_have_caused_spends_a_retry() {
     let all = services(2);
     let server = failed(FailureKind::Server, Some(500), Reach::Trial);
-    assert_eq!(all.failed(0, &server), Effect::Own);
-    assert_eq!(all.failed(0, &server), Effect::Own);
-    assert_eq!(all.failed(0, &server), Effect::Elsewhere, "now it is out");
+    assert_eq!(all.failed(ONE, 0, &server), Effect::Own);
+    assert_eq!(all.failed(ONE, 0, &server), Effect::Own);
+    assert_eq!(
+        all.failed(ONE, 0, &server),
+        Effect::Elsewhere,
+        "now it is out"
+    );
     // A reply in between begins the count anew.
-    all.failed(1, &server);
-    all.failed(1, &server);
-    assert!(all.succeeded(1, None, Instant::now()).is_ok());
-    all.failed(1, &server);
-    assert!(all.is_working(1));
+    all.failed(ONE, 1, &server);
+    all.failed(ONE, 1, &server);
+    assert!(all.succeeded(ONE, 1, None, Instant::now()).is_ok());
+    all.failed(ONE, 1, &server);
+    assert!(all.takes(ONE, 1));
     // One to a request from before the failure does not.
     let before = Instant::now();
     tokio::time::advance(Duration::from_secs(1)).await;
-    all.failed(1, &server);
-    assert!(all.succeeded(1, None, before).is_ok());
+    all.failed(ONE, 1, &server);
+    assert!(all.succeeded(ONE, 1, None, before).is_ok());
     tokio::time::advance(Duration::from_secs(1)).await;
-    assert!(all.succeeded(1, None, Instant::now()).is_ok());
+    assert!(all.succeeded(ONE, 1, None, Instant::now()).is_ok());
     // A refusal of the request, and a rate limit, say nothing of the replica.
     for (kind, status, again) in [
         (FailureKind::Request, 400, Again::Never),
@@ -155,9 +165,9 @@ async fn what_the_request_may_have_caused_spends_a_retry() {
                 again,
                 ..failed(kind, Some(status), Reach::Trial)
             };
-            assert_eq!(all.failed(1, &failure), Effect::Own);
+            assert_eq!(all.failed(ONE, 1, &failure), Effect::Own);
         }
-        assert!(all.is_working(1), "{status}");
+        assert!(all.takes(ONE, 1), "{status}");
     }
 }
 
@@ -165,44 +175,89 @@ async fn what_the_request_may_have_caused_spends_a_retry() {
 async fn a_replica_without_the_model_is_gone_and_the_last_one_stops_the_run() {
     let all = services(2);
     let missing = failed(FailureKind::Request, Some(404), Reach::Endpoint);
-    assert_eq!(all.failed(0, &missing), Effect::Elsewhere);
+    assert_eq!(all.failed(ONE, 0, &missing), Effect::Elsewhere);
     tokio::time::advance(Duration::from_hours(1)).await;
     for image in 0..20 {
         assert_eq!(choose(&all, image), 1);
     }
-    assert_eq!(all.failed(1, &missing), Effect::Own);
-    assert_eq!(all.choose(0, &[], |_| true), Choice::None);
+    assert_eq!(all.failed(ONE, 1, &missing), Effect::Own);
+    assert_eq!(all.choose(ONE, 0, &[], |_| true), Choice::None);
 }
 
 #[tokio::test(start_paused = true)]
 async fn a_replica_of_another_model_is_gone() {
     let all = services(3);
-    assert!(all.succeeded(0, Some("a"), Instant::now()).is_ok());
+    assert!(all.succeeded(ONE, 0, Some("a"), Instant::now()).is_ok());
     assert!(
-        all.succeeded(1, None, Instant::now()).is_ok(),
+        all.succeeded(ONE, 1, None, Instant::now()).is_ok(),
         "it does not say"
     );
     assert_eq!(
-        all.succeeded(1, Some("b"), Instant::now()),
+        all.succeeded(ONE, 1, Some("b"), Instant::now()),
         Err(Effect::Elsewhere)
     );
-    assert!(!all.is_working(1));
-    assert!(all.succeeded(2, Some("a"), Instant::now()).is_ok() && all.is_working(2));
+    assert!(!all.takes(ONE, 1));
+    assert!(all.succeeded(ONE, 2, Some("a"), Instant::now()).is_ok() && all.takes(ONE, 2));
+}
+
+/// What a replica is for one model says nothing of another one at the same replicas.
+#[tokio::test(start_paused = true)]
+async fn each_model_has_replicas_of_its_own() {
+    let all = services(2);
+    let other = all.add_model("b".to_owned());
+    for (model, name) in [(ONE, "a"), (other, "b"), (ONE, "a")] {
+        for index in 0..2 {
+            let noted = all.succeeded(model, index, Some(name), Instant::now());
+            assert!(
+                noted.is_ok() && all.takes(model, index),
+                "{name} at {index}"
+            );
+        }
+    }
+    let missing = failed(FailureKind::Request, Some(404), Reach::Endpoint);
+    assert_eq!(all.failed(ONE, 0, &missing), Effect::Elsewhere);
+    assert_eq!(all.failed(ONE, 1, &missing), Effect::Own);
+    assert_eq!(all.choose(ONE, 0, &[], |_| true), Choice::None);
+    assert!(!all.has_other(ONE, &[]) && all.has_other(other, &[0]));
+    assert!(matches!(
+        all.choose(other, 0, &[], |_| true),
+        Choice::Replica(_)
+    ));
+    // A replica that does not answer is out for all of them.
+    for _ in 0..3 {
+        all.failed(other, 0, &refused_connection());
+    }
+    assert!(!all.takes(other, 0) && all.takes(other, 1));
+}
+
+/// A model is asked again without the field that a replica refuses.
+#[tokio::test(start_paused = true)]
+async fn a_refused_field_takes_no_replica_away() {
+    let all = services(2);
+    let field = FailedTry {
+        refused_field: Some(AdaptableField::Temperature),
+        ..failed(FailureKind::Request, Some(403), Reach::Endpoint)
+    };
+    assert_eq!(all.failed(ONE, 0, &field), Effect::Own);
+    assert!(all.takes(ONE, 0));
 }
 
 #[tokio::test(start_paused = true)]
 async fn if_none_works_all_are_tried_as_one_endpoint_is() {
     let all = services(2);
     for index in [0, 0, 0, 1, 1] {
-        all.failed(index, &refused_connection());
+        all.failed(ONE, index, &refused_connection());
     }
     assert_eq!(
-        all.failed(1, &refused_connection()),
+        all.failed(ONE, 1, &refused_connection()),
         Effect::Own,
         "no other is left"
     );
-    assert!(!all.is_working(0) && !all.is_working(1));
-    assert!(matches!(all.choose(0, &[], |_| true), Choice::Replica(_)));
+    assert!(!all.takes(ONE, 0) && !all.takes(ONE, 1));
+    assert!(matches!(
+        all.choose(ONE, 0, &[], |_| true),
+        Choice::Replica(_)
+    ));
 }
 
 #[test]
@@ -210,7 +265,7 @@ fn those_that_have_room_come_first() {
     let all = services(3);
     for image in 0..20 {
         assert_eq!(
-            all.choose(image, &[], |index| index == 1),
+            all.choose(ONE, image, &[], |index| index == 1),
             Choice::Replica(1)
         );
         all.released(1);

@@ -9,7 +9,6 @@ use super::driver::{Driver, Step};
 use super::event::Event;
 use super::part::Stage;
 use super::replies::{Imported, ReplyImport};
-use crate::ask::batch::BatchLine;
 use crate::error::{Error, Result};
 use crate::types::{Detail, Failure, FailureKind, TrialKey};
 
@@ -24,10 +23,11 @@ impl<D: Detail> Driver<'_, D> {
         let model = self.models.iter().find(|one| one.name() == model);
         let mut refused = BTreeSet::new();
         let (mut is_adapted, mut unread) = (false, 0);
+        let server = self.servers.of(&self.part(part).facts.base)?;
         let mut replies = ReplyImport::new(self.store, self.manifest)?;
         for path in paths.iter().filter(|path| path.exists()) {
             for_each_line(path, |line| {
-                let Some(line) = BatchLine::read(line) else {
+                let Some(line) = server.line(line) else {
                     unread += 1;
                     return Ok(());
                 };

@@ -5,7 +5,7 @@ use serde_json::json;
 use super::{BLIND, QUESTIONS, answered, assert_each_once, blind, call_with};
 use crate::support::batches::{Course, Fault, Line, MockBatches, Order};
 use crate::support::endpoint::Answer;
-use crate::support::run::{Bench, called, words};
+use crate::support::run::{Bench, called, records, words};
 use crate::support::table::check_rows;
 
 #[test]
@@ -24,6 +24,39 @@ fn output_comes_in_any_shape() {
         let sizes: Vec<usize> = mock.asked().iter().map(Vec::len).collect();
         assert_eq!(sizes, [QUESTIONS, 1][..batches], "{order:?}");
     }
+}
+
+/// A key that a server repeats in its files is in no file of the run.
+#[test]
+fn a_key_in_the_output_of_a_batch_is_kept_nowhere() {
+    const KEY: &str = "sk-0123456789abcdef";
+    let course = Course::of("completed")
+        .text("C, and the key is sk-0123456789abcdef")
+        .lines(|i| [Line::Right, Line::Status(400, "no sk-0123456789abcdef")][i % 2]);
+    let bench = Bench::with_questions(QUESTIONS);
+    let mock = MockBatches::start([course]);
+    let base = mock.base_url();
+    let args = [words(BLIND), vec!["--base-url", &base]].concat();
+    let called = called(bench.command(&args).env("OPENAI_API_KEY", KEY));
+    assert_eq!(called.code, Some(1), "{called:?}");
+    assert!(!called.stderr.contains(KEY), "{called:?}");
+    let records = records(&bench.path("run"));
+    let hidden = records.iter().map(ToString::to_string);
+    let hidden = hidden.filter(|record| record.contains("[secret]"));
+    assert_eq!(hidden.count(), QUESTIONS);
+    let mut texts = 0;
+    for folder in ["run", "run/batch"] {
+        for entry in std::fs::read_dir(bench.path(folder)).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_file() {
+                let text = std::fs::read(&path).unwrap();
+                let text = String::from_utf8_lossy(&text);
+                assert!(!text.contains(KEY), "{}", path.display());
+                texts += usize::from(text.contains("[secret]"));
+            }
+        }
+    }
+    assert!(texts >= 2, "the records and the output of the batch");
 }
 
 #[test]

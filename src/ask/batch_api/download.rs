@@ -1,0 +1,67 @@
+//! Removal of keys from a file that a server sent: [`remove_secrets`].
+
+use std::fs::{self, File};
+use std::io::{self, BufRead as _, BufReader, BufWriter, Write as _};
+use std::path::Path;
+
+use crate::ask::secret::Scrub;
+
+/// Removes keys from the lines of a file. A file without any of them is not written again.
+pub(super) fn remove_secrets(path: &Path, scrub: &Scrub) -> io::Result<()> {
+    if scrub.is_empty() || !has_secrets(path, scrub)? {
+        return Ok(());
+    }
+    let cleaned = path.with_extension("cleaned");
+    let mut out = BufWriter::new(File::create(&cleaned)?);
+    for_each_line(path, |line| {
+        let text = String::from_utf8_lossy(line).into_owned();
+        out.write_all(scrub.reply(text).as_bytes())
+    })?;
+    out.into_inner()?.sync_all()?;
+    fs::rename(&cleaned, path)
+}
+
+fn has_secrets(path: &Path, scrub: &Scrub) -> io::Result<bool> {
+    let mut found = false;
+    for_each_line(path, |line| {
+        let text = String::from_utf8_lossy(line).into_owned();
+        found = found || scrub.reply(text.clone()) != text;
+        Ok(())
+    })?;
+    Ok(found)
+}
+
+/// Calls `take` with each line of a file and its line end.
+fn for_each_line(path: &Path, mut take: impl FnMut(&[u8]) -> io::Result<()>) -> io::Result<()> {
+    let mut file = BufReader::new(File::open(path)?);
+    let mut line = Vec::new();
+    while file.read_until(b'\n', &mut line)? > 0 {
+        take(&line)?;
+        line.clear();
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_are_removed_and_all_else_stays_byte_by_byte() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("part.download");
+        let scrub = Scrub::new(["sk-0123456789abcdef".to_owned()]);
+        let after = |before: &[u8]| {
+            fs::write(&path, before).unwrap();
+            remove_secrets(&path, &scrub).unwrap();
+            fs::read(&path).unwrap()
+        };
+        assert_eq!(
+            after(b"{\"a\": 1}\r\n\n{\"key\": \"sk-0123456789abcdef\"}"),
+            b"{\"a\": 1}\r\n\n{\"key\": \"[secret]\"}"
+        );
+        let other = b"sk-0123456789\xff\n\n";
+        assert_eq!(after(other), other);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+}
