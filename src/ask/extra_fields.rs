@@ -8,6 +8,7 @@ use clap::Args;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use super::body_secrets::refuse_secrets;
 use crate::error::{Error, Result};
 use crate::types::Decides;
 
@@ -95,7 +96,8 @@ impl RequestArgs {
     /// The fields, with the files read.
     ///
     /// # Errors
-    /// If a file cannot be read, the JSON is no object, or a field is one that the program sets.
+    /// If a file cannot be read, the JSON is no object, or a field is one that the program sets or looks like a secret, which the error
+    /// does not show.
     pub(crate) fn resolve(&self) -> Result<ExtraFields> {
         let system = match (&self.system, &self.system_file) {
             (Some(words), _) => Some(words.clone()),
@@ -154,6 +156,7 @@ fn body(value: &str) -> Result<Map<String, Value>> {
     if let Some((field, by)) = owned.find(|(field, _)| fields.contains_key(*field)) {
         return Err(wrong(format!("{field} is set by the program: use {by}")));
     }
+    refuse_secrets(&fields)?;
     Ok(fields)
 }
 

@@ -12,6 +12,7 @@ pub(crate) mod batch;
 pub(crate) mod batch_api;
 mod batch_interface;
 mod body;
+mod body_secrets;
 mod call;
 mod complaint;
 mod connection;

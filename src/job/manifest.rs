@@ -61,8 +61,14 @@ pub(crate) fn of<E: Experiment>(
         None => OtherSettings::Refused,
     };
     let before = stored.clone();
-    let now = experiment.columns();
-    renamed::note(&mut manifest, &before, &now, other_settings)?;
+    let now = experiment.columns().remove("model").unwrap_or_default();
+    let views = renamed::views(&job.ask);
+    let now = renamed::Now {
+        models: &now,
+        views: &views,
+        settings: other_settings,
+    };
+    renamed::note(&mut manifest, &before, now)?;
     let images = merged_flags(&stored.images, manifest.images);
     if stored.status != Status::Complete {
         return Ok(RunManifest {
@@ -77,7 +83,7 @@ pub(crate) fn of<E: Experiment>(
     }
     stored.settings.extend(notes);
     stored.models.clone_from(&manifest.models);
-    renamed::note(&mut stored, &before, &now, other_settings)?;
+    renamed::note(&mut stored, &before, now)?;
     Ok(RunManifest {
         identity: manifest.identity,
         columns: manifest.columns,

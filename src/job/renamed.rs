@@ -7,11 +7,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
 
-use super::identity::Columns;
-use super::models::ADAPTED_FOR;
+use super::models::{ADAPTED_FOR, AskSettings};
 use crate::error::Result;
 use crate::types::control::OBSERVER;
 use crate::types::manifest::RunManifest;
+use crate::types::model_views::{Fit, StoredViews, Views};
 use crate::types::recorded_names::RecordedNames;
 use crate::types::{Control, Digest, Record};
 
@@ -27,21 +27,47 @@ pub(super) enum OtherSettings {
     Refused,
 }
 
+/// The models of a command.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Now<'a> {
+    /// What decides the replies of each, by name.
+    pub(super) models: &'a BTreeMap<String, Value>,
+    /// What each is shown, by name.
+    pub(super) views: &'a Views,
+    pub(super) settings: OtherSettings,
+}
+
+/// What the models of a command are shown.
+pub(super) fn views(ask: &AskSettings) -> Views {
+    let mut views = Views::new();
+    for model in &ask.models {
+        views
+            .entry(model.name.clone())
+            .or_default()
+            .insert(model.view);
+    }
+    views
+}
+
 /// Notes in a manifest which models of the stored one have another name in these columns. Two names are of one model if all that
-/// decides its replies is the same. A model whose name another one has now is `NAME (before)`.
+/// decides its replies is the same, and both are shown images, or none. A model whose name another one has now is `NAME (before)`.
 ///
 /// # Errors
 /// If a number in the settings of a model is not finite.
 pub(super) fn note(
     manifest: &mut RunManifest,
     stored: &RunManifest,
-    now: &Columns,
-    settings: OtherSettings,
+    command: Now<'_>,
 ) -> Result<()> {
+    let Now {
+        models: now,
+        settings,
+        ..
+    } = command;
     let empty = BTreeMap::new();
-    let now = now.get("model").unwrap_or(&empty);
     let before = stored.columns.get("model").unwrap_or(&empty);
-    let moves = moves(before, now, settings);
+    let stored_views = StoredViews::of(stored);
+    let moves = moves(before, &stored_views, command);
     let mut names = RecordedNames::of(stored);
     names.rename(&moves);
     for (name, content) in now {
@@ -62,14 +88,22 @@ pub(super) fn note(
             .map(|(name, content)| (new(name), content.clone()));
         *models = known.chain(now.clone()).collect();
     }
+    let adapted = |name: &String| format!("{ADAPTED_FOR}{name}");
+    // Two models may have exchanged their names: all are taken out before one is put in.
+    for name in moves
+        .keys()
+        .filter(|name| stored.settings.contains_key(&adapted(name)))
+    {
+        manifest.settings.remove(&adapted(name));
+    }
     for (name, new) in &moves {
-        if let Some(changes) = stored.settings.get(&format!("{ADAPTED_FOR}{name}")) {
-            let changes = changes.clone();
-            manifest.settings.remove(&format!("{ADAPTED_FOR}{name}"));
-            manifest
-                .settings
-                .insert(format!("{ADAPTED_FOR}{new}"), changes);
+        if let Some(changes) = stored.settings.get(&adapted(name)) {
+            manifest.settings.insert(adapted(new), changes.clone());
         }
+    }
+    let known = before.keys().map(|name| (name, new(name)));
+    if settings == OtherSettings::Allowed || stored_views.is_noted() {
+        stored_views.note(manifest, known, command.views);
     }
     let left = left_out(manifest, stored, now, &moves, settings);
     if left.is_empty() {
@@ -83,20 +117,42 @@ pub(super) fn note(
 /// The new name of each model that has one.
 fn moves(
     before: &BTreeMap<String, Value>,
-    now: &BTreeMap<String, Value>,
-    settings: OtherSettings,
+    views: &StoredViews,
+    command: Now<'_>,
 ) -> BTreeMap<String, String> {
+    let Now {
+        models: now,
+        settings,
+        ..
+    } = command;
+    // How well a model of before fits one of now; `None` if it is another one.
+    let fit = |old: &String, new: &String| {
+        let is_same = decides(before.get(old)?) == decides(now.get(new)?);
+        let fit = views.fit(old, command.views.get(new)?);
+        is_same.then_some(fit).filter(|fit| *fit > Fit::Apart)
+    };
     let is_same = |name: &String| match (before.get(name), now.get(name)) {
-        (Some(old), Some(new)) => decides(old) == decides(new),
+        // A model that is shown something else now keeps its name unless another one of before has it now.
+        (Some(old), Some(new)) => {
+            decides(old) == decides(new)
+                && (fit(name, name).is_some() || !before.keys().any(|old| fit(old, name).is_some()))
+        }
         _ => false,
     };
-    let mut moves = BTreeMap::new();
-    for (new, content) in now.iter().filter(|(new, _)| !is_same(new)) {
-        let mut same = before.iter().filter(|(old, other)| {
-            *old != new && !is_same(old) && decides(content) == decides(other)
-        });
-        if let Some((old, _)) = same.next() {
-            moves.insert(old.clone(), new.clone());
+    let mut moves: BTreeMap<String, String> = BTreeMap::new();
+    let mut found = BTreeSet::new();
+    for least in [Fit::Whole, Fit::Part, Fit::Unknown] {
+        for new in now.keys().filter(|new| !is_same(new)) {
+            let mut same = before.keys().filter(|old| {
+                let is_free = !moves.contains_key(*old) && !is_same(old);
+                *old != new && is_free && fit(old, new) >= Some(least)
+            });
+            if !found.contains(new)
+                && let Some(old) = same.next()
+            {
+                moves.insert(old.clone(), new.clone());
+                found.insert(new.clone());
+            }
         }
     }
     if settings == OtherSettings::Refused {

@@ -28,6 +28,10 @@ pub(crate) struct ModelsArgs {
     /// One key of one model, above the file; repeatable; default: none
     #[arg(long, value_name = "NAME.KEY=VALUE", help_heading = "Model", add = Decides::Reply)]
     pub set: Vec<String>,
+    /// Take the file of models as your own although the working directory is not in its folder: with --check it may name any variable
+    /// and file
+    #[arg(long, help_heading = "Model", add = Decides::Nothing)]
+    pub trust_models: bool,
     /// Send one tiny request to each model, and print what came of it
     #[arg(long, help_heading = "Model", add = Decides::Nothing)]
     pub check: bool,
@@ -36,12 +40,14 @@ pub(crate) struct ModelsArgs {
 /// Prints what each model of a file comes to: endpoint, where its key comes from, request and digest. Sends nothing without `--check`.
 ///
 /// # Errors
-/// If the file cannot be used, or a key is missing that `--check` needs.
+/// If the file cannot be used, or a key is missing that `--check` needs, or the file may be a stranger's and names what is not its
+/// own.
 pub(crate) fn models(args: &ModelsArgs, progress: &Progress) -> Result<Outcome> {
     let named = ModelArgs {
         models: Some(args.file.clone()),
         only: args.only.clone(),
         set: args.set.clone(),
+        trust_models: args.trust_models,
         ..ModelArgs::default()
     };
     let context = ResolveContext {
@@ -52,7 +58,8 @@ pub(crate) fn models(args: &ModelsArgs, progress: &Progress) -> Result<Outcome> 
         } else {
             KeyUse::NotNeeded
         },
-        data: None,
+        // The data are not known here: they may lie where the file does. Without requests nobody gets anything.
+        data: args.check.then_some(args.file.as_path()),
     };
     let ask = AskSettings::resolve(&named, &AskingArgs::defaults()?, context)?;
     let mut output = describe(&ask)?;

@@ -195,6 +195,61 @@ fn two_models_may_exchange_their_names() {
     assert_eq!((mock.requests().len(), found.len()), (asked, 2));
 }
 
+/// A model is asked with and without images under two names; they differ in nothing else.
+#[test]
+fn replies_with_and_without_images_keep_apart_under_new_names() {
+    const BLIND: &str = "view = \"blind\"";
+    // Right (C) where there is an image.
+    let mock = MockEndpoint::answering(|body| {
+        let has_image = body["messages"][0]["content"].is_array();
+        Answer::text(if has_image { "C" } else { "A" })
+    });
+    let url = mock.base_url();
+    let tables =
+        |image: &str, blind: &str| [table(blind, "m", &url, BLIND), table(image, "m", &url, "")];
+    let is = |bench: &Bench, image: &str, blind: &str| {
+        let expected = [(image, "1.0"), (blind, "0.0")];
+        let expected = expected.map(|(name, value)| (name.to_owned(), value.to_owned()));
+        assert_eq!(accuracies(bench), BTreeMap::from(expected));
+    };
+    // Both get another name, in whatever order the names are; they exchange them; and nothing is asked again.
+    let bench = Bench::with_questions(2);
+    complete(&bench, &tables("GPT-4o", "GPT-4o (blind)"), "");
+    is(&bench, "GPT-4o", "GPT-4o (blind)");
+    assert_eq!(mock.requests().len(), 4);
+    for (image, blind) in [
+        ("4o", "4o (blind)"),
+        ("seeing", "a"),
+        ("a", "seeing"),
+        ("a", "b"),
+    ] {
+        complete(&bench, &tables(image, blind), "");
+        is(&bench, image, blind);
+        bench.complete(&["report", "run", "--all"]);
+        is(&bench, image, blind);
+    }
+    assert_eq!(mock.requests().len(), 4);
+    // One gets another name, and the other one is new.
+    for blind in ["4o (blind)", "3o"] {
+        let bench = Bench::with_questions(2);
+        complete(&bench, &[table("GPT-4o", "m", &url, "")], "");
+        let asked = mock.requests().len();
+        complete(&bench, &tables("4o", blind), "");
+        is(&bench, "4o", blind);
+        assert_eq!(mock.requests().len(), asked + 2);
+    }
+    // One is taken out, and the other one has its name.
+    let bench = Bench::with_questions(2);
+    complete(&bench, &tables("x", "y"), "");
+    let run = complete(&bench, &[table("x", "m", &url, BLIND)], "");
+    let left = "x (before) is left out of run";
+    assert!(run.stdout.contains(left), "{}", run.stdout);
+    assert_eq!(
+        accuracies(&bench),
+        BTreeMap::from([("x".into(), "0.0".into())])
+    );
+}
+
 #[test]
 fn models_whose_requests_were_changed_are_marked() {
     let strict = MockEndpoint::answering(|body| match body.get("temperature") {

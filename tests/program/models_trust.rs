@@ -118,6 +118,165 @@ fn a_file_that_came_with_the_data_takes_nothing_that_is_not_its_own() {
 }
 
 #[test]
+fn what_a_table_leaves_of_the_defaults_is_held_against_its_own_address() {
+    let evil = "https://evil.example/v1";
+    let variables = [
+        ("OPENAI_API_KEY", "sk-0123456789"),
+        ("AWS_SECRET_ACCESS_KEY", "aws-0123456789"),
+    ];
+    let secret = "headers = { X-A = { env = \"AWS_SECRET_ACCESS_KEY\" } }";
+    let none = "key-env = \"none\"";
+    let cases = [
+        // The header of [defaults] is another one than that of the table.
+        (
+            format!("{secret}\n{none}"),
+            String::new(),
+            "",
+            "line 2: headers: AWS_SECRET_ACCESS_KEY is no variable of evil.example's own tools",
+        ),
+        // A key of a flag is not sent to the address of a table, which leaves the default.
+        (
+            none.to_owned(),
+            String::new(),
+            "--api-key-env AWS_SECRET_ACCESS_KEY",
+            "",
+        ),
+        // A flag names a secret for an address, and the table names another address.
+        (
+            none.to_owned(),
+            String::new(),
+            "--header-env X-A=AWS_SECRET_ACCESS_KEY",
+            "line 5: endpoints: AWS_SECRET_ACCESS_KEY would be sent to evil.example",
+        ),
+        (
+            none.to_owned(),
+            "allow-http = true".to_owned(),
+            "",
+            "line 6: allow-http: ",
+        ),
+        (
+            none.to_owned(),
+            "ca-file = \"../data/inside.txt\"".to_owned(),
+            "",
+            "line 6: ca-file: ",
+        ),
+        // Neither goes there.
+        (none.to_owned(), String::new(), "", ""),
+        (
+            format!("{secret}\n{none}"),
+            "headers = { X-B = \"b\" }".to_owned(),
+            "",
+            "",
+        ),
+        (
+            format!("{secret}\n{none}"),
+            "headers = {}".to_owned(),
+            "",
+            "",
+        ),
+    ];
+    for (defaults, more, line, part) in cases {
+        let file = format!("[defaults]\n{defaults}\n{}", table("m", evil, &more));
+        let called = strange(&file, line, &variables);
+        let code = if part.is_empty() { 0 } else { 2 };
+        assert_eq!(called.code, Some(code), "{file} {line}: {called:?}");
+        assert!(called.stderr.contains(part), "{}", called.stderr);
+    }
+}
+
+/// What is sent with `defaults` and the keys `more` of one table, whose address is a mock's.
+fn sent(defaults: &str, more: &str, line: &str) -> crate::support::endpoint::Request {
+    let mock = MockEndpoint::start([Answer::text("C")]);
+    let bench = Bench::with_questions(1);
+    let table = table("m", &mock.base_url(), more);
+    bench.file("models.toml", format!("[defaults]\n{defaults}\n{table}"));
+    let line = format!("--models models.toml --data set.jsonl --levels L0 --out run {line}");
+    let mut command = bench.command(&words(&line));
+    command
+        .env("OPENAI_API_KEY", "sk-openai-0123")
+        .env("GATEWAY_KEY", "gateway-0123456789")
+        .env("FLAG_KEY", "flag-0123456789")
+        .env("AWS_SECRET_ACCESS_KEY", "aws-0123456789");
+    let called = called(&mut command);
+    assert_eq!(called.code, Some(0), "{called:?}");
+    mock.requests().remove(0)
+}
+
+#[test]
+fn the_key_and_headers_of_the_defaults_go_to_each_address() {
+    let gateway = "key-env = \"GATEWAY_KEY\"";
+    let secret = "headers = { X-A = { env = \"AWS_SECRET_ACCESS_KEY\" } }";
+    let bearer = |key: &str| Some(format!("Bearer {key}"));
+    for (defaults, more, line, key) in [
+        (gateway, "", "", bearer("gateway-0123456789")),
+        // The key of a flag belongs to the address of the flags.
+        (
+            gateway,
+            "",
+            "--api-key-env FLAG_KEY",
+            bearer("gateway-0123456789"),
+        ),
+        ("", "", "--api-key-env FLAG_KEY", bearer("sk-openai-0123")),
+        ("key-env = \"none\"", "", "", None),
+        (
+            "key-env = \"none\"",
+            gateway,
+            "",
+            bearer("gateway-0123456789"),
+        ),
+    ] {
+        let request = sent(defaults, more, line);
+        let found = request.header("authorization");
+        assert_eq!(found, key.as_deref(), "{defaults} {more} {line}");
+    }
+    let request = sent(secret, "", "");
+    assert_eq!(request.header("x-a"), Some("aws-0123456789"));
+    // A table of headers replaces the other one whole.
+    for headers in [
+        "{ X-B = \"b\" }",
+        "{ X-B = { env = \"GATEWAY_KEY\" } }",
+        "{}",
+    ] {
+        let request = sent(secret, &format!("headers = {headers}"), "");
+        assert_eq!(request.header("x-a"), None, "{headers}");
+        assert_eq!(request.header("x-b").is_some(), headers != "{}");
+    }
+}
+
+#[test]
+fn a_file_of_another_folder_is_not_checked_with_any_key() {
+    let mock = MockEndpoint::start([Answer::text("OK")]);
+    let bench = Bench::new();
+    let key = "key-env = \"AWS_SECRET_ACCESS_KEY\"";
+    bench.file("data/models.toml", table("m", &mock.base_url(), key));
+    fs::create_dir_all(bench.path("work")).unwrap();
+    let call = |folder: &str, line: &str| {
+        let mut command = bench.command(&words(&format!("models {line}")));
+        command
+            .env("AWS_SECRET_ACCESS_KEY", "aws-0123456789")
+            .current_dir(bench.path(folder));
+        called(&mut command)
+    };
+    for (folder, file) in [(".", "data/models.toml"), ("work", "../data/models.toml")] {
+        let refused = call(folder, &format!("{file} --check"));
+        assert_eq!(refused.code, Some(2), "{refused:?}");
+        let part = "line 4: key-env: AWS_SECRET_ACCESS_KEY is no variable of 127.0.0.1's own tools";
+        assert!(refused.stderr.contains(part), "{}", refused.stderr);
+        // Nothing is sent without --check.
+        assert_eq!(call(folder, file).code, Some(0));
+    }
+    assert_eq!(mock.requests().len(), 0);
+    for (folder, line) in [
+        ("data", "models.toml --check"),
+        (".", "data/models.toml --check --trust-models"),
+    ] {
+        let called = call(folder, line);
+        assert_eq!(called.code, Some(0), "{called:?}");
+    }
+    assert_eq!(mock.requests().len(), 2);
+}
+
+#[test]
 fn a_table_of_vendors_says_how_a_host_is_asked() {
     let mock = MockEndpoint::start([Answer::text("C")]);
     let bench = Bench::with_questions(1);

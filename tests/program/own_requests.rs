@@ -200,6 +200,36 @@ fn what_the_program_sets_is_refused_by_name() {
     assert!(error.contains("--constrain"), "{error}");
 }
 
+/// Bodies are written to the manifest and to files of batches.
+#[test]
+fn a_secret_in_the_body_is_refused_and_written_nowhere() {
+    let bench = Bench::with_questions(1);
+    let mock = MockEndpoint::start([Answer::text("C")]);
+    let body = format!("{{\"litellm\": {{\"api_key\": \"{SECRET}\"}}}}");
+    bench.file("body.json", &body);
+    let table = format!(
+        "[[model]]\nid = \"m\"\nendpoints = [\"{}\"]\nbody = \"@body.json\"\n",
+        mock.base_url()
+    );
+    bench.file("models.toml", table);
+    let url = mock.base_url();
+    let flags = ["--model", "m", "--base-url", &url, "--extra-body"];
+    for words in [
+        [&flags[..], &[&*body]].concat(),
+        [&flags[..], &["@body.json"]].concat(),
+        vec!["--models", "models.toml"],
+    ] {
+        let line = ["--data", "set.jsonl", "--levels", "L0", "--out", "run"];
+        let refused = bench.call(&[&line[..], &words].concat());
+        assert_eq!(refused.code, Some(2), "{refused:?}");
+        let part = "api_key looks like a secret";
+        assert!(refused.stderr.contains(part), "{}", refused.stderr);
+        assert!(!refused.stderr.contains(SECRET), "{}", refused.stderr);
+        assert!(!bench.path("run").exists(), "{words:?}");
+    }
+    assert_eq!(mock.requests().len(), 0);
+}
+
 #[test]
 fn a_refused_field_of_the_user_is_named() {
     let bench = Bench::with_questions(1);

@@ -54,6 +54,17 @@ impl AskingArgs {
         flags.map(str::to_owned).collect()
     }
 
+    /// Takes the key away: it belongs to another address than the one that follows.
+    pub(super) fn forget_key(&mut self) {
+        (self.access.api_key_env, self.access.api_key_file) = (None, None);
+    }
+
+    /// Takes all headers away: those that follow replace them.
+    pub(super) fn forget_headers(&mut self) {
+        self.access.header.clear();
+        self.access.header_env.clear();
+    }
+
     /// Replaces the settings that these words name; the others stay. A switch is written `--flag=true`.
     ///
     /// # Errors
@@ -65,11 +76,7 @@ impl AskingArgs {
         let given = |id: &str| matches.contains_id(id);
         // Of two settings of one thing, the one of this layer holds.
         if given("api_key_env") || given("api_key_file") {
-            (self.access.api_key_env, self.access.api_key_file) = (None, None);
-        }
-        if given("base_url") && !given("api_key_env") && !given("api_key_file") {
-            // A key that belongs to another address is not sent to this one.
-            (self.access.api_key_env, self.access.api_key_file) = (None, None);
+            self.forget_key();
         }
         if given("system") || given("system_file") {
             (self.request.system, self.request.system_file) = (None, None);
@@ -135,14 +142,15 @@ mod tests {
     }
 
     #[test]
-    fn a_key_does_not_follow_another_address() {
+    fn one_key_replaces_the_other() {
         let mut args = AskingArgs::defaults().unwrap();
         args.access.api_key_env = Some("A".into());
         args.update(&["--temperature=1".into()]).unwrap();
         assert_eq!(args.access.api_key_env.as_deref(), Some("A"));
         args.update(&["--api-key-file=f".into()]).unwrap();
         assert_eq!(args.access.api_key_env, None);
-        args.update(&["--base-url=http://h/v1".into()]).unwrap();
+        assert!(args.access.api_key_file.is_some());
+        args.forget_key();
         assert_eq!(args.access.api_key_file, None);
     }
 }

@@ -116,6 +116,10 @@ impl Entry {
             place: Some(id.place.clone()),
             ..Self::of_flag(name, view, asking)
         };
+        if keys.contains_key("endpoints") {
+            // A key of the flags belongs to the address of the flags. One of [defaults] is of all models of the file.
+            entry.asking.forget_key();
+        }
         for layer in layers {
             entry.apply(layer)?;
         }
@@ -136,6 +140,10 @@ impl Entry {
                 key if is_of_the_run(key) => {}
                 key => {
                     let words = words(key, located)?;
+                    if key == "headers" {
+                        // One table holds, even an empty one: the headers of two layers are not mixed.
+                        self.asking.forget_headers();
+                    }
                     let wrong = |problem: String| located.error(format_args!("{key}: {problem}"));
                     self.asking.update(&words).map_err(wrong)?;
                 }

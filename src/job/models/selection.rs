@@ -49,7 +49,13 @@ pub(super) fn set(entries: &mut [Entry], text: &str) -> Result<()> {
     let keys = Keys::from([(key, located)]);
     check_keys(&keys, false)?;
     let mut named = entries.iter_mut().filter(|entry| entry.name == name);
-    named.try_for_each(|entry| entry.apply(&keys))
+    named.try_for_each(|entry| {
+        if keys.contains_key("endpoints") {
+            // A key that belongs to another address is not sent to this one.
+            entry.asking.forget_key();
+        }
+        entry.apply(&keys)
+    })
 }
 
 /// Keeps only the models that `--only` names.

@@ -97,7 +97,7 @@ impl AskSettings {
             } else {
                 Trust::ByPlace
             };
-            trust::check(file, &entries, context.data, trust)?;
+            trust::check(file, &entries, asking, context.data, trust)?;
         }
         let flag = |name: &ModelName, view| Entry::of_flag(name.clone(), view, asking.clone());
         entries.extend(args.model.iter().map(|name| flag(name, view)));
@@ -166,18 +166,20 @@ fn of_file(
         "view" => typed.contains("blind"),
         "seed" => typed.contains("sampling-seed"),
         "headers" => typed.contains("header") || typed.contains("header-env"),
+        "key-env" | "key-file" => typed.contains("api-key-env") || typed.contains("api-key-file"),
         key => flag_of(key).is_some_and(|flag| typed.contains(flag)),
     };
-    let defaults: Keys = file
-        .defaults
-        .clone()
-        .into_iter()
-        .filter(|(key, _)| !is_typed(key))
-        .collect();
+    // A key of the flags is not sent to an address of the file, so that it is above no key of [defaults] there.
+    let holds = |key: &str, keys: &Keys| {
+        let is_key = matches!(key, "key-env" | "key-file");
+        !is_typed(key) || (is_key && keys.contains_key("endpoints"))
+    };
     let mut entries = Vec::new();
     let mut overridden = BTreeSet::new();
     for keys in &file.models {
         check_keys(keys, false)?;
+        let defaults = file.defaults.clone().into_iter();
+        let defaults: Keys = defaults.filter(|(key, _)| holds(key, keys)).collect();
         overridden.extend(keys.keys().filter(|key| is_typed(key)).cloned());
         entries.push(Entry::of_file(
             keys,

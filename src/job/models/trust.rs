@@ -1,21 +1,17 @@
-//! What a file of models that came with data may not do by itself: [`check`].
+//! What a file of models that may have come with data may not do by itself: [`check`].
 //!
 //! Such a file is a stranger's: it could name a variable or a file of this machine, and an address of its own to send it to.
 
 use std::path::{Path, PathBuf};
 
-use toml::Value;
-
+use super::asking::AskingArgs;
 use super::entry::Entry;
 use super::file::{Keys, Located, ModelsFile};
-use crate::ask::{BaseUrl, OPENAI_KEY, own_variables};
+use crate::ask::{AccessArgs, BaseUrl, OPENAI_KEY, own_variables};
 use crate::error::{Error, Result};
 
 /// The value of `key-env` for an endpoint without keys.
 const NO_KEY: &str = "none";
-
-/// Keys that name a file whose content is sent.
-const FILES: [&str; 2] = ["key-file", "system-file"];
 
 /// Whether the user has said that a file of models is the user's own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,15 +22,17 @@ pub(super) enum Trust {
     ByPlace,
 }
 
-/// Refuses keys of a file in the folder of the `data` that would send variables other than those of the host's own tools, or files
+/// Refuses a file in the folder of the `data` by which variables other than those of the host's own tools would be sent, or files
 /// outside the file's own folder. A file is the user's own if the working directory lies in that folder. `entries` are the file's
-/// models, with all that flags add.
+/// models as merged: what they come to is looked at, and not what single tables say. What the `flags` alone send is the user's own
+/// wish, but to the addresses of the flags only.
 ///
 /// # Errors
 /// [`Error::Usage`] with the line of the key.
 pub(super) fn check(
     file: &ModelsFile,
     entries: &[Entry],
+    flags: &AskingArgs,
     data: Option<&Path>,
     trust: Trust,
 ) -> Result<()> {
@@ -45,7 +43,15 @@ pub(super) fn check(
         return Ok(());
     }
     for (keys, entry) in file.models.iter().zip(entries) {
-        check_model(file, keys, entry)?;
+        let model = Suspect {
+            file,
+            keys,
+            entry,
+            flags,
+        };
+        model.check_files()?;
+        model.check_connection()?;
+        model.check_variables()?;
     }
     Ok(())
 }
@@ -75,90 +81,180 @@ fn real(path: &Path) -> Option<PathBuf> {
     path.canonicalize().ok()
 }
 
-fn check_model(file: &ModelsFile, keys: &Keys, entry: &Entry) -> Result<()> {
-    let stated = |key: &str| keys.get(key).or_else(|| file.defaults.get(key));
-    let own = file.path.parent().and_then(real);
-    let is_inside = |path: &str| match (&own, real(Path::new(path))) {
-        (Some(own), Some(path)) => path.starts_with(own),
-        // What is not there cannot be sent.
-        _ => true,
-    };
-    for key in FILES {
-        if let Some(located) = stated(key)
-            && let Value::String(path) = &located.value
-            && !is_inside(path)
-        {
-            return Err(strange(
-                located,
-                format_args!("{key}: {path} is outside its folder"),
-            ));
+/// A model of a file that may be a stranger's.
+struct Suspect<'a> {
+    file: &'a ModelsFile,
+    /// Its own table.
+    keys: &'a Keys,
+    /// What it comes to.
+    entry: &'a Entry,
+    flags: &'a AskingArgs,
+}
+
+/// A variable that is sent, and the key of the file that says so.
+struct Sent<'a> {
+    key: &'static str,
+    variable: &'a str,
+    /// Whether the flags alone send it, too.
+    by_flags: bool,
+}
+
+impl Suspect<'_> {
+    /// Refuses files outside the folder of the file of models, whose content would be sent.
+    fn check_files(&self) -> Result<()> {
+        let (asking, flags) = (&self.entry.asking, self.flags);
+        let body = |asking: &AskingArgs| {
+            let text = asking.request.extra_body.as_deref()?;
+            text.strip_prefix('@').map(PathBuf::from)
+        };
+        let files = [
+            (
+                "key-file",
+                asking.access.api_key_file.clone(),
+                flags.access.api_key_file.clone(),
+            ),
+            (
+                "system-file",
+                asking.request.system_file.clone(),
+                flags.request.system_file.clone(),
+            ),
+            ("body", body(asking), body(flags)),
+        ];
+        for (key, path, of_flags) in files {
+            if let Some(path) = path
+                && Some(&path) != of_flags.as_ref()
+                && !self.is_inside(&path)
+            {
+                let problem = format_args!("{key}: {} is outside its folder", path.display());
+                return Err(self.strange(key, problem));
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses what decides which variables are sent, whom a connection trusts, and whether others can read it.
+    fn check_connection(&self) -> Result<()> {
+        let (access, flags) = (&self.entry.asking.access, &self.flags.access);
+        if access.vendor != flags.vendor {
+            let problem = "vendor: such a table says which variables are sent";
+            return Err(self.strange("vendor", format_args!("{problem}")));
+        }
+        if access.ca_file != flags.ca_file {
+            let problem = "ca-file: its authorities could pass off another server as the vendor's";
+            return Err(self.strange("ca-file", format_args!("{problem}")));
+        }
+        if access.allow_http && !flags.allow_http {
+            let problem = "allow-http: others on the way could read what is sent";
+            return Err(self.strange("allow-http", format_args!("{problem}")));
+        }
+        Ok(())
+    }
+
+    /// Refuses variables that would be sent to a host whose own tools do not read them.
+    fn check_variables(&self) -> Result<()> {
+        let access = &self.entry.asking.access;
+        let of_flags = self.flags.access.addresses()?;
+        for base in access.addresses()? {
+            let own = own_variables(base.host());
+            let is_of_flags = of_flags.contains(&base);
+            let mut sent = named(access, &self.flags.access);
+            sent.extend(self.default_key(&base, &own));
+            let mut foreign = sent.iter().filter(|sent| {
+                let is_wished = sent.by_flags && is_of_flags;
+                !is_wished && !own.contains(&sent.variable)
+            });
+            if let Some(Sent { key, variable, .. }) = foreign.next() {
+                return Err(self.foreign(key, variable, &base));
+            }
+        }
+        Ok(())
+    }
+
+    /// The variable that is taken for a host that the table of vendors does not have, if no other key is named.
+    fn default_key(&self, base: &BaseUrl, own: &[&str]) -> Option<Sent<'static>> {
+        let (access, flags) = (&self.entry.asking.access, &self.flags.access);
+        let none =
+            |access: &AccessArgs| access.api_key_env.is_none() && access.api_key_file.is_none();
+        let is_set = std::env::var_os(OPENAI_KEY).is_some_and(|text| !text.is_empty());
+        let is_sent = none(access) && own.is_empty() && !base.is_loopback() && is_set;
+        is_sent.then(|| Sent {
+            key: "endpoints",
+            variable: OPENAI_KEY,
+            by_flags: none(flags),
+        })
+    }
+
+    /// The error about a variable at a host that is not its own.
+    fn foreign(&self, key: &str, variable: &str, base: &BaseUrl) -> Error {
+        let host = base.host();
+        if self.stated(key, variable).is_some() && key != "endpoints" {
+            let problem = format_args!("{key}: {variable} is no variable of {host}'s own tools");
+            return self.strange_at(self.stated(key, variable), problem);
+        }
+        let problem = if key == "endpoints" {
+            format!("{variable} would be sent to {host}, which the table of vendors does not have")
+        } else {
+            format!("{variable} would be sent to {host}, which no flag names")
+        };
+        self.strange("endpoints", format_args!("endpoints: {problem}"))
+    }
+
+    /// The key of the model's own table, else that of `[defaults]`, if it names the variable.
+    fn stated(&self, key: &str, variable: &str) -> Option<&Located> {
+        let layers = [self.keys.get(key), self.file.defaults.get(key)];
+        let names = |located: &&Located| match &located.value {
+            toml::Value::Table(table) => {
+                let mut values = table.values();
+                values.any(|value| value.get("env").and_then(toml::Value::as_str) == Some(variable))
+            }
+            value => value.as_str() == Some(variable),
+        };
+        layers.into_iter().flatten().find(names)
+    }
+
+    fn is_inside(&self, path: &Path) -> bool {
+        let own = self.file.path.parent().and_then(real);
+        match (own, real(path)) {
+            (Some(own), Some(path)) => path.starts_with(own),
+            // What is not there cannot be sent.
+            _ => true,
         }
     }
-    if let Some(located) = stated("body")
-        && let Value::String(text) = &located.value
-        && let Some(path) = text.strip_prefix('@')
-        && !is_inside(path)
-    {
-        return Err(strange(
-            located,
-            format_args!("body: {path} is outside its folder"),
-        ));
+
+    /// The error at the line of a key: that of the model's own table, else that of `[defaults]`.
+    fn strange(&self, key: &str, problem: std::fmt::Arguments<'_>) -> Error {
+        let located = self.keys.get(key).or_else(|| self.file.defaults.get(key));
+        self.strange_at(located, problem)
     }
-    if let Some(located) = stated("vendor") {
-        let problem = "vendor: such a table says which variables are sent";
-        return Err(strange(located, format_args!("{problem}")));
-    }
-    let hosts = entry.asking.access.addresses()?;
-    let headers = stated("headers");
-    for (located, key, variable) in variables(stated("key-env"), headers) {
-        if let Some(base) = hosts.iter().find(|base| !is_own(base, variable)) {
-            let problem = format_args!(
-                "{key}: {variable} is no variable of {}'s own tools",
-                base.host()
-            );
-            return Err(strange(located, problem));
-        }
-    }
-    let unknown = |base: &&BaseUrl| own_variables(base.host()).is_empty() && !base.is_loopback();
-    let takes_default = stated("key-env").is_none() && stated("key-file").is_none();
-    if let (true, Some(located)) = (takes_default, stated("endpoints"))
-        && let Some(base) = hosts.iter().find(unknown)
-        && std::env::var_os(OPENAI_KEY).is_some_and(|text| !text.is_empty())
-    {
-        let problem = format_args!(
-            "endpoints: {OPENAI_KEY} would be sent to {}, which the table of vendors does not have",
-            base.host()
+
+    fn strange_at(&self, located: Option<&Located>, problem: std::fmt::Arguments<'_>) -> Error {
+        let problem = format!(
+            "{problem}, and the file may have come with the data and be a stranger's; --trust-models says that it is yours"
         );
-        return Err(strange(located, problem));
+        match (located, &self.entry.place) {
+            (Some(located), _) => located.error(problem),
+            (None, Some(place)) => Error::usage(place, problem),
+            (None, None) => Error::usage("--models", problem),
+        }
     }
-    Ok(())
 }
 
-/// The variables that are named, each with the key that names it.
-fn variables<'a>(
-    key_env: Option<&'a Located>,
-    headers: Option<&'a Located>,
-) -> Vec<(&'a Located, &'static str, &'a str)> {
-    let mut found = Vec::new();
-    if let Some(located) = key_env
-        && let Some(name) = located.value.as_str().filter(|name| *name != NO_KEY)
-    {
-        found.push((located, "key-env", name));
-    }
-    if let Some(located) = headers {
-        let tables = located.value.as_table().into_iter().flatten();
-        let names = tables.filter_map(|(_, value)| value.get("env")?.as_str());
-        found.extend(names.map(|name| (located, "headers", name)));
-    }
-    found
-}
-
-fn is_own(base: &BaseUrl, variable: &str) -> bool {
-    own_variables(base.host()).contains(&variable)
-}
-
-fn strange(located: &Located, problem: std::fmt::Arguments<'_>) -> Error {
-    located.error(format_args!(
-        "{problem}, and the file lies in the folder of the data, so that it may be a stranger's; --trust-models says that it is yours"
-    ))
+/// The variables that an endpoint names for its key and its headers.
+fn named<'a>(access: &'a AccessArgs, flags: &AccessArgs) -> Vec<Sent<'a>> {
+    let key = access.api_key_env.as_deref().filter(|name| *name != NO_KEY);
+    let key = key.filter(|_| access.api_key_file.is_none());
+    let key = key.map(|variable| Sent {
+        key: "key-env",
+        variable,
+        by_flags: access.api_key_env == flags.api_key_env,
+    });
+    let headers = access.header_env.iter().filter_map(|text| {
+        let (_, variable) = text.split_once('=')?;
+        Some(Sent {
+            key: "headers",
+            variable: variable.trim(),
+            by_flags: flags.header_env.contains(text),
+        })
+    });
+    key.into_iter().chain(headers).collect()
 }
