@@ -13,9 +13,9 @@ use super::journal::Journal;
 use super::part::{Part, Stage};
 use super::servers::Servers;
 use super::settings::BatchRunArgs;
-use crate::ask::Model;
 use crate::ask::batch_api::{ApiFailure, BatchServer};
 use crate::error::{Error, Result};
+use crate::job::models::ModelUnderTest;
 use crate::job::money::MoneySettings;
 use crate::job::progress::Progress;
 use crate::store::Store;
@@ -68,8 +68,8 @@ pub(super) struct Driver<'a, D> {
     pub(super) manifest: &'a RunManifest,
     pub(super) journal: &'a mut Journal,
     pub(super) servers: &'a Servers,
-    /// The models of the run, to adapt their requests; empty if none is asked again.
-    pub(super) models: &'a [&'a Model],
+    /// The models of all phases of the run, to adapt their requests and to price their replies; empty if none is asked again.
+    pub(super) models: &'a [&'a ModelUnderTest],
     pub(super) args: &'a BatchRunArgs,
     /// Limits of the cost; `None` if nothing is submitted.
     pub(super) money: Option<&'a MoneySettings>,

@@ -10,7 +10,7 @@ use super::part::Part;
 use super::requests::SHARE_OF_QUOTA;
 use crate::ask::batch_api::QuotaRefusal;
 use crate::error::Result;
-use crate::job::budget::Budget;
+use crate::job::budget::{Answering, Budget};
 use crate::types::Detail;
 
 /// How many looks long nothing is submitted after the first refusal; chosen: a minute with the default of 10 s.
@@ -79,7 +79,14 @@ impl<D: Detail> Driver<'_, D> {
         };
         let charged = match self.notes.charged.get() {
             Some(charged) => charged,
-            None => Budget::new(money, &[], &self.store.records()?)?.charged(),
+            None => {
+                let answering = Answering {
+                    models: self.models,
+                    manifest: Some(self.manifest),
+                };
+                let records = self.store.records()?;
+                Budget::of_run(money, &[], answering, &records)?.charged()
+            }
         };
         self.notes.charged.set(Some(charged));
         let out = self.journal.parts.iter().filter(|part| part.is_out());

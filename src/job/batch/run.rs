@@ -15,13 +15,13 @@ use super::servers::Servers;
 use super::settings::BatchRunArgs;
 use super::summary;
 use crate::error::Result;
-use crate::job::budget::Budget;
+use crate::job::budget::{Answering, Budget};
 use crate::job::circuit_breaker::EndReason;
 use crate::job::enhancers::{self, OpenEnhancers};
 use crate::job::experiment::Experiment;
 use crate::job::interrupt::Interrupt;
 use crate::job::models;
-use crate::job::open_run::{OpenRun, Remaining};
+use crate::job::open_run::{OpenRun, Remaining, every_model};
 use crate::job::outcome::Outcome;
 use crate::job::trial::Item as _;
 use crate::job::workers::unstarted;
@@ -110,7 +110,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
                 }
                 self.write(phase, remaining)?;
             }
-            match self.drive(phase)? {
+            match self.drive()? {
                 Some(Driven::Reached) if self.args.detach && self.journal.has_open_parts() => {
                     return Ok(PhaseEnd::Detached);
                 }
@@ -168,7 +168,12 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         self.run.write_counts(&remaining.stored)?;
         let experiment = self.run.experiment;
         let (models, money) = (experiment.models(phase), &experiment.settings().money);
-        let budget = Budget::new(money, models, &remaining.stored)?;
+        let all = every_model(experiment);
+        let answering = Answering {
+            models: &all,
+            manifest: Some(&self.run.manifest),
+        };
+        let budget = Budget::of_run(money, models, answering, &remaining.stored)?;
         let cost = |trial: &_, stimulus: &crate::job::trial::Stimulus| {
             let trial: &crate::job::trial::Trial<E::Item> = trial;
             let images = stimulus.images.iter().map(|image| image.facts());
@@ -203,18 +208,15 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
     }
 
     /// Moves all parts on; `None` if the user interrupted it.
-    fn drive(&mut self, phase: usize) -> Result<Option<Driven>> {
+    fn drive(&mut self) -> Result<Option<Driven>> {
         let experiment = self.run.experiment;
         let mut servers = Servers::default();
-        for phase in 0..E::PHASES.len() {
-            for model in experiment.models(phase) {
-                if let Some(server) = model.model.batch_server()? {
-                    servers.add(model.model.batch_base().unwrap_or_default(), server);
-                }
+        let models = every_model(experiment);
+        for model in &models {
+            if let Some(server) = model.model.batch_server()? {
+                servers.add(model.model.batch_base().unwrap_or_default(), server);
             }
         }
-        let models = experiment.models(phase).iter();
-        let models: Vec<_> = models.map(|model| &*model.model).collect();
         let mut driver = Driver {
             store: &mut self.run.store,
             manifest: &self.run.manifest,

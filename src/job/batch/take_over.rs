@@ -20,7 +20,7 @@ impl<D: Detail> Driver<'_, D> {
         };
         let (paths, keys) = (self.fetched(part), self.keys(part)?);
         let model = &self.part(part).facts.model;
-        let model = self.models.iter().find(|one| one.name() == model);
+        let model = self.models.iter().find(|one| one.model.name() == model);
         let mut refused = BTreeSet::new();
         let (mut is_adapted, mut unread) = (false, 0);
         let server = self.servers.of(&self.part(part).facts.base)?;
@@ -38,7 +38,7 @@ impl<D: Detail> Driver<'_, D> {
                 {
                     refused.insert(key);
                     if let (Some(model), Some((status, body))) = (model, refusal) {
-                        is_adapted |= model.adapt_to_refusal(status, body.as_bytes());
+                        is_adapted |= model.model.adapt_to_refusal(status, body.as_bytes());
                     }
                 }
                 Ok(())
