@@ -210,13 +210,8 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
     /// Moves all parts on; `None` if the user interrupted it.
     fn drive(&mut self) -> Result<Option<Driven>> {
         let experiment = self.run.experiment;
-        let mut servers = Servers::default();
         let models = every_model(experiment);
-        for model in &models {
-            if let Some(server) = model.model.batch_server()? {
-                servers.add(model.model.batch_base().unwrap_or_default(), server);
-            }
-        }
+        let servers = Servers::of_models(&models)?;
         let mut driver = Driver {
             store: &mut self.run.store,
             manifest: &self.run.manifest,

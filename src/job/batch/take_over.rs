@@ -23,7 +23,7 @@ impl<D: Detail> Driver<'_, D> {
         let model = self.models.iter().find(|one| one.model.name() == model);
         let mut refused = BTreeSet::new();
         let (mut is_adapted, mut unread) = (false, 0);
-        let server = self.servers.of(&self.part(part).facts.base)?;
+        let server = self.servers.of(&self.part(part).facts)?;
         let mut replies = ReplyImport::new(self.store, self.manifest)?;
         for path in paths.iter().filter(|path| path.exists()) {
             for_each_line(path, |line| {

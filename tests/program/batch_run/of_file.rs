@@ -1,0 +1,79 @@
+//! Batches of the models of a file: each with its own key, settings and course.
+
+use super::{QUESTIONS, assert_each_once};
+use crate::support::batches::{Course, MockBatches};
+use crate::support::run::{Bench, Called, called, words};
+
+const RUN: &str =
+    "batch run --data set.jsonl --models models.toml --trust-models --out run --poll 0.02";
+
+/// A folder with a file of two blind models at one server; `keys` are further lines of each.
+fn bench_of_two(mock: &MockBatches, models: [&str; 2]) -> Bench {
+    let bench = Bench::with_questions(QUESTIONS);
+    let base = mock.base_url();
+    let table =
+        |keys: &str| format!("[[model]]\n{keys}\nview = \"blind\"\nendpoints = [\"{base}\"]\n");
+    bench.file("models.toml", models.map(table).concat());
+    bench
+}
+
+/// A call with the variables that the file names.
+fn call(bench: &Bench, line: &str) -> Called {
+    let mut command = bench.command(&words(line));
+    called(command.env("TEAM_A", "key-a").env("TEAM_B", "key-b"))
+}
+
+#[test]
+fn batches_of_a_model_are_made_with_its_own_key() {
+    let mock = MockBatches::start([Course::of("in_progress completed")]);
+    let keys = [
+        "name = \"A\"\nid = \"m\"\nkey-env = \"TEAM_A\"",
+        "name = \"B\"\nid = \"n\"\nkey-env = \"TEAM_B\"",
+    ];
+    let bench = bench_of_two(&mock, keys);
+    let detached = call(&bench, &format!("{RUN} --no-scout --detach"));
+    assert_eq!(detached.code, Some(0), "{detached:?}");
+    let uploads: Vec<(bool, String)> = mock
+        .requests()
+        .iter()
+        .filter(|request| request.line.starts_with("POST /v1/files"))
+        .map(|request| {
+            let body = String::from_utf8_lossy(&request.body);
+            let key = request.header("authorization").unwrap();
+            (body.contains("\"model\":\"m\""), key.to_owned())
+        })
+        .collect();
+    let own = [(true, "Bearer key-a"), (false, "Bearer key-b")];
+    assert_eq!(uploads, own.map(|(is_a, key)| (is_a, key.to_owned())));
+    // One key is not enough for both, and says so before anything is asked.
+    let before = mock.requests().len();
+    for command in ["batch fetch run", "batch cancel run --poll 0.02"] {
+        let refused = call(&bench, command);
+        assert_eq!(refused.code, Some(2), "{refused:?}");
+        assert!(refused.stderr.contains("of A and B"), "{refused:?}");
+    }
+    assert_eq!(mock.requests().len(), before);
+    let called = call(&bench, RUN);
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_each_once(&bench, &mock, 2 * QUESTIONS);
+    for request in mock.requests() {
+        let key = request.header("authorization").unwrap().to_owned();
+        assert!(["Bearer key-a", "Bearer key-b"].contains(&&*key));
+        let of = |id: &str| request.line.contains(id);
+        if of("batch%5F1") || of("batch%5F2") {
+            assert_eq!(of("batch%5F1"), key == "Bearer key-a", "{}", request.line);
+        }
+    }
+}
+
+#[test]
+fn models_with_one_key_are_fetched_by_their_folder() {
+    let mock = MockBatches::start([Course::of("completed")]);
+    let keys = ["id = \"m\"\nrpm = 100", "id = \"n\"\nrpm = 200"];
+    let bench = bench_of_two(&mock, keys);
+    let detached = call(&bench, &format!("{RUN} --no-scout --detach"));
+    assert_eq!(detached.code, Some(0), "{detached:?}");
+    let fetched = call(&bench, "batch fetch run");
+    assert_eq!(fetched.code, Some(0), "{fetched:?}");
+    assert_each_once(&bench, &mock, 2 * QUESTIONS);
+}
