@@ -1,11 +1,16 @@
 //! Batches of the models of a file: each with its own key, settings and course.
 
-use super::{QUESTIONS, assert_each_once};
-use crate::support::batches::{Course, MockBatches};
+use serde_json::Value;
+
+use super::{QUESTIONS, answered, assert_each_once};
+use crate::support::batches::{Course, Line, MockBatches};
 use crate::support::run::{Bench, Called, called, words};
 
 const RUN: &str =
     "batch run --data set.jsonl --models models.toml --trust-models --out run --poll 0.02";
+
+const TEMPERATURE: &str =
+    "'temperature' is not supported with this model: only the default (1) is supported";
 
 /// A folder with a file of two blind models at one server; `keys` are further lines of each.
 fn bench_of_two(mock: &MockBatches, models: [&str; 2]) -> Bench {
@@ -76,4 +81,39 @@ fn models_with_one_key_are_fetched_by_their_folder() {
     let fetched = call(&bench, "batch fetch run");
     assert_eq!(fetched.code, Some(0), "{fetched:?}");
     assert_each_once(&bench, &mock, 2 * QUESTIONS);
+}
+
+#[test]
+fn a_field_that_is_refused_in_a_batch_is_left_out_for_that_model() {
+    let refused = Course::of("completed").lines(|_| Line::Status(400, TEMPERATURE));
+    let mock = MockBatches::start([Course::of("completed"), refused, Course::of("completed")]);
+    let keys = [
+        "name = \"A\"\nid = \"m\"",
+        "name = \"B\"\nid = \"m\"\ndeployment = \"b\"",
+    ];
+    let bench = bench_of_two(&mock, keys);
+    let called = call(&bench, &format!("{RUN} --no-scout"));
+    assert_eq!(called.code, Some(0), "{called:?}");
+    mock.with(|server| {
+        let sent = server.batches.iter();
+        let sent: Vec<bool> = sent
+            .map(|one| one.requests[0]["body"].get("temperature").is_some())
+            .collect();
+        assert_eq!(sent, [true, true, false]);
+    });
+    let manifest = bench.path("run/manifest.json");
+    let manifest: Value = serde_json::from_slice(&std::fs::read(manifest).unwrap()).unwrap();
+    let settings = &manifest["settings"];
+    assert!(settings.get("adapted for B").is_some(), "{settings}");
+    assert!(settings.get("adapted for A").is_none(), "{settings}");
+}
+
+#[test]
+fn a_refused_field_costs_the_batches_that_were_out() {
+    let refused = Course::of("completed").lines(|_| Line::Status(400, TEMPERATURE));
+    let courses = [refused.clone(), refused, Course::of("completed")];
+    let (bench, mock, called) = super::blind(&courses, "--file-requests 2");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_eq!(answered(&bench).len(), QUESTIONS);
+    assert_eq!(mock.asked().len(), 4);
 }
