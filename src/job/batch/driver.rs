@@ -13,6 +13,7 @@ use super::journal::Journal;
 use super::part::{Part, Stage};
 use super::servers::Servers;
 use super::settings::BatchRunArgs;
+use super::stopped::Stopped;
 use crate::ask::batch_api::{ApiFailure, BatchServer};
 use crate::error::{Error, Result};
 use crate::job::models::ModelUnderTest;
@@ -77,6 +78,8 @@ pub(super) struct Driver<'a, D> {
     pub(super) until: Until,
     /// Trials that were refused in a way in which they would be again.
     pub(super) refused: &'a mut BTreeSet<TrialKey>,
+    /// The models whose parts stay as they are.
+    pub(super) stopped: &'a mut Stopped,
     pub(super) notes: Notes,
 }
 
@@ -104,10 +107,10 @@ pub(super) struct Notes {
 }
 
 impl<D: Detail> Driver<'_, D> {
-    /// Moves all parts on.
+    /// Moves all parts on. If a server refuses what every further call would ask, the parts of that model stay as they are.
     ///
     /// # Errors
-    /// If a server refuses what every further call would ask, or a file cannot be written.
+    /// If a file cannot be written, the server of a part is not known, or one refuses and the first model that is stopped ends the run.
     pub(super) async fn drive(&mut self) -> Result<Driven> {
         let first = self.args.collect.poll;
         let mut wait = first;
@@ -117,7 +120,7 @@ impl<D: Detail> Driver<'_, D> {
             let mut part = 0;
             // Parts that are divided add parts at the end.
             while part < self.journal.parts.len() {
-                while self.step(part).await? == Step::Moved {
+                while self.step_or_stop(part).await? == Step::Moved {
                     moved = true;
                 }
                 part += 1;
@@ -134,6 +137,24 @@ impl<D: Detail> Driver<'_, D> {
                 (wait * 3 / 2).min(first * LONGEST_WAIT)
             };
             sleep(wait).await;
+        }
+    }
+
+    /// A step of a part, unless its model is stopped; stops it if its server refuses what every further call would ask.
+    async fn step_or_stop(&mut self, part: usize) -> Result<Step> {
+        if self.is_stopped(part) {
+            return Ok(Step::Waiting);
+        }
+        match self.step(part).await {
+            Err(error @ Error::Endpoint { .. })
+                if !self.money.is_some_and(|money| money.fail_fast) =>
+            {
+                self.progress.say(&format!("stopped: {error}"));
+                let facts = &self.journal.parts[part].facts;
+                self.stopped.add_part(facts, error);
+                Ok(Step::Waiting)
+            }
+            step => step,
         }
     }
 
@@ -163,8 +184,9 @@ impl<D: Detail> Driver<'_, D> {
 
     fn is_reached(&self) -> Result<bool> {
         let has_ended = |part: &Part| part.stage == Stage::Ended;
+        let stays = |part: usize| self.is_elsewhere(part) || self.is_stopped(part);
         let mut parts = 0..self.journal.parts.len();
-        if parts.all(|part| has_ended(self.part(part)) || self.is_elsewhere(part)) {
+        if parts.all(|part| has_ended(self.part(part)) || stays(part)) {
             return Ok(true);
         }
         Ok(match self.until {
@@ -174,7 +196,8 @@ impl<D: Detail> Driver<'_, D> {
                 let mut waiting = true;
                 for (index, part) in self.journal.parts.iter().enumerate() {
                     let is_out = part.stage == Stage::Created;
-                    waiting &= has_ended(part) || is_out || self.is_held(index)?;
+                    let is_left = has_ended(part) || is_out || self.is_stopped(index);
+                    waiting &= is_left || self.is_held(index)?;
                 }
                 waiting
             }
@@ -186,6 +209,10 @@ impl<D: Detail> Driver<'_, D> {
         let only_looks = matches!(self.until, Until::LookedAt | Until::Cancelled);
         let part = self.part(part);
         only_looks && part.stage != Stage::Ended && !self.servers.has(&part.facts.base)
+    }
+
+    fn is_stopped(&self, part: usize) -> bool {
+        self.stopped.has_part(&self.part(part).facts)
     }
 
     pub(super) fn part(&self, part: usize) -> &Part {

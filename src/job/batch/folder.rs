@@ -12,6 +12,7 @@ use super::part::Stage;
 use super::recover::recover;
 use super::servers::Servers;
 use super::settings::{BatchRunArgs, CollectArgs};
+use super::stopped::Stopped;
 use super::summary;
 use crate::ask::{AccessArgs, Endpoint, Sending};
 use crate::error::{Error, Result};
@@ -134,6 +135,7 @@ impl<'a> FolderBatches<'a> {
         self.refuse_several_accounts()?;
         recover(&mut self.journal, store)?;
         let args = BatchRunArgs::collecting(collect);
+        let mut stopped = Stopped::default();
         let mut driver = Driver {
             store,
             manifest: self.manifest,
@@ -148,9 +150,13 @@ impl<'a> FolderBatches<'a> {
                 FolderTask::Cancel => Until::Cancelled,
             },
             refused: &mut BTreeSet::new(),
+            stopped: &mut stopped,
             notes: Notes::default(),
         };
         start()?.block_on(driver.drive())?;
+        if let Some(first) = stopped.take_errors().into_iter().next() {
+            return Err(first);
+        }
         Ok(summary::lines(&self.journal, &BTreeMap::new()))
     }
 }

@@ -37,7 +37,10 @@ impl<D: Detail> Driver<'_, D> {
         if hold.is_some_and(|(until, _)| Instant::now() < *until) {
             return Ok(true);
         }
-        let out = |other: &&Part| other.is_out() && other.facts.place() == place;
+        // Those of a stopped model are not looked at any more, so nobody waits for them.
+        let out = |other: &&Part| {
+            other.is_out() && other.facts.place() == place && !self.stopped.has_part(&other.facts)
+        };
         let waiting = self.journal.parts.iter().filter(out);
         let waiting: f64 = waiting.map(|other| other.facts.tokens).sum();
         let limit = self.limit(part);
@@ -97,9 +100,15 @@ impl<D: Detail> Driver<'_, D> {
     /// Whether nothing is out, and no part that is left is within `--max-cost`.
     pub(super) fn is_over_budget(&self) -> Result<bool> {
         let parts = &self.journal.parts;
-        let left = parts.iter().filter(|part| part.is_unsubmitted());
-        let left: Vec<&Part> = left.collect();
-        if left.is_empty() || parts.iter().any(Part::is_out) {
+        let open = parts
+            .iter()
+            .filter(|part| !self.stopped.has_part(&part.facts));
+        let (mut left, mut is_out) = (Vec::new(), false);
+        for part in open {
+            is_out |= part.is_out();
+            left.extend(Some(part).filter(|part| part.is_unsubmitted()));
+        }
+        if left.is_empty() || is_out {
             return Ok(false);
         }
         for part in left {

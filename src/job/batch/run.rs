@@ -13,15 +13,16 @@ use super::recover::recover;
 use super::requests::{require_files, require_remote};
 use super::servers::Servers;
 use super::settings::BatchRunArgs;
+use super::stopped::Stopped;
 use super::summary;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::job::budget::{Answering, Budget};
 use crate::job::circuit_breaker::EndReason;
 use crate::job::enhancers::{self, OpenEnhancers};
 use crate::job::experiment::Experiment;
 use crate::job::interrupt::Interrupt;
 use crate::job::models;
-use crate::job::open_run::{OpenRun, Remaining, every_model};
+use crate::job::open_run::{OpenRun, Remaining, answered, every_model};
 use crate::job::outcome::Outcome;
 use crate::job::trial::Item as _;
 use crate::job::workers::unstarted;
@@ -58,6 +59,7 @@ pub(crate) fn run<E: Experiment>(
         files,
         args,
         refused: BTreeSet::new(),
+        stopped: Stopped::default(),
         enhancers_taken: false,
     };
     recover(&mut batches.journal, &batches.run.store)?;
@@ -72,6 +74,9 @@ pub(crate) fn run<E: Experiment>(
             }
         }
     }
+    if matches!(end, EndReason::AllAsked) && !batches.stopped.errors().is_empty() {
+        end = EndReason::ModelsStopped(batches.stopped.take_errors());
+    }
     batches.finish(end)
 }
 
@@ -83,6 +88,8 @@ struct BatchRun<'a, 'b, E: Experiment> {
     args: &'b BatchRunArgs,
     /// Trials that were refused in a way in which they would be again.
     refused: BTreeSet<TrialKey>,
+    /// The models that cannot be asked any further.
+    stopped: Stopped,
     enhancers_taken: bool,
 }
 
@@ -110,7 +117,11 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
                 }
                 self.write(phase, remaining)?;
             }
-            match self.drive()? {
+            let driven = self.drive()?;
+            if let Some(first) = self.stopped_phase(phase) {
+                return Ok(PhaseEnd::Early(EndReason::Stopped(first)));
+            }
+            match driven {
                 Some(Driven::Reached) if self.args.detach && self.journal.has_open_parts() => {
                     return Ok(PhaseEnd::Detached);
                 }
@@ -128,8 +139,24 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
     /// The trials of a phase that are to be asked in a batch.
     fn remaining(&mut self, phase: usize) -> Result<Remaining<E>> {
         let mut remaining = self.run.remaining(phase)?;
-        remaining.plan.exclude(|key| self.refused.contains(key));
+        let models = self.run.experiment.models(phase);
+        let mut left_out = BTreeSet::new();
+        for (_, group) in remaining.plan.groups() {
+            let trials = group.trials.iter();
+            let of_stopped = trials.filter(|trial| self.stopped.has_model(&models[trial.model]));
+            left_out.extend(of_stopped.map(|trial| trial.key));
+        }
+        let is_left_out = |key: &TrialKey| self.refused.contains(key) || left_out.contains(key);
+        remaining.plan.exclude(is_left_out);
         Ok(remaining)
+    }
+
+    /// The first error, if all models of a phase are stopped; `None` if one may still be asked.
+    fn stopped_phase(&mut self, phase: usize) -> Option<Error> {
+        let mut models = self.run.experiment.models(phase).iter();
+        let is_stopped = models.all(|model| self.stopped.has_model(model));
+        let errors = is_stopped.then(|| self.stopped.take_errors())?;
+        errors.into_iter().next()
     }
 
     /// Warns about trials in files that the user submits.
@@ -143,20 +170,45 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         }
     }
 
-    /// Asks one trial of each model directly, so that what the server refuses is found out before a batch is made.
+    /// Asks one trial of each model directly, so that what the server refuses is found out before a batch is made. A model that cannot
+    /// be asked any further is stopped alone.
     fn scout(&mut self, phase: usize, mut remaining: Remaining<E>) -> Result<EndReason> {
-        let mut models = BTreeSet::new();
-        let mut scouts = BTreeSet::new();
+        let mut scouts = BTreeMap::new();
         for (_, group) in remaining.plan.groups() {
             for trial in &group.trials {
-                if models.insert(trial.model) {
-                    scouts.insert(trial.key);
-                }
+                scouts.entry(trial.model).or_insert(trial.key);
             }
         }
-        remaining.plan.exclude(|key| !scouts.contains(key));
+        let keys: BTreeSet<TrialKey> = scouts.values().copied().collect();
+        remaining.plan.exclude(|key| !keys.contains(key));
         self.reload_enhancers()?;
-        self.run.ask_phase(phase, remaining)
+        let end = self.run.ask_phase(phase, remaining)?;
+        if let EndReason::ModelsStopped(errors) = end {
+            self.stop_unanswered(phase, &scouts, errors)?;
+            return Ok(EndReason::AllAsked);
+        }
+        Ok(end)
+    }
+
+    /// Stops the models whose question had no reply, for one of these errors.
+    fn stop_unanswered(
+        &mut self,
+        phase: usize,
+        scouts: &BTreeMap<usize, TrialKey>,
+        errors: Vec<Error>,
+    ) -> Result<()> {
+        let answered = answered(&self.run.store.records()?);
+        let models = self.run.experiment.models(phase);
+        for (model, _) in scouts.iter().filter(|(_, key)| !answered.contains(key)) {
+            // Each error begins with the name of its model. Another failure is that of the question alone.
+            let name = format!("{}: ", models[*model].name);
+            let is_of_model = |error: &Error| matches!(error, Error::Endpoint { problem, .. } if problem.starts_with(&name));
+            if errors.iter().any(is_of_model) {
+                self.stopped.add_model(&models[*model]);
+            }
+        }
+        self.stopped.add_errors(errors);
+        Ok(())
     }
 
     /// Writes the remaining trials as parts.
@@ -227,6 +279,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
                 Until::TakenOver
             },
             refused: &mut self.refused,
+            stopped: &mut self.stopped,
             notes: Notes::default(),
         };
         let runtime = runtime::Builder::new_current_thread()
@@ -260,10 +313,14 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         let output = format!(
             "{parts}the same command, or batch fetch {folder}, takes the replies over; the same command also submits what waits\n"
         );
-        Outcome {
-            status: Status::Complete,
-            output,
+        for error in self.stopped.errors() {
+            tracing::warn!("not asked any further: {error}");
         }
+        let status = match self.stopped.errors() {
+            [] => Status::Complete,
+            _ => Status::Stopped,
+        };
+        Outcome { status, output }
     }
 
     fn finish(mut self, end: EndReason) -> Result<Outcome> {

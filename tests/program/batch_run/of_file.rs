@@ -1,9 +1,12 @@
 //! Batches of the models of a file: each with its own key, settings and course.
 
+use std::collections::BTreeSet;
+
 use serde_json::Value;
 
 use super::{QUESTIONS, answered, assert_each_once};
 use crate::support::batches::{Course, Line, MockBatches};
+use crate::support::endpoint::Answer;
 use crate::support::run::{Bench, Called, called, words};
 
 const RUN: &str =
@@ -116,4 +119,48 @@ fn a_refused_field_costs_the_batches_that_were_out() {
     assert_eq!(called.code, Some(0), "{called:?}");
     assert_eq!(answered(&bench).len(), QUESTIONS);
     assert_eq!(mock.asked().len(), 4);
+}
+
+#[test]
+fn a_model_that_cannot_be_asked_stops_alone() {
+    let mock = MockBatches::start([Course::of("completed")]);
+    mock.chat(|body| match body["model"].as_str() {
+        Some("typo") => Answer::error(404, "model_not_found", "no such model"),
+        _ => Answer::text("C"),
+    });
+    let bench = bench_of_two(&mock, ["id = \"typo\"", "id = \"m\""]);
+    let called = call(&bench, RUN);
+    assert_eq!(called.code, Some(1), "{called:?}");
+    assert!(
+        called.stderr.contains("not asked any further"),
+        "{called:?}"
+    );
+    let models: BTreeSet<String> = answered(&bench)
+        .iter()
+        .map(|record| record["model"].as_str().unwrap().to_owned())
+        .collect();
+    assert_eq!(models, BTreeSet::from(["m".to_owned()]));
+    assert_eq!(answered(&bench).len(), QUESTIONS);
+    // Nothing of the other is in a batch.
+    assert_eq!(mock.asked().concat().len(), QUESTIONS - 1);
+}
+
+#[test]
+fn a_vendor_that_refuses_batches_stops_its_models_alone() {
+    let (one, two) = (
+        MockBatches::start([Course::failing("x", "this line is no JSON", &Value::Null)]),
+        MockBatches::start([Course::of("in_progress completed")]),
+    );
+    let bench = Bench::with_questions(QUESTIONS);
+    let table = |id: &str, mock: &MockBatches| {
+        let base = mock.base_url();
+        format!("[[model]]\nid = \"{id}\"\nview = \"blind\"\nendpoints = [\"{base}\"]\n")
+    };
+    bench.file("models.toml", table("m", &one) + &table("n", &two));
+    let called = call(&bench, &format!("{RUN} --no-scout"));
+    assert_eq!(called.code, Some(1), "{called:?}");
+    assert!(called.stderr.contains("this line is no JSON"), "{called:?}");
+    assert_eq!(answered(&bench).len(), QUESTIONS);
+    // What cannot be begun is not tried again by the same command.
+    assert_eq!(one.count("POST batches"), 1);
 }
