@@ -117,7 +117,9 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
                 }
                 self.write(phase, remaining)?;
             }
-            let driven = self.drive()?;
+            let driven = self.drive();
+            self.note_adapted()?;
+            let driven = driven?;
             if let Some(first) = self.stopped_phase(phase) {
                 return Ok(PhaseEnd::Early(EndReason::Stopped(first)));
             }
@@ -182,7 +184,9 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         let keys: BTreeSet<TrialKey> = scouts.values().copied().collect();
         remaining.plan.exclude(|key| !keys.contains(key));
         self.reload_enhancers()?;
-        let end = self.run.ask_phase(phase, remaining)?;
+        let end = self.run.ask_phase(phase, remaining);
+        self.note_adapted()?;
+        let end = end?;
         if let EndReason::ModelsStopped(errors) = end {
             self.stop_unanswered(phase, &scouts, errors)?;
             return Ok(EndReason::AllAsked);
@@ -323,7 +327,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         Outcome { status, output }
     }
 
-    fn finish(mut self, end: EndReason) -> Result<Outcome> {
+    fn finish(self, end: EndReason) -> Result<Outcome> {
         if let EndReason::Interrupted = end {
             let line = format!(
                 "interrupted: the batches go on working; the same command goes on, and batch cancel {} ends them",
@@ -331,10 +335,19 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
             );
             self.run.progress.note(&line);
         }
+        self.run.finish(end)
+    }
+
+    /// Writes into the manifest how requests were changed, so that it is known however the command ends.
+    fn note_adapted(&mut self) -> Result<()> {
+        let before = self.run.manifest.settings.clone();
         for phase in 0..E::PHASES.len() {
             let adapted = models::adapted(self.run.experiment.models(phase));
             self.run.manifest.settings.extend(adapted);
         }
-        self.run.finish(end)
+        if self.run.manifest.settings == before {
+            return Ok(());
+        }
+        self.run.store.write_manifest(&self.run.manifest)
     }
 }

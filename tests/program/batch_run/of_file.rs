@@ -164,3 +164,23 @@ fn a_vendor_that_refuses_batches_stops_its_models_alone() {
     // What cannot be begun is not tried again by the same command.
     assert_eq!(one.count("POST batches"), 1);
 }
+
+#[test]
+fn a_detached_run_keeps_how_its_requests_were_changed() {
+    let mock = MockBatches::start([Course::of("completed")]);
+    mock.chat(|body| match body.get("temperature") {
+        Some(_) => Answer::error(400, "unsupported_value", TEMPERATURE),
+        None => Answer::text("C"),
+    });
+    let bench = bench_of_two(&mock, ["id = \"m\"", "id = \"n\""]);
+    let detached = call(&bench, &format!("{RUN} --detach"));
+    assert_eq!(detached.code, Some(0), "{detached:?}");
+    let fetched = call(&bench, "batch fetch run");
+    assert_eq!(fetched.code, Some(0), "{fetched:?}");
+    let manifest = bench.path("run/manifest.json");
+    let manifest: Value = serde_json::from_slice(&std::fs::read(manifest).unwrap()).unwrap();
+    for model in ["m", "n"] {
+        let changes = &manifest["settings"][format!("adapted for {model}")];
+        assert!(changes.to_string().contains("temperature"), "{changes}");
+    }
+}
