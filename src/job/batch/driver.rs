@@ -14,6 +14,7 @@ use super::part::{Part, Stage};
 use super::servers::Servers;
 use super::settings::BatchRunArgs;
 use super::stopped::Stopped;
+use crate::ask::BaseUrl;
 use crate::ask::batch_api::{ApiFailure, BatchServer};
 use crate::error::{Error, Result};
 use crate::job::models::ModelUnderTest;
@@ -26,8 +27,14 @@ use crate::types::{Detail, TrialKey};
 /// How many times as long as at first the wait between two looks may become; chosen: 5 minutes with the default of 10 s.
 const LONGEST_WAIT: u32 = 30;
 
-/// How many looks long a file or batch is looked for that may exist; chosen: a minute with the default of 10 s.
+/// How many looks long a file or batch is looked for at least that may exist; chosen.
 pub(super) const SEARCH: u32 = 6;
+
+/// How long a file or batch is looked for at least that may exist; chosen: lists of servers may be late.
+const SHORTEST_SEARCH: Duration = Duration::from_mins(1);
+
+/// The shortest `--poll` with which a server on this machine is searched for that long; chosen.
+const SHORT_POLL: Duration = Duration::from_millis(200);
 
 /// How many refused looks in a row end the command; chosen.
 const MOST_REFUSED: u32 = 10;
@@ -275,14 +282,21 @@ impl<D: Detail> Driver<'_, D> {
     pub(super) fn is_missing(&mut self, part: usize) -> bool {
         let now = Instant::now();
         let since = *self.notes.missing_since.entry(part).or_insert(now);
-        let is_missing = now - since >= self.search_time();
+        let is_missing = now - since >= self.search_time(part);
         if is_missing {
             self.notes.missing_since.remove(&part);
         }
         is_missing
     }
 
-    fn search_time(&self) -> Duration {
-        self.args.collect.poll * SEARCH
+    /// How long a part's file or batch is looked for. A server on this machine that is looked at all the time has lists that are not late.
+    fn search_time(&self, part: usize) -> Duration {
+        let poll = self.args.collect.poll;
+        let base = self.part(part).facts.base.parse::<BaseUrl>();
+        let is_here = base.is_ok_and(|base| base.is_loopback());
+        if is_here && poll < SHORT_POLL {
+            return poll * SEARCH;
+        }
+        SHORTEST_SEARCH.max(poll * SEARCH)
     }
 }
