@@ -80,16 +80,15 @@ impl<D: Detail> Driver<'_, D> {
         let Some((money, max_cost)) = limit else {
             return Ok(true);
         };
-        let charged = match self.notes.charged.get() {
-            Some(charged) => charged,
-            None => {
-                let answering = Answering {
-                    models: self.models,
-                    manifest: Some(self.manifest),
-                };
-                let records = self.store.records()?;
-                Budget::of_run(money, &[], answering, &records)?.charged()
-            }
+        let charged = if let Some(charged) = self.notes.charged.get() {
+            charged
+        } else {
+            let answering = Answering {
+                models: self.models,
+                manifest: Some(self.manifest),
+            };
+            let records = self.store.records()?;
+            Budget::of_run(money, &[], answering, &records)?.charged()
         };
         self.notes.charged.set(Some(charged));
         let out = self.journal.parts.iter().filter(|part| part.is_out());
