@@ -145,7 +145,10 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         let mut left_out = BTreeSet::new();
         for (_, group) in remaining.plan.groups() {
             let trials = group.trials.iter();
-            let of_stopped = trials.filter(|trial| self.stopped.has_model(&models[trial.model]));
+            let of_stopped = trials.filter(|trial| {
+                self.stopped
+                    .has_model(phase, (trial.model, &models[trial.model]))
+            });
             left_out.extend(of_stopped.map(|trial| trial.key));
         }
         let is_left_out = |key: &TrialKey| self.refused.contains(key) || left_out.contains(key);
@@ -155,8 +158,8 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
 
     /// The first error, if all models of a phase are stopped; `None` if one may still be asked.
     fn stopped_phase(&mut self, phase: usize) -> Option<Error> {
-        let mut models = self.run.experiment.models(phase).iter();
-        let is_stopped = models.all(|model| self.stopped.has_model(model));
+        let mut models = self.run.experiment.models(phase).iter().enumerate();
+        let is_stopped = models.all(|model| self.stopped.has_model(phase, model));
         let errors = is_stopped.then(|| self.stopped.take_errors())?;
         errors.into_iter().next()
     }
@@ -208,7 +211,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
             let name = format!("{}: ", models[*model].name);
             let is_of_model = |error: &Error| matches!(error, Error::Endpoint { problem, .. } if problem.starts_with(&name));
             if errors.iter().any(is_of_model) {
-                self.stopped.add_model(&models[*model]);
+                self.stopped.add_model(phase, *model);
             }
         }
         self.stopped.add_errors(errors);

@@ -9,8 +9,10 @@ use crate::job::models::ModelUnderTest;
 /// The models whose batches go on no further under this command, because their server refuses what every further call would ask.
 #[derive(Debug, Default)]
 pub(super) struct Stopped {
-    /// Addresses and names in tables.
+    /// Addresses and names in tables of models whose parts stay as they are.
     models: BTreeSet<(String, String)>,
+    /// Models that are asked nothing more in a phase, by phase and index: one that takes no images may be asked without, and may judge.
+    asked: BTreeSet<(usize, usize)>,
     errors: Vec<Error>,
 }
 
@@ -21,10 +23,9 @@ impl Stopped {
         self.errors.push(error);
     }
 
-    /// Stops a model; the error is added apart.
-    pub(super) fn add_model(&mut self, model: &ModelUnderTest) {
-        let base = model.model.batch_base().unwrap_or_default();
-        self.models.insert((base, model.name.to_string()));
+    /// Stops the model with this index in a phase; the error is added apart.
+    pub(super) fn add_model(&mut self, phase: usize, index: usize) {
+        self.asked.insert((phase, index));
     }
 
     /// Adds why models are stopped.
@@ -37,10 +38,11 @@ impl Stopped {
         self.models.contains(&place(facts))
     }
 
-    /// Whether a model is stopped.
-    pub(super) fn has_model(&self, model: &ModelUnderTest) -> bool {
+    /// Whether nothing more is asked of the model with this index in a phase.
+    pub(super) fn has_model(&self, phase: usize, (index, model): (usize, &ModelUnderTest)) -> bool {
         let base = model.model.batch_base().unwrap_or_default();
-        self.models.contains(&(base, model.name.to_string()))
+        let place = (base, model.name.to_string());
+        self.asked.contains(&(phase, index)) || self.models.contains(&place)
     }
 
     /// Why models are stopped; empty if none is.
