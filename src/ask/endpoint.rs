@@ -137,6 +137,16 @@ impl Endpoint {
         Ok(BatchServer::new(connection, headers, self.sending.timeout))
     }
 
+    /// Whether the files and batches of another endpoint are those of the same account: its address, key and headers are the same.
+    ///
+    /// # Errors
+    /// If a header value has characters that HTTP does not allow.
+    pub(crate) fn has_account_of(&self, other: &Self) -> Result<bool> {
+        let (own, other) = (&self.replicas[0], &other.replicas[0]);
+        let is_same_base = own.base() == other.base();
+        Ok(is_same_base && own.headers(Wire::Chat)? == other.headers(Wire::Chat)?)
+    }
+
     /// Stops further requests: those in flight are finished, those that wait fail at once.
     pub fn close(&self) {
         self.closing.send_replace(true);

@@ -156,6 +156,19 @@ impl RequestFields {
         (adapted != self).then_some(adapted)
     }
 
+    /// Whether a field is sent in another way than in the `first` request.
+    pub(super) fn differs(self, field: AdaptableField, first: Self) -> bool {
+        match field {
+            AdaptableField::Wire(_) => self.wire != first.wire,
+            AdaptableField::TokenField => self.token_field != first.token_field,
+            AdaptableField::Temperature => self.temperature != first.temperature,
+            AdaptableField::StreamUsage => self.stream_usage != first.stream_usage,
+            AdaptableField::Logprobs | AdaptableField::TopLogprobs => {
+                self.top_logprobs != first.top_logprobs
+            }
+        }
+    }
+
     /// What changed since the `first` request, in words.
     pub(super) fn changes(self, first: Self) -> Vec<String> {
         let wire = match self.wire {

@@ -162,6 +162,17 @@ impl Model {
             .transpose()
     }
 
+    /// Whether the files and batches of both models are those of one account; false if one is built in.
+    ///
+    /// # Errors
+    /// If a header value has characters that HTTP does not allow.
+    pub(crate) fn has_account_of(&self, other: &Self) -> Result<bool> {
+        match (self.remote(), other.remote()) {
+            (Some(own), Some(other)) => own.endpoint().has_account_of(other.endpoint()),
+            _ => Ok(false),
+        }
+    }
+
     /// Adapts further requests to a refusal in the output of a batch, as after a refused request. Returns whether the request may
     /// succeed now.
     #[must_use]

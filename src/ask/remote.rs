@@ -248,6 +248,21 @@ impl Remote {
     /// Adapts further requests to a refused line of a batch; whether the request may succeed now.
     pub(super) fn adapt_to_refusal(&self, status: u16, body: &[u8]) -> bool {
         let fields = self.fields();
+        if self.adapt(fields, self.refused_in_batch(status, body, fields)) {
+            return true;
+        }
+        // The batch may have been made before another one changed the fields.
+        let refused_field = self.refused_in_batch(status, body, self.first);
+        refused_field.is_some_and(|field| fields.differs(field, self.first))
+    }
+
+    /// The field for which a line of a batch with these fields was refused, if the program can send it in another way.
+    fn refused_in_batch(
+        &self,
+        status: u16,
+        body: &[u8],
+        fields: RequestFields,
+    ) -> Option<AdaptableField> {
         let sent = SentFields {
             parameters: &self.parameters,
             fields,
@@ -256,8 +271,7 @@ impl Remote {
         };
         let wire = fields.wire.in_batch();
         let complaint = wire.complaint(body);
-        let class = FailureClass::of(status, &complaint, wire, sent);
-        self.adapt(fields, class.refused_field)
+        FailureClass::of(status, &complaint, wire, sent).refused_field
     }
 
     /// The letter in a constrained reply, else the text. Warns once if the server does not follow the constraint.

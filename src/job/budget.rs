@@ -2,9 +2,11 @@
 
 use super::models::ModelUnderTest;
 use super::money::MoneySettings;
+use super::report;
 use super::trial::{Item, Prompt, Trial};
 use crate::ask::Price;
 use crate::error::{Error, Result};
+use crate::types::manifest::RunManifest;
 use crate::types::{ImageFacts, Record, Usage, Via};
 
 /// Characters of English text per token, by the rule of thumb of every provider.
@@ -12,6 +14,26 @@ const CHARACTERS_PER_TOKEN: f64 = 4.0;
 
 /// Tokens of a message besides its text and images.
 const MESSAGE_TOKENS: f64 = 10.0;
+
+/// Whose replies a run has: the models of all its phases, and those that its manifest knows from earlier commands.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Answering<'a> {
+    pub(crate) models: &'a [&'a ModelUnderTest],
+    /// `None` if the models are all.
+    pub(crate) manifest: Option<&'a RunManifest>,
+}
+
+impl Answering<'_> {
+    /// The price of the replies under a name in records; `None` if it is not known.
+    fn price(self, money: &MoneySettings, name: &str) -> Option<Price> {
+        let model = self.models.iter().find(|model| *model.name == *name);
+        match (model, self.manifest) {
+            (Some(model), _) => model.price(&money.prices),
+            (None, Some(manifest)) => report::price(&money.prices, manifest, name),
+            (None, None) => money.prices.of(name),
+        }
+    }
+}
 
 /// The sum of what replies cost, and the decision whether one more question is within `--max-cost`.
 #[derive(Debug)]
@@ -27,13 +49,31 @@ pub(crate) struct Budget {
 }
 
 impl Budget {
-    /// A budget that includes the cost of the stored records.
+    /// A budget that includes the cost of the stored records, which are of these models.
     ///
     /// # Errors
     /// If `--max-cost` is set and a model has no price, because the limit could not be enforced.
     pub(crate) fn new<D>(
         money: &MoneySettings,
         models: &[ModelUnderTest],
+        stored: &[Record<D>],
+    ) -> Result<Self> {
+        let all: Vec<&ModelUnderTest> = models.iter().collect();
+        let answering = Answering {
+            models: &all,
+            manifest: None,
+        };
+        Self::of_run(money, models, answering, stored)
+    }
+
+    /// A budget of the models that are asked now. It includes the cost of the stored records of all models of the run.
+    ///
+    /// # Errors
+    /// If `--max-cost` is set and a model has no price, because the limit could not be enforced.
+    pub(crate) fn of_run<D>(
+        money: &MoneySettings,
+        models: &[ModelUnderTest],
+        answering: Answering<'_>,
         stored: &[Record<D>],
     ) -> Result<Self> {
         let price = |model: &ModelUnderTest| model.price(&money.prices);
@@ -58,11 +98,7 @@ impl Budget {
             highest_cost: None,
         };
         for record in stored {
-            let model = models.iter().find(|model| *model.name == record.model);
-            let price = match model {
-                Some(model) => model.price(&money.prices),
-                None => money.prices.of(&record.model),
-            };
+            let price = answering.price(money, &record.model);
             let Some((price, usage)) = price.zip(record.usage) else {
                 continue;
             };

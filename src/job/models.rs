@@ -13,6 +13,7 @@ mod selection;
 mod settings;
 mod trust;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use serde_json::{Value, json};
@@ -207,11 +208,19 @@ pub(crate) fn open(
 /// The beginning of the fields of a manifest that say how requests to a model were changed; the model's name follows.
 pub(super) const ADAPTED_FOR: &str = "adapted for ";
 
-/// Changes to requests that the endpoint made necessary, by model; for the manifest.
+/// Changes to requests that the endpoint made necessary, by name; for the manifest. Those of a model that is asked with images and
+/// without stand together.
 pub(crate) fn adapted(models: &[ModelUnderTest]) -> impl Iterator<Item = (String, Value)> {
-    models.iter().filter_map(|model| {
-        let adapted = model.model.adapted();
+    let mut by_name: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for model in models {
         let name = format!("{ADAPTED_FOR}{}", model.name);
-        (!adapted.is_empty()).then(|| (name, json!(adapted)))
-    })
+        for change in model.model.adapted() {
+            let changes = by_name.entry(name.clone()).or_default();
+            if !changes.contains(&change) {
+                changes.push(change);
+            }
+        }
+    }
+    let by_name = by_name.into_iter();
+    by_name.map(|(name, changes)| (name, json!(changes)))
 }

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::path::Path;
 use std::time::Instant;
 
-use super::budget::Budget;
+use super::budget::{Answering, Budget};
 use super::circuit_breaker::EndReason;
 use super::dark_already;
 use super::dispatch::{Dispatcher, TrialCounts};
@@ -15,7 +15,7 @@ use super::frame_work::ImageSteps;
 use super::image_notes::MissingNotes;
 use super::image_pipeline::ImagePipeline;
 use super::manifest;
-use super::models;
+use super::models::{self, ModelUnderTest};
 use super::outcome::Outcome;
 use super::plan::Plan;
 use super::progress::Progress;
@@ -122,7 +122,12 @@ impl<E: Experiment> OpenRun<'_, E> {
         let experiment = self.experiment;
         let settings = experiment.settings();
         let models = experiment.models(phase);
-        let budget = Budget::new(&settings.money, models, &stored)?;
+        let all = every_model(experiment);
+        let answering = Answering {
+            models: &all,
+            manifest: Some(&self.manifest),
+        };
+        let budget = Budget::of_run(&settings.money, models, answering, &stored)?;
         let counts = TrialCounts {
             trials: plan.keys.len(),
             answered: plan.keys.len() - plan.remaining(),
@@ -246,6 +251,12 @@ impl<E: Experiment> OpenRun<'_, E> {
             _ => Ok(outcome),
         }
     }
+}
+
+/// The models of all phases of an experiment.
+pub(super) fn every_model<E: Experiment>(experiment: &E) -> Vec<&ModelUnderTest> {
+    let phases = 0..E::PHASES.len();
+    phases.flat_map(|phase| experiment.models(phase)).collect()
 }
 
 /// The enhancers' notes, by name.

@@ -238,6 +238,11 @@ impl MockBatches {
         })
     }
 
+    /// Every request that arrived.
+    pub fn requests(&self) -> Vec<Request> {
+        self.endpoint.requests()
+    }
+
     /// How many requests of a kind arrived, as `POST batches`.
     pub fn count(&self, kind: &str) -> usize {
         self.with(|server| server.log.iter().filter(|one| *one == kind).count())

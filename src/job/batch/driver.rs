@@ -13,9 +13,11 @@ use super::journal::Journal;
 use super::part::{Part, Stage};
 use super::servers::Servers;
 use super::settings::BatchRunArgs;
-use crate::ask::Model;
+use super::stopped::Stopped;
+use crate::ask::BaseUrl;
 use crate::ask::batch_api::{ApiFailure, BatchServer};
 use crate::error::{Error, Result};
+use crate::job::models::ModelUnderTest;
 use crate::job::money::MoneySettings;
 use crate::job::progress::Progress;
 use crate::store::Store;
@@ -25,8 +27,14 @@ use crate::types::{Detail, TrialKey};
 /// How many times as long as at first the wait between two looks may become; chosen: 5 minutes with the default of 10 s.
 const LONGEST_WAIT: u32 = 30;
 
-/// How many looks long a file or batch is looked for that may exist; chosen: a minute with the default of 10 s.
+/// How many looks long a file or batch is looked for at least that may exist; chosen.
 pub(super) const SEARCH: u32 = 6;
+
+/// How long a file or batch is looked for at least that may exist; chosen: lists of servers may be late.
+const SHORTEST_SEARCH: Duration = Duration::from_mins(1);
+
+/// The shortest `--poll` with which a server on this machine is searched for that long; chosen.
+const SHORT_POLL: Duration = Duration::from_millis(200);
 
 /// How many refused looks in a row end the command; chosen.
 const MOST_REFUSED: u32 = 10;
@@ -68,8 +76,8 @@ pub(super) struct Driver<'a, D> {
     pub(super) manifest: &'a RunManifest,
     pub(super) journal: &'a mut Journal,
     pub(super) servers: &'a Servers,
-    /// The models of the run, to adapt their requests; empty if none is asked again.
-    pub(super) models: &'a [&'a Model],
+    /// The models of all phases of the run, to adapt their requests and to price their replies; empty if none is asked again.
+    pub(super) models: &'a [&'a ModelUnderTest],
     pub(super) args: &'a BatchRunArgs,
     /// Limits of the cost; `None` if nothing is submitted.
     pub(super) money: Option<&'a MoneySettings>,
@@ -77,6 +85,8 @@ pub(super) struct Driver<'a, D> {
     pub(super) until: Until,
     /// Trials that were refused in a way in which they would be again.
     pub(super) refused: &'a mut BTreeSet<TrialKey>,
+    /// The models whose parts stay as they are.
+    pub(super) stopped: &'a mut Stopped,
     pub(super) notes: Notes,
 }
 
@@ -104,10 +114,10 @@ pub(super) struct Notes {
 }
 
 impl<D: Detail> Driver<'_, D> {
-    /// Moves all parts on.
+    /// Moves all parts on. If a server refuses what every further call would ask, the parts of that model stay as they are.
     ///
     /// # Errors
-    /// If a server refuses what every further call would ask, or a file cannot be written.
+    /// If a file cannot be written, the server of a part is not known, or one refuses and the first model that is stopped ends the run.
     pub(super) async fn drive(&mut self) -> Result<Driven> {
         let first = self.args.collect.poll;
         let mut wait = first;
@@ -117,7 +127,7 @@ impl<D: Detail> Driver<'_, D> {
             let mut part = 0;
             // Parts that are divided add parts at the end.
             while part < self.journal.parts.len() {
-                while self.step(part).await? == Step::Moved {
+                while self.step_or_stop(part).await? == Step::Moved {
                     moved = true;
                 }
                 part += 1;
@@ -134,6 +144,24 @@ impl<D: Detail> Driver<'_, D> {
                 (wait * 3 / 2).min(first * LONGEST_WAIT)
             };
             sleep(wait).await;
+        }
+    }
+
+    /// A step of a part, unless its model is stopped; stops it if its server refuses what every further call would ask.
+    async fn step_or_stop(&mut self, part: usize) -> Result<Step> {
+        if self.is_stopped(part) {
+            return Ok(Step::Waiting);
+        }
+        match self.step(part).await {
+            Err(error @ Error::Endpoint { .. })
+                if !self.money.is_some_and(|money| money.fail_fast) =>
+            {
+                self.progress.say(&format!("stopped: {error}"));
+                let facts = &self.journal.parts[part].facts;
+                self.stopped.add_part(facts, error);
+                Ok(Step::Waiting)
+            }
+            step => step,
         }
     }
 
@@ -163,8 +191,9 @@ impl<D: Detail> Driver<'_, D> {
 
     fn is_reached(&self) -> Result<bool> {
         let has_ended = |part: &Part| part.stage == Stage::Ended;
+        let stays = |part: usize| self.is_elsewhere(part) || self.is_stopped(part);
         let mut parts = 0..self.journal.parts.len();
-        if parts.all(|part| has_ended(self.part(part)) || self.is_elsewhere(part)) {
+        if parts.all(|part| has_ended(self.part(part)) || stays(part)) {
             return Ok(true);
         }
         Ok(match self.until {
@@ -174,7 +203,8 @@ impl<D: Detail> Driver<'_, D> {
                 let mut waiting = true;
                 for (index, part) in self.journal.parts.iter().enumerate() {
                     let is_out = part.stage == Stage::Created;
-                    waiting &= has_ended(part) || is_out || self.is_held(index)?;
+                    let is_left = has_ended(part) || is_out || self.is_stopped(index);
+                    waiting &= is_left || self.is_held(index)?;
                 }
                 waiting
             }
@@ -188,13 +218,17 @@ impl<D: Detail> Driver<'_, D> {
         only_looks && part.stage != Stage::Ended && !self.servers.has(&part.facts.base)
     }
 
+    fn is_stopped(&self, part: usize) -> bool {
+        self.stopped.has_part(&self.part(part).facts)
+    }
+
     pub(super) fn part(&self, part: usize) -> &Part {
         &self.journal.parts[part]
     }
 
     /// The server of a part.
     pub(super) fn server(&self, part: usize) -> Result<&BatchServer> {
-        self.servers.of(&self.part(part).facts.base)
+        self.servers.of(&self.part(part).facts)
     }
 
     /// Prints a line once.
@@ -248,14 +282,21 @@ impl<D: Detail> Driver<'_, D> {
     pub(super) fn is_missing(&mut self, part: usize) -> bool {
         let now = Instant::now();
         let since = *self.notes.missing_since.entry(part).or_insert(now);
-        let is_missing = now - since >= self.search_time();
+        let is_missing = now - since >= self.search_time(part);
         if is_missing {
             self.notes.missing_since.remove(&part);
         }
         is_missing
     }
 
-    fn search_time(&self) -> Duration {
-        self.args.collect.poll * SEARCH
+    /// How long a part's file or batch is looked for. A server on this machine that is looked at all the time has lists that are not late.
+    fn search_time(&self, part: usize) -> Duration {
+        let poll = self.args.collect.poll;
+        let base = self.part(part).facts.base.parse::<BaseUrl>();
+        let is_here = base.is_ok_and(|base| base.is_loopback());
+        if is_here && poll < SHORT_POLL {
+            return poll * SEARCH;
+        }
+        SHORTEST_SEARCH.max(poll * SEARCH)
     }
 }

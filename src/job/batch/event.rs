@@ -11,8 +11,15 @@ pub(crate) struct PartFacts {
     pub bytes: u64,
     /// Number of requests.
     pub requests: usize,
-    /// The model that is asked.
+    /// The model that is asked, as the endpoint names it.
     pub model: String,
+    /// The model's name in tables; empty in the journals of earlier versions.
+    #[serde(default)]
+    pub name: String,
+    /// The account that is charged: the name of the first model with the same address, key and headers; empty in the journals of earlier
+    /// versions.
+    #[serde(default)]
+    pub account: String,
     /// Address of the model's endpoint, without secrets.
     pub base: String,
     /// The path of each request, as `/v1/chat/completions`.
@@ -27,6 +34,11 @@ impl PartFacts {
     /// What a limit of waiting tokens holds for: address and model.
     pub(super) fn place(&self) -> (String, String) {
         (self.base.clone(), self.model.clone())
+    }
+
+    /// Whether a model of this name and id is the one that is asked.
+    pub(super) fn asks(&self, name: &str, id: &str) -> bool {
+        self.model == id && (self.name.is_empty() || self.name == name)
     }
 }
 

@@ -9,7 +9,9 @@ use super::requests::{CostOf, Requests, require_remote, summary};
 use crate::error::{Error, Result};
 use crate::job::dark_already;
 use crate::job::experiment::Experiment;
-use crate::job::open_run::{OpenRun, Remaining, limit, missing_notes, pipeline, usages};
+use crate::job::open_run::{
+    OpenRun, Remaining, every_model, limit, missing_notes, pipeline, usages,
+};
 use crate::job::outcome::Outcome;
 use crate::job::plan::Plan;
 use crate::job::timings::Timings;
@@ -101,7 +103,8 @@ pub(super) fn write<E: Experiment>(
         journal: target.journal,
     };
     let (models, files) = (experiment.models(phase), target.files);
-    let mut requests = Requests::new(models, files, target.quota, register, target.cost)?;
+    let all = every_model(experiment);
+    let mut requests = Requests::new(models, &all, files, target.quota, register, target.cost)?;
     let mut problems = Vec::new();
     let plan = plan.sources.into_iter();
     workers.install(|| {

@@ -37,6 +37,8 @@ pub(crate) struct RequestCost {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Destination {
     pub(crate) model: String,
+    pub(crate) name: String,
+    pub(crate) account: String,
     pub(crate) base: String,
     pub(crate) url: String,
 }
@@ -177,7 +179,13 @@ impl<D: Detail> ModelInputFiles<D> {
             .and_then(|file| file.sync_all())
             .map_err(unwritten)?;
         if let Some(journal) = &mut register.journal {
-            let Destination { model, base, url } = self.destination.clone();
+            let Destination {
+                model,
+                name: of_model,
+                account,
+                base,
+                url,
+            } = self.destination.clone();
             let name = open.path.file_name().unwrap_or_default();
             journal.add(
                 &name.to_string_lossy(),
@@ -186,6 +194,8 @@ impl<D: Detail> ModelInputFiles<D> {
                     bytes: open.bytes,
                     requests: open.blanks.len(),
                     model,
+                    name: of_model,
+                    account,
                     base,
                     url,
                     tokens: open.tokens.round(),

@@ -12,6 +12,7 @@ use super::part::Stage;
 use super::recover::recover;
 use super::servers::Servers;
 use super::settings::{BatchRunArgs, CollectArgs};
+use super::stopped::Stopped;
 use super::summary;
 use crate::ask::{AccessArgs, Endpoint, Sending};
 use crate::error::{Error, Result};
@@ -62,7 +63,7 @@ impl<'a> FolderBatches<'a> {
             };
             let sending = Sending::default();
             let endpoint = Endpoint::of(access.server(sending)?.replicas, sending)?;
-            servers.add(endpoint.base().to_string(), endpoint.batch_server()?);
+            servers = Servers::at(endpoint.base().to_string(), endpoint.batch_server()?);
         }
         Ok(Self {
             journal,
@@ -80,7 +81,7 @@ impl<'a> FolderBatches<'a> {
             let (Stage::Created, Some(id)) = (&part.stage, &part.batch) else {
                 continue;
             };
-            let looked = match self.servers.of(&part.facts.base) {
+            let looked = match self.servers.of(&part.facts) {
                 Ok(server) => runtime
                     .block_on(server.batch(id))
                     .map_err(|e| e.to_string()),
@@ -100,6 +101,26 @@ impl<'a> FolderBatches<'a> {
         Ok(summary::lines(&self.journal, &counts) + &problems)
     }
 
+    /// Refuses batches of several accounts at the address: the flags name one key, with which the others are not found.
+    fn refuse_several_accounts(&self) -> Result<()> {
+        let open = self.journal.parts.iter();
+        let open = open.filter(|part| part.stage != Stage::Ended);
+        let here = open.filter(|part| self.servers.has(&part.facts.base));
+        let accounts = here.map(|part| &*part.facts.account);
+        // Journals of earlier versions name none.
+        let accounts: BTreeSet<&str> = accounts.filter(|account| !account.is_empty()).collect();
+        if accounts.len() < 2 {
+            return Ok(());
+        }
+        let accounts: Vec<&str> = accounts.into_iter().collect();
+        let problem = format_args!(
+            "the batches of this run were made with several keys or headers, among them those of {}, and these flags have one key; batch \
+             run with the file of models takes the replies of all over, and the server's own page cancels them",
+            accounts.join(" and ")
+        );
+        Err(Error::usage("--api-key-env", problem))
+    }
+
     /// Carries out a task in the open folder; a text about the batches.
     ///
     /// # Errors
@@ -111,8 +132,10 @@ impl<'a> FolderBatches<'a> {
         collect: &CollectArgs,
         progress: &Progress,
     ) -> Result<String> {
+        self.refuse_several_accounts()?;
         recover(&mut self.journal, store)?;
         let args = BatchRunArgs::collecting(collect);
+        let mut stopped = Stopped::default();
         let mut driver = Driver {
             store,
             manifest: self.manifest,
@@ -127,9 +150,13 @@ impl<'a> FolderBatches<'a> {
                 FolderTask::Cancel => Until::Cancelled,
             },
             refused: &mut BTreeSet::new(),
+            stopped: &mut stopped,
             notes: Notes::default(),
         };
         start()?.block_on(driver.drive())?;
+        if let Some(first) = stopped.take_errors().into_iter().next() {
+            return Err(first);
+        }
         Ok(summary::lines(&self.journal, &BTreeMap::new()))
     }
 }

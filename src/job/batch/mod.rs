@@ -20,6 +20,7 @@ pub(super) mod run;
 mod servers;
 mod settings;
 mod split;
+mod stopped;
 mod submit;
 mod summary;
 mod take_over;

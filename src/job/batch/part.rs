@@ -35,6 +35,8 @@ pub(crate) struct Part {
     pub(super) stage: Stage,
     /// How often a batch of this part was to be made.
     pub(super) attempt: u32,
+    /// Whether a batch that was to be made was refused or not found, so that it may exist all the same.
+    pub(super) in_doubt: bool,
     /// How often its file was to be uploaded.
     pub(super) uploads: u32,
     /// The server's names of its files: the input file first.
@@ -58,6 +60,7 @@ impl Part {
             facts,
             stage: Stage::Written,
             attempt: 0,
+            in_doubt: false,
             uploads: 0,
             files: Vec::new(),
             batch: None,
@@ -111,7 +114,10 @@ impl Part {
                 at.clone_into(&mut self.created);
                 Stage::Created
             }
-            Event::Refused { .. } if self.stage == Stage::Creating => Stage::Uploaded,
+            Event::Refused { .. } if self.stage == Stage::Creating => {
+                self.in_doubt = true;
+                Stage::Uploaded
+            }
             Event::Refused { .. } => Stage::Written,
             Event::QuotaReached { .. } => {
                 self.batch = None;

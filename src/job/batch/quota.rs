@@ -10,7 +10,7 @@ use super::part::Part;
 use super::requests::SHARE_OF_QUOTA;
 use crate::ask::batch_api::QuotaRefusal;
 use crate::error::Result;
-use crate::job::budget::Budget;
+use crate::job::budget::{Answering, Budget};
 use crate::types::Detail;
 
 /// How many looks long nothing is submitted after the first refusal; chosen: a minute with the default of 10 s.
@@ -37,7 +37,10 @@ impl<D: Detail> Driver<'_, D> {
         if hold.is_some_and(|(until, _)| Instant::now() < *until) {
             return Ok(true);
         }
-        let out = |other: &&Part| other.is_out() && other.facts.place() == place;
+        // Those of a stopped model are not looked at any more, so nobody waits for them.
+        let out = |other: &&Part| {
+            other.is_out() && other.facts.place() == place && !self.stopped.has_part(&other.facts)
+        };
         let waiting = self.journal.parts.iter().filter(out);
         let waiting: f64 = waiting.map(|other| other.facts.tokens).sum();
         let limit = self.limit(part);
@@ -77,9 +80,15 @@ impl<D: Detail> Driver<'_, D> {
         let Some((money, max_cost)) = limit else {
             return Ok(true);
         };
-        let charged = match self.notes.charged.get() {
-            Some(charged) => charged,
-            None => Budget::new(money, &[], &self.store.records()?)?.charged(),
+        let charged = if let Some(charged) = self.notes.charged.get() {
+            charged
+        } else {
+            let answering = Answering {
+                models: self.models,
+                manifest: Some(self.manifest),
+            };
+            let records = self.store.records()?;
+            Budget::of_run(money, &[], answering, &records)?.charged()
         };
         self.notes.charged.set(Some(charged));
         let out = self.journal.parts.iter().filter(|part| part.is_out());
@@ -90,9 +99,15 @@ impl<D: Detail> Driver<'_, D> {
     /// Whether nothing is out, and no part that is left is within `--max-cost`.
     pub(super) fn is_over_budget(&self) -> Result<bool> {
         let parts = &self.journal.parts;
-        let left = parts.iter().filter(|part| part.is_unsubmitted());
-        let left: Vec<&Part> = left.collect();
-        if left.is_empty() || parts.iter().any(Part::is_out) {
+        let open = parts
+            .iter()
+            .filter(|part| !self.stopped.has_part(&part.facts));
+        let (mut left, mut is_out) = (Vec::new(), false);
+        for part in open {
+            is_out |= part.is_out();
+            left.extend(Some(part).filter(|part| part.is_unsubmitted()));
+        }
+        if left.is_empty() || is_out {
             return Ok(false);
         }
         for part in left {

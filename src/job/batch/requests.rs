@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::BatchFileArgs;
 use super::file::{Destination, FileLimits, ModelInputFiles, Register, RequestCost, file_name};
+use super::servers::account;
 use crate::ask::BatchInterface;
 use crate::error::{Error, Result};
 use crate::job::models::ModelUnderTest;
@@ -33,12 +34,13 @@ pub(crate) struct Requests<'a, I: Item> {
 }
 
 impl<'a, I: Item> Requests<'a, I> {
-    /// Input files in the batch folder of a run, which is created.
+    /// Input files in the batch folder of a run, which is created; `all` are the models of all phases.
     ///
     /// # Errors
     /// If the folder cannot be created.
     pub(crate) fn new(
         models: &'a [ModelUnderTest],
+        all: &[&ModelUnderTest],
         args: &'a BatchFileArgs,
         quota: Option<u64>,
         register: Register<'a, I::Detail>,
@@ -47,10 +49,12 @@ impl<'a, I: Item> Requests<'a, I> {
         let folder = register.store.folder().join(BATCH);
         fs::create_dir_all(&folder).map_err(|e| Error::file(&folder, "create", e))?;
         let journal = register.journal.as_deref();
-        let files = models.iter().enumerate().map(|(i, model)| {
+        let (mut files, mut urls) = (Vec::new(), Vec::new());
+        for (i, model) in models.iter().enumerate() {
             // The number is needed: two names may give the same file name, and a model may be asked with and without images.
             let stem = file_name(&format!("{}-{}", i + 1, model.name));
-            let destination = destination(model, args);
+            let destination = destination(model, all, args)?;
+            urls.push(destination.url.clone());
             let known = BatchInterface::at(&destination.base);
             let (stem, first, tokens) = match journal {
                 None => (stem, 1, f64::INFINITY),
@@ -71,15 +75,13 @@ impl<'a, I: Item> Requests<'a, I> {
                 requests: args.file_requests.unwrap_or(known.requests()).get(),
                 tokens,
             };
-            ModelInputFiles::new(&folder, &stem, first, limits, destination)
-        });
+            let files_of_model = ModelInputFiles::new(&folder, &stem, first, limits, destination);
+            files.push(files_of_model);
+        }
         Ok(Self {
             models,
-            urls: models
-                .iter()
-                .map(|model| destination(model, args).url)
-                .collect(),
-            files: files.collect(),
+            urls,
+            files,
             register,
             cost,
         })
@@ -116,16 +118,22 @@ impl<'a, I: Item> Requests<'a, I> {
 }
 
 /// Where the requests of a model go.
-fn destination(model: &ModelUnderTest, args: &BatchFileArgs) -> Destination {
+fn destination(
+    model: &ModelUnderTest,
+    all: &[&ModelUnderTest],
+    args: &BatchFileArgs,
+) -> Result<Destination> {
     let base = model.model.batch_base().unwrap_or_default();
     let known = BatchInterface::at(&base);
     let usual = model.model.batch_url().unwrap_or_default();
     let url = args.url.as_deref().unwrap_or_else(|| known.url(usual));
-    Destination {
+    Ok(Destination {
         model: model.model.name().to_owned(),
+        name: model.name.to_string(),
+        account: account(model, all)?,
         url: url.to_owned(),
         base,
-    }
+    })
 }
 
 /// Checks that all models can be asked in a batch.

@@ -13,15 +13,16 @@ use super::recover::recover;
 use super::requests::{require_files, require_remote};
 use super::servers::Servers;
 use super::settings::BatchRunArgs;
+use super::stopped::Stopped;
 use super::summary;
-use crate::error::Result;
-use crate::job::budget::Budget;
+use crate::error::{Error, Result};
+use crate::job::budget::{Answering, Budget};
 use crate::job::circuit_breaker::EndReason;
 use crate::job::enhancers::{self, OpenEnhancers};
 use crate::job::experiment::Experiment;
 use crate::job::interrupt::Interrupt;
 use crate::job::models;
-use crate::job::open_run::{OpenRun, Remaining};
+use crate::job::open_run::{OpenRun, Remaining, answered, every_model};
 use crate::job::outcome::Outcome;
 use crate::job::trial::Item as _;
 use crate::job::workers::unstarted;
@@ -58,6 +59,7 @@ pub(crate) fn run<E: Experiment>(
         files,
         args,
         refused: BTreeSet::new(),
+        stopped: Stopped::default(),
         enhancers_taken: false,
     };
     recover(&mut batches.journal, &batches.run.store)?;
@@ -72,6 +74,9 @@ pub(crate) fn run<E: Experiment>(
             }
         }
     }
+    if matches!(end, EndReason::AllAsked) && !batches.stopped.errors().is_empty() {
+        end = EndReason::ModelsStopped(batches.stopped.take_errors());
+    }
     batches.finish(end)
 }
 
@@ -83,6 +88,8 @@ struct BatchRun<'a, 'b, E: Experiment> {
     args: &'b BatchRunArgs,
     /// Trials that were refused in a way in which they would be again.
     refused: BTreeSet<TrialKey>,
+    /// The models that cannot be asked any further.
+    stopped: Stopped,
     enhancers_taken: bool,
 }
 
@@ -110,7 +117,13 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
                 }
                 self.write(phase, remaining)?;
             }
-            match self.drive(phase)? {
+            let driven = self.drive();
+            self.note_adapted()?;
+            let driven = driven?;
+            if let Some(first) = self.stopped_phase(phase) {
+                return Ok(PhaseEnd::Early(EndReason::Stopped(first)));
+            }
+            match driven {
                 Some(Driven::Reached) if self.args.detach && self.journal.has_open_parts() => {
                     return Ok(PhaseEnd::Detached);
                 }
@@ -128,8 +141,27 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
     /// The trials of a phase that are to be asked in a batch.
     fn remaining(&mut self, phase: usize) -> Result<Remaining<E>> {
         let mut remaining = self.run.remaining(phase)?;
-        remaining.plan.exclude(|key| self.refused.contains(key));
+        let models = self.run.experiment.models(phase);
+        let mut left_out = BTreeSet::new();
+        for (_, group) in remaining.plan.groups() {
+            let trials = group.trials.iter();
+            let of_stopped = trials.filter(|trial| {
+                self.stopped
+                    .has_model(phase, (trial.model, &models[trial.model]))
+            });
+            left_out.extend(of_stopped.map(|trial| trial.key));
+        }
+        let is_left_out = |key: &TrialKey| self.refused.contains(key) || left_out.contains(key);
+        remaining.plan.exclude(is_left_out);
         Ok(remaining)
+    }
+
+    /// The first error, if all models of a phase are stopped; `None` if one may still be asked.
+    fn stopped_phase(&mut self, phase: usize) -> Option<Error> {
+        let mut models = self.run.experiment.models(phase).iter().enumerate();
+        let is_stopped = models.all(|model| self.stopped.has_model(phase, model));
+        let errors = is_stopped.then(|| self.stopped.take_errors())?;
+        errors.into_iter().next()
     }
 
     /// Warns about trials in files that the user submits.
@@ -143,20 +175,47 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         }
     }
 
-    /// Asks one trial of each model directly, so that what the server refuses is found out before a batch is made.
+    /// Asks one trial of each model directly, so that what the server refuses is found out before a batch is made. A model that cannot
+    /// be asked any further is stopped alone.
     fn scout(&mut self, phase: usize, mut remaining: Remaining<E>) -> Result<EndReason> {
-        let mut models = BTreeSet::new();
-        let mut scouts = BTreeSet::new();
+        let mut scouts = BTreeMap::new();
         for (_, group) in remaining.plan.groups() {
             for trial in &group.trials {
-                if models.insert(trial.model) {
-                    scouts.insert(trial.key);
-                }
+                scouts.entry(trial.model).or_insert(trial.key);
             }
         }
-        remaining.plan.exclude(|key| !scouts.contains(key));
+        let keys: BTreeSet<TrialKey> = scouts.values().copied().collect();
+        remaining.plan.exclude(|key| !keys.contains(key));
         self.reload_enhancers()?;
-        self.run.ask_phase(phase, remaining)
+        let end = self.run.ask_phase(phase, remaining);
+        self.note_adapted()?;
+        let end = end?;
+        if let EndReason::ModelsStopped(errors) = end {
+            self.stop_unanswered(phase, &scouts, errors)?;
+            return Ok(EndReason::AllAsked);
+        }
+        Ok(end)
+    }
+
+    /// Stops the models whose question had no reply, for one of these errors.
+    fn stop_unanswered(
+        &mut self,
+        phase: usize,
+        scouts: &BTreeMap<usize, TrialKey>,
+        errors: Vec<Error>,
+    ) -> Result<()> {
+        let answered = answered(&self.run.store.records()?);
+        let models = self.run.experiment.models(phase);
+        for (model, _) in scouts.iter().filter(|(_, key)| !answered.contains(key)) {
+            // Each error begins with the name of its model. Another failure is that of the question alone.
+            let name = format!("{}: ", models[*model].name);
+            let is_of_model = |error: &Error| matches!(error, Error::Endpoint { problem, .. } if problem.starts_with(&name));
+            if errors.iter().any(is_of_model) {
+                self.stopped.add_model(phase, *model);
+            }
+        }
+        self.stopped.add_errors(errors);
+        Ok(())
     }
 
     /// Writes the remaining trials as parts.
@@ -168,7 +227,12 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         self.run.write_counts(&remaining.stored)?;
         let experiment = self.run.experiment;
         let (models, money) = (experiment.models(phase), &experiment.settings().money);
-        let budget = Budget::new(money, models, &remaining.stored)?;
+        let all = every_model(experiment);
+        let answering = Answering {
+            models: &all,
+            manifest: Some(&self.run.manifest),
+        };
+        let budget = Budget::of_run(money, models, answering, &remaining.stored)?;
         let cost = |trial: &_, stimulus: &crate::job::trial::Stimulus| {
             let trial: &crate::job::trial::Trial<E::Item> = trial;
             let images = stimulus.images.iter().map(|image| image.facts());
@@ -203,18 +267,10 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
     }
 
     /// Moves all parts on; `None` if the user interrupted it.
-    fn drive(&mut self, phase: usize) -> Result<Option<Driven>> {
+    fn drive(&mut self) -> Result<Option<Driven>> {
         let experiment = self.run.experiment;
-        let mut servers = Servers::default();
-        for phase in 0..E::PHASES.len() {
-            for model in experiment.models(phase) {
-                if let Some(server) = model.model.batch_server()? {
-                    servers.add(model.model.batch_base().unwrap_or_default(), server);
-                }
-            }
-        }
-        let models = experiment.models(phase).iter();
-        let models: Vec<_> = models.map(|model| &*model.model).collect();
+        let models = every_model(experiment);
+        let servers = Servers::of_models(&models)?;
         let mut driver = Driver {
             store: &mut self.run.store,
             manifest: &self.run.manifest,
@@ -230,6 +286,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
                 Until::TakenOver
             },
             refused: &mut self.refused,
+            stopped: &mut self.stopped,
             notes: Notes::default(),
         };
         let runtime = runtime::Builder::new_current_thread()
@@ -263,13 +320,17 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         let output = format!(
             "{parts}the same command, or batch fetch {folder}, takes the replies over; the same command also submits what waits\n"
         );
-        Outcome {
-            status: Status::Complete,
-            output,
+        for error in self.stopped.errors() {
+            tracing::warn!("not asked any further: {error}");
         }
+        let status = match self.stopped.errors() {
+            [] => Status::Complete,
+            _ => Status::Stopped,
+        };
+        Outcome { status, output }
     }
 
-    fn finish(mut self, end: EndReason) -> Result<Outcome> {
+    fn finish(self, end: EndReason) -> Result<Outcome> {
         if let EndReason::Interrupted = end {
             let line = format!(
                 "interrupted: the batches go on working; the same command goes on, and batch cancel {} ends them",
@@ -277,10 +338,19 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
             );
             self.run.progress.note(&line);
         }
+        self.run.finish(end)
+    }
+
+    /// Writes into the manifest how requests were changed, so that it is known however the command ends.
+    fn note_adapted(&mut self) -> Result<()> {
+        let before = self.run.manifest.settings.clone();
         for phase in 0..E::PHASES.len() {
             let adapted = models::adapted(self.run.experiment.models(phase));
             self.run.manifest.settings.extend(adapted);
         }
-        self.run.finish(end)
+        if self.run.manifest.settings == before {
+            return Ok(());
+        }
+        self.run.store.write_manifest(&self.run.manifest)
     }
 }

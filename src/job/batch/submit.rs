@@ -3,7 +3,7 @@
 use super::driver::{Driver, Step, Until};
 use super::event::Event;
 use crate::ask::BatchInterface;
-use crate::ask::batch_api::{ApiFailure, Effect, NewBatch, Readiness};
+use crate::ask::batch_api::{ApiFailure, BatchState, Effect, NewBatch, Readiness, RemoteBatch};
 use crate::error::{Error, Result};
 use crate::types::Detail;
 
@@ -99,6 +99,11 @@ impl<D: Detail> Driver<'_, D> {
                 Err(failure) => return self.look_failed(part, &failure),
             };
         }
+        if self.part(part).in_doubt
+            && let Some(step) = self.find_earlier(part).await?
+        {
+            return Ok(step);
+        }
         let attempt = self.part(part).attempt + 1;
         self.journal.record(part, Event::Creating { attempt })?;
         let (mark, url) = (self.mark(part), self.part(part).facts.url.clone());
@@ -125,12 +130,39 @@ impl<D: Detail> Driver<'_, D> {
             Err(failure) if failure.is_unsupported() => return Err(self.unknown(part)),
             Err(failure) => return self.look_failed(part, &failure),
         };
-        let mark = self.mark(part);
-        match batches.into_iter().find(|batch| batch.mark == mark) {
+        match self.of_part(part, batches) {
             Some(batch) => self.created(part, batch.id),
             None if self.is_missing(part) => self.refuse(part, "the batch is not at the server"),
             None => Ok(Step::Waiting),
         }
+    }
+
+    /// Looks for a batch that an earlier attempt made all the same; `None` if a new one is to be made.
+    async fn find_earlier(&mut self, part: usize) -> Result<Option<Step>> {
+        let listed = self.server(part)?.batches().await;
+        match listed {
+            Ok(batches) => match self.of_part(part, batches) {
+                Some(batch) => self.created(part, batch.id).map(Some),
+                None => Ok(None),
+            },
+            Err(failure) if failure.is_unsupported() => Ok(None),
+            Err(failure) => self.look_failed(part, &failure).map(Some),
+        }
+    }
+
+    /// The batch of a part: of its last attempt, else one of an earlier attempt that the server did not refuse.
+    fn of_part(&self, part: usize, batches: Vec<RemoteBatch>) -> Option<RemoteBatch> {
+        let last = self.mark(part);
+        let any = format!("{}/{}/", self.journal.run, self.part(part).stem());
+        let is_ours = |batch: &RemoteBatch| {
+            batch.mark == last
+                || (batch.mark.starts_with(&any) && batch.state != BatchState::Failed)
+        };
+        let (own, earlier): (Vec<_>, Vec<_>) = batches
+            .into_iter()
+            .filter(is_ours)
+            .partition(|batch| batch.mark == last);
+        own.into_iter().chain(earlier).next()
     }
 
     fn created(&mut self, part: usize, id: String) -> Result<Step> {

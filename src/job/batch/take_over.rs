@@ -9,21 +9,21 @@ use super::driver::{Driver, Step};
 use super::event::Event;
 use super::part::Stage;
 use super::replies::{Imported, ReplyImport};
+use crate::ask::Model;
 use crate::error::{Error, Result};
 use crate::types::{Detail, Failure, FailureKind, TrialKey};
 
-impl<D: Detail> Driver<'_, D> {
+impl<'a, D: Detail> Driver<'a, D> {
     /// Reads the replies of a part into the records of the run. What has no line may be asked again.
     pub(super) fn take_over(&mut self, part: usize) -> Result<Step> {
         let Stage::Fetched { state } = self.part(part).stage.clone() else {
             return Ok(Step::Waiting);
         };
         let (paths, keys) = (self.fetched(part), self.keys(part)?);
-        let model = &self.part(part).facts.model;
-        let model = self.models.iter().find(|one| one.name() == model);
+        let models = self.models_of(part);
         let mut refused = BTreeSet::new();
         let (mut is_adapted, mut unread) = (false, 0);
-        let server = self.servers.of(&self.part(part).facts.base)?;
+        let server = self.servers.of(&self.part(part).facts)?;
         let mut replies = ReplyImport::new(self.store, self.manifest)?;
         for path in paths.iter().filter(|path| path.exists()) {
             for_each_line(path, |line| {
@@ -37,8 +37,10 @@ impl<D: Detail> Driver<'_, D> {
                     imported
                 {
                     refused.insert(key);
-                    if let (Some(model), Some((status, body))) = (model, refusal) {
-                        is_adapted |= model.adapt_to_refusal(status, body.as_bytes());
+                    if let Some((status, body)) = refusal {
+                        for model in &models {
+                            is_adapted |= model.adapt_to_refusal(status, body.as_bytes());
+                        }
                     }
                 }
                 Ok(())
@@ -59,6 +61,19 @@ impl<D: Detail> Driver<'_, D> {
         self.journal
             .record(part, Event::TakenOver { answered, failed })?;
         Ok(Step::Moved)
+    }
+
+    /// The models that a part asks: several if one is asked with images and without. A model that has another name now is known by its id.
+    fn models_of(&self, part: usize) -> Vec<&'a Model> {
+        let facts = &self.part(part).facts;
+        let all = || self.models.iter().map(|one| (&*one.name, &*one.model));
+        let named = all().filter(|(name, model)| facts.asks(name, model.name()));
+        let named: Vec<&Model> = named.map(|(_, model)| model).collect();
+        if !named.is_empty() {
+            return named;
+        }
+        let of_id = all().filter(|(_, model)| model.name() == facts.model);
+        of_id.map(|(_, model)| model).collect()
     }
 
     fn say_what_is_missing(&self, part: usize, unread: usize, is_file_gone: bool) {

@@ -32,7 +32,7 @@ fn charged_at<D>(price: Price, batch: f64, record: &Record<D>) -> Option<f64> {
 }
 
 /// The price of a model of a run: the one that its file of models states, else that of the table by the name that the endpoint knows.
-fn price(prices: &Prices, manifest: &RunManifest, model: &str) -> Option<Price> {
+pub(in crate::job) fn price(prices: &Prices, manifest: &RunManifest, model: &str) -> Option<Price> {
     let mut stated = manifest
         .settings
         .get("models")

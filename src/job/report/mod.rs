@@ -17,5 +17,6 @@ mod runs;
 mod settings;
 mod story;
 
+pub(super) use cost::price;
 pub(crate) use runs::{ReportArgs, report};
 pub(crate) use story::story_curves;

@@ -4,6 +4,8 @@ use std::fs;
 use std::process::Stdio;
 use std::time::Duration;
 
+use serde_json::json;
+
 use super::{BLIND, QUESTIONS, SCOUTED, assert_each_once, blind, call_with};
 use crate::support::batches::{Course, Fault, MockBatches, Server};
 use crate::support::endpoint::Answer;
@@ -41,6 +43,41 @@ fn what_was_made_before_the_connection_broke_is_found() {
         (mock.count("POST files"), mock.count("POST batches")),
         (2, 2)
     );
+}
+
+#[test]
+fn a_batch_that_is_listed_late_is_not_made_again() {
+    // The list of batches is seconds behind.
+    let bench = Bench::with_questions(QUESTIONS);
+    let mock = MockBatches::start([Course::of("completed")]);
+    mock.fault("POST batches", Fault::CutAfter);
+    for _ in 0..6 {
+        let none = json!({"object": "list", "data": [], "has_more": false});
+        mock.fault("GET batches", Fault::Instead(Answer::json(200, &none)));
+    }
+    let run = BLIND.replace("--poll 0.02", "--poll 0.2");
+    let called = call_with(&run, &bench, &mock, "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_each_once(&bench, &mock, QUESTIONS);
+    assert_eq!(mock.count("POST batches"), 1);
+
+    // It was given up, and is listed before the next attempt.
+    let bench = Bench::with_questions(QUESTIONS);
+    let mock = MockBatches::start([Course::of("completed")]);
+    let called = call_with(BLIND, &bench, &mock, "--detach");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    let path = bench.path("run/batch/state.jsonl");
+    let state = fs::read_to_string(&path).unwrap();
+    let creating = state.find("\"creating\"").unwrap();
+    let end = creating + state[creating..].find('\n').unwrap() + 1;
+    let line = json!({
+        "file": "part-1-m-001.jsonl", "event": "refused", "why": "the batch is not at the server", "at": "2026-01-01T00:00:00Z",
+    });
+    fs::write(&path, format!("{}{line}\n", &state[..end])).unwrap();
+    let called = call_with(BLIND, &bench, &mock, "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_each_once(&bench, &mock, QUESTIONS);
+    assert_eq!(mock.count("POST batches"), 1);
 }
 
 #[test]

@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::{BLIND, QUESTIONS, answered, assert_each_once, blind, call_with};
 use crate::support::batches::{Course, MockBatches};
 use crate::support::endpoint::Answer;
-use crate::support::run::Bench;
+use crate::support::run::{Bench, words};
 
 const QUOTA: &str = "Enqueued token limit reached for m in organization o. Limit: 1,000,000 enqueued tokens. Please try again once some \
     in_progress batches have been completed.";
@@ -105,4 +105,39 @@ fn a_limit_of_cost_is_kept_at_the_price_of_batches() {
     let called = limited("0.01");
     assert_eq!(called.code, Some(0), "{called:?}");
     assert_each_once(&bench, &mock, QUESTIONS);
+}
+
+#[test]
+fn a_limit_of_cost_is_kept_for_models_of_a_file() {
+    // The name in tables has no row in the table of prices; the id has one, or the file states the price.
+    let table = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 10, output = 10 }\n";
+    let other =
+        "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nother = { input = 1, output = 1 }\n";
+    for (prices, price) in [
+        (table, ""),
+        (other, "price = { input = 10, output = 10 }\n"),
+    ] {
+        let bench = Bench::with_questions(QUESTIONS);
+        let mock = MockBatches::start([Course::of("completed")]);
+        bench.file("prices.toml", prices);
+        let base = mock.base_url();
+        let models = format!(
+            "[[model]]\nname = \"A name\"\nid = \"m\"\nview = \"blind\"\nendpoints = [\"{base}\"]\n{price}"
+        );
+        bench.file("models.toml", models);
+        let limited = |limit: &str| {
+            let line = format!(
+                "batch run --data set.jsonl --models models.toml --out run --poll 0.02 --no-scout --prices prices.toml \
+                 --file-requests 1 --enqueued-tokens 60 --max-cost {limit}"
+            );
+            bench.call(&words(&line))
+        };
+        // Two replies of $0.000455.
+        let called = limited("0.001");
+        assert_eq!(called.code, Some(3), "{called:?}");
+        assert_eq!(answered(&bench).len(), 2, "{called:?}");
+        let called = limited("0.01");
+        assert_eq!(called.code, Some(0), "{called:?}");
+        assert_each_once(&bench, &mock, QUESTIONS);
+    }
 }

@@ -4,6 +4,7 @@ mod ends;
 mod folder;
 mod killed;
 mod limits;
+mod of_file;
 
 use std::collections::BTreeSet;
 

@@ -56,6 +56,24 @@ fn a_budget_holds_for_answers_and_marks_together() {
     assert_eq!(mock.requests().len(), 6);
 }
 
+#[test]
+fn the_answers_of_a_model_of_a_file_count_against_the_budget_of_marks() {
+    let house = House::new();
+    let usage = json!({"prompt_tokens": 100_000, "completion_tokens": 10});
+    let body = json!({"choices": [{"message": {"content": "5"}, "finish_reason": "stop"}], "usage": usage});
+    let mock = MockEndpoint::start([Answer::json(200, &body)]);
+    let base = mock.base_url();
+    // The name in tables has no price; the id costs 0.25 dollars a reply.
+    let models =
+        format!("[[model]]\nname = \"A name\"\nid = \"gpt-4o\"\nendpoints = [\"{base}\"]\n");
+    house.0.file("models.toml", models);
+    let called = house.call(&words(&format!(
+        "--models models.toml --judge gpt-4o --judge-base-url {base} --levels L0 --out run --max-cost 1.1"
+    )));
+    assert_eq!(called.code, Some(3), "{called:?}");
+    assert_eq!(mock.requests().len(), 4);
+}
+
 /// Groq takes 5 images in a request: said by the estimate, and refused before anything is sent. A blind model is shown none.
 #[test]
 fn more_images_than_a_vendor_takes_are_refused() {

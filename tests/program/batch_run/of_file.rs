@@ -1,0 +1,186 @@
+//! Batches of the models of a file: each with its own key, settings and course.
+
+use std::collections::BTreeSet;
+
+use serde_json::Value;
+
+use super::{QUESTIONS, answered, assert_each_once};
+use crate::support::batches::{Course, Line, MockBatches};
+use crate::support::endpoint::Answer;
+use crate::support::run::{Bench, Called, called, words};
+
+const RUN: &str =
+    "batch run --data set.jsonl --models models.toml --trust-models --out run --poll 0.02";
+
+const TEMPERATURE: &str =
+    "'temperature' is not supported with this model: only the default (1) is supported";
+
+/// A folder with a file of two blind models at one server; `keys` are further lines of each.
+fn bench_of_two(mock: &MockBatches, models: [&str; 2]) -> Bench {
+    let bench = Bench::with_questions(QUESTIONS);
+    let base = mock.base_url();
+    let table =
+        |keys: &str| format!("[[model]]\n{keys}\nview = \"blind\"\nendpoints = [\"{base}\"]\n");
+    bench.file("models.toml", models.map(table).concat());
+    bench
+}
+
+/// A call with the variables that the file names.
+fn call(bench: &Bench, line: &str) -> Called {
+    let mut command = bench.command(&words(line));
+    called(command.env("TEAM_A", "key-a").env("TEAM_B", "key-b"))
+}
+
+#[test]
+fn batches_of_a_model_are_made_with_its_own_key() {
+    let mock = MockBatches::start([Course::of("in_progress completed")]);
+    let keys = [
+        "name = \"A\"\nid = \"m\"\nkey-env = \"TEAM_A\"",
+        "name = \"B\"\nid = \"n\"\nkey-env = \"TEAM_B\"",
+    ];
+    let bench = bench_of_two(&mock, keys);
+    let detached = call(&bench, &format!("{RUN} --no-scout --detach"));
+    assert_eq!(detached.code, Some(0), "{detached:?}");
+    let uploads: Vec<(bool, String)> = mock
+        .requests()
+        .iter()
+        .filter(|request| request.line.starts_with("POST /v1/files"))
+        .map(|request| {
+            let body = String::from_utf8_lossy(&request.body);
+            let key = request.header("authorization").unwrap();
+            (body.contains("\"model\":\"m\""), key.to_owned())
+        })
+        .collect();
+    let own = [(true, "Bearer key-a"), (false, "Bearer key-b")];
+    assert_eq!(uploads, own.map(|(is_a, key)| (is_a, key.to_owned())));
+    // One key is not enough for both, and says so before anything is asked.
+    let before = mock.requests().len();
+    for command in ["batch fetch run", "batch cancel run --poll 0.02"] {
+        let refused = call(&bench, command);
+        assert_eq!(refused.code, Some(2), "{refused:?}");
+        assert!(refused.stderr.contains("of A and B"), "{refused:?}");
+    }
+    assert_eq!(mock.requests().len(), before);
+    let called = call(&bench, RUN);
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_each_once(&bench, &mock, 2 * QUESTIONS);
+    for request in mock.requests() {
+        let key = request.header("authorization").unwrap().to_owned();
+        assert!(["Bearer key-a", "Bearer key-b"].contains(&&*key));
+        let of = |id: &str| request.line.contains(id);
+        if of("batch%5F1") || of("batch%5F2") {
+            assert_eq!(of("batch%5F1"), key == "Bearer key-a", "{}", request.line);
+        }
+    }
+}
+
+#[test]
+fn models_with_one_key_are_fetched_by_their_folder() {
+    let mock = MockBatches::start([Course::of("completed")]);
+    let keys = ["id = \"m\"\nrpm = 100", "id = \"n\"\nrpm = 200"];
+    let bench = bench_of_two(&mock, keys);
+    let detached = call(&bench, &format!("{RUN} --no-scout --detach"));
+    assert_eq!(detached.code, Some(0), "{detached:?}");
+    let fetched = call(&bench, "batch fetch run");
+    assert_eq!(fetched.code, Some(0), "{fetched:?}");
+    assert_each_once(&bench, &mock, 2 * QUESTIONS);
+}
+
+#[test]
+fn a_field_that_is_refused_in_a_batch_is_left_out_for_that_model() {
+    let refused = Course::of("completed").lines(|_| Line::Status(400, TEMPERATURE));
+    let mock = MockBatches::start([Course::of("completed"), refused, Course::of("completed")]);
+    let keys = [
+        "name = \"A\"\nid = \"m\"",
+        "name = \"B\"\nid = \"m\"\ndeployment = \"b\"",
+    ];
+    let bench = bench_of_two(&mock, keys);
+    let called = call(&bench, &format!("{RUN} --no-scout"));
+    assert_eq!(called.code, Some(0), "{called:?}");
+    mock.with(|server| {
+        let sent = server.batches.iter();
+        let sent: Vec<bool> = sent
+            .map(|one| one.requests[0]["body"].get("temperature").is_some())
+            .collect();
+        assert_eq!(sent, [true, true, false]);
+    });
+    let manifest = bench.path("run/manifest.json");
+    let manifest: Value = serde_json::from_slice(&std::fs::read(manifest).unwrap()).unwrap();
+    let settings = &manifest["settings"];
+    assert!(settings.get("adapted for B").is_some(), "{settings}");
+    assert!(settings.get("adapted for A").is_none(), "{settings}");
+}
+
+#[test]
+fn a_refused_field_costs_the_batches_that_were_out() {
+    let refused = Course::of("completed").lines(|_| Line::Status(400, TEMPERATURE));
+    let courses = [refused.clone(), refused, Course::of("completed")];
+    let (bench, mock, called) = super::blind(&courses, "--file-requests 2");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_eq!(answered(&bench).len(), QUESTIONS);
+    assert_eq!(mock.asked().len(), 4);
+}
+
+#[test]
+fn a_model_that_cannot_be_asked_stops_alone() {
+    let mock = MockBatches::start([Course::of("completed")]);
+    mock.chat(|body| match body["model"].as_str() {
+        Some("typo") => Answer::error(404, "model_not_found", "no such model"),
+        _ => Answer::text("C"),
+    });
+    let bench = bench_of_two(&mock, ["id = \"typo\"", "id = \"m\""]);
+    let called = call(&bench, RUN);
+    assert_eq!(called.code, Some(1), "{called:?}");
+    assert!(
+        called.stderr.contains("not asked any further"),
+        "{called:?}"
+    );
+    let models: BTreeSet<String> = answered(&bench)
+        .iter()
+        .map(|record| record["model"].as_str().unwrap().to_owned())
+        .collect();
+    assert_eq!(models, BTreeSet::from(["m".to_owned()]));
+    assert_eq!(answered(&bench).len(), QUESTIONS);
+    // Nothing of the other is in a batch.
+    assert_eq!(mock.asked().concat().len(), QUESTIONS - 1);
+}
+
+#[test]
+fn a_vendor_that_refuses_batches_stops_its_models_alone() {
+    let (one, two) = (
+        MockBatches::start([Course::failing("x", "this line is no JSON", &Value::Null)]),
+        MockBatches::start([Course::of("in_progress completed")]),
+    );
+    let bench = Bench::with_questions(QUESTIONS);
+    let table = |id: &str, mock: &MockBatches| {
+        let base = mock.base_url();
+        format!("[[model]]\nid = \"{id}\"\nview = \"blind\"\nendpoints = [\"{base}\"]\n")
+    };
+    bench.file("models.toml", table("m", &one) + &table("n", &two));
+    let called = call(&bench, &format!("{RUN} --no-scout"));
+    assert_eq!(called.code, Some(1), "{called:?}");
+    assert!(called.stderr.contains("this line is no JSON"), "{called:?}");
+    assert_eq!(answered(&bench).len(), QUESTIONS);
+    // What cannot be begun is not tried again by the same command.
+    assert_eq!(one.count("POST batches"), 1);
+}
+
+#[test]
+fn a_detached_run_keeps_how_its_requests_were_changed() {
+    let mock = MockBatches::start([Course::of("completed")]);
+    mock.chat(|body| match body.get("temperature") {
+        Some(_) => Answer::error(400, "unsupported_value", TEMPERATURE),
+        None => Answer::text("C"),
+    });
+    let bench = bench_of_two(&mock, ["id = \"m\"", "id = \"n\""]);
+    let detached = call(&bench, &format!("{RUN} --detach"));
+    assert_eq!(detached.code, Some(0), "{detached:?}");
+    let fetched = call(&bench, "batch fetch run");
+    assert_eq!(fetched.code, Some(0), "{fetched:?}");
+    let manifest = bench.path("run/manifest.json");
+    let manifest: Value = serde_json::from_slice(&std::fs::read(manifest).unwrap()).unwrap();
+    for model in ["m", "n"] {
+        let changes = &manifest["settings"][format!("adapted for {model}")];
+        assert!(changes.to_string().contains("temperature"), "{changes}");
+    }
+}
