@@ -203,9 +203,9 @@ mod tests {
         assert_eq!(of("http://127.0.0.1:8000/v1"), ImageLimit::UNKNOWN);
     }
 
-    #[test]
-    fn an_image_beyond_the_limit_is_an_error_with_a_remedy() {
-        let image = |bytes, width| ImageFacts {
+    /// A PNG file of this many bytes and this width.
+    fn image(bytes: usize, width: usize) -> ImageFacts {
+        ImageFacts {
             digest: crate::types::Digest::of(b""),
             bytes,
             width,
@@ -213,7 +213,11 @@ mod tests {
             format: "png".into(),
             orientation: None,
             exposure: None,
-        };
+        }
+    }
+
+    #[test]
+    fn an_image_beyond_the_limit_is_an_error_with_a_remedy() {
         let limit = ImageLimit::of(&Access::new(
             "https://api.anthropic.com/v1".parse().unwrap(),
         ));
@@ -235,15 +239,6 @@ mod tests {
 
     #[test]
     fn several_images_in_a_request_have_limits_of_their_own() {
-        let image = |bytes, width| ImageFacts {
-            digest: crate::types::Digest::of(b""),
-            bytes,
-            width,
-            height: 10,
-            format: "png".into(),
-            orientation: None,
-            exposure: None,
-        };
         let at = |base: &str| {
             ImageLimit::stated(1).with_requests_to(&Access::new(base.parse().unwrap()))
         };

@@ -1,6 +1,6 @@
 //! Batches by the folder of their run.
 
-use super::{QUESTIONS, answered, assert_each_once, blind};
+use super::{QUESTIONS, answered, assert_each_once, blind, call_with};
 use crate::support::batches::{Course, Line};
 use crate::support::endpoint::Answer;
 use crate::support::run::{Bench, words};
@@ -51,18 +51,12 @@ fn a_detached_run_is_looked_at_fetched_and_cancelled_by_its_folder() {
         (1, 1)
     );
     // The rest may be asked directly.
-    let base = mock.base_url();
-    let plain = [
-        "--data",
-        "set.jsonl",
-        "--blind-model",
-        "m",
-        "--resume",
-        "run",
-        "--base-url",
-        &base,
-    ];
-    let called = bench.call(&plain);
+    let called = call_with(
+        "--data set.jsonl --blind-model m --resume run",
+        &bench,
+        &mock,
+        "",
+    );
     assert_eq!(
         (called.code, mock.count("POST chat/completions")),
         (Some(0), 3),
@@ -99,16 +93,12 @@ fn what_waits_for_the_quota_is_freed_by_a_cancel() {
     let cancelled = bench.call(&words("batch cancel run --poll 0.02"));
     assert_eq!(cancelled.code, Some(1), "{cancelled:?}");
     mock.with(|server| assert!(server.files.iter().all(|file| file.deleted)));
-    let base = mock.base_url();
-    let plain = [
-        "--data",
-        "set.jsonl",
-        "--blind-model",
-        "m",
-        "--resume",
-        "run",
-    ];
-    let called = bench.call(&[&plain[..], &["--base-url", &base]].concat());
+    let called = call_with(
+        "--data set.jsonl --blind-model m --resume run",
+        &bench,
+        &mock,
+        "",
+    );
     assert_eq!(called.code, Some(0), "{called:?}");
     assert_eq!(mock.count("POST chat/completions"), QUESTIONS);
 }

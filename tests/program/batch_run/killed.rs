@@ -210,18 +210,12 @@ fn an_interrupt_leaves_the_batches_working() {
     assert_eq!(process.wait().unwrap().code(), Some(130));
     assert_eq!(mock.count("POST batches/id/cancel"), 0);
     // What is out is asked nowhere else.
-    let base = mock.base_url();
-    let plain = [
-        "--data",
-        "set.jsonl",
-        "--blind-model",
-        "m",
-        "--out",
-        "run",
-        "--base-url",
-        &base,
-    ];
-    let called = bench.call(&plain);
+    let called = call_with(
+        "--data set.jsonl --blind-model m --out run",
+        &bench,
+        &mock,
+        "",
+    );
     assert!(
         called.stderr.contains("4 trials are waiting for a batch"),
         "{called:?}"
