@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use ndarray::Array2;
+use serde_json::Value;
 
 use crate::error::{Error, Result};
 use crate::labels;
@@ -88,6 +89,8 @@ pub(crate) struct Listing {
     pub unlisted: BTreeMap<String, usize>,
     /// Horizontal field of view in degrees, for frames without intrinsics.
     pub hfov: Option<f64>,
+    /// What is recorded about how the data set was rendered.
+    pub renders: Option<Value>,
     /// Default camera for images of its size.
     pub(super) sensor: Option<SizedCamera>,
 }

@@ -2,7 +2,8 @@
 //!
 //! A scene has `<scene>/rgb/<frame>.png`, `depth/<frame>.npy` (metres) or `.png`, and `semantic/<frame>.npy` or 16-bit `.png`
 //! (numbers of instances). Beside them lies `*.semantic.txt` (HM3D-Sem), `*.house` (Matterport3D) or `info_semantic.json`
-//! (Replica). The optional `trajectory.jsonl` has one line per frame: `{"frame", "t", "pose", "intrinsics"}`.
+//! (Replica). The optional `trajectory.jsonl` has one line per frame: `{"frame", "t", "pose", "intrinsics"}`. The optional
+//! `scenes.json` beside the scenes says how they were rendered (see [`renders`]).
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -11,7 +12,7 @@ use serde::Deserialize;
 
 use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs, class_numbers};
 use super::files::{IMAGES, check_same_size, depth_of, file_name, files, folders, segments};
-use super::{hm3d, mp3d, replica};
+use super::{hm3d, mp3d, renders, replica};
 use crate::error::{Error, Result};
 use crate::files::reading::{json_lines, text};
 use crate::types::{Intrinsics, Rgb, SegmentName};
@@ -69,6 +70,7 @@ impl Habitat {
                 set.add(&scene)?;
             }
         }
+        set.listing.renders = renders::of(folder, &set.scenes.keys().collect())?;
         Ok(set)
     }
 

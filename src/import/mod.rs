@@ -13,6 +13,7 @@ pub(crate) mod keyframes;
 mod mp3d;
 mod nyu;
 mod polygons;
+mod renders;
 mod replica;
 mod scannet;
 mod sunrgbd;

@@ -24,6 +24,9 @@ use crate::types::{Decides, FrameId, InputNote, Rgb};
 /// Plausible median depths of a frame in millimetres (chosen). Outside this range the scale is wrong, or it shows a wall.
 const ROOM: std::ops::RangeInclusive<u32> = 300..=15_000;
 
+/// The script that renders HM3D with habitat-sim in the layout that `import habitat` reads.
+const HM3D_SCRIPT: &str = include_str!("../import/hm3d_frames.py");
+
 /// The maximum number of words without a class that are printed.
 const NAMED: usize = 12;
 
@@ -33,12 +36,15 @@ pub(crate) struct ImportArgs {
     /// The kind of data set in --src
     #[arg(value_name = "KIND", value_enum, add = Decides::Pixels)]
     pub kind: DataSetKind,
-    /// The data set, laid out as src/import/README.md shows
-    #[arg(long, value_name = "DIR", add = Decides::Pixels)]
-    pub src: PathBuf,
-    /// Where the frames go, in the common interface
-    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
-    pub out: PathBuf,
+    /// The data set, laid out as src/import/README.md shows; default: none, it is needed but for --script
+    #[arg(long, value_name = "DIR", required_unless_present = "script", add = Decides::Pixels)]
+    pub src: Option<PathBuf>,
+    /// Where the frames go, in the common interface; default: none, it is needed but for --script
+    #[arg(long, value_name = "DIR", required_unless_present = "script", add = Decides::Nothing)]
+    pub out: Option<PathBuf>,
+    /// Print the Python script that renders HM3D with habitat-sim for --src, and import nothing (kind habitat)
+    #[arg(long, conflicts_with_all = ["src", "out"], add = Decides::Nothing)]
+    pub script: bool,
     /// The name the data set gives itself; questions are named by it; default: the kind
     #[arg(long, value_name = "NAME", add = Decides::Reply)]
     pub name: Option<String>,
@@ -62,21 +68,44 @@ pub(crate) struct ImportArgs {
     pub threads: ThreadArgs,
 }
 
-/// Imports the frames.
-///
-/// If one frame fails, the error is logged and counted, and the others continue.
+/// Imports the frames; or only prints the script of --script.
 ///
 /// # Errors
 /// If there are no frames, the folder holds frames already, the typical depth is not that of a room, or no frame could be
-/// read.
+/// read; or if the kind has no script.
 pub(crate) fn import(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
-    let list = args.out.join("frames.jsonl");
+    match (&args.src, &args.out) {
+        _ if args.script => script(args.kind),
+        (Some(src), Some(out)) => import_frames(args, src, out, progress),
+        _ => Err(Error::usage("--src", "--src and --out are required")),
+    }
+}
+
+fn script(kind: DataSetKind) -> Result<Outcome> {
+    if kind != DataSetKind::Habitat {
+        let problem = format_args!("only the kind habitat has a script, not {kind}");
+        return Err(Error::usage("--script", problem));
+    }
+    Ok(Outcome {
+        status: Status::Complete,
+        output: HM3D_SCRIPT.to_owned(),
+    })
+}
+
+/// If one frame fails, the error is logged and counted, and the others continue.
+fn import_frames(
+    args: &ImportArgs,
+    src: &Path,
+    out: &Path,
+    progress: &Progress,
+) -> Result<Outcome> {
+    let list = out.join("frames.jsonl");
     if !args.force && list.exists() {
         let problem =
             "the folder has frames already; --force overwrites them, another --out keeps both";
         return Err(Error::data(list.display(), problem));
     }
-    let adapter = open(args.kind, &args.src, &args.stated)?;
+    let adapter = open(args.kind, src, &args.stated)?;
     let frames = choose(
         &adapter.listing().frames,
         args.key_frames.selection(),
@@ -86,7 +115,7 @@ pub(crate) fn import(args: &ImportArgs, progress: &Progress) -> Result<Outcome> 
     let (bar, tally) = (progress.bar("frames", frames.len()), InputTally::default());
     let written: Vec<Option<WrittenFrame>> = workers.install(|| {
         let frames = frames.par_iter().map(|frame| {
-            let written = write_frame(args, &*adapter, frame, &tally);
+            let written = write_frame(args, out, &*adapter, frame, &tally);
             bar.inc();
             written
                 .map_err(|e| tracing::error!("{}/{}: {e}", frame.scene, frame.frame))
@@ -99,10 +128,7 @@ pub(crate) fn import(args: &ImportArgs, progress: &Progress) -> Result<Outcome> 
     let failed = written.iter().filter(|written| written.is_none()).count();
     let written: Vec<WrittenFrame> = written.into_iter().flatten().collect();
     if written.is_empty() {
-        return Err(Error::data(
-            args.src.display(),
-            "no frame of it could be read",
-        ));
+        return Err(Error::data(src.display(), "no frame of it could be read"));
     }
     let note = depths(&written)?;
     let mut scenes: Vec<&str> = frames.iter().map(|frame| frame.scene.as_str()).collect();
@@ -110,21 +136,24 @@ pub(crate) fn import(args: &ImportArgs, progress: &Progress) -> Result<Outcome> 
     let listing = adapter.listing();
     for scene in &scenes {
         if let Some(names) = listing.names.get(*scene) {
-            frame_folder::names(&args.out, scene, names)?;
+            frame_folder::names(out, scene, names)?;
         }
     }
-    let info = json!({
+    let mut info = json!({
         "schema": "darkqa.dataset/1",
         "name": args.name.as_deref().unwrap_or(&args.kind.to_string()),
         "label_space": listing.labels.space,
         "depth_kind": listing.depth_kind,
         "source": args.kind.to_string(),
     });
+    if let Some(renders) = &listing.renders {
+        info["renders"] = renders.clone();
+    }
     let lines = written.iter().map(|written| &written.line);
-    frame_folder::finish(&args.out, &listing.labels, &info, lines)?;
+    frame_folder::finish(out, &listing.labels, &info, lines)?;
     let mut output = format!(
         "{}: {} frames of {} scenes{}\n{note}",
-        args.out.display(),
+        out.display(),
         written.len(),
         scenes.len(),
         if failed == 0 {
@@ -177,6 +206,7 @@ impl ImportedImage {
 
 fn write_frame(
     args: &ImportArgs,
+    out: &Path,
     adapter: &dyn Adapter,
     frame: &ListedFrame,
     tally: &InputTally,
@@ -192,7 +222,7 @@ fn write_frame(
     let note = file.note();
     tally.add(&FrameId(frame.rgb.display().to_string()), &note);
     let paths = FramePaths {
-        out: &args.out,
+        out,
         scene: &frame.scene,
         frame: &frame.frame,
     };

@@ -24,6 +24,7 @@ mod fair;
 mod faults;
 mod fidelity;
 mod golden;
+mod hm3d;
 mod identity;
 mod import;
 mod inputs;

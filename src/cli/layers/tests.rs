@@ -91,8 +91,9 @@ fn required(command: &Command, without: &Arg) -> Vec<String> {
     let mut words = Vec::new();
     for arg in command.get_arguments() {
         let conflicts = hides(command, without, arg);
-        let needed = arg.is_required_set() || arg.get_id() == "inputs" || arg.get_id() == "pairs";
-        if conflicts || !needed && arg.get_id() != "out" {
+        // Needed unless another flag is set.
+        let unless = ["inputs", "pairs", "out", "src"].contains(&arg.get_id().as_str());
+        if conflicts || !arg.is_required_set() && !unless {
             continue;
         }
         if let Some(flag) = arg.get_long() {

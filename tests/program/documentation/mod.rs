@@ -22,7 +22,7 @@ use page::{Block, BlockKind, Page, files, pages, root};
 use regex::Regex;
 
 /// Flags of other programs that pages name: `sbatch`, `pip`, `cargo`, and `inspect eval`.
-const OF_OTHERS: [&str; 8] = [
+const OF_OTHERS: [&str; 11] = [
     "--array",
     "--no-deps",
     "--path",
@@ -31,6 +31,9 @@ const OF_OTHERS: [&str; 8] = [
     "--test",
     "--ignored",
     "--nocapture",
+    "--hm3d",
+    "--walks",
+    "--cover",
 ];
 
 /// The words that follow the name of the program in a command; `None` for other commands.
