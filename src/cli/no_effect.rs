@@ -10,12 +10,11 @@ use super::layers;
 use crate::ask::{AccessArgs, ImageArgs, Parameters, RequestArgs, Sending};
 use crate::dataset::CodesArgs;
 use crate::enhance::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
-use crate::import::StatedArgs;
-use crate::import::keyframes::KeyFrameArgs;
 use crate::job::batch::{BatchFileArgs, BatchRunArgs};
 use crate::job::models::ModelName;
 use crate::job::settings::JobArgs;
 use crate::run::evaluate::{EvaluateArgs, ShrinkArgs};
+use crate::run::import::ImportArgs;
 use crate::run::openeqa::{JudgeArgs, OpenEqaArgs};
 use crate::run::synthesize::Sheet;
 use crate::score::realism::residual::Bins;
@@ -51,14 +50,9 @@ pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
             idle.enhancement(&args.enhancers);
         }
         Some(Command::Import(args)) if args.script => {
-            let others = ["name", "force", "max_pixels", "threads"].map(String::from);
-            let flags = [
-                ids::<StatedArgs>(),
-                ids::<KeyFrameArgs>(),
-                ids::<CodesArgs>(),
-                others.to_vec(),
-            ];
-            idle.because("--script imports nothing", &flags.concat());
+            let mut others = ids::<ImportArgs>();
+            others.retain(|id| id != "kind" && id != "script");
+            idle.because("--script imports nothing", &others);
         }
         Some(Command::Realism(args)) if args.kl_bins == Bins::Kousha => {
             let why = "the bins of kousha have one count added to each";
