@@ -141,8 +141,8 @@ for core in ("numpy.core", "numpy._core"):  # NumPy 1 and 2
     ADMITTED[core + ".numeric", "_frombuffer"] = from_buffer
 
 
-class StateUnpickler(pickle.Unpickler):
-    """Reads a state without running anything outside this file."""
+class StateUnpickler(pickle._Unpickler):
+    """Reads a state without running anything outside this file. The unpickler in C would reserve gigabytes if a pickle says so."""
 
     def find_class(self, module, name):
         if (module, name) not in ADMITTED:

@@ -87,9 +87,7 @@ impl House {
 
     /// Runs the script as the program prints it, and returns what it says.
     pub(super) fn render(&self, config: &str, out: &str, flags: &[&str], code: i32) -> String {
-        let script = self.path("hm3d_frames.py");
-        let printed = self.call(&["import", "habitat", "--script"]).stdout;
-        fs::write(&script, printed).unwrap();
+        let script = self.print_script();
         let config = format!("HM3D/{config}");
         let fixed = ["--hm3d", "HM3D/val", "--config", &config, "--out", out];
         let size: &[&str] = if flags.contains(&"--size") {
@@ -101,6 +99,22 @@ impl House {
         let said = text(&output);
         assert_eq!(output.status.code(), Some(code), "{said}");
         said
+    }
+
+    fn print_script(&self) -> PathBuf {
+        let script = self.path("hm3d_frames.py");
+        let printed = self.call(&["import", "habitat", "--script"]).stdout;
+        fs::write(&script, printed).unwrap();
+        script
+    }
+
+    /// Runs checks in Python, which import the script.
+    pub(super) fn check(&self, checks: &str) {
+        self.print_script();
+        let script = self.path("checks.py");
+        fs::write(&script, checks).unwrap();
+        let output = self.python(&script, &[]);
+        assert!(output.status.success(), "{}", text(&output));
     }
 
     /// Packs `states/hm3d-v0` with one member more.

@@ -311,6 +311,12 @@ fn wrong_calls_say_what_is_expected() {
     assert!(said.contains("no navigation mesh"), "{said}");
 }
 
+#[test]
+fn the_rules_of_the_script_hold_one_by_one() {
+    let house = House::new();
+    house.check(include_str!("check_rules.py"));
+}
+
 /// A scene without a navigation mesh.
 const ISLANDS: &str = r#"{"room": [0, 0, 0, 6, 2.6, 5], "boxes": [], "islands": []}"#;
 
