@@ -53,7 +53,8 @@
 //! let reply = Reply::local("The answer is (B).".to_owned());
 //! let (strict, lenient) = readings(&reply, &choices);
 //! assert!(matches!(strict, Answer::Unparsed(_)));
-//! assert_eq!(lenient, Answer::Chosen(choices.truth()));
+//! assert_eq!(choices.truth(), Some(1));
+//! assert_eq!(lenient, Answer::Chosen(1));
 //! # Ok::<(), darkqa_eval::Error>(())
 //! ```
 //!

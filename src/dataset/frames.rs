@@ -32,9 +32,9 @@ use crate::labels;
 use crate::types::{DepthKind, FrameId, Intrinsics, Labels, SegmentName, Segmentation};
 
 /// The file that lists the frames of the common interface.
-const FRAMES: &str = "frames.jsonl";
+pub(super) const FRAMES: &str = "frames.jsonl";
 /// The file of the questions about the frames of the folder.
-const QUESTIONS: &str = "questions.jsonl";
+pub(super) const QUESTIONS: &str = "questions.jsonl";
 /// The file with the class of each number in the semantic maps.
 const CLASSES: &str = "classes.json";
 /// The file with the name of the data set and the kind of its depth.

@@ -3,6 +3,7 @@
 //! The entry point is [`Dataset::open`]. The path decides the reader: a folder of frames ([`frames`]) or a
 //! ready-made multiple-choice set ([`multiple_choice`]). Without a path the data are the built-in rooms ([`rooms`]).
 
+mod bank;
 mod colour;
 mod dialect;
 pub(crate) mod frame_folder;
@@ -15,6 +16,7 @@ pub(crate) mod multiple_choice;
 pub(crate) mod npy;
 pub(crate) mod openeqa;
 pub(crate) mod pairs;
+mod photographs;
 pub(crate) mod picture;
 pub(crate) mod questions;
 pub(crate) mod raw_png;
@@ -32,11 +34,13 @@ use crate::error::{Error, Result};
 use crate::rooms::{self, Rooms};
 use crate::types::{Frame, FrameId, Labels, Question};
 
+pub(crate) use bank::{Bank, BankPlace};
 pub(crate) use image_file::ImageFile;
 use maps::MapPaths;
+pub(crate) use photographs::Photographs;
 pub(crate) use picture::Picture;
 pub(crate) use reading_rule::ReadingRule;
-pub(crate) use settings::{CodesArgs, DataArgs, PixelLimit, SelectionArgs, place};
+pub(crate) use settings::{BankArgs, CodesArgs, DataArgs, PixelLimit, SelectionArgs, place};
 use view::FrameFacts;
 pub(crate) use view::FrameFiles;
 

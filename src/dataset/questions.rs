@@ -133,7 +133,7 @@ mod tests {
                 question.choices.truth(),
                 &question.family
             ),
-            ("7", 1, &Family::Color)
+            ("7", Some(1), &Family::Color)
         );
     }
 

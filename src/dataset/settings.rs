@@ -1,4 +1,4 @@
-//! The flags for data: [`DataArgs`], [`SelectionArgs`], [`PixelLimit`], [`CodesArgs`].
+//! The flags for data: [`DataArgs`], [`SelectionArgs`], [`BankArgs`], [`PixelLimit`], [`CodesArgs`].
 
 use std::convert::Infallible;
 use std::fmt;
@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::DataPlace;
+use super::bank::BankPlace;
 use super::reading_rule::{ColourRule, MOST_PIXELS, ReadingRule, Transfer};
 use crate::rooms::Rooms;
 use crate::types::{Decides, Family};
@@ -38,6 +39,19 @@ pub(crate) struct SelectionArgs {
     /// Only these question families (or categories of a ready-made set), separated by commas; default: all
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = family, add = Decides::Trials)]
     pub families: Vec<Family>,
+}
+
+/// The flags that ask the same questions about every image.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Data")]
+pub(crate) struct BankArgs {
+    /// Ask these questions about every image of --data; nobody knows the answers, and the report says how far each model agrees with its
+    /// own answer in the light: home, home:uncertain (built in), or a file of lines with id, question, choices; default: none
+    #[arg(long, value_name = "home|home:uncertain|FILE", conflicts_with_all = ["questions", "rules"], add = Decides::Reply)]
+    pub ask: Option<BankPlace>,
+    /// Only N of the questions of --ask about each image, drawn by the image's name; default: all
+    #[arg(long, value_name = "N", requires = "ask", add = Decides::Trials)]
+    pub ask_per_image: Option<NonZeroUsize>,
 }
 
 /// The flag for the maximum size of an image.

@@ -27,7 +27,7 @@ pub(crate) use asking::AskingArgs;
 pub(crate) use describe::{check, describe};
 pub(crate) use name::ModelName;
 pub(crate) use run_defaults::{RunDefault, run_defaults};
-pub(crate) use settings::{AskSettings, KeyUse, ResolveContext};
+pub(crate) use settings::{AskSettings, KeyUse, ResolveContext, TextBaseline};
 
 /// Name of the endpoint of built-in models in messages.
 const BUILT_IN: &str = "built-in models";

@@ -1,15 +1,18 @@
-//! The questions of a data set that are asked: [`select`]; and the rules that make them: [`rules`].
+//! The questions of a data set that are asked: [`select`], [`AskedBank`]; and the rules that make them: [`rules`].
 
 use std::collections::BTreeSet;
+use std::num::NonZeroUsize;
 use std::path::Path;
 
 use super::progress::Progress;
 use super::questions_by_rule::by_rule;
-use crate::dataset::{DataPlace, Dataset, ReadingRule, SelectionArgs};
+use crate::dataset::{
+    Bank, BankArgs, BankPlace, DataPlace, Dataset, Photographs, ReadingRule, SelectionArgs,
+};
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::questions::rules::Rules;
-use crate::types::{Family, Question};
+use crate::types::{Digest, Family, Question};
 
 /// The rulebook in a file; without one, the one built in.
 ///
@@ -36,6 +39,67 @@ pub(crate) fn open_data(
     }
     let questions = by_rule(&dataset, rules, progress)?;
     Ok(dataset.with_questions(questions))
+}
+
+/// Questions that are asked about every image, and nobody knows the answers.
+#[derive(Debug)]
+pub(crate) struct AskedBank {
+    place: BankPlace,
+    bank: Bank,
+    /// The number of questions about each image; `None` for all.
+    per_image: Option<NonZeroUsize>,
+}
+
+impl AskedBank {
+    /// The questions that these flags name; `None` if they name none.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or a line is no such question.
+    pub(crate) fn open(args: &BankArgs) -> Result<Option<Self>> {
+        let Some(place) = &args.ask else {
+            return Ok(None);
+        };
+        Ok(Some(Self {
+            bank: Bank::open(place)?,
+            place: place.clone(),
+            per_image: args.ask_per_image,
+        }))
+    }
+
+    /// The digest of all questions.
+    ///
+    /// # Errors
+    /// None in practice: the questions are text.
+    pub(crate) fn digest(&self) -> Result<Digest> {
+        self.bank.digest()
+    }
+
+    /// The images at a place with the questions about each. What is left aside, and what is asked besides, is said.
+    ///
+    /// # Errors
+    /// If there is no image.
+    pub(crate) fn data(
+        &self,
+        place: &DataPlace,
+        rule: ReadingRule,
+        progress: &Progress,
+    ) -> Result<Dataset> {
+        let found = Photographs::at(place)?;
+        for note in &found.notes {
+            progress.say(note);
+        }
+        let questions = self.bank.about(found.dataset.frames(), self.per_image);
+        let images = found.dataset.frames().count();
+        let each = self.per_image.map_or(self.bank.len(), NonZeroUsize::get);
+        progress.say(&format!(
+            "--ask {}: {} questions about {images} images without answers ({} each); each model is held against its own answers at L0, and is \
+             asked without images, too",
+            self.place,
+            questions.len(),
+            each.min(self.bank.len())
+        ));
+        Ok(found.dataset.with_rule(rule).with_questions(questions))
+    }
 }
 
 /// The questions that are asked: the first `--limit` ones of the chosen families.

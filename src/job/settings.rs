@@ -10,7 +10,7 @@ use clap::Args;
 use super::conditions::check_used;
 use super::enhancers::{self, EnhancerRunArgs};
 use super::image_words::ImageWords;
-use super::models::{AskSettings, AskingArgs, KeyUse, ModelArgs, ResolveContext};
+use super::models::{AskSettings, AskingArgs, KeyUse, ModelArgs, ResolveContext, TextBaseline};
 use super::money::{MoneyArgs, MoneySettings};
 use super::outcome::{ShowArgs, StdoutFormat};
 use super::shard::Shard;
@@ -140,6 +140,8 @@ pub(crate) struct ExperimentSettings {
     pub max_side: Option<NonZeroU32>,
     /// The file or folder of the data; `None` for the built-in rooms.
     pub data: Option<PathBuf>,
+    /// Which models are asked without images, too.
+    pub text_baseline: TextBaseline,
 }
 
 impl JobSettings {
@@ -202,6 +204,7 @@ impl JobArgs {
                 KeyUse::Needed
             },
             data: experiment.data.as_deref(),
+            text_baseline: experiment.text_baseline,
         };
         Ok(JobSettings {
             light: LightSettings::resolve(&self.light)?,

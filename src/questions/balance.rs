@@ -61,7 +61,8 @@ pub(super) fn balance(
         };
         for (_, list) in groups(&asked, &dropped, binary) {
             let truth = |i: &usize| asked[*i].question.choices.truth();
-            let (yes, no): (Vec<usize>, Vec<usize>) = list.into_iter().partition(|i| truth(i) == 0);
+            let (yes, no): (Vec<usize>, Vec<usize>) =
+                list.into_iter().partition(|i| truth(i) == Some(0));
             let max = yes.len().min(no.len()) + 1;
             dropped.extend(yes.into_iter().skip(max));
             dropped.extend(no.into_iter().skip(max));

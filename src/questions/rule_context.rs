@@ -64,7 +64,10 @@ impl GeneratedQuestion {
     /// The text of the true choice.
     #[must_use]
     pub fn answer(&self) -> &str {
-        &self.question.choices.texts()[self.question.choices.truth()]
+        self.question
+            .choices
+            .truth()
+            .map_or("", |truth| &self.question.choices.texts()[truth])
     }
 
     /// The scene, the text and the answer; two questions that share all three repeat each other.

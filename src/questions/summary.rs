@@ -179,7 +179,10 @@ impl QuestionSummary {
         *answers.entry(asked.answer().to_owned()).or_insert(0) += 1;
         if matches!(question.family, Family::Affordance | Family::Presence) {
             let subjects = self.polarity.entry(question.family.clone()).or_default();
-            subjects.entry(asked.about.clone()).or_default()[question.choices.truth()] += 1;
+            let counts = subjects.entry(asked.about.clone()).or_default();
+            if let Some(truth) = question.choices.truth() {
+                counts[truth] += 1;
+            }
         }
         if let Some(gap) = question
             .evidence

@@ -9,7 +9,7 @@ use clap::Args;
 use crate::error::Result;
 use crate::job::Outcome;
 use crate::job::models::{
-    AskSettings, AskingArgs, KeyUse, ModelArgs, ResolveContext, check, describe,
+    AskSettings, AskingArgs, KeyUse, ModelArgs, ResolveContext, TextBaseline, check, describe,
 };
 use crate::job::progress::Progress;
 use crate::job::shard::Shard;
@@ -60,6 +60,7 @@ pub(crate) fn models(args: &ModelsArgs, progress: &Progress) -> Result<Outcome> 
         },
         // The data are not known here: they may lie where the file does. Without requests nobody gets anything.
         data: args.check.then_some(args.file.as_path()),
+        text_baseline: TextBaseline::default(),
     };
     let ask = AskSettings::resolve(&named, &AskingArgs::defaults()?, context)?;
     let mut output = describe(&ask)?;

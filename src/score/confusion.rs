@@ -68,7 +68,7 @@ fn counts(grid: &Grid<'_>, subject: usize, family: &Family, labels: &[String]) -
             let text = item.record.detail.choices.get(index)?;
             labels.binary_search(text).ok()
         };
-        if let Some(truth) = position(item.record.detail.truth) {
+        if let Some(truth) = item.record.detail.truth.and_then(position) {
             let predicted = chosen.and_then(|index| position(usize::from(index)));
             counts[truth][predicted.unwrap_or(labels.len())] += 1;
         }
@@ -207,7 +207,9 @@ impl FalseAnswer {
             Self::No => Self::Yes,
             Self::Yes => Self::No,
         };
-        item.is_of(Some(&Family::Presence)) && truth.is_choice(item, item.record.detail.truth)
+        let known = item.record.detail.truth;
+        item.is_of(Some(&Family::Presence))
+            && known.is_some_and(|known| truth.is_choice(item, known))
     }
 
     /// Whether a reading of a reply is this answer. A reply that could not be read is neither word.

@@ -61,10 +61,10 @@ pub struct GridItem<'a> {
 }
 
 impl GridItem<'_> {
-    /// Whether a reading is the true choice of the item.
+    /// Whether a reading is the true choice of the item; never if nobody knows that.
     #[must_use]
     pub fn is_right(&self, chosen: Option<u8>) -> bool {
-        chosen.map(usize::from) == Some(self.record.detail.truth)
+        chosen.is_some_and(|chosen| self.record.detail.truth == Some(usize::from(chosen)))
     }
 
     /// Whether the item belongs to a family; always true for `None`.

@@ -18,12 +18,15 @@ impl Detail for ChoiceDetail {
 
     /// Stores both readings of a reply, and the outcome, which follows from the strict reading.
     fn read(&mut self, reply: &Reply) -> Result<()> {
-        let choices = Choices::new(self.choices.clone(), self.truth)?;
+        let choices = Choices::known_by(self.choices.clone(), self.truth)?;
         let (strict, lenient) = readings(reply, &choices);
         self.outcome = match strict {
-            Answer::Chosen(index) if index == choices.truth() => TrialOutcome::Right,
-            Answer::Chosen(_) => TrialOutcome::Wrong,
             Answer::Unparsed(_) => TrialOutcome::Unparsed,
+            Answer::Chosen(index) => match choices.truth() {
+                None => TrialOutcome::Answered,
+                Some(truth) if truth == index => TrialOutcome::Right,
+                Some(_) => TrialOutcome::Wrong,
+            },
         };
         self.strict = Some(strict.into());
         self.lenient = Some(lenient.into());

@@ -37,7 +37,7 @@ pub(super) fn records(model: &str, condition: &str, answers: Answers) -> Vec<Rec
             frame: FrameId(format!("f{:02}", item / 2)),
             family: [Family::Color, Family::RoomType][item % 2].clone(),
             choices: ["a", "b", "c"].map(str::to_owned).to_vec(),
-            truth: 0,
+            truth: Some(0),
             repeat: 0,
             strict: chosen,
             lenient: chosen,
@@ -263,7 +263,7 @@ fn presence(model: &str, condition: &str, reply: fn(usize, bool) -> Option<bool>
         let is_there = item % 2 == 0;
         detail.family = Family::Presence;
         detail.choices = ["Yes", "no"].map(str::to_owned).to_vec();
-        detail.truth = usize::from(!is_there);
+        detail.truth = Some(usize::from(!is_there));
         let chosen = reply(item / 2, is_there).map(|yes| usize::from(!yes));
         detail.strict = Some(AnswerReading { chosen, why: None });
     }
@@ -322,7 +322,7 @@ fn a_collapse_is_more_than_its_truth_and_more_than_a_guess() {
         let mut all = presence("m", "L3-noise", reply);
         // Something is there in four of 24 questions alone.
         for (item, record) in all.iter_mut().enumerate() {
-            record.detail.truth = usize::from(item % 2 == 1 || item > 7);
+            record.detail.truth = Some(usize::from(item % 2 == 1 || item > 7));
         }
         with_grid(&all, |grid| confusions(grid)[0].collapse.clone().unwrap())
     };

@@ -33,7 +33,7 @@ fn record(name: &str, outcome: TrialOutcome) -> Record {
         frame: FrameId("f".into()),
         family: Family::Color,
         choices: vec!["a".into(), "b".into()],
-        truth: 0,
+        truth: Some(0),
         repeat: 0,
         strict: None,
         lenient: None,

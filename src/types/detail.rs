@@ -83,8 +83,8 @@ details! {
         family: Family,
         /// The choices in the order shown.
         choices: Vec<String>,
-        /// The index of the true choice.
-        truth: usize,
+        /// The index of the true choice; `None` if nobody knows it.
+        truth: Option<usize>,
         /// How many times the same question was asked before; not in the file if 0.
         #[serde(default, skip_serializing_if = "is_first")]
         repeat: u32,
@@ -183,6 +183,8 @@ pub enum TrialOutcome {
     Right,
     /// The model named a false choice.
     Wrong,
+    /// The model named a choice of a question whose true choice nobody knows: neither right nor wrong.
+    Answered,
     /// A reply without a readable choice: scored as wrong, counted separately.
     Unparsed,
     /// No reply: not scored, asked again on resume.

@@ -62,6 +62,7 @@ pub use model_listing::{ListedModel, ModelColumn, ModelListing};
 pub use observed::{AnswerSource, Observed};
 pub use option_probabilities::{OptionProbabilities, Thought, TokenChances, TokenPosition};
 pub use pixels::Pixels;
+pub(crate) use question::Truths;
 pub use question::{Answer, Choices, Family, Question, QuestionId, UnreadReason};
 pub use record::{Detail, Failure, FailureKind, Via, View};
 pub use reply::{Finish, Reply, Usage};

@@ -88,11 +88,11 @@ impl<'de> Deserialize<'de> for Family {
     }
 }
 
-/// The answers that a question offers, in the order shown, and the index of the true one.
+/// The answers that a question offers, in the order shown, and the index of the true one, if anybody knows it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Choices {
     texts: Vec<String>,
-    truth: usize,
+    truth: Option<usize>,
 }
 
 impl Choices {
@@ -105,6 +105,22 @@ impl Choices {
     /// # Errors
     /// [`Error::Data`] at the place `choices`.
     pub fn new(texts: Vec<String>, truth: usize) -> Result<Self, Error> {
+        Self::known_by(texts, Some(truth))
+    }
+
+    /// Checks a list of choices of which nobody knows the true one, as [`new`](Self::new) does.
+    ///
+    /// # Errors
+    /// [`Error::Data`] at the place `choices`.
+    pub fn without_truth(texts: Vec<String>) -> Result<Self, Error> {
+        Self::known_by(texts, None)
+    }
+
+    /// Checks a list of choices with the index of the true one, or `None` if nobody knows it.
+    ///
+    /// # Errors
+    /// [`Error::Data`] at the place `choices`.
+    pub(crate) fn known_by(texts: Vec<String>, truth: Option<usize>) -> Result<Self, Error> {
         let wrong = |problem: String| Err(Error::data("choices", problem));
         if !(2..=Self::MOST).contains(&texts.len()) {
             return wrong(format!(
@@ -113,7 +129,7 @@ impl Choices {
                 Self::MOST
             ));
         }
-        if truth >= texts.len() {
+        if let Some(truth) = truth.filter(|truth| *truth >= texts.len()) {
             return wrong(format!(
                 "the answer is choice {} of {}",
                 truth + 1,
@@ -146,9 +162,9 @@ impl Choices {
         &self.texts
     }
 
-    /// The index of the true choice.
+    /// The index of the true choice; `None` if nobody knows it, so that a reply is neither right nor wrong.
     #[must_use]
-    pub fn truth(&self) -> usize {
+    pub fn truth(&self) -> Option<usize> {
         self.truth
     }
 
@@ -158,6 +174,18 @@ impl Choices {
     pub fn len(&self) -> usize {
         self.texts.len()
     }
+}
+
+/// The choice of a model that does not see enough. A choice with these words, in any letter case, is the way out of its question.
+pub(crate) const CANNOT_TELL: &str = "cannot tell";
+
+/// Whether the true answers to the questions of a run are known. A run has questions of one kind alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Truths {
+    /// Every question has a true answer: replies are right or wrong.
+    Known,
+    /// No question has one: a model is held against its own answers.
+    Unknown,
 }
 
 /// The letter of the choice at an index: 0 is `A`.
@@ -242,6 +270,9 @@ mod tests {
     #[test]
     fn choices_are_checked() {
         assert!(Choices::new(texts(&["yes", "no"]), 1).is_ok());
+        let unknown = Choices::without_truth(texts(&["yes", "no"])).unwrap();
+        assert_eq!(unknown.truth(), None);
+        assert!(Choices::without_truth(texts(&["yes", " Yes "])).is_err());
         for (list, truth) in [
             (vec!["yes"], 0),
             (vec!["yes", "no"], 2),

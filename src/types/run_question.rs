@@ -7,6 +7,9 @@ use super::digest::Digest;
 use super::frame::FrameId;
 use super::question::{Family, Question, QuestionId};
 
+/// The key in [`RunQuestion::evidence`] under which a question that is asked about every image has its name among such questions.
+pub(crate) const ASKED: &str = "asked";
+
 /// One line of a run's `questions.jsonl`: a question with the scene of its frame. The file can also be used as `--questions`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RunQuestion {
@@ -27,8 +30,8 @@ pub struct RunQuestion {
     pub text: String,
     /// The choices in the order of the data set; a record has them in the order shown.
     pub choices: Vec<String>,
-    /// The text of the true choice.
-    pub answer: String,
+    /// The text of the true choice; `None` if nobody knows it.
+    pub answer: Option<String>,
     /// Further right answers; only for open questions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub extra_answers: Option<Vec<String>>,
@@ -54,6 +57,13 @@ impl RunQuestion {
         words(self) == words(other) && images.is_none_or(|(image, other)| image == other)
     }
 
+    /// The name of the question among those that are asked about every image; its own name if it is about one image alone.
+    #[must_use]
+    pub fn asked(&self) -> &str {
+        let asked = self.evidence.get(ASKED).and_then(Value::as_str);
+        asked.unwrap_or(&self.id.0)
+    }
+
     /// The stored form of a question at an index, about a frame of this scene.
     #[must_use]
     pub fn new(question: &Question, place: usize, scene: &str) -> Self {
@@ -66,7 +76,7 @@ impl RunQuestion {
             family: question.family.clone(),
             text: question.text.clone(),
             choices: choices.to_vec(),
-            answer: choices[question.choices.truth()].clone(),
+            answer: question.choices.truth().map(|truth| choices[truth].clone()),
             extra_answers: None,
             evidence: question.evidence.clone(),
             image: None,

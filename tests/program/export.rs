@@ -45,7 +45,7 @@ fn words(set: &Dataset) -> Vec<(String, Vec<String>, usize, String)> {
         (
             question.text.clone(),
             choices.texts().to_vec(),
-            choices.truth(),
+            choices.truth().unwrap(),
             question.family.to_string(),
         )
     };

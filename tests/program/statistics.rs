@@ -374,7 +374,7 @@ fn a_made_set_gives_the_papers_arithmetic() {
         let mut made = record(MODEL, &at(None), (number, number), chosen == Some(truth));
         made.detail.family = family;
         made.detail.choices = choices.iter().map(|&text| text.to_owned()).collect();
-        made.detail.truth = truth;
+        made.detail.truth = Some(truth);
         made.detail.strict = Some(AnswerReading { chosen, why: None });
         records.push(made);
     };

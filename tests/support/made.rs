@@ -20,7 +20,7 @@ pub fn record(
         frame: FrameId(format!("f{frame:04}")),
         family: Family::Color,
         choices: ["a", "b", "c"].map(str::to_owned).to_vec(),
-        truth: 0,
+        truth: Some(0),
         repeat: 0,
         strict: Some(chosen),
         lenient: Some(chosen),

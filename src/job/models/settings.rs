@@ -64,6 +64,18 @@ pub(crate) struct ResolveContext<'a> {
     pub(crate) keys: KeyUse,
     /// The file or folder of the data, if a file of models may have come with it.
     pub(crate) data: Option<&'a Path>,
+    /// Which models are asked without images, too.
+    pub(crate) text_baseline: TextBaseline,
+}
+
+/// Which of the models that see images are asked without any, too.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum TextBaseline {
+    /// Those of which flags or the file of models say it.
+    #[default]
+    AsSaid,
+    /// All of them.
+    Always,
 }
 
 /// Whether the keys of endpoints are needed.
@@ -104,6 +116,9 @@ impl AskSettings {
         entries.extend(args.blind_model.iter().map(|name| flag(name, View::Blind)));
         for text in &args.set {
             set(&mut entries, text)?;
+        }
+        if context.text_baseline == TextBaseline::Always {
+            add_text_baselines(&mut entries);
         }
         let listed = entries.iter().map(|entry| ListedModel {
             name: entry.name.clone(),
@@ -151,6 +166,18 @@ impl AskSettings {
             }
         }
         servers
+    }
+}
+
+/// Has every model that sees images be asked without any, too, unless it is already.
+fn add_text_baselines(entries: &mut [Entry]) {
+    let blind = entries
+        .iter()
+        .filter(|entry| entry.views.contains(&View::Blind));
+    let blind: BTreeSet<String> = blind.map(|entry| entry.name.clone()).collect();
+    let seeing = entries.iter_mut();
+    for entry in seeing.filter(|entry| !blind.contains(&entry.name)) {
+        entry.views.push(View::Blind);
     }
 }
 

@@ -136,7 +136,7 @@ fn offers(records: &[Record], questions: &[RunQuestion]) -> Vec<OfferedChoices> 
 
 /// Checks that runs can be compared.
 pub(super) fn check_comparable(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
-    let mut questions = BTreeMap::<&QuestionId, (usize, BTreeSet<&String>, &String)>::new();
+    let mut questions = BTreeMap::<&QuestionId, (usize, BTreeSet<&String>, Option<&String>)>::new();
     let wrong = |run: &StoredRun<ChoiceDetail>, problem: String| {
         let path = run.folder.clone();
         Err(Error::Run { path, problem })
@@ -145,10 +145,13 @@ pub(super) fn check_comparable(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
         let (mut shared, others) = (false, !questions.is_empty());
         for record in &run.records {
             let choices: BTreeSet<&String> = record.detail.choices.iter().collect();
-            let Some(truth) = record.detail.choices.get(record.detail.truth) else {
+            let truth = record.detail.truth;
+            let truth = truth.map(|truth| record.detail.choices.get(truth));
+            if truth == Some(None) {
                 let problem = format!("the record {} has no true choice", record.key);
                 return wrong(run, problem);
-            };
+            }
+            let truth = truth.flatten();
             let (first, known, known_truth) = questions
                 .entry(&record.question)
                 .or_insert_with(|| (index, choices.clone(), truth));

@@ -55,7 +55,7 @@ impl LenientChange {
         self.replies += 1;
         self.changed += usize::from(old.chosen != new.chosen);
         for (right, reading) in self.right.iter_mut().zip([old, new]) {
-            *right += usize::from(reading.chosen == Some(now.truth));
+            *right += usize::from(now.truth.is_some() && reading.chosen == now.truth);
         }
     }
 

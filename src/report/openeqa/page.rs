@@ -120,7 +120,7 @@ fn walks(report: &OpenReport<'_>) -> Vec<Value> {
         walks[walk].1.push(json!({
             "id": question.id,
             "text": readable(&question.text),
-            "answer": readable(&question.answer),
+            "answer": readable(question.answer.as_deref().unwrap_or_default()),
             "extra": extra,
             "category": question.family.name(),
             "marks": marks(&answers),

@@ -102,7 +102,8 @@ struct Item {
     name: String,
     question: usize,
     choices: usize,
-    truth: usize,
+    /// Index of the true choice; `None` if nobody knows it.
+    truth: Option<usize>,
 }
 
 #[derive(Serialize)]

@@ -5,7 +5,7 @@ use std::num::NonZeroU32;
 use clap::Args;
 
 use crate::error::Result;
-use crate::types::{Choices, Decides, Digest, Question};
+use crate::types::{Choices, Condition, Decides, Digest, Question, Truths};
 
 /// The flags for the order of choices and for repeats.
 #[derive(Debug, Clone, Copy, Args)]
@@ -17,9 +17,51 @@ pub(crate) struct ChoiceOrder {
     /// Ask each question once for every rotation of its choices: what a model answers by position averages out
     #[arg(long, add = Decides::Reply)]
     pub circular: bool,
-    /// Ask everything N times
-    #[arg(long, value_name = "N", default_value_t = NonZeroU32::MIN, add = Decides::Trials)]
-    pub repeats: NonZeroU32,
+    /// Ask everything N times; default: once, and with --ask the untouched images twice
+    #[arg(long, value_name = "N", add = Decides::Trials)]
+    pub repeats: Option<NonZeroU32>,
+}
+
+/// How many times each order of choices is asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Repeats {
+    /// So many times everywhere.
+    Everywhere(NonZeroU32),
+    /// So many times about untouched images without an enhancer, and once everywhere else.
+    InTheLight(NonZeroU32),
+}
+
+/// How many times untouched images are asked about where nobody knows the answers, so that the report can tell what light changes
+/// from what a model answers differently by itself.
+const IN_THE_LIGHT: NonZeroU32 = NonZeroU32::MIN.saturating_add(1);
+
+impl Repeats {
+    /// The largest number of times in any condition.
+    pub(super) fn most(self) -> NonZeroU32 {
+        match self {
+            Self::Everywhere(times) | Self::InTheLight(times) => times,
+        }
+    }
+
+    /// How many times a question is asked in a condition; without an image if it is `None`.
+    pub(super) fn times(self, condition: Option<&Condition>) -> u32 {
+        match self {
+            Self::Everywhere(times) => times.get(),
+            Self::InTheLight(times) if condition == Some(&Condition::raw(None)) => times.get(),
+            Self::InTheLight(_) => 1,
+        }
+    }
+}
+
+impl ChoiceOrder {
+    /// How many times each order is asked, of questions with these truths.
+    pub(super) fn repeats(self, truths: Truths) -> Repeats {
+        match (self.repeats, truths) {
+            (Some(times), _) => Repeats::Everywhere(times),
+            (None, Truths::Known) => Repeats::Everywhere(NonZeroU32::MIN),
+            (None, Truths::Unknown) => Repeats::InTheLight(IN_THE_LIGHT),
+        }
+    }
 }
 
 /// One order in which a question is shown.
@@ -33,13 +75,14 @@ pub(super) struct ShownQuestion {
     pub(super) turn: u32,
 }
 
-/// All orders in which a question is shown: each rotation of the first order, repeated `--repeats` times.
+/// All orders in which a question is shown: each rotation of the first order, repeated as often as in any condition.
 ///
 /// A record holds the choices in the order shown, so its readings need no mapping back. Two orders have two keys, because
 /// the choices enter the key.
 pub(super) fn arrange(
     question: &Question,
     choice_order: ChoiceOrder,
+    repeats: Repeats,
     seed: u64,
 ) -> Result<Vec<ShownQuestion>> {
     let choices = &question.choices;
@@ -63,15 +106,17 @@ pub(super) fn arrange(
         1
     };
     let mut arranged = Vec::new();
-    for repeat in 0..choice_order.repeats.get() {
+    for repeat in 0..repeats.most().get() {
         for rotation in 0..rotations {
             let mut order = order.clone();
             order.rotate_left(rotation);
             let texts = order.iter().map(|&index| choices.texts()[index].clone());
-            let truth = order.iter().position(|&index| index == choices.truth());
+            let truth = order
+                .iter()
+                .position(|&index| Some(index) == choices.truth());
             arranged.push(ShownQuestion {
                 question: Question {
-                    choices: Choices::new(texts.collect(), truth.unwrap_or_default())?,
+                    choices: Choices::known_by(texts.collect(), truth)?,
                     ..question.clone()
                 },
                 repeat,
@@ -105,12 +150,13 @@ mod tests {
         let choice_order = ChoiceOrder {
             shuffle_options: shuffled,
             circular,
-            repeats: NonZeroU32::new(repeats).unwrap(),
+            repeats: NonZeroU32::new(repeats),
         };
-        let arranged = arrange(&question(id), choice_order, 7).unwrap();
+        let repeats = choice_order.repeats(Truths::Known);
+        let arranged = arrange(&question(id), choice_order, repeats, 7).unwrap();
         let shown = arranged.iter().map(|arranged| {
             let choices = &arranged.question.choices;
-            assert_eq!(choices.texts()[choices.truth()], "b");
+            assert_eq!(choices.texts()[choices.truth().unwrap()], "b");
             (choices.texts().concat(), arranged.repeat)
         });
         shown.collect()
@@ -131,6 +177,37 @@ mod tests {
                 expected("cab", 1)
             ]
         );
+    }
+
+    #[test]
+    fn without_truths_the_untouched_images_alone_are_asked_twice() {
+        let times = |repeats: Option<u32>, truths, condition: Option<&str>| {
+            let order = ChoiceOrder {
+                shuffle_options: false,
+                circular: false,
+                repeats: repeats.and_then(NonZeroU32::new),
+            };
+            let condition = condition.map(|name| name.parse::<Condition>().unwrap());
+            order.repeats(truths).times(condition.as_ref())
+        };
+        for (condition, expected) in [
+            (Some("L0"), 2),
+            (Some("L3-noise"), 1),
+            (Some("L0+lift"), 1),
+            (None, 1),
+        ] {
+            assert_eq!(
+                times(None, Truths::Unknown, condition),
+                expected,
+                "{condition:?}"
+            );
+            assert_eq!(times(None, Truths::Known, condition), 1, "{condition:?}");
+            assert_eq!(
+                times(Some(3), Truths::Unknown, condition),
+                3,
+                "{condition:?}"
+            );
+        }
     }
 
     #[test]

@@ -87,6 +87,7 @@ impl Experiment for ChoiceSetup<'_> {
                 .then_some(("--shuffle-options", true.into())),
             order.circular.then_some(("--circular", true.into())),
             rules.map(|rules| ("--rules", json!(rules))),
+            self.bank.map(|bank| ("--ask", json!(bank))),
             // Left out if unset, so that runs from before the flag go on.
             (self.config.image_place == ImagePlace::BeforeWords)
                 .then_some(("--image-first", true.into())),

@@ -72,7 +72,8 @@ fn prompts(
     question: &Question,
     shown_frame: Option<&FrameId>,
 ) -> Result<Vec<QuestionPrompts>> {
-    let arranged = arrange(question, setup.config.order, setup.recipe.seed)?.into_iter();
+    let (order, repeats) = (setup.config.order, setup.config.repeats);
+    let arranged = arrange(question, order, repeats, setup.recipe.seed)?.into_iter();
     let prompts = arranged.map(|arranged| {
         let prompt = |view| {
             let words = setup.config.prompts.render(view, &arranged.question)?;
@@ -116,7 +117,9 @@ fn group(
     let own = asked.own.iter().map(|shown| (shown, false));
     let others = asked.others.iter().map(|shown| (shown, true));
     let mut trials = Vec::with_capacity((asked.own.len() + asked.others.len()) * models.len());
-    for (shown, is_of_other) in own.chain(others) {
+    let times = setup.config.repeats.times(condition);
+    let all = own.chain(others);
+    for (shown, is_of_other) in all.filter(|(shown, _)| shown.item.repeat < times) {
         let prompt = match view {
             View::Image => &shown.image,
             View::Blind => &shown.blind,

@@ -5,14 +5,17 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::choice_order::ChoiceOrder;
+use super::choice_order::{ChoiceOrder, Repeats};
 use crate::ask::{Constrain, Prompts};
-use crate::dataset::{CodesArgs, DataArgs, DataPlace, PixelLimit, ReadingRule, SelectionArgs};
-use crate::error::Result;
-use crate::job::questions::rules;
+use crate::dataset::{
+    BankArgs, CodesArgs, DataArgs, DataPlace, PixelLimit, ReadingRule, SelectionArgs,
+};
+use crate::error::{Error, Result};
+use crate::job::models::{ModelName, TextBaseline};
+use crate::job::questions::{AskedBank, rules};
 use crate::job::settings::{ExperimentSettings, JobArgs, JobSettings};
 use crate::questions::rules::Rules;
-use crate::types::Decides;
+use crate::types::{Decides, Truths, View};
 
 /// The flags of an evaluation, by help heading.
 #[derive(Debug, Args)]
@@ -23,6 +26,9 @@ pub(crate) struct EvaluateArgs {
     /// The flags that select questions.
     #[command(flatten)]
     pub selection: SelectionArgs,
+    /// The questions that are asked about every image.
+    #[command(flatten)]
+    pub bank: BankArgs,
     /// The order in which choices are shown.
     #[command(flatten)]
     pub order: ChoiceOrder,
@@ -90,7 +96,11 @@ pub(super) struct Evaluation {
     pub(super) selection: SelectionArgs,
     /// The rule by which images are read.
     pub(super) rule: ReadingRule,
+    /// The questions that are asked about every image, and how many about each; `None` if questions have answers.
+    pub(super) bank: Option<AskedBank>,
     pub(super) order: ChoiceOrder,
+    /// How many times each order of choices is asked.
+    pub(super) repeats: Repeats,
     pub(super) prompts: Prompts,
     /// The place of the image in a message.
     pub(super) image_place: ImagePlace,
@@ -115,6 +125,22 @@ impl EvaluateArgs {
             DataPlace::Path(path) => Some(path.clone()),
             DataPlace::Rooms(_) => None,
         };
+        let bank = AskedBank::open(&self.bank)?;
+        let truths = bank.as_ref().map_or(Truths::Known, |_| Truths::Unknown);
+        let job = self.job.resolve(&ExperimentSettings {
+            constrain: self.choice.constrain,
+            probabilities: self.choice.probabilities,
+            max_side: self.shrink.max_side,
+            sampling_seed: None,
+            data,
+            text_baseline: match truths {
+                Truths::Known => TextBaseline::AsSaid,
+                Truths::Unknown => TextBaseline::Always,
+            },
+        })?;
+        if truths == Truths::Unknown {
+            check_without_truths(&job)?;
+        }
         Ok(Evaluation {
             rules: rules(self.selection.rules.as_deref())?,
             observer_controls: self.choice.observer_controls,
@@ -126,15 +152,47 @@ impl EvaluateArgs {
             data: self.data,
             selection: self.selection,
             rule: self.codes.rule(self.limit),
+            repeats: self.order.repeats(truths),
             order: self.order,
+            bank,
             prompts: prompts.map_or_else(Prompts::built_in, Prompts::load)?,
-            job: self.job.resolve(&ExperimentSettings {
-                constrain: self.choice.constrain,
-                probabilities: self.choice.probabilities,
-                max_side: self.shrink.max_side,
-                sampling_seed: None,
-                data,
-            })?,
+            job,
         })
     }
+}
+
+/// Checks that a run of questions without answers has what every model is held against: its own answers in the light.
+///
+/// # Errors
+/// If the observer is asked, if a model is shown no image, or if the untouched images are left out.
+fn check_without_truths(job: &JobSettings) -> Result<()> {
+    let models = &job.ask.models;
+    if let Some(observer) = models
+        .iter()
+        .find(|model| matches!(model.id, ModelName::Observer(_)))
+    {
+        let problem = format_args!(
+            "{} cannot be asked with --ask: it answers by the maps of a frame and the rules that made its question, and these questions have \
+             neither; models at an endpoint, random and script:FILE can",
+            observer.name
+        );
+        return Err(Error::usage("--model", problem));
+    }
+    let sees = |name: &str| {
+        let mut models = models.iter();
+        models.any(|model| model.name == name && model.view == View::Image)
+    };
+    if let Some(blind) = models.iter().find(|model| !sees(&model.name)) {
+        let problem = format_args!(
+            "{} is shown no image, and --ask holds a model against its own answers in the light: name it with --model and leave --blind out; it is \
+             asked without images, too",
+            blind.name
+        );
+        return Err(Error::usage("--ask", problem));
+    }
+    if !job.light.degradations().contains(&None) {
+        let problem = "--ask holds a model against its own answers at L0: add L0 to --levels; what a run has is not asked again";
+        return Err(Error::usage("--levels", problem));
+    }
+    Ok(())
 }

@@ -14,7 +14,7 @@ use crate::job::conditions::conditions;
 use crate::job::models::{self, ModelName, ModelUnderTest};
 use crate::job::observer::Observer;
 use crate::job::progress::Progress;
-use crate::job::questions::{open_data, select};
+use crate::job::questions::{AskedBank, open_data, select};
 use crate::job::recipe::Recipe;
 use crate::job::shard::part;
 use crate::job::source::{Source, SourceFrame, first_asked, inspect_all};
@@ -38,6 +38,8 @@ pub(super) struct ChoiceSetup<'a> {
     pub(super) models: Vec<ModelUnderTest>,
     pub(super) conditions: Vec<Condition>,
     pub(super) recipe: Recipe,
+    /// The digest of the questions that are asked about every image; `None` if questions have answers.
+    pub(super) bank: Option<Digest>,
 }
 
 impl<'a> ChoiceSetup<'a> {
@@ -55,13 +57,13 @@ impl<'a> ChoiceSetup<'a> {
             Vec::new()
         };
         let place = &config.data.data;
-        let dataset = open_data(
-            place,
-            &config.selection,
-            &config.rules,
-            config.rule,
-            progress,
-        )?;
+        let dataset = match &config.bank {
+            Some(bank) => bank.data(place, config.rule, progress)?,
+            None => {
+                let (selection, rules) = (&config.selection, &config.rules);
+                open_data(place, selection, rules, config.rule, progress)?
+            }
+        };
         let dataset = Arc::new(dataset);
         let all = select(&dataset, &config.selection)?;
         let other_rooms = OtherRooms::of(&all, |frame| dataset.scene(frame));
@@ -89,6 +91,7 @@ impl<'a> ChoiceSetup<'a> {
             digests: digests(&sources),
             sources,
             models,
+            bank: config.bank.as_ref().map(AskedBank::digest).transpose()?,
             conditions: conditions(&job.light, job.enhancers.llie_on, &recipe.enhancers),
             recipe,
             questions,

@@ -162,7 +162,7 @@ const COLUMNS: [&str; 6] = ["index", "image", "question", "answer", "category", 
 /// A row of VLMEvalKit's table (`vlmeval/dataset/image_mcq.py`). The index is a number. A short cell in the column `image`
 /// is the index of the row that has the image.
 fn table(index: usize, image: String, question: &Question) -> Vec<String> {
-    let truth = letter(question.choices.truth()).to_string();
+    let truth = true_letter(question);
     let head = [
         index.to_string(),
         image,
@@ -176,6 +176,12 @@ fn table(index: usize, image: String, question: &Question) -> Vec<String> {
         .collect()
 }
 
+/// The letter of the true choice; empty if nobody knows it.
+fn true_letter(question: &Question) -> String {
+    let truth = question.choices.truth();
+    truth.map_or_else(String::new, |truth| letter(truth).to_string())
+}
+
 /// A line of `metadata.jsonl` for an image folder.
 fn image_folder(file: &str, question: &Question) -> Value {
     json!({
@@ -183,7 +189,7 @@ fn image_folder(file: &str, question: &Question) -> Value {
         "id": question.id,
         "question": question.text,
         "options": question.choices.texts(),
-        "answer": letter(question.choices.truth()).to_string(),
+        "answer": true_letter(question),
         "category": question.family,
     })
 }
@@ -194,7 +200,7 @@ fn llava(file: &str, question: &Question) -> Value {
         "question_id": question.id,
         "image": file,
         "text": format!("{}\n{}\n{LLAVA}", question.text, lettered(&question.choices)),
-        "answer": letter(question.choices.truth()).to_string(),
+        "answer": true_letter(question),
         "category": question.family,
     })
 }

@@ -81,7 +81,7 @@ impl Experiment for OpenSetup<'_> {
                 family: Family::from(&*question.category),
                 text: question.text.clone(),
                 choices: Vec::new(),
-                answer: question.answer.clone(),
+                answer: Some(question.answer.clone()),
                 extra_answers: question.extra.clone(),
                 evidence: Value::Null,
                 image: walk.map(|walk| walk.digest()),

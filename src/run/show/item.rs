@@ -68,7 +68,7 @@ pub(super) fn choice_text(record: &Record, stored_question: Option<&RunQuestion>
         let _ = writeln!(text, "{}", stored_question.text);
     }
     for (index, choice) in record.detail.choices.iter().enumerate() {
-        let truth = if index == record.detail.truth {
+        let truth = if Some(index) == record.detail.truth {
             "  (true)"
         } else {
             ""
@@ -85,6 +85,7 @@ fn choice_answer(record: &Record) -> ShownAnswer {
         outcome: match record.detail.outcome {
             types::TrialOutcome::Right => "right",
             types::TrialOutcome::Wrong => "wrong",
+            types::TrialOutcome::Answered => "answered",
             types::TrialOutcome::Unparsed => "not readable",
             types::TrialOutcome::Failed => "failed",
         },
@@ -97,11 +98,8 @@ fn choice_answer(record: &Record) -> ShownAnswer {
 fn open_text(record: &Record<OpenDetail>, stored_question: Option<&RunQuestion>) -> String {
     let mut text = format!("{}, about {}\n", record.question, record.detail.episode);
     if let Some(stored_question) = stored_question {
-        let _ = writeln!(
-            text,
-            "{}\n  {}  (true)",
-            stored_question.text, stored_question.answer
-        );
+        let answer = stored_question.answer.as_deref().unwrap_or_default();
+        let _ = writeln!(text, "{}\n  {answer}  (true)", stored_question.text);
     }
     text
 }

@@ -201,7 +201,9 @@ impl SheetItem {
             let mark = match record.detail.outcome {
                 TrialOutcome::Right => StoryMark::Right,
                 TrialOutcome::Wrong => StoryMark::Wrong,
-                TrialOutcome::Unparsed | TrialOutcome::Failed => StoryMark::None,
+                TrialOutcome::Answered | TrialOutcome::Unparsed | TrialOutcome::Failed => {
+                    StoryMark::None
+                }
             };
             marks.push((record.model.clone(), mark));
         }

@@ -59,7 +59,7 @@ pub(super) fn confident_replies(grid: &Grid<'_>, subject: usize) -> SortedReplie
 /// The reply of a record; `None` if the probabilities are not those of its choices, as in a file that was edited.
 fn reply(record: &Record, options: &OptionProbabilities, cluster: u32) -> Option<ConfidentReply> {
     let (detail, p) = (&record.detail, &options.p);
-    let truth = *p.get(detail.truth)?;
+    let truth = *p.get(detail.truth?)?;
     if p.len() != detail.choices.len() || options.mass <= 0.0 {
         return None;
     }

@@ -34,7 +34,7 @@ pub(super) fn shares(grid: &Grid<'_>, subject: usize) -> Vec<PositionShare> {
             }
             let share = &mut shares[position];
             share.p += p;
-            share.truth += f64::from(u8::from(item.record.detail.truth == position));
+            share.truth += f64::from(u8::from(item.record.detail.truth == Some(position)));
             share.n += 1;
         }
     }

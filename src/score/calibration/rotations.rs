@@ -34,7 +34,7 @@ pub(super) fn accuracy(grid: &Grid<'_>, subject: usize) -> Option<Estimate> {
             .entry((&record.question, detail.repeat))
             .or_default();
         asked.cluster = item.cluster;
-        asked.truth = detail.choices.get(detail.truth)?;
+        asked.truth = detail.choices.get(detail.truth?)?;
         asked.shown.insert(&detail.choices);
         for (text, p) in detail.choices.iter().zip(&options.p) {
             *asked.by_text.entry(text).or_default() += p;

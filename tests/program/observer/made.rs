@@ -138,7 +138,7 @@ impl Set {
                     match answer(asked, &seen, question) {
                         None => (guess, guess, 0),
                         Some(choice) => {
-                            let right = choice == question.choices.truth();
+                            let right = Some(choice) == question.choices.truth();
                             (f64::from(u8::from(right)), guess, 1)
                         }
                     }
@@ -189,7 +189,7 @@ impl Set {
         let score = |seen: &Observation, question: &Question| -> f64 {
             match seen.answer(question, &self.rules, &self.palette) {
                 None => 1.0 / question.choices.len() as f64,
-                Some(choice) => f64::from(u8::from(choice == question.choices.truth())),
+                Some(choice) => f64::from(u8::from(Some(choice) == question.choices.truth())),
             }
         };
         let frames = self.frames.par_iter().enumerate();

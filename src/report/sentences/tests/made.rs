@@ -28,7 +28,7 @@ fn asked(model: &str, frames: usize, conditions: &[(&str, f64)]) -> Vec<Record> 
                 frame: FrameId(format!("f{:02}", item / 2)),
                 family: [Family::Color, Family::RoomType][item % 2].clone(),
                 choices: ["a", "b", "c"].map(str::to_owned).to_vec(),
-                truth: 0,
+                truth: Some(0),
                 repeat: 0,
                 strict: reading,
                 lenient: reading,

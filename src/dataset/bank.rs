@@ -1,0 +1,402 @@
+//! Questions that are asked about every photograph, without anybody knowing the answers: [`Bank`], and [`BankPlace`], where they are.
+//!
+//! A line is `{"id", "question", "choices", "family"}`, the last optional. There is no image and no answer in it: a question without a
+//! true answer cannot be scored as right or wrong, and its lines have no room for one.
+
+use std::collections::HashMap;
+use std::convert::Infallible;
+use std::fmt;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use super::questions::{checked, other};
+use crate::error::{Error, Result};
+use crate::files::reading::text;
+use crate::types::question::CANNOT_TELL;
+use crate::types::run_question::ASKED;
+use crate::types::{Choices, Digest, Family, FrameId, Question, QuestionId};
+
+/// The built-in bank.
+const HOME: &str = include_str!("../../prompts/ask/home.jsonl");
+
+/// The place of a bank: what `--ask` names.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum BankPlace {
+    /// The built-in bank, with or without a way out of each question.
+    Home(WayOut),
+    /// A file of the user.
+    File(PathBuf),
+}
+
+/// Whether each question of the built-in bank has the last choice “cannot tell”.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum WayOut {
+    /// Every choice says something about the photograph.
+    None,
+    /// The last choice is “cannot tell”.
+    CannotTell,
+}
+
+impl FromStr for BankPlace {
+    type Err = Infallible;
+
+    /// A file named `home` is a path.
+    fn from_str(text: &str) -> Result<Self, Infallible> {
+        let path = PathBuf::from(text);
+        Ok(match text {
+            "home" if !path.exists() => Self::Home(WayOut::None),
+            "home:uncertain" => Self::Home(WayOut::CannotTell),
+            _ => Self::File(path),
+        })
+    }
+}
+
+impl fmt::Display for BankPlace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Home(WayOut::None) => f.write_str("home"),
+            Self::Home(WayOut::CannotTell) => f.write_str("home:uncertain"),
+            Self::File(path) => path.display().fmt(f),
+        }
+    }
+}
+
+/// A question of a bank, about no photograph yet.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct BankQuestion {
+    id: String,
+    text: String,
+    choices: Choices,
+    family: Family,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BankLine {
+    id: Value,
+    question: String,
+    choices: Vec<String>,
+    #[serde(default = "other")]
+    family: Family,
+}
+
+/// The questions of a bank, checked: no two have one id or one text.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Bank {
+    questions: Vec<BankQuestion>,
+}
+
+impl Bank {
+    /// The bank at a place.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or a line is no question of a bank; the error names the file and the line.
+    pub(crate) fn open(place: &BankPlace) -> Result<Self> {
+        match place {
+            BankPlace::Home(way_out) => Self::parse(HOME, Path::new("home"), *way_out),
+            BankPlace::File(path) if !path.exists() => Err(Error::usage(
+                "--ask",
+                format_args!(
+                    "{}: no such file; home and home:uncertain are built in",
+                    path.display()
+                ),
+            )),
+            BankPlace::File(path) => Self::parse(&text(path)?, path, WayOut::None),
+        }
+    }
+
+    fn parse(text: &str, path: &Path, way_out: WayOut) -> Result<Self> {
+        let mut questions: Vec<(usize, BankQuestion)> = Vec::new();
+        let (mut ids, mut texts) = (HashMap::new(), HashMap::new());
+        let lines = (1..).zip(text.trim_start_matches('\u{feff}').lines());
+        for (number, line) in lines.filter(|(_, line)| !line.trim().is_empty()) {
+            let question = line_of(line, way_out, path, number)?;
+            for (known, name, value) in [
+                (&mut ids, "id", question.id.clone()),
+                (&mut texts, "question", question.text.clone()),
+            ] {
+                if let Some(first) = known.insert(value.clone(), number) {
+                    let problem = format_args!("the {name} {value:?} is that of line {first}, too");
+                    return Err(Error::line(path, number, problem));
+                }
+            }
+            questions.push((number, question));
+        }
+        if questions.is_empty() {
+            return Err(Error::data(path.display(), "no questions in it"));
+        }
+        Ok(Self {
+            questions: questions
+                .into_iter()
+                .map(|(_, question)| question)
+                .collect(),
+        })
+    }
+
+    /// The digest of everything that is asked, whatever the file is called.
+    ///
+    /// # Errors
+    /// None in practice: the questions are text.
+    pub(crate) fn digest(&self) -> Result<Digest> {
+        let lines = self.questions.iter().map(|question| {
+            json!([
+                question.id,
+                question.text,
+                question.choices.texts(),
+                question.family
+            ])
+        });
+        Digest::canonical("darkqa.bank/1", &lines.collect::<Vec<_>>())
+    }
+
+    /// Number of questions.
+    pub(crate) fn len(&self) -> usize {
+        self.questions.len()
+    }
+
+    /// Every question about every photograph, photograph by photograph in the order of the bank.
+    ///
+    /// With a number, so many of them about each: those whose text has the lowest digest together with the photograph's name. Other
+    /// photographs, another order of the bank or further questions therefore do not change which of two is taken first.
+    pub(crate) fn about<'f>(
+        &self,
+        frames: impl IntoIterator<Item = &'f FrameId>,
+        per_image: Option<NonZeroUsize>,
+    ) -> Vec<Question> {
+        let most = per_image.map_or(usize::MAX, NonZeroUsize::get);
+        let frames = frames.into_iter();
+        let questions = frames.flat_map(|frame| {
+            let mut drawn: Vec<usize> = (0..self.questions.len()).collect();
+            if most < drawn.len() {
+                drawn.sort_by_cached_key(|index| {
+                    let text = self.questions[*index].text.as_bytes();
+                    *Digest::of_parts([b"ask", frame.0.as_bytes(), text]).as_bytes()
+                });
+                drawn.truncate(most);
+                drawn.sort_unstable();
+            }
+            let asked = drawn.into_iter();
+            asked.map(move |index| self.questions[index].about(frame))
+        });
+        questions.collect()
+    }
+}
+
+impl BankQuestion {
+    /// The question about a photograph.
+    fn about(&self, frame: &FrameId) -> Question {
+        Question {
+            id: QuestionId(format!("{}@{}", self.id, frame.0)),
+            frame: frame.clone(),
+            family: self.family.clone(),
+            text: self.text.clone(),
+            choices: self.choices.clone(),
+            evidence: json!({ ASKED: self.id }),
+        }
+    }
+}
+
+/// The question in a line.
+fn line_of(line: &str, way_out: WayOut, path: &Path, number: usize) -> Result<BankQuestion> {
+    let wrong = |problem: String| Error::line(path, number, problem);
+    let value: Value =
+        serde_json::from_str(line).map_err(|e| Error::json_line(path, number, &e))?;
+    for (field, instead) in [
+        (
+            "answer",
+            "--questions FILE asks questions whose answers are known",
+        ),
+        (
+            "image",
+            "each question is asked about every image of --data",
+        ),
+        (
+            "frame",
+            "each question is asked about every image of --data",
+        ),
+    ] {
+        if value.get(field).is_some() {
+            let problem = format!("a question of --ask has no {field:?}: {instead}");
+            return Err(wrong(problem));
+        }
+    }
+    let mut line: BankLine =
+        serde_json::from_value(value).map_err(|e| Error::json_line(path, number, &e))?;
+    let id = match line.id {
+        Value::String(id) if !id.trim().is_empty() => id,
+        Value::Number(id) => id.to_string(),
+        other => {
+            return Err(wrong(format!(
+                "the id {other} is neither text nor a number"
+            )));
+        }
+    };
+    if line.question.trim().is_empty() {
+        return Err(wrong(format!("question {id:?} is empty")));
+    }
+    if way_out == WayOut::CannotTell {
+        line.choices.push(CANNOT_TELL.to_owned());
+    }
+    let at = |e: Error| e.at(format!("{}, line {number}", path.display()));
+    Ok(BankQuestion {
+        id,
+        text: line.question,
+        choices: Choices::without_truth(line.choices).map_err(at)?,
+        family: checked(line.family).map_err(at)?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    fn bank(text: &str) -> Result<Bank> {
+        Bank::parse(text, Path::new("bank.jsonl"), WayOut::None)
+    }
+
+    fn frames(names: &[&str]) -> Vec<FrameId> {
+        names.iter().map(|name| FrameId((*name).into())).collect()
+    }
+
+    const TWO: &str = concat!(
+        "\u{feff}{\"id\":\"lamp\",\"question\":\"Is there a lamp?\",\"choices\":[\"yes\",\"no\"],\"family\":\"presence\"}\n\n",
+        "{\"id\":2,\"question\":\"What color?\",\"choices\":[\"red\",\"blue\",\"green\"]}\n"
+    );
+
+    #[test]
+    fn the_built_in_bank_has_25_questions_with_and_without_a_way_out() {
+        let home = Bank::open(&"home".parse().unwrap()).unwrap();
+        let uncertain = Bank::open(&"home:uncertain".parse().unwrap()).unwrap();
+        assert_eq!((home.len(), uncertain.len()), (25, 25));
+        let presence = |question: &&BankQuestion| question.family == Family::Presence;
+        assert_eq!(home.questions.iter().filter(presence).count(), 15);
+        for (bare, with_way_out) in home.questions.iter().zip(&uncertain.questions) {
+            assert!(
+                !bare
+                    .choices
+                    .texts()
+                    .iter()
+                    .any(|text| text.contains("cannot"))
+            );
+            let (last, others) = with_way_out.choices.texts().split_last().unwrap();
+            assert_eq!((&**last, others), (CANNOT_TELL, bare.choices.texts()));
+        }
+        assert_ne!(home.digest().unwrap(), uncertain.digest().unwrap());
+    }
+
+    #[test]
+    fn every_question_is_asked_about_every_photograph_and_has_no_truth() {
+        let asked = bank(TWO)
+            .unwrap()
+            .about(&frames(&["a.png", "b/c.png"]), None);
+        let ids: Vec<&str> = asked.iter().map(|question| &*question.id.0).collect();
+        assert_eq!(ids, ["lamp@a.png", "2@a.png", "lamp@b/c.png", "2@b/c.png"]);
+        assert!(
+            asked
+                .iter()
+                .all(|question| question.choices.truth().is_none())
+        );
+        assert_eq!(asked[0].evidence, json!({"asked": "lamp"}));
+    }
+
+    #[test]
+    fn fewer_questions_a_photograph_are_drawn_by_names_alone() {
+        let home = Bank::open(&BankPlace::Home(WayOut::None)).unwrap();
+        let frames = frames(&["a.png", "b.png", "c.png"]);
+        let drawn = |frames: &[FrameId], most| -> BTreeSet<String> {
+            let asked = home.about(frames, NonZeroUsize::new(most));
+            asked.into_iter().map(|question| question.id.0).collect()
+        };
+        let (five, six) = (drawn(&frames, 5), drawn(&frames, 6));
+        assert_eq!((five.len(), six.len()), (15, 18));
+        assert!(five.is_subset(&six));
+        assert!(drawn(&frames[1..], 5).is_subset(&five));
+        // Photographs are not all asked the same ones.
+        let questions: BTreeSet<&str> = five.iter().filter_map(|id| id.split('@').next()).collect();
+        assert!(questions.len() > 5, "{questions:?}");
+        assert_eq!(drawn(&frames, 99).len(), 75);
+    }
+
+    #[test]
+    fn broken_lines_are_named() {
+        let line = |rest: &str| format!("{}{rest}", TWO.trim_start_matches('\u{feff}'));
+        for (rest, says) in [
+            ("{", "bank.jsonl, line 4: EOF"),
+            (
+                r#"{"id":3,"question":"?","choices":["x","y"],"answer":"x"}"#,
+                "line 4: a question of --ask has no \"answer\": --questions",
+            ),
+            (
+                r#"{"id":3,"question":"?","choices":["x","y"],"image":"a.png"}"#,
+                "line 4: a question of --ask has no \"image\"",
+            ),
+            (
+                r#"{"id":3,"question":"?","choices":["x","y"],"hint":"a"}"#,
+                "line 4: unknown field `hint`",
+            ),
+            (
+                r#"{"id":3,"choices":["x","y"]}"#,
+                "line 4: missing field `question`",
+            ),
+            (
+                r#"{"id":3,"question":" ","choices":["x","y"]}"#,
+                "line 4: question \"3\" is empty",
+            ),
+            (
+                r#"{"id":true,"question":"?","choices":["x","y"]}"#,
+                "line 4: the id true",
+            ),
+            (
+                r#"{"id":3,"question":"?","choices":["x"]}"#,
+                "line 4: 1 choices: a question needs 2 to 26",
+            ),
+            (
+                r#"{"id":3,"question":"?","choices":["x","X "]}"#,
+                "line 4: choices A and B are both",
+            ),
+            (
+                r#"{"id":"2","question":"?","choices":["x","y"]}"#,
+                "line 4: the id \"2\" is that of line 3, too",
+            ),
+            (
+                r#"{"id":3,"question":"What color?","choices":["x","y"]}"#,
+                "line 4: the question \"What color?\" is that of line 3, too",
+            ),
+            (
+                r#"{"id":3,"question":"?","choices":["x","y"],"family":"all"}"#,
+                "line 4: the family \"all\" is the name",
+            ),
+        ] {
+            let error = bank(&line(rest)).unwrap_err().to_string();
+            assert!(error.contains(says), "{rest}: {error}");
+        }
+        let error = bank("\n").unwrap_err().to_string();
+        assert_eq!(error, "bank.jsonl: no questions in it");
+        let missing = Bank::open(&BankPlace::File("no-such-bank".into())).unwrap_err();
+        assert!(
+            missing
+                .to_string()
+                .contains("home and home:uncertain are built in"),
+            "{missing}"
+        );
+    }
+
+    #[test]
+    fn a_bank_is_known_by_what_it_asks() {
+        let digest = |text: &str| bank(text).unwrap().digest().unwrap();
+        assert_eq!(digest(TWO), digest(&TWO.replace("\n\n", "\n")));
+        for other in [
+            TWO.replace("red", "pink"),
+            TWO.replace("presence", "color"),
+            TWO.replace("lamp?", "torch?"),
+        ] {
+            assert_ne!(digest(TWO), digest(&other));
+        }
+    }
+}

@@ -1,0 +1,227 @@
+//! The images at a place without regard to questions about them: [`Photographs`].
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use super::image_file::format::READ;
+use super::image_names::{ImageNames, is_image};
+use super::{DataPlace, Dataset, ImageSource, frames, stem};
+use crate::error::{Error, Result};
+use crate::files::reading::entries;
+use crate::types::FrameId;
+
+/// The images at a place, and what is to be said about how they were found.
+#[derive(Debug)]
+pub(crate) struct Photographs {
+    /// The images, without questions.
+    pub(crate) dataset: Dataset,
+    /// Lines for the user: what is left aside, and how images are named.
+    pub(crate) notes: Vec<String>,
+}
+
+impl Photographs {
+    /// The images at a place. No image is read.
+    ///
+    /// A folder with a list of frames has those of the list. Any other folder has all images in it and in the folders below, each
+    /// named by its path from the folder; what begins with a dot is passed over. A single image is a place of its own. The
+    /// built-in rooms and ready-made sets have the images that they are about.
+    ///
+    /// # Errors
+    /// If the place cannot be read, or has no image.
+    pub(crate) fn at(place: &DataPlace) -> Result<Self> {
+        let dataset = match place {
+            DataPlace::Rooms(rooms) => Dataset::of_rooms(*rooms),
+            DataPlace::Path(path) if path.is_dir() => return Self::in_folder(path),
+            DataPlace::Path(path) if is_image(path) => Dataset::of_images(path)?,
+            DataPlace::Path(path) => {
+                let set = Dataset::open(place, None)?;
+                let count = set.questions().len();
+                let note = format!(
+                    "{}: its {count} questions are left aside, and --ask is asked about its images",
+                    path.display()
+                );
+                return Ok(Self {
+                    dataset: set.with_questions(Vec::new()),
+                    notes: vec![note],
+                });
+            }
+        };
+        let notes = Vec::new();
+        Ok(Self { dataset, notes })
+    }
+
+    fn in_folder(folder: &Path) -> Result<Self> {
+        let mut notes = Vec::new();
+        if folder.join(frames::QUESTIONS).exists() {
+            notes.push(format!(
+                "{} is left aside: --ask brings the questions",
+                folder.join(frames::QUESTIONS).display()
+            ));
+        }
+        if folder.join(frames::FRAMES).exists() {
+            let dataset = Dataset::of_frames(folder)?;
+            return Ok(Self { dataset, notes });
+        }
+        let mut scan = Scan::default();
+        scan.add(folder, folder)?;
+        let names = ImageNames::of(scan.files);
+        let mut sources = BTreeMap::new();
+        for path in &names.images {
+            let inner = path.strip_prefix(folder).unwrap_or(path);
+            let parts = inner.iter().map(|part| part.to_string_lossy());
+            let id = FrameId(parts.collect::<Vec<_>>().join("/"));
+            sources.insert(id, ImageSource::image(path.clone()));
+        }
+        if sources.is_empty() {
+            let unread = names
+                .unread()
+                .map_or(String::new(), |unread| format!("; {unread}"));
+            let problem = format_args!("no {READ} image in this folder or below{unread}");
+            return Err(Error::data(folder.display(), problem));
+        }
+        names.warn_of_unread(folder);
+        if scan.links_out > 0 {
+            tracing::warn!(
+                "{}: {} links lead out of the folder and are not followed",
+                folder.display(),
+                scan.links_out
+            );
+        }
+        if sources.keys().any(|id| id.0.contains('/')) {
+            notes.push(format!(
+                "{}: {} images in it and in the folders below, each named by its path from there",
+                folder.display(),
+                sources.len()
+            ));
+        }
+        Ok(Self {
+            dataset: Dataset::new(stem(folder), sources, Vec::new()),
+            notes,
+        })
+    }
+}
+
+/// The files in a folder and below.
+#[derive(Debug, Default)]
+struct Scan {
+    files: Vec<PathBuf>,
+    /// The folders that were looked through, as they really lie: a link to one of them is not followed again.
+    seen: BTreeSet<PathBuf>,
+    /// Number of links that lead out of the folder.
+    links_out: usize,
+}
+
+impl Scan {
+    fn add(&mut self, root: &Path, folder: &Path) -> Result<()> {
+        let real = |path: &Path| {
+            path.canonicalize()
+                .map_err(|e| Error::file(path, "read", e))
+        };
+        if !self.seen.insert(real(folder)?) {
+            return Ok(());
+        }
+        let root_really = real(root)?;
+        for path in entries(folder)? {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            if name.starts_with('.') {
+                continue;
+            }
+            // A link to nowhere is no image.
+            let Ok(target) = path.canonicalize() else {
+                continue;
+            };
+            if !target.starts_with(&root_really) {
+                self.links_out += 1;
+            } else if path.is_dir() {
+                self.add(root, &path)?;
+            } else {
+                self.files.push(path);
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use image::RgbImage;
+
+    use super::*;
+
+    fn found(path: &Path) -> Result<(Vec<String>, Vec<String>)> {
+        let found = Photographs::at(&DataPlace::Path(path.to_owned()))?;
+        let names = found.dataset.frames().map(|id| id.0.clone());
+        Ok((names.collect(), found.notes))
+    }
+
+    fn save(folder: &Path, name: &str) {
+        let path = folder.join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        RgbImage::new(2, 1).save(path).unwrap();
+    }
+
+    #[test]
+    fn a_folder_of_folders_names_images_by_their_paths() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in [
+            "b.png",
+            "living/a.png",
+            "living/deep/a.png",
+            ".hidden/x.png",
+        ] {
+            save(folder.path(), name);
+        }
+        fs::write(folder.path().join("notes.txt"), "").unwrap();
+        let (names, notes) = found(folder.path()).unwrap();
+        assert_eq!(names, ["b.png", "living/a.png", "living/deep/a.png"]);
+        assert!(
+            notes[0].contains("3 images in it and in the folders below"),
+            "{notes:?}"
+        );
+        let (names, notes) = found(&folder.path().join("living/deep")).unwrap();
+        assert_eq!((names, notes.len()), (vec!["a.png".to_owned()], 0));
+        assert_eq!(found(&folder.path().join("b.png")).unwrap().0, ["b.png"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_stay_in_the_folder_and_end() {
+        use std::os::unix::fs::symlink;
+        let (folder, outside) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        save(folder.path(), "in/a.png");
+        save(outside.path(), "secret.png");
+        let link = |target: &Path, name: &str| symlink(target, folder.path().join(name)).unwrap();
+        link(&outside.path().join("secret.png"), "secret.png");
+        link(outside.path(), "out");
+        link(folder.path(), "in/again");
+        link(&folder.path().join("in/a.png"), "b.png");
+        assert_eq!(found(folder.path()).unwrap().0, ["b.png", "in/a.png"]);
+    }
+
+    #[test]
+    fn a_folder_without_an_image_is_refused_and_questions_are_left_aside() {
+        let folder = tempfile::tempdir().unwrap();
+        let problem = || found(folder.path()).unwrap_err().to_string();
+        assert!(
+            problem().ends_with("image in this folder or below"),
+            "{}",
+            problem()
+        );
+        fs::write(folder.path().join("a.heic"), "").unwrap();
+        assert!(
+            problem().contains("1 file looks like an image"),
+            "{}",
+            problem()
+        );
+        save(folder.path(), "a.png");
+        fs::write(folder.path().join("questions.jsonl"), "not read").unwrap();
+        let (names, notes) = found(folder.path()).unwrap();
+        assert_eq!(names, ["a.png"]);
+        assert!(
+            notes[0].contains("questions.jsonl is left aside"),
+            "{notes:?}"
+        );
+    }
+}
