@@ -17,7 +17,7 @@ use super::questions::{checked, other};
 use crate::error::{Error, Result};
 use crate::files::reading::text;
 use crate::types::question::CANNOT_TELL;
-use crate::types::run_question::ASKED;
+use crate::types::run_question::BANK_ID;
 use crate::types::{Choices, Digest, Family, FrameId, Question, QuestionId};
 
 /// The built-in bank.
@@ -195,7 +195,7 @@ impl BankQuestion {
             family: self.family.clone(),
             text: self.text.clone(),
             choices: self.choices.clone(),
-            evidence: json!({ ASKED: self.id }),
+            evidence: json!({ BANK_ID: self.id }),
         }
     }
 }
@@ -302,7 +302,7 @@ mod tests {
                 .iter()
                 .all(|question| question.choices.truth().is_none())
         );
-        assert_eq!(asked[0].evidence, json!({"asked": "lamp"}));
+        assert_eq!(asked[0].evidence, json!({"bank_id": "lamp"}));
     }
 
     #[test]

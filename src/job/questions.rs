@@ -1,4 +1,4 @@
-//! The questions of a data set that are asked: [`select`], [`AskedBank`]; and the rules that make them: [`rules`].
+//! The questions of a data set that are asked: [`select`], [`QuestionBank`]; and the rules that make them: [`rules`].
 
 use std::collections::BTreeSet;
 use std::num::NonZeroUsize;
@@ -43,14 +43,14 @@ pub(crate) fn open_data(
 
 /// Questions that are asked about every image, and nobody knows the answers.
 #[derive(Debug)]
-pub(crate) struct AskedBank {
+pub(crate) struct QuestionBank {
     place: BankPlace,
     bank: Bank,
     /// The number of questions about each image; `None` for all.
     per_image: Option<NonZeroUsize>,
 }
 
-impl AskedBank {
+impl QuestionBank {
     /// The questions that these flags name; `None` if they name none.
     ///
     /// # Errors

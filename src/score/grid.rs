@@ -104,8 +104,8 @@ pub struct ClusterCount {
 }
 
 impl<'a> Grid<'a> {
-    /// Table of records. Of two records for the same subject and item, the later one counts. Records of frames without a
-    /// cluster are ignored.
+    /// Table of records whose true choice is known. Of two records for the same subject and item, the later one counts. Records of
+    /// frames without a cluster are ignored.
     #[must_use]
     pub fn new(records: &'a [Record], clusters: &Clusters) -> Self {
         Self::of_models(records, clusters, &ModelListing::default(), |_| true)
@@ -119,10 +119,34 @@ impl<'a> Grid<'a> {
         listing: &ModelListing,
         is_shown: impl Fn(&str) -> bool,
     ) -> Self {
+        // A question whose true choice nobody knows is never scored.
+        Self::of(records, clusters, listing, |record| {
+            record.detail.truth.is_some() && is_shown(&record.model)
+        })
+    }
+
+    /// Table of what was answered to questions whose true choice nobody knows: to look at, not to score.
+    #[must_use]
+    pub(crate) fn without_truths(
+        records: &'a [Record],
+        clusters: &Clusters,
+        listing: &ModelListing,
+    ) -> Self {
+        Self::of(records, clusters, listing, |record| {
+            record.detail.truth.is_none()
+        })
+    }
+
+    fn of(
+        records: &'a [Record],
+        clusters: &Clusters,
+        listing: &ModelListing,
+        is_shown: impl Fn(&Record) -> bool,
+    ) -> Self {
         let mut subjects = BTreeMap::<Subject, usize>::new();
         let mut item_indices = HashMap::<(&QuestionId, &[String], u32), usize>::new();
         let mut items: Vec<GridItem<'a>> = Vec::new();
-        for record in records.iter().filter(|record| is_shown(&record.model)) {
+        for record in records.iter().filter(|record| is_shown(record)) {
             let Some(cluster) = clusters.of(&record.detail.frame, &record.question) else {
                 continue;
             };
@@ -146,7 +170,8 @@ impl<'a> Grid<'a> {
         let size = subjects.len() * items.len();
         let (mut results, mut record_indices) =
             (vec![TrialResult::Absent; size], vec![u32::MAX; size]);
-        for (index, record) in records.iter().enumerate() {
+        let shown = records.iter().enumerate();
+        for (index, record) in shown.filter(|(_, record)| is_shown(record)) {
             let (subject, item) = (
                 indices.get(&Subject::of(record)),
                 item_indices.get(&key(record)),

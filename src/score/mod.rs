@@ -46,6 +46,7 @@ mod quantiles;
 pub(crate) mod realism;
 mod record;
 mod residuals;
+pub(crate) mod self_agreement;
 pub(crate) mod significance;
 mod split_mix;
 pub(crate) mod subject;

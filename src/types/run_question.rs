@@ -8,7 +8,7 @@ use super::frame::FrameId;
 use super::question::{Family, Question, QuestionId};
 
 /// The key in [`RunQuestion::evidence`] under which a question that is asked about every image has its name among such questions.
-pub(crate) const ASKED: &str = "asked";
+pub(crate) const BANK_ID: &str = "bank_id";
 
 /// One line of a run's `questions.jsonl`: a question with the scene of its frame. The file can also be used as `--questions`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -59,9 +59,9 @@ impl RunQuestion {
 
     /// The name of the question among those that are asked about every image; its own name if it is about one image alone.
     #[must_use]
-    pub fn asked(&self) -> &str {
-        let asked = self.evidence.get(ASKED).and_then(Value::as_str);
-        asked.unwrap_or(&self.id.0)
+    pub fn bank_id(&self) -> &str {
+        let bank_id = self.evidence.get(BANK_ID).and_then(Value::as_str);
+        bank_id.unwrap_or(&self.id.0)
     }
 
     /// The stored form of a question at an index, about a frame of this scene.

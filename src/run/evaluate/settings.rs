@@ -12,7 +12,7 @@ use crate::dataset::{
 };
 use crate::error::{Error, Result};
 use crate::job::models::{ModelName, TextBaseline};
-use crate::job::questions::{AskedBank, rules};
+use crate::job::questions::{QuestionBank, rules};
 use crate::job::settings::{ExperimentSettings, JobArgs, JobSettings};
 use crate::questions::rules::Rules;
 use crate::types::{Decides, Truths, View};
@@ -97,7 +97,7 @@ pub(super) struct Evaluation {
     /// The rule by which images are read.
     pub(super) rule: ReadingRule,
     /// The questions that are asked about every image, and how many about each; `None` if questions have answers.
-    pub(super) bank: Option<AskedBank>,
+    pub(super) bank: Option<QuestionBank>,
     pub(super) order: ChoiceOrder,
     /// How many times each order of choices is asked.
     pub(super) repeats: Repeats,
@@ -125,7 +125,7 @@ impl EvaluateArgs {
             DataPlace::Path(path) => Some(path.clone()),
             DataPlace::Rooms(_) => None,
         };
-        let bank = AskedBank::open(&self.bank)?;
+        let bank = QuestionBank::open(&self.bank)?;
         let truths = bank.as_ref().map_or(Truths::Known, |_| Truths::Unknown);
         let job = self.job.resolve(&ExperimentSettings {
             constrain: self.choice.constrain,

@@ -14,7 +14,7 @@ use crate::job::conditions::conditions;
 use crate::job::models::{self, ModelName, ModelUnderTest};
 use crate::job::observer::Observer;
 use crate::job::progress::Progress;
-use crate::job::questions::{AskedBank, open_data, select};
+use crate::job::questions::{QuestionBank, open_data, select};
 use crate::job::recipe::Recipe;
 use crate::job::shard::part;
 use crate::job::source::{Source, SourceFrame, first_asked, inspect_all};
@@ -91,7 +91,7 @@ impl<'a> ChoiceSetup<'a> {
             digests: digests(&sources),
             sources,
             models,
-            bank: config.bank.as_ref().map(AskedBank::digest).transpose()?,
+            bank: config.bank.as_ref().map(QuestionBank::digest).transpose()?,
             conditions: conditions(&job.light, job.enhancers.llie_on, &recipe.enhancers),
             recipe,
             questions,

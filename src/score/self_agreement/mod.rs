@@ -1,0 +1,188 @@
+//! How far each model agrees with its own answers in the light, where nobody knows the true ones: [`SelfAgreement`].
+//!
+//! The reference of a model is its own reading at L0, for each question and order of choices. A record is held against it as another
+//! record is held against the truth, so that the counts by cluster, the paired tests, Holm's correction and the crossing of a curve
+//! are those of the other reports; nothing here is an accuracy. By the triangle inequality the accuracy that is lost in a
+//! condition is at most one minus the agreement there, whatever the true answers are.
+//!
+//! Agreement alone says little: a model that answers no to everything agrees with itself. Beside it stand κ with the expected
+//! agreement by question, the entropy of the answers, the agreement of the model without an image (the floor) and of the same
+//! question asked again at L0 (the ceiling), and the share of the way from the floor to the ceiling ([`evidence`]).
+//!
+//! Sources: metamorphic testing for want of an oracle (Spieker and Gotlieb 2019, arXiv:1910.00262); flips of predictions under
+//! corruption (Hendrycks and Dietterich 2019, arXiv:1903.12261, ImageNet-P); consistency of vision-language models under corruption
+//! (Bench-C, arXiv:2511.19032).
+
+pub(crate) mod cell;
+mod counts;
+pub(crate) mod evidence;
+mod kappa;
+pub(crate) mod light;
+pub(crate) mod models_in_light;
+pub(crate) mod question_in_light;
+#[cfg(test)]
+mod tests;
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use self::cell::{AgreementCell, cells};
+use self::evidence::{EvidenceCurve, curves};
+use self::light::{LightAnswers, LightReplies};
+use self::models_in_light::{ModelsInLight, models_in_light};
+use self::question_in_light::{QuestionInLight, questions_in_light};
+use super::bootstrap::Resamples;
+use super::choice::ReadingMode;
+use super::cluster::{ClusterUnit, Clusters};
+use super::comparison::{Comparison, ComparisonKind, comparisons};
+use super::confusion::{Confusion, Hallucination, confusions, hallucinations};
+use super::grid::Grid;
+use super::health::{Health, healths};
+use crate::types::{FrameId, ModelListing, QuestionId, Record, RunQuestion};
+
+/// All results of a run without true answers.
+#[derive(Debug)]
+pub struct SelfAgreement<'a> {
+    /// What was answered, by subject and item.
+    pub(crate) grid: Grid<'a>,
+    /// The unit that is treated as independent.
+    pub(crate) unit: ClusterUnit,
+    /// What each model answered in the light, in each reading.
+    pub(crate) light: Vec<LightReplies>,
+    /// The agreement of each subject with its model's answers in the light. The cell of L0 is that of the questions asked again.
+    pub(crate) cells: Vec<AgreementCell>,
+    /// Every question of the bank, for each model, in the strict reading.
+    pub(crate) questions: Vec<QuestionInLight>,
+    /// Paired differences between the conditions of one model, in the strict reading: which of them agrees with L0.
+    pub(crate) comparisons: Vec<Comparison>,
+    /// The exposure drop at which half of the evidence is lost.
+    pub(crate) curves: Vec<EvidenceCurve>,
+    /// Answers given against those at L0.
+    pub(crate) confusions: Vec<Confusion>,
+    /// Rates of “yes” where L0 says no, and the other way round.
+    pub(crate) hallucinations: Vec<Hallucination>,
+    /// Counts of replies, unreadable replies and failures of each subject.
+    pub(crate) health: Vec<Health>,
+    /// How far two models agree with each other in the light.
+    pub(crate) between: Vec<ModelsInLight>,
+}
+
+/// The questions of a bank by the questions about single images: two with the same text and the same choices are one.
+pub(super) struct BankIndex<'a> {
+    by_id: HashMap<&'a QuestionId, usize>,
+    /// A question about an image for each question of the bank.
+    examples: Vec<&'a RunQuestion>,
+}
+
+impl<'a> BankIndex<'a> {
+    fn new(questions: &'a [RunQuestion]) -> Self {
+        let mut numbers = HashMap::<(&str, BTreeSet<&str>), usize>::new();
+        let (mut by_id, mut examples) = (HashMap::new(), Vec::new());
+        for question in questions {
+            let choices = question.choices.iter().map(String::as_str).collect();
+            let number = *numbers.entry((&question.text, choices)).or_insert_with(|| {
+                examples.push(question);
+                examples.len() - 1
+            });
+            by_id.insert(&question.id, number);
+        }
+        Self { by_id, examples }
+    }
+
+    /// The number of the bank's question that a question about an image asks; `None` if the run does not store it.
+    pub(super) fn of(&self, question: &QuestionId) -> Option<usize> {
+        self.by_id.get(question).copied()
+    }
+}
+
+impl<'a> SelfAgreement<'a> {
+    /// The results of records without true answers. `scenes` holds the scene of each frame for which it is known.
+    #[must_use]
+    pub(crate) fn new(
+        records: &'a [Record],
+        scenes: &BTreeMap<FrameId, String>,
+        questions: &'a [RunQuestion],
+        listing: &ModelListing,
+    ) -> Self {
+        let pairs = records
+            .iter()
+            .map(|record| (&record.question, &record.detail.frame));
+        let clusters = Clusters::new(pairs, scenes);
+        let draws = Resamples::new(clusters.count());
+        let bank = BankIndex::new(questions);
+        let grid = Grid::without_truths(records, &clusters, listing);
+        let subjects = grid.subjects.iter();
+        let mut models: Vec<String> = subjects.map(|subject| subject.model.clone()).collect();
+        models.dedup();
+        let mut all = Self {
+            unit: clusters.unit(),
+            light: Vec::new(),
+            cells: Vec::new(),
+            questions: Vec::new(),
+            comparisons: Vec::new(),
+            curves: Vec::new(),
+            confusions: Vec::new(),
+            hallucinations: Vec::new(),
+            health: healths(&grid),
+            between: models_in_light(records, &clusters, &models, &bank),
+            grid,
+        };
+        for model in &models {
+            let answers = LightAnswers::of(records, model);
+            for mode in ReadingMode::ALL {
+                let replies = answers.replies(mode);
+                let held = answers.held_against(records, mode);
+                let grid = Grid::new(&held, &clusters);
+                let questions = questions_in_light(model, &answers, &bank, mode);
+                all.cells
+                    .extend(cells(&grid, &draws, &bank, &questions, mode));
+                all.light.push(replies);
+                if mode == ReadingMode::Strict {
+                    let found = comparisons(&grid);
+                    let within = |found: &Comparison| found.kind != ComparisonKind::Model;
+                    all.comparisons.extend(found.into_iter().filter(within));
+                    all.curves.extend(curves(&grid, &draws));
+                    all.confusions.extend(confusions(&grid));
+                    all.hallucinations.extend(hallucinations(&grid));
+                    all.questions.extend(questions);
+                }
+            }
+        }
+        // The kinds stand together, as in other reports; the sort is stable.
+        all.comparisons
+            .sort_by_key(|found| (found.kind, found.family.is_some()));
+        all
+    }
+
+    /// The models, in their order.
+    pub(crate) fn models(&self) -> Vec<&str> {
+        let light = self.light.iter();
+        let strict = light.filter(|light| light.mode == ReadingMode::Strict);
+        strict.map(|light| &*light.model).collect()
+    }
+
+    /// What a model answered in the light, in the strict reading.
+    pub(crate) fn light_of(&self, model: &str) -> Option<&LightReplies> {
+        let mut light = self.light.iter();
+        light.find(|light| light.model == model && light.mode == ReadingMode::Strict)
+    }
+
+    /// The cells of all families together in the strict reading.
+    pub(crate) fn whole(&self) -> impl Iterator<Item = &AgreementCell> + Clone {
+        let cells = self.cells.iter();
+        cells.filter(|cell| cell.family.is_none() && cell.mode == ReadingMode::Strict)
+    }
+
+    /// Numbers of the bank's questions of a model: those that can tell something, and all.
+    pub(crate) fn informative(&self, model: &str) -> (usize, usize) {
+        let questions = self.questions.iter();
+        let questions = questions.filter(|question| question.model == model);
+        let informative = questions.clone().filter(|found| found.is_informative());
+        (informative.count(), questions.count())
+    }
+
+    /// Whether the bank cannot tell anything of a model: its commonest answer to every question is that about nearly all images.
+    pub(crate) fn cannot_tell(&self, model: &str) -> bool {
+        let (informative, all) = self.informative(model);
+        informative == 0 && all > 0
+    }
+}

@@ -1,0 +1,55 @@
+//! How far two models agree with each other in the light: [`ModelsInLight`].
+
+use super::BankIndex;
+use super::counts::BankCounts;
+use super::kappa::kappa;
+use super::light::LightAnswers;
+use crate::score::choice::ReadingMode;
+use crate::score::cluster::Clusters;
+use crate::score::estimate::Estimate;
+use crate::score::grid::Grid;
+use crate::types::Record;
+
+/// Agreement of two models at L0, in the strict reading, on the items that both answered readably. Each model has its own reference, so
+/// that their agreements with themselves in the dark compare only as far as they agree here.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ModelsInLight {
+    pub(crate) first: String,
+    pub(crate) second: String,
+    /// Share of the items with the same answer.
+    pub(crate) same: Estimate,
+    /// κ with the expected agreement by question; `None` if it is not defined.
+    pub(crate) kappa: Option<Estimate>,
+}
+
+/// Every pair of models that answered the same items in the light.
+pub(super) fn models_in_light(
+    records: &[Record],
+    clusters: &Clusters,
+    models: &[String],
+    bank: &BankIndex<'_>,
+) -> Vec<ModelsInLight> {
+    let mode = ReadingMode::Strict;
+    let mut pairs = Vec::new();
+    for (place, first) in models.iter().enumerate() {
+        let answers = LightAnswers::of(records, first);
+        for second in &models[place + 1..] {
+            let held = answers.held_against_other(records, second, mode);
+            let grid = Grid::new(&held, clusters);
+            if grid.subjects.is_empty() {
+                continue;
+            }
+            let counts = grid.counts(0, None, mode);
+            if let Some(same) = Estimate::clustered(&counts) {
+                let answers = BankCounts::of(&grid, 0, None, mode, bank);
+                pairs.push(ModelsInLight {
+                    first: (*first).to_owned(),
+                    second: (*second).to_owned(),
+                    same,
+                    kappa: kappa(&answers, &counts, same),
+                });
+            }
+        }
+    }
+    pairs
+}

@@ -1,0 +1,89 @@
+//! What a model says to each question of a bank in the light: [`QuestionInLight`].
+
+use std::collections::BTreeMap;
+
+use super::BankIndex;
+use super::light::{LightAnswers, chosen};
+use crate::score::choice::ReadingMode;
+use crate::types::Family;
+
+/// Share of the images at which the commonest answer makes a question uninformative; chosen.
+pub(crate) const UNINFORMATIVE: f64 = 0.95;
+
+/// The answers of a model to one question of the bank at L0, over all images.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct QuestionInLight {
+    pub(crate) model: String,
+    /// Index among the questions of the bank.
+    pub(super) index: usize,
+    /// The name of the question in the bank.
+    pub(crate) bank_id: String,
+    pub(crate) text: String,
+    pub(crate) family: Family,
+    /// Number of images with a readable answer.
+    pub(crate) images: usize,
+    /// The answer given most often; of several, the first by name. Empty without a readable answer.
+    pub(crate) top: String,
+    /// Share of the images with that answer; 0 without a readable answer.
+    pub(crate) top_share: f64,
+    /// Entropy of the answers, 0 to 1; `None` without a readable answer.
+    pub(crate) entropy: Option<f64>,
+}
+
+impl QuestionInLight {
+    /// Whether the answers differ from image to image, so that agreement says something.
+    pub(crate) fn is_informative(&self) -> bool {
+        self.images > 0 && self.top_share < UNINFORMATIVE
+    }
+}
+
+/// Every question of the bank that a model was asked in the light, in the order of the bank.
+pub(super) fn questions_in_light(
+    model: &str,
+    answers: &LightAnswers<'_>,
+    bank: &BankIndex<'_>,
+    mode: ReadingMode,
+) -> Vec<QuestionInLight> {
+    let mut counts = BTreeMap::<usize, BTreeMap<&str, usize>>::new();
+    for record in answers.first().filter(|record| !record.failed()) {
+        let Some(question) = bank.of(&record.question) else {
+            continue;
+        };
+        let counts = counts.entry(question).or_default();
+        let choice = chosen(record, mode).and_then(|index| record.detail.choices.get(index));
+        if let Some(choice) = choice {
+            *counts.entry(choice).or_default() += 1;
+        }
+    }
+    let questions = counts.into_iter().map(|(index, counts)| {
+        let example = bank.examples[index];
+        let images = counts.values().sum();
+        let top = counts.iter().rev().max_by_key(|(_, count)| **count);
+        QuestionInLight {
+            model: model.to_owned(),
+            index,
+            bank_id: example.bank_id().to_owned(),
+            text: example.text.clone(),
+            family: example.family.clone(),
+            images,
+            top: top.map_or_else(String::new, |(top, _)| (*top).to_owned()),
+            top_share: top.map_or(0.0, |(_, count)| *count as f64 / images as f64),
+            entropy: entropy(counts.values().copied(), example.choices.len()),
+        }
+    });
+    questions.collect()
+}
+
+/// Shannon entropy of counts over that of `choices` equally frequent answers: 0 if all answers are the same, 1 if none is more
+/// frequent than another. `None` without a count.
+pub(super) fn entropy(counts: impl Iterator<Item = usize> + Clone, choices: usize) -> Option<f64> {
+    let all: usize = counts.clone().sum();
+    if all == 0 {
+        return None;
+    }
+    let terms = counts.filter(|count| *count > 0).map(|count| {
+        let share = count as f64 / all as f64;
+        -share * libm::log(share)
+    });
+    Some(terms.sum::<f64>() / libm::log(choices as f64))
+}
