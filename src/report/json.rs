@@ -30,7 +30,7 @@ fn rows<S: Serializer>(table: &Table, serializer: S) -> Result<S::Ok, S::Error> 
 }
 
 /// The rows of a table as objects.
-struct Rows<'a>(&'a Table);
+pub(super) struct Rows<'a>(pub(super) &'a Table);
 
 impl Serialize for Rows<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -85,7 +85,7 @@ struct Head<'a> {
 
 /// One of several runs.
 #[derive(Serialize)]
-struct ComparedRun<'a> {
+pub(super) struct ComparedRun<'a> {
     folder: &'a Path,
     run: &'a RunManifest,
 }
@@ -99,24 +99,37 @@ pub(crate) enum RunList<'a> {
     Several(&'a [(&'a RunManifest, &'a Path)]),
 }
 
+impl<'a> RunList<'a> {
+    /// The one run with its folder, and the several ones: one of both is empty.
+    pub(super) fn parts(
+        self,
+    ) -> (
+        Option<&'a RunManifest>,
+        Option<&'a Path>,
+        Vec<ComparedRun<'a>>,
+    ) {
+        let (run, folder, runs) = match self {
+            Self::One(run, folder) => (Some(run), folder, [].as_slice()),
+            Self::Several(runs) => (None, None, runs),
+        };
+        let runs = runs.iter();
+        let runs = runs.map(|&(run, folder)| ComparedRun { folder, run });
+        (run, folder, runs.collect())
+    }
+}
+
 /// The summary of runs as JSON.
 ///
 /// # Errors
 /// If the document cannot be written.
 pub(crate) fn summary(report: &ChoiceReport<'_>, runs: RunList<'_>) -> Result<String> {
     let tables = &report.tables;
-    let (run, folder, runs) = match runs {
-        RunList::One(run, folder) => (Some(run), folder, [].as_slice()),
-        RunList::Several(runs) => (None, None, runs),
-    };
-    let runs = runs
-        .iter()
-        .map(|&(run, folder)| ComparedRun { folder, run });
+    let (run, folder, runs) = runs.parts();
     let head = Head {
         schema: "darkqa.summary/1",
         folder,
         run,
-        runs: runs.collect(),
+        runs,
         readings: LightReadings::of(&report.findings.grid.subjects),
         unread: &report.findings.summary.unread,
         alerts: &report.alerts,

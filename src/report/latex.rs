@@ -48,6 +48,7 @@ pub(super) fn escaped(text: &str) -> String {
             '~' => escaped.push_str("\\textasciitilde{}"),
             '^' => escaped.push_str("\\textasciicircum{}"),
             '−' => escaped.push_str("$-$"),
+            'κ' => escaped.push_str("$\\kappa$"),
             '†' => escaped.push_str("$\\dagger$"),
             '<' | '>' => {
                 let _ = write!(escaped, "${c}$");

@@ -21,6 +21,7 @@ mod readable;
 pub(crate) mod realism;
 mod samples;
 mod script;
+pub(crate) mod self_agreement;
 pub(crate) mod sentences;
 pub(crate) mod sheet;
 pub(crate) mod short;

@@ -7,7 +7,8 @@ use std::fmt::Write;
 use std::path::Path;
 
 use self::foot::BELOW;
-use self::wrapped::{WIDTH, wrapped};
+use self::wrapped::WIDTH;
+pub(super) use self::wrapped::wrapped;
 use super::alert::lines;
 use super::choice_report::ChoiceReport;
 use super::ladder::{Ladder, Series, SeriesByLevel};

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::alerts::alerts;
 use super::combine::{Combined, combine};
-use super::enhancers;
+use super::{enhancers, own_answers};
 use crate::error::Result;
 use crate::job::outcome::Outcome;
 use crate::job::outcome::StdoutFormat;
@@ -15,7 +15,7 @@ use crate::report::products::{PAGE, products};
 use crate::report::short::{findings, full, short};
 use crate::store::Store;
 use crate::types::manifest::RunManifest;
-use crate::types::{ChoiceDetail, Record};
+use crate::types::{ChoiceDetail, Record, Truths};
 
 /// Reads the replies of a run again, and writes its report and manifest into its folder.
 pub(crate) fn write(
@@ -39,6 +39,9 @@ pub(super) fn in_its_folder(
     combined: &Combined,
     show: StdoutFormat,
 ) -> Result<String> {
+    if combined.truths() == Truths::Unknown {
+        return own_answers::in_its_folder(store, manifest, combined, show);
+    }
     let (folder, findings) = (store.folder(), combined.findings());
     let report = ChoiceReport::new(&findings, alerts(combined, &findings))
         .with_enhancers(&enhancers::rows(&combined.runs));

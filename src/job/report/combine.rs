@@ -13,7 +13,7 @@ use crate::score::cluster::{ClusterUnit, Clusters};
 use crate::score::findings::Findings;
 use crate::score::grid::Grid;
 use crate::types::manifest::RunManifest;
-use crate::types::{ChoiceDetail, FrameId, QuestionId, Record, RunQuestion};
+use crate::types::{ChoiceDetail, FrameId, QuestionId, Record, RunQuestion, Truths};
 
 /// Several runs of questions with choices, joined.
 pub(super) type Combined = Joined<ChoiceDetail>;
@@ -35,6 +35,14 @@ impl Combined {
         by_replies.fold(findings, |findings, apart| {
             findings.with_lights_between(&apart.names)
         })
+    }
+
+    /// Whether the true answers are known; [`combine`] has checked that they are known of all questions or of none.
+    pub(super) fn truths(&self) -> Truths {
+        match self.records.first() {
+            Some(record) if record.detail.truth.is_none() => Truths::Unknown,
+            _ => Truths::Known,
+        }
     }
 
     /// The unit that is treated as independent.
@@ -74,7 +82,9 @@ impl Combined {
 }
 
 /// The scene of each frame.
-fn scenes<'a>(questions: impl IntoIterator<Item = &'a RunQuestion>) -> BTreeMap<FrameId, String> {
+pub(super) fn scenes<'a>(
+    questions: impl IntoIterator<Item = &'a RunQuestion>,
+) -> BTreeMap<FrameId, String> {
     let questions = questions.into_iter();
     questions
         .map(|question| (question.frame.clone(), question.scene.clone()))
@@ -95,8 +105,10 @@ pub(super) fn clusters<'a>(
 /// Joins runs that can be compared.
 ///
 /// # Errors
-/// If a run shares no question with the others, or a question has other choices or another truth in two runs.
+/// If a run shares no question with the others, a question has other choices or another truth in two runs, or the true answers are known
+/// of some questions and not of others.
 pub(super) fn combine(runs: Vec<StoredRun<ChoiceDetail>>) -> Result<Combined> {
+    check_one_measure(&runs)?;
     if runs.len() > 1 {
         check_comparable(&runs)?;
     }
@@ -132,6 +144,35 @@ fn offers(records: &[Record], questions: &[RunQuestion]) -> Vec<OfferedChoices> 
         std::iter::repeat_n(offer, times)
     });
     offers.collect()
+}
+
+/// Checks that the true answers are known of all questions, or of none: an accuracy and an agreement are not the same measure.
+fn check_one_measure(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
+    let mut first: Option<(&Path, bool)> = None;
+    for run in runs {
+        for record in &run.records {
+            let is_known = record.detail.truth.is_some();
+            let (folder, known) = *first.get_or_insert((&run.folder, is_known));
+            if known == is_known {
+                continue;
+            }
+            let problem = if folder == run.folder {
+                format!(
+                    "the record {} has no true choice, and others have one: these are not the records of one run",
+                    record.key
+                )
+            } else {
+                format!(
+                    "the true answers are known of the questions of one run and not of the other, {}: accuracy and agreement are different \
+                     measures; report each run alone",
+                    folder.display()
+                )
+            };
+            let path = run.folder.clone();
+            return Err(Error::Run { path, problem });
+        }
+    }
+    Ok(())
 }
 
 /// Checks that runs can be compared.

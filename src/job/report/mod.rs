@@ -12,6 +12,7 @@ mod lights;
 mod listing;
 mod models;
 pub(crate) mod open;
+mod own_answers;
 mod rereading;
 mod runs;
 mod settings;

@@ -14,6 +14,8 @@ pub(super) struct LenientChange {
     replies: usize,
     /// Number of replies that read differently.
     changed: usize,
+    /// Number of replies to questions whose true choice is known.
+    scored: usize,
     /// Number of replies that read as the true choice, before and now.
     right: [usize; 2],
 }
@@ -54,8 +56,11 @@ impl LenientChange {
         };
         self.replies += 1;
         self.changed += usize::from(old.chosen != new.chosen);
-        for (right, reading) in self.right.iter_mut().zip([old, new]) {
-            *right += usize::from(now.truth.is_some() && reading.chosen == now.truth);
+        if now.truth.is_some() {
+            self.scored += 1;
+            for (right, reading) in self.right.iter_mut().zip([old, new]) {
+                *right += usize::from(reading.chosen == now.truth);
+            }
         }
     }
 
@@ -66,11 +71,15 @@ impl LenientChange {
 
     /// The change in words: `lenient/2 reads 3 of 60 replies differently than lenient/1: the lenient accuracy is 45.0 %, and was 50.0 %`.
     pub(super) fn words(&self) -> String {
-        let percent = |right: usize| 100.0 * right as f64 / self.replies.max(1) as f64;
-        let [before, now] = self.right.map(percent);
-        format!(
-            "{LENIENT_VERSION} reads {} of {} replies differently than {}: the lenient accuracy is {now:.1} %, and was {before:.1} %",
+        let change = format!(
+            "{LENIENT_VERSION} reads {} of {} replies differently than {}",
             self.changed, self.replies, self.from
-        )
+        );
+        if self.scored == 0 && self.replies > 0 {
+            return change;
+        }
+        let percent = |right: usize| 100.0 * right as f64 / self.scored.max(1) as f64;
+        let [before, now] = self.right.map(percent);
+        format!("{change}: the lenient accuracy is {now:.1} %, and was {before:.1} %")
     }
 }

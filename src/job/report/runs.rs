@@ -11,8 +11,8 @@ use super::choice::{in_its_folder, text};
 use super::combine::{Combined, combine};
 use super::common::restrict;
 use super::enhancers;
-use super::open;
 use super::rereading::LenientChange;
+use super::{open, own_answers};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::job::folder::now;
@@ -24,7 +24,7 @@ use crate::report::json::{RunList, summary};
 use crate::report::products::{PAGE, products};
 use crate::store::{AddressChange, Store};
 use crate::types::manifest::Status;
-use crate::types::{ChoiceDetail, Decides, Detail as _, ModelColumn, OpenDetail};
+use crate::types::{ChoiceDetail, Decides, Detail as _, ModelColumn, OpenDetail, Truths};
 
 /// The flags of `report`.
 #[derive(Debug, Args)]
@@ -155,6 +155,9 @@ fn of_choices(
     });
     let old = old.transpose()?;
     let mut combined = combine(runs)?;
+    if combined.truths() == Truths::Unknown {
+        refuse_without_truths(args)?;
+    }
     if args.common {
         combined = restrict(combined)?;
     }
@@ -186,6 +189,26 @@ fn of_choices(
     Ok((status, output))
 }
 
+/// Refuses what compares accuracies, for runs whose questions have no true answers.
+fn refuse_without_truths(args: &ReportArgs) -> Result<()> {
+    let flags = [
+        (
+            "--common",
+            args.common,
+            "each model is held against its own answers, on the questions that it answered in the light",
+        ),
+        (
+            "--baseline",
+            args.baseline.baseline.is_some(),
+            "it compares accuracies, and nobody knows the true answers (--ask)",
+        ),
+    ];
+    match flags.iter().find(|(_, is_set, _)| *is_set) {
+        Some((flag, _, why)) => Err(Error::usage(*flag, format_args!("{why}: leave it out"))),
+        None => Ok(()),
+    }
+}
+
 /// The text of several runs, joined. Writes the report if `--out` is set.
 fn compare(
     combined: &Combined,
@@ -193,6 +216,11 @@ fn compare(
     args: &ReportArgs,
     again: &[Alert],
 ) -> Result<String> {
+    if combined.truths() == Truths::Unknown {
+        let show = args.show.format();
+        let output = own_answers::compared(combined, again, show, args.out.is_some())?;
+        return write_files(args, output.text, output.files);
+    }
     let findings = combined.findings();
     let runs = combined.manifests();
     let mut above = again.to_vec();

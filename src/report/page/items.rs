@@ -13,7 +13,7 @@ use serde_json::Value;
 use super::inputs::PageInputs;
 use crate::error::{Error, Result};
 use crate::score::choice::ReadingMode;
-use crate::score::findings::Findings;
+use crate::score::confusion;
 use crate::score::grid::{Grid, TrialResult};
 use crate::types::{
     Axis, AxisLevel, FrameId, QuestionId, RunQuestion, Thumbnail, UnreadReason, View,
@@ -147,10 +147,14 @@ impl<T: Copy + Eq + std::hash::Hash> Distinct<T> {
 ///
 /// # Errors
 /// If the data cannot be written.
-pub(super) fn packed<'a>(findings: &'a Findings<'a>, inputs: &PageInputs<'a>) -> Result<String> {
+pub(super) fn packed<'a>(
+    grid: &'a Grid<'a>,
+    confusions: &'a [confusion::Confusion],
+    inputs: &PageInputs<'a>,
+) -> Result<String> {
     let mut packed = String::new();
     for limit in SIZE_LIMITS {
-        packed = pack(&data(findings, inputs, limit))?;
+        packed = pack(&data(grid, confusions, inputs, limit))?;
         if packed.len() <= MAX_PACKED_BYTES {
             break;
         }
@@ -167,8 +171,12 @@ fn pack(data: &PageData<'_>) -> Result<String> {
     Ok(STANDARD.encode(bytes))
 }
 
-fn data<'a>(findings: &'a Findings<'a>, inputs: &PageInputs<'a>, limit: SizeLimit) -> PageData<'a> {
-    let grid = &findings.grid;
+fn data<'a>(
+    grid: &'a Grid<'a>,
+    confusions: &'a [confusion::Confusion],
+    inputs: &PageInputs<'a>,
+    limit: SizeLimit,
+) -> PageData<'a> {
     let run_questions: HashMap<&QuestionId, &RunQuestion> = inputs
         .questions
         .iter()
@@ -231,7 +239,7 @@ fn data<'a>(findings: &'a Findings<'a>, inputs: &PageInputs<'a>, limit: SizeLimi
         why,
         texts,
         replies,
-        confusions: confusions(findings),
+        confusions: confusions_of(grid, confusions),
     }
 }
 
@@ -337,11 +345,13 @@ fn replies(grid: &Grid<'_>, limit: usize) -> (Vec<String>, Vec<Vec<usize>>) {
     (texts.list.iter().map(cut).collect(), indices)
 }
 
-fn confusions<'a>(findings: &'a Findings<'_>) -> Vec<Confusion<'a>> {
-    let all = findings.confusions.iter();
-    let named = all.filter_map(|confusion| {
+fn confusions_of<'a>(
+    grid: &Grid<'_>,
+    confusions: &'a [confusion::Confusion],
+) -> Vec<Confusion<'a>> {
+    let named = confusions.iter().filter_map(|confusion| {
         Some(Confusion {
-            subject: findings.grid.find(&confusion.subject)?,
+            subject: grid.find(&confusion.subject)?,
             family: confusion.family.name(),
             labels: &confusion.labels,
             counts: &confusion.counts,

@@ -1,4 +1,4 @@
-//! The HTML page of an evaluation: [`page`].
+//! The HTML page of questions with choices: [`page`] of an evaluation, [`page_of`] of any content.
 //!
 //! All numbers and figures are text and SVG, so that the page can be read and printed without scripts. The items, with their
 //! thumbnails, are packed data that its script reads. The page needs no network, and its content security policy allows none.
@@ -14,13 +14,18 @@ pub(crate) use inputs::PageRun;
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use super::alert::Alert;
 use super::chart::Figure;
 use super::choice_report::ChoiceReport;
 use super::light_readings::LightReadings;
 use super::sentences::{HOW_TO_READ, Sentence};
+use super::table::Table;
+use super::tables::{SECTIONS, Section};
 use super::template::filled;
 use crate::error::Result;
+use crate::score::confusion::Confusion;
 use crate::score::findings::Findings;
+use crate::score::grid::Grid;
 use crate::types::Record;
 use crate::types::manifest::RunManifest;
 
@@ -39,6 +44,8 @@ struct Page<'a> {
     /// The findings in words.
     sentences: Vec<PageSentence<'a>>,
     how_to_read: &'static str,
+    /// Heading of the table of answers against answers.
+    answers_title: &'static str,
     sections: Vec<sections::PageSection<'a>>,
     runs: Vec<Value>,
     /// The items, as compressed JSON in base64.
@@ -67,7 +74,24 @@ impl<'a> PageSentence<'a> {
     }
 }
 
-/// The page as HTML.
+/// What a page shows, besides its figures and the facts of its runs.
+pub(crate) struct PageContent<'a> {
+    /// Lines about the numbers as a whole.
+    pub(crate) intro: Vec<String>,
+    pub(crate) alerts: &'a [Alert],
+    pub(crate) sentences: &'a [Sentence],
+    pub(crate) how_to_read: &'static str,
+    pub(crate) tables: &'a [Table],
+    /// The sections in order.
+    pub(crate) sections: &'static [Section],
+    /// The items and the replies to them.
+    pub(crate) grid: &'a Grid<'a>,
+    /// Answers against answers, and the heading of their table.
+    pub(crate) confusions: &'a [Confusion],
+    pub(crate) answers_title: &'static str,
+}
+
+/// The page of an evaluation as HTML.
 ///
 /// # Errors
 /// If the items cannot be written or the template cannot be filled.
@@ -77,18 +101,42 @@ pub(crate) fn page<'a>(
     inputs: &PageInputs<'a>,
 ) -> Result<String> {
     let findings = report.findings;
-    let sentences = report.sentences.iter().map(PageSentence::new).collect();
+    let content = PageContent {
+        intro: intro(findings),
+        alerts: &report.alerts,
+        sentences: &report.sentences,
+        how_to_read: HOW_TO_READ,
+        tables: &report.tables,
+        sections: &SECTIONS,
+        grid: &findings.grid,
+        confusions: &findings.confusions,
+        answers_title: "Answers given against true answers",
+    };
+    page_of(content, figures, inputs)
+}
+
+/// A page as HTML.
+///
+/// # Errors
+/// If the items cannot be written or the template cannot be filled.
+pub(crate) fn page_of<'a>(
+    content: PageContent<'a>,
+    figures: &[Figure],
+    inputs: &PageInputs<'a>,
+) -> Result<String> {
+    let sections = content.sections;
     filled(
         PAGE,
         Page {
             title: title(inputs),
-            alerts: report.alerts.iter().map(|alert| &*alert.text).collect(),
-            sentences,
-            how_to_read: HOW_TO_READ,
-            intro: intro(findings),
-            sections: sections::sections(&report.tables, figures, inputs.thumbnails),
+            alerts: content.alerts.iter().map(|alert| &*alert.text).collect(),
+            sentences: content.sentences.iter().map(PageSentence::new).collect(),
+            how_to_read: content.how_to_read,
+            answers_title: content.answers_title,
+            intro: content.intro,
+            sections: sections::sections(sections, content.tables, figures, inputs.thumbnails),
             runs: inputs.runs.iter().map(facts).collect(),
-            data: items::packed(findings, inputs)?,
+            data: items::packed(content.grid, content.confusions, inputs)?,
             css: STYLE,
             script: SCRIPT,
         },

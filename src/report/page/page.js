@@ -48,13 +48,34 @@ const unpack = async () => {
 
 // What a subject made of an item.
 const chosen = (subject, item) => data.strict[subject][item];
-const isRight = (subject, item) => chosen(subject, item) === data.items[item].truth;
+// Where nobody knows the true choice, a model is held against its own answer in the light: that of the first item of the question.
+const hasTruth = () => !data.lights;
+const findReferences = () => {
+  if (data.items.every((item) => item.truth !== null)) return;
+  data.lights = data.subjects.map((s) => data.subjects.findIndex((o) => o.model === s.model && o.level === "L0" && o.enhancer === null));
+  const seen = new Map();
+  data.firsts = data.items.map((item, i) => {
+    const key = item.question + " " + item.choices;
+    if (!seen.has(key)) seen.set(key, i);
+    return seen.get(key);
+  });
+};
+const reference = (subject, item) => {
+  const { truth } = data.items[item];
+  if (truth !== null) return truth;
+  const there = subject < 0 ? -1 : data.lights[subject];
+  const code = there < 0 ? ABSENT : chosen(there, data.firsts[item]);
+  return code < UNREAD ? code : null;
+};
+const isRight = (subject, item) => chosen(subject, item) === reference(subject, item);
 const mark = (subject, item) => {
   const code = chosen(subject, item);
   if (code === ABSENT) return ["", "m-none", "not asked"];
   if (code === FAILED) return ["!", "m-odd", "no reply"];
   if (code === UNREAD) return ["?", "m-odd", "not readable"];
-  return isRight(subject, item) ? ["✓ " + letter(code), "m-right", "right"] : ["✗ " + letter(code), "m-wrong", "wrong"];
+  if (reference(subject, item) === null) return [letter(code), "m-none", "no answer in the light"];
+  const [same, other] = hasTruth() ? ["right", "wrong"] : [SAME, OTHER];
+  return isRight(subject, item) ? ["✓ " + letter(code), "m-right", same] : ["✗ " + letter(code), "m-wrong", other];
 };
 const find = (model, light, level) =>
   data.subjects.findIndex((s) => s.model === model && s.light === light && s.level === level);
@@ -91,6 +112,17 @@ const STATES = {
     const codes = data.subjects.map((o, n) => o.level === here.level && o.light === here.light ? chosen(n, i) : ABSENT).filter((c) => c < FAILED);
     return new Set(codes).size > 1;
   },
+};
+
+// The same without true choices: nothing is right or wrong.
+const SAME = "as in the light", OTHER = "not as in the light";
+const withoutTruth = () => {
+  const kept = [["all", "all"], ["right", SAME], ["wrong", OTHER], ["not readable", "not readable"], ["no reply", "no reply"],
+    ["rescued by the enhancer", "brought back by the enhancer"], ["harmed by the enhancer", "changed by the enhancer"],
+    ["another answer there", "another answer there"], ["models differ", "models differ"]];
+  const states = kept.map(([name, own]) => [own, STATES[name]]);
+  for (const name of Object.keys(STATES)) delete STATES[name];
+  Object.assign(STATES, Object.fromEntries(states));
 };
 
 const fill = (select, values, value) => {
@@ -288,7 +320,7 @@ const draw = () => {
   const list = data.choices[item.choices].map((choice, index) => {
     const row = make("li");
     reveal(row, letter(index) + ". " + choice);
-    if (index === item.truth) { row.classList.add("true"); row.title = "true"; row.append(" ✓"); }
+    if (index === reference(subject, i)) { row.classList.add("true"); row.title = hasTruth() ? "true" : "its answer in the light"; row.append(" ✓"); }
     if (subject >= 0 && chosen(subject, i) === index) { row.classList.add("chosen"); row.title = "chosen"; }
     return row;
   });
@@ -311,7 +343,7 @@ const confusion = () => {
   const family = fill($("c-family"), families, $("c-family").value);
   const one = all.find((c) => of(c).model === model && of(c).condition === condition && c.family === family);
   const table = $("c-table"), head = make("tr");
-  head.append(make("th", "true ↓ given →"), ...one.labels.map((l) => make("th", l)), make("th", "not readable"));
+  head.append(make("th", hasTruth() ? "true ↓ given →" : "at L0 ↓ given →"), ...one.labels.map((l) => make("th", l)), make("th", "not readable"));
   const rows = one.counts.map((row, truth) => {
     const line = make("tr");
     line.append(make("td", one.labels[truth]), ...row.map((n, given) => make("td", n || "·", n && given === truth ? "diagonal" : "")));
@@ -341,6 +373,8 @@ const follow = () => {
 
 const start = async () => {
   data = await unpack();
+  findReferences();
+  if (!hasTruth()) withoutTruth();
   const first = data.subjects.find((s) => s.light !== "blind") || data.subjects[0];
   state = { family: "all", model: first?.model, light: undefined, level: undefined, against: "–", show: "all", words: "", item: data.items.length ? 0 : null, pictured: null };
   $("loading").hidden = true;

@@ -6,7 +6,7 @@ use super::tables;
 use crate::report::chart::Figure;
 use crate::report::samples::{SamplePage, samples};
 use crate::report::table::Table;
-use crate::report::tables::{ENHANCERS, SECTIONS};
+use crate::report::tables::{ENHANCERS, Section};
 use crate::types::Thumbnail;
 
 /// A section as the template reads it.
@@ -20,13 +20,14 @@ pub(super) struct PageSection<'a> {
     tables: Vec<tables::PageTable<'a>>,
 }
 
-/// All sections that have a table, a figure or samples.
+/// Those of the sections that have a table, a figure or samples.
 pub(super) fn sections<'a>(
+    sections: &[Section],
     tables: &'a [Table],
     figures: &'a [Figure],
     thumbnails: &[Thumbnail],
 ) -> Vec<PageSection<'a>> {
-    let sections = SECTIONS
+    let sections = sections
         .iter()
         .filter_map(|&(id, title, note, figure_names)| {
             let figures = figures

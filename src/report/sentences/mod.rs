@@ -17,12 +17,14 @@ mod models;
 mod pooled;
 mod readings;
 mod sample;
+mod self_agreement;
 mod sentence;
 mod words_alone;
 
 pub(crate) use baseline::{against_baseline, no_verdict};
 pub(in crate::report) use models::over_levels;
 pub(in crate::report) use sample::left_out;
+pub(in crate::report) use self_agreement::self_agreement;
 pub(crate) use sentence::Sentence;
 
 use std::collections::BTreeSet;

@@ -4,7 +4,7 @@
 pub(super) const WIDTH: usize = 80;
 
 /// Text in lines of [`WIDTH`] characters; the first begins with `first`, the others with `rest`.
-pub(super) fn wrapped(first: &str, text: &str, rest: &str) -> String {
+pub(in crate::report) fn wrapped(first: &str, text: &str, rest: &str) -> String {
     let mut lines = String::new();
     let mut line = first.to_owned();
     let mut is_empty = true;

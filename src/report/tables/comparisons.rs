@@ -3,8 +3,9 @@
 use super::pooled::too_few_clusters;
 use super::sections::ENHANCERS;
 use crate::report::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
-use crate::report::table::{Table, TableBuilder, TableFormat};
+use crate::report::table::{Column, Table, TableBuilder, TableFormat};
 use crate::report::words::{counted, name};
+use crate::score::cluster::ClusterUnit;
 use crate::score::comparison::{Comparison, ComparisonKind, MIN_PAIRS};
 use crate::score::findings::Findings;
 use crate::score::significance::Significance;
@@ -13,10 +14,42 @@ use crate::score::significance::Significance;
 const MAX_ROWS: usize = 40;
 
 pub(super) fn comparisons(findings: &Findings<'_>) -> Vec<Table> {
+    tables_of(&findings.comparisons, findings.unit, titles)
+}
+
+/// The tables of comparisons of another measure, which the last column of the file names.
+pub(in crate::report) fn comparisons_of(
+    comparisons: &[Comparison],
+    unit: ClusterUnit,
+    measure: &'static str,
+) -> Vec<Table> {
+    let mut tables = tables_of(comparisons, unit, titles_against_light);
+    for table in &mut tables {
+        let caption = format!(
+            "{}, paired by question, in percentage points.",
+            table.caption
+        );
+        table.latex = table.latex.as_ref().map(|_| caption);
+        table.columns.push(Column {
+            kind: Text,
+            heads: "csv measure".into(),
+        });
+        for row in &mut table.rows {
+            row.cells.push(measure.into());
+        }
+    }
+    tables
+}
+
+/// The tables of each kind of comparison; `titles` returns the caption on the page, and the heading in the terminal.
+fn tables_of(
+    comparisons: &[Comparison],
+    unit: ClusterUnit,
+    titles: fn(ComparisonKind) -> (&'static str, Option<&'static str>),
+) -> Vec<Table> {
     let mut tables = Vec::new();
     for kind in ComparisonKind::ALL {
-        let all = findings
-            .comparisons
+        let all = comparisons
             .iter()
             .filter(|comparison| comparison.kind == kind);
         let (whole, by_family): (Vec<&Comparison>, Vec<&Comparison>) =
@@ -24,7 +57,7 @@ pub(super) fn comparisons(findings: &Findings<'_>) -> Vec<Table> {
         let (caption, heading) = titles(kind);
         let least = whole.iter();
         let least = least.map(|comparison| (comparison.least_holm, comparison.paired.clusters));
-        let note = too_few_clusters(least, &findings.unit.to_string());
+        let note = too_few_clusters(least, &unit.to_string());
         let mut total = table(kind, caption, &whole);
         total.is_folded = kind != ComparisonKind::Enhancer;
         if !whole.is_empty() {
@@ -68,6 +101,33 @@ fn titles(kind: ComparisonKind) -> (&'static str, Option<&'static str>) {
         ComparisonKind::Light => (
             "Light less light",
             Some("One light against another, same model, paired by question"),
+        ),
+    }
+}
+
+/// The same for agreement with the answers at L0. The level L0 is that of the images asked again.
+fn titles_against_light(kind: ComparisonKind) -> (&'static str, Option<&'static str>) {
+    match kind {
+        ComparisonKind::Level => (
+            "Agreement at each dark level less that of L0 again, raw",
+            Some("Agreement in the dark against that of L0 asked again, paired by question"),
+        ),
+        ComparisonKind::Variant => (
+            "Agreement with sensor noise less exposure drop alone",
+            Some("Agreement with sensor noise against exposure drop alone, paired by question"),
+        ),
+        ComparisonKind::Enhancer => (
+            "Agreement of enhanced less raw",
+            Some("Agreement of enhanced against raw, paired by question"),
+        ),
+        ComparisonKind::Model => ("Model less model", None),
+        ComparisonKind::Blind => (
+            "Agreement with images less without",
+            Some("Agreement with images against without, paired by question"),
+        ),
+        ComparisonKind::Light => (
+            "Agreement in one light less another",
+            Some("Agreement in one light against another, same model, paired by question"),
         ),
     }
 }

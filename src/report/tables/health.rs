@@ -39,7 +39,7 @@ const OTHER: [UnreadReason; 4] = [
     UnreadReason::Empty,
 ];
 
-pub(super) fn health(health: &[Health]) -> Table {
+pub(in crate::report) fn health(health: &[Health]) -> Table {
     let mut builder = TableBuilder::new("health", health)
         .page("health", "Replies and failures by subject")
         .subject(|health| &health.subject, ToString::to_string)

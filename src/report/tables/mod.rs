@@ -29,12 +29,15 @@ use crate::types::{EnhancerName, Family, KindReading, ModelListing};
 
 pub(super) use baseline::BASELINE;
 pub(crate) use baseline::baseline;
+pub(super) use comparisons::comparisons_of;
 pub(crate) use enhancers::EnhancerRow;
 pub(super) use enhancers::enhancers;
+pub(super) use health::health;
 pub(super) use levels::unread;
 pub(super) use observer::{notes as observer_notes, what_it_is};
-pub(super) use sections::{ENHANCERS, SECTIONS};
+pub(super) use sections::{ENHANCERS, SECTIONS, Section};
 pub(super) use summary::{SUMMARY, reading, summary as summary_rows};
+pub(super) use thresholds::why as level_words;
 
 /// All tables of an evaluation; the first is the summary. What is not shown is in the files alone.
 #[must_use]
@@ -131,7 +134,7 @@ impl<T> TableBuilder<T> {
     }
 
     /// Adds the columns of the family; `None` is all families together.
-    fn family(self, of: impl Fn(&T) -> Option<&Family>) -> Self {
+    pub(in crate::report) fn family(self, of: impl Fn(&T) -> Option<&Family>) -> Self {
         self.column(Text, "csv family", |row| {
             of(row).map_or(Family::TOTAL, Family::name).to_owned()
         })

@@ -109,7 +109,7 @@ fn table(names: &Names, caption: &str, curves: &[&Curve]) -> Table {
 }
 
 /// Why a threshold is not known.
-fn why(reason: &NoThreshold) -> String {
+pub(in crate::report) fn why(reason: &NoThreshold) -> String {
     match reason {
         NoThreshold::NotAboveChance => "not clearly above chance at L0".to_owned(),
         NoThreshold::Thin(level) => thin(level),

@@ -37,6 +37,13 @@ pub(crate) struct LightReplies {
     pub(crate) has_way_out: bool,
 }
 
+impl LightReplies {
+    /// Number of replies.
+    pub(crate) fn replies(&self) -> usize {
+        self.read.map_or(0, |read| read.n)
+    }
+}
+
 /// Whether a record is about an untouched image, without an enhancer.
 pub(super) fn is_light(record: &Record) -> bool {
     let condition = record.condition.as_ref();

@@ -41,7 +41,7 @@ use crate::types::{FrameId, ModelListing, QuestionId, Record, RunQuestion};
 
 /// All results of a run without true answers.
 #[derive(Debug)]
-pub struct SelfAgreement<'a> {
+pub(crate) struct SelfAgreement<'a> {
     /// What was answered, by subject and item.
     pub(crate) grid: Grid<'a>,
     /// The unit that is treated as independent.

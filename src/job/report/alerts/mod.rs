@@ -20,8 +20,9 @@ use super::combine::Combined;
 use super::enhancers::of_enhancers;
 use super::join::{Joined, JoinedRun};
 use crate::report::alert::{Alert, AlertKind};
-use crate::score::cluster::MIN_SCENES;
+use crate::score::cluster::{ClusterUnit, MIN_SCENES};
 use crate::score::findings::Findings;
+use crate::score::self_agreement::SelfAgreement;
 use crate::types::manifest::Status;
 use crate::types::{Detail, InputSummary};
 
@@ -29,7 +30,7 @@ use crate::types::{Detail, InputSummary};
 pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert> {
     let mut alerts = of_runs(combined);
     alerts.extend(of_joining(combined));
-    alerts.extend(replies::of_replies(findings));
+    alerts.extend(replies::of_replies(&findings.health, "count as wrong"));
     alerts.extend(replies::of_people(combined));
     alerts.extend(readings::of_readings(combined));
     alerts.extend(confidence::of_confidence(&combined.runs, &combined.records));
@@ -39,16 +40,35 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
     ));
     alerts.extend(questions::of_repeats(combined));
     alerts.extend(questions::of_items(findings));
-    if findings.grid.clusters < MIN_SCENES {
-        let (clusters, unit) = (findings.grid.clusters, findings.unit);
+    alerts.extend(of_clusters(findings.grid.clusters, findings.unit));
+    alerts.sort_by_key(|alert| alert.kind);
+    alerts
+}
+
+/// All alerts of a report on questions without true answers, in the order of their kinds.
+pub(super) fn alerts_without_truths(combined: &Combined, found: &SelfAgreement<'_>) -> Vec<Alert> {
+    let mut alerts = of_runs(combined);
+    alerts.extend(of_joining(combined));
+    alerts.extend(replies::of_replies(&found.health, "do not agree"));
+    alerts.extend(readings::of_readings(combined));
+    alerts.extend(constraints::of_constraints(
+        &combined.runs,
+        &combined.records,
+    ));
+    alerts.extend(of_clusters(found.grid.clusters, found.unit));
+    alerts.sort_by_key(|alert| alert.kind);
+    alerts
+}
+
+/// That there are too few clusters for good intervals.
+fn of_clusters(clusters: usize, unit: ClusterUnit) -> Option<Alert> {
+    (clusters < MIN_SCENES).then(|| {
         let text = format!(
             "There are only {} ({MIN_SCENES} are needed): intervals and tests are rough.",
             counted(clusters, &unit.to_string())
         );
-        alerts.push(Alert::new(AlertKind::Clusters, text));
-    }
-    alerts.sort_by_key(|alert| alert.kind);
-    alerts
+        Alert::new(AlertKind::Clusters, text)
+    })
 }
 
 /// The alerts that follow from manifests and the questions asked, of runs of either kind.

@@ -6,13 +6,13 @@ use super::words::counted;
 use crate::job::report::combine::Combined;
 use crate::job::report::settings::is_of_people;
 use crate::report::alert::{Alert, AlertKind, MAX_UNREAD};
-use crate::score::findings::Findings;
+use crate::score::health::Health;
 use crate::types::UnreadReason;
 
-/// Replies that could not be read, and trials without a reply.
-pub(super) fn of_replies(findings: &Findings<'_>) -> Vec<Alert> {
+/// Replies that could not be read, with what they count as, and trials without a reply.
+pub(super) fn of_replies(health: &[Health], unread_as: &str) -> Vec<Alert> {
     let mut counts = BTreeMap::<&str, [usize; 3]>::new();
-    for health in &findings.health {
+    for health in health {
         let [replies, unread, failed] = counts.entry(&health.subject.model).or_default();
         *replies += health.replies;
         *unread += health.replies - health.read;
@@ -23,7 +23,7 @@ pub(super) fn of_replies(findings: &Findings<'_>) -> Vec<Alert> {
         if unread as f64 > MAX_UNREAD * replies as f64 {
             let share = 100.0 * unread as f64 / replies as f64;
             let text = format!(
-                "{unread} of {replies} replies of {model} ({share:.1} %) could not be read, and count as wrong."
+                "{unread} of {replies} replies of {model} ({share:.1} %) could not be read, and {unread_as}."
             );
             alerts.push(Alert::new(AlertKind::Unread, text));
         }

@@ -1,0 +1,98 @@
+//! The report of runs whose questions have no true answers: each model against its own answers in the light.
+
+use super::alerts::alerts_without_truths;
+use super::combine::{Combined, scenes};
+use super::enhancers;
+use crate::error::Result;
+use crate::job::StdoutFormat;
+use crate::report::alert::Alert;
+use crate::report::json::RunList;
+use crate::report::products::PAGE;
+use crate::report::self_agreement::{AgreementReport, TextLength, products, summary, text};
+use crate::score::self_agreement::SelfAgreement;
+use crate::store::Store;
+use crate::types::ChoiceDetail;
+use crate::types::manifest::RunManifest;
+
+/// The files of a report by name, and its text for standard output.
+pub(super) struct ReportOutput {
+    pub(super) files: Vec<(String, Vec<u8>)>,
+    pub(super) text: String,
+}
+
+/// Writes the report and the manifest of a run into its folder; returns the text for standard output.
+pub(super) fn in_its_folder(
+    store: &Store<ChoiceDetail>,
+    manifest: &RunManifest,
+    combined: &Combined,
+    show: StdoutFormat,
+) -> Result<String> {
+    let found = found(combined);
+    let report = report(combined, &found, &[]);
+    for (name, content) in products(&report, &combined.shown())? {
+        store.write(&name, &content)?;
+    }
+    let json = |folder| summary(&report, RunList::One(manifest, folder));
+    store.write("summary.json", json(None)?.as_bytes())?;
+    store.write_manifest(manifest)?;
+    let folder = store.folder();
+    Ok(match length(show) {
+        None => json(Some(folder))?,
+        Some(length) => {
+            let page = folder.join(PAGE);
+            text(&report, &[(manifest, folder)], length) + &format!("report: {}\n", page.display())
+        }
+    })
+}
+
+/// The report of several runs, or of one that is not written into its folder. The files are made only if they are `wanted`.
+pub(super) fn compared(
+    combined: &Combined,
+    again: &[Alert],
+    show: StdoutFormat,
+    wanted: bool,
+) -> Result<ReportOutput> {
+    let found = found(combined);
+    let report = report(combined, &found, again);
+    let runs = combined.manifests();
+    let json = || summary(&report, RunList::Several(&runs));
+    let mut files = Vec::new();
+    if wanted {
+        files = products(&report, &combined.shown())?;
+        files.push(("summary.json".to_owned(), json()?.into_bytes()));
+    }
+    let text = match length(show) {
+        None => json()?,
+        Some(length) => text(&report, &runs, length),
+    };
+    Ok(ReportOutput { files, text })
+}
+
+fn found(combined: &Combined) -> SelfAgreement<'_> {
+    SelfAgreement::new(
+        &combined.records,
+        &scenes(&combined.questions),
+        &combined.questions,
+        &combined.listing,
+    )
+}
+
+fn report<'a>(
+    combined: &Combined,
+    found: &'a SelfAgreement<'a>,
+    again: &[Alert],
+) -> AgreementReport<'a> {
+    let mut above = again.to_vec();
+    above.extend(alerts_without_truths(combined, found));
+    AgreementReport::new(found, above, &enhancers::rows(&combined.runs))
+}
+
+/// How much is printed; `None` for JSON.
+fn length(show: StdoutFormat) -> Option<TextLength> {
+    match show {
+        StdoutFormat::Findings => Some(TextLength::Findings),
+        StdoutFormat::Short => Some(TextLength::Short),
+        StdoutFormat::Full => Some(TextLength::Full),
+        StdoutFormat::Json => None,
+    }
+}

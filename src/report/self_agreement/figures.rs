@@ -1,0 +1,144 @@
+//! Figures of a run without true answers: [`figures`].
+
+use crate::error::Result;
+use crate::report::chart::{Chart, Figure, LineStyle, Panel, PanelContent, PlotLine};
+use crate::report::ladder::{Ladder, Series, SeriesByLevel};
+use crate::score::estimate::Estimate;
+use crate::score::self_agreement::SelfAgreement;
+use crate::score::self_agreement::cell::{AgreementCell, CellRole};
+use crate::types::AxisLevel;
+
+/// Agreement by level with its floor, and the evidence kept, for each light. Empty if only one level was asked.
+///
+/// # Errors
+/// If a figure cannot be drawn.
+pub(super) fn figures(found: &SelfAgreement<'_>) -> Result<Vec<Figure>> {
+    let ladder = Ladder::new(found.whole().map(|cell| (&cell.subject, cell))).with_clean();
+    if ladder.levels.len() < 2 {
+        return Ok(Vec::new());
+    }
+    let note = format!(
+        "n = {} items in {} {unit}s; bands are 95 % intervals by {unit}; strict reading",
+        found.grid.items.len(),
+        found.grid.clusters,
+        unit = found.unit
+    );
+    let agreement = panels(
+        found,
+        &ladder,
+        |cell| cell.agreement,
+        |panel| panel.extend(floors(found)),
+    );
+    let kept = |cell: &AgreementCell| match cell.role() {
+        // The ceiling is the whole evidence by definition.
+        CellRole::Ceiling => None,
+        _ => cell.evidence?.ok(),
+    };
+    let evidence = panels(found, &ladder, kept, |_| {});
+    let charts = [
+        (
+            "agreement",
+            "Agreement of each model with its own answer in the light, not with the truth. L0: the same images asked again, the ceiling. \
+             Broken lines: without images, the floor.",
+            "agreement with its own answer in the light, %",
+            agreement,
+        ),
+        (
+            "evidence",
+            "Evidence kept: the share of the way from the floor to the ceiling. Below 0 and above 100 % the line lies on the edge.",
+            "evidence kept, %",
+            evidence,
+        ),
+    ];
+    let mut figures = Vec::new();
+    for (name, caption, measure, panels) in charts {
+        let has_points = |panel: &Panel| {
+            let mut lines = panel.lines.iter();
+            lines.any(
+                |line| matches!(&line.content, PanelContent::Curve(points) if !points.is_empty()),
+            )
+        };
+        let panels: Vec<Panel> = panels.into_iter().filter(has_points).collect();
+        if panels.is_empty() {
+            continue;
+        }
+        let chart = Chart {
+            measure,
+            panels,
+            columns: 2,
+            note: note.clone(),
+        };
+        figures.push(Figure {
+            name,
+            caption: caption.to_owned(),
+            svg: chart.svg()?,
+        });
+    }
+    Ok(figures)
+}
+
+/// A panel for each light, raw or with one enhancer, with a line for each model.
+fn panels(
+    found: &SelfAgreement<'_>,
+    ladder: &Ladder<'_, AgreementCell>,
+    number: impl Fn(&AgreementCell) -> Option<Estimate>,
+    add: impl Fn(&mut Vec<PlotLine>),
+) -> Vec<Panel> {
+    let mut panels: Vec<(String, Vec<PlotLine>)> = Vec::new();
+    let degraded = ladder.series.iter();
+    // One level is no line.
+    for (series, cells) in degraded.filter(|(series, _)| series.axis().is_some()) {
+        let line = line(found, series, cells, &number);
+        let title = series.light();
+        match panels.iter_mut().find(|(known, _)| *known == title) {
+            Some((_, lines)) => lines.push(line),
+            None => panels.push((title, vec![line])),
+        }
+    }
+    let panels = panels.into_iter().map(|(title, mut lines)| {
+        add(&mut lines);
+        Panel {
+            title: format!("{title}, n {}", found.grid.items.len()),
+            lines,
+        }
+    });
+    panels.collect()
+}
+
+fn line(
+    found: &SelfAgreement<'_>,
+    series: &Series<'_>,
+    cells: &SeriesByLevel<'_, AgreementCell>,
+    number: impl Fn(&AgreementCell) -> Option<Estimate>,
+) -> PlotLine {
+    let points = cells
+        .iter()
+        .filter_map(|(level, cell)| Some((*level, number(cell)?)));
+    let points: Vec<(AxisLevel, Estimate)> = points.collect();
+    PlotLine {
+        name: series.model.to_owned(),
+        style: style(found, series.model),
+        content: PanelContent::Curve(points),
+    }
+}
+
+/// The place of a model among those of the report decides its style.
+fn style(found: &SelfAgreement<'_>, model: &str) -> LineStyle {
+    let models = found.models();
+    let place = models.iter().position(|known| *known == model);
+    LineStyle(place.unwrap_or(models.len()))
+}
+
+/// A flat line for each model that was asked without images.
+fn floors(found: &SelfAgreement<'_>) -> Vec<PlotLine> {
+    let floors = found.whole().filter(|cell| cell.role() == CellRole::Floor);
+    let lines = floors.filter_map(|cell| {
+        let model = &*cell.subject.model;
+        Some(PlotLine {
+            name: format!("{model} without images"),
+            style: style(found, model),
+            content: PanelContent::Flat(cell.agreement?.value),
+        })
+    });
+    lines.collect()
+}

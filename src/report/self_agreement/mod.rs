@@ -1,0 +1,154 @@
+//! The report of a run without true answers: its files ([`products`]), its summary ([`summary`]) and its text ([`text`]).
+//!
+//! The measure is agreement with the model's own answer in the light. It never stands without what keeps it honest, and the word
+//! accuracy never stands over it.
+
+mod figures;
+mod levels;
+mod sections;
+mod tables;
+mod text;
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::alert::Alert;
+use super::chart;
+use super::json::{ComparedRun, Rows, RunList, document};
+use super::light_readings::LightReadings;
+use super::page::{PageContent, PageInputs, page_of};
+use super::products::{PAGE, table_files};
+use super::samples::{figure, samples};
+use super::sentences::{Sentence, self_agreement};
+use super::table::Table;
+use super::tables::{EnhancerRow, enhancers};
+use super::words::counted;
+use crate::error::Result;
+use crate::score::self_agreement::SelfAgreement;
+use crate::types::manifest::RunManifest;
+
+pub(crate) use text::{TextLength, text};
+
+/// Name of the measure in files.
+const AGREEMENT: &str = "agreement";
+
+/// What is said about the sentences as a whole.
+const HOW_TO_READ: &str = "Agreement is with the model's own answer at L0, whether that is true or not; whatever the truth is, the share of right answers falls by at most one minus the agreement. It says little alone: read it between the floor (no image) and the ceiling (the same image asked again), beside κ and the entropy of the answers. p is Holm's, over the conditions of a model; intervals are 95 %.";
+
+/// All that a report without true answers shows.
+pub(crate) struct AgreementReport<'a> {
+    pub(super) found: &'a SelfAgreement<'a>,
+    /// What a reader must know before any number.
+    pub(super) alerts: Vec<Alert>,
+    /// The findings in words.
+    pub(super) sentences: Vec<Sentence>,
+    /// The tables; the first is the summary.
+    pub(super) tables: Vec<Table>,
+}
+
+impl<'a> AgreementReport<'a> {
+    /// The report of these results; `used` says how each enhancer was used.
+    pub(crate) fn new(
+        found: &'a SelfAgreement<'a>,
+        alerts: Vec<Alert>,
+        used: &[EnhancerRow],
+    ) -> Self {
+        let mut tables = tables::tables(found);
+        tables.extend(enhancers(used));
+        Self {
+            sentences: self_agreement(found),
+            found,
+            alerts,
+            tables,
+        }
+    }
+}
+
+/// Files of a report by name: numbers as CSV, the main tables as LaTeX, figures as SVG, and the HTML page.
+///
+/// # Errors
+/// If a file cannot be made.
+pub(crate) fn products<'a>(
+    report: &'a AgreementReport<'a>,
+    inputs: &PageInputs<'a>,
+) -> Result<Vec<(String, Vec<u8>)>> {
+    let figures = figures::figures(report.found)?;
+    let content = PageContent {
+        intro: intro(report.found),
+        alerts: &report.alerts,
+        sentences: &report.sentences,
+        how_to_read: HOW_TO_READ,
+        tables: &report.tables,
+        sections: &sections::SECTIONS,
+        grid: &report.found.grid,
+        confusions: &report.found.confusions,
+        answers_title: "Answers given against those in the light",
+    };
+    let page = page_of(content, &figures, inputs)?;
+    let mut files = table_files(&report.tables, &report.sentences, "Findings and tables")?;
+    files.extend(chart::files(figures));
+    for samples in samples(inputs.thumbnails) {
+        let name = format!("figures/{}.svg", samples.name);
+        files.push((name, figure(&samples).into_bytes()));
+    }
+    files.push((PAGE.to_owned(), page.into_bytes()));
+    Ok(files)
+}
+
+/// Lines at the top of the page.
+fn intro(found: &SelfAgreement<'_>) -> Vec<String> {
+    let unit = found.unit;
+    let facts = format!(
+        "Nobody knows the true answers to these questions. Each model is held against its own answers at L0: {}, {} subjects (model × \
+         condition). Strict reading. Intervals are 95 %, by {unit} ({} clusters); differences are paired by item, tested by swapping whole \
+         {unit}s, and corrected by Holm over the comparisons of one kind and model.",
+        counted(found.grid.items.len(), "item"),
+        found.grid.subjects.len(),
+        found.grid.clusters
+    );
+    let readings = LightReadings::of(&found.grid.subjects);
+    std::iter::once(facts)
+        .chain(readings.open_question())
+        .collect()
+}
+
+/// The head of the summary.
+#[derive(Serialize)]
+struct Head<'a> {
+    schema: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    folder: Option<&'a Path>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    run: Option<&'a RunManifest>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    runs: Vec<ComparedRun<'a>>,
+    measure: &'static str,
+    readings: LightReadings,
+    alerts: &'a [Alert],
+    findings: &'a [Sentence],
+    /// The rows of `own_answers.csv`.
+    own_answers: Option<Rows<'a>>,
+}
+
+/// The summary of runs as JSON, with the rows of `summary.csv`.
+///
+/// # Errors
+/// If the document cannot be written.
+pub(crate) fn summary(report: &AgreementReport<'_>, runs: RunList<'_>) -> Result<String> {
+    let (run, folder, runs) = runs.parts();
+    let mut tables = report.tables.iter();
+    let own_answers = tables.find(|table| table.name == tables::OWN_ANSWERS);
+    let head = Head {
+        schema: "darkqa.self-agreement/1",
+        folder,
+        run,
+        runs,
+        measure: AGREEMENT,
+        readings: LightReadings::of(&report.found.grid.subjects),
+        alerts: &report.alerts,
+        findings: &report.sentences,
+        own_answers: own_answers.map(Rows),
+    };
+    document(head, &tables::summary(report.found))
+}

@@ -1,0 +1,349 @@
+//! The tables of a run without true answers: [`tables`].
+
+use super::AGREEMENT;
+use super::levels::{levels, why};
+use crate::report::table::ColumnKind::{self, Count, Number, Percent, Ratio, Share, Text};
+use crate::report::table::{Table, TableBuilder, TableCell};
+use crate::report::tables::{SUMMARY, comparisons_of, health, level_words, reading};
+use crate::report::words::{counted, light};
+use crate::score::choice::ReadingMode;
+use crate::score::confusion::{Confusion, Hallucination};
+use crate::score::self_agreement::SelfAgreement;
+use crate::score::self_agreement::cell::{AgreementCell, CellRole};
+use crate::score::self_agreement::evidence::{EvidenceCurve, NoHalf};
+use crate::score::self_agreement::models_in_light::ModelsInLight;
+use crate::score::self_agreement::question_in_light::QuestionInLight;
+use crate::types::LightGroup;
+
+/// Name of the table of all agreements.
+pub(super) const OWN_ANSWERS: &str = "own_answers";
+
+/// All tables; the first is the summary.
+pub(super) fn tables(found: &SelfAgreement<'_>) -> Vec<Table> {
+    let mut tables = vec![summary(found)];
+    tables.extend(levels(found));
+    tables.push(own_answers(found));
+    tables.push(models_in_light(&found.between));
+    tables.push(thresholds(found));
+    tables.push(questions(found));
+    tables.extend(comparisons_of(&found.comparisons, found.unit, AGREEMENT));
+    tables.extend([
+        changed(&found.hallucinations),
+        commonest(&found.confusions),
+        against_light(&found.confusions),
+        health(&found.health),
+    ]);
+    tables
+}
+
+/// The columns that all reports have, with the measure as the last one. There is no number of right replies: nothing is known to be right.
+pub(super) fn summary(found: &SelfAgreement<'_>) -> Table {
+    let builder = TableBuilder::new(SUMMARY, &found.cells)
+        .subject(|cell| &cell.subject, |variant| variant.word().to_owned())
+        .family(|cell| cell.family.as_ref())
+        .column(Text, "csv mode", |cell| mode(cell.mode))
+        .column(Count, "csv n", |cell| cell.replies())
+        .column(Count, "csv right", |_| None::<usize>)
+        .column(Count, "csv unparsed", |cell| unread(cell))
+        .column(Count, "csv failed", |cell| cell.failed)
+        .column(Share, "csv value low high", |cell| cell.agreement)
+        .column(Text, "csv reading", |cell| reading(&cell.subject))
+        .model_facts(&found.grid.listing, |cell| &cell.subject);
+    let has_groups = found.cells.iter().any(|cell| group(cell).is_some());
+    let builder = if has_groups {
+        builder.column(Text, "csv light", |cell| group(cell))
+    } else {
+        builder
+    };
+    builder.column(Text, "csv measure", |_| AGREEMENT).build()
+}
+
+fn mode(mode: ReadingMode) -> &'static str {
+    match mode {
+        ReadingMode::Strict => "strict",
+        ReadingMode::Lenient => "lenient",
+    }
+}
+
+fn group(cell: &AgreementCell) -> Option<&str> {
+    cell.subject.variant.group.as_ref().map(LightGroup::name)
+}
+
+/// Number of replies in which no answer could be read.
+fn unread(cell: &AgreementCell) -> usize {
+    let unread = cell.unread;
+    unread.map_or(0, |share| (share.value * share.n as f64).round() as usize)
+}
+
+/// What a cell is to the others of its model, in files.
+fn role(cell: &AgreementCell) -> &'static str {
+    match cell.role() {
+        CellRole::Floor => "floor",
+        CellRole::Ceiling => "ceiling",
+        CellRole::Other => "",
+    }
+}
+
+/// A row for each agreement, with all that stands beside it.
+fn own_answers(found: &SelfAgreement<'_>) -> Table {
+    let light = |cell: &AgreementCell| {
+        let mut light = found.light.iter();
+        light.find(|light| light.model == cell.subject.model && light.mode == cell.mode)
+    };
+    TableBuilder::new(OWN_ANSWERS, &found.cells)
+        .subject(|cell| &cell.subject, ToString::to_string)
+        .family(|cell| cell.family.as_ref())
+        .column(Text, "csv mode", |cell| mode(cell.mode))
+        .column(Text, "csv role", |cell| role(cell))
+        .column(Share, "csv agreement low high n", |cell| cell.agreement)
+        .column(
+            Share,
+            "csv informative informative_low informative_high informative_n",
+            |cell| cell.informative,
+        )
+        .column(Ratio, "csv kappa kappa_low kappa_high", |cell| cell.kappa)
+        .column(Number, "csv entropy_light", |cell| cell.entropies[0])
+        .column(Number, "csv entropy", |cell| cell.entropies[1])
+        .column(Share, "csv evidence evidence_low evidence_high", |cell| {
+            cell.evidence.and_then(Result::ok)
+        })
+        .column(Text, "csv no_evidence", |cell| {
+            cell.evidence.and_then(Result::err).map(why)
+        })
+        .column(Share, "csv unread unread_low unread_high", |cell| {
+            cell.unread
+        })
+        .column(Count, "csv refused", |cell| cell.refused)
+        .column(Count, "csv failed", |cell| cell.failed)
+        .column(
+            Share,
+            "csv cannot_tell cannot_tell_low cannot_tell_high",
+            |cell| cell.cannot_tell,
+        )
+        .column(Count, "csv asked_light", |cell| {
+            light(cell).map(|light| light.asked)
+        })
+        .column(Number, "csv read_light", |cell| {
+            light(cell)
+                .and_then(|light| light.read)
+                .map(|read| read.value)
+        })
+        .column(Count, "csv refused_light", |cell| {
+            light(cell).map(|light| light.refused)
+        })
+        .build()
+}
+
+fn models_in_light(pairs: &[ModelsInLight]) -> Table {
+    let mut table = TableBuilder::new("models_in_light", pairs)
+        .page("models", "Two models at L0: each against the other, not against the truth")
+        .column(Text, "csv model | terminal model | page model", |pair| pair.first.clone())
+        .column(Text, "csv against | terminal and | page and", |pair| pair.second.clone())
+        .column(Share, "csv same_answer same_low same_high n | terminal same answer at L0 in % | page same answer in % [95 %]", |pair| pair.same)
+        .column(Ratio, "csv kappa kappa_low kappa_high | terminal κ | page κ [95 %]", |pair| pair.kappa)
+        .column(Count, "page n", |pair| pair.same.n)
+        .build();
+    if !pairs.is_empty() {
+        table.heading = Some("Two models in the light: each has its own answers as reference, so that their agreements compare only as far as these".to_owned());
+    }
+    table
+}
+
+/// Why the exposure drop at which half is lost is not known.
+fn why_no_half(reason: &NoHalf) -> String {
+    match reason {
+        NoHalf::NoEvidence(reason) => why(*reason),
+        NoHalf::Curve(reason) => level_words(reason).replace("chance", "the floor"),
+    }
+}
+
+fn thresholds(found: &SelfAgreement<'_>) -> Table {
+    let columns = "csv threshold low high | terminal half kept down to, interval | page half kept down to [95 %]";
+    let unit = |curve: &EvidenceCurve| curve.darkest.axis().map(|axis| axis.unit);
+    let mut table = TableBuilder::new("evidence_thresholds", &found.curves)
+        .page("thresholds", "Where half of the evidence is lost")
+        .column(Text, "csv model | terminal model | page model", |curve| {
+            curve.model.clone()
+        })
+        .column(Text, "csv variant", |curve| curve.variant.to_string())
+        .column(Text, "csv enhancer", |curve| {
+            curve.enhancer.as_ref().map(ToString::to_string)
+        })
+        .column(Text, "terminal light | page light", |curve| {
+            light(&curve.variant, curve.enhancer.as_ref())
+        })
+        .column(Number, "csv darkest", |curve| curve.darkest.value())
+        .column(ColumnKind::Threshold, columns, |curve| {
+            match &curve.threshold {
+                Ok(threshold) => TableCell::Threshold(*threshold, curve.darkest.value()),
+                Err(reason) => TableCell::Unknown(why_no_half(reason)),
+            }
+        })
+        .column(Text, "csv unit | terminal unit | page unit", |curve| {
+            unit(curve)
+        })
+        .column(Text, "csv reason", |curve| {
+            curve.threshold.as_ref().err().map(why_no_half)
+        })
+        .build();
+    if !found.curves.is_empty() {
+        table.heading = Some(format!(
+            "Where half of the evidence is lost, with 95 % intervals by {}",
+            found.unit
+        ));
+    }
+    table
+}
+
+fn questions(found: &SelfAgreement<'_>) -> Table {
+    let mut table = TableBuilder::new("own_questions", &found.questions)
+        .page("questions", "Answers in the light, by question of the bank")
+        .column(
+            Text,
+            "csv model | terminal model | page model",
+            |question| question.model.clone(),
+        )
+        .column(Text, "csv question | page id", |question| {
+            question.bank_id.clone()
+        })
+        .column(Text, "csv family", |question| {
+            question.family.name().to_owned()
+        })
+        .column(
+            Text,
+            "csv text | terminal question | page question",
+            |question| question.text.clone(),
+        )
+        .column(
+            Count,
+            "csv images | terminal images | page images",
+            |question| question.images,
+        )
+        .column(
+            Text,
+            "csv top_answer | terminal commonest | page commonest answer",
+            |question| question.top.clone(),
+        )
+        .column(
+            Percent,
+            "csv top_share | terminal in % | page in %",
+            |question| question.top_share,
+        )
+        .column(Number, "csv entropy | page entropy", |question| {
+            question.entropy
+        })
+        .column(Text, "csv informative", |question| {
+            question.is_informative().to_string()
+        })
+        .column(Text, "terminal | page", |question| tells(question))
+        .build();
+    table.is_folded = true;
+    let without = |question: &QuestionInLight| !question.is_informative();
+    if found.questions.iter().any(without) {
+        let count = found
+            .questions
+            .iter()
+            .filter(|question| without(question))
+            .count();
+        table.heading = Some(format!(
+            "{} in the light of which nothing can be told, because one answer is that about 95 % of the images or more",
+            counted(count, "question")
+        ));
+        for (row, question) in table.rows.iter_mut().zip(&found.questions) {
+            if question.is_informative() {
+                row.hidden_in
+                    .push(crate::report::table::TableFormat::Terminal);
+            }
+        }
+    }
+    table
+}
+
+fn tells(question: &QuestionInLight) -> &'static str {
+    if question.is_informative() {
+        ""
+    } else {
+        "tells nothing"
+    }
+}
+
+/// Rates of “yes” where L0 says no, and of “no” where L0 says yes.
+fn changed(rates: &[Hallucination]) -> Table {
+    TableBuilder::new("presence_changes", rates)
+        .page(
+            "answers",
+            "Questions about presence: yes where L0 says no, and the other way round",
+        )
+        .subject(|rates| &rates.subject, ToString::to_string)
+        .column(
+            Share,
+            "csv yes_for_no yes_low yes_high yes_n | page yes where L0 says no, in % [95 %]",
+            |rates| rates.false_positive,
+        )
+        .column(
+            Share,
+            "csv no_for_yes no_low no_high no_n | page no where L0 says yes, in % [95 %]",
+            |rates| rates.false_negative,
+        )
+        .build()
+}
+
+/// The answer given most often, beside how often it is that at L0.
+fn commonest(confusions: &[Confusion]) -> Table {
+    let answers = confusions.iter();
+    let answers = answers.filter_map(|confusion| Some((confusion, confusion.collapse.as_ref()?)));
+    let mut table = TableBuilder::new("commonest_answers", answers)
+        .page(
+            "answers",
+            "The answer given most often, and how often it is the answer at L0",
+        )
+        .subject(|(confusion, _)| &confusion.subject, ToString::to_string)
+        .family(|(confusion, _)| Some(&confusion.family))
+        .column(Text, "csv top_answer | page given most often", |(_, c)| {
+            c.top.clone()
+        })
+        .column(
+            Share,
+            "csv top_share top_low top_high | page given in % [95 %]",
+            |(_, c)| c.share,
+        )
+        .column(Percent, "csv light_share | page at L0 in %", |(_, c)| {
+            c.truth
+        })
+        .column(
+            Number,
+            "csv entropy_bits | page entropy in bits",
+            |(_, c)| c.entropy,
+        )
+        .column(Number, "csv light_entropy_bits | page at L0", |(_, c)| {
+            c.true_entropy
+        })
+        .column(Count, "csv n | page n", |(_, c)| c.share.n)
+        .build();
+    table.is_folded = true;
+    table
+}
+
+/// A row for each answer at L0 and each answer given instead. The answer given is empty if none could be read.
+fn against_light(confusions: &[Confusion]) -> Table {
+    let cells = confusions.iter().flat_map(|confusion| {
+        let rows = confusion.counts.iter().enumerate();
+        let cells = rows.flat_map(|(light, row)| {
+            let given = row.iter().enumerate();
+            given.map(move |(given, count)| (light, given, *count))
+        });
+        cells.map(move |cell| (confusion, cell))
+    });
+    let counted = cells.filter(|(_, (_, _, count))| *count > 0);
+    TableBuilder::new("answers_against_light", counted)
+        .subject(|(confusion, _)| &confusion.subject, ToString::to_string)
+        .family(|(confusion, _)| Some(&confusion.family))
+        .column(Text, "csv at_l0", |(confusion, (light, _, _))| {
+            confusion.labels[*light].clone()
+        })
+        .column(Text, "csv given", |(confusion, (_, given, _))| {
+            confusion.labels.get(*given).cloned()
+        })
+        .column(Count, "csv count", |(_, (_, _, count))| *count)
+        .build()
+}

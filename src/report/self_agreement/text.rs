@@ -1,0 +1,110 @@
+//! The text of a report without true answers in the terminal: [`text`].
+
+use std::fmt::Write;
+use std::path::Path;
+
+use super::levels::{levels, notes};
+use super::{AgreementReport, HOW_TO_READ};
+use crate::report::alert::lines;
+use crate::report::light_readings::LightReadings;
+use crate::report::sentences::Sentence;
+use crate::report::short::wrapped;
+use crate::report::terminal::{render, table};
+use crate::report::words::counted;
+use crate::types::manifest::RunManifest;
+
+/// How much of a report is printed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum TextLength {
+    /// The findings alone.
+    Findings,
+    /// The findings and the table of levels.
+    Short,
+    /// Everything.
+    Full,
+}
+
+/// The report as text. `runs` are the runs with their folders.
+#[must_use]
+pub(crate) fn text(
+    report: &AgreementReport<'_>,
+    runs: &[(&RunManifest, &Path)],
+    length: TextLength,
+) -> String {
+    let mut text = String::new();
+    if length == TextLength::Full {
+        text += &lines(&report.alerts);
+        for sentence in &report.sentences {
+            text += &sentence_lines(sentence);
+        }
+        let _ = writeln!(text, " {HOW_TO_READ}\n");
+        text += &render(&report.tables);
+    } else {
+        text += &findings(report);
+    }
+    if length == TextLength::Short {
+        text += &short_tables(report);
+    }
+    if length != TextLength::Findings {
+        let readings = LightReadings::of(&report.found.grid.subjects);
+        let open = readings.open_question();
+        text += &open.map_or_else(String::new, |open| wrapped(" ", &open, " "));
+        for (_, folder) in runs {
+            let _ = writeln!(text, "run: {}", folder.display());
+        }
+    }
+    text
+}
+
+/// The head, the alerts and the sentences.
+fn findings(report: &AgreementReport<'_>) -> String {
+    let mut text = head(report) + "\n";
+    for alert in &report.alerts {
+        text += &wrapped("! ", &alert.text, "  ");
+    }
+    for sentence in &report.sentences {
+        text += &sentence_lines(sentence);
+    }
+    text + &wrapped(" ", HOW_TO_READ, " ")
+}
+
+/// The table of each axis, within the width of a terminal as far as its levels allow, and the notes.
+fn short_tables(report: &AgreementReport<'_>) -> String {
+    let mut text = String::from("\n");
+    for part in levels(report.found) {
+        text += &wrapped(" ", part.heading.as_deref().unwrap_or_default(), " ");
+        text += &table(&[part]);
+    }
+    for note in notes(report.found) {
+        text += &wrapped(" ", &note, "   ");
+    }
+    text
+}
+
+fn sentence_lines(sentence: &Sentence) -> String {
+    let sign = format!(" {}  ", sentence.tone.sign());
+    wrapped(&sign, &sentence.text, "    ") + &wrapped("    ", &sentence.detail, "    ")
+}
+
+/// Numbers of models, questions, images and replies.
+fn head(report: &AgreementReport<'_>) -> String {
+    let found = report.found;
+    let items = &found.grid.items;
+    let models = found.models();
+    let who = match &models[..] {
+        [one] => (*one).to_owned(),
+        several => counted(several.len(), "model"),
+    };
+    let questions = items.iter().map(|item| &item.record.question);
+    let questions: std::collections::BTreeSet<_> = questions.collect();
+    let frames = items.iter().map(|item| &item.record.detail.frame);
+    let frames: std::collections::BTreeSet<_> = frames.collect();
+    let replies: usize = found.health.iter().map(|health| health.replies).sum();
+    let failed: usize = found.health.iter().map(|health| health.failures()).sum();
+    format!(
+        "{who} · {} without answers · {} · {replies} replies, {failed} failed · intervals by {}",
+        counted(questions.len(), "question"),
+        counted(frames.len(), "image"),
+        found.unit
+    )
+}
