@@ -23,7 +23,7 @@ struct QuestionLine {
     family: Family,
     question: String,
     choices: Vec<String>,
-    answer: String,
+    answer: Option<String>,
     #[serde(default)]
     evidence: Value,
 }
@@ -83,16 +83,24 @@ impl QuestionLine {
                 format_args!("question {id:?} is empty"),
             ));
         }
+        let Some(answer) = self.answer else {
+            return Err(Error::data(
+                "answer",
+                format_args!(
+                    "question {id:?} has no answer; questions without answers are asked about every image with --ask FILE"
+                ),
+            ));
+        };
         let truth = self
             .choices
             .iter()
-            .position(|choice| *choice == self.answer)
+            .position(|choice| *choice == answer)
             .ok_or_else(|| {
                 Error::data(
                     "answer",
                     format_args!(
-                        "question {id:?}: the answer {:?} is not among the choices {:?}",
-                        self.answer, self.choices
+                        "question {id:?}: the answer {answer:?} is not among the choices {:?}",
+                        self.choices
                     ),
                 )
             })?;

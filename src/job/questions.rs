@@ -41,6 +41,9 @@ pub(crate) fn open_data(
     Ok(dataset.with_questions(questions))
 }
 
+/// The field of a run's identity that holds the digest of the questions that are asked about every image.
+pub(crate) const ASK: &str = "--ask";
+
 /// Questions that are asked about every image, and nobody knows the answers.
 #[derive(Debug)]
 pub(crate) struct QuestionBank {
@@ -74,6 +77,22 @@ impl QuestionBank {
         self.bank.digest()
     }
 
+    /// The questions in words, for the manifest: their name, and how many are asked about each image.
+    pub(crate) fn words(&self) -> String {
+        format!(
+            "{}: {} of {} questions about each image",
+            self.place,
+            self.each(),
+            self.bank.len()
+        )
+    }
+
+    /// The number of questions about each image.
+    fn each(&self) -> usize {
+        let most = self.bank.len();
+        self.per_image.map_or(most, |each| each.get().min(most))
+    }
+
     /// The images at a place with the questions about each. What is left aside, and what is asked besides, is said.
     ///
     /// # Errors
@@ -86,17 +105,16 @@ impl QuestionBank {
     ) -> Result<Dataset> {
         let found = Photographs::at(place)?;
         for note in &found.notes {
-            progress.say(note);
+            progress.note(note);
         }
         let questions = self.bank.about(found.dataset.frames(), self.per_image);
         let images = found.dataset.frames().count();
-        let each = self.per_image.map_or(self.bank.len(), NonZeroUsize::get);
-        progress.say(&format!(
+        progress.note(&format!(
             "--ask {}: {} questions about {images} images without answers ({} each); each model is held against its own answers at L0, and is \
              asked without images, too",
             self.place,
             questions.len(),
-            each.min(self.bank.len())
+            self.each()
         ));
         Ok(found.dataset.with_rule(rule).with_questions(questions))
     }

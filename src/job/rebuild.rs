@@ -9,13 +9,14 @@ use super::enhancers::{self, EnhancerRunArgs, OpenEnhancers};
 use super::frame_work::ImageSteps;
 use super::image_pipeline::ImagePipeline;
 use super::image_words::ImageFlags;
+use super::questions::ASK;
 use super::recipe::Recipe;
 use super::source::{Frames, Source, SourceFrame};
 use super::timings::Timings;
 use super::walk::{Walk, WalkFolder};
 use super::workers::ThreadArgs;
 use crate::ask::Payload;
-use crate::dataset::{DataPlace, Dataset, place};
+use crate::dataset::{DataPlace, Dataset, Photographs, place};
 use crate::enhance::{Enhancer, Implausible, ProbeArgs, RuntimeArgs};
 use crate::error::{Error, Result};
 use crate::synthesis::KindSettings;
@@ -85,7 +86,11 @@ impl ImageRebuilder {
             let folder = WalkFolder::new(&walk, flags.codes.rule(flags.limit));
             (FrameFolder::Walks(folder, walk), recipe)
         } else {
-            let dataset = frames(&flags.data.data)?;
+            let dataset = if manifest.identity.contains_key(ASK) {
+                Photographs::at(&flags.data.data)?.dataset
+            } else {
+                frames(&flags.data.data)?
+            };
             let dataset = dataset.with_rule(flags.codes.rule(flags.limit));
             (FrameFolder::Frames(dataset), recipe)
         };

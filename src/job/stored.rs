@@ -149,6 +149,23 @@ impl AnyRun {
 }
 
 impl StoredRun<ChoiceDetail> {
+    /// The run, if the true answers to its questions are known.
+    ///
+    /// # Errors
+    /// If they are not. That error tells the user `why` they are needed.
+    pub(crate) fn with_truths(self, why: &str) -> Result<Self> {
+        let mut records = self.records.iter();
+        if records.all(|record| record.detail.truth.is_some()) {
+            return Ok(self);
+        }
+        Err(Error::Run {
+            path: self.folder,
+            problem: format!(
+                "nobody knows the true answers to the questions of this run (--ask): {why}"
+            ),
+        })
+    }
+
     /// Reads a run of questions with choices.
     ///
     /// # Errors

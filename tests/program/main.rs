@@ -50,4 +50,5 @@ mod serve;
 mod shards;
 mod statistics;
 mod synthesize;
+mod unlabelled;
 mod walks;

@@ -177,6 +177,7 @@ fn check_one_measure(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
 
 /// Checks that runs can be compared.
 pub(super) fn check_comparable(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
+    check_one_measure(runs)?;
     let mut questions = BTreeMap::<&QuestionId, (usize, BTreeSet<&String>, Option<&String>)>::new();
     let wrong = |run: &StoredRun<ChoiceDetail>, problem: String| {
         let path = run.folder.clone();

@@ -38,13 +38,13 @@ impl Measure {
 
     fn name(self) -> &'static str {
         match self {
-            Self::Agreement => "agreement in %",
+            Self::Agreement => "agreement",
             Self::Kappa => "κ",
-            Self::Evidence => "evidence kept in %",
-            Self::Entropy => "entropy of answers",
-            Self::Unread => "not read in %",
-            Self::Refused => "refused in %",
-            Self::CannotTell => "cannot tell in %",
+            Self::Evidence => "evidence kept",
+            Self::Entropy => "entropy",
+            Self::Unread => "not read",
+            Self::Refused => "refused",
+            Self::CannotTell => "cannot tell",
         }
     }
 
@@ -118,10 +118,9 @@ fn share(share: Option<Estimate>) -> TableCell {
     })
 }
 
-/// A row: the model and the light if they differ from the row above, the measure, and a cell for each level.
+/// A row: the model with the light, the measure, and a cell for each level.
 struct MeasureRow {
-    model: String,
-    light: String,
+    series: String,
     measure: Measure,
     cells: Vec<TableCell>,
 }
@@ -152,15 +151,14 @@ fn of_axis(found: &SelfAgreement<'_>, axis: Axis, ladder: &Ladder<'_, AgreementC
     for (series, cells) in &ladder.series {
         let measures = Measure::ALL.into_iter();
         let measures = measures.filter(|measure| measure.says_something(found, cells));
-        for (place, measure) in measures.enumerate() {
-            let name = |text: String| if place == 0 { text } else { String::new() };
+        let model = found.grid.listing.label(series.model);
+        for measure in measures {
             let cell = |level: &AxisLevel| match cells.get(level) {
                 Some(cell) => measure.cell(found, cell),
                 None => TableCell::Blank,
             };
             rows.push(MeasureRow {
-                model: name(found.grid.listing.label(series.model)),
-                light: name(series.light()),
+                series: format!("{model}, {}", series.light()),
                 measure,
                 cells: levels.iter().map(cell).collect(),
             });
@@ -175,13 +173,8 @@ fn of_axis(found: &SelfAgreement<'_>, axis: Axis, ladder: &Ladder<'_, AgreementC
         format!("Agreement with its own answer in the light by {by}, and what keeps it honest");
     let mut table = TableBuilder::new(AGREEMENT, rows)
         .page("agreement", &caption)
-        .column(Text, "terminal model | page model | latex Model", |row| {
-            row.model.clone()
-        })
-        .column(Text, "terminal light | page light | latex Light", |row| {
-            row.light.clone()
-        })
-        .column(Text, "terminal measure | page | latex Measure", |row| {
+        .group(|row| Some(row.series.clone()))
+        .column(Text, "terminal | page | latex Measure", |row| {
             row.measure.name()
         });
     for (index, level) in levels.iter().enumerate() {
@@ -195,8 +188,8 @@ fn of_axis(found: &SelfAgreement<'_>, axis: Axis, ladder: &Ladder<'_, AgreementC
     }
     let mut table = table.build();
     table.heading = Some(format!(
-        "Agreement with its own answer in the light by {by}; L0 again: the same images asked again, the ceiling; 95 %: how far the \
-         widest interval of the row reaches down and up"
+        "Agreement with its own answer in the light by {by}, in % (κ and entropy from 0 to 1); L0 again: the same images asked again, the \
+         ceiling; 95 %: how far the widest interval of the row reaches down and up"
     ));
     table.latex = Some(format!(
         "Agreement of each model with its own answer in the light by {by} (strict reading), not with the truth; intervals by {}.",

@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::plan::{ChoiceItem, trials};
 use super::settings::ImagePlace;
@@ -12,6 +12,7 @@ use crate::job::experiment::Experiment;
 use crate::job::identity::{self, Columns, Identity};
 use crate::job::models::ModelUnderTest;
 use crate::job::plan::SourcePlan;
+use crate::job::questions::ASK;
 use crate::job::recipe::Recipe;
 use crate::job::report;
 use crate::job::settings::JobSettings;
@@ -87,7 +88,7 @@ impl Experiment for ChoiceSetup<'_> {
                 .then_some(("--shuffle-options", true.into())),
             order.circular.then_some(("--circular", true.into())),
             rules.map(|rules| ("--rules", json!(rules))),
-            self.bank.map(|bank| ("--ask", json!(bank))),
+            self.bank.map(|bank| (ASK, json!(bank))),
             // Left out if unset, so that runs from before the flag go on.
             (self.config.image_place == ImagePlace::BeforeWords)
                 .then_some(("--image-first", true.into())),
@@ -96,6 +97,12 @@ impl Experiment for ChoiceSetup<'_> {
         fields
             .map(|(field, value)| (field.to_owned(), value))
             .chain(identity::images(&self.recipe))
+            .collect()
+    }
+
+    fn notes(&self) -> Vec<(&'static str, Value)> {
+        let bank = self.config.bank.iter();
+        bank.map(|bank| ("questions without answers", json!(bank.words())))
             .collect()
     }
 

@@ -98,6 +98,8 @@ struct SheetItem {
 impl SheetItem {
     fn read(args: &ShowArgs) -> Result<Self> {
         let run = StoredRun::of_choices(&args.run, "--sheet draws questions with choices")?;
+        let run =
+            run.with_truths("--sheet draws accuracy; leave it out to see the images and replies")?;
         let problem = |problem: String| Error::Run {
             path: args.run.clone(),
             problem,

@@ -46,7 +46,8 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
         records,
         questions,
         ..
-    } = StoredRun::of_choices(&args.run, "openeqa --study DIR makes their page")?;
+    } = StoredRun::of_choices(&args.run, "openeqa --study DIR makes their page")?
+        .with_truths("what people answer is scored by them")?;
     let wrong = |problem: String| {
         let path = args.run.clone();
         Error::Run { path, problem }

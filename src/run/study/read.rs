@@ -88,7 +88,8 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
     } = StoredRun::of_choices(
         &args.run,
         "openeqa --answers NAME=FILE reads what people answered",
-    )?;
+    )?
+    .with_truths("what people answer is scored by them")?;
     let asked = asked(records);
     let mut counts = AnswerCounts::default();
     let mut lines = Vec::new();

@@ -85,5 +85,6 @@ pub(super) fn entropy(counts: impl Iterator<Item = usize> + Clone, choices: usiz
         let share = count as f64 / all as f64;
         -share * libm::log(share)
     });
-    Some(terms.sum::<f64>() / libm::log(choices as f64))
+    // The entropy of one answer is 0, and not −0.
+    Some((terms.sum::<f64>() + 0.0) / libm::log(choices as f64))
 }

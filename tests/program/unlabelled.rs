@@ -1,0 +1,392 @@
+//! Photographs without labels: questions that are asked about every image, and agreement with a model's own answers in the light.
+
+use std::collections::BTreeSet;
+use std::fs;
+
+use serde_json::{Value, json};
+
+use crate::support::run::{Bench, records, words};
+
+/// Number of photographs.
+const PHOTOGRAPHS: usize = 12;
+
+/// Twelve photographs in two folders, a bank of three questions, and a script that answers as it sees: it forgets in the dark.
+fn photographs() -> Bench {
+    let bench = Bench::new();
+    let mut replies = Vec::new();
+    for index in 0..PHOTOGRAPHS {
+        let name = format!("{}/{index:02}.png", ["hall", "kitchen"][index % 2]);
+        let grey = 60 + 10 * index as u8;
+        let picture = image::RgbImage::from_pixel(24, 16, image::Rgb([grey, 90, 200 - grey]));
+        fs::create_dir_all(bench.path("photos").join(&name).parent().unwrap()).unwrap();
+        picture.save(bench.path("photos").join(&name)).unwrap();
+        for (id, light) in [
+            ("lamp", index % 3 == 0),
+            ("window", index % 2 == 0),
+            ("cat", false),
+        ] {
+            let letter = if light { "A" } else { "B" };
+            let id = format!("{id}@{name}");
+            // Without an image, and in the dark, it says no to everything; the enhancer of a name is not used here.
+            replies.push(json!({"question": id, "reply": "B"}));
+            replies.push(json!({"question": id, "condition": "L0", "reply": letter}));
+            let at_l1 = if index < 10 { letter } else { "B" };
+            replies.push(json!({"question": id, "condition": "L1-noise", "reply": at_l1}));
+        }
+    }
+    let lines = |values: &[Value]| {
+        values
+            .iter()
+            .map(|value| format!("{value}\n"))
+            .collect::<String>()
+    };
+    bench.file("eyes.jsonl", lines(&replies));
+    let question = |id: &str, text: &str, family: &str| json!({"id": id, "question": text, "choices": ["yes", "no"], "family": family});
+    bench.file(
+        "bank.jsonl",
+        lines(&[
+            question("lamp", "Is there a lamp in it?", "presence"),
+            question("window", "Is there a window in it?", "presence"),
+            question("cat", "Is there a cat in it?", "animals"),
+        ]),
+    );
+    bench
+}
+
+const ASKED: &str = "--data photos --ask bank.jsonl --model script:eyes.jsonl --levels L0,L1,L5 --variant noise --out run";
+
+fn text(bench: &Bench, name: &str) -> String {
+    fs::read_to_string(bench.path(name)).unwrap()
+}
+
+/// The words of a text without its line breaks.
+fn on_one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// The rows of a CSV file, by column.
+fn rows(bench: &Bench, name: &str) -> Vec<Value> {
+    let mut reader = csv::Reader::from_path(bench.path(name)).unwrap();
+    let rows = reader.deserialize::<std::collections::BTreeMap<String, String>>();
+    rows.map(|row| json!(row.unwrap())).collect()
+}
+
+fn row<'r>(rows: &'r [Value], wanted: &[(&str, &str)]) -> &'r Value {
+    let mut rows = rows.iter();
+    let fits = |row: &&Value| wanted.iter().all(|(column, value)| row[*column] == *value);
+    rows.find(fits).unwrap_or_else(|| panic!("{wanted:?}"))
+}
+
+fn number(row: &Value, column: &str) -> f64 {
+    row[column].as_str().unwrap().parse().unwrap()
+}
+
+#[test]
+fn a_folder_of_photographs_is_asked_and_no_reply_is_right_or_wrong() {
+    let bench = photographs();
+    let called = bench.call(&words(ASKED));
+    assert_eq!(called.code, Some(0), "{called:?}");
+    for said in [
+        "12 images in it and in the folders below, each named by its path from there",
+        "--ask bank.jsonl: 36 questions about 12 images without answers (3 each)",
+        "is asked without images, too",
+    ] {
+        assert!(called.stderr.contains(said), "{said}: {}", called.stderr);
+    }
+    let records = records(&bench.path("run"));
+    // Twice at L0, once at L1, at L5 and without an image.
+    assert_eq!(records.len(), 36 * 5);
+    let outcomes: BTreeSet<&str> = records
+        .iter()
+        .filter_map(|record| record["outcome"].as_str())
+        .collect();
+    assert_eq!(outcomes, BTreeSet::from(["answered"]));
+    assert!(records.iter().all(|record| record["truth"].is_null()));
+    let again = records.iter().filter(|record| record["repeat"] == 1);
+    let again: BTreeSet<&str> = again
+        .filter_map(|record| record["condition"].as_str())
+        .collect();
+    assert_eq!(again, BTreeSet::from(["L0"]));
+    let question = text(&bench, "run/questions.jsonl");
+    let question: Value = serde_json::from_str(question.lines().next().unwrap()).unwrap();
+    assert_eq!(
+        (&question["answer"], &question["evidence"]),
+        (&Value::Null, &json!({"bank_id": "lamp"}))
+    );
+}
+
+#[test]
+fn the_report_says_how_far_the_answers_are_those_in_the_light() {
+    let bench = photographs();
+    let shown = bench.complete(&words(ASKED));
+    let own = rows(&bench, "run/own_answers.csv");
+    let of = |level: &str| {
+        row(
+            &own,
+            &[
+                ("level", level),
+                ("family", "all"),
+                ("mode", "strict"),
+                ("view", "image"),
+            ],
+        )
+    };
+    // In the light 4 lamps, 6 windows and no cat: 10 of 36 are yes. At L5 all is no.
+    assert!((number(of("L5"), "agreement") - 26.0 / 36.0).abs() < 1e-12);
+    assert!((number(of("L0"), "agreement") - 1.0).abs() < 1e-12);
+    assert_eq!(of("L0")["role"], "ceiling");
+    // The floor is no to everything, too, so that nothing is kept at L5.
+    assert!(number(of("L5"), "evidence").abs() < 1e-12 && number(of("L5"), "kappa").abs() < 1e-12);
+    assert!(number(of("L5"), "entropy").abs() < 1e-12 && number(of("L5"), "entropy_light") > 0.5);
+    // Of the last two photographs one has a window.
+    assert!((number(of("L1"), "agreement") - 35.0 / 36.0).abs() < 1e-12);
+    assert!((number(of("L1"), "evidence") - 0.9).abs() < 1e-12);
+    let questions = rows(&bench, "run/own_questions.csv");
+    let informative = questions.iter().map(|row| {
+        (
+            row["question"].as_str().unwrap(),
+            row["informative"].as_str().unwrap(),
+        )
+    });
+    assert_eq!(
+        informative.collect::<Vec<_>>(),
+        [("lamp", "true"), ("window", "true"), ("cat", "false")]
+    );
+    for said in [
+        "evidence kept",
+        "entropy",
+        "κ",
+        "without images, the floor",
+        "2 of 3 questions of the bank can tell something",
+    ] {
+        assert!(on_one_line(&shown).contains(said), "{said}: {shown}");
+    }
+    let comparisons = rows(&bench, "run/comparisons.csv");
+    let dark = row(
+        &comparisons,
+        &[
+            ("kind", "level"),
+            ("condition", "L5-noise"),
+            ("family", "all"),
+        ],
+    );
+    assert_eq!(
+        (
+            &dark["against_condition"],
+            &dark["only_second"],
+            &dark["measure"]
+        ),
+        (&json!("L0"), &json!("10"), &json!("agreement"))
+    );
+}
+
+#[test]
+fn the_word_accuracy_stands_over_no_agreement() {
+    let bench = photographs();
+    let shown = bench.complete(&words(ASKED)) + &bench.complete(&["report", "run", "--full"]);
+    assert!(!shown.contains("ccuracy"), "{shown}");
+    let summary = rows(&bench, "run/summary.csv");
+    assert!(
+        summary
+            .iter()
+            .all(|row| row["measure"] == "agreement" && row["right"] == "")
+    );
+    let head = text(&bench, "run/summary.csv");
+    assert!(head.starts_with("model,view,level,variant,enhancer,family,mode,n,right,unparsed,failed,value,low,high,reading,measure\n"), "{head}");
+    let json: Value = serde_json::from_str(&text(&bench, "run/summary.json")).unwrap();
+    assert_eq!(json["measure"], "agreement");
+    assert_eq!(
+        json["own_answers"].as_array().unwrap().len(),
+        json["rows"].as_array().unwrap().len()
+    );
+    for name in ["figures/agreement.svg", "figures/evidence.svg"] {
+        assert!(
+            !text(&bench, &format!("run/{name}")).contains("ccuracy"),
+            "{name}"
+        );
+    }
+    let figure = text(&bench, "run/figures/agreement.svg");
+    assert!(
+        figure.contains("agreement with its own answer in the light"),
+        "{figure}"
+    );
+    let page = text(&bench, "run/report.html");
+    // The style and the script are those of every page.
+    let page = page.split("<script id=\"data\"").next().unwrap();
+    assert!(
+        !page.contains("ccuracy") && page.contains("Agreement with its own answer in the light")
+    );
+    assert!(
+        !bench.path("run/thresholds.csv").exists()
+            && bench.path("run/evidence_thresholds.csv").exists()
+    );
+}
+
+#[test]
+fn a_bank_to_which_all_is_no_gives_no_verdict() {
+    let bench = photographs();
+    bench.file("no.jsonl", json!({"default": "B"}).to_string());
+    let shown = bench.complete(&words(&ASKED.replace("eyes.jsonl", "no.jsonl")));
+    assert!(
+        on_one_line(&shown).contains("This bank cannot tell what script:no.jsonl sees"),
+        "{shown}"
+    );
+    assert!(
+        !shown.contains("gives its answer in the light to"),
+        "{shown}"
+    );
+    assert!(
+        on_one_line(&shown)
+            .contains("the ceiling is 0.0 points above the floor, and 10.0 are needed"),
+        "{shown}"
+    );
+}
+
+#[test]
+fn a_way_out_is_a_measure_of_its_own() {
+    let bench = photographs();
+    let bank = text(&bench, "bank.jsonl").replace("\"no\"]", "\"no\",\"Cannot tell\"]");
+    bench.file("bank.jsonl", bank);
+    let replies = text(&bench, "eyes.jsonl");
+    let replies = replies.lines().map(|line| {
+        let mut line: Value = serde_json::from_str(line).unwrap();
+        if line.get("condition").is_none() {
+            line["reply"] = "C".into();
+        }
+        format!("{line}\n")
+    });
+    let replies: String = replies.collect();
+    bench.file("eyes.jsonl", replies);
+    let shown = bench.complete(&words(ASKED));
+    let shown = on_one_line(&shown);
+    assert!(
+        shown.contains(
+            "script:eyes.jsonl says “cannot tell” to 0.0 % of the questions in the light, and to 100.0 % at L5"
+        ),
+        "{shown}"
+    );
+    let own = rows(&bench, "run/own_answers.csv");
+    let dark = row(
+        &own,
+        &[("level", "L5"), ("family", "all"), ("mode", "strict")],
+    );
+    assert!((number(dark, "cannot_tell") - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn runs_go_on_grow_and_are_merged() {
+    let bench = photographs();
+    let less = ASKED.replace("--levels L0,L1,L5", "--levels L0,L5");
+    bench.complete(&words(&less));
+    let before = text(&bench, "run/records.jsonl");
+    bench.complete(&words(&less));
+    assert_eq!(text(&bench, "run/records.jsonl"), before);
+    bench.complete(&words(ASKED));
+    let after = text(&bench, "run/records.jsonl");
+    assert!(after.starts_with(&before));
+    assert_eq!(after.lines().count() - before.lines().count(), 36);
+    let rescored = bench.complete(&["report", "run", "--rescore"]);
+    assert!(
+        rescored.starts_with("0 of 180 records now read differently\n"),
+        "{rescored}"
+    );
+    for shard in ["1/2", "2/2"] {
+        let call = ASKED.replace("--out run", "--out parts");
+        bench.complete(&[words(&call), vec!["--shard", shard]].concat());
+    }
+    bench.complete(&words("merge parts --out whole"));
+    assert_eq!(
+        text(&bench, "whole/own_answers.csv"),
+        text(&bench, "run/own_answers.csv")
+    );
+    let item = bench.complete(&words("show run lamp@hall/00.png --data photos"));
+    assert!(
+        item.contains("answered") && !item.contains("(true)"),
+        "{item}"
+    );
+}
+
+#[test]
+fn fewer_questions_a_photograph_grow_to_more() {
+    let bench = photographs();
+    let few = format!("{ASKED} --ask-per-image 1");
+    bench.complete(&words(&few));
+    assert_eq!(records(&bench.path("run")).len(), 12 * 5);
+    bench.complete(&words(ASKED));
+    assert_eq!(records(&bench.path("run")).len(), 36 * 5);
+}
+
+#[test]
+fn two_models_are_held_against_each_other_first() {
+    let bench = photographs();
+    let shown = bench.complete(&words(&format!("{ASKED} --model random")));
+    // References are not compared with models.
+    assert!(!shown.contains("give the same answer"), "{shown}");
+    bench.file("other.jsonl", text(&bench, "eyes.jsonl"));
+    let shown = bench.complete(&words(&format!("{ASKED} --model script:other.jsonl")));
+    let shown = on_one_line(shown.split_once('\n').unwrap().1);
+    let first = shown.split(" · ").nth(1).unwrap();
+    assert!(
+        first.starts_with(
+            "At L0 script:eyes.jsonl and script:other.jsonl give the same answer to 100.0 %"
+        ),
+        "{shown}"
+    );
+    assert_eq!(rows(&bench, "run/models_in_light.csv").len(), 3);
+}
+
+#[test]
+fn what_needs_a_truth_is_refused() {
+    let bench = photographs();
+    bench.complete(&words(ASKED));
+    bench.file("photos/questions.jsonl", json!({"id": "a", "frame": "hall/00.png", "question": "?", "choices": ["yes", "no"], "answer": "no"}).to_string());
+    let set = json!({"id": "a", "image": "photos/hall/00.png", "question": "?", "choices": ["yes", "no"], "answer": "no"});
+    bench.file("set.jsonl", set.to_string());
+    bench.complete(&words(
+        "--data set.jsonl --model random --levels L0 --out known",
+    ));
+    let open = json!({"id": "a", "frame": "hall/00.png", "question": "?", "choices": ["yes", "no"], "answer": null});
+    bench.file("open.jsonl", open.to_string());
+    let asked = "--data photos --ask bank.jsonl --levels L0,L5 --out other";
+    for (call, says) in [
+        (format!("{asked} --model observer"), "observer cannot be asked with --ask"),
+        (format!("{asked} --model random --blind"), "random is shown no image"),
+        (format!("{asked} --blind-model random"), "random is shown no image"),
+        (format!("{asked} --model random --questions set.jsonl"), "cannot be used with"),
+        ("--data photos --ask bank.jsonl --model random --levels L5 --out other".to_owned(), "add L0 to --levels"),
+        ("--data photos --ask nothing --model random --out other".to_owned(), "no such file; home and home:uncertain are built in"),
+        ("--data photos --ask-per-image 3 --model random --out other".to_owned(), "--ask"),
+        ("--data photos --ask home --model script:eyes.jsonl --levels L0,L1,L5 --variant noise --out run".to_owned(), "--ask"),
+        ("--data set.jsonl --model random --levels L0 --out run".to_owned(), "--ask"),
+        ("report run known".to_owned(), "accuracy and agreement are different measures"),
+        ("report known --baseline run".to_owned(), "accuracy and agreement are different measures"),
+        ("report run --baseline run".to_owned(), "--baseline: it compares accuracies"),
+        ("report run --common".to_owned(), "--common: each model is held against its own answers"),
+        ("study pack run --out page".to_owned(), "nobody knows the true answers"),
+        ("show run lamp@hall/00.png --data photos --sheet story.png".to_owned(), "nobody knows the true answers"),
+        ("--data photos --questions open.jsonl --model random --out other".to_owned(), "has no answer; questions without answers"),
+    ] {
+        let called = bench.call(&words(&call));
+        assert_eq!(called.code, Some(2), "{call}: {called:?}");
+        assert!(called.stderr.contains(says), "{call}: {says} expected: {}", called.stderr);
+    }
+}
+
+#[test]
+fn images_of_rooms_and_of_sets_are_asked_too() {
+    let bench = photographs();
+    let set = json!({"id": "a", "image": "photos/hall/00.png", "question": "?", "choices": ["yes", "no"], "answer": "no"});
+    bench.file("set.jsonl", set.to_string());
+    let call = |data: &str, out: &str| {
+        let call = format!(
+            "--data {data} --ask home:uncertain --ask-per-image 2 --model random --levels L0,L5 --variant ev --out {out}"
+        );
+        let called = bench.call(&words(&call));
+        assert_eq!(called.code, Some(0), "{called:?}");
+        called.stderr
+    };
+    assert!(call("set.jsonl", "one").contains("its 1 questions are left aside"));
+    assert_eq!(records(&bench.path("one")).len(), 2 * 4);
+    call("rooms:frames=6,size=64x48", "two");
+    assert_eq!(records(&bench.path("two")).len(), 12 * 4);
+}
