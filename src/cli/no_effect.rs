@@ -148,6 +148,9 @@ impl NoEffect {
             let why = "the observer is not asked about images";
             self.because(why, &["observer_controls".to_owned()]);
         }
+        if args.bank.ask.is_none() {
+            self.because("no --ask is named", &["ask_per_image".to_owned()]);
+        }
         let images = [ids::<ShrinkArgs>(), vec!["image_first".into()]].concat();
         if !models
             .model
@@ -327,6 +330,10 @@ mod tests {
             "--observer-controls: no effect: the observer is not asked",
         ),
         (
+            "--model m --ask-per-image 3",
+            "--ask-per-image: no effect: no --ask is named",
+        ),
+        (
             "--model m --trust-models",
             "--trust-models: no effect: no file of models is named",
         ),
@@ -406,6 +413,7 @@ mod tests {
         for words in [
             "--model m",
             "--model m --llie f.onnx --tile whole --profile eld --image jpeg:90 --rpm 9",
+            "--model m --ask home --ask-per-image 3",
             "--model m --blind --seed 3 --temperature 1",
             "--model random --seed 3 --shuffle-options",
             "--model observer --observer-controls",

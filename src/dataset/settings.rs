@@ -50,7 +50,7 @@ pub(crate) struct BankArgs {
     #[arg(long, value_name = "home|home:uncertain|FILE", conflicts_with_all = ["questions", "rules"], add = Decides::Reply)]
     pub ask: Option<BankPlace>,
     /// Only N of the questions of --ask about each image, drawn by the image's name; default: all
-    #[arg(long, value_name = "N", requires = "ask", add = Decides::Trials)]
+    #[arg(long, value_name = "N", add = Decides::Trials)]
     pub ask_per_image: Option<NonZeroUsize>,
 }
 

@@ -88,6 +88,11 @@ impl Scene {
             let text = fs::read_to_string(built_in).unwrap();
             bench.file(&format!("own/{name}"), format!("Look closely.\n{text}"));
         }
+        let bank = [
+            json!({"id": "lamp", "question": "Is there a lamp?", "choices": ["yes", "no"]}),
+            json!({"id": "color", "question": "What color?", "choices": ["red", "blue"]}),
+        ];
+        bench.file("bank.jsonl", bank.map(|line| line.to_string()).join("\n"));
         let rules = include_str!("../../src/questions/rules.toml");
         bench.file("rules.toml", rules.replace("gap_mm = 300", "gap_mm = 301"));
         onnx::gain(0.5).write(&bench.path(""), "one.onnx");
@@ -205,8 +210,9 @@ fn set(conditions: &str) -> BTreeSet<String> {
 }
 
 /// What refuses an evaluation on the folder of another: the field that the message names, and the flag.
-const REFUSED: [(&str, &str); 34] = [
+const REFUSED: [(&str, &str); 35] = [
     ("--data", "--data elsewhere/frames"),
+    ("--ask", "--ask bank.jsonl"),
     ("--questions", "--questions other.jsonl"),
     ("--rules", "--rules rules.toml"),
     ("--shuffle-options", "--shuffle-options"),
@@ -299,7 +305,7 @@ fn every_field_of_open_questions_refuses_another_value() {
 type Addition = (&'static str, &'static str, usize);
 
 /// What may be added to an evaluation. A part of the noise model that is said makes another light reading.
-const ADDITIONS: [Addition; 22] = [
+const ADDITIONS: [Addition; 23] = [
     ("", "--blind", 3),
     ("", "--model m --model n", 9),
     ("", "--model n", 9),
@@ -337,6 +343,12 @@ const ADDITIONS: [Addition; 22] = [
     ("--limit 2", "--limit 3", 3),
     ("--families presence", "--families presence,color", 3),
     ("", "--repeats 2", 9),
+    // Of two images: without an image, at L0 twice, and at L3 twice.
+    (
+        "--ask bank.jsonl --ask-per-image 1",
+        "--ask-per-image 2 --ask bank.jsonl",
+        10,
+    ),
     // They come with the observer alone.
     ("", "--observer-controls", 0),
 ];

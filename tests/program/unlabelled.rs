@@ -355,7 +355,6 @@ fn what_needs_a_truth_is_refused() {
         (format!("{asked} --model random --questions set.jsonl"), "cannot be used with"),
         ("--data photos --ask bank.jsonl --model random --levels L5 --out other".to_owned(), "add L0 to --levels"),
         ("--data photos --ask nothing --model random --out other".to_owned(), "no such file; home and home:uncertain are built in"),
-        ("--data photos --ask-per-image 3 --model random --out other".to_owned(), "--ask"),
         ("--data photos --ask home --model script:eyes.jsonl --levels L0,L1,L5 --variant noise --out run".to_owned(), "--ask"),
         ("--data set.jsonl --model random --levels L0 --out run".to_owned(), "--ask"),
         ("report run known".to_owned(), "accuracy and agreement are different measures"),
