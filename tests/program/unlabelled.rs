@@ -34,11 +34,9 @@ fn photographs() -> Bench {
             replies.push(json!({"question": id, "condition": "L1-noise", "reply": at_l1}));
         }
     }
-    let lines = |values: &[Value]| {
-        values
-            .iter()
-            .map(|value| format!("{value}\n"))
-            .collect::<String>()
+    let lines = |values: &[Value]| -> String {
+        let lines: Vec<String> = values.iter().map(ToString::to_string).collect();
+        lines.join("\n")
     };
     bench.file("eyes.jsonl", lines(&replies));
     let question = |id: &str, text: &str, family: &str| json!({"id": id, "question": text, "choices": ["yes", "no"], "family": family});

@@ -11,6 +11,7 @@ use crate::report::sentences::Sentence;
 use crate::report::short::wrapped;
 use crate::report::terminal::{render, table};
 use crate::report::words::counted;
+use crate::score::health::Health;
 use crate::types::manifest::RunManifest;
 
 /// How much of a report is printed.
@@ -100,7 +101,7 @@ fn head(report: &AgreementReport<'_>) -> String {
     let frames = items.iter().map(|item| &item.record.detail.frame);
     let frames: std::collections::BTreeSet<_> = frames.collect();
     let replies: usize = found.health.iter().map(|health| health.replies).sum();
-    let failed: usize = found.health.iter().map(|health| health.failures()).sum();
+    let failed: usize = found.health.iter().map(Health::failures).sum();
     format!(
         "{who} · {} without answers · {} · {replies} replies, {failed} failed · intervals by {}",
         counted(questions.len(), "question"),

@@ -57,12 +57,11 @@ impl<'a> ChoiceSetup<'a> {
             Vec::new()
         };
         let place = &config.data.data;
-        let dataset = match &config.bank {
-            Some(bank) => bank.data(place, config.rule, progress)?,
-            None => {
-                let (selection, rules) = (&config.selection, &config.rules);
-                open_data(place, selection, rules, config.rule, progress)?
-            }
+        let dataset = if let Some(bank) = &config.bank {
+            bank.data(place, config.rule, progress)?
+        } else {
+            let (selection, rules) = (&config.selection, &config.rules);
+            open_data(place, selection, rules, config.rule, progress)?
         };
         let dataset = Arc::new(dataset);
         let all = select(&dataset, &config.selection)?;

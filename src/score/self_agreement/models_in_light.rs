@@ -43,8 +43,8 @@ pub(super) fn models_in_light(
             if let Some(same) = Estimate::clustered(&counts) {
                 let answers = BankCounts::of(&grid, 0, None, mode, bank);
                 pairs.push(ModelsInLight {
-                    first: (*first).to_owned(),
-                    second: (*second).to_owned(),
+                    first: first.clone(),
+                    second: second.clone(),
                     same,
                     kappa: kappa(&answers, &counts, same),
                 });
