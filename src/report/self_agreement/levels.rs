@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::AGREEMENT;
+use super::measure::AGREEMENT;
 use crate::report::ladder::{Ladder, SeriesByLevel};
 use crate::report::table::ColumnKind::{Accuracy, Text};
 use crate::report::table::{Table, TableBuilder, TableCell};

@@ -3,8 +3,10 @@
 //! The measure is agreement with the model's own answer in the light. It never stands without what keeps it honest, and the word
 //! accuracy never stands over it.
 
+mod agreement_report;
 mod figures;
 mod levels;
+mod measure;
 mod sections;
 mod tables;
 mod text;
@@ -20,50 +22,16 @@ use super::light_readings::LightReadings;
 use super::page::{PageContent, PageInputs, page_of};
 use super::products::{PAGE, table_files};
 use super::samples::{figure, samples};
-use super::sentences::{Sentence, self_agreement};
-use super::table::Table;
-use super::tables::{EnhancerRow, enhancers};
+use super::sentences::Sentence;
 use super::words::counted;
 use crate::error::Result;
 use crate::score::self_agreement::SelfAgreement;
 use crate::types::manifest::RunManifest;
 
+pub(crate) use agreement_report::AgreementReport;
 pub(crate) use text::{TextLength, text};
 
-/// Name of the measure in files.
-const AGREEMENT: &str = "agreement";
-
-/// What is said about the sentences as a whole.
-const HOW_TO_READ: &str = "Agreement is with the model's own answer at L0, whether that is true or not; whatever the truth is, the share of right answers falls by at most one minus the agreement. It says little alone: read it between the floor (no image) and the ceiling (the same image asked again), beside κ and the entropy of the answers. p is Holm's, over the conditions of a model; intervals are 95 %.";
-
-/// All that a report without true answers shows.
-pub(crate) struct AgreementReport<'a> {
-    pub(super) found: &'a SelfAgreement<'a>,
-    /// What a reader must know before any number.
-    pub(super) alerts: Vec<Alert>,
-    /// The findings in words.
-    pub(super) sentences: Vec<Sentence>,
-    /// The tables; the first is the summary.
-    pub(super) tables: Vec<Table>,
-}
-
-impl<'a> AgreementReport<'a> {
-    /// The report of these results; `used` says how each enhancer was used.
-    pub(crate) fn new(
-        found: &'a SelfAgreement<'a>,
-        alerts: Vec<Alert>,
-        used: &[EnhancerRow],
-    ) -> Self {
-        let mut tables = tables::tables(found);
-        tables.extend(enhancers(used));
-        Self {
-            sentences: self_agreement(found),
-            found,
-            alerts,
-            tables,
-        }
-    }
-}
+use self::measure::{AGREEMENT, HOW_TO_READ};
 
 /// Files of a report by name: numbers as CSV, the main tables as LaTeX, figures as SVG, and the HTML page.
 ///

@@ -1,7 +1,7 @@
 //! The tables of a run without true answers: [`tables`].
 
-use super::AGREEMENT;
 use super::levels::{levels, why};
+use super::measure::AGREEMENT;
 use crate::report::table::ColumnKind::{self, Count, Number, Percent, Ratio, Share, Text};
 use crate::report::table::{Table, TableBuilder, TableCell};
 use crate::report::tables::{SUMMARY, comparisons_of, health, level_words, reading};

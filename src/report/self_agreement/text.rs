@@ -3,8 +3,9 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use super::agreement_report::AgreementReport;
 use super::levels::{levels, notes};
-use super::{AgreementReport, HOW_TO_READ};
+use super::measure::HOW_TO_READ;
 use crate::report::alert::lines;
 use crate::report::light_readings::LightReadings;
 use crate::report::sentences::Sentence;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::BankIndex;
+use super::bank_index::BankIndex;
 use super::counts::BankCounts;
 use super::evidence::{Bounds, NoEvidence, evidence};
 use super::kappa::kappa;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::BankIndex;
+use super::bank_index::BankIndex;
 use super::question_in_light::entropy;
 use crate::score::choice::ReadingMode;
 use crate::score::grid::Grid;

@@ -13,6 +13,7 @@
 //! corruption (Hendrycks and Dietterich 2019, arXiv:1903.12261, ImageNet-P); consistency of vision-language models under corruption
 //! (Bench-C, arXiv:2511.19032).
 
+mod bank_index;
 pub(crate) mod cell;
 mod counts;
 pub(crate) mod evidence;
@@ -23,8 +24,9 @@ pub(crate) mod question_in_light;
 #[cfg(test)]
 mod tests;
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::BTreeMap;
 
+use self::bank_index::BankIndex;
 use self::cell::{AgreementCell, cells};
 use self::evidence::{EvidenceCurve, curves};
 use self::light::{LightAnswers, LightReplies};
@@ -37,7 +39,7 @@ use super::comparison::{Comparison, ComparisonKind, comparisons};
 use super::confusion::{Confusion, Hallucination, confusions, hallucinations};
 use super::grid::Grid;
 use super::health::{Health, healths};
-use crate::types::{FrameId, ModelListing, QuestionId, Record, RunQuestion};
+use crate::types::{FrameId, ModelListing, Record, RunQuestion};
 
 /// All results of a run without true answers.
 #[derive(Debug)]
@@ -64,34 +66,6 @@ pub(crate) struct SelfAgreement<'a> {
     pub(crate) health: Vec<Health>,
     /// How far two models agree with each other in the light.
     pub(crate) between: Vec<ModelsInLight>,
-}
-
-/// The questions of a bank by the questions about single images: two with the same text and the same choices are one.
-pub(super) struct BankIndex<'a> {
-    by_id: HashMap<&'a QuestionId, usize>,
-    /// A question about an image for each question of the bank.
-    examples: Vec<&'a RunQuestion>,
-}
-
-impl<'a> BankIndex<'a> {
-    fn new(questions: &'a [RunQuestion]) -> Self {
-        let mut numbers = HashMap::<(&str, BTreeSet<&str>), usize>::new();
-        let (mut by_id, mut examples) = (HashMap::new(), Vec::new());
-        for question in questions {
-            let choices = question.choices.iter().map(String::as_str).collect();
-            let number = *numbers.entry((&question.text, choices)).or_insert_with(|| {
-                examples.push(question);
-                examples.len() - 1
-            });
-            by_id.insert(&question.id, number);
-        }
-        Self { by_id, examples }
-    }
-
-    /// The number of the bank's question that a question about an image asks; `None` if the run does not store it.
-    pub(super) fn of(&self, question: &QuestionId) -> Option<usize> {
-        self.by_id.get(question).copied()
-    }
 }
 
 impl<'a> SelfAgreement<'a> {

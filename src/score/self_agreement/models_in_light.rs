@@ -1,6 +1,6 @@
 //! How far two models agree with each other in the light: [`ModelsInLight`].
 
-use super::BankIndex;
+use super::bank_index::BankIndex;
 use super::counts::BankCounts;
 use super::kappa::kappa;
 use super::light::LightAnswers;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::BankIndex;
+use super::bank_index::BankIndex;
 use super::light::{LightAnswers, chosen};
 use crate::score::choice::ReadingMode;
 use crate::types::Family;

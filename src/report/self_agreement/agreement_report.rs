@@ -1,0 +1,37 @@
+//! All that a report without true answers shows: [`AgreementReport`].
+
+use super::tables;
+use crate::report::alert::Alert;
+use crate::report::sentences::{Sentence, self_agreement};
+use crate::report::table::Table;
+use crate::report::tables::{EnhancerRow, enhancers};
+use crate::score::self_agreement::SelfAgreement;
+
+/// All that a report without true answers shows.
+pub(crate) struct AgreementReport<'a> {
+    pub(super) found: &'a SelfAgreement<'a>,
+    /// What a reader must know before any number.
+    pub(super) alerts: Vec<Alert>,
+    /// The findings in words.
+    pub(super) sentences: Vec<Sentence>,
+    /// The tables; the first is the summary.
+    pub(super) tables: Vec<Table>,
+}
+
+impl<'a> AgreementReport<'a> {
+    /// The report of these results; `used` says how each enhancer was used.
+    pub(crate) fn new(
+        found: &'a SelfAgreement<'a>,
+        alerts: Vec<Alert>,
+        used: &[EnhancerRow],
+    ) -> Self {
+        let mut tables = tables::tables(found);
+        tables.extend(enhancers(used));
+        Self {
+            sentences: self_agreement(found),
+            found,
+            alerts,
+            tables,
+        }
+    }
+}
