@@ -40,7 +40,7 @@ pub(super) fn counted(number: usize, noun: &str) -> String {
 
 /// A share in percent, with one decimal.
 pub(super) fn percent(share: f64) -> String {
-    format!("{:.1}", 100.0 * share)
+    format!("{:.1}", 100.0 * share).replace('-', "−")
 }
 
 /// A difference of shares in percentage points, with its sign and one decimal.

@@ -19,7 +19,7 @@ pub(super) fn figures(found: &SelfAgreement<'_>) -> Result<Vec<Figure>> {
     }
     let note = format!(
         "n = {} items in {} {unit}s; bands are 95 % intervals by {unit}; strict reading",
-        found.grid.items.len(),
+        found.items(),
         found.grid.clusters,
         unit = found.unit
     );
@@ -98,7 +98,7 @@ fn panels(
     let panels = panels.into_iter().map(|(title, mut lines)| {
         add(&mut lines);
         Panel {
-            title: format!("{title}, n {}", found.grid.items.len()),
+            title: format!("{title}, n {}", found.items()),
             lines,
         }
     });

@@ -17,6 +17,7 @@ use crate::types::{Axis, AxisLevel};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Measure {
     Agreement,
+    Informative,
     Kappa,
     Evidence,
     Entropy,
@@ -26,8 +27,9 @@ enum Measure {
 }
 
 impl Measure {
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 8] = [
         Self::Agreement,
+        Self::Informative,
         Self::Kappa,
         Self::Evidence,
         Self::Entropy,
@@ -39,6 +41,7 @@ impl Measure {
     fn name(self) -> &'static str {
         match self {
             Self::Agreement => "agreement",
+            Self::Informative => "informative",
             Self::Kappa => "κ",
             Self::Evidence => "evidence kept",
             Self::Entropy => "entropy",
@@ -58,6 +61,7 @@ impl Measure {
         };
         match self {
             Self::Agreement => cell.agreement.into(),
+            Self::Informative => share(cell.informative),
             Self::Kappa => decimals(cell.kappa.map(|kappa| kappa.value)),
             Self::Evidence => match cell.evidence {
                 Some(Ok(kept)) => kept.into(),
@@ -81,7 +85,8 @@ impl Measure {
         }
     }
 
-    /// Whether the row says something of a series: refusals only if there are any, and a way out only if the questions have one.
+    /// Whether the row says something of a series: the informative questions only if there are others, refusals only if there are any,
+    /// and a way out only if the questions have one.
     fn says_something(
         self,
         found: &SelfAgreement<'_>,
@@ -94,6 +99,10 @@ impl Measure {
                 cell.refused > 0 || light.is_some_and(|light| light.refused > 0)
             }),
             Self::CannotTell => cells.any(|cell| cell.cannot_tell.is_some()),
+            Self::Informative => cells.next().is_some_and(|cell| {
+                let (informative, all) = found.informative(&cell.subject.model);
+                informative < all && informative > 0
+            }),
             _ => true,
         }
     }

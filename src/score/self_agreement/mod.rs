@@ -134,6 +134,12 @@ impl<'a> SelfAgreement<'a> {
         strict.map(|light| &*light.model).collect()
     }
 
+    /// Number of items: questions about images, each in one order of its choices, without those that were only asked again.
+    pub(crate) fn items(&self) -> usize {
+        let items = self.grid.items.iter();
+        items.filter(|item| item.record.detail.repeat == 0).count()
+    }
+
     /// What a model answered in the light, in the strict reading.
     pub(crate) fn light_of(&self, model: &str) -> Option<&LightReplies> {
         let mut light = self.light.iter();
