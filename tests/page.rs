@@ -243,6 +243,62 @@ fn narrow(browser: &mut Browser, url: &str) {
 }
 
 #[test]
+fn the_page_without_true_answers_works_in_a_browser() {
+    let Some(mut browser) = browser() else {
+        return;
+    };
+    let bench = Bench::with_questions(1);
+    let line = "--data a.png --ask home --ask-per-image 9 --model random --levels L0,L5 --variant ev --out run";
+    let called = bench.call(&words(line));
+    assert_eq!(called.code, Some(0), "{called:?}");
+    let url = format!("file://{}", bench.path("run/report.html").display());
+    browser.window(1400, 900, "light");
+    browser.go(&url);
+    browser.wait("document.documentElement?.dataset.ready === 'true'");
+    let states = browser
+        .evaluate("[...document.querySelector('#f-state').options].map((o) => o.value).join(', ')");
+    let states = states.as_str().unwrap().to_owned();
+    assert!(
+        states.contains("as in the light, not as in the light") && !states.contains("right"),
+        "{states}"
+    );
+    browser.choose("#f-light", "exposure drop");
+    browser.choose("#f-level", "L5");
+    let mut counts = [0, 0];
+    for (count_of, state) in counts
+        .iter_mut()
+        .zip(["as in the light", "not as in the light"])
+    {
+        browser.choose("#f-state", state);
+        let text = count(&mut browser);
+        *count_of = text
+            .as_str()
+            .unwrap()
+            .split(' ')
+            .next()
+            .unwrap()
+            .parse()
+            .unwrap();
+    }
+    // Nine questions at L5, and random answers some of them as before and some not.
+    assert!(
+        counts[0] > 0 && counts[1] > 0 && counts[0] + counts[1] == 9,
+        "{counts:?}"
+    );
+    let title = browser.evaluate("document.querySelector('#i-choices .true').title");
+    assert_eq!(title, "its answer in the light");
+    let reading = browser.evaluate("document.querySelector('#r-reading').textContent");
+    assert!(
+        reading.as_str().unwrap().ends_with("not as in the light"),
+        "{reading}"
+    );
+    let head = browser.evaluate("document.querySelector('#c-table th').textContent");
+    assert_eq!(head, "at L0 ↓ given →");
+    browser.shot("without-truths.png", true);
+    assert_eq!(browser.complaints(&url), Vec::<String>::new());
+}
+
+#[test]
 fn people_can_answer() {
     let Some(mut browser) = browser() else {
         return;

@@ -241,6 +241,25 @@ fn a_bank_to_which_all_is_no_gives_no_verdict() {
 }
 
 #[test]
+fn a_model_that_cannot_be_read_in_the_light_is_held_against_nothing() {
+    let bench = photographs();
+    bench.file("mute.jsonl", json!({"default": "Well."}).to_string());
+    let shown = bench.complete(&words(&ASKED.replace("eyes.jsonl", "mute.jsonl")));
+    let shown = on_one_line(&shown);
+    assert!(
+        shown.contains("Nothing can be told about script:mute.jsonl"),
+        "{shown}"
+    );
+    assert!(
+        shown.contains(
+            "180 of 180 replies of script:mute.jsonl (100.0 %) could not be read, and do not agree."
+        ),
+        "{shown}"
+    );
+    assert!(!shown.contains("This bank cannot tell"), "{shown}");
+}
+
+#[test]
 fn a_way_out_is_a_measure_of_its_own() {
     let bench = photographs();
     let bank = text(&bench, "bank.jsonl").replace("\"no\"]", "\"no\",\"Cannot tell\"]");

@@ -59,7 +59,7 @@ class Choices(RunTest):
         self.assertEqual(list(table["level"].cat.categories), ["L0", "L3"])
         self.assertEqual(list(table["condition"].cat.categories), ["L0", "L3-ev", "L3-noise"])
         self.assertTrue(table["level"].cat.ordered and (table["level"].max(), table["ev"].max()) == ("L3", 6.0))
-        self.assertEqual(list(table["outcome"].cat.categories), ["right", "wrong", "unparsed", "failed"])
+        self.assertEqual(list(table["outcome"].cat.categories), ["right", "wrong", "answered", "unparsed", "failed"])
         questions = {line["id"]: line for line in read_lines(REFERENCE / "questions.jsonl")}
         for row in table.itertuples():
             question = questions[row.question]
@@ -125,6 +125,13 @@ class Choices(RunTest):
         row = table.loc[again["key"]]
         self.assertEqual((row["outcome"], row["failure_status"], row["failure_kind"]), ("failed", 503, "server"))
         self.assertEqual(table.loc[records[1]["key"]]["outcome"], records[1]["outcome"])
+
+    def test_without_true_answers_no_reply_is_right_or_wrong(self):
+        self.call("--model random --ask home --ask-per-image 2 --levels L0,L2 --data rooms:frames=6,size=96x64 --out run")
+        table = load_run(self.folder / "run")
+        self.assertEqual(set(table["outcome"]), {"answered"})
+        self.assertTrue(table["right"].isna().all() and table["truth"].isna().all() and table["answer"].isna().all())
+        self.assertTrue(table["predicted"].notna().all())
 
     def test_shards(self):
         trials = "--model random --blind-model random --levels L0,L2 --data rooms:frames=6,size=96x64 --out"

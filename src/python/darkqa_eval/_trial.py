@@ -98,7 +98,7 @@ COLUMNS = {
 FROM_QUESTIONS = {CHOICE: {"scene", "text"}, OPEN: {"text", "answer"}}
 # All values of the column `outcome`, so that each is counted, also if no trial has it.
 OUTCOMES = {
-    CHOICE: ["right", "wrong", "unparsed", "failed"],
+    CHOICE: ["right", "wrong", "answered", "unparsed", "failed"],
     OPEN: ["marked", "null", "unmarked", "unjudged", "failed"],
 }
 
@@ -118,11 +118,13 @@ def add_readings(record: Record) -> None:
     observed = record.get("observed") or {}
     for name in ("from", "things", "seen", "detected", "explained_ppm"):
         record[f"observed_{name}"] = observed.get(name)
-    record.update(choices=tuple(choices), choice_count=len(choices), answer=choices[truth])
+    # Nobody knows the true answers to questions that are asked about every image (--ask): no reply is right or wrong.
+    answer = None if truth is None else choices[truth]
+    record.update(choices=tuple(choices), choice_count=len(choices), answer=answer)
     for mode, suffix in (("strict", ""), ("lenient", "_lenient")):
         read = record[mode] or {"chosen": None, "why": None}
         chosen = read["chosen"]
-        record["right" + suffix] = None if record[mode] is None else chosen == truth
+        record["right" + suffix] = None if record[mode] is None or truth is None else chosen == truth
         record["predicted" + suffix] = None if chosen is None else choices[chosen]
         record["why" + suffix] = read["why"]
         record[mode] = chosen

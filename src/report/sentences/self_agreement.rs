@@ -16,6 +16,11 @@ use crate::types::{AxisLevel, EnhancerName, KindReading};
 pub(in crate::report) fn self_agreement(found: &SelfAgreement<'_>) -> Vec<Sentence> {
     let mut sentences = between(found);
     for model in found.models() {
+        let light = found.light_of(model);
+        if light.is_some_and(|light| light.is_unread()) {
+            sentences.push(unread(found, model));
+            continue;
+        }
         if found.cannot_tell(model) {
             sentences.push(cannot_tell(found, model));
             continue;
@@ -32,6 +37,21 @@ pub(in crate::report) fn self_agreement(found: &SelfAgreement<'_>) -> Vec<Senten
         sentences.extend(way_out(found, model));
     }
     sentences
+}
+
+/// The sentence in place of a verdict: no reply in the light could be read.
+fn unread(found: &SelfAgreement<'_>, model: &str) -> Sentence {
+    let text = format!(
+        "Nothing can be told about {model}: no answer could be read in any of its replies at L0, so that there is nothing to hold it against."
+    );
+    let detail = "--constrain choice makes a server allow letters alone; --max-tokens may be too low for a model that thinks first";
+    let numbers = Numbers::of(found.unit);
+    numbers.sentence(
+        "no_answer_in_the_light",
+        Tone::Note,
+        text,
+        detail.to_owned(),
+    )
 }
 
 /// The sentence in place of a verdict: all questions have one answer about nearly all images.

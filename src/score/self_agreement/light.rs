@@ -38,6 +38,11 @@ pub(crate) struct LightReplies {
 }
 
 impl LightReplies {
+    /// Whether no answer could be read in any reply.
+    pub(crate) fn is_unread(&self) -> bool {
+        self.read.is_none_or(|read| read.value <= 0.0)
+    }
+
     /// Number of replies.
     pub(crate) fn replies(&self) -> usize {
         self.read.map_or(0, |read| read.n)
