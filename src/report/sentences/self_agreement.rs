@@ -62,8 +62,16 @@ fn cannot_tell(found: &SelfAgreement<'_>, model: &str) -> Sentence {
     let text = format!(
         "This bank cannot tell what {model} sees: at L0 its answer to each of the {all} questions is the same about 95 % of the images or more."
     );
-    let detail = "such a model agrees with itself whether it sees or not; ask other questions, or about other images";
-    numbers.sentence("bank_cannot_tell", Tone::Note, text, detail.to_owned())
+    let own = found.questions.iter();
+    let images = own.filter(|question| question.model == model);
+    let images = images.map(|question| question.images);
+    let fewest = numbers.count("fewest_images", images.clone().min().unwrap_or_default());
+    let most = numbers.count("most_images", images.max().unwrap_or_default());
+    let detail = format!(
+        "each question has an answer about {fewest} to {most} images; such a model agrees with itself whether it sees or not: ask other questions, \
+         or about more images"
+    );
+    numbers.sentence("bank_cannot_tell", Tone::Note, text, detail)
 }
 
 /// Each pair of models in the light.
