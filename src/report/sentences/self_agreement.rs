@@ -7,6 +7,7 @@ use crate::report::words::light;
 use crate::score::comparison::{Comparison, ComparisonKind};
 use crate::score::self_agreement::SelfAgreement;
 use crate::score::self_agreement::cell::{AgreementCell, CellRole};
+use crate::score::self_agreement::light::LightReplies;
 use crate::score::significance::Significance;
 use crate::score::subject::judged;
 use crate::types::{AxisLevel, EnhancerName, KindReading};
@@ -17,7 +18,7 @@ pub(in crate::report) fn self_agreement(found: &SelfAgreement<'_>) -> Vec<Senten
     let mut sentences = between(found);
     for model in found.models() {
         let light = found.light_of(model);
-        if light.is_some_and(|light| light.is_unread()) {
+        if light.is_some_and(LightReplies::is_unread) {
             sentences.push(unread(found, model));
             continue;
         }
