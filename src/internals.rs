@@ -12,7 +12,7 @@ pub mod dataset {
     pub use crate::dataset::image_file::ImageFile;
     pub use crate::dataset::picture::Picture;
     pub use crate::dataset::reading_rule::{ColourRule, MOST_PIXELS, ReadingRule, Transfer};
-    pub use crate::dataset::{DataPlace, Dataset};
+    pub use crate::dataset::{DataPlace, Dataset, SetArgs};
 }
 
 pub mod job {

@@ -11,7 +11,7 @@ use crate::job::report::ReportArgs;
 use crate::run::batch::{BatchFolderArgs, BatchImportArgs, BatchStatusArgs};
 use crate::run::calibrate::CalibrateArgs;
 use crate::run::enhance::EnhanceArgs;
-use crate::run::evaluate::EvaluateArgs;
+use crate::run::evaluate::{CheckArgs, EvaluateArgs};
 use crate::run::export::ExportArgs;
 use crate::run::import::ImportArgs;
 use crate::run::models::ModelsArgs;
@@ -84,6 +84,8 @@ pub(crate) enum Command {
     Calibrate(Box<CalibrateArgs>),
     /// Make multiple-choice questions about frames, by rule, from their depth, class and segment maps
     Questions(Box<QuestionsArgs>),
+    /// Check data, images, models and enhancers before anything is asked or paid; takes the flags of the evaluation
+    Check(Box<CheckCommand>),
     /// Import frames of another data set as a folder of frames
     Import(Box<ImportArgs>),
     /// Write ready-made sets for other tools, one for each condition, with its images
@@ -146,6 +148,17 @@ pub(crate) enum BatchCommand {
     Export(Box<BatchExportArgs>),
     /// Import the replies of a Batch API into a run
     Import(BatchImportArgs),
+}
+
+/// The flags of `check`.
+#[derive(Debug, Args)]
+pub(crate) struct CheckCommand {
+    /// Flags of the check.
+    #[command(flatten)]
+    pub check: CheckArgs,
+    /// Flags of the evaluation.
+    #[command(flatten)]
+    pub evaluate: EvaluateArgs,
 }
 
 /// The flags of `batch run`.

@@ -1,27 +1,25 @@
 //! Data sets: images, their maps, and the questions that came with them.
 //!
 //! The entry point is [`Dataset::open`]. The path decides the reader: a folder of frames ([`frames`]) or a
-//! ready-made multiple-choice set ([`multiple_choice`]). Without a path the data are the built-in rooms ([`rooms`]).
+//! ready-made multiple-choice set ([`ready_made`]). Without a path the data are the built-in rooms ([`rooms`]).
 
 mod colour;
-mod dialect;
 pub(crate) mod frame_folder;
 pub(crate) mod frames;
+pub(crate) mod guarded;
 pub(crate) mod image_file;
 pub(crate) mod image_names;
 pub(crate) mod inputs;
 pub(crate) mod maps;
-pub(crate) mod multiple_choice;
 pub(crate) mod npy;
 pub(crate) mod openeqa;
 pub(crate) mod pairs;
 pub(crate) mod picture;
-pub(crate) mod questions;
 pub(crate) mod raw_png;
 pub(crate) mod reading_rule;
+mod ready_made;
+mod root;
 mod settings;
-mod sibling_files;
-mod table;
 mod view;
 
 use std::collections::{BTreeMap, HashSet};
@@ -36,6 +34,9 @@ pub(crate) use image_file::ImageFile;
 use maps::MapPaths;
 pub(crate) use picture::Picture;
 pub(crate) use reading_rule::ReadingRule;
+use ready_made::EmbeddedImage;
+pub use ready_made::SetArgs;
+pub(crate) use root::Root;
 pub(crate) use settings::{CodesArgs, DataArgs, PixelLimit, SelectionArgs, place};
 use view::FrameFacts;
 pub(crate) use view::FrameFiles;
@@ -47,6 +48,24 @@ pub enum DataPlace {
     Rooms(Rooms),
     /// A folder or file of the user.
     Path(PathBuf),
+    /// A well-known set, read by its rules.
+    Known {
+        /// The name of the set.
+        name: String,
+        /// Its file or folder.
+        path: PathBuf,
+    },
+}
+
+impl DataPlace {
+    /// The folder or file; `None` for the built-in rooms.
+    #[must_use]
+    pub fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Rooms(_) => None,
+            Self::Path(path) | Self::Known { path, .. } => Some(path),
+        }
+    }
 }
 
 /// The place of one image and of its maps.
@@ -58,8 +77,8 @@ pub(crate) enum ImageSource {
         maps: MapPaths,
         view: FrameFacts,
     },
-    /// A base64 cell of a table, by the position of its row in the file.
-    Cell(table::ImageCell),
+    /// An image inside a file of rows.
+    Embedded(EmbeddedImage),
     /// A frame of the built-in rooms.
     Room(rooms::Room),
 }
@@ -85,6 +104,8 @@ pub struct Dataset {
     questions: Vec<Question>,
     labels: Option<Labels>,
     rule: ReadingRule,
+    /// What was taken for what in a ready-made set, one fact a line; empty for other data.
+    reading: Vec<String>,
 }
 
 impl Dataset {
@@ -100,6 +121,7 @@ impl Dataset {
             questions,
             labels: None,
             rule: ReadingRule::default(),
+            reading: Vec::new(),
         }
     }
 
@@ -110,7 +132,9 @@ impl Dataset {
     pub fn open_without_questions(place: &DataPlace) -> Result<Self> {
         match place {
             DataPlace::Rooms(rooms) => Ok(Self::of_rooms(*rooms)),
-            DataPlace::Path(folder) => Self::of_frames(folder),
+            DataPlace::Path(folder) | DataPlace::Known { path: folder, .. } => {
+                Self::of_frames(folder, &[])
+            }
         }
     }
 
@@ -134,10 +158,8 @@ impl Dataset {
     }
 
     /// The same data set with the questions of a file. Each must be about one of its frames.
-    fn with_questions_of(self, questions: Vec<Question>, file: &Path) -> Result<Self> {
-        if questions.is_empty() {
-            return Err(Error::data(file.display(), "no questions in it"));
-        }
+    fn with_questions_of(self, file: &Path, set: &SetArgs) -> Result<Self> {
+        let (questions, reading) = ready_made::about_frames(file, set)?;
         let unmatched = questions
             .iter()
             .find(|question| !self.sources.contains_key(&question.frame));
@@ -149,13 +171,17 @@ impl Dataset {
             );
             return Err(Error::data(file.display(), problem));
         }
-        Ok(self.with_questions(questions))
+        Ok(Self {
+            questions,
+            reading,
+            ..self
+        })
     }
 
     /// The images of an image file or a folder of frames, without questions. No image is read.
     pub fn of_images(path: &Path) -> Result<Self> {
         let sources = if path.is_dir() {
-            frames::sources(path)?
+            frames::sources(path, &[])?
         } else {
             frames::image(path)?
         };
@@ -163,14 +189,14 @@ impl Dataset {
     }
 
     /// The frames of a folder and the labels of its maps, without questions. No image is read.
-    pub fn of_frames(folder: &Path) -> Result<Self> {
+    pub fn of_frames(folder: &Path, further: &[PathBuf]) -> Result<Self> {
         if !folder.is_dir() {
             return Err(Error::usage(
                 "DATA",
                 format_args!("{}: no such folder of frames", folder.display()),
             ));
         }
-        frames::frames(folder)
+        frames::frames(folder, further)
     }
 
     /// The labels of the semantic maps at a place, whether or not it has questions.
@@ -181,7 +207,7 @@ impl Dataset {
         match place {
             DataPlace::Rooms(_) => Ok(Some(rooms::labels())),
             DataPlace::Path(path) if path.is_dir() => frames::labels(path),
-            DataPlace::Path(_) => Ok(None),
+            DataPlace::Path(_) | DataPlace::Known { .. } => Ok(None),
         }
     }
 
@@ -208,7 +234,7 @@ impl Dataset {
         match self.sources.get(id) {
             Some(ImageSource::File { view, .. }) => view.scene.clone(),
             Some(ImageSource::Room(room)) => room.scene(),
-            Some(ImageSource::Cell(_)) | None => String::new(),
+            Some(ImageSource::Embedded(_)) | None => String::new(),
         }
     }
 
@@ -217,26 +243,32 @@ impl Dataset {
     /// No image is read. Every question is checked: its choices, its answer among them, its frame among the images. The
     /// built-in rooms, and a folder of frames with maps but no questions, have none yet. The caller makes those by rule
     /// from [`Self::labels`] and adds them by [`Self::with_questions`].
-    pub fn open(place: &DataPlace, questions: Option<&Path>) -> Result<Self> {
+    pub fn open(place: &DataPlace, questions: Option<&Path>, set: &SetArgs) -> Result<Self> {
         let dataset = match place {
             DataPlace::Rooms(rooms) => {
                 let rooms = Self::of_rooms(*rooms);
                 match questions {
-                    Some(file) => rooms.with_questions_of(questions::read(file)?, file)?,
+                    Some(file) => rooms.with_questions_of(file, set)?,
                     None => rooms,
                 }
             }
-            DataPlace::Path(path) if multiple_choice::is_image_folder(path) => {
-                refuse(
-                    questions,
-                    "a folder with metadata.jsonl brings its own questions",
-                )?;
-                multiple_choice::open_image_folder(path)?
+            DataPlace::Path(path) if frames::is_folder_of_frames(path, questions) => {
+                frames::open(path, questions, set)?
             }
-            DataPlace::Path(path) if path.is_dir() => frames::open(path, questions)?,
             DataPlace::Path(path) => {
                 refuse(questions, "a ready-made set brings its own questions")?;
-                multiple_choice::open(path)?
+                ready_made::open(path, set)?
+            }
+            DataPlace::Known { name, path } => {
+                refuse(questions, "a ready-made set brings its own questions")?;
+                let preset = Some(name.clone());
+                ready_made::open(
+                    path,
+                    &SetArgs {
+                        preset,
+                        ..set.clone()
+                    },
+                )?
             }
         };
         if dataset.questions.is_empty() && dataset.labels.is_none() {
@@ -268,6 +300,12 @@ impl Dataset {
         &self.title
     }
 
+    /// What was taken for what in a ready-made set, one fact a line; empty for other data.
+    #[must_use]
+    pub fn reading(&self) -> &[String] {
+        &self.reading
+    }
+
     /// The questions, in the order of their file.
     #[must_use]
     pub fn questions(&self) -> &[Question] {
@@ -284,7 +322,7 @@ impl Dataset {
                 let file = ImageFile::open(rgb, self.rule)?;
                 file.beside(maps).map(Picture::Encoded)
             }
-            Some(ImageSource::Cell(cell)) => cell.image(self.rule).map(Picture::Encoded),
+            Some(ImageSource::Embedded(image)) => image.image(self.rule).map(Picture::Encoded),
             Some(ImageSource::Room(room)) => Ok(Picture::Drawn(room.clone(), self.rule)),
             None => Err(Error::data(
                 &self.name,
@@ -299,7 +337,7 @@ impl Dataset {
         match self.sources.get(frame)? {
             ImageSource::File { view, .. } => view.intrinsics.map(|camera| camera.fx),
             ImageSource::Room(room) => Some(room.focal()),
-            ImageSource::Cell(_) => None,
+            ImageSource::Embedded(_) => None,
         }
     }
 
@@ -308,7 +346,7 @@ impl Dataset {
     pub fn image_file(&self, frame: &FrameId) -> Option<&Path> {
         match self.sources.get(frame)? {
             ImageSource::File { rgb, .. } => Some(rgb),
-            ImageSource::Cell(_) | ImageSource::Room(_) => None,
+            ImageSource::Embedded(_) | ImageSource::Room(_) => None,
         }
     }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::progress::Progress;
 use super::questions_by_rule::by_rule;
-use crate::dataset::{DataPlace, Dataset, ReadingRule, SelectionArgs};
+use crate::dataset::{DataPlace, Dataset, ReadingRule, SelectionArgs, SetArgs};
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::questions::rules::Rules;
@@ -25,12 +25,13 @@ pub(crate) fn rules(path: Option<&Path>) -> Result<Rules> {
 /// The opened data. If they have no questions, these are made by rule.
 pub(crate) fn open_data(
     place: &DataPlace,
+    set: &SetArgs,
     selection: &SelectionArgs,
     rules: &Rules,
     rule: ReadingRule,
     progress: &Progress,
 ) -> Result<Dataset> {
-    let dataset = Dataset::open(place, selection.questions.as_deref())?.with_rule(rule);
+    let dataset = Dataset::open(place, selection.questions.as_deref(), set)?.with_rule(rule);
     if !dataset.questions().is_empty() {
         return Ok(dataset);
     }

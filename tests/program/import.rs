@@ -89,7 +89,7 @@ impl Scene {
     /// Imports, and reads what came of it.
     fn import(&self, kind: &str, flags: &[&str]) -> Dataset {
         self.run(kind, flags).success();
-        Dataset::of_frames(&self.out()).unwrap()
+        Dataset::of_frames(&self.out(), &[]).unwrap()
     }
 
     /// Imports in vain, and returns what is said.
@@ -161,7 +161,7 @@ fn habitat_renders_of_hm3d() {
         message.contains("2 frames of 1 scenes") && message.contains("\"bed, made\" 1"),
         "{message}"
     );
-    let set = Dataset::of_frames(&scene.out()).unwrap();
+    let set = Dataset::of_frames(&scene.out(), &[]).unwrap();
     let names: Vec<&str> = set.frames().map(|id| id.0.as_str()).collect();
     assert_eq!(names, ["00800-x/000", "00800-x/003"]);
     let frame = frame(&set, "00800-x/003");
@@ -248,7 +248,10 @@ fn what_is_wrong_with_renders_is_said() {
         "{message}"
     );
     assert_eq!(
-        Dataset::of_frames(&scene.out()).unwrap().frames().count(),
+        Dataset::of_frames(&scene.out(), &[])
+            .unwrap()
+            .frames()
+            .count(),
         4
     );
     assert!(
@@ -258,7 +261,10 @@ fn what_is_wrong_with_renders_is_said() {
     );
     scene.run("habitat", &["--force", "--count", "2"]).success();
     assert_eq!(
-        Dataset::of_frames(&scene.out()).unwrap().frames().count(),
+        Dataset::of_frames(&scene.out(), &[])
+            .unwrap()
+            .frames()
+            .count(),
         2
     );
 }
@@ -472,7 +478,7 @@ fn folders_of_images_and_maps() {
         .arg("--out")
         .arg(&again);
     command.assert().success();
-    let twice = frame(&Dataset::of_frames(&again).unwrap(), "home/a");
+    let twice = frame(&Dataset::of_frames(&again, &[]).unwrap(), "home/a");
     assert_eq!(
         (twice.depth, twice.semantic, twice.segments),
         (found.depth, found.semantic, found.segments)

@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::plan::{ChoiceItem, trials};
 use super::settings::ImagePlace;
@@ -96,6 +96,13 @@ impl Experiment for ChoiceSetup<'_> {
             .map(|(field, value)| (field.to_owned(), value))
             .chain(identity::images(&self.recipe))
             .collect()
+    }
+
+    fn notes(&self) -> Vec<(&'static str, Value)> {
+        match self.dataset.reading() {
+            [] => Vec::new(),
+            lines => vec![("reading of the data", json!(lines))],
+        }
     }
 
     fn columns(&self) -> Columns {

@@ -1,13 +1,13 @@
 //! The flags of an evaluation ([`EvaluateArgs`]) and its validated settings ([`Evaluation`]).
 
 use std::num::NonZeroU32;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
 use super::choice_order::ChoiceOrder;
 use crate::ask::{Constrain, Prompts};
-use crate::dataset::{CodesArgs, DataArgs, DataPlace, PixelLimit, ReadingRule, SelectionArgs};
+use crate::dataset::{CodesArgs, DataArgs, PixelLimit, ReadingRule, SelectionArgs};
 use crate::error::Result;
 use crate::job::questions::rules;
 use crate::job::settings::{ExperimentSettings, JobArgs, JobSettings};
@@ -111,10 +111,7 @@ impl EvaluateArgs {
             return Err(self.job.no_model_error());
         }
         let prompts = self.choice.prompts.as_deref();
-        let data = match &self.data.data {
-            DataPlace::Path(path) => Some(path.clone()),
-            DataPlace::Rooms(_) => None,
-        };
+        let experiment = self.experiment();
         Ok(Evaluation {
             rules: rules(self.selection.rules.as_deref())?,
             observer_controls: self.choice.observer_controls,
@@ -128,13 +125,18 @@ impl EvaluateArgs {
             rule: self.codes.rule(self.limit),
             order: self.order,
             prompts: prompts.map_or_else(Prompts::built_in, Prompts::load)?,
-            job: self.job.resolve(&ExperimentSettings {
-                constrain: self.choice.constrain,
-                probabilities: self.choice.probabilities,
-                max_side: self.shrink.max_side,
-                sampling_seed: None,
-                data,
-            })?,
+            job: self.job.resolve(&experiment)?,
         })
+    }
+
+    /// The settings that not every experiment has.
+    pub(super) fn experiment(&self) -> ExperimentSettings {
+        ExperimentSettings {
+            constrain: self.choice.constrain,
+            probabilities: self.choice.probabilities,
+            max_side: self.shrink.max_side,
+            sampling_seed: None,
+            data: self.data.data.path().map(Path::to_owned),
+        }
     }
 }

@@ -57,6 +57,7 @@ impl<'a> ChoiceSetup<'a> {
         let place = &config.data.data;
         let dataset = open_data(
             place,
+            &config.data.set,
             &config.selection,
             &config.rules,
             config.rule,
@@ -102,6 +103,13 @@ impl<'a> ChoiceSetup<'a> {
         setup.recipe.check(&setup.sources, &setup.conditions)?;
         controls.print(progress);
         Ok((setup, files))
+    }
+
+    /// Says what was taken for what in a ready-made set.
+    pub(super) fn say_reading(&self, progress: &Progress) {
+        for line in self.dataset.reading() {
+            progress.note(line);
+        }
     }
 
     /// Adds the questions that are asked with the image of another frame, if that image is of this run or shard.

@@ -142,7 +142,7 @@ fn read<T>(path: Option<&Path>, parse: fn(&str) -> Result<T>) -> Result<Option<T
 /// If there are no frames or no classes, or a file cannot be written.
 pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Outcome> {
     let making = &QuestionMaking::read(args)?;
-    let dataset = Dataset::of_frames(&args.data)?;
+    let dataset = Dataset::of_frames(&args.data, &[])?;
     let dataset = dataset.with_rule(args.codes.rule(args.limit));
     let labels = dataset.labels().ok_or_else(|| {
         let problem = "no classes.json in this folder, which gives the class of each number in its maps; `darkqa-eval import` writes one";

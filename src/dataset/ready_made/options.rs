@@ -1,0 +1,100 @@
+//! The options of a row: [`Options`].
+
+use super::cell::Cell;
+use super::lettered::{in_cell, without_letters};
+use super::python_list::python_list;
+use super::roles::{Column, Roles};
+use super::row::Row;
+
+/// What the columns of a row offer as options.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Options {
+    /// No column has any.
+    None,
+    Found(Vec<String>),
+    /// Two columns differ.
+    Differ([String; 2]),
+    /// A cell that is no list of options.
+    Unread {
+        column: String,
+        cell: String,
+    },
+}
+
+impl Options {
+    /// The options of a row in its columns.
+    pub(super) fn of(row: &Row, roles: &Roles) -> Self {
+        let mut found: Vec<(String, Vec<String>)> = Vec::new();
+        let cells: Vec<String> = roles
+            .cells
+            .iter()
+            .filter_map(|cell| cell.text(row))
+            .collect();
+        if let Some(first) = roles.cells.first()
+            && !cells.is_empty()
+        {
+            found.push((cell_names(first, &roles.cells), without_letters(cells)));
+        }
+        for column in &roles.options {
+            let cell = column.of(row);
+            if cell.is_absent() {
+                continue;
+            }
+            match options(cell, roles.split_options.as_deref()) {
+                Some(options) => found.push((column.name.clone(), without_letters(options))),
+                None => {
+                    return Self::Unread {
+                        column: column.name.clone(),
+                        cell: cell.shown(60),
+                    };
+                }
+            }
+        }
+        let mut found = found.into_iter();
+        let Some((name, options)) = found.next() else {
+            return Self::None;
+        };
+        match found.find(|(_, other)| *other != options) {
+            Some((other, _)) => Self::Differ([name, other]),
+            None => Self::Found(options),
+        }
+    }
+}
+
+/// The names of the columns of options as `--map` takes them.
+fn cell_names(first: &Column, cells: &[Column]) -> String {
+    let names: Vec<&str> = cells.iter().map(|cell| cell.name.as_str()).collect();
+    if names.is_empty() {
+        return first.name.clone();
+    }
+    names.join(",")
+}
+
+/// The options in a cell.
+fn options(cell: &Cell, split: Option<&str>) -> Option<Vec<String>> {
+    match (cell, split) {
+        (Cell::List(cells), _) => cells.iter().map(Cell::text).collect(),
+        (Cell::Text(text), Some(signs)) => {
+            let parts = text.split(signs).map(|part| part.trim().to_owned());
+            Some(parts.collect())
+        }
+        (Cell::Text(text), None) => list(text).or_else(|| in_cell(text)),
+        _ => None,
+    }
+}
+
+/// The texts of a list in a text: JSON, then Python's notation.
+pub(super) fn list(text: &str) -> Option<Vec<String>> {
+    let text = text.trim();
+    if !text.starts_with('[') {
+        return None;
+    }
+    let json = serde_json::from_str::<Vec<serde_json::Value>>(text).ok();
+    let json = json.and_then(|items| {
+        items
+            .into_iter()
+            .map(|item| Cell::from(item).text())
+            .collect()
+    });
+    json.or_else(|| python_list(text))
+}
