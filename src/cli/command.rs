@@ -14,6 +14,7 @@ use crate::run::enhance::EnhanceArgs;
 use crate::run::evaluate::{CheckArgs, EvaluateArgs};
 use crate::run::export::ExportArgs;
 use crate::run::import::ImportArgs;
+use crate::run::init::InitArgs;
 use crate::run::models::ModelsArgs;
 use crate::run::openeqa::OpenEqaArgs;
 use crate::run::questions::QuestionsArgs;
@@ -84,6 +85,8 @@ pub(crate) enum Command {
     Calibrate(Box<CalibrateArgs>),
     /// Make multiple-choice questions about frames, by rule, from their depth, class and segment maps
     Questions(Box<QuestionsArgs>),
+    /// Make a folder of data that a run takes as it is, to put your own images and questions in
+    Init(InitArgs),
     /// Check data, images, models and enhancers before anything is asked or paid; takes the flags of the evaluation
     Check(Box<CheckCommand>),
     /// Import frames of another data set as a folder of frames

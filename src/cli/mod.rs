@@ -122,6 +122,7 @@ fn carry_out(cli: Cli, progress: &Progress) -> Result<Outcome> {
         Command::Realism(args) => run::realism::realism(&args, progress),
         Command::Calibrate(args) => run::calibrate::calibrate(&args, progress),
         Command::Questions(args) => run::questions::questions(&args, progress),
+        Command::Init(args) => run::init::init(&args, progress),
         Command::Check(args) => check(args.evaluate, &args.check, progress),
         Command::Import(args) => run::import::import(&args, progress),
         Command::Export(args) => run::export::export(&args, progress),

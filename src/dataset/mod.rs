@@ -24,7 +24,7 @@ mod view;
 
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
 use crate::error::{Error, Result};
 use crate::rooms::{self, Rooms};
@@ -34,8 +34,8 @@ pub(crate) use image_file::ImageFile;
 use maps::MapPaths;
 pub(crate) use picture::Picture;
 pub(crate) use reading_rule::ReadingRule;
-use ready_made::EmbeddedImage;
 pub use ready_made::SetArgs;
+use ready_made::{Archive, EmbeddedImage};
 pub(crate) use root::Root;
 pub(crate) use settings::{CodesArgs, DataArgs, PixelLimit, SelectionArgs, place};
 use view::FrameFacts;
@@ -77,6 +77,8 @@ pub(crate) enum ImageSource {
         maps: MapPaths,
         view: FrameFacts,
     },
+    /// An image of this name in a ZIP file.
+    Member(Arc<Archive>),
     /// An image inside a file of rows.
     Embedded(EmbeddedImage),
     /// A frame of the built-in rooms.
@@ -234,7 +236,7 @@ impl Dataset {
         match self.sources.get(id) {
             Some(ImageSource::File { view, .. }) => view.scene.clone(),
             Some(ImageSource::Room(room)) => room.scene(),
-            Some(ImageSource::Embedded(_)) | None => String::new(),
+            Some(ImageSource::Embedded(_) | ImageSource::Member(_)) | None => String::new(),
         }
     }
 
@@ -323,6 +325,11 @@ impl Dataset {
                 file.beside(maps).map(Picture::Encoded)
             }
             Some(ImageSource::Embedded(image)) => image.image(self.rule).map(Picture::Encoded),
+            Some(ImageSource::Member(archive)) => {
+                let place = format!("{}, {}", archive.path().display(), frame.0);
+                let file = ImageFile::new(archive.image(&frame.0)?, place, self.rule);
+                Ok(Picture::Encoded(file))
+            }
             Some(ImageSource::Room(room)) => Ok(Picture::Drawn(room.clone(), self.rule)),
             None => Err(Error::data(
                 &self.name,
@@ -337,7 +344,7 @@ impl Dataset {
         match self.sources.get(frame)? {
             ImageSource::File { view, .. } => view.intrinsics.map(|camera| camera.fx),
             ImageSource::Room(room) => Some(room.focal()),
-            ImageSource::Embedded(_) => None,
+            ImageSource::Embedded(_) | ImageSource::Member(_) => None,
         }
     }
 
@@ -346,7 +353,7 @@ impl Dataset {
     pub fn image_file(&self, frame: &FrameId) -> Option<&Path> {
         match self.sources.get(frame)? {
             ImageSource::File { rgb, .. } => Some(rgb),
-            ImageSource::Embedded(_) | ImageSource::Room(_) => None,
+            ImageSource::Embedded(_) | ImageSource::Member(_) | ImageSource::Room(_) => None,
         }
     }
 

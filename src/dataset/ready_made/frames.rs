@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::cell::FileFacts;
+use super::container::Archive;
 use super::images::{EmbeddedImage, RowImage, Step, images};
 use super::roles::{Column, Roles};
 use super::row::Table;
@@ -50,6 +51,8 @@ enum Found {
     },
     /// In a file: the name of its frame and its path.
     File(FrameId, PathBuf),
+    /// In a file of the archive.
+    Member(FrameId),
     /// A frame of other data.
     Frame(FrameId),
 }
@@ -58,6 +61,8 @@ enum Found {
 pub(super) struct Frames<'a> {
     table: &'a Table,
     root: &'a Root,
+    /// The ZIP file that holds the set.
+    archive: Option<&'a Arc<Archive>>,
     /// The row of each id whose own cell holds an image.
     holders: HashMap<String, usize>,
     roles: &'a Roles,
@@ -67,10 +72,16 @@ pub(super) struct Frames<'a> {
 }
 
 impl<'a> Frames<'a> {
-    pub(super) fn new(table: &'a Table, root: &'a Root, roles: &'a Roles) -> Self {
+    pub(super) fn new(
+        table: &'a Table,
+        root: &'a Root,
+        archive: Option<&'a Arc<Archive>>,
+        roles: &'a Roles,
+    ) -> Self {
         let mut frames = Self {
             table,
             root,
+            archive,
             holders: HashMap::new(),
             roles,
             names: HashMap::new(),
@@ -170,7 +181,11 @@ impl<'a> Frames<'a> {
 
     /// The file that a row names: below the folder of its table, or below that of the set.
     fn file(&self, row: usize, path: &str) -> Result<Found, String> {
-        let table = &self.table.files[self.table.rows[row].file].path;
+        let file = &self.table.files[self.table.rows[row].file];
+        if let (Some(archive), Some(inner)) = (self.archive, &file.inner) {
+            return archive.find(inner, path).map(Found::Member);
+        }
+        let table = &file.path;
         let base = table.parent().unwrap_or(Path::new(""));
         let found = self.root.image(base, path);
         let found = match found {
@@ -187,6 +202,15 @@ impl<'a> Frames<'a> {
     pub(super) fn frame(&mut self, answered: &Answered) -> Result<FrameId> {
         match self.find(answered)? {
             Found::Frame(name) => Ok(name),
+            Found::Member(name) => {
+                if let Some(archive) = self.archive {
+                    let archive = Arc::clone(archive);
+                    self.sources
+                        .entry(name.clone())
+                        .or_insert(ImageSource::Member(archive));
+                }
+                Ok(name)
+            }
             Found::File(name, path) => {
                 self.sources
                     .entry(name.clone())
@@ -265,6 +289,15 @@ impl<'a> Frames<'a> {
             let image = match self.find(answered)? {
                 Found::Cell { facts, .. } => facts.digest,
                 Found::Frame(name) => Digest::of(name.0.as_bytes()),
+                Found::Member(name) => match (files.get(&name), self.archive) {
+                    (Some(digest), _) => *digest,
+                    (None, Some(archive)) => {
+                        let digest = Digest::of(&archive.image(&name.0)?);
+                        files.insert(name, digest);
+                        digest
+                    }
+                    (None, None) => Digest::of(name.0.as_bytes()),
+                },
                 Found::File(name, path) => match files.get(&name) {
                     Some(digest) => *digest,
                     None => {

@@ -37,7 +37,7 @@ use super::{Dataset, ImageSource, stem};
 use crate::error::{Error, Result};
 use crate::types::{Family, FrameId, Question};
 
-pub(super) use container::holds_files;
+pub(super) use container::{Archive, holds_files};
 pub(super) use images::EmbeddedImage;
 pub(super) use preset::{is_known as is_known_set, names as known_sets};
 pub use settings::SetArgs;
@@ -70,10 +70,11 @@ pub(super) fn open(place: &Path, args: &SetArgs) -> Result<Dataset> {
         files,
         folder,
         blobs,
+        archive,
         notes,
     } = found;
-    let own = own_map(&folder)?;
-    let map = Map::joined(own.iter().chain(&args.map));
+    let info = FolderInfo::of(&folder)?;
+    let map = Map::joined(info.map.iter().chain(&args.map));
     let mut further = args.data_root.clone();
     further.extend(blobs);
     let root = Root::of(&folder, &further)?;
@@ -88,8 +89,11 @@ pub(super) fn open(place: &Path, args: &SetArgs) -> Result<Dataset> {
     };
     let set = read(&table, &map, args, preset, ImagesAre::Files)
         .map_err(|problem| wrong(&table, problem))?;
-    let name = stem(place);
-    let mut frames = Frames::new(&table, &root, &set.roles);
+    let name = match &*info.name {
+        "" => stem(place),
+        name => name.to_owned(),
+    };
+    let mut frames = Frames::new(&table, &root, archive.as_ref(), &set.roles);
     let ids = frames.ids(&set.answered)?;
     let (questions, sources) = questions(&table, &set, &ids, &mut frames)?;
     let mut notes = notes;
@@ -111,6 +115,7 @@ pub(super) fn open(place: &Path, args: &SetArgs) -> Result<Dataset> {
     let lines = summary.lines();
     Ok(Dataset {
         reading: lines,
+        title: info.name.clone(),
         ..Dataset::new(name, sources, questions)
     })
 }
@@ -128,7 +133,7 @@ pub(super) fn about_frames(file: &Path, args: &SetArgs) -> Result<(Vec<Question>
     let set = read(&table, &map, args, None, ImagesAre::Frames)
         .map_err(|problem| Error::data(file.display(), problem))?;
     let root = Root::of(file.parent().unwrap_or(Path::new("")), &[])?;
-    let mut frames = Frames::new(&table, &root, &set.roles);
+    let mut frames = Frames::new(&table, &root, None, &set.roles);
     let ids = frames.ids(&set.answered)?;
     let (questions, sources) = questions(&table, &set, &ids, &mut frames)?;
     if is_own(&table) {
@@ -284,19 +289,28 @@ fn questions(
     Ok((questions, frames.take_sources()))
 }
 
-/// The map in the `dataset.json` of a folder.
-fn own_map(folder: &Path) -> Result<Option<Map>> {
-    let path = folder.join("dataset.json");
-    if !path.is_file() {
-        return Ok(None);
+/// What the `dataset.json` of a folder says of a set.
+#[derive(Debug, Default)]
+struct FolderInfo {
+    name: String,
+    map: Option<Map>,
+}
+
+impl FolderInfo {
+    fn of(folder: &Path) -> Result<Self> {
+        let path = folder.join("dataset.json");
+        if !path.is_file() {
+            return Ok(Self::default());
+        }
+        let info: serde_json::Value = crate::files::reading::json(&path)?;
+        let text = |key: &str| info.get(key).and_then(serde_json::Value::as_str);
+        let map = text("map").map(str::parse).transpose();
+        let wrong = |problem: String| Error::data(path.display(), format_args!("map: {problem}"));
+        Ok(Self {
+            name: text("name").unwrap_or_default().to_owned(),
+            map: map.map_err(wrong)?,
+        })
     }
-    let info: serde_json::Value = crate::files::reading::json(&path)?;
-    let map = info
-        .get("map")
-        .and_then(serde_json::Value::as_str)
-        .map(str::parse);
-    map.transpose()
-        .map_err(|problem: String| Error::data(path.display(), format_args!("map: {problem}")))
 }
 
 #[cfg(test)]

@@ -1,34 +1,48 @@
 //! The files of a ready-made set: [`SetFile`].
 
+mod archive;
 mod card;
-mod folder;
+mod choose;
+mod find;
 mod json;
 mod json_scan;
 mod parquet;
+mod shards;
 mod splits;
 mod table;
+mod tree;
 
 use std::fs::File;
-use std::io::Read as _;
+use std::io::{BufReader, Read as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::cell::Cell;
 use super::images::Step;
 use super::row::{RowPlace, Table};
+use flate2::read::MultiGzDecoder;
+use tempfile::NamedTempFile;
+
 use crate::error::{Error, Result};
 
-pub(in crate::dataset) use folder::holds_files;
-pub(super) use folder::{FoundFiles, find};
+pub(in crate::dataset) use archive::Archive;
+pub(in crate::dataset) use find::holds_files;
+pub(super) use find::{FoundFiles, find};
 
 /// The endings of the files that are read.
-pub(super) const READ: &str = ".parquet, .tsv, .csv, .jsonl, .ndjson or .json";
+pub(super) const READ: &str =
+    ".parquet, .tsv, .csv, .jsonl, .ndjson or .json (the texts also as .gz), or a .zip of these";
 
 /// One file of rows.
 #[derive(Debug)]
 pub(in crate::dataset) struct SetFile {
+    /// The path of the file, for messages; of a file in an archive, behind that of the archive.
     pub(super) path: PathBuf,
     kind: FileKind,
+    /// The unpacked copy of a compressed file, gone when the file is closed.
+    unpacked: Option<NamedTempFile>,
+    /// The folder inside the archive that holds the file; `None` outside archives.
+    pub(super) inner: Option<PathBuf>,
     /// The configuration of the repository that it belongs to; empty if there is none.
     pub(super) config: String,
 }
@@ -46,9 +60,35 @@ impl SetFile {
     /// The file at a path, whose ending tells its kind.
     pub(super) fn open(path: PathBuf, config: String) -> Result<Self> {
         check_content(&path)?;
-        let kind = match &*ending(&path) {
+        let unpacked = if ending(&path) == "gz" {
+            Some(unpacked(&path)?)
+        } else {
+            None
+        };
+        Self::of(path, unpacked, config)
+    }
+
+    /// A file of an archive.
+    pub(super) fn of_member(archive: &Archive, name: &Path, config: String) -> Result<Self> {
+        let unpacked = archive.unpacked(&name.to_string_lossy())?;
+        let file = Self::of(archive.path.join(name), Some(unpacked), config)?;
+        Ok(Self {
+            inner: Some(name.parent().unwrap_or(Path::new("")).to_owned()),
+            ..file
+        })
+    }
+
+    fn of(path: PathBuf, unpacked: Option<NamedTempFile>, config: String) -> Result<Self> {
+        let bare = match &*ending(&path) {
+            "gz" => path.with_extension(""),
+            _ => path.clone(),
+        };
+        let read = unpacked
+            .as_ref()
+            .map_or(path.as_path(), NamedTempFile::path);
+        let kind = match &*ending(&bare) {
             name @ ("tsv" | "csv") => FileKind::Table {
-                delimiter: table::delimiter(&path, name)?,
+                delimiter: table::delimiter(read, name)?,
             },
             "jsonl" | "ndjson" => FileKind::JsonLines,
             "json" => FileKind::Json,
@@ -58,18 +98,33 @@ impl SetFile {
                 return Err(Error::data(path.display(), problem));
             }
         };
-        Ok(Self { path, kind, config })
+        Ok(Self {
+            path,
+            kind,
+            unpacked,
+            inner: None,
+            config,
+        })
+    }
+
+    /// The file that is read: the unpacked copy of a compressed one.
+    fn read_path(&self) -> &Path {
+        self.unpacked
+            .as_ref()
+            .map_or(&self.path, NamedTempFile::path)
     }
 
     /// Adds the rows of the file to a table.
     pub(super) fn read(self, rows: Option<&str>, table: &mut Table) -> Result<()> {
-        let (path, kind) = (self.path.clone(), self.kind);
-        table.files.push(Arc::new(self));
+        let kind = self.kind;
+        let file = Arc::new(self);
+        let path = file.read_path();
+        table.files.push(Arc::clone(&file));
         match kind {
-            FileKind::Table { delimiter } => table::read(&path, delimiter, table),
-            FileKind::JsonLines => json::read_lines(&path, table),
-            FileKind::Json => json::read(&path, rows, table),
-            FileKind::Parquet => parquet::read(&path, table),
+            FileKind::Table { delimiter } => table::read(path, delimiter, table),
+            FileKind::JsonLines => json::read_lines(path, table),
+            FileKind::Json => json::read(path, rows, table),
+            FileKind::Parquet => parquet::read(path, table),
         }
     }
 
@@ -77,10 +132,10 @@ impl SetFile {
     pub(super) fn value(&self, row: &RowPlace, column: &str, steps: &[Step]) -> Result<Vec<u8>> {
         let cell = match (row, self.kind) {
             (RowPlace::Parquet { group, row, .. }, _) => {
-                return parquet::bytes(&self.path, (*group, *row), column, steps);
+                return parquet::bytes(self.read_path(), (*group, *row), column, steps);
             }
             (RowPlace::Record(position), FileKind::Table { delimiter }) => {
-                table::cell(&self.path, delimiter, position, column)?
+                table::cell(self.read_path(), delimiter, position, column)?
             }
             (
                 RowPlace::Json {
@@ -92,7 +147,7 @@ impl SetFile {
                 _,
             ) => {
                 let inner = inner.as_ref().map(|(at, list)| (*at, &**list));
-                json::cell(&self.path, (*offset, *length), inner, column)?
+                json::cell(self.read_path(), (*offset, *length), inner, column)?
             }
             (RowPlace::Record(_), _) => Cell::Absent,
         };
@@ -112,6 +167,16 @@ impl SetFile {
 fn ending(path: &Path) -> String {
     let ending = path.extension().and_then(|ending| ending.to_str());
     ending.unwrap_or_default().to_ascii_lowercase()
+}
+
+/// An unpacked copy of a compressed file. Images are read at their places in it, which a compressed file does not have.
+fn unpacked(path: &Path) -> Result<NamedTempFile> {
+    let file = File::open(path).map_err(|e| Error::file(path, "read", e))?;
+    let mut copy =
+        NamedTempFile::new().map_err(|e| Error::file(std::env::temp_dir(), "write", e))?;
+    std::io::copy(&mut MultiGzDecoder::new(BufReader::new(file)), &mut copy)
+        .map_err(|e| Error::data(path.display(), format_args!("cannot be unpacked: {e}")))?;
+    Ok(copy)
 }
 
 /// Refuses a pointer of Git LFS, which stands where a file was not downloaded.

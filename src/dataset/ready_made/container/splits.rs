@@ -1,8 +1,10 @@
 //! The split of each file of a set, and the one that is asked: [`of_name`], [`chosen`].
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use super::choose::Candidate;
+use super::tree::Tree;
 use super::{ending, parquet};
 use crate::error::{Error, Result};
 
@@ -33,19 +35,19 @@ pub(super) fn of_name(path: &Path) -> String {
 /// # Errors
 /// If no file is of the split named, or none is named and several splits are there; the error lists the splits with their rows.
 pub(super) fn chosen(
-    place: &Path,
-    files: Vec<(String, PathBuf)>,
+    tree: &Tree,
+    files: Vec<Candidate>,
     wanted: Option<&str>,
-) -> Result<Vec<PathBuf>> {
+) -> Result<Vec<Candidate>> {
     let mut splits: BTreeMap<&str, Vec<&Path>> = BTreeMap::new();
-    for (split, file) in &files {
-        splits.entry(split).or_default().push(file);
+    for file in &files {
+        splits.entry(&file.split).or_default().push(&file.path);
     }
     let split = match wanted {
         Some("all") => None,
         Some(name) if splits.contains_key(name) => Some(name),
         Some(name) => {
-            let problem = format_args!("no split {name:?}; there are {}", listed(&splits));
+            let problem = format_args!("no split {name:?}; there are {}", listed(tree, &splits));
             return Err(Error::usage("--split", problem));
         }
         None if splits.len() == 1 => None,
@@ -53,34 +55,31 @@ pub(super) fn chosen(
         None => {
             let problem = format_args!(
                 "the splits {}; --split NAME names one, --split all takes them together",
-                listed(&splits)
+                listed(tree, &splits)
             );
-            return Err(Error::data(place.display(), problem));
+            return Err(Error::data(tree.place().display(), problem));
         }
     };
     let split = split.map(str::to_owned);
     let files = files.into_iter();
-    let of_split = files.filter(|(of, _)| split.as_ref().is_none_or(|split| of == split));
-    Ok(of_split.map(|(_, file)| file).collect())
+    let of_split = files.filter(|file| split.as_ref().is_none_or(|split| file.split == *split));
+    Ok(of_split.collect())
 }
 
-/// The splits with their rows where these are cheap to know, as `test (1,000 rows)`.
-fn listed(splits: &BTreeMap<&str, Vec<&Path>>) -> String {
+/// The splits with their rows where these are cheap to know, as `test (1000 rows)`.
+fn listed(tree: &Tree, splits: &BTreeMap<&str, Vec<&Path>>) -> String {
+    let rows = |file: &&Path| match (tree, &*ending(file)) {
+        (Tree::Folder { .. }, "parquet") => parquet::count(&tree.whole(file)).ok(),
+        _ => None,
+    };
     let splits = splits.iter().map(|(split, files)| {
         let name = if split.is_empty() {
             "without a name"
         } else {
             split
         };
-        let rows: Option<u64> = files
-            .iter()
-            .map(|file| {
-                (ending(file) == "parquet")
-                    .then(|| parquet::count(file).ok())
-                    .flatten()
-            })
-            .sum();
-        match rows {
+        let counts: Option<u64> = files.iter().map(rows).sum();
+        match counts {
             Some(rows) => format!("{name} ({rows} rows)"),
             None => format!("{name} ({} files)", files.len()),
         }
@@ -108,13 +107,19 @@ mod tests {
     #[test]
     fn one_split_is_chosen_or_named() {
         let files = |splits: &[&str]| {
-            let files = splits
-                .iter()
-                .map(|split| ((*split).to_owned(), PathBuf::from(split)));
-            files.collect::<Vec<(String, PathBuf)>>()
+            let files = splits.iter().map(|split| Candidate {
+                split: (*split).to_owned(),
+                config: String::new(),
+                path: split.into(),
+            });
+            files.collect::<Vec<Candidate>>()
         };
-        let place = Path::new("set");
-        let choose = |splits: &[&str], wanted| chosen(place, files(splits), wanted);
+        let folder = tempfile::tempdir().unwrap();
+        let tree = Tree::of_folder(folder.path()).unwrap();
+        let choose = |splits: &[&str], wanted| {
+            let files = chosen(&tree, files(splits), wanted)?.into_iter();
+            Ok::<_, Error>(files.map(|file| file.path).collect::<Vec<_>>())
+        };
         assert_eq!(choose(&["a"], None).unwrap(), [Path::new("a")]);
         assert_eq!(
             choose(&["test", "train"], None).unwrap(),

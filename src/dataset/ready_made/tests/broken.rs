@@ -187,3 +187,59 @@ fn a_file_that_changes_after_it_was_opened_is_not_shown() {
         "{problem}"
     );
 }
+
+#[test]
+fn an_archive_that_climbs_or_lies_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let line = |image: &str| {
+        json!({"file_name": image, "question": "?", "options": ["x", "y"], "answer": "x"})
+            .to_string()
+    };
+    for (name, entries, says) in [
+        (
+            "a.zip",
+            vec![("../a.png", "x".to_owned())],
+            "leads out of the file",
+        ),
+        (
+            "b.zip",
+            vec![("/etc/a.png", "x".to_owned())],
+            "leads out of the file",
+        ),
+        (
+            "c.zip",
+            vec![("metadata.jsonl", line("../a.png"))],
+            "lies outside",
+        ),
+        (
+            "d.zip",
+            vec![("metadata.jsonl", line("/etc/hostname"))],
+            "lies outside",
+        ),
+        (
+            "e.zip",
+            vec![("metadata.jsonl", line("none.png"))],
+            "no such file: \"none.png\"",
+        ),
+        (
+            "f.zip",
+            vec![("a.txt", String::new())],
+            "no file of questions in it",
+        ),
+    ] {
+        let path = folder.path().join(name);
+        let entries: Vec<(&str, &[u8])> = entries
+            .iter()
+            .map(|(name, text)| (*name, text.as_bytes()))
+            .collect();
+        super::shapes::pack(&path, &entries);
+        let problem = refusal(&path, &SetArgs::default());
+        assert!(problem.contains(says), "{name}: {problem}");
+    }
+    let path = folder.path().join("g.zip");
+    fs::write(&path, b"PK no").unwrap();
+    assert!(refusal(&path, &SetArgs::default()).contains("not a whole ZIP file"));
+    let path = folder.path().join("h.jsonl.gz");
+    fs::write(&path, b"no gzip").unwrap();
+    assert!(refusal(&path, &SetArgs::default()).contains("cannot be unpacked"));
+}

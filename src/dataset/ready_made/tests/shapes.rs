@@ -451,3 +451,58 @@ fn a_hub_s_cache_is_read_through_its_links() {
         assert_eq!(read(&dataset)[0].5, 9, "{}", place.display());
     }
 }
+
+#[test]
+fn compressed_files_are_read() {
+    let rows = [
+        row(
+            json!({"file_name": "pics/0.png", "question": "?", "options": ["x", "y"], "answer": "y"}),
+        ),
+        row(
+            json!({"file_name": "pics/../pics/0.png", "question": "??", "options": ["x", "y"], "answer": "y"}),
+        ),
+    ];
+    let (folder, path) = set("set.jsonl", &rows);
+    let text = fs::read(&path).unwrap();
+    let packed = folder.path().join("set.jsonl.gz");
+    let mut encoder = flate2::write::GzEncoder::new(
+        fs::File::create(&packed).unwrap(),
+        flate2::Compression::fast(),
+    );
+    std::io::Write::write_all(&mut encoder, &text).unwrap();
+    encoder.finish().unwrap();
+    fs::create_dir(folder.path().join("pics")).unwrap();
+    fs::write(folder.path().join("pics/0.png"), png(5)).unwrap();
+    assert_eq!(read(&open(&packed, &SetArgs::default()).unwrap())[0].5, 5);
+    let zip = folder.path().join("set.zip");
+    pack(
+        &zip,
+        &[
+            ("test/metadata.jsonl", &text),
+            ("test/pics/0.png", &png(6)),
+            ("__MACOSX/metadata.csv", b"x"),
+        ],
+    );
+    let dataset = open(&zip, &SetArgs::default()).unwrap();
+    let frames: Vec<&str> = dataset.frames().map(|frame| frame.0.as_str()).collect();
+    assert_eq!((frames, read(&dataset)[1].5), (vec!["test/pics/0.png"], 6));
+    // Embedded images are read from the unpacked copy.
+    let rows = [row(
+        json!({"id": 1, "question": "?", "options": ["x", "y"], "answer": "y", "image": bytes(7)}),
+    )];
+    let (folder, path) = set("data/test.parquet", &rows);
+    let zip = folder.path().join("set.zip");
+    pack(&zip, &[("data/test.parquet", &fs::read(&path).unwrap())]);
+    assert_eq!(read(&open(&zip, &SetArgs::default()).unwrap())[0].5, 7);
+}
+
+/// Writes a ZIP file of these entries.
+pub(super) fn pack(path: &std::path::Path, entries: &[(&str, &[u8])]) {
+    let mut zip = zip::ZipWriter::new(fs::File::create(path).unwrap());
+    for (name, bytes) in entries {
+        let options = zip::write::SimpleFileOptions::default();
+        zip.start_file(*name, options).unwrap();
+        std::io::Write::write_all(&mut zip, bytes).unwrap();
+    }
+    zip.finish().unwrap();
+}
