@@ -108,6 +108,16 @@ pub struct Dataset {
     rule: ReadingRule,
     /// What was taken for what in a ready-made set, one fact a line; empty for other data.
     reading: Vec<String>,
+    form: Form,
+}
+
+/// Whose form a set has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Form {
+    /// This program's, in which nothing has to be found out.
+    Own,
+    /// That of other tools.
+    Foreign,
 }
 
 impl Dataset {
@@ -124,6 +134,7 @@ impl Dataset {
             labels: None,
             rule: ReadingRule::default(),
             reading: Vec::new(),
+            form: Form::Own,
         }
     }
 
@@ -175,6 +186,11 @@ impl Dataset {
         }
         Ok(Self {
             questions,
+            form: if reading.is_empty() {
+                Form::Own
+            } else {
+                Form::Foreign
+            },
             reading,
             ..self
         })
@@ -306,6 +322,15 @@ impl Dataset {
     #[must_use]
     pub fn reading(&self) -> &[String] {
         &self.reading
+    }
+
+    /// The lines of [`Self::reading`] that the user should see; none where the set has this program's own form.
+    #[must_use]
+    pub fn reading_to_say(&self) -> &[String] {
+        match self.form {
+            Form::Own => &[],
+            Form::Foreign => &self.reading,
+        }
     }
 
     /// The questions, in the order of their file.

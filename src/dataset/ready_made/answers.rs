@@ -1,5 +1,6 @@
 //! What the answers of a set mean: [`Reading`], and the one of all rows: [`one_reading`].
 
+use super::options::Offered;
 use crate::types::Choices;
 use crate::types::question::letter;
 
@@ -34,7 +35,8 @@ impl Reading {
     }
 
     /// The index of the choice that an answer means; `None` if it means none.
-    pub(super) fn truth(self, answer: &str, options: &[String]) -> Option<usize> {
+    pub(super) fn truth(self, answer: &str, options: &Offered) -> Option<usize> {
+        let at = |wanted: usize| options.places.iter().position(|place| *place == wanted);
         let answer = answer.trim();
         match self {
             Self::Letter => {
@@ -44,19 +46,18 @@ impl Reading {
                     return None;
                 };
                 let is_marked = name.is_ascii_uppercase() || bare.len() < answer.len();
-                let known = options.len().min(Choices::MOST);
-                let mut letters = (0..known).filter(|_| is_marked);
-                letters.find(|&index| letter(index) == name.to_ascii_uppercase())
+                let mut letters = (0..Choices::MOST).filter(|_| is_marked);
+                at(letters.find(|&index| letter(index) == name.to_ascii_uppercase())?)
             }
             Self::Text => {
                 let answer = folded(answer);
-                options.iter().position(|option| folded(option) == answer)
+                options
+                    .texts
+                    .iter()
+                    .position(|option| folded(option) == answer)
             }
-            Self::Index0 => number(answer).filter(|&index| index < options.len()),
-            Self::Index1 => {
-                let index = number(answer)?.checked_sub(1);
-                index.filter(|&index| index < options.len())
-            }
+            Self::Index0 => at(number(answer)?),
+            Self::Index1 => at(number(answer)?.checked_sub(1)?),
         }
     }
 }
@@ -75,7 +76,7 @@ fn number(text: &str) -> Option<usize> {
 }
 
 /// An answer and the options of its row.
-pub(super) type AnswerOf<'a> = (&'a str, &'a [String]);
+pub(super) type AnswerOf<'a> = (&'a str, &'a Offered);
 
 /// How the answers of all rows are read.
 #[derive(Debug, PartialEq, Eq)]
@@ -151,8 +152,21 @@ pub(super) fn asks_yes_or_no(question: &str) -> bool {
 mod tests {
     use super::*;
 
-    fn options(texts: &[&str]) -> Vec<String> {
-        texts.iter().map(ToString::to_string).collect()
+    fn options(texts: &[&str]) -> Offered {
+        Offered::listed(texts.iter().map(ToString::to_string).collect())
+    }
+
+    #[test]
+    fn letters_and_numbers_name_columns_also_behind_an_empty_one() {
+        let offered = Offered {
+            texts: vec!["red".to_owned(), "blue".to_owned()],
+            places: vec![0, 2],
+        };
+        let read = |answer: &str| Reading::ALL.map(|reading| reading.truth(answer, &offered));
+        assert_eq!(read("C"), [Some(1), None, None, None]);
+        assert_eq!(read("B"), [None; 4]);
+        assert_eq!(read("2"), [None, None, Some(1), None]);
+        assert_eq!(read("3"), [None, None, None, Some(1)]);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::images::{ImagesAre, RowImage, images, named_frames};
 use super::left_out::{LeftOut, Why};
 use super::lettered::in_question;
 use super::names::without_endings;
-use super::options::Options;
+use super::options::{Offered, Options};
 use super::roles::Roles;
 use super::row::{Row, Table};
 use std::collections::BTreeMap;
@@ -26,7 +26,7 @@ pub(super) struct Item {
     pub(super) image: RowImage,
     pub(super) text: String,
     /// The options; `None` if neither columns nor the question hold any.
-    pub(super) options: Option<Vec<String>>,
+    pub(super) options: Option<Offered>,
 }
 
 /// What is done about instructions at the end of questions.
@@ -85,7 +85,7 @@ pub(super) fn items(
 }
 
 /// The text and the options of a row; the inner error is the fault of a bad row.
-type Parts = Result<(String, Option<Vec<String>>), String>;
+type Parts = Result<(String, Option<Offered>), String>;
 
 fn item(
     table: &Table,
@@ -118,7 +118,7 @@ fn item(
         Options::None => {
             let text = without(&text);
             match in_question(&text) {
-                Some((question, options)) => (without(&question), Some(options)),
+                Some((question, options)) => (without(&question), Some(Offered::listed(options))),
                 None => (text, None),
             }
         }
@@ -140,7 +140,12 @@ fn item(
     let hint = roles.hint.as_ref().and_then(|hint| hint.text(row));
     let text = hint.map_or_else(|| text.clone(), |hint| format!("{}\n{text}", hint.trim()));
     let is_long = |text: &String| text.len() > LONGEST_TEXT;
-    if is_long(&text) || options.iter().flatten().any(is_long) {
+    if is_long(&text)
+        || options
+            .iter()
+            .flat_map(|options| &options.texts)
+            .any(is_long)
+    {
         let problem = format!("a text of more than {} KB", LONGEST_TEXT >> 10);
         return Ok(Err(problem));
     }

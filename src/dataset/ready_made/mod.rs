@@ -33,7 +33,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::root::Root;
-use super::{Dataset, ImageSource, stem};
+use super::{Dataset, Form, ImageSource, stem};
 use crate::error::{Error, Result};
 use crate::types::{Family, FrameId, Question};
 
@@ -42,7 +42,6 @@ pub(super) use images::EmbeddedImage;
 pub(super) use preset::{is_known as is_known_set, names as known_sets};
 pub use settings::SetArgs;
 
-use answers::Reading;
 use container::FoundFiles;
 use frames::Frames;
 use images::ImagesAre;
@@ -53,7 +52,7 @@ use names::Role;
 use roles::Roles;
 use row::Table;
 use summary::Summary;
-use truths::{Answered, truths};
+use truths::{Answered, is_own, truths};
 
 /// The family of a question that names none.
 const OTHER: &str = "other";
@@ -115,6 +114,11 @@ pub(super) fn open(place: &Path, args: &SetArgs) -> Result<Dataset> {
     let lines = summary.lines();
     Ok(Dataset {
         reading: lines,
+        form: if is_own(&table) {
+            Form::Own
+        } else {
+            Form::Foreign
+        },
         title: info.name.clone(),
         ..Dataset::new(name, sources, questions)
     })
@@ -197,12 +201,6 @@ fn read(
     let how = map
         .of(Role::Answer)
         .map_or(&How::ByRule, |entry| &entry.how);
-    let own = How::Answer(Reading::Text);
-    let how = if *how == How::ByRule && is_own(table) {
-        &own
-    } else {
-        how
-    };
     let truths = truths(table, &roles, how, kept, &mut left)?;
     left.check(table.rows.len(), args)
         .map_err(|problem| image_hint(table, &roles, problem))?;
@@ -216,13 +214,6 @@ fn read(
         cut,
         left,
     })
-}
-
-/// Whether the lines are of this program's own form, in which the answer is the text of a choice.
-fn is_own(table: &Table) -> bool {
-    ["frame", "choices", "answer"]
-        .iter()
-        .all(|name| table.find(name).is_some())
 }
 
 /// Adds the columns and a `--map` for images to a problem, if no row has any.

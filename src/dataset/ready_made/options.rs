@@ -6,12 +6,28 @@ use super::python_list::python_list;
 use super::roles::{Column, Roles};
 use super::row::Row;
 
+/// The options of a row.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(super) struct Offered {
+    pub(super) texts: Vec<String>,
+    /// The place of each among its columns, by which letters and numbers name it: where B is empty, C is still C.
+    pub(super) places: Vec<usize>,
+}
+
+impl Offered {
+    /// The options of a list, in order.
+    pub(super) fn listed(texts: Vec<String>) -> Self {
+        let places = (0..texts.len()).collect();
+        Self { texts, places }
+    }
+}
+
 /// What the columns of a row offer as options.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Options {
     /// No column has any.
     None,
-    Found(Vec<String>),
+    Found(Offered),
     /// Two columns differ.
     Differ([String; 2]),
     /// A cell that is no list of options.
@@ -24,16 +40,13 @@ pub(super) enum Options {
 impl Options {
     /// The options of a row in its columns.
     pub(super) fn of(row: &Row, roles: &Roles) -> Self {
-        let mut found: Vec<(String, Vec<String>)> = Vec::new();
-        let cells: Vec<String> = roles
-            .cells
-            .iter()
-            .filter_map(|cell| cell.text(row))
-            .collect();
-        if let Some(first) = roles.cells.first()
-            && !cells.is_empty()
-        {
-            found.push((cell_names(first, &roles.cells), without_letters(cells)));
+        let mut found: Vec<(String, Offered)> = Vec::new();
+        let cells = roles.cells.iter().enumerate();
+        let cells = cells.filter_map(|(place, cell)| Some((cell.text(row)?, place)));
+        let (texts, places): (Vec<String>, Vec<usize>) = cells.unzip();
+        if !texts.is_empty() {
+            let texts = without_letters(texts);
+            found.push((cell_names(&roles.cells), Offered { texts, places }));
         }
         for column in &roles.options {
             let cell = column.of(row);
@@ -41,7 +54,10 @@ impl Options {
                 continue;
             }
             match options(cell, roles.split_options.as_deref()) {
-                Some(options) => found.push((column.name.clone(), without_letters(options))),
+                Some(options) => {
+                    let offered = Offered::listed(without_letters(options));
+                    found.push((column.name.clone(), offered));
+                }
                 None => {
                     return Self::Unread {
                         column: column.name.clone(),
@@ -54,7 +70,7 @@ impl Options {
         let Some((name, options)) = found.next() else {
             return Self::None;
         };
-        match found.find(|(_, other)| *other != options) {
+        match found.find(|(_, other)| other.texts != options.texts) {
             Some((other, _)) => Self::Differ([name, other]),
             None => Self::Found(options),
         }
@@ -62,11 +78,8 @@ impl Options {
 }
 
 /// The names of the columns of options as `--map` takes them.
-fn cell_names(first: &Column, cells: &[Column]) -> String {
+fn cell_names(cells: &[Column]) -> String {
     let names: Vec<&str> = cells.iter().map(|cell| cell.name.as_str()).collect();
-    if names.is_empty() {
-        return first.name.clone();
-    }
     names.join(",")
 }
 

@@ -79,7 +79,10 @@ impl Roles {
         refuse_wide(table, map)?;
         let question = question.into_iter().next();
         let question =
-            question.ok_or_else(|| format!("no question among its columns:\n{}", shown(table)))?;
+            question.ok_or_else(|| format!(
+                "no question among its columns:\n{}\n say which is which: --map question=COLUMN,image=COLUMN,options=COLUMN,answer=COLUMN",
+                shown(table)
+            ))?;
         let how = map.of(Role::Options);
         let mut options = named(Role::Options)?;
         let is_of_cells = how.is_some_and(|entry| entry.columns.len() > 1);

@@ -1,9 +1,12 @@
 //! The true option of each question of a set: [`Truths`].
 
-use super::answers::{OneReading, Reading, asks_yes_or_no, digit, one_reading, yes_or_no};
+use super::answers::{
+    AnswerOf, OneReading, Reading, asks_yes_or_no, digit, one_reading, yes_or_no,
+};
 use super::items::{AnswerCell, Item};
 use super::left_out::{LeftOut, Why};
 use super::map::How;
+use super::options::Offered;
 use super::roles::{Column, Roles};
 use super::row::Table;
 use crate::types::Choices;
@@ -66,6 +69,19 @@ pub(super) fn truths(
     Ok(truths)
 }
 
+/// Whether the lines are of this program's own form, in which the answer is the text of a choice.
+pub(super) fn is_own(table: &Table) -> bool {
+    const FIELDS: [&str; 8] = [
+        "id", "frame", "image", "family", "question", "choices", "answer", "evidence",
+    ];
+    let has = |name: &&str| table.find(name).is_some();
+    ["question", "choices", "answer"].iter().all(has)
+        && table
+            .columns
+            .iter()
+            .all(|column| FIELDS.contains(&column.as_str()))
+}
+
 /// Items with an answer each. Those without one, or with several, are counted.
 fn with_answers(
     table: &Table,
@@ -111,15 +127,23 @@ fn of_options(
     }
     let column = column_of_options(table, roles, &items)?;
     let items = with_answers(table, column, items, left)?;
-    let rows: Vec<(&str, &[String])> = items
+    let none = Offered::default();
+    let rows: Vec<AnswerOf<'_>> = items
         .iter()
-        .map(|(item, answer)| (answer.as_str(), item.options.as_deref().unwrap_or_default()))
+        .map(|(item, answer)| (answer.as_str(), item.options.as_ref().unwrap_or(&none)))
         .collect();
+    let fits = |reading: Reading| {
+        rows.iter()
+            .all(|(answer, options)| reading.truth(answer, options).is_some())
+    };
     let (reading, unfit) = match how {
         How::Answer(reading) => {
             let unfit =
                 (0..rows.len()).filter(|&row| reading.truth(rows[row].0, rows[row].1).is_none());
             (*reading, unfit.collect())
+        }
+        How::ByRule | How::Split(_) if is_own(table) && fits(Reading::Text) => {
+            (Reading::Text, Vec::new())
         }
         How::ByRule | How::Split(_) => match one_reading(&rows) {
             OneReading::Fits(reading) => (reading, Vec::new()),
@@ -130,7 +154,7 @@ fn of_options(
                     "{}: the answer {:?} may be read as {one} or as {other}, which differ among the options {:?}; --map answer={name}:{one} or --map answer={name}:{other} says which is meant",
                     table.place(items[row].0.row),
                     rows[row].0,
-                    rows[row].1,
+                    rows[row].1.texts,
                     name = column.name,
                 ));
             }
@@ -142,7 +166,7 @@ fn of_options(
             "{}: the answer {answer:?} (column {:?}) is none of the options {:?}, neither by letter nor by text nor by number",
             table.place(item.row),
             column.name,
-            rows[0].1
+            rows[0].1.texts
         ));
     }
     let fit = rows.len() - unfit.len();
@@ -151,10 +175,11 @@ fn of_options(
         .push(format!("{} ({})", column.name, reading.name()));
     for (item, answer) in items {
         let options = item.options.clone().unwrap_or_default();
+        let texts = &options.texts;
         let choices = match reading.truth(&answer, &options) {
-            Some(truth) => Choices::new(options, truth).map_err(|e| e.to_string()),
+            Some(truth) => Choices::new(texts.clone(), truth).map_err(|e| e.to_string()),
             None => Err(format!(
-                "the answer {answer:?} is none of the options {options:?} (read as {}, which fits {fit} rows)",
+                "the answer {answer:?} is none of the options {texts:?} (read as {}, which fits {fit} rows)",
                 reading.name()
             )),
         };
@@ -173,17 +198,15 @@ fn column_of_options<'a>(
     items: &[Item],
 ) -> Result<&'a Column, String> {
     let fitting = roles.answers.iter().filter_map(|column| {
-        let answers: Option<Vec<(String, &[String])>> = items
+        let answers: Option<Vec<(String, &Offered)>> = items
             .iter()
             .map(|item| match AnswerCell::of(&table.rows[item.row], column) {
-                AnswerCell::One(answer) => {
-                    Some((answer, item.options.as_deref().unwrap_or_default()))
-                }
+                AnswerCell::One(answer) => Some((answer, item.options.as_ref()?)),
                 AnswerCell::Absent | AnswerCell::Several(_) => None,
             })
             .collect();
         let answers = answers?;
-        let rows: Vec<(&str, &[String])> = answers
+        let rows: Vec<AnswerOf<'_>> = answers
             .iter()
             .map(|(answer, options)| (answer.as_str(), *options))
             .collect();

@@ -107,7 +107,7 @@ impl<'a> ChoiceSetup<'a> {
 
     /// Says what was taken for what in a ready-made set.
     pub(super) fn say_reading(&self, progress: &Progress) {
-        for line in self.dataset.reading() {
+        for line in self.dataset.reading_to_say() {
             progress.note(line);
         }
     }

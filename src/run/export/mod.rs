@@ -83,7 +83,7 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
         rule,
         progress,
     )?;
-    for line in dataset.reading() {
+    for line in dataset.reading_to_say() {
         progress.note(line);
     }
     let questions = select(&dataset, &args.selection)?;

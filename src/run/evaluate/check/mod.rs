@@ -31,13 +31,13 @@ use images::Depth;
 /// The flags of `check` besides those of the evaluation.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct CheckArgs {
-    /// The data, in place of --data
+    /// The data, in place of --data; default: --data
     #[arg(value_name = "DATA", value_parser = crate::dataset::place, add = Decides::Nothing)]
     pub place: Option<DataPlace>,
     /// Decode every image, so that a truncated file is found
     #[arg(long, help_heading = "Check", add = Decides::Nothing)]
     pub deep: bool,
-    /// Write the questions as they were read, one a line, with the SHA-256 of each image
+    /// Write the questions as they were read, one a line, with the SHA-256 of each image; default: none
     #[arg(long, value_name = "FILE", help_heading = "Check", add = Decides::Nothing)]
     pub save_questions: Option<PathBuf>,
 }
