@@ -9,6 +9,7 @@ pub(crate) mod frames;
 pub(crate) mod guarded;
 pub(crate) mod image_file;
 pub(crate) mod image_names;
+mod image_source;
 pub(crate) mod inputs;
 pub(crate) mod maps;
 pub(crate) mod npy;
@@ -24,18 +25,19 @@ mod view;
 
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, LazyLock};
+use std::sync::LazyLock;
 
 use crate::error::{Error, Result};
 use crate::rooms::{self, Rooms};
 use crate::types::{Frame, FrameId, Labels, Question};
 
 pub(crate) use image_file::ImageFile;
+pub(crate) use image_source::ImageSource;
 use maps::MapPaths;
 pub(crate) use picture::Picture;
 pub(crate) use reading_rule::ReadingRule;
+use ready_made::Form;
 pub use ready_made::SetArgs;
-use ready_made::{Archive, EmbeddedImage};
 pub(crate) use root::Root;
 pub(crate) use settings::{CodesArgs, DataArgs, PixelLimit, SelectionArgs, place};
 use view::FrameFacts;
@@ -68,34 +70,6 @@ impl DataPlace {
     }
 }
 
-/// The place of one image and of its maps.
-#[derive(Debug, Clone)]
-pub(crate) enum ImageSource {
-    /// An image file, its map files, and the other facts about the frame.
-    File {
-        rgb: PathBuf,
-        maps: MapPaths,
-        view: FrameFacts,
-    },
-    /// An image of this name in a ZIP file.
-    Member(Arc<Archive>),
-    /// An image inside a file of rows.
-    Embedded(EmbeddedImage),
-    /// A frame of the built-in rooms.
-    Room(rooms::Room),
-}
-
-impl ImageSource {
-    /// An image file without maps.
-    fn image(rgb: PathBuf) -> Self {
-        Self::File {
-            rgb,
-            maps: MapPaths::default(),
-            view: FrameFacts::default(),
-        }
-    }
-}
-
 /// Images and the questions about them.
 #[derive(Debug)]
 pub struct Dataset {
@@ -109,15 +83,6 @@ pub struct Dataset {
     /// What was taken for what in a ready-made set, one fact a line; empty for other data.
     reading: Vec<String>,
     form: Form,
-}
-
-/// Whose form a set has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Form {
-    /// This program's, in which nothing has to be found out.
-    Own,
-    /// That of other tools.
-    Foreign,
 }
 
 impl Dataset {
@@ -161,6 +126,16 @@ impl Dataset {
             title: rooms.title(),
             labels: Some(rooms::labels()),
             ..Self::new("rooms".to_owned(), sources, Vec::new())
+        }
+    }
+
+    /// The data of a ready-made set.
+    fn of_set(set: ready_made::ReadySet) -> Self {
+        Self {
+            title: set.title,
+            reading: set.reading,
+            form: set.form,
+            ..Self::new(set.name, set.sources, set.questions)
         }
     }
 
@@ -275,18 +250,19 @@ impl Dataset {
             }
             DataPlace::Path(path) => {
                 refuse(questions, "a ready-made set brings its own questions")?;
-                ready_made::open(path, set)?
+                Self::of_set(ready_made::open(path, &stem(path), set)?)
             }
             DataPlace::Known { name, path } => {
                 refuse(questions, "a ready-made set brings its own questions")?;
                 let preset = Some(name.clone());
-                ready_made::open(
+                Self::of_set(ready_made::open(
                     path,
+                    &stem(path),
                     &SetArgs {
                         preset,
                         ..set.clone()
                     },
-                )?
+                )?)
             }
         };
         if dataset.questions.is_empty() && dataset.labels.is_none() {

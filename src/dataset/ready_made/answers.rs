@@ -1,6 +1,6 @@
 //! What the answers of a set mean: [`Reading`], and the one of all rows: [`one_reading`].
 
-use super::options::Offered;
+use super::offered::Offered;
 use crate::types::Choices;
 use crate::types::question::letter;
 

@@ -5,12 +5,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::cell::FileFacts;
-use super::container::Archive;
-use super::images::{EmbeddedImage, RowImage, Step, images};
+use super::container::{Archive, SetFile};
+use super::images::{EmbeddedImage, RowImage, images};
 use super::roles::{Column, Roles};
 use super::row::Table;
+use super::step::Step;
 use super::truths::Answered;
-use crate::dataset::{ImageSource, Root};
+use crate::dataset::Root;
+use crate::dataset::image_source::ImageSource;
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::types::{Digest, FrameId, QuestionId};
@@ -63,6 +65,7 @@ pub(super) struct Frames<'a> {
     root: &'a Root,
     /// The ZIP file that holds the set.
     archive: Option<&'a Arc<Archive>>,
+    files: &'a [Arc<SetFile>],
     /// The row of each id whose own cell holds an image.
     holders: HashMap<String, usize>,
     roles: &'a Roles,
@@ -76,12 +79,14 @@ impl<'a> Frames<'a> {
         table: &'a Table,
         root: &'a Root,
         archive: Option<&'a Arc<Archive>>,
+        files: &'a [Arc<SetFile>],
         roles: &'a Roles,
     ) -> Self {
         let mut frames = Self {
             table,
             root,
             archive,
+            files,
             holders: HashMap::new(),
             roles,
             names: HashMap::new(),
@@ -228,7 +233,7 @@ impl<'a> Frames<'a> {
                 let row = &self.table.rows[row];
                 self.sources.entry(name.clone()).or_insert_with(|| {
                     ImageSource::Embedded(EmbeddedImage {
-                        file: Arc::clone(&self.table.files[row.file]),
+                        file: Arc::clone(&self.files[row.file]),
                         row: row.place.clone(),
                         column: self.table.columns[column].clone(),
                         steps,

@@ -4,39 +4,13 @@ use std::sync::Arc;
 
 use super::cell::{Cell, FileFacts, LONGEST_NAME, decoded};
 use super::container::SetFile;
-use super::options::list;
 use super::roles::{Images, Roles, braces};
 use super::row::{Row, RowPlace, Table};
+use super::step::Step;
+use super::text_list::list;
 use crate::dataset::image_file::format::FileFormat;
 use crate::dataset::{ImageFile, ReadingRule};
 use crate::error::{Error, Result};
-
-/// A step from a cell to a value inside it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Step {
-    /// An item of a list, or of the text of a list.
-    Item(usize),
-    /// A field of a struct.
-    Field(String),
-}
-
-impl Cell {
-    /// The value at some steps.
-    pub(super) fn at(&self, steps: &[Step]) -> Option<Self> {
-        let Some((step, rest)) = steps.split_first() else {
-            return Some(self.clone());
-        };
-        match (self, step) {
-            (Self::List(cells), Step::Item(at)) => cells.get(*at)?.at(rest),
-            (Self::Text(text), Step::Item(at)) => {
-                let item = list(text)?.into_iter().nth(*at)?;
-                Self::Text(item).at(rest)
-            }
-            (_, Step::Field(name)) => self.field(name)?.at(rest),
-            (_, Step::Item(_)) => None,
-        }
-    }
-}
 
 /// An image of a row.
 #[derive(Debug, Clone)]
@@ -198,7 +172,7 @@ impl EmbeddedImage {
     /// # Errors
     /// If the file of rows cannot be read, or has changed since it was opened.
     pub(in crate::dataset) fn image(&self, rule: ReadingRule) -> Result<ImageFile> {
-        let place = format!("{}, {}", self.file.path.display(), self.row);
+        let place = format!("{}, {}", self.file.label.path.display(), self.row);
         let value = self.file.value(&self.row, &self.column, &self.steps)?;
         let value = match std::str::from_utf8(&value).ok().and_then(decoded) {
             Some(bytes) => bytes,

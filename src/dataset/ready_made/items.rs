@@ -4,7 +4,8 @@ use super::images::{ImagesAre, RowImage, images, named_frames};
 use super::left_out::{LeftOut, Why};
 use super::lettered::in_question;
 use super::names::without_endings;
-use super::options::{Offered, Options};
+use super::offered::Offered;
+use super::options::Options;
 use super::roles::Roles;
 use super::row::{Row, Table};
 use std::collections::BTreeMap;
@@ -166,7 +167,7 @@ impl AnswerCell {
         let cell = column.of(row);
         let items = match cell {
             Cell::List(cells) => cells.iter().map(Cell::text).collect(),
-            Cell::Text(text) => super::options::list(text),
+            Cell::Text(text) => super::text_list::list(text),
             _ => None,
         };
         match (items.as_deref(), cell.text()) {

@@ -20,20 +20,24 @@ mod left_out;
 mod lettered;
 mod map;
 mod names;
+mod offered;
 mod options;
 mod preset;
 mod python_list;
 mod roles;
 mod row;
 mod settings;
+mod step;
 mod summary;
+mod text_list;
 mod truths;
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
+use super::image_source::ImageSource;
 use super::root::Root;
-use super::{Dataset, Form, ImageSource, stem};
 use crate::error::{Error, Result};
 use crate::types::{Family, FrameId, Question};
 
@@ -42,7 +46,7 @@ pub(super) use images::EmbeddedImage;
 pub(super) use preset::{is_known as is_known_set, names as known_sets};
 pub use settings::SetArgs;
 
-use container::FoundFiles;
+use container::{FoundFiles, SetFile};
 use frames::Frames;
 use images::ImagesAre;
 use items::{Cut, Endings, items};
@@ -61,7 +65,7 @@ const OTHER: &str = "other";
 ///
 /// # Errors
 /// If it cannot be read without guessing. The error shows the columns, what was taken for what, and a flag that mends it.
-pub(super) fn open(place: &Path, args: &SetArgs) -> Result<Dataset> {
+pub(super) fn open(place: &Path, stem: &str, args: &SetArgs) -> Result<ReadySet> {
     let preset = preset::named(args.preset.as_deref());
     let args = &preset.map_or_else(|| args.clone(), |preset| preset.beneath(args));
     let found = container::find(place, args)?;
@@ -78,7 +82,8 @@ pub(super) fn open(place: &Path, args: &SetArgs) -> Result<Dataset> {
     further.extend(blobs);
     let root = Root::of(&folder, &further)?;
     let mut table = Table::default();
-    for file in files {
+    let files: Vec<Arc<SetFile>> = files.into_iter().map(Arc::new).collect();
+    for file in &files {
         file.read(args.rows.as_deref(), &mut table)?;
     }
     let wrong = |table: &Table, problem: String| {
@@ -89,10 +94,10 @@ pub(super) fn open(place: &Path, args: &SetArgs) -> Result<Dataset> {
     let set = read(&table, &map, args, preset, ImagesAre::Files)
         .map_err(|problem| wrong(&table, problem))?;
     let name = match &*info.name {
-        "" => stem(place),
+        "" => stem.to_owned(),
         name => name.to_owned(),
     };
-    let mut frames = Frames::new(&table, &root, archive.as_ref(), &set.roles);
+    let mut frames = Frames::new(&table, &root, archive.as_ref(), &files, &set.roles);
     let ids = frames.ids(&set.answered)?;
     let (questions, sources) = questions(&table, &set, &ids, &mut frames)?;
     let mut notes = notes;
@@ -112,16 +117,40 @@ pub(super) fn open(place: &Path, args: &SetArgs) -> Result<Dataset> {
         notes,
     };
     let lines = summary.lines();
-    Ok(Dataset {
+    Ok(ReadySet {
         reading: lines,
         form: if is_own(&table) {
             Form::Own
         } else {
             Form::Foreign
         },
-        title: info.name.clone(),
-        ..Dataset::new(name, sources, questions)
+        title: info.name,
+        name,
+        sources,
+        questions,
     })
+}
+
+/// A set that was read.
+pub(super) struct ReadySet {
+    /// The name in `dataset.json`, else that of the file or folder.
+    pub(super) name: String,
+    /// The name in `dataset.json`; empty if there is none.
+    pub(super) title: String,
+    pub(super) sources: BTreeMap<FrameId, ImageSource>,
+    pub(super) questions: Vec<Question>,
+    /// What was taken for what, one fact a line.
+    pub(super) reading: Vec<String>,
+    pub(super) form: Form,
+}
+
+/// Whose form a set has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Form {
+    /// This program's, in which nothing has to be found out.
+    Own,
+    /// That of other tools.
+    Foreign,
 }
 
 /// The questions of a file about frames of other data, and what was taken for what.
@@ -130,21 +159,20 @@ pub(super) fn open(place: &Path, args: &SetArgs) -> Result<Dataset> {
 /// As [`open`].
 pub(super) fn about_frames(file: &Path, args: &SetArgs) -> Result<(Vec<Question>, Vec<String>)> {
     let mut table = Table::default();
-    container::SetFile::open(file.to_owned(), String::new())?
-        .read(args.rows.as_deref(), &mut table)?;
+    SetFile::open(file.to_owned(), String::new())?.read(args.rows.as_deref(), &mut table)?;
     let own: Option<Map> = table.find("frame").and_then(|_| "image=frame".parse().ok());
     let map = Map::joined(own.iter().chain(&args.map));
     let set = read(&table, &map, args, None, ImagesAre::Frames)
         .map_err(|problem| Error::data(file.display(), problem))?;
     let root = Root::of(file.parent().unwrap_or(Path::new("")), &[])?;
-    let mut frames = Frames::new(&table, &root, None, &set.roles);
+    let mut frames = Frames::new(&table, &root, None, &[], &set.roles);
     let ids = frames.ids(&set.answered)?;
     let (questions, sources) = questions(&table, &set, &ids, &mut frames)?;
     if is_own(&table) {
         return Ok((questions, Vec::new()));
     }
     let summary = Summary {
-        name: &stem(file),
+        name: &file.display().to_string(),
         table: &table,
         roles: &set.roles,
         answers: &set.said,

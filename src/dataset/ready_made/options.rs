@@ -2,25 +2,10 @@
 
 use super::cell::Cell;
 use super::lettered::{in_cell, without_letters};
-use super::python_list::python_list;
+use super::offered::Offered;
 use super::roles::{Column, Roles};
 use super::row::Row;
-
-/// The options of a row.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(super) struct Offered {
-    pub(super) texts: Vec<String>,
-    /// The place of each among its columns, by which letters and numbers name it: where B is empty, C is still C.
-    pub(super) places: Vec<usize>,
-}
-
-impl Offered {
-    /// The options of a list, in order.
-    pub(super) fn listed(texts: Vec<String>) -> Self {
-        let places = (0..texts.len()).collect();
-        Self { texts, places }
-    }
-}
+use super::text_list::list;
 
 /// What the columns of a row offer as options.
 #[derive(Debug, PartialEq, Eq)]
@@ -94,20 +79,4 @@ fn options(cell: &Cell, split: Option<&str>) -> Option<Vec<String>> {
         (Cell::Text(text), None) => list(text).or_else(|| in_cell(text)),
         _ => None,
     }
-}
-
-/// The texts of a list in a text: JSON, then Python's notation.
-pub(super) fn list(text: &str) -> Option<Vec<String>> {
-    let text = text.trim();
-    if !text.starts_with('[') {
-        return None;
-    }
-    let json = serde_json::from_str::<Vec<serde_json::Value>>(text).ok();
-    let json = json.and_then(|items| {
-        items
-            .into_iter()
-            .map(|item| Cell::from(item).text())
-            .collect()
-    });
-    json.or_else(|| python_list(text))
 }

@@ -2,20 +2,31 @@
 
 use std::collections::HashMap;
 use std::fmt;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use csv::Position;
 
 use super::cell::Cell;
-use super::container::SetFile;
 
 /// All rows of a set, in the order of its files.
 #[derive(Debug, Default)]
 pub(super) struct Table {
-    pub(super) files: Vec<Arc<SetFile>>,
+    pub(super) files: Vec<FileLabel>,
     pub(super) columns: Vec<String>,
     places: HashMap<String, usize>,
     pub(super) rows: Vec<Row>,
+}
+
+/// What is known of a file of rows besides its rows.
+#[derive(Debug, Clone)]
+pub(super) struct FileLabel {
+    /// The path of the file, for messages; of a file in an archive, behind that of the archive.
+    pub(super) path: PathBuf,
+    /// The folder inside the archive that holds the file; `None` outside archives.
+    pub(super) inner: Option<PathBuf>,
+    /// The configuration of the repository that it belongs to; empty if there is none.
+    pub(super) config: String,
 }
 
 /// One row. Cells of columns that come later than its own may lack.

@@ -6,7 +6,7 @@ use super::items::Cut;
 use super::left_out::LeftOut;
 use super::roles::{Images, Roles};
 use super::row::Table;
-use crate::dataset::ImageSource;
+use crate::dataset::image_source::ImageSource;
 use crate::types::{FrameId, Question};
 
 /// The facts of a set that was read, for messages and the manifest.

@@ -6,7 +6,7 @@ use super::answers::{
 use super::items::{AnswerCell, Item};
 use super::left_out::{LeftOut, Why};
 use super::map::How;
-use super::options::Offered;
+use super::offered::Offered;
 use super::roles::{Column, Roles};
 use super::row::Table;
 use crate::types::Choices;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use glob::{MatchOptions, Pattern};
 
 use super::card::{Config, configs};
+use super::splits::Candidate;
 use super::tree::Tree;
 use super::{READ, ending, splits};
 use crate::dataset::ready_made::settings::SetArgs;
@@ -16,14 +17,6 @@ const CARD: &str = "README.md";
 
 /// The names of the tables of an image folder (Hugging Face, "ImageFolder").
 const METADATA: [&str; 3] = ["metadata.jsonl", "metadata.csv", "metadata.parquet"];
-
-/// A file of rows, with its split and its configuration.
-#[derive(Debug, Clone)]
-pub(super) struct Candidate {
-    pub(super) split: String,
-    pub(super) config: String,
-    pub(super) path: PathBuf,
-}
 
 /// Whether some files of a tree look like a set.
 pub(super) fn is_set(tree: &Tree, files: &[PathBuf]) -> bool {

@@ -15,11 +15,10 @@ mod tree;
 use std::fs::File;
 use std::io::{BufReader, Read as _};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use super::cell::Cell;
-use super::images::Step;
-use super::row::{RowPlace, Table};
+use super::row::{FileLabel, RowPlace, Table};
+use super::step::Step;
 use flate2::read::MultiGzDecoder;
 use tempfile::NamedTempFile;
 
@@ -36,15 +35,10 @@ pub(super) const READ: &str =
 /// One file of rows.
 #[derive(Debug)]
 pub(in crate::dataset) struct SetFile {
-    /// The path of the file, for messages; of a file in an archive, behind that of the archive.
-    pub(super) path: PathBuf,
+    pub(super) label: FileLabel,
     kind: FileKind,
     /// The unpacked copy of a compressed file, gone when the file is closed.
     unpacked: Option<NamedTempFile>,
-    /// The folder inside the archive that holds the file; `None` outside archives.
-    pub(super) inner: Option<PathBuf>,
-    /// The configuration of the repository that it belongs to; empty if there is none.
-    pub(super) config: String,
 }
 
 /// How rows stand in a file.
@@ -72,10 +66,12 @@ impl SetFile {
     pub(super) fn of_member(archive: &Archive, name: &Path, config: String) -> Result<Self> {
         let unpacked = archive.unpacked(&name.to_string_lossy())?;
         let file = Self::of(archive.path.join(name), Some(unpacked), config)?;
-        Ok(Self {
-            inner: Some(name.parent().unwrap_or(Path::new("")).to_owned()),
-            ..file
-        })
+        let inner = Some(name.parent().unwrap_or(Path::new("")).to_owned());
+        let label = FileLabel {
+            inner,
+            ..file.label
+        };
+        Ok(Self { label, ..file })
     }
 
     fn of(path: PathBuf, unpacked: Option<NamedTempFile>, config: String) -> Result<Self> {
@@ -98,12 +94,15 @@ impl SetFile {
                 return Err(Error::data(path.display(), problem));
             }
         };
-        Ok(Self {
+        let label = FileLabel {
             path,
-            kind,
-            unpacked,
             inner: None,
             config,
+        };
+        Ok(Self {
+            label,
+            kind,
+            unpacked,
         })
     }
 
@@ -111,16 +110,14 @@ impl SetFile {
     fn read_path(&self) -> &Path {
         self.unpacked
             .as_ref()
-            .map_or(&self.path, NamedTempFile::path)
+            .map_or(&self.label.path, NamedTempFile::path)
     }
 
     /// Adds the rows of the file to a table.
-    pub(super) fn read(self, rows: Option<&str>, table: &mut Table) -> Result<()> {
-        let kind = self.kind;
-        let file = Arc::new(self);
-        let path = file.read_path();
-        table.files.push(Arc::clone(&file));
-        match kind {
+    pub(super) fn read(&self, rows: Option<&str>, table: &mut Table) -> Result<()> {
+        table.files.push(self.label.clone());
+        let path = self.read_path();
+        match self.kind {
             FileKind::Table { delimiter } => table::read(path, delimiter, table),
             FileKind::JsonLines => json::read_lines(path, table),
             FileKind::Json => json::read(path, rows, table),
@@ -155,7 +152,7 @@ impl SetFile {
             Some(Cell::Bytes(bytes)) => Ok(bytes),
             Some(Cell::Text(text)) => Ok(text.into_bytes()),
             _ => {
-                let place = format!("{}, {row}", self.path.display());
+                let place = format!("{}, {row}", self.label.path.display());
                 let problem = format_args!("the column {column:?} has changed since it was read");
                 Err(Error::data(place, problem))
             }

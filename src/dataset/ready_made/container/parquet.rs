@@ -17,8 +17,8 @@ use parquet::file::serialized_reader::SerializedPageReader;
 use parquet::record::{Field, Row as Record};
 
 use super::super::cell::Cell;
-use super::super::images::Step;
 use super::super::row::{RowPlace, Table};
+use super::super::step::Step;
 use crate::dataset::guarded::guarded;
 use crate::error::{Error, Result};
 

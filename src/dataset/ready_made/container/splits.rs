@@ -1,12 +1,19 @@
 //! The split of each file of a set, and the one that is asked: [`of_name`], [`chosen`].
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use super::choose::Candidate;
 use super::tree::Tree;
 use super::{ending, parquet};
 use crate::error::{Error, Result};
+
+/// A file of rows, with its split and its configuration.
+#[derive(Debug, Clone)]
+pub(super) struct Candidate {
+    pub(super) split: String,
+    pub(super) config: String,
+    pub(super) path: PathBuf,
+}
 
 /// The words that name splits, and the split that each means (Hugging Face, "File names and splits").
 const WORDS: [(&str, &str); 10] = [
