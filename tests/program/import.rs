@@ -396,10 +396,24 @@ fn frames_of_sun_rgb_d() {
     let set = scene.import("sunrgbd", &[]);
     let frame = frame(&set, "kv1-b3dodata/img_0063");
     assert_eq!(sides(frame.depth.as_ref()), (2000, 8000));
+    // Which of the two was read is said, by frame and in all.
+    assert_eq!(scene.line(0)["depth_from"], "depth_bfx");
+    let out = scene.run("sunrgbd", &["--force"]).success();
+    let out = String::from_utf8(out.get_output().stdout.clone()).unwrap();
+    assert!(
+        out.contains("frames by the folder of their depth: depth_bfx 1\n"),
+        "{out}"
+    );
     assert_eq!(sides(frame.segments.as_ref()), (3, 1));
     assert_eq!(classes(&set, &frame), pair("chest_of_drawers", "wall"));
     assert_eq!(frame.room.as_deref(), Some("living room"));
     assert!((frame.intrinsics.unwrap().fy - 510.0).abs() < 1e-9);
+    // Without filled depth, the other one is read, and that is said too.
+    fs::remove_file(scene.at(&at("depth_bfx/img_0063.png"))).unwrap();
+    let set = scene.import("sunrgbd", &["--force"]);
+    let unfilled = self::frame(&set, "kv1-b3dodata/img_0063");
+    assert_eq!(sides(unfilled.depth.as_ref()), (1000, 1000));
+    assert_eq!(scene.line(0)["depth_from"], "depth");
 }
 
 #[test]
