@@ -36,6 +36,7 @@ fn candidate(
     if !unique(context, segment) {
         return Err(Reason::NotUnique);
     }
+    let word = segment.called(context.book).ok_or(Reason::Wordless)?;
     let color = dominant_color(segment, rule, palette)?;
     let (choices, truth) = offered(context, color).ok_or(Reason::NotOffered)?;
     let (_, most, next, none) = segment.leading_color();
@@ -47,9 +48,7 @@ fn candidate(
         "nameless_ppm": share(none),
         "median_rgb": segment.median,
     });
-    let text = rule
-        .text
-        .replace("{object}", context.book.name(&segment.class));
+    let text = context.book.filled(&rule.text, &rule.plural, word);
     Ok(context.viable(
         Candidate {
             family: Family::Color,

@@ -26,6 +26,7 @@ pub(crate) mod statistics;
 pub(crate) mod summary;
 #[cfg(test)]
 mod tests;
+mod vocabulary;
 
 pub use generate::{Generated, QuestionRequest, generate};
 pub use rule_context::GeneratedQuestion;

@@ -22,8 +22,12 @@ pub enum Reason {
     Void,
     /// A large mirror shows objects that are elsewhere.
     Mirror,
-    /// The data set has no label for the class; it may be part of another label.
+    /// The data set has no label or word for the thing; it may be part of another label.
     Inexpressible,
+    /// A coarse class in which such a thing may be hidden is visible.
+    Hidden,
+    /// The segment has no word of its own, or one that questions do not use.
+    Wordless,
     /// An object that may be mistaken for it is visible.
     Confusable,
     /// The class is rare in such rooms, so the answer could be guessed without the image.

@@ -38,6 +38,34 @@ fn one_colour_must_dominate() {
 }
 
 #[test]
+fn things_are_called_by_their_own_words() {
+    for (class, word, text) in [
+        (
+            "cushion",
+            "pillow",
+            "What color is the pillow in the image?",
+        ),
+        ("table", "desk", "What color is the desk in the image?"),
+        (
+            "curtain",
+            "curtains",
+            "What color are the curtains in the image?",
+        ),
+        (
+            "blinds",
+            "window blinds",
+            "What color are the blinds in the image?",
+        ),
+    ] {
+        let frame = frame(&[(class, word, 100_000)]);
+        let question = candidate(&frame, &Family::Color, class, "").unwrap();
+        assert_eq!(question.text, text);
+    }
+    let coarse = sofa(|frame| frame.segments[1].source = WordSource::Coarse);
+    assert_eq!(coarse, Some(Reason::Wordless));
+}
+
+#[test]
 fn the_object_must_be_unique_and_large_enough() {
     let with_second = |area| {
         let frame = frame(&[("sofa", "sofa", 100_000), ("sofa", "sofa", area)]);
