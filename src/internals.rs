@@ -29,6 +29,7 @@ pub mod questions {
     pub use crate::questions::observer::controls::spoiled;
     pub use crate::questions::observer::{Observation, ObservedFrame};
     pub use crate::questions::room::RoomSource;
+    pub use crate::questions::rule_context::RuleResult;
     pub use crate::questions::rules::{ClassFlag, Rules};
     pub use crate::questions::statistics::measure;
     pub use crate::types::Control;

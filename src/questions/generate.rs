@@ -13,6 +13,7 @@ use super::room::{RoomSigns, RoomSource, classify};
 use super::rule_context::{Candidate, GeneratedQuestion, RuleContext, RuleResult};
 use super::rules::{RuleBook, Rules};
 use super::statistics::FrameStatistics;
+use super::views::Views;
 use super::vocabulary::Vocabulary;
 use super::{affordance, closest, color, presence, room_type};
 use crate::error::Result;
@@ -114,6 +115,7 @@ pub fn generate(
     mut explain: impl FnMut(&FrameId, &RuleResult),
 ) -> Result<Generated> {
     let book = request.rules.book();
+    let views = Views::of(frames, request.palette, book);
     let vocabulary = Vocabulary::of(frames, request.labels, book);
     let mut frames: Vec<&FrameStatistics> = frames.iter().collect();
     frames.sort_by(|a, b| (&a.scene, &a.frame).cmp(&(&b.scene, &b.frame)));
@@ -144,6 +146,7 @@ pub fn generate(
             room: room.as_deref(),
             any_room: any_room(frame, signs, request.room_source),
             vocabulary: &vocabulary,
+            views: &views,
             frequency: &frequency,
             picker: Picker {
                 seed: book.seed,

@@ -54,6 +54,10 @@ pub enum Reason {
     Motley,
     /// People do not agree on a name for the colour.
     Nameless,
+    /// Relative to the light of the frame, or around the thing, the colour has another name: a white thing in shade looks grey.
+    Lit,
+    /// Another view of the thing shows another colour.
+    Disagreed,
     /// The colour is not one of the choices.
     NotOffered,
     /// The frame has no depth.

@@ -9,6 +9,7 @@ use super::reason::Reason;
 use super::room::RoomSigns;
 use super::rules::RuleBook;
 use super::statistics::{FrameStatistics, Segment};
+use super::views::Views;
 use super::vocabulary::Vocabulary;
 use crate::types::{Family, Labels, Question};
 
@@ -27,6 +28,8 @@ pub(crate) struct RuleContext<'a> {
     pub frequency: &'a Frequency,
     /// The words that the data set can say.
     pub vocabulary: &'a Vocabulary,
+    /// The colours of things in all views of their scenes.
+    pub views: &'a Views,
     /// Picks among candidates that are equally good.
     pub picker: Picker<'a>,
 }

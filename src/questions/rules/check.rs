@@ -11,8 +11,15 @@ impl RuleBook {
         if self.schema != SCHEMA {
             return Err(format!("schema {:?}; {SCHEMA:?} expected", self.schema));
         }
-        if self.measure.erosion_per_height == 0 || self.measure.void_per_height == 0 {
+        let measure = &self.measure;
+        if measure.erosion_per_height == 0 || measure.void_per_height == 0 {
             return Err("erosion_per_height and void_per_height must be above 0".to_owned());
+        }
+        let percents = [measure.light_percent, measure.around_percent];
+        if measure.light_rows == 0 || percents.iter().any(|percent| !(1..=100).contains(percent)) {
+            return Err(
+                "light_rows must be above 0, light_percent and around_percent 1 to 100".to_owned(),
+            );
         }
         self.check_classes()?;
         self.check_words()?;

@@ -24,6 +24,10 @@ pub struct MeasureRule {
     pub crushed: u8,
     pub dark_luma: u8,
     pub detail_ppm: u64,
+    pub luminous: BTreeSet<String>,
+    pub light_rows: usize,
+    pub light_percent: u64,
+    pub around_percent: u64,
 }
 
 /// Thresholds that a segment must pass to be evidence.
@@ -286,6 +290,7 @@ pub struct ColorRule {
     pub dominant_ppm: u64,
     pub lead: u64,
     pub none_ppm: u64,
+    pub view_px: u64,
     pub candidates: ColorChoices,
     pub fixed8: Vec<Color>,
     pub neighbours: Vec<[Color; 2]>,

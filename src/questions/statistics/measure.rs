@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::FrameStatistics;
 use super::light::{frame_depth, luma};
+use super::reference::LightSamples;
 use super::scene::SceneMaps;
 use super::shape::MaskShapes;
 use crate::error::Result;
@@ -33,6 +34,7 @@ pub fn measure(
     let (void, effective_void, lower_void) = scene.void(&shapes.joint, rule);
     let mut cores = shapes.cores(frame, &scene, rule, palette);
     let coarse = &rules.book().coarse;
+    let samples = LightSamples::of(frame, &scene, rule);
     let (mut classes, mut loose, mut words) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
     let mut unnamed = BTreeMap::new();
     for (&(mask, id), &count) in &shapes.joint {
@@ -58,6 +60,7 @@ pub fn measure(
         }
         if let Some(core) = cores[mask].take() {
             core.write_to(&mut segment);
+            segment.around = samples.around(mask as u32 + 1, segment.bbox);
             segments.push(segment);
         }
     }
@@ -67,6 +70,7 @@ pub fn measure(
         scene: frame.scene.clone(),
         size,
         luma: luma(frame),
+        light: samples.light(),
         void,
         effective_void,
         lower_void,

@@ -6,6 +6,7 @@ mod components;
 mod light;
 mod measure;
 mod opening;
+mod reference;
 mod rim;
 pub(in crate::questions) mod scene;
 mod shape;
@@ -40,6 +41,8 @@ pub struct FrameStatistics {
     pub size: [usize; 2],
     /// 10 %, 50 % and 90 % quantiles of luma, from 0 to 255.
     pub luma: [u8; 3],
+    /// The light of the frame by its surfaces: a high quantile of each channel, without windows, lamps, mirrors and screens.
+    pub light: [u8; 3],
     /// Number of pixels without a class.
     pub void: u64,
     /// Number of void pixels that remain after a morphological opening, which removes thin margins between labels.
@@ -131,6 +134,9 @@ pub struct Segment {
     pub colors: [u64; BINS],
     /// Median code of each channel over the core.
     pub median: [u8; 3],
+    /// The light around the segment by other surfaces: a high quantile of luma near it. `None` if there are none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub around: Option<u8>,
     /// Number of over-exposed core pixels.
     pub bright: u64,
     /// Number of core pixels crushed to black.

@@ -166,6 +166,7 @@ impl MaskShapes {
             depth: None,
             colors: [0; BINS],
             median: [0; 3],
+            around: None,
             bright: 0,
             crushed: 0,
         })

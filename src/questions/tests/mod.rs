@@ -37,6 +37,7 @@ pub(crate) fn frame(segments: &[(&str, &str, u64)]) -> FrameStatistics {
         scene: "scene".into(),
         size: [1000, 1000],
         luma: [60, 120, 200],
+        light: [255; 3],
         void: 0,
         effective_void: 0,
         lower_void: 0,
@@ -81,6 +82,7 @@ pub(crate) fn frame(segments: &[(&str, &str, u64)]) -> FrameStatistics {
             depth: Some(depth_at(area, 2000 + 1000 * id)),
             colors,
             median: [110, 70, 40],
+            around: None,
             bright: 0,
             crushed: 0,
         });
