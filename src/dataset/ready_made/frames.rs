@@ -294,23 +294,18 @@ impl<'a> Frames<'a> {
             let image = match self.find(answered)? {
                 Found::Cell { facts, .. } => facts.digest,
                 Found::Frame(name) => Digest::of(name.0.as_bytes()),
-                Found::Member(name) => match (files.get(&name), self.archive) {
-                    (Some(digest), _) => *digest,
-                    (None, Some(archive)) => {
-                        let digest = Digest::of(&archive.image(&name.0)?);
-                        files.insert(name, digest);
-                        digest
+                Found::Member(name) => {
+                    if let (None, Some(archive)) = (files.get(&name), self.archive) {
+                        files.insert(name.clone(), Digest::of(&archive.image(&name.0)?));
                     }
-                    (None, None) => Digest::of(name.0.as_bytes()),
-                },
-                Found::File(name, path) => match files.get(&name) {
-                    Some(digest) => *digest,
-                    None => {
-                        let digest = Digest::of(&reading::bytes(&path)?);
-                        files.insert(name, digest);
-                        digest
+                    files[&name]
+                }
+                Found::File(name, path) => {
+                    if !files.contains_key(&name) {
+                        files.insert(name.clone(), Digest::of(&reading::bytes(&path)?));
                     }
-                },
+                    files[&name]
+                }
             };
             let options = answered.choices.texts().iter().map(String::as_bytes);
             let parts = [image.as_bytes(), answered.item.text.as_bytes()];

@@ -100,7 +100,7 @@ impl Roles {
             answers: named(Role::Answer)?,
             ids: named(Role::Id)?,
             hint: named(Role::Hint)?.into_iter().next(),
-            family: family(table, named(Role::Family)?),
+            family: family(table, &named(Role::Family)?),
             evidence,
             split_options: how.and_then(|entry| match &entry.how {
                 How::Split(signs) => Some(signs.clone()),
@@ -245,7 +245,7 @@ fn cells(table: &Table) -> Vec<Column> {
 }
 
 /// The first column of families with more than one value; if all are constant, the first.
-fn family(table: &Table, columns: Vec<Column>) -> Option<Column> {
+fn family(table: &Table, columns: &[Column]) -> Option<Column> {
     let varies = |column: &&Column| {
         let texts = table.rows.iter().map(|row| column.text(row));
         let mut seen = BTreeSet::new();

@@ -58,10 +58,7 @@ impl Summary<'_> {
             ));
         }
         for (ending, number) in self.cut {
-            lines.push(format!(
-                "cut from the question: {ending:?} {} times",
-                number
-            ));
+            lines.push(format!("cut from the question: {ending:?} {number} times"));
         }
         if families.len() > MANY_FAMILIES {
             lines.push(format!(

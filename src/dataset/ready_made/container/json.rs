@@ -121,9 +121,8 @@ fn add(found: &Found, number: u64, inner: Option<&str>, table: &mut Table) -> Re
     };
     let name: Arc<str> = list.into();
     let mut outer = fields;
-    let rows = match outer.remove(list) {
-        Some(Value::Array(rows)) => rows,
-        _ => return Err(format!("object {number} has no list {list:?}")),
+    let Some(Value::Array(rows)) = outer.remove(list) else {
+        return Err(format!("object {number} has no list {list:?}"));
     };
     for (at, row) in rows.into_iter().enumerate() {
         let Value::Object(row) = row else {

@@ -298,7 +298,7 @@ mod tests {
             (r#"{"items": [1, 2"#, "the file ends at byte"),
             (r#"{"items": ["abc"#, "inside a value"),
             (r#"{"items" 1}"#, "':' is expected"),
-            (r#"{items: 1}"#, "not the name of a field"),
+            (r"{items: 1}", "not the name of a field"),
             (r#"{"items": []} {"items": []}"#, "named .jsonl"),
             (r#"{"items": [1 2]}"#, "']' is expected"),
             (

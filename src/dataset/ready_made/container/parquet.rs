@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use parquet::basic::Compression;
 use parquet::column::reader::{ColumnReader, get_column_reader};
 use parquet::data_type::ByteArray;
-use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader};
+use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader, RowGroupMetaData};
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::file::serialized_reader::SerializedPageReader;
 use parquet::record::{Field, Row as Record};
@@ -106,7 +106,10 @@ pub(super) fn read(path: &Path, table: &mut Table) -> Result<()> {
 
 /// Refuses a column whose compression is not read.
 fn check_codecs(path: &Path, footer: &ParquetMetaData) -> Result<()> {
-    let columns = footer.row_groups().iter().flat_map(|group| group.columns());
+    let columns = footer
+        .row_groups()
+        .iter()
+        .flat_map(RowGroupMetaData::columns);
     for column in columns {
         let codec = column.compression();
         let is_read = matches!(

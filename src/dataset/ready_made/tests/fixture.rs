@@ -50,7 +50,9 @@ pub(super) fn set(name: &str, rows: &[Map<String, Value>]) -> (tempfile::TempDir
 pub(super) fn write(path: &Path, rows: &[Map<String, Value>]) {
     let text = match path.extension().unwrap().to_str().unwrap() {
         "json" => serde_json::to_string_pretty(rows).unwrap(),
-        "jsonl" => rows.iter().map(|row| format!("{}\n", json!(row))).collect(),
+        "jsonl" => rows.iter().fold(String::new(), |text, row| {
+            text + &json!(row).to_string() + "\n"
+        }),
         "tsv" => table(rows, b'\t'),
         "csv" => table(rows, b','),
         "parquet" => return parquet(path, rows),

@@ -34,14 +34,14 @@ struct Looked {
     bytes: u64,
 }
 
-/// Looks at the images that the questions are about; returns their number, and the bytes of their files.
+/// Looks at the images that the questions are about.
 pub(super) fn images(
     dataset: &Dataset,
     questions: &[Question],
     depth: Depth,
     progress: &Progress,
     findings: &mut Findings,
-) -> Result<u64> {
+) {
     let asked = first_asked(questions);
     let bar = progress.bar("reading images", asked.len());
     let looked: Vec<Looked> = asked
@@ -87,7 +87,6 @@ pub(super) fn images(
         findings.warn(line);
     }
     light(dataset, &asked, findings);
-    Ok(bytes)
 }
 
 fn look(dataset: &Dataset, id: &FrameId, depth: Depth) -> Looked {

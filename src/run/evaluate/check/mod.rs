@@ -7,6 +7,7 @@ mod images;
 mod questions;
 mod settings;
 
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -144,7 +145,7 @@ fn data(
     } else {
         Depth::Heads
     };
-    images::images(&dataset, &asked, depth, progress, findings)?;
+    images::images(&dataset, &asked, depth, progress, findings);
     if let Some(path) = &check.save_questions {
         save(path, &dataset, &asked)?;
         findings.ok(format!(
@@ -198,5 +199,8 @@ fn save(path: &Path, dataset: &Dataset, questions: &[Question]) -> Result<()> {
 }
 
 fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
 }
