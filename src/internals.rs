@@ -12,7 +12,7 @@ pub mod dataset {
     pub use crate::dataset::image_file::ImageFile;
     pub use crate::dataset::picture::Picture;
     pub use crate::dataset::reading_rule::{ColourRule, MOST_PIXELS, ReadingRule, Transfer};
-    pub use crate::dataset::{DataPlace, Dataset};
+    pub use crate::dataset::{DataPlace, Dataset, SetArgs};
 }
 
 pub mod job {
@@ -29,6 +29,7 @@ pub mod questions {
     pub use crate::questions::observer::controls::spoiled;
     pub use crate::questions::observer::{Observation, ObservedFrame};
     pub use crate::questions::room::RoomSource;
+    pub use crate::questions::rule_context::RuleResult;
     pub use crate::questions::rules::{ClassFlag, Rules};
     pub use crate::questions::statistics::measure;
     pub use crate::types::Control;

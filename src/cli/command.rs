@@ -11,9 +11,10 @@ use crate::job::report::ReportArgs;
 use crate::run::batch::{BatchFolderArgs, BatchImportArgs, BatchStatusArgs};
 use crate::run::calibrate::CalibrateArgs;
 use crate::run::enhance::EnhanceArgs;
-use crate::run::evaluate::EvaluateArgs;
+use crate::run::evaluate::{CheckArgs, EvaluateArgs};
 use crate::run::export::ExportArgs;
 use crate::run::import::ImportArgs;
+use crate::run::init::InitArgs;
 use crate::run::models::ModelsArgs;
 use crate::run::openeqa::OpenEqaArgs;
 use crate::run::questions::QuestionsArgs;
@@ -84,6 +85,10 @@ pub(crate) enum Command {
     Calibrate(Box<CalibrateArgs>),
     /// Make multiple-choice questions about frames, by rule, from their depth, class and segment maps
     Questions(Box<QuestionsArgs>),
+    /// Make a folder of data that a run takes as it is, to put your own images and questions in
+    Init(InitArgs),
+    /// Check data, images, models and enhancers before anything is asked or paid; takes the flags of the evaluation
+    Check(Box<CheckCommand>),
     /// Import frames of another data set as a folder of frames
     Import(Box<ImportArgs>),
     /// Write ready-made sets for other tools, one for each condition, with its images
@@ -146,6 +151,17 @@ pub(crate) enum BatchCommand {
     Export(Box<BatchExportArgs>),
     /// Import the replies of a Batch API into a run
     Import(BatchImportArgs),
+}
+
+/// The flags of `check`.
+#[derive(Debug, Args)]
+pub(crate) struct CheckCommand {
+    /// Flags of the check.
+    #[command(flatten)]
+    pub check: CheckArgs,
+    /// Flags of the evaluation.
+    #[command(flatten)]
+    pub evaluate: EvaluateArgs,
 }
 
 /// The flags of `batch run`.

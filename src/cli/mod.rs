@@ -22,7 +22,7 @@ use crate::job::merge::merge;
 use crate::job::progress::{Progress, Verbosity};
 use crate::job::report::report;
 use crate::job::{Outcome, image_words};
-use crate::run::evaluate::{evaluate, export_batch, run_batch};
+use crate::run::evaluate::{check, evaluate, export_batch, run_batch};
 use crate::run::openeqa::openeqa;
 use crate::run::{self, study};
 use crate::types::manifest::Status;
@@ -102,6 +102,7 @@ fn read(parsed: &layers::Parsed) -> Result<Cli> {
         None => Some(&mut cli.evaluate.job),
         Some(Command::Batch(BatchCommand::Export(args))) => Some(&mut args.evaluate.job),
         Some(Command::Batch(BatchCommand::Run(args))) => Some(&mut args.evaluate.job),
+        Some(Command::Check(args)) => Some(&mut args.evaluate.job),
         Some(Command::OpenEqa(args)) => Some(&mut args.job),
         _ => None,
     };
@@ -121,6 +122,8 @@ fn carry_out(cli: Cli, progress: &Progress) -> Result<Outcome> {
         Command::Realism(args) => run::realism::realism(&args, progress),
         Command::Calibrate(args) => run::calibrate::calibrate(&args, progress),
         Command::Questions(args) => run::questions::questions(&args, progress),
+        Command::Init(args) => run::init::init(&args, progress),
+        Command::Check(args) => check(args.evaluate, &args.check, progress),
         Command::Import(args) => run::import::import(&args, progress),
         Command::Export(args) => run::export::export(&args, progress),
         Command::Rooms(args) => run::rooms::rooms(&args, progress),

@@ -5,10 +5,10 @@ use std::collections::BTreeSet;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, Command as Clap};
 
-use super::command::{BatchCommand, Cli, Command};
+use super::command::{BatchCommand, CheckCommand, Cli, Command};
 use super::layers;
 use crate::ask::{AccessArgs, ImageArgs, Parameters, RequestArgs, Sending};
-use crate::dataset::CodesArgs;
+use crate::dataset::{CodesArgs, SetArgs};
 use crate::enhance::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
 use crate::job::batch::{BatchFileArgs, BatchRunArgs};
 use crate::job::models::ModelName;
@@ -28,6 +28,7 @@ pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
         None => idle.evaluation(&cli.evaluate),
         Some(Command::Batch(BatchCommand::Export(args))) => idle.evaluation(&args.evaluate),
         Some(Command::Batch(BatchCommand::Run(args))) => idle.evaluation(&args.evaluate),
+        Some(Command::Check(args)) => idle.check(args),
         Some(Command::OpenEqa(args)) => idle.open(args),
         Some(Command::Synthesize(args)) if args.check.is_some() => {
             let mut others = ids::<LightArgs>();
@@ -160,7 +161,20 @@ impl NoEffect {
             let why = "no model at an endpoint is shown an image";
             self.because(why, &["image_first".to_owned()]);
         }
+        if args.data.data.path().is_none() {
+            self.because("the built-in rooms are no files", &ids::<SetArgs>());
+        }
         self.job(&args.job, &images, &replies, None);
+    }
+
+    fn check(&mut self, args: &CheckCommand) {
+        if let Some(place) = &args.check.place {
+            let why = "the data are named without it";
+            self.because(why, &["data".to_owned()]);
+            if place.path().is_none() {
+                self.because("the built-in rooms are no files", &ids::<SetArgs>());
+            }
+        }
     }
 
     fn open(&mut self, args: &OpenEqaArgs) {

@@ -13,7 +13,7 @@ use std::str::FromStr;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::questions::{checked, other};
+use super::family::{checked, other};
 use crate::error::{Error, Result};
 use crate::files::reading::text;
 use crate::types::question::CANNOT_TELL;

@@ -25,7 +25,7 @@ use super::image_file::format::READ;
 use super::image_names::{ImageNames, is_image};
 use super::maps::{DepthFile, MapPaths};
 use super::view::FrameFacts;
-use super::{Dataset, ImageSource, questions, stem};
+use super::{Dataset, ImageSource, Root, SetArgs, ready_made, stem};
 use crate::error::{Error, Result};
 use crate::files::reading::{entries, json, json_lines};
 use crate::labels;
@@ -84,18 +84,11 @@ impl FrameLine {
     /// The files of the frame and the other facts of its line. Every file must exist.
     fn source(
         self,
-        folder: &Path,
+        root: &Root,
         info: &DataSetInfo,
         names: &SceneNames,
     ) -> Result<ImageSource, String> {
-        let existing = |file: PathBuf| {
-            let path = folder.join(file);
-            if path.is_file() {
-                Ok(path)
-            } else {
-                Err(format!("no such file: {}", path.display()))
-            }
-        };
+        let existing = |file: PathBuf| root.file(root.folder(), &file);
         let rgb = existing(self.rgb)?;
         let depth = self.depth.map(existing).transpose()?;
         let maps = MapPaths {
@@ -131,7 +124,7 @@ impl FrameLine {
 }
 
 /// The frames of a folder and the labels of its maps, without questions.
-pub(super) fn frames(folder: &Path) -> Result<Dataset> {
+pub(super) fn frames(folder: &Path, further: &[PathBuf]) -> Result<Dataset> {
     let info = data_set_info(folder)?;
     let labels = labels(folder)?;
     let title = info.name.unwrap_or_default();
@@ -140,7 +133,7 @@ pub(super) fn frames(folder: &Path) -> Result<Dataset> {
     } else {
         title.clone()
     };
-    let dataset = Dataset::new(name, sources(folder)?, Vec::new());
+    let dataset = Dataset::new(name, sources(folder, further)?, Vec::new());
     Ok(Dataset {
         title,
         labels,
@@ -169,11 +162,15 @@ fn data_set_info(folder: &Path) -> Result<DataSetInfo> {
 }
 
 /// Segment number → name in a scene; empty without a `segments.json`.
-fn segment_names(folder: &Path, scene: &str) -> Result<Arc<BTreeMap<u32, SegmentName>>> {
-    let path = folder.join("scenes").join(scene).join(SEGMENTS);
+fn segment_names(root: &Root, scene: &str) -> Result<Arc<BTreeMap<u32, SegmentName>>> {
+    let below = Path::new("scenes").join(scene).join(SEGMENTS);
+    let path = root.folder().join(&below);
     if !path.exists() {
         return Ok(Arc::default());
     }
+    let path = root
+        .file(root.folder(), &below)
+        .map_err(|problem| Error::data("scene", problem))?;
     let names: BTreeMap<u32, SegmentName> = json(&path)?;
     let canonical = labels::canonical();
     if let Some((id, name)) = names
@@ -189,26 +186,36 @@ fn segment_names(folder: &Path, scene: &str) -> Result<Arc<BTreeMap<u32, Segment
     Ok(Arc::new(names))
 }
 
-pub(super) fn open(folder: &Path, questions: Option<&Path>) -> Result<Dataset> {
+pub(super) fn open(folder: &Path, questions: Option<&Path>, set: &SetArgs) -> Result<Dataset> {
     let file = questions.map_or_else(|| folder.join(QUESTIONS), Path::to_owned);
     if questions.is_none() && !file.exists() {
         if folder.join(FRAMES).exists() && folder.join(CLASSES).exists() {
-            return frames(folder);
+            return frames(folder, &set.data_root);
         }
         let problem = format_args!(
             "no {QUESTIONS} in this folder, and no {FRAMES} with {CLASSES} to make questions of; --questions FILE names some"
         );
         return Err(Error::data(folder.display(), problem));
     }
-    let questions = questions::read(&file)?;
-    Dataset::new(stem(folder), sources(folder)?, Vec::new()).with_questions_of(questions, &file)
+    Dataset::new(stem(folder), sources(folder, &set.data_root)?, Vec::new())
+        .with_questions_of(&file, set)
+}
+
+/// Whether a place is a folder of frames, and not a ready-made set.
+pub(super) fn is_folder_of_frames(place: &Path, questions: Option<&Path>) -> bool {
+    let has = |name: &str| place.join(name).exists();
+    place.is_dir()
+        && (questions.is_some() || has(FRAMES) || has(QUESTIONS) || !ready_made::holds_files(place))
 }
 
 /// The frames of a folder: those in `frames.jsonl`, or every image if there is no such list.
-pub(super) fn sources(folder: &Path) -> Result<BTreeMap<FrameId, ImageSource>> {
+pub(super) fn sources(
+    folder: &Path,
+    further: &[PathBuf],
+) -> Result<BTreeMap<FrameId, ImageSource>> {
     let list = folder.join(FRAMES);
     if list.exists() {
-        frames_of_list(folder, &list)
+        frames_of_list(&Root::of(folder, further)?, &list)
     } else {
         images(folder)
     }
@@ -222,16 +229,18 @@ pub(super) fn image(path: &Path) -> Result<BTreeMap<FrameId, ImageSource>> {
     Ok([(id, ImageSource::image(path.to_owned()))].into())
 }
 
-fn frames_of_list(folder: &Path, list: &Path) -> Result<BTreeMap<FrameId, ImageSource>> {
-    let (info, mut names) = (data_set_info(folder)?, SceneNames::new());
+fn frames_of_list(root: &Root, list: &Path) -> Result<BTreeMap<FrameId, ImageSource>> {
+    let (info, mut names) = (data_set_info(root.folder())?, SceneNames::new());
     let mut sources = BTreeMap::new();
     for (number, line) in json_lines::<FrameLine>(list)? {
         let id = FrameId(format!("{}/{}", line.scene, line.frame));
         if !names.contains_key(&line.scene) {
-            names.insert(line.scene.clone(), segment_names(folder, &line.scene)?);
+            let of_scene = segment_names(root, &line.scene)
+                .map_err(|problem| Error::line(list, number, problem))?;
+            names.insert(line.scene.clone(), of_scene);
         }
         let source = line
-            .source(folder, &info, &names)
+            .source(root, &info, &names)
             .map_err(|problem| Error::line(list, number, problem))?;
         if sources.insert(id.clone(), source).is_some() {
             let problem = format_args!("a second frame {:?}", id.0);
@@ -299,13 +308,19 @@ mod tests {
     fn a_frame_has_the_maps_its_line_names() {
         let id = FrameId("a/0".into());
         let bare = folder(r#","depth":null,"depth_scale":0.001"#);
-        let frame = open(bare.path(), None).unwrap().frame(&id).unwrap();
+        let frame = open(bare.path(), None, &SetArgs::default())
+            .unwrap()
+            .frame(&id)
+            .unwrap();
         assert_eq!((&frame.id, frame.rgb.width()), (&id, 2));
         assert!(frame.depth.is_none() && frame.semantic.is_none() && frame.segments.is_none());
         let full = folder(
             r#","depth":"deep.png","depth_scale":0.002,"sem":"sem.png","over":"deep.png","t":1.5"#,
         );
-        let frame = open(full.path(), None).unwrap().frame(&id).unwrap();
+        let frame = open(full.path(), None, &SetArgs::default())
+            .unwrap()
+            .frame(&id)
+            .unwrap();
         assert_eq!(frame.depth.unwrap(), array![[0, 3000]]);
         assert_eq!(frame.semantic.unwrap(), array![[3, 4]]);
         assert_eq!(frame.segments.unwrap(), array![[0, 1500]]);
@@ -328,7 +343,7 @@ mod tests {
         for (keys, says) in [
             (r#","depth":"no.png","depth_scale":1"#, "no.png"),
             (r#","sem":"no.png""#, "no such file: "),
-            (r#","over":"""#, "no such file: "),
+            (r#","over":"""#, "the path is empty"),
             (r#","depth":"deep.png""#, "depth_scale is missing"),
             (
                 r#","depth":"deep.png","depth_scale":0"#,
@@ -337,7 +352,9 @@ mod tests {
             (r#","depth":"deep.png","depth_scale":"mm""#, "invalid type"),
         ] {
             let folder = folder(keys);
-            let error = open(folder.path(), None).unwrap_err().to_string();
+            let error = open(folder.path(), None, &SetArgs::default())
+                .unwrap_err()
+                .to_string();
             assert!(
                 error.contains("frames.jsonl, line 2: ") && error.contains(says),
                 "{error}"
@@ -351,14 +368,16 @@ mod tests {
         let list = folder.path().join(FRAMES);
         let text = fs::read_to_string(&list).unwrap();
         fs::write(&list, format!("\u{feff}{}", text.trim_start())).unwrap();
-        assert!(open(folder.path(), None).is_ok());
+        assert!(open(folder.path(), None, &SetArgs::default()).is_ok());
     }
 
     #[test]
     fn a_broken_line_is_named_once() {
         let folder = folder("");
         fs::write(folder.path().join(FRAMES), "\n{\n").unwrap();
-        let error = open(folder.path(), None).unwrap_err().to_string();
+        let error = open(folder.path(), None, &SetArgs::default())
+            .unwrap_err()
+            .to_string();
         assert!(
             error.ends_with("frames.jsonl, line 2: EOF while parsing an object"),
             "{error}"

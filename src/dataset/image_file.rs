@@ -3,7 +3,6 @@
 mod exr_layers;
 mod facts;
 pub(super) mod format;
-mod guarded;
 mod jpeg_markers;
 mod png_chunks;
 mod tiff_tags;
@@ -21,8 +20,8 @@ use image::{ColorType, DynamicImage, ImageDecoder, ImageReader, Limits};
 use self::exr_layers::ExrFile;
 use self::facts::{Depth, FileFacts, fault, unshowable};
 use self::format::FileFormat;
-use self::guarded::guarded;
 use super::colour::{CodeDepth, ColourSpace, ColourTag, Meaning};
+use super::guarded::guarded;
 use super::maps::MapPaths;
 use super::reading_rule::{ColourRule, ReadingRule, Transfer};
 use crate::error::{Error, Result};

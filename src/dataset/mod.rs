@@ -1,29 +1,29 @@
 //! Data sets: images, their maps, and the questions that came with them.
 //!
 //! The entry point is [`Dataset::open`]. The path decides the reader: a folder of frames ([`frames`]) or a
-//! ready-made multiple-choice set ([`multiple_choice`]). Without a path the data are the built-in rooms ([`rooms`]).
+//! ready-made multiple-choice set ([`ready_made`]). Without a path the data are the built-in rooms ([`rooms`]).
 
 mod bank;
 mod colour;
-mod dialect;
+mod family;
 pub(crate) mod frame_folder;
 pub(crate) mod frames;
+pub(crate) mod guarded;
 pub(crate) mod image_file;
 pub(crate) mod image_names;
+mod image_source;
 pub(crate) mod inputs;
 pub(crate) mod maps;
-pub(crate) mod multiple_choice;
 pub(crate) mod npy;
 pub(crate) mod openeqa;
 pub(crate) mod pairs;
 mod photographs;
 pub(crate) mod picture;
-pub(crate) mod questions;
 pub(crate) mod raw_png;
 pub(crate) mod reading_rule;
+mod ready_made;
+mod root;
 mod settings;
-mod sibling_files;
-mod table;
 mod view;
 
 use std::collections::{BTreeMap, HashSet};
@@ -36,10 +36,14 @@ use crate::types::{Frame, FrameId, Labels, Question};
 
 pub(crate) use bank::{Bank, BankPlace};
 pub(crate) use image_file::ImageFile;
+pub(crate) use image_source::ImageSource;
 use maps::MapPaths;
 pub(crate) use photographs::Photographs;
 pub(crate) use picture::Picture;
 pub(crate) use reading_rule::ReadingRule;
+use ready_made::Form;
+pub use ready_made::SetArgs;
+pub(crate) use root::Root;
 pub(crate) use settings::{BankArgs, CodesArgs, DataArgs, PixelLimit, SelectionArgs, place};
 use view::FrameFacts;
 pub(crate) use view::FrameFiles;
@@ -51,30 +55,22 @@ pub enum DataPlace {
     Rooms(Rooms),
     /// A folder or file of the user.
     Path(PathBuf),
-}
-
-/// The place of one image and of its maps.
-#[derive(Debug, Clone)]
-pub(crate) enum ImageSource {
-    /// An image file, its map files, and the other facts about the frame.
-    File {
-        rgb: PathBuf,
-        maps: MapPaths,
-        view: FrameFacts,
+    /// A well-known set, read by its rules.
+    Known {
+        /// The name of the set.
+        name: String,
+        /// Its file or folder.
+        path: PathBuf,
     },
-    /// A base64 cell of a table, by the position of its row in the file.
-    Cell(table::ImageCell),
-    /// A frame of the built-in rooms.
-    Room(rooms::Room),
 }
 
-impl ImageSource {
-    /// An image file without maps.
-    fn image(rgb: PathBuf) -> Self {
-        Self::File {
-            rgb,
-            maps: MapPaths::default(),
-            view: FrameFacts::default(),
+impl DataPlace {
+    /// The folder or file; `None` for the built-in rooms.
+    #[must_use]
+    pub fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Rooms(_) => None,
+            Self::Path(path) | Self::Known { path, .. } => Some(path),
         }
     }
 }
@@ -89,6 +85,9 @@ pub struct Dataset {
     questions: Vec<Question>,
     labels: Option<Labels>,
     rule: ReadingRule,
+    /// What was taken for what in a ready-made set, one fact a line; empty for other data.
+    reading: Vec<String>,
+    form: Form,
 }
 
 impl Dataset {
@@ -104,6 +103,8 @@ impl Dataset {
             questions,
             labels: None,
             rule: ReadingRule::default(),
+            reading: Vec::new(),
+            form: Form::Own,
         }
     }
 
@@ -114,7 +115,9 @@ impl Dataset {
     pub fn open_without_questions(place: &DataPlace) -> Result<Self> {
         match place {
             DataPlace::Rooms(rooms) => Ok(Self::of_rooms(*rooms)),
-            DataPlace::Path(folder) => Self::of_frames(folder),
+            DataPlace::Path(folder) | DataPlace::Known { path: folder, .. } => {
+                Self::of_frames(folder, &[])
+            }
         }
     }
 
@@ -131,6 +134,16 @@ impl Dataset {
         }
     }
 
+    /// The data of a ready-made set.
+    fn of_set(set: ready_made::ReadySet) -> Self {
+        Self {
+            title: set.title,
+            reading: set.reading,
+            form: set.form,
+            ..Self::new(set.name, set.sources, set.questions)
+        }
+    }
+
     /// The same data set with these questions.
     #[must_use]
     pub fn with_questions(self, questions: Vec<Question>) -> Self {
@@ -138,10 +151,8 @@ impl Dataset {
     }
 
     /// The same data set with the questions of a file. Each must be about one of its frames.
-    fn with_questions_of(self, questions: Vec<Question>, file: &Path) -> Result<Self> {
-        if questions.is_empty() {
-            return Err(Error::data(file.display(), "no questions in it"));
-        }
+    fn with_questions_of(self, file: &Path, set: &SetArgs) -> Result<Self> {
+        let (questions, reading) = ready_made::about_frames(file, set)?;
         let unmatched = questions
             .iter()
             .find(|question| !self.sources.contains_key(&question.frame));
@@ -153,13 +164,22 @@ impl Dataset {
             );
             return Err(Error::data(file.display(), problem));
         }
-        Ok(self.with_questions(questions))
+        Ok(Self {
+            questions,
+            form: if reading.is_empty() {
+                Form::Own
+            } else {
+                Form::Foreign
+            },
+            reading,
+            ..self
+        })
     }
 
     /// The images of an image file or a folder of frames, without questions. No image is read.
     pub fn of_images(path: &Path) -> Result<Self> {
         let sources = if path.is_dir() {
-            frames::sources(path)?
+            frames::sources(path, &[])?
         } else {
             frames::image(path)?
         };
@@ -167,14 +187,14 @@ impl Dataset {
     }
 
     /// The frames of a folder and the labels of its maps, without questions. No image is read.
-    pub fn of_frames(folder: &Path) -> Result<Self> {
+    pub fn of_frames(folder: &Path, further: &[PathBuf]) -> Result<Self> {
         if !folder.is_dir() {
             return Err(Error::usage(
                 "DATA",
                 format_args!("{}: no such folder of frames", folder.display()),
             ));
         }
-        frames::frames(folder)
+        frames::frames(folder, further)
     }
 
     /// The labels of the semantic maps at a place, whether or not it has questions.
@@ -185,7 +205,7 @@ impl Dataset {
         match place {
             DataPlace::Rooms(_) => Ok(Some(rooms::labels())),
             DataPlace::Path(path) if path.is_dir() => frames::labels(path),
-            DataPlace::Path(_) => Ok(None),
+            DataPlace::Path(_) | DataPlace::Known { .. } => Ok(None),
         }
     }
 
@@ -212,7 +232,7 @@ impl Dataset {
         match self.sources.get(id) {
             Some(ImageSource::File { view, .. }) => view.scene.clone(),
             Some(ImageSource::Room(room)) => room.scene(),
-            Some(ImageSource::Cell(_)) | None => String::new(),
+            Some(ImageSource::Embedded(_) | ImageSource::Member(_)) | None => String::new(),
         }
     }
 
@@ -221,26 +241,33 @@ impl Dataset {
     /// No image is read. Every question is checked: its choices, its answer among them, its frame among the images. The
     /// built-in rooms, and a folder of frames with maps but no questions, have none yet. The caller makes those by rule
     /// from [`Self::labels`] and adds them by [`Self::with_questions`].
-    pub fn open(place: &DataPlace, questions: Option<&Path>) -> Result<Self> {
+    pub fn open(place: &DataPlace, questions: Option<&Path>, set: &SetArgs) -> Result<Self> {
         let dataset = match place {
             DataPlace::Rooms(rooms) => {
                 let rooms = Self::of_rooms(*rooms);
                 match questions {
-                    Some(file) => rooms.with_questions_of(questions::read(file)?, file)?,
+                    Some(file) => rooms.with_questions_of(file, set)?,
                     None => rooms,
                 }
             }
-            DataPlace::Path(path) if multiple_choice::is_image_folder(path) => {
-                refuse(
-                    questions,
-                    "a folder with metadata.jsonl brings its own questions",
-                )?;
-                multiple_choice::open_image_folder(path)?
+            DataPlace::Path(path) if frames::is_folder_of_frames(path, questions) => {
+                frames::open(path, questions, set)?
             }
-            DataPlace::Path(path) if path.is_dir() => frames::open(path, questions)?,
             DataPlace::Path(path) => {
                 refuse(questions, "a ready-made set brings its own questions")?;
-                multiple_choice::open(path)?
+                Self::of_set(ready_made::open(path, &stem(path), set)?)
+            }
+            DataPlace::Known { name, path } => {
+                refuse(questions, "a ready-made set brings its own questions")?;
+                let preset = Some(name.clone());
+                Self::of_set(ready_made::open(
+                    path,
+                    &stem(path),
+                    &SetArgs {
+                        preset,
+                        ..set.clone()
+                    },
+                )?)
             }
         };
         if dataset.questions.is_empty() && dataset.labels.is_none() {
@@ -272,6 +299,21 @@ impl Dataset {
         &self.title
     }
 
+    /// What was taken for what in a ready-made set, one fact a line; empty for other data.
+    #[must_use]
+    pub fn reading(&self) -> &[String] {
+        &self.reading
+    }
+
+    /// The lines of [`Self::reading`] that the user should see; none where the set has this program's own form.
+    #[must_use]
+    pub fn reading_to_say(&self) -> &[String] {
+        match self.form {
+            Form::Own => &[],
+            Form::Foreign => &self.reading,
+        }
+    }
+
     /// The questions, in the order of their file.
     #[must_use]
     pub fn questions(&self) -> &[Question] {
@@ -288,7 +330,12 @@ impl Dataset {
                 let file = ImageFile::open(rgb, self.rule)?;
                 file.beside(maps).map(Picture::Encoded)
             }
-            Some(ImageSource::Cell(cell)) => cell.image(self.rule).map(Picture::Encoded),
+            Some(ImageSource::Embedded(image)) => image.image(self.rule).map(Picture::Encoded),
+            Some(ImageSource::Member(archive)) => {
+                let place = format!("{}, {}", archive.path().display(), frame.0);
+                let file = ImageFile::new(archive.image(&frame.0)?, place, self.rule);
+                Ok(Picture::Encoded(file))
+            }
             Some(ImageSource::Room(room)) => Ok(Picture::Drawn(room.clone(), self.rule)),
             None => Err(Error::data(
                 &self.name,
@@ -303,7 +350,7 @@ impl Dataset {
         match self.sources.get(frame)? {
             ImageSource::File { view, .. } => view.intrinsics.map(|camera| camera.fx),
             ImageSource::Room(room) => Some(room.focal()),
-            ImageSource::Cell(_) => None,
+            ImageSource::Embedded(_) | ImageSource::Member(_) => None,
         }
     }
 
@@ -312,7 +359,7 @@ impl Dataset {
     pub fn image_file(&self, frame: &FrameId) -> Option<&Path> {
         match self.sources.get(frame)? {
             ImageSource::File { rgb, .. } => Some(rgb),
-            ImageSource::Cell(_) | ImageSource::Room(_) => None,
+            ImageSource::Embedded(_) | ImageSource::Member(_) | ImageSource::Room(_) => None,
         }
     }
 

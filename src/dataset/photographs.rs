@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::image_file::format::READ;
 use super::image_names::{ImageNames, is_image};
-use super::{DataPlace, Dataset, ImageSource, frames, stem};
+use super::{DataPlace, Dataset, ImageSource, SetArgs, frames, stem};
 use crate::error::{Error, Result};
 use crate::files::reading::entries;
 use crate::types::FrameId;
@@ -28,13 +28,15 @@ impl Photographs {
     ///
     /// # Errors
     /// If the place cannot be read, or has no image.
-    pub(crate) fn at(place: &DataPlace) -> Result<Self> {
+    pub(crate) fn at(place: &DataPlace, set: &SetArgs) -> Result<Self> {
         let dataset = match place {
             DataPlace::Rooms(rooms) => Dataset::of_rooms(*rooms),
-            DataPlace::Path(path) if path.is_dir() => return Self::in_folder(path),
+            DataPlace::Path(path) if path.is_dir() => {
+                return Self::in_folder(path, &set.data_root);
+            }
             DataPlace::Path(path) if is_image(path) => Dataset::of_images(path)?,
-            DataPlace::Path(path) => {
-                let set = Dataset::open(place, None)?;
+            DataPlace::Path(path) | DataPlace::Known { path, .. } => {
+                let set = Dataset::open(place, None, set)?;
                 let count = set.questions().len();
                 let note = format!(
                     "{}: its {count} questions are left aside, and --ask is asked about its images",
@@ -50,7 +52,7 @@ impl Photographs {
         Ok(Self { dataset, notes })
     }
 
-    fn in_folder(folder: &Path) -> Result<Self> {
+    fn in_folder(folder: &Path, further: &[PathBuf]) -> Result<Self> {
         let mut notes = Vec::new();
         if folder.join(frames::QUESTIONS).exists() {
             notes.push(format!(
@@ -59,7 +61,7 @@ impl Photographs {
             ));
         }
         if folder.join(frames::FRAMES).exists() {
-            let dataset = Dataset::of_frames(folder)?;
+            let dataset = Dataset::of_frames(folder, further)?;
             return Ok(Self { dataset, notes });
         }
         let mut scan = Scan::default();
@@ -151,7 +153,7 @@ mod tests {
     use super::*;
 
     fn found(path: &Path) -> Result<(Vec<String>, Vec<String>)> {
-        let found = Photographs::at(&DataPlace::Path(path.to_owned()))?;
+        let found = Photographs::at(&DataPlace::Path(path.to_owned()), &SetArgs::default())?;
         let names = found.dataset.frames().map(|id| id.0.clone());
         Ok((names.collect(), found.notes))
     }

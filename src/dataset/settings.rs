@@ -7,9 +7,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::DataPlace;
 use super::bank::BankPlace;
 use super::reading_rule::{ColourRule, MOST_PIXELS, ReadingRule, Transfer};
+use super::ready_made::{is_known_set, known_sets};
+use super::{DataPlace, SetArgs};
 use crate::rooms::Rooms;
 use crate::types::{Decides, Family};
 
@@ -17,9 +18,13 @@ use crate::types::{Decides, Family};
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct DataArgs {
-    /// A folder of frames, a ready-made set (.tsv, .jsonl), or built-in rooms, rooms:frames=N,seed=N,size=WIDTHxHEIGHT,light=linear
+    /// A folder of frames, a ready-made set (.parquet, .tsv, .csv, .json, .jsonl, a folder of them; a well-known one by its name, as
+    /// mmbench:FILE), or built-in rooms, rooms:frames=N,seed=N,size=WIDTHxHEIGHT,light=linear
     #[arg(long, value_name = "DIR|FILE|rooms:…", value_parser = place, default_value_t, add = Decides::Reply)]
     pub data: DataPlace,
+    /// How a ready-made set is read.
+    #[command(flatten)]
+    pub set: SetArgs,
 }
 
 /// The flags that select questions.
@@ -97,13 +102,26 @@ impl CodesArgs {
     }
 }
 
-/// The place in a text: a path, `rooms` or `rooms:frames=48,seed=7,size=1280x720`. A file or folder named `rooms` is a path.
+/// The place in a text: a path, `rooms`, `rooms:frames=48,seed=7,size=1280x720`, or a well-known set with its path, as `mmvp:FILE`. A
+/// file or folder of the whole name is a path.
 pub(crate) fn place(text: &str) -> Result<DataPlace, String> {
     let path = PathBuf::from(text);
     match text.strip_prefix("rooms:") {
         Some(rooms) => rooms.parse().map(DataPlace::Rooms),
         None if text == "rooms" && !path.exists() => Ok(DataPlace::Rooms(Rooms::default())),
-        None => Ok(DataPlace::Path(path)),
+        None if path.exists() => Ok(DataPlace::Path(path)),
+        None => match text.split_once(':') {
+            Some((name, place)) if is_known_set(name) => Ok(DataPlace::Known {
+                name: name.to_owned(),
+                path: PathBuf::from(place),
+            }),
+            // A letter before a colon is a drive.
+            Some((name, place)) if name.len() > 1 && PathBuf::from(place).exists() => Err(format!(
+                "no rules for a set named {name:?}; there are {}; other sets are read by the names of their columns: --data {place}",
+                known_sets().join(", ")
+            )),
+            _ => Ok(DataPlace::Path(path)),
+        },
     }
 }
 
@@ -123,6 +141,7 @@ impl fmt::Display for DataPlace {
         match self {
             Self::Rooms(rooms) => write!(f, "rooms:{rooms}"),
             Self::Path(path) => path.display().fmt(f),
+            Self::Known { name, path } => write!(f, "{name}:{}", path.display()),
         }
     }
 }

@@ -130,6 +130,11 @@ pub(crate) trait Adapter: fmt::Debug + Sync {
         frame.intrinsics.or(stated).or(default)
     }
 
+    /// The folder that the depth of a frame is read from, for data sets that have several depths of a frame; `None` for others.
+    fn depth_folder(&self, _frame: &ListedFrame) -> Option<&'static str> {
+        None
+    }
+
     /// Reads the maps of a frame; `rgb` is its image.
     ///
     /// # Errors

@@ -29,7 +29,7 @@ struct InterfaceLine {
 
 impl Interface {
     pub(super) fn open(folder: &Path) -> Result<Self> {
-        let dataset = Dataset::of_frames(folder)?;
+        let dataset = Dataset::of_frames(folder, &[])?;
         let Some(labels) = dataset.labels().cloned() else {
             return Err(Error::data(
                 folder.display(),

@@ -22,6 +22,10 @@ use crate::labels::canonical;
 use crate::labels::names::class_of;
 use crate::types::{Intrinsics, Label, Labels, Rgb};
 
+/// The folders of depth, in the order in which they are looked for. `depth_bfx` is `depth` with its holes filled, which is what
+/// the toolbox reads (`depthpath` of its `SUNRGBDMeta`).
+const DEPTHS: [&str; 2] = ["depth_bfx", "depth"];
+
 /// Maximum depth in millimetres; the toolbox clamps at the same value.
 const MAX_DEPTH: u32 = 8_000;
 
@@ -35,7 +39,8 @@ pub(super) struct SunRgbd {
 
 #[derive(Debug)]
 struct SunRgbdFiles {
-    depth: Option<PathBuf>,
+    /// The depth file, with the name of its folder.
+    depth: Option<(&'static str, PathBuf)>,
     annotation: PathBuf,
 }
 
@@ -99,10 +104,10 @@ impl SunRgbd {
                 "no image in this folder",
             ));
         };
-        // `depth_bfx` is `depth` with its holes filled, under the same file name.
-        let mut depths = files(&folder.join("depth_bfx"), &[".png"])?;
-        if depths.is_empty() {
-            depths = files(&folder.join("depth"), &[".png"])?;
+        let mut depth = None;
+        for name in DEPTHS {
+            let first = files(&folder.join(name), &[".png"])?.into_values().next();
+            depth = depth.or(first.map(|path| (name, path)));
         }
         let camera = folder.join("intrinsics.txt");
         let intrinsics = match camera
@@ -121,10 +126,7 @@ impl SunRgbd {
             || ("frame".to_owned(), String::new()),
             |(frame, scene)| (frame.clone(), scene.join("-")),
         );
-        self.files.push(SunRgbdFiles {
-            depth: depths.into_values().next(),
-            annotation,
-        });
+        self.files.push(SunRgbdFiles { depth, annotation });
         self.listing.frames.push(ListedFrame {
             scene: if scene.is_empty() {
                 "sunrgbd".to_owned()
@@ -201,10 +203,15 @@ impl Adapter for SunRgbd {
         &self.listing
     }
 
+    fn depth_folder(&self, frame: &ListedFrame) -> Option<&'static str> {
+        let depth = self.files[frame.index].depth.as_ref();
+        depth.map(|(folder, _)| *folder)
+    }
+
     fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
         let files = &self.files[frame.index];
         let depth = match &files.depth {
-            Some(path) => {
+            Some((_, path)) => {
                 let rotated = png(path, &[SampleForm::Grey16])?;
                 check_same_size(path, &rotated, rgb)?;
                 Some(rotated.mapv(|value| u32::from(value.rotate_right(3)).min(MAX_DEPTH)))

@@ -7,7 +7,7 @@ use std::path::Path;
 use super::progress::Progress;
 use super::questions_by_rule::by_rule;
 use crate::dataset::{
-    Bank, BankArgs, BankPlace, DataPlace, Dataset, Photographs, ReadingRule, SelectionArgs,
+    Bank, BankArgs, BankPlace, DataPlace, Dataset, Photographs, ReadingRule, SelectionArgs, SetArgs,
 };
 use crate::error::{Error, Result};
 use crate::files::reading;
@@ -28,12 +28,13 @@ pub(crate) fn rules(path: Option<&Path>) -> Result<Rules> {
 /// The opened data. If they have no questions, these are made by rule.
 pub(crate) fn open_data(
     place: &DataPlace,
+    set: &SetArgs,
     selection: &SelectionArgs,
     rules: &Rules,
     rule: ReadingRule,
     progress: &Progress,
 ) -> Result<Dataset> {
-    let dataset = Dataset::open(place, selection.questions.as_deref())?.with_rule(rule);
+    let dataset = Dataset::open(place, selection.questions.as_deref(), set)?.with_rule(rule);
     if !dataset.questions().is_empty() {
         return Ok(dataset);
     }
@@ -100,10 +101,11 @@ impl QuestionBank {
     pub(crate) fn data(
         &self,
         place: &DataPlace,
+        set: &SetArgs,
         rule: ReadingRule,
         progress: &Progress,
     ) -> Result<Dataset> {
-        let found = Photographs::at(place)?;
+        let found = Photographs::at(place, set)?;
         for note in &found.notes {
             progress.note(note);
         }

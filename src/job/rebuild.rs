@@ -16,7 +16,7 @@ use super::timings::Timings;
 use super::walk::{Walk, WalkFolder};
 use super::workers::ThreadArgs;
 use crate::ask::Payload;
-use crate::dataset::{DataPlace, Dataset, Photographs, place};
+use crate::dataset::{DataArgs, DataPlace, Dataset, Photographs, place};
 use crate::enhance::{Enhancer, Implausible, ProbeArgs, RuntimeArgs};
 use crate::error::{Error, Result};
 use crate::synthesis::KindSettings;
@@ -87,9 +87,9 @@ impl ImageRebuilder {
             (FrameFolder::Walks(folder, walk), recipe)
         } else {
             let dataset = if manifest.identity.contains_key(ASK) {
-                Photographs::at(&flags.data.data)?.dataset
+                Photographs::at(&flags.data.data, &flags.data.set)?.dataset
             } else {
-                frames(&flags.data.data)?
+                frames(&flags.data)?
             };
             let dataset = dataset.with_rule(flags.codes.rule(flags.limit));
             (FrameFolder::Frames(dataset), recipe)
@@ -164,10 +164,14 @@ fn with_new_paths(mut flags: ImageFlags, args: &RebuildArgs) -> Result<ImageFlag
 }
 
 /// The frames of a data set. Its questions are ignored.
-fn frames(place: &DataPlace) -> Result<Dataset> {
-    match place {
-        DataPlace::Path(path) if path.join("frames.jsonl").is_file() => Dataset::of_frames(path),
-        DataPlace::Path(_) => Dataset::open(place, None),
-        DataPlace::Rooms(_) => Dataset::open_without_questions(place),
+fn frames(data: &DataArgs) -> Result<Dataset> {
+    match &data.data {
+        DataPlace::Path(path) if path.join("frames.jsonl").is_file() => {
+            Dataset::of_frames(path, &data.set.data_root)
+        }
+        place @ (DataPlace::Path(_) | DataPlace::Known { .. }) => {
+            Dataset::open(place, None, &data.set)
+        }
+        place @ DataPlace::Rooms(_) => Dataset::open_without_questions(place),
     }
 }

@@ -179,22 +179,47 @@ impl JobArgs {
         Error::usage("--model", format_args!("no model is named: {remedy}"))
     }
 
+    /// How models are asked that no file of models says it of.
+    fn asking(&self, experiment: &ExperimentSettings) -> AskingArgs {
+        AskingArgs {
+            parameters: self.parameters.clone(),
+            request: self.request.clone(),
+            access: self.access.clone(),
+            sending: self.sending,
+            constrain: experiment.constrain,
+            seed: experiment.sampling_seed,
+            probabilities: experiment.probabilities,
+            reply_headers: Vec::new(),
+        }
+    }
+
+    /// The names of the models, after a check that each has an address and the key that it needs. Nothing is sent.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the flag, variable or file that cannot be used.
+    pub(crate) fn check_models(&self, experiment: &ExperimentSettings) -> Result<Vec<String>> {
+        let context = ResolveContext {
+            typed: &self.typed,
+            shard: Shard::WHOLE,
+            keys: KeyUse::Needed,
+            data: experiment.data.as_deref(),
+            text_baseline: experiment.text_baseline,
+        };
+        let asking = self.asking(experiment);
+        let settings = AskSettings::resolve(&self.models, &asking, context)?;
+        let models = settings.models.iter();
+        Ok(models
+            .map(|model| format!("{} ({})", model.name, model.view))
+            .collect())
+    }
+
     /// The settings of these flags. Files and variables that they name are read.
     ///
     /// # Errors
     /// [`Error::Usage`] with the flag that cannot be used.
     pub(crate) fn resolve(self, experiment: &ExperimentSettings) -> Result<JobSettings> {
         let shard = Shard::resolve(self.scale.shard.as_deref(), |name| std::env::var(name).ok())?;
-        let asking = AskingArgs {
-            parameters: self.parameters,
-            request: self.request,
-            access: self.access,
-            sending: self.sending,
-            constrain: experiment.constrain,
-            seed: experiment.sampling_seed,
-            probabilities: experiment.probabilities,
-            reply_headers: Vec::new(),
-        };
+        let asking = self.asking(experiment);
         let context = ResolveContext {
             typed: &self.typed,
             shard,

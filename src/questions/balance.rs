@@ -14,7 +14,7 @@ use crate::types::{Digest, Family};
 pub enum BalanceMode {
     /// No balancing, as in the paper's Algorithm 1.
     None,
-    /// Numbers of yes and no differ by at most 1 for each class and activity.
+    /// Numbers of yes and no differ by at most 1 for each word and activity.
     #[default]
     Binary,
     /// As binary, and no room type or colour exceeds its share of the answers.
@@ -57,7 +57,7 @@ pub(super) fn balance(
         let binary = |asked: &GeneratedQuestion| {
             let family = &asked.question.family;
             matches!(family, Family::Affordance | Family::Presence)
-                .then(|| (family.clone(), asked.about.clone()))
+                .then(|| (family.clone(), asked.question.text.clone()))
         };
         for (_, list) in groups(&asked, &dropped, binary) {
             let truth = |i: &usize| asked[*i].question.choices.truth();

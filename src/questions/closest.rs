@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::reason::Reason;
 use super::rule_context::{Candidate, RuleContext, RuleResult, rejected};
-use super::rules::{ClassFlag, GapScope};
+use super::rules::{ClassFlag, GapScope, RuleBook};
 use super::statistics::{Segment, SegmentDepth};
 use crate::types::Family;
 
@@ -41,7 +41,7 @@ fn candidate(context: &RuleContext<'_>) -> Result<RuleResult, Reason> {
         GapScope::Classes => rest.iter().find(|(other, _)| other.class != first.0.class),
     };
     let second = second.ok_or(Reason::Few)?;
-    let mut classes = classes(&objects);
+    let mut classes = classes(&objects, book);
     if classes.len() < 2 {
         return Err(Reason::Few);
     }
@@ -50,20 +50,18 @@ fn candidate(context: &RuleContext<'_>) -> Result<RuleResult, Reason> {
 
     let winner = classes[0];
     classes.truncate(book.closest.choices);
+    let about = winner.0.to_owned();
     context.picker.shuffle("closest", &mut classes);
     let truth = classes
         .iter()
         .position(|class| *class == winner)
         .unwrap_or(0);
-    let choices = classes
-        .iter()
-        .map(|class| book.name(class).to_owned())
-        .collect();
+    let choices = classes.iter().map(|(_, word)| (*word).to_owned()).collect();
     let segments: Vec<&Segment> = objects.iter().map(|(segment, _)| *segment).collect();
     Ok(context.viable(
         Candidate {
             family: Family::Closest,
-            about: winner.to_owned(),
+            about,
             text: book.closest.text.clone(),
             choices,
             truth,
@@ -77,12 +75,16 @@ fn candidate(context: &RuleContext<'_>) -> Result<RuleResult, Reason> {
     ))
 }
 
-/// The different classes, nearest first.
-fn classes<'a>(objects: &[NearObject<'a>]) -> Vec<&'a str> {
-    let mut classes: Vec<&str> = Vec::new();
+/// The different classes, nearest first, each with the word of its nearest object.
+fn classes<'a>(objects: &[NearObject<'a>], book: &'a RuleBook) -> Vec<(&'a str, &'a str)> {
+    let mut classes: Vec<(&str, &str)> = Vec::new();
     for (segment, _) in objects {
-        if !classes.contains(&segment.class.as_str()) {
-            classes.push(&segment.class);
+        let Some(word) = segment.called(book) else {
+            continue;
+        };
+        let is_new = |(class, known): &(&str, &str)| *class != segment.class && *known != word;
+        if classes.iter().all(is_new) {
+            classes.push((&segment.class, word));
         }
     }
     classes
@@ -94,6 +96,7 @@ fn eligible(context: &RuleContext<'_>, segment: &Segment) -> bool {
     book.is(&segment.class, ClassFlag::Asked)
         && !book.is(&segment.class, ClassFlag::Structural)
         && !segment.flat(book)
+        && segment.called(book).is_some()
         && context.statistics.area(segment) >= book.closest.area_ppm
 }
 

@@ -4,6 +4,7 @@ use serde_json::json;
 
 use super::colors::{Color, Palette};
 use super::reason::Reason;
+use super::relative::relative;
 use super::rule_context::{Candidate, RuleContext, RuleResult, rejected};
 use super::rules::{ClassFlag, ColorChoices, ColorRule};
 use super::statistics::{Segment, ppm};
@@ -36,7 +37,12 @@ fn candidate(
     if !unique(context, segment) {
         return Err(Reason::NotUnique);
     }
+    let word = segment.called(context.book).ok_or(Reason::Wordless)?;
     let color = dominant_color(segment, rule, palette)?;
+    check_light(context, segment, color, palette)?;
+    if context.views.disagree(context.statistics, segment, color) {
+        return Err(Reason::Disagreed);
+    }
     let (choices, truth) = offered(context, color).ok_or(Reason::NotOffered)?;
     let (_, most, next, none) = segment.leading_color();
     let share = |part| ppm(part, segment.core);
@@ -46,10 +52,10 @@ fn candidate(
         "second_ppm": share(next),
         "nameless_ppm": share(none),
         "median_rgb": segment.median,
+        "light_rgb": context.statistics.light,
+        "around_luma": segment.around,
     });
-    let text = rule
-        .text
-        .replace("{object}", context.book.name(&segment.class));
+    let text = context.book.filled(&rule.text, &rule.plural, word);
     Ok(context.viable(
         Candidate {
             family: Family::Color,
@@ -93,6 +99,29 @@ fn dominant_color(segment: &Segment, rule: &ColorRule, palette: &Palette) -> Res
         return Err(Reason::Motley);
     }
     Ok(color)
+}
+
+/// Checks that the colour has the same name relative to the light of the frame, channel by channel, and relative to the light
+/// around the segment, whose colour is that of the neighbours and does not count.
+fn check_light(
+    context: &RuleContext<'_>,
+    segment: &Segment,
+    color: Color,
+    palette: &Palette,
+) -> Result<(), Reason> {
+    let lights = [
+        Some(context.statistics.light),
+        segment.around.map(|luma| [luma; 3]),
+    ];
+    let in_light = |light: [u8; 3]| {
+        let code = |channel: usize| relative(segment.median[channel], light[channel]);
+        palette.color([0, 1, 2].map(code)) == Some(color)
+    };
+    if lights.into_iter().flatten().all(in_light) {
+        Ok(())
+    } else {
+        Err(Reason::Lit)
+    }
 }
 
 /// The colours that are offered, and the index of the true one; `None` if it is not among them.

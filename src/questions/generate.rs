@@ -13,6 +13,8 @@ use super::room::{RoomSigns, RoomSource, classify};
 use super::rule_context::{Candidate, GeneratedQuestion, RuleContext, RuleResult};
 use super::rules::{RuleBook, Rules};
 use super::statistics::FrameStatistics;
+use super::views::Views;
+use super::vocabulary::Vocabulary;
 use super::{affordance, closest, color, presence, room_type};
 use crate::error::Result;
 use crate::types::{Choices, Digest, Family, FrameId, Labels, Question, QuestionId};
@@ -113,6 +115,8 @@ pub fn generate(
     mut explain: impl FnMut(&FrameId, &RuleResult),
 ) -> Result<Generated> {
     let book = request.rules.book();
+    let views = Views::of(frames, request.palette, book);
+    let vocabulary = Vocabulary::of(frames, request.labels, book);
     let mut frames: Vec<&FrameStatistics> = frames.iter().collect();
     frames.sort_by(|a, b| (&a.scene, &a.frame).cmp(&(&b.scene, &b.frame)));
     let mut generated = Generated::default();
@@ -140,6 +144,9 @@ pub fn generate(
             statistics: frame,
             signs,
             room: room.as_deref(),
+            any_room: any_room(frame, signs, request.room_source),
+            vocabulary: &vocabulary,
+            views: &views,
             frequency: &frequency,
             picker: Picker {
                 seed: book.seed,
@@ -207,6 +214,18 @@ fn room(
     }
 }
 
+/// The room type of a frame, also one that questions do not ask about; `None` if it is unknown.
+fn any_room<'a>(
+    frame: &'a FrameStatistics,
+    signs: &'a RoomSigns,
+    source: RoomSource,
+) -> Option<&'a str> {
+    match source {
+        RoomSource::Signature => signs.winner.as_deref(),
+        RoomSource::Stated => frame.room.as_deref(),
+    }
+}
+
 /// The room type that the data set states for a frame; `None` if questions do not ask about such rooms.
 #[must_use]
 pub(crate) fn stated(frame: &FrameStatistics, book: &RuleBook) -> Option<String> {
@@ -233,7 +252,7 @@ fn apply_rules(family: &Family, context: &RuleContext<'_>, palette: &Palette) ->
     }
 }
 
-/// Numbers of yes and no answers chosen so far, by family and subject.
+/// Numbers of yes and no answers chosen so far, by family and text.
 #[derive(Default)]
 struct AnswerCounts(BTreeMap<(Family, String), [u64; 2]>);
 
@@ -241,7 +260,7 @@ impl AnswerCounts {
     /// Chooses one of a family's candidates.
     ///
     /// For yes-no families, the answer is picked first, if both are possible. Among the candidates with this answer, the
-    /// subject that lacks it most comes first, then the subject asked about least. A pick decides the rest.
+    /// question that lacks it most comes first, then the question asked least. A pick decides the rest.
     fn choose(
         &mut self,
         candidates: Vec<Candidate>,
@@ -261,14 +280,14 @@ impl AnswerCounts {
             .partition(|candidate| candidate.truth == answer);
         let eligible = if wanted.is_empty() { others } else { wanted };
         let rank = |candidate: &Candidate| {
-            let counts = self.0.get(&(family.clone(), candidate.about.clone()));
+            let counts = self.0.get(&(family.clone(), candidate.text.clone()));
             let counts = counts.copied().unwrap_or_default();
             let (own, other) = (counts[candidate.truth], counts[1 - candidate.truth]);
-            let bits = context.picker.bits(family.name(), &candidate.about);
+            let bits = context.picker.bits(family.name(), &candidate.text);
             (i128::from(own) - i128::from(other), own + other, bits)
         };
         let chosen = eligible.into_iter().min_by_key(rank)?;
-        let counts = self.0.entry((family, chosen.about.clone())).or_default();
+        let counts = self.0.entry((family, chosen.text.clone())).or_default();
         counts[chosen.truth] += 1;
         Some(chosen)
     }

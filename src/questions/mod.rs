@@ -18,6 +18,7 @@ pub(crate) mod observer;
 pub(crate) mod pick;
 mod presence;
 pub(crate) mod reason;
+mod relative;
 pub(crate) mod room;
 mod room_type;
 pub(crate) mod rule_context;
@@ -26,6 +27,8 @@ pub(crate) mod statistics;
 pub(crate) mod summary;
 #[cfg(test)]
 mod tests;
+mod views;
+mod vocabulary;
 
 pub use generate::{Generated, QuestionRequest, generate};
 pub use rule_context::GeneratedQuestion;

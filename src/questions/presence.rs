@@ -1,6 +1,6 @@
 //! "Is there a chair in the image?"
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::json;
 
@@ -10,7 +10,8 @@ use super::rules::{ClassFlag, PresenceRule};
 use super::statistics::{Segment, ppm};
 use crate::types::Family;
 
-/// One candidate for every asked class: yes if it has a pixel in the frame, else no.
+/// Candidates for every asked class: if it has a pixel in the frame, a yes for each word by which its segments are called, else
+/// a no for each word that the data set has for it.
 pub(super) fn candidates(context: &RuleContext<'_>) -> Vec<RuleResult> {
     let rule = &context.book.presence;
     let expected = context.room.and_then(|room| {
@@ -21,39 +22,44 @@ pub(super) fn candidates(context: &RuleContext<'_>) -> Vec<RuleResult> {
     let classes = context.book.class.iter();
     let asked = classes.filter(|(_, class)| class.flags.contains(&ClassFlag::Asked));
     asked
-        .map(|(class, _)| {
+        .flat_map(|(class, _)| {
             let present = context.statistics.of_class(class) > 0;
             let result = if present {
                 yes(context, class)
             } else {
                 no(context, class, expected.as_ref())
             };
-            result.unwrap_or_else(|reason| rejected(Family::Presence, class, Some(present), reason))
+            result.unwrap_or_else(|reason| {
+                vec![rejected(Family::Presence, class, Some(present), reason)]
+            })
         })
         .collect()
 }
 
-/// Yes: one segment of the class is large enough, of one class and not cut by the border.
-fn yes(context: &RuleContext<'_>, class: &str) -> Result<RuleResult, Reason> {
+/// Yes: one segment that is called so is large enough, of one class and not cut by the border.
+fn yes(context: &RuleContext<'_>, class: &str) -> Result<Vec<RuleResult>, Reason> {
     let rule = &context.book.presence;
     let segments = context.statistics.segments.iter();
     let mut segments: Vec<&Segment> = segments.filter(|segment| segment.class == class).collect();
     segments.sort_by_key(|segment| (std::cmp::Reverse(segment.area), segment.id));
-    let flaws: Vec<Option<Reason>> = segments
-        .iter()
-        .map(|segment| flaw(context, segment, rule))
-        .collect();
-    match flaws.iter().position(Option::is_none) {
-        Some(found) => Ok(candidate(
-            context,
-            class,
-            0,
-            &segments[found..=found],
-            json!({}),
-        )),
-        // The reason is that of the largest segment. If none is listed, all are tiny.
-        None => Err(flaws.first().copied().flatten().unwrap_or(Reason::Small)),
+    let mut shown: BTreeMap<&str, &Segment> = BTreeMap::new();
+    let mut first_flaw = None;
+    for segment in segments {
+        match (flaw(context, segment, rule), segment.called(context.book)) {
+            (None, Some(word)) => drop(shown.entry(word).or_insert(segment)),
+            (flaw, _) => {
+                first_flaw.get_or_insert(flaw.unwrap_or(Reason::Wordless));
+            }
+        }
     }
+    if shown.is_empty() {
+        // The reason is that of the largest segment. If none is listed, all are tiny.
+        return Err(first_flaw.unwrap_or(Reason::Small));
+    }
+    let shown = shown.into_iter();
+    let found =
+        shown.map(|(word, segment)| candidate(context, (class, word), 0, &[segment], json!({})));
+    Ok(found.collect())
 }
 
 fn flaw(context: &RuleContext<'_>, segment: &Segment, rule: &PresenceRule) -> Option<Reason> {
@@ -74,15 +80,19 @@ fn flaw(context: &RuleContext<'_>, segment: &Segment, rule: &PresenceRule) -> Op
     }
 }
 
-/// No: the class and the classes that may be mistaken for it have no pixel, absence can be shown in this frame, and the class
-/// is common in such rooms.
+/// No: the class and the classes and words that may be mistaken for it have no pixel, nothing of it can be hidden in a coarse
+/// class, absence can be shown in this frame, and the class is common in such rooms.
 fn no(
     context: &RuleContext<'_>,
     class: &str,
     expected: Option<&BTreeSet<String>>,
-) -> Result<RuleResult, Reason> {
-    if !context.labels.expressible.contains(class) {
+) -> Result<Vec<RuleResult>, Reason> {
+    let words: Vec<&str> = context.vocabulary.of_class(class).collect();
+    if words.is_empty() || !context.labels.expressible.contains(class) {
         return Err(Reason::Inexpressible);
+    }
+    if context.may_be_hidden(class) {
+        return Err(Reason::Hidden);
     }
     if let Some(reason) = context.absence_blocker() {
         return Err(reason);
@@ -103,7 +113,8 @@ fn no(
                 .keys()
                 .any(|word| group.names.contains(word))
     });
-    if confused {
+    let resembles = |word: &String| context.book.resembles(word, class);
+    if confused || context.statistics.words.keys().any(resembles) {
         return Err(Reason::Confusable);
     }
     if expected.is_some_and(|expected| !expected.contains(class)) {
@@ -115,19 +126,20 @@ fn no(
         "mirror_ppm": context.statistics.ppm(context.statistics.of_class("mirror")),
         "confusable": groups.flat_map(|group| &group.classes).collect::<BTreeSet<_>>(),
     });
-    Ok(candidate(context, class, 1, &[], evidence))
+    let denied = words.into_iter();
+    let denied = denied.map(|word| candidate(context, (class, word), 1, &[], evidence.clone()));
+    Ok(denied.collect())
 }
 
 fn candidate(
     context: &RuleContext<'_>,
-    class: &str,
+    (class, word): (&str, &str),
     truth: usize,
     segments: &[&Segment],
     evidence: serde_json::Value,
 ) -> RuleResult {
-    let book = context.book;
-    let text = book.presence.text.replace("{article}", book.article(class));
-    let text = text.replace("{object}", book.name(class));
+    let rule = &context.book.presence;
+    let text = context.book.filled(&rule.text, &rule.plural, word);
     context.viable(
         Candidate {
             family: Family::Presence,

@@ -22,8 +22,12 @@ pub enum Reason {
     Void,
     /// A large mirror shows objects that are elsewhere.
     Mirror,
-    /// The data set has no label for the class; it may be part of another label.
+    /// The data set has no label or word for the thing; it may be part of another label.
     Inexpressible,
+    /// A coarse class in which such a thing may be hidden is visible.
+    Hidden,
+    /// The segment has no word of its own, or one that questions do not use.
+    Wordless,
     /// An object that may be mistaken for it is visible.
     Confusable,
     /// The class is rare in such rooms, so the answer could be guessed without the image.
@@ -50,6 +54,10 @@ pub enum Reason {
     Motley,
     /// People do not agree on a name for the colour.
     Nameless,
+    /// Relative to the light of the frame, or around the thing, the colour has another name: a white thing in shade looks grey.
+    Lit,
+    /// Another view of the thing shows another colour.
+    Disagreed,
     /// The colour is not one of the choices.
     NotOffered,
     /// The frame has no depth.

@@ -16,6 +16,8 @@ pub struct RoomSigns {
     pub segments: BTreeMap<String, Vec<u32>>,
     /// The room type, or why there is none.
     pub room: Result<String, NoRoom>,
+    /// The winner, also if questions do not ask about this room type.
+    pub winner: Option<String>,
 }
 
 /// Why a frame has no room type.
@@ -61,7 +63,8 @@ pub(crate) fn classify(statistics: &FrameStatistics, book: &RuleBook) -> RoomSig
             list.dedup();
         }
     }
-    let room = winner(&signs, &scores, &segments).and_then(|room| {
+    let winner = winner(&signs, &scores, &segments);
+    let room = winner.clone().and_then(|room| {
         if book.room.order.contains(&room) {
             Ok(room)
         } else {
@@ -72,6 +75,7 @@ pub(crate) fn classify(statistics: &FrameStatistics, book: &RuleBook) -> RoomSig
         scores,
         segments,
         room,
+        winner: winner.ok(),
     }
 }
 

@@ -9,6 +9,8 @@ use super::reason::Reason;
 use super::room::RoomSigns;
 use super::rules::RuleBook;
 use super::statistics::{FrameStatistics, Segment};
+use super::views::Views;
+use super::vocabulary::Vocabulary;
 use crate::types::{Family, Labels, Question};
 
 /// All that the rules see of a frame.
@@ -18,10 +20,16 @@ pub(crate) struct RuleContext<'a> {
     pub labels: &'a Labels,
     pub statistics: &'a FrameStatistics,
     pub signs: &'a RoomSigns,
-    /// Room type of the frame, from `signs` or from the data set; `None` if it is unknown.
+    /// Room type of the frame, from `signs` or from the data set; `None` if it is unknown, or if questions do not ask about it.
     pub room: Option<&'a str>,
+    /// The same, also of a type that questions do not ask about, such as a laundry room.
+    pub any_room: Option<&'a str>,
     /// Classes that are common in each type of room.
     pub frequency: &'a Frequency,
+    /// The words that the data set can say.
+    pub vocabulary: &'a Vocabulary,
+    /// The colours of things in all views of their scenes.
+    pub views: &'a Views,
     /// Picks among candidates that are equally good.
     pub picker: Picker<'a>,
 }
@@ -145,6 +153,13 @@ impl RuleContext<'_> {
         } else {
             None
         }
+    }
+
+    /// Whether a thing of a class may be hidden among the unnamed pixels of a coarse class. False for a token that is a word.
+    pub(super) fn may_be_hidden(&self, class: &str) -> bool {
+        let hidden = self.book.class.get(class).map(|rule| &rule.hidden);
+        let mut hidden = hidden.into_iter().flatten();
+        hidden.any(|other| self.statistics.unnamed.contains_key(other))
     }
 
     /// Whether the labels of the data set can show that a token is absent. A class must be expressible; a token that is a word

@@ -130,7 +130,7 @@ fn import_frames(
     if written.is_empty() {
         return Err(Error::data(src.display(), "no frame of it could be read"));
     }
-    let note = depths(&written)?;
+    let note = depths(&written)? + &depth_folders(&written);
     let mut scenes: Vec<&str> = frames.iter().map(|frame| frame.scene.as_str()).collect();
     scenes.dedup();
     let listing = adapter.listing();
@@ -179,6 +179,8 @@ struct WrittenFrame {
     line: Map<String, Value>,
     /// The median depth in millimetres; `None` without a depth map.
     depth: Option<u32>,
+    /// The folder of its depth, for data sets that have several depths of a frame.
+    depth_folder: Option<&'static str>,
 }
 
 /// The image of a frame with its maps. Maps belong to the image as it is stored; an image without maps is turned as its file
@@ -243,6 +245,7 @@ fn write_frame(
         room,
     } = maps;
     let median = depth.as_ref().and_then(median);
+    let depth_folder = adapter.depth_folder(frame);
     if let Some(depth) = &depth {
         paths.depth(&mut line, depth, adapter.listing().depth_kind)?;
     }
@@ -260,6 +263,7 @@ fn write_frame(
         ("pose", json!(frame.pose)),
         ("intrinsics", json!(intrinsics)),
         ("room_gt", json!(frame.room.clone().or(room))),
+        ("depth_from", json!(depth_folder)),
     ] {
         if !value.is_null() {
             line.insert(key.to_owned(), value);
@@ -268,6 +272,7 @@ fn write_frame(
     Ok(WrittenFrame {
         line,
         depth: median,
+        depth_folder,
     })
 }
 
@@ -297,6 +302,25 @@ fn depths(written: &[WrittenFrame]) -> Result<String> {
         return Err(Error::data("depth", problem));
     }
     Ok(format!("typical depth: {:.2} m\n", metres(typical)))
+}
+
+/// A note of the folders that depth was read from; empty if the data set has one depth of each frame.
+fn depth_folders(written: &[WrittenFrame]) -> String {
+    let mut counts = BTreeMap::new();
+    for folder in written.iter().filter_map(|written| written.depth_folder) {
+        *counts.entry(folder).or_insert(0_usize) += 1;
+    }
+    let counts: Vec<String> = counts
+        .iter()
+        .map(|(folder, count)| format!("{folder} {count}"))
+        .collect();
+    if counts.is_empty() {
+        return String::new();
+    }
+    format!(
+        "frames by the folder of their depth: {}\n",
+        counts.join(", ")
+    )
 }
 
 /// A note of the words for which no table has a class.

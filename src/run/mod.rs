@@ -6,6 +6,7 @@ pub(crate) mod enhance;
 pub(crate) mod evaluate;
 pub(crate) mod export;
 pub(crate) mod import;
+pub(crate) mod init;
 pub(crate) mod models;
 pub(crate) mod openeqa;
 pub(crate) mod questions;

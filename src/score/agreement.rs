@@ -120,7 +120,7 @@ pub fn clustered_kappa(counts: &[AgreementCounts]) -> Option<Estimate> {
 
 /// Cohen's κ of two binary ratings (Cohen 1960, Educ. Psychol. Meas. 20:37), from the shares that both, the first and the second
 /// got right; `None` if one of them does not vary.
-fn kappa(both: f64, first: f64, second: f64) -> Option<f64> {
+pub(super) fn kappa(both: f64, first: f64, second: f64) -> Option<f64> {
     let observed = 1.0 - first - second + 2.0 * both;
     let expected = first * second + (1.0 - first) * (1.0 - second);
     let varies = |share: f64| share > 0.0 && share < 1.0;

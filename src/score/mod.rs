@@ -23,6 +23,7 @@ pub(crate) mod bootstrap;
 pub(crate) mod by_reading;
 pub(crate) mod calibration;
 pub(crate) mod chance;
+pub(crate) mod checks;
 pub mod choice;
 pub(crate) mod cluster;
 pub(crate) mod common;

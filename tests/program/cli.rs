@@ -189,7 +189,7 @@ fn wrong_data_name_their_file() {
     refused(
         &bench,
         line,
-        &["questions.jsonl, line 1", "\"maybe\"", "choices"],
+        &["questions.jsonl, line 1", "\"maybe\"", "options"],
     );
     data(&bench, |question| question["choices"] = json!(["yes"]));
     refused(&bench, line, &["questions.jsonl, line 1"]);
@@ -207,11 +207,15 @@ fn wrong_data_name_their_file() {
         &["empty", "frames.jsonl"],
     );
     bench.file("table.tsv", "a\tb\n1\t2\n");
-    refused(
-        &bench,
-        "--data table.tsv --model random",
-        &["table.tsv", "column"],
-    );
+    let called = bench.call(&words("--data table.tsv --model random"));
+    assert_eq!(called.code, Some(2));
+    for part in [
+        "table.tsv: no question among its columns",
+        "text     \"1\"",
+        "--map question=COLUMN",
+    ] {
+        assert!(called.stderr.contains(part), "{}", called.stderr);
+    }
 }
 
 #[test]

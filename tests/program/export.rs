@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::support::table::check_rows;
 use assert_cmd::Command;
-use darkqa_eval::internals::dataset::{DataPlace, Dataset};
+use darkqa_eval::internals::dataset::{DataPlace, Dataset, SetArgs};
 use darkqa_eval::internals::synthesis::expose;
 use darkqa_eval::types::{Question, Rgb, Severity};
 use image::{Rgb as Pixel, RgbImage};
@@ -67,7 +67,12 @@ fn pixels(set: &Dataset, text: &str) -> Rgb {
 #[test]
 fn every_form_is_read_back() {
     let data = data();
-    let original = Dataset::open(&DataPlace::Path(data.path().to_owned()), None).unwrap();
+    let original = Dataset::open(
+        &DataPlace::Path(data.path().to_owned()),
+        None,
+        &SetArgs::default(),
+    )
+    .unwrap();
     let name = original.name().to_owned();
     let rows = [
         ("vlmevalkit", format!("{name}_CONDITION.tsv")),
@@ -86,7 +91,8 @@ fn every_form_is_read_back() {
         .success();
         for (condition, degraded) in [("L0", false), ("L2-ev", true)] {
             let path = out.path().join(file.replace("CONDITION", condition));
-            let set = Dataset::open(&DataPlace::Path(path.clone()), None).unwrap();
+            let set =
+                Dataset::open(&DataPlace::Path(path.clone()), None, &SetArgs::default()).unwrap();
             assert_eq!(words(&set), words(&original), "{}", path.display());
             for question in original.questions() {
                 let clean = original.picture(&question.frame).unwrap().decode().unwrap();

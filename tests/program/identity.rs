@@ -428,7 +428,21 @@ fn what_decides_nothing_asks_nothing() {
 }
 
 /// Flags that the tables here leave out, and where they are held.
-const ELSEWHERE: [(&str, &str); 35] = [
+const ELSEWHERE: [(&str, &str); 46] = [
+    ("--map", "tests/program/ready_made.rs"),
+    ("--config-name", "src/dataset/ready_made/tests/shapes.rs"),
+    ("--split", "src/dataset/ready_made/tests/shapes.rs"),
+    ("--rows", "src/dataset/ready_made/tests/shapes.rs"),
+    ("--multi-image", "src/dataset/ready_made/tests/shapes.rs"),
+    ("--no-image", "src/dataset/ready_made/tests/shapes.rs"),
+    ("--open", "tests/program/ready_made.rs"),
+    ("--several", "src/dataset/ready_made/tests/refusals.rs"),
+    ("--bad", "src/dataset/ready_made/tests/refusals.rs"),
+    ("--data-root", "tests/program/ready_made.rs"),
+    (
+        "--keep-instructions",
+        "src/dataset/ready_made/tests/shapes.rs",
+    ),
     (
         "--transfer",
         "it changes images of 16 bits: tests/program/inputs/depth.rs",

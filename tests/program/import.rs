@@ -89,7 +89,7 @@ impl Scene {
     /// Imports, and reads what came of it.
     fn import(&self, kind: &str, flags: &[&str]) -> Dataset {
         self.run(kind, flags).success();
-        Dataset::of_frames(&self.out()).unwrap()
+        Dataset::of_frames(&self.out(), &[]).unwrap()
     }
 
     /// Imports in vain, and returns what is said.
@@ -161,7 +161,7 @@ fn habitat_renders_of_hm3d() {
         message.contains("2 frames of 1 scenes") && message.contains("\"bed, made\" 1"),
         "{message}"
     );
-    let set = Dataset::of_frames(&scene.out()).unwrap();
+    let set = Dataset::of_frames(&scene.out(), &[]).unwrap();
     let names: Vec<&str> = set.frames().map(|id| id.0.as_str()).collect();
     assert_eq!(names, ["00800-x/000", "00800-x/003"]);
     let frame = frame(&set, "00800-x/003");
@@ -248,7 +248,10 @@ fn what_is_wrong_with_renders_is_said() {
         "{message}"
     );
     assert_eq!(
-        Dataset::of_frames(&scene.out()).unwrap().frames().count(),
+        Dataset::of_frames(&scene.out(), &[])
+            .unwrap()
+            .frames()
+            .count(),
         4
     );
     assert!(
@@ -258,7 +261,10 @@ fn what_is_wrong_with_renders_is_said() {
     );
     scene.run("habitat", &["--force", "--count", "2"]).success();
     assert_eq!(
-        Dataset::of_frames(&scene.out()).unwrap().frames().count(),
+        Dataset::of_frames(&scene.out(), &[])
+            .unwrap()
+            .frames()
+            .count(),
         2
     );
 }
@@ -390,10 +396,24 @@ fn frames_of_sun_rgb_d() {
     let set = scene.import("sunrgbd", &[]);
     let frame = frame(&set, "kv1-b3dodata/img_0063");
     assert_eq!(sides(frame.depth.as_ref()), (2000, 8000));
+    // Which of the two was read is said, by frame and in all.
+    assert_eq!(scene.line(0)["depth_from"], "depth_bfx");
+    let out = scene.run("sunrgbd", &["--force"]).success();
+    let out = String::from_utf8(out.get_output().stdout.clone()).unwrap();
+    assert!(
+        out.contains("frames by the folder of their depth: depth_bfx 1\n"),
+        "{out}"
+    );
     assert_eq!(sides(frame.segments.as_ref()), (3, 1));
     assert_eq!(classes(&set, &frame), pair("chest_of_drawers", "wall"));
     assert_eq!(frame.room.as_deref(), Some("living room"));
     assert!((frame.intrinsics.unwrap().fy - 510.0).abs() < 1e-9);
+    // Without filled depth, the other one is read, and that is said too.
+    fs::remove_file(scene.at(&at("depth_bfx/img_0063.png"))).unwrap();
+    let set = scene.import("sunrgbd", &["--force"]);
+    let unfilled = self::frame(&set, "kv1-b3dodata/img_0063");
+    assert_eq!(sides(unfilled.depth.as_ref()), (1000, 1000));
+    assert_eq!(scene.line(0)["depth_from"], "depth");
 }
 
 #[test]
@@ -472,7 +492,7 @@ fn folders_of_images_and_maps() {
         .arg("--out")
         .arg(&again);
     command.assert().success();
-    let twice = frame(&Dataset::of_frames(&again).unwrap(), "home/a");
+    let twice = frame(&Dataset::of_frames(&again, &[]).unwrap(), "home/a");
     assert_eq!(
         (twice.depth, twice.semantic, twice.segments),
         (found.depth, found.semantic, found.segments)

@@ -40,6 +40,7 @@ mod openeqa;
 mod own_requests;
 mod pins;
 mod questions;
+mod ready_made;
 mod realism;
 mod replicas;
 mod report;

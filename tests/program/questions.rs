@@ -246,7 +246,7 @@ fn what_was_measured_is_kept_by_content() {
     }
     fs::write(&kept, format!("{frame}\n")).unwrap();
     let closest = |outcome: &Outcome| outcome.of("closest")[0]["answer"].clone();
-    assert_eq!(closest(&data.ask(out.path(), &[])), "chest of drawers");
+    assert_eq!(closest(&data.ask(out.path(), &[])), "dresser");
     // Another image under the same name is measured anew.
     let mut things = BEDROOM;
     things[4].4 = [22, 60, 170];
@@ -317,6 +317,9 @@ fn verdicts_leave_out_what_was_rejected() {
     let color = before.of("color")[0]["id"].as_str().unwrap().to_owned();
     let html = fs::read_to_string(page).unwrap();
     assert!(html.contains(&color) && html.contains("rgb0.png"));
+    // The rule's answer stands in no element of the page, but only where its script finds it once the person has answered.
+    let (head, script) = html.split_once("<script>").unwrap();
+    assert!(!head.contains(&color) && script.contains("if (!own) return;"));
     let verdicts = out.path().join("verdicts.jsonl");
     fs::write(
         &verdicts,
@@ -347,6 +350,97 @@ fn verdicts_leave_out_what_was_rejected() {
             "{id}"
         );
     }
+}
+
+#[test]
+fn two_people_check_on_their_own() {
+    let views: Vec<View> = ["a", "b", "c"].map(bedroom).into();
+    let (data, out) = (Data::of(&views), folder());
+    let asked = data.ask(out.path(), &["--balance", "none"]).lines();
+    let checked = |person: &str, ambiguous: usize| {
+        let lines = asked.iter().enumerate().map(|(i, question)| {
+            let (found, verdict) = match i {
+                0 => ("wrong", "reject"),
+                i if i == ambiguous => ("ambiguous", "reject"),
+                _ => ("right", "accept"),
+            };
+            let line = json!({
+                "id": question["id"], "person": person, "found": found, "verdict": verdict,
+                "family": question["family"], "frame": question["frame"],
+            });
+            format!("{line}\n")
+        });
+        let path = out.path().join(format!("verdicts-{person}.jsonl"));
+        fs::write(&path, lines.collect::<String>()).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let (anna, ben) = (checked("anna", 1), checked("ben", 2));
+    let after = data.ask(
+        out.path(),
+        &["--balance", "none", "--verdicts", &anna, "--verdicts", &ben],
+    );
+    assert_eq!(after.lines().len(), asked.len() - 3);
+    let all = asked.len();
+    let same = format!("{:.1}", 100.0 * (all - 2) as f64 / all as f64);
+    let said = format!("anna and ben found the same of {same} [");
+    assert!(after.out.contains(&said), "{}", after.out);
+    assert!(
+        after
+            .out
+            .contains("Cohen's κ of finding a question right: 0."),
+        "{}",
+        after.out
+    );
+    // A file of one person has shares, but no κ.
+    let alone = data.ask(out.path(), &["--balance", "none", "--verdicts", &anna]);
+    assert!(
+        alone.out.contains("anna") && !alone.out.contains("κ"),
+        "{}",
+        alone.out
+    );
+    let json = data.ask(
+        out.path(),
+        &["--json", "--verdicts", &anna, "--verdicts", &ben],
+    );
+    let json: Value = serde_json::from_str(&json.out).unwrap();
+    assert_eq!(
+        json["checks"]["agreements"][0]["people"],
+        json!(["anna", "ben"])
+    );
+    assert_eq!(json["checks"]["agreements"][0]["questions"], all);
+}
+
+/// The page is written into the folder of the command, into a new folder and beside the data: its links lead to the images.
+#[test]
+fn the_page_finds_its_images_wherever_it_is() {
+    let (data, out) = (Data::of(&[bedroom("s")]), folder());
+    let root = out.path().join("root");
+    fs::create_dir_all(&root).unwrap();
+    let beside = data.path("review.html");
+    check_rows(
+        [
+            "review.html",
+            "new/deep/review.html",
+            beside.to_str().unwrap(),
+        ],
+        |page| {
+            let mut command = Command::cargo_bin("darkqa-eval").unwrap();
+            command
+                .current_dir(&root)
+                .arg("questions")
+                .arg(data.0.path());
+            command
+                .args(["--out", "elsewhere/q.jsonl", "--review", page])
+                .assert()
+                .success();
+            let page = root.join(page);
+            let html = fs::read_to_string(&page).unwrap();
+            let (_, link) = html.split_once("\"image\":\"").unwrap();
+            let (link, _) = link.split_once('"').unwrap();
+            let image = page.parent().unwrap().join(link);
+            assert!(image.is_file(), "{link} of {}", page.display());
+        },
+    );
 }
 
 #[test]

@@ -1,12 +1,13 @@
 //! The built-in rooms, held to what their generator knows.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::LazyLock;
 
 use crate::support::run::{Bench, records, words};
 use crate::support::table::check_rows;
 use darkqa_eval::internals::dataset::{DataPlace, Dataset};
 use darkqa_eval::internals::questions::{
-    BalanceMode, ClassFlag, Palette, RoomSource, Rules, measure,
+    BalanceMode, ClassFlag, Palette, RoomSource, RuleResult, Rules, measure,
 };
 use darkqa_eval::internals::rooms::{Room, RoomTruth, Rooms, ThingTruth, VERSION, labels};
 use darkqa_eval::questions::{Generated, GeneratedQuestion, QuestionRequest, generate};
@@ -41,8 +42,9 @@ impl Seen {
     }
 }
 
-/// Questions about the rooms of a seed, by Algorithm 1, with what the generator knows of their frames.
-fn asked(rooms: Rooms) -> (Generated, BTreeMap<FrameId, Seen>) {
+/// Questions about the rooms of a seed, by Algorithm 1, with what the generator knows of their frames; and what is wrong with every
+/// colour that could be asked, with the number of these.
+fn asked(rooms: Rooms) -> (Generated, BTreeMap<FrameId, Seen>, (usize, Vec<String>)) {
     let (rules, palette, labels) = (
         Rules::built_in().unwrap(),
         Palette::built_in().unwrap(),
@@ -66,7 +68,22 @@ fn asked(rooms: Rooms) -> (Generated, BTreeMap<FrameId, Seen>) {
         balance: BalanceMode::default(),
         rejected: BTreeSet::new(),
     };
-    (generate(&statistics, &order, |_, _| {}).unwrap(), seen)
+    let (mut colors, mut faults) = (0, Vec::new());
+    let made = generate(&statistics, &order, |frame, result| {
+        let RuleResult::Viable(candidate) = result else {
+            return;
+        };
+        if candidate.family != Family::Color {
+            return;
+        }
+        colors += 1;
+        let number = candidate.evidence["segments"][0]["id"].as_u64().unwrap();
+        let paint = seen[frame].truth.things[number as usize - 1].color;
+        if paint != candidate.answer() {
+            faults.push(format!("{frame} {}: {paint:?}", candidate.text));
+        }
+    });
+    (made.unwrap(), seen, (colors, faults))
 }
 
 /// Where each activity of the rulebook is done.
@@ -83,6 +100,13 @@ const DONE_IN: [(&str, &[&str]); 10] = [
     ("do the laundry", &[]),
 ];
 
+/// The word by which questions call a thing; its class if they do not name it.
+fn called(thing: &ThingTruth) -> String {
+    static RULES: LazyLock<Rules> = LazyLock::new(|| Rules::built_in().unwrap());
+    let word = RULES.book().called(thing.class, thing.word);
+    word.unwrap_or(thing.class).to_owned()
+}
+
 /// What is wrong with an answer, by what the generator knows.
 fn wrong(asked: &GeneratedQuestion, seen: &Seen) -> Option<String> {
     let (answer, about) = (asked.answer(), asked.about.as_str());
@@ -94,7 +118,12 @@ fn wrong(asked: &GeneratedQuestion, seen: &Seen) -> Option<String> {
             if suits { "yes" } else { "no" }.to_owned()
         }
         Family::Presence => {
-            let is_visible = !seen.of_class(about).is_empty();
+            let is_visible = seen.of_class(about).into_iter().any(|thing| {
+                asked
+                    .question
+                    .text
+                    .contains(&format!(" {} in", called(thing)))
+            });
             if is_visible { "yes" } else { "no" }.to_owned()
         }
         Family::Color => {
@@ -112,17 +141,13 @@ fn wrong(asked: &GeneratedQuestion, seen: &Seen) -> Option<String> {
         }
         Family::Closest => {
             let offered = asked.question.choices.texts();
-            let book = Rules::built_in().unwrap();
-            let nearest = |class: &str| {
-                let things = seen.of_class(class);
-                let near = things.iter().map(|thing| thing.near);
-                near.fold(f32::MAX, f32::min)
-            };
-            let classes = book.book().class.keys();
-            let offered =
-                classes.filter(|class| offered.contains(&book.book().name(class).to_owned()));
-            let winner = offered.min_by(|a, b| nearest(a).total_cmp(&nearest(b)));
-            book.book().name(winner?).to_owned()
+            let visible = seen.pixels.keys().filter_map(|number| {
+                let place = (*number as usize).checked_sub(1)?;
+                seen.truth.things.get(place)
+            });
+            let offered = visible.filter(|thing| offered.contains(&called(thing)));
+            let winner = offered.min_by(|a, b| a.near.total_cmp(&b.near));
+            called(winner?)
         }
         Family::Other(_) => return None,
     };
@@ -134,10 +159,10 @@ fn wrong(asked: &GeneratedQuestion, seen: &Seen) -> Option<String> {
     })
 }
 
-/// Two hundred frames, as many of each kind of room as of any other.
+/// Three hundred frames, as many of each kind of room as of any other.
 fn many(seed: u64) -> Rooms {
     Rooms {
-        frames: 204,
+        frames: 312,
         seed,
         size: [240, 180],
         ..Rooms::default()
@@ -146,7 +171,12 @@ fn many(seed: u64) -> Rooms {
 
 #[test]
 fn the_questions_are_right_and_even() {
-    let (made, seen) = asked(many(7));
+    let (made, seen, (colors, lit_wrong)) = asked(many(7));
+    // Every colour that passes the rules is that of the paint, in light and in shade.
+    assert!(
+        lit_wrong.is_empty() && colors >= 200,
+        "{colors}: {lit_wrong:?}"
+    );
     let faults: Vec<String> = made
         .asked
         .iter()
@@ -251,7 +281,7 @@ fn rooms_on_disk_are_those_in_the_program() {
     let bench = Bench::new();
     let size = ["--frames", "4", "--size", "160x120"];
     bench.complete(&[&["rooms", "--out", "frames"][..], &size].concat());
-    let folder = Dataset::of_frames(&bench.path("frames")).unwrap();
+    let folder = Dataset::of_frames(&bench.path("frames"), &[]).unwrap();
     let rooms = Rooms {
         frames: 4,
         size: [160, 120],

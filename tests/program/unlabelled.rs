@@ -380,7 +380,7 @@ fn what_needs_a_truth_is_refused() {
         ("report run --common".to_owned(), "--common: each model is held against its own answers"),
         ("study pack run --out page".to_owned(), "nobody knows the true answers"),
         ("show run lamp@hall/00.png --data photos --sheet story.png".to_owned(), "nobody knows the true answers"),
-        ("--data photos --questions open.jsonl --model random --out other".to_owned(), "has no answer; questions without answers"),
+        ("--data photos --questions open.jsonl --model random --out other".to_owned(), "--ask FILE asks questions without answers"),
     ] {
         let called = bench.call(&words(&call));
         assert_eq!(called.code, Some(2), "{call}: {called:?}");

@@ -64,6 +64,7 @@ fn sample(arg: &Arg) -> String {
         "size" => "64x48",
         "answers" => "people=answers.json",
         "condition" => "L3-noise",
+        "map" => "question=abc",
         "url" => "/v1/responses",
         "families" => "color",
         "crop" => "0,0,256,256",

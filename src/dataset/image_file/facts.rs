@@ -4,9 +4,9 @@ use std::borrow::Cow;
 
 use image::metadata::Orientation;
 
+use super::super::guarded::guarded;
 use super::exr_layers::ExrFile;
 use super::format::FileFormat;
-use super::guarded::guarded;
 use super::jpeg_markers::{self, JpegOutline};
 use super::png_chunks::{self, PngFault, PngOutline};
 use super::tiff_tags::TiffOutline;

@@ -4,7 +4,7 @@ use image::ImageFormat;
 
 /// A format that is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum FileFormat {
+pub(in crate::dataset) enum FileFormat {
     Png,
     Jpeg,
     WebP,
@@ -59,7 +59,7 @@ impl FileFormat {
     ///
     /// # Errors
     /// If it is not one that is read. The error names the format if it is known, and says what to do.
-    pub(super) fn of(file: &[u8]) -> Result<Self, String> {
+    pub(in crate::dataset) fn of(file: &[u8]) -> Result<Self, String> {
         let has =
             |at: usize, mark: &[u8]| file.get(at..).is_some_and(|rest| rest.starts_with(mark));
         if let Some((.., name, remedy)) = UNREAD.iter().find(|(at, mark, ..)| has(*at, mark)) {
@@ -91,6 +91,17 @@ impl FileFormat {
             Self::WebP => Some(ImageFormat::WebP),
             Self::Tiff => Some(ImageFormat::Tiff),
             Self::OpenExr => None,
+        }
+    }
+
+    /// The name of the format, for messages.
+    pub(in crate::dataset) fn name(self) -> &'static str {
+        match self {
+            Self::Png => "PNG",
+            Self::Jpeg => "JPEG",
+            Self::WebP => "WebP",
+            Self::Tiff => "TIFF",
+            Self::OpenExr => "OpenEXR",
         }
     }
 

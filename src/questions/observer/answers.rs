@@ -1,6 +1,6 @@
 //! Answers from what is seen alone: [`Observation::answer`].
 
-use super::wording::QuestionTopic;
+use super::wording::{QuestionTopic, ThingWord};
 use super::{Observation, Shade};
 use crate::questions::colors::{Color, Palette};
 use crate::questions::room::classify;
@@ -17,8 +17,8 @@ impl Observation {
         let answer = match QuestionTopic::of(question, rules.book())? {
             QuestionTopic::Room => self.room(rules),
             QuestionTopic::Activity(activity) => self.affordance(activity, rules),
-            QuestionTopic::Presence(class) => self.presence(&class, rules),
-            QuestionTopic::Color(class) => self.color(&class, question, palette),
+            QuestionTopic::Presence(thing) => self.presence(&thing, rules),
+            QuestionTopic::Color(thing) => self.color(&thing, question, rules, palette),
             QuestionTopic::Closest => self.closest(question, rules),
         }?;
         question
@@ -54,10 +54,11 @@ impl Observation {
         Some(yes_no(yes))
     }
 
-    /// Yes if the class is seen. No if at least half of the area of all things is seen, and the class is not among it: without
+    /// Yes if the thing is seen. No if at least half of the area of all things is seen, and the thing is not among it: without
     /// this, a black image would be answered with no.
-    fn presence(&self, class: &str, rules: &Rules) -> Option<String> {
-        let is_seen = self.statistics.of_class(class) > 0;
+    fn presence(&self, thing: &ThingWord, rules: &Rules) -> Option<String> {
+        let mut seen = self.statistics.segments.iter();
+        let is_seen = seen.any(|segment| thing.calls(segment, rules.book()));
         (is_seen || self.sees_half(rules)).then(|| yes_no(is_seen))
     }
 
@@ -75,11 +76,17 @@ impl Observation {
         all > 0 && 2 * seen >= all
     }
 
-    /// The colour of the largest segment of a class, if that one is seen, among the colours offered.
-    fn color(&self, class: &str, question: &Question, palette: &Palette) -> Option<String> {
+    /// The colour of the largest segment that is called so, if that one is seen, among the colours offered.
+    fn color(
+        &self,
+        thing: &ThingWord,
+        question: &Question,
+        rules: &Rules,
+        palette: &Palette,
+    ) -> Option<String> {
         let segments = self.frame.segments.iter();
         let largest = segments
-            .filter(|segment| segment.class == class)
+            .filter(|segment| thing.calls(segment, rules.book()))
             .max_by_key(|segment| (segment.area, std::cmp::Reverse(segment.id)))?;
         let shade: &Shade = self.shades.get(&largest.id)?.as_ref()?;
         let texts = question.choices.texts();
@@ -95,8 +102,9 @@ impl Observation {
         let book = rules.book();
         let texts = question.choices.texts();
         let offered = |segment: &&Segment| {
-            let name = book.name(&segment.class);
-            book.is(&segment.class, ClassFlag::Asked) && texts.iter().any(|text| text == name)
+            let word = segment.called(book);
+            book.is(&segment.class, ClassFlag::Asked)
+                && texts.iter().any(|text| Some(&**text) == word)
         };
         let segments = self.statistics.segments.iter().filter(offered);
         let measured: Vec<_> = segments
@@ -107,7 +115,7 @@ impl Observation {
             .min_by_key(|(depth, _)| (depth.median, depth.p10))?;
         let mut others = measured.iter();
         let has_two = others.any(|(_, segment)| segment.class != nearest.class);
-        has_two.then(|| book.name(&nearest.class).to_owned())
+        has_two.then(|| nearest.called(book).map(str::to_owned))?
     }
 }
 

@@ -1,7 +1,22 @@
 //! The subject of a question, read from its text: [`QuestionTopic`].
 
 use crate::questions::rules::{RuleBook, Rules};
+use crate::questions::statistics::Segment;
 use crate::types::Question;
+
+/// The word by which a question calls a thing, with the class that the word belongs to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct ThingWord {
+    class: String,
+    word: String,
+}
+
+impl ThingWord {
+    /// Whether a segment is called so.
+    pub(super) fn calls(&self, segment: &Segment, book: &RuleBook) -> bool {
+        segment.class == self.class && segment.called(book) == Some(&*self.word)
+    }
+}
 
 /// Subject of a question of the rulebook.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -10,10 +25,10 @@ pub(super) enum QuestionTopic {
     Room,
     /// Whether the room suits an activity, given by its index in the rulebook.
     Activity(usize),
-    /// Whether an object of a class is visible.
-    Presence(String),
-    /// The colour of the object of a class.
-    Color(String),
+    /// Whether an object is visible.
+    Presence(ThingWord),
+    /// The colour of an object.
+    Color(ThingWord),
     /// The object that is closest to the camera.
     Closest,
 }
@@ -37,18 +52,19 @@ impl QuestionTopic {
         if let Some(activity) = activity {
             return Some(Self::Activity(activity));
         }
-        let fill = |template: &str, class: &str| {
-            template
-                .replace("{article}", book.article(class))
-                .replace("{object}", book.name(class))
+        let word = |singular: &str, plural: &str| {
+            book.class.iter().find_map(|(class, rule)| {
+                let mut words = rule.words.iter();
+                let word = words.find(|word| text == book.filled(singular, plural, word))?;
+                Some(ThingWord {
+                    class: class.clone(),
+                    word: word.clone(),
+                })
+            })
         };
-        let class = |template: &str| {
-            let mut classes = book.class.keys();
-            classes.find(|class| text == fill(template, class)).cloned()
-        };
-        class(&book.presence.text)
+        word(&book.presence.text, &book.presence.plural)
             .map(Self::Presence)
-            .or_else(|| class(&book.color.text).map(Self::Color))
+            .or_else(|| word(&book.color.text, &book.color.plural).map(Self::Color))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::{RuleBook, SCHEMA};
+use super::{ClassFlag, RuleBook, SCHEMA};
 use crate::types::Choices;
 
 impl RuleBook {
@@ -11,10 +11,18 @@ impl RuleBook {
         if self.schema != SCHEMA {
             return Err(format!("schema {:?}; {SCHEMA:?} expected", self.schema));
         }
-        if self.measure.erosion_per_height == 0 || self.measure.void_per_height == 0 {
+        let measure = &self.measure;
+        if measure.erosion_per_height == 0 || measure.void_per_height == 0 {
             return Err("erosion_per_height and void_per_height must be above 0".to_owned());
         }
+        let percents = [measure.light_percent, measure.around_percent];
+        if measure.light_rows == 0 || percents.iter().any(|percent| !(1..=100).contains(percent)) {
+            return Err(
+                "light_rows must be above 0, light_percent and around_percent 1 to 100".to_owned(),
+            );
+        }
         self.check_classes()?;
+        self.check_words()?;
         self.check_rooms()?;
         if !(2..=Choices::MOST).contains(&self.closest.choices) {
             return Err(format!(
@@ -23,12 +31,14 @@ impl RuleBook {
             ));
         }
         for (family, text, blank) in [
-            ("affordance", &self.affordance.text, "{activity}"),
-            ("presence", &self.presence.text, "{object}"),
-            ("color", &self.color.text, "{object}"),
+            ("affordance.text", &self.affordance.text, "{activity}"),
+            ("presence.text", &self.presence.text, "{object}"),
+            ("presence.plural", &self.presence.plural, "{object}"),
+            ("color.text", &self.color.text, "{object}"),
+            ("color.plural", &self.color.plural, "{object}"),
         ] {
             if !text.contains(blank) {
-                return Err(format!("{family}.text has no {blank} in it"));
+                return Err(format!("{family} has no {blank} in it"));
             }
         }
         Ok(())
@@ -66,6 +76,35 @@ impl RuleBook {
             }
         }
         Ok(())
+    }
+
+    /// Every asked class has a word, no two classes share one, and the grammar is that of known words.
+    fn check_words(&self) -> Result<(), String> {
+        let mut known = BTreeSet::new();
+        for (class, rule) in &self.class {
+            let named = [ClassFlag::Asked, ClassFlag::Color];
+            if rule.words.is_empty() && named.iter().any(|flag| rule.flags.contains(flag)) {
+                return Err(format!("class.{class} has no words, but questions name it"));
+            }
+            if let Some(twice) = rule.words.iter().find(|word| !known.insert(word.as_str())) {
+                return Err(format!("class.{class} has the word {twice:?} again"));
+            }
+            if let Some(other) = rule
+                .hidden
+                .iter()
+                .find(|other| !self.class.contains_key(*other))
+            {
+                return Err(format!(
+                    "class.{class}.hidden names the class {other:?}, which [class] does not define"
+                ));
+            }
+        }
+        let grammar = self.words.plural.iter().chain(&self.words.an);
+        let mut named = grammar.chain(self.words.spelled.values());
+        match named.find(|word| !known.contains(word.as_str())) {
+            Some(word) => Err(format!("[words] has {word:?}, which no class has")),
+            None => Ok(()),
+        }
     }
 
     fn check_rooms(&self) -> Result<(), String> {

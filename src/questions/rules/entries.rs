@@ -24,6 +24,10 @@ pub struct MeasureRule {
     pub crushed: u8,
     pub dark_luma: u8,
     pub detail_ppm: u64,
+    pub luminous: BTreeSet<String>,
+    pub light_rows: usize,
+    pub light_percent: u64,
+    pub around_percent: u64,
 }
 
 /// Thresholds that a segment must pass to be evidence.
@@ -60,14 +64,51 @@ pub enum ClassFlag {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ClassRule {
-    /// Name in a question; default: the class itself.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub name: Option<String>,
-    /// Article in a question; default: "a".
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub article: Option<String>,
     /// Properties of the class; may be empty.
     pub flags: BTreeSet<ClassFlag>,
+    /// Words by which questions call things of the class; may be empty for classes that no question names.
+    #[serde(default)]
+    pub words: Vec<String>,
+    /// Classes whose unnamed pixels may hide a thing of this class.
+    #[serde(default)]
+    pub hidden: BTreeSet<String>,
+}
+
+/// The grammar of the words in questions.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GrammarRule {
+    /// Words that are plural.
+    pub plural: BTreeSet<String>,
+    /// Words that take the article "an"; others take "a".
+    pub an: BTreeSet<String>,
+    /// The word in questions for words that data sets write otherwise.
+    pub spelled: BTreeMap<String, String>,
+}
+
+/// Words that do not say what a thing is, because they stand for several kinds of things.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CoarseRule {
+    /// Names of segments that say nothing.
+    pub vague: BTreeSet<String>,
+    /// By label space, the words that do say what a thing is. In a space that is not listed, all words do.
+    pub spaces: BTreeMap<String, BTreeSet<String>>,
+}
+
+impl CoarseRule {
+    /// Whether the name of a segment says what the thing is.
+    #[must_use]
+    pub(crate) fn is_name(&self, name: &str) -> bool {
+        !name.is_empty() && !name.starts_with("unknown") && !self.vague.contains(name)
+    }
+
+    /// Whether the word of a label space says what a thing is.
+    #[must_use]
+    pub(crate) fn says(&self, space: &str, word: &str) -> bool {
+        let words = self.spaces.get(space);
+        words.is_none_or(|words| words.contains(word)) && !word.is_empty()
+    }
 }
 
 /// Words that change how a segment of a class is treated.
@@ -227,6 +268,7 @@ pub struct ActivityRule {
 #[serde(deny_unknown_fields)]
 pub struct PresenceRule {
     pub text: String,
+    pub plural: String,
     pub area_ppm: u64,
     pub purity_ppm: u64,
     pub border_ppm: u64,
@@ -239,6 +281,7 @@ pub struct PresenceRule {
 #[serde(deny_unknown_fields)]
 pub struct ColorRule {
     pub text: String,
+    pub plural: String,
     pub lone_ppm: u64,
     pub area_ppm: u64,
     pub eroded_px: u64,
@@ -247,6 +290,7 @@ pub struct ColorRule {
     pub dominant_ppm: u64,
     pub lead: u64,
     pub none_ppm: u64,
+    pub view_px: u64,
     pub candidates: ColorChoices,
     pub fixed8: Vec<Color>,
     pub neighbours: Vec<[Color; 2]>,

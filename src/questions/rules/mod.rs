@@ -41,6 +41,8 @@ pub struct RuleBook {
     pub qualified: EvidenceRule,
     /// Canonical classes by name.
     pub class: BTreeMap<String, ClassRule>,
+    pub words: GrammarRule,
+    pub coarse: CoarseRule,
     pub names: WordRules,
     pub confusable: Vec<Confusable>,
     pub room: RoomRule,
@@ -88,7 +90,8 @@ impl Rules {
         // The digest covers the values, not the text: a comment does not change it.
         let content = |part: String| Digest::of_parts([part.as_bytes()]);
         let whole = serde_json::to_string(&book).map_err(|e| wrong(e.to_string()))?;
-        let measure = serde_json::to_string(&book.measure).map_err(|e| wrong(e.to_string()))?;
+        let measured = (&book.measure, &book.coarse);
+        let measure = serde_json::to_string(&measured).map_err(|e| wrong(e.to_string()))?;
         Ok(Self {
             book,
             digest: content(whole),
@@ -108,7 +111,7 @@ impl Rules {
         self.digest
     }
 
-    /// The digest of `[measure]`, the part of the rulebook that decides the statistics of a frame.
+    /// The digest of `[measure]` and `[coarse]`, the parts of the rulebook that decide the statistics of a frame.
     #[must_use]
     pub fn measure_digest(&self) -> Digest {
         self.measure_digest
@@ -123,23 +126,47 @@ impl RuleBook {
         class.is_some_and(|class| class.flags.contains(&flag))
     }
 
-    /// The name of a class in a question.
+    /// The word in questions for a thing that an annotator calls by `word`; `None` if questions do not use this word for things
+    /// of the class.
     #[must_use]
-    pub fn name<'a>(&'a self, class: &'a str) -> &'a str {
-        let name = self
-            .class
-            .get(class)
-            .and_then(|class| class.name.as_deref());
-        name.unwrap_or(class)
+    pub fn called(&self, class: &str, word: &str) -> Option<&str> {
+        let plain = word.replace('_', " ");
+        let spelled = self.words.spelled.get(&plain).unwrap_or(&plain);
+        let words = &self.class.get(class)?.words;
+        words
+            .iter()
+            .find(|known| *known == spelled)
+            .map(String::as_str)
     }
 
-    /// The article of a class in a question.
+    /// A template with the word of a thing filled in; `plural` is used for plural words.
     #[must_use]
-    pub fn article(&self, class: &str) -> &str {
-        let class = self.class.get(class);
-        class
-            .and_then(|class| class.article.as_deref())
-            .unwrap_or("a")
+    pub(crate) fn filled(&self, singular: &str, plural: &str, word: &str) -> String {
+        if self.words.plural.contains(word) {
+            return plural.replace("{object}", word);
+        }
+        let article = if self.words.an.contains(word) {
+            "an"
+        } else {
+            "a"
+        };
+        singular
+            .replace("{article}", article)
+            .replace("{object}", word)
+    }
+
+    /// Whether a word of a data set may be another word for things of a class: its last words are one by which questions call
+    /// such things, as in "decorative lamp".
+    #[must_use]
+    pub(crate) fn resembles(&self, word: &str, class: &str) -> bool {
+        let plain = word.replace('_', " ");
+        let spelled = self.words.spelled.get(&plain).unwrap_or(&plain);
+        let words = self.class.get(class).into_iter();
+        let mut words = words.flat_map(|class| &class.words);
+        words.any(|known| {
+            let before = spelled.strip_suffix(known.as_str());
+            before.is_some_and(|before| before.is_empty() || before.ends_with(' '))
+        })
     }
 
     /// The token of a segment by its word and class; the class itself if no token matches.
@@ -181,6 +208,19 @@ mod tests {
         assert_eq!(book.token("shower curtain", "curtain"), "bath fitting");
         assert_eq!(book.token("bathtub", "bathtub"), "bathtub");
         assert_eq!(book.token("dog bed", "bed"), "pet bed");
+    }
+
+    #[test]
+    fn every_word_has_its_article() {
+        let rules = Rules::built_in().unwrap();
+        let book = rules.book();
+        let words = book.class.values().flat_map(|class| &class.words);
+        for word in words.filter(|word| !book.words.plural.contains(*word)) {
+            let vowel = word.starts_with(['a', 'e', 'i', 'o', 'u']);
+            assert_eq!(book.words.an.contains(word), vowel, "{word}");
+            let plural = word.ends_with('s') && word != "chest of drawers";
+            assert!(!plural, "{word} is not in words.plural");
+        }
     }
 
     #[test]
@@ -229,6 +269,26 @@ mod tests {
                 "affordance.text has no {activity}",
             ),
             ("choices = 4", "choices = 1", "closest.choices is 1"),
+            (
+                "words = [\"sofa\"]",
+                "words = []",
+                "class.sofa has no words",
+            ),
+            (
+                "words = [\"sofa\"]",
+                "words = [\"bed\"]",
+                "has the word \"bed\" again",
+            ),
+            (
+                "\"towels\"]\n# Words",
+                "\"oxen\"]\n# Words",
+                "[words] has \"oxen\"",
+            ),
+            (
+                "hidden = [\"furniture\"]",
+                "hidden = [\"attic\"]",
+                "names the class \"attic\"",
+            ),
             ("\"office\"]   #", "\"bedroom\"]   #", "\"bedroom\" twice"),
         ] {
             assert!(BUILT_IN.contains(from), "{from}");

@@ -2,7 +2,7 @@
 
 use ndarray::{CowArray, Ix2};
 
-use super::{DepthAxis, FrameDepth, Segment, SegmentDepth};
+use super::{DepthAxis, FrameDepth, Segment, SegmentDepth, reference};
 use crate::questions::colors::{BINS, Palette};
 use crate::questions::rules::MeasureRule;
 use crate::types::{DepthKind, Frame, Intrinsics};
@@ -76,7 +76,7 @@ fn rank(count: u64, percent: u64) -> u64 {
 }
 
 /// A quantile of 8-bit values, from their histogram.
-fn quantile(counts: &[u32; 256], count: u64, percent: u64) -> u8 {
+pub(super) fn quantile(counts: &[u32; 256], count: u64, percent: u64) -> u8 {
     let rank = rank(count, percent);
     let mut seen = 0;
     let value = counts.iter().position(|count| {
@@ -185,13 +185,12 @@ pub(super) fn frame_depth(frame: &Frame) -> Option<FrameDepth> {
     })
 }
 
-/// The 10 %, 50 % and 90 % quantiles of luma (weights of ITU-R BT.709 in 256ths).
+/// The 10 %, 50 % and 90 % quantiles of luma.
 pub(super) fn luma(frame: &Frame) -> [u8; 3] {
     let mut counts = [0; 256];
     let (pixels, _) = frame.rgb.samples().as_chunks::<3>();
-    for &[red, green, blue] in pixels {
-        let luma = 54 * u32::from(red) + 183 * u32::from(green) + 19 * u32::from(blue);
-        counts[(luma >> 8) as usize] += 1;
+    for pixel in pixels {
+        counts[usize::from(reference::luma(*pixel))] += 1;
     }
     [10, 50, 90].map(|percent| quantile(&counts, pixels.len() as u64, percent))
 }

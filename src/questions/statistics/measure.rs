@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::FrameStatistics;
 use super::light::{frame_depth, luma};
+use super::reference::LightSamples;
 use super::scene::SceneMaps;
 use super::shape::MaskShapes;
 use crate::error::Result;
@@ -32,19 +33,26 @@ pub fn measure(
     let shapes = MaskShapes::of(&scene, rule);
     let (void, effective_void, lower_void) = scene.void(&shapes.joint, rule);
     let mut cores = shapes.cores(frame, &scene, rule, palette);
+    let coarse = &rules.book().coarse;
+    let samples = LightSamples::of(frame, &scene, rule);
     let (mut classes, mut loose, mut words) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
+    let mut unnamed = BTreeMap::new();
     for (&(mask, id), &count) in &shapes.joint {
         let Some(class) = scene.class(id) else {
             continue;
         };
         *classes.entry(class.to_owned()).or_insert(0) += count;
+        if !scene.is_named(frame, (mask, id), coarse) {
+            *unnamed.entry(class.to_owned()).or_insert(0) += count;
+        }
         if mask == 0 {
             *loose.entry(class.to_owned()).or_insert(0) += count;
         }
     }
     let mut segments = Vec::new();
     for (mask, shape) in shapes.list.iter().enumerate() {
-        let Some(mut segment) = shapes.segment(frame, &scene, mask as u32 + 1, shape) else {
+        let Some(mut segment) = shapes.segment(frame, &scene, coarse, (mask as u32 + 1, shape))
+        else {
             continue;
         };
         if !segment.word.is_empty() {
@@ -52,6 +60,7 @@ pub fn measure(
         }
         if let Some(core) = cores[mask].take() {
             core.write_to(&mut segment);
+            segment.around = samples.around(mask as u32 + 1, segment.bbox);
             segments.push(segment);
         }
     }
@@ -61,11 +70,13 @@ pub fn measure(
         scene: frame.scene.clone(),
         size,
         luma: luma(frame),
+        light: samples.light(),
         void,
         effective_void,
         lower_void,
         classes,
         loose,
+        unnamed,
         words,
         unknown: scene.unknown(&shapes.joint),
         depth: frame_depth(frame),

@@ -6,6 +6,7 @@ mod components;
 mod light;
 mod measure;
 mod opening;
+mod reference;
 mod rim;
 pub(in crate::questions) mod scene;
 mod shape;
@@ -25,7 +26,7 @@ use crate::types::{Digest, FrameId};
 pub use measure::measure;
 
 /// Version of the measurements. If it changes, all cached statistics are computed again.
-pub(crate) const VERSION: u64 = 1;
+pub(crate) const VERSION: u64 = 2;
 
 /// The measurements of a frame.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -40,6 +41,8 @@ pub struct FrameStatistics {
     pub size: [usize; 2],
     /// 10 %, 50 % and 90 % quantiles of luma, from 0 to 255.
     pub luma: [u8; 3],
+    /// The light of the frame by its surfaces: a high quantile of each channel, without windows, lamps, mirrors and screens.
+    pub light: [u8; 3],
     /// Number of pixels without a class.
     pub void: u64,
     /// Number of void pixels that remain after a morphological opening, which removes thin margins between labels.
@@ -50,6 +53,9 @@ pub struct FrameStatistics {
     pub classes: BTreeMap<String, u64>,
     /// Number of pixels of each class that belong to no segment.
     pub loose: BTreeMap<String, u64>,
+    /// Number of pixels of each class that have no word of their own: neither a name nor a label that says what the thing is.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub unnamed: BTreeMap<String, u64>,
     /// Number of pixels of segments by word, with tiny segments.
     pub words: BTreeMap<String, u64>,
     /// Number of pixels by map number, for numbers that the label space does not have.
@@ -96,6 +102,9 @@ pub struct Segment {
     pub class: String,
     /// Word of the data set for the segment, in lower case.
     pub word: String,
+    /// Where the word comes from.
+    #[serde(default, skip_serializing_if = "WordSource::is_name")]
+    pub source: WordSource,
     /// Place of the segment as its word gives it.
     #[serde(default, skip_serializing_if = "SegmentPlace::is_here")]
     pub stands: SegmentPlace,
@@ -125,6 +134,9 @@ pub struct Segment {
     pub colors: [u64; BINS],
     /// Median code of each channel over the core.
     pub median: [u8; 3],
+    /// The light around the segment by other surfaces: a high quantile of luma near it. `None` if there are none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub around: Option<u8>,
     /// Number of over-exposed core pixels.
     pub bright: u64,
     /// Number of core pixels crushed to black.
@@ -153,6 +165,26 @@ pub enum SegmentPlace {
     Here,
     /// In another room or outside, seen through an opening.
     Elsewhere,
+}
+
+/// Where the word of a segment comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WordSource {
+    /// The segment's own name.
+    #[default]
+    Name,
+    /// The label of its pixels, which says what the thing is.
+    Label,
+    /// The label of its pixels, or a name, that stands for things of several kinds.
+    Coarse,
+}
+
+impl WordSource {
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's way to call it")]
+    fn is_name(&self) -> bool {
+        *self == Self::Name
+    }
 }
 
 impl SegmentPlace {
@@ -261,6 +293,15 @@ impl Segment {
     pub fn unlike(&self, book: &RuleBook) -> bool {
         let words = book.names.unlike.get(&self.class);
         words.is_some_and(|words| words.contains(&self.word))
+    }
+
+    /// The word by which questions call the segment; `None` if it has no word of its own, or one that questions do not use.
+    #[must_use]
+    pub fn called<'a>(&self, book: &'a RuleBook) -> Option<&'a str> {
+        match self.source {
+            WordSource::Coarse => None,
+            WordSource::Name | WordSource::Label => book.called(&self.class, &self.word),
+        }
     }
 
     /// The token of the segment by its word and class.

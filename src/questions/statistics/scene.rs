@@ -6,9 +6,10 @@ use ndarray::{CowArray, Ix2};
 
 use super::components::components;
 use super::opening::open;
+use super::plain_word;
 use super::rim::runs;
 use crate::error::{Error, Result};
-use crate::questions::rules::MeasureRule;
+use crate::questions::rules::{CoarseRule, MeasureRule};
 use crate::types::{Frame, Labels, Segmentation};
 
 /// Label of pixels without a class.
@@ -25,7 +26,7 @@ enum LabelSource<'a> {
 /// The mask and the label of each pixel of a frame.
 pub(in crate::questions) struct SceneMaps<'a> {
     pub(in crate::questions) size: [usize; 2],
-    labels: &'a Labels,
+    pub(super) labels: &'a Labels,
     source: LabelSource<'a>,
     /// Mask of each pixel, from 1; 0 for no mask.
     pub(in crate::questions) masks: Vec<u32>,
@@ -213,6 +214,27 @@ impl<'a> SceneMaps<'a> {
             .ok()
             .and_then(|id| self.labels.labels.get(&id));
         label.map_or("", |label| &label.name)
+    }
+
+    /// Whether pixels of a mask and a label have a word of their own: the name of their segment, or a label that says what the
+    /// thing is.
+    pub(super) fn is_named(
+        &self,
+        frame: &Frame,
+        (mask, id): (u32, u32),
+        coarse: &CoarseRule,
+    ) -> bool {
+        let number = (mask as usize)
+            .checked_sub(1)
+            .and_then(|mask| self.numbers.get(mask));
+        let name = match (&frame.segments, frame.segmentation) {
+            (Some(_), Segmentation::Instances) => number.and_then(|number| frame.names.get(number)),
+            _ => None,
+        };
+        match name {
+            Some(name) => coarse.is_name(&plain_word(&name.name).0),
+            None => coarse.says(&self.labels.space, &plain_word(self.word(id)).0),
+        }
     }
 
     /// The number of pixels of each map number that the label space does not have.

@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use super::light::{MaskCore, PixelLight};
 use super::rim::{cores, runs};
 use super::scene::{JointCounts, SceneMaps, rounded};
-use super::{Segment, plain_word, ppm};
+use super::{Segment, WordSource, plain_word, ppm};
 use crate::questions::colors::{BINS, Palette};
-use crate::questions::rules::MeasureRule;
+use crate::questions::rules::{CoarseRule, MeasureRule};
 use crate::types::{Frame, Segmentation};
 
 /// Measurements of the shape of a mask.
@@ -116,8 +116,8 @@ impl MaskShapes {
         &self,
         frame: &Frame,
         scene: &SceneMaps<'_>,
-        mask: u32,
-        shape: &MaskShape,
+        coarse: &CoarseRule,
+        (mask, shape): (u32, &MaskShape),
     ) -> Option<Segment> {
         let labels = self.joint.range((mask, 0)..=(mask, u32::MAX));
         let mut classes: BTreeMap<&str, u64> = BTreeMap::new();
@@ -142,10 +142,18 @@ impl MaskShapes {
             |name| &name.name,
         );
         let (word, stands) = plain_word(word);
+        let source = if own.is_some() && coarse.is_name(&word) {
+            WordSource::Name
+        } else if own.is_none() && coarse.says(&scene.labels.space, &word) {
+            WordSource::Label
+        } else {
+            WordSource::Coarse
+        };
         Some(Segment {
             id: number,
             class: class.to_owned(),
             word,
+            source,
             stands,
             region: own.and_then(|name| name.region),
             parts: scene.parts.get(mask as usize - 1).copied().unwrap_or(0),
@@ -158,6 +166,7 @@ impl MaskShapes {
             depth: None,
             colors: [0; BINS],
             median: [0; 3],
+            around: None,
             bright: 0,
             crushed: 0,
         })

@@ -419,3 +419,40 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn the_light_of_a_frame_is_that_of_its_surfaces() {
+    let (width, height) = (40, 20);
+    // A window of code 255 above a wall of code 200 with a chair of code 90 in it, and void of code 250 below.
+    let class = |x: usize, y: usize| match (x, y) {
+        (_, 0..4) => 5,
+        (_, 18..) => 0,
+        (16..24, 8..12) => 4,
+        _ => 1,
+    };
+    let places = || (0..width * height).map(|i| (i % width, i / width));
+    let semantic: Vec<u16> = places().map(|(x, y)| class(x, y)).collect();
+    let code = |class: &u16| [250, 200, 0, 0, 90, 255][usize::from(*class)];
+    let mut frame = frame(width, height, semantic.clone());
+    let codes = semantic.iter().flat_map(|class| [code(class); 3]);
+    frame.rgb = Rgb::new(height, width, codes.collect()).unwrap();
+    let mut labels = labels();
+    let window = Label {
+        name: "window".into(),
+        canonical: "window".into(),
+    };
+    labels.labels.insert(5, window);
+    let rules = Rules::built_in().unwrap();
+    let palette = Palette::built_in().unwrap();
+    let measured = measure(&frame, &labels, &rules, &palette, Digest::of(b"")).unwrap();
+    assert_eq!(measured.light, [200; 3]);
+    let around = |class: &str| {
+        let mut segments = measured.segments.iter();
+        segments
+            .find(|segment| segment.class == class)
+            .unwrap()
+            .around
+    };
+    // Around the chair is the wall; around the wall only the chair, because windows and void are no surfaces.
+    assert_eq!((around("chair"), around("wall")), (Some(200), Some(90)));
+}

@@ -33,7 +33,7 @@ fn yes_needs_the_room_and_an_enabler() {
         ),
         (vec![("appliances", "stove", 60_000)], "cook a meal"),
         (
-            vec![("appliances", "", 60_000), ("counter", "", 60_000)],
+            vec![("appliances", "toaster", 60_000), ("counter", "", 60_000)],
             "cook a meal",
         ),
         (
@@ -49,9 +49,69 @@ fn yes_needs_the_room_and_an_enabler() {
             vec![("table", "desk", 60_000), ("chair", "office chair", 9_000)],
             "work at a desk",
         ),
+        // A room type that questions do not ask about is still one in which something is done.
+        (
+            vec![("appliances", "washing machine", 60_000)],
+            "do the laundry",
+        ),
+        (
+            vec![
+                ("toilet", "toilet", 60_000),
+                ("appliances", "laundry machine", 9_000),
+            ],
+            "do the laundry",
+        ),
     ] {
         assert_eq!(ask(&frame(&segments), activity, "yes"), None, "{activity}");
     }
+}
+
+#[test]
+fn an_activity_that_the_data_set_cannot_enable_is_not_asked_about() {
+    let reasons = |labels: &Labels, frames: &[FrameStatistics]| {
+        let rules = Rules::built_in().unwrap();
+        let results = run_rules_of(frames, |_| {}, &rules, labels);
+        let about = |result: &RuleResult| match result {
+            RuleResult::Viable(candidate) if candidate.about == "do the laundry" => Some(None),
+            RuleResult::Rejected(rejected) if rejected.about == "do the laundry" => {
+                Some(Some(rejected.reason))
+            }
+            _ => None,
+        };
+        results
+            .candidates
+            .iter()
+            .filter_map(about)
+            .collect::<Vec<_>>()
+    };
+    let bedroom = [frame(&BEDROOM)];
+    let knows = labels();
+    assert_eq!(reasons(&knows, &bedroom), [Some(Reason::OtherRoom), None]);
+    let mut knows_none = knows.clone();
+    let named = &mut knows_none.labels;
+    named.retain(|_, label| label.name != "washing machine");
+    let (other, cannot) = (Some(Reason::OtherRoom), Some(Reason::Inexpressible));
+    assert_eq!(reasons(&knows_none, &bedroom), [other, cannot]);
+    // A word of one frame is a word of the data set.
+    let mut laundry = frame(&[("appliances", "clothes dryer", 9_000)]);
+    laundry.frame = FrameId("scene/1".into());
+    let both = [bedroom[0].clone(), laundry];
+    assert_eq!(reasons(&knows_none, &both), [other, None]);
+}
+
+#[test]
+fn the_sofa_of_a_coarse_label_may_be_an_armchair() {
+    let mut room = frame(&[("sofa", "sofa", 60_000)]);
+    assert_eq!(ask(&room, "relax on a sofa", "yes"), None);
+    room.segments[0].source = WordSource::Coarse;
+    assert_eq!(ask(&room, "relax on a sofa", "yes"), Some(Reason::Unseen));
+    // It shows a living room all the same.
+    assert_eq!(
+        candidate(&room, &Family::RoomType, "", "")
+            .unwrap()
+            .answer(),
+        "living room"
+    );
 }
 
 #[test]

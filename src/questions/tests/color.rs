@@ -38,6 +38,34 @@ fn one_colour_must_dominate() {
 }
 
 #[test]
+fn things_are_called_by_their_own_words() {
+    for (class, word, text) in [
+        (
+            "cushion",
+            "pillow",
+            "What color is the pillow in the image?",
+        ),
+        ("table", "desk", "What color is the desk in the image?"),
+        (
+            "curtain",
+            "curtains",
+            "What color are the curtains in the image?",
+        ),
+        (
+            "blinds",
+            "window blinds",
+            "What color are the blinds in the image?",
+        ),
+    ] {
+        let frame = frame(&[(class, word, 100_000)]);
+        let question = candidate(&frame, &Family::Color, class, "").unwrap();
+        assert_eq!(question.text, text);
+    }
+    let coarse = sofa(|frame| frame.segments[1].source = WordSource::Coarse);
+    assert_eq!(coarse, Some(Reason::Wordless));
+}
+
+#[test]
 fn the_object_must_be_unique_and_large_enough() {
     let with_second = |area| {
         let frame = frame(&[("sofa", "sofa", 100_000), ("sofa", "sofa", area)]);
@@ -115,6 +143,80 @@ fn over_exposed_and_crushed_pixels_block_the_question() {
         });
         assert_eq!(reason, None, "{color:?}");
     }
+}
+
+/// A sofa of one sRGB code in all pixels, in light of a frame and around it.
+fn lit(color: Color, code: [u8; 3], light: [u8; 3], around: Option<u8>) -> Option<Reason> {
+    sofa(|frame| {
+        frame.light = light;
+        let sofa = &mut frame.segments[1];
+        sofa.colors = [0; NONE + 1];
+        sofa.colors[color as usize] = 100_000;
+        (sofa.median, sofa.around) = (code, around);
+    })
+}
+
+#[test]
+fn a_colour_must_be_the_same_relative_to_the_light() {
+    let grey = |light, around| lit(Color::Grey, [128; 3], light, around);
+    // In full light it is grey. If nothing in the frame, or nothing near, is brighter, it may be white in shade.
+    assert_eq!(grey([250; 3], Some(245)), None);
+    assert_eq!(grey([135; 3], Some(245)), Some(Reason::Lit));
+    assert_eq!(grey([250; 3], Some(135)), Some(Reason::Lit));
+    // Without surfaces around it, only the light of the frame counts.
+    assert_eq!(grey([250; 3], None), None);
+    // Under warm light, a grey thing that looks brown is not asked about; nor is a brown one that looks orange in sunshine.
+    let brown = [150, 108, 66];
+    assert_eq!(lit(Color::Brown, brown, [250; 3], Some(240)), None);
+    assert_eq!(
+        lit(Color::Brown, brown, [190, 137, 84], None),
+        Some(Reason::Lit)
+    );
+    // Pink in shade looks red.
+    let red = [190, 110, 126];
+    assert_eq!(lit(Color::Red, red, [250; 3], Some(250)), None);
+    assert_eq!(lit(Color::Red, red, [250; 3], Some(210)), Some(Reason::Lit));
+    // White stays white however dark its surroundings are.
+    assert_eq!(lit(Color::White, [240; 3], [250; 3], Some(90)), None);
+}
+
+#[test]
+fn two_views_of_a_thing_must_show_the_same_colour() {
+    let view = |name: &str, scene: &str, median, core, source| {
+        let mut view = frame(&[("wall", "wall", 500_000), ("sofa", "sofa", 100_000)]);
+        (view.frame, view.scene) = (FrameId(name.into()), scene.into());
+        let sofa = &mut view.segments[1];
+        (sofa.source, sofa.median, sofa.core) = (source, median, core);
+        view
+    };
+    let (brown, white) = ([110, 70, 40], [250; 3]);
+    let reason = |other: FrameStatistics| {
+        let first = view("a/0", "a", brown, 100_000, WordSource::Name);
+        let results = run_rules(&[first, other], |_| {}, &Rules::built_in().unwrap());
+        let mut reasons = results
+            .candidates
+            .into_iter()
+            .filter_map(|result| match result {
+                RuleResult::Viable(found) if found.family == Family::Color => Some(None),
+                RuleResult::Rejected(found) if found.family == Family::Color => {
+                    Some(Some(found.reason))
+                }
+                _ => None,
+            });
+        reasons.next().unwrap()
+    };
+    let named = WordSource::Name;
+    assert_eq!(reason(view("a/1", "a", brown, 100_000, named)), None);
+    let disagreed = Some(Reason::Disagreed);
+    assert_eq!(reason(view("a/1", "a", white, 100_000, named)), disagreed);
+    // Too few pixels, another scene, and numbers without names say nothing about it.
+    assert_eq!(reason(view("a/1", "a", white, 499, named)), None);
+    assert_eq!(reason(view("a/1", "a", white, 500, named)), disagreed);
+    assert_eq!(reason(view("b/1", "b", white, 100_000, named)), None);
+    assert_eq!(
+        reason(view("a/1", "a", white, 100_000, WordSource::Label)),
+        None
+    );
 }
 
 #[test]

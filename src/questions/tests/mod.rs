@@ -13,6 +13,7 @@ mod rooms;
 mod whole;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::LazyLock;
 
 use crate::questions::balance::BalanceMode;
 use crate::questions::colors::{Color, NONE, Palette};
@@ -23,9 +24,10 @@ use crate::questions::rule_context::GeneratedQuestion;
 use crate::questions::rule_context::{Candidate, RuleResult};
 use crate::questions::rules::Rules;
 use crate::questions::statistics::{
-    DepthAxis, FrameDepth, FrameStatistics, Segment, SegmentDepth, SegmentPlace, plain_word,
+    DepthAxis, FrameDepth, FrameStatistics, Segment, SegmentDepth, SegmentPlace, WordSource,
+    plain_word,
 };
-use crate::types::{Digest, Family, FrameId, Labels, QuestionId};
+use crate::types::{Digest, Family, FrameId, Label, Labels, QuestionId};
 
 /// A frame with the given segments: class, word of the data set, area in pixels.
 pub(crate) fn frame(segments: &[(&str, &str, u64)]) -> FrameStatistics {
@@ -35,11 +37,13 @@ pub(crate) fn frame(segments: &[(&str, &str, u64)]) -> FrameStatistics {
         scene: "scene".into(),
         size: [1000, 1000],
         luma: [60, 120, 200],
+        light: [255; 3],
         void: 0,
         effective_void: 0,
         lower_void: 0,
         classes: BTreeMap::new(),
         loose: BTreeMap::new(),
+        unnamed: BTreeMap::new(),
         words: BTreeMap::new(),
         unknown: BTreeMap::new(),
         depth: Some(FrameDepth {
@@ -51,6 +55,11 @@ pub(crate) fn frame(segments: &[(&str, &str, u64)]) -> FrameStatistics {
         room: None,
     };
     for (id, &(class, word, area)) in (1..).zip(segments) {
+        let word = if word.is_empty() {
+            default_word(class)
+        } else {
+            word
+        };
         let (word, stands) = plain_word(word);
         *frame.classes.entry(class.to_owned()).or_insert(0) += area;
         *frame.words.entry(word.clone()).or_insert(0) += area;
@@ -60,6 +69,7 @@ pub(crate) fn frame(segments: &[(&str, &str, u64)]) -> FrameStatistics {
             id,
             class: class.to_owned(),
             word,
+            source: WordSource::Label,
             stands,
             region: None,
             parts: 0,
@@ -72,6 +82,7 @@ pub(crate) fn frame(segments: &[(&str, &str, u64)]) -> FrameStatistics {
             depth: Some(depth_at(area, 2000 + 1000 * id)),
             colors,
             median: [110, 70, 40],
+            around: None,
             bright: 0,
             crushed: 0,
         });
@@ -89,10 +100,41 @@ fn depth_at(valid: u64, median: u32) -> SegmentDepth {
     }
 }
 
-/// A label space in which every class is expressible.
+/// The first word of a class in questions; the class itself if questions do not name it.
+fn default_word(class: &str) -> &str {
+    static RULES: LazyLock<Rules> = LazyLock::new(|| Rules::built_in().unwrap());
+    let rule = RULES.book().class.get(class);
+    rule.and_then(|rule| rule.words.first())
+        .map_or(class, String::as_str)
+}
+
+/// A label space in which every class is expressible, with a label for its first word.
 pub(crate) fn labels() -> Labels {
     let rules = Rules::built_in().unwrap();
+    let classes = (1..).zip(rules.book().class.keys());
+    let label = |class: &String| Label {
+        name: default_word(class).to_owned(),
+        canonical: class.clone(),
+    };
+    let words = [
+        "washing machine",
+        "desk",
+        "dining table",
+        "dining chair",
+        "stove",
+    ];
+    let named = (100..).zip(words).map(|(id, word)| {
+        let label = Label {
+            name: word.to_owned(),
+            canonical: "misc".to_owned(),
+        };
+        (id, label)
+    });
     Labels {
+        labels: classes
+            .map(|(id, class)| (id, label(class)))
+            .chain(named)
+            .collect(),
         expressible: rules.book().class.keys().cloned().collect(),
         ..Labels::default()
     }
@@ -109,10 +151,19 @@ fn run_rules(
     change: impl FnOnce(&mut QuestionRequest<'_>),
     rules: &Rules,
 ) -> RuleResults {
-    let (labels, palette) = (labels(), Palette::built_in().unwrap());
+    run_rules_of(frames, change, rules, &labels())
+}
+
+fn run_rules_of(
+    frames: &[FrameStatistics],
+    change: impl FnOnce(&mut QuestionRequest<'_>),
+    rules: &Rules,
+    labels: &Labels,
+) -> RuleResults {
+    let palette = Palette::built_in().unwrap();
     let mut request = QuestionRequest {
         dataset: "test",
-        labels: &labels,
+        labels,
         rules,
         palette: &palette,
         families: Family::PAPER.into_iter().collect(),

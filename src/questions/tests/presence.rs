@@ -54,23 +54,107 @@ fn yes_needs_one_good_segment() {
 
 #[test]
 fn words_fit_their_classes() {
-    for (class, text) in [
-        ("appliances", "Is there an appliance in the image?"),
-        ("tv_monitor", "Is there a TV in the image?"),
-        (
-            "chest_of_drawers",
-            "Is there a chest of drawers in the image?",
-        ),
-        ("lighting", "Is there a lamp in the image?"),
+    for (class, word, object) in [
+        ("appliances", "fridge", "Is there a refrigerator"),
+        ("appliances", "oven", "Is there an oven"),
+        ("tv_monitor", "tv", "Is there a TV"),
+        ("chest_of_drawers", "night stand", "Is there a nightstand"),
+        ("lighting", "ceiling light", "Is there a ceiling light"),
+        ("cushion", "pillow", "Is there a pillow"),
+        ("table", "desk", "Is there a desk"),
+        ("chair", "armchair", "Is there an armchair"),
+        ("curtain", "curtain", "Is there a curtain"),
+        ("curtain", "curtains", "Are there curtains"),
+        ("shelving", "shelves", "Are there shelves"),
+        ("plant", "flowers", "Are there flowers"),
     ] {
-        let frame = frame(&[(class, "", 20_000)]);
-        assert_eq!(
-            candidate(&frame, &Family::Presence, class, "yes")
-                .unwrap()
-                .text,
-            text
-        );
+        let frame = frame(&[(class, word, 20_000)]);
+        let question = candidate(&frame, &Family::Presence, class, "yes").unwrap();
+        assert_eq!(question.text, format!("{object} in the image?"));
     }
+}
+
+#[test]
+fn things_without_a_word_of_their_own_are_not_asked_about() {
+    let mut sofa = frame(&[("sofa", "sofa", 20_000)]);
+    assert_eq!(ask(&sofa, "sofa", "yes"), None);
+    sofa.segments[0].source = WordSource::Coarse;
+    assert_eq!(ask(&sofa, "sofa", "yes"), Some(Reason::Wordless));
+    for (class, word) in [
+        ("bed", "bed sheet"),
+        ("lighting", "light fixture"),
+        ("sofa", "Sessel"),
+    ] {
+        let frame = frame(&[(class, word, 20_000)]);
+        assert_eq!(ask(&frame, class, "yes"), Some(Reason::Wordless), "{word}");
+    }
+    // Each word that a class has in the frame is asked about.
+    let both = frame(&[
+        ("chair", "armchair", 20_000),
+        ("chair", "dining chair", 9_000),
+    ]);
+    let results = run_rules(&[both], |_| {}, &Rules::built_in().unwrap());
+    let texts = results.candidates.iter().filter_map(|result| match result {
+        RuleResult::Viable(found) if found.about == "chair" && found.family == Family::Presence => {
+            Some(found.text.as_str())
+        }
+        _ => None,
+    });
+    let expected = [
+        "Is there a dining chair in the image?",
+        "Is there an armchair in the image?",
+    ];
+    assert_eq!(texts.collect::<BTreeSet<_>>(), expected.into());
+}
+
+#[test]
+fn nothing_is_denied_that_a_coarse_class_may_hide() {
+    let rules = Rules::built_in().unwrap();
+    for (class, rule) in &rules.book().class {
+        for other in &rule.hidden {
+            let mut seen = frame(&[("wall", "wall", 500_000)]);
+            let no = |seen: &FrameStatistics| ask(seen, class, "no");
+            assert_eq!(no(&seen), None, "{class}");
+            seen.unnamed.insert(other.clone(), 1);
+            assert_eq!(no(&seen), Some(Reason::Hidden), "{class} in {other}");
+        }
+    }
+    // Named, the same things hide nothing; but a name may be another word for the class.
+    let named = |word| frame(&[("wall", "wall", 500_000), ("objects", word, 9_000)]);
+    assert_eq!(ask(&named("vase"), "lighting", "no"), None);
+    assert_eq!(ask(&named("lamp base"), "lighting", "no"), None);
+    let resembling = Some(Reason::Confusable);
+    assert_eq!(ask(&named("salt lamp"), "lighting", "no"), resembling);
+    // "Headlamp" is one word.
+    assert_eq!(ask(&named("headlamp"), "lighting", "no"), None);
+}
+
+#[test]
+fn only_words_of_the_data_set_are_denied() {
+    let denied = |frames: &[FrameStatistics]| -> BTreeSet<String> {
+        let results = run_rules(frames, |_| {}, &Rules::built_in().unwrap());
+        let results = results.candidates.into_iter();
+        let texts = results.filter_map(|result| match result {
+            RuleResult::Viable(found) if found.about == "lighting" && found.answer() == "no" => {
+                Some(found.text)
+            }
+            _ => None,
+        });
+        texts.collect()
+    };
+    let wall = frame(&[("wall", "wall", 500_000)]);
+    let lamp = "Is there a lamp in the image?".to_owned();
+    assert_eq!(denied(std::slice::from_ref(&wall)), [lamp.clone()].into());
+    let mut lit = frame(&[("lighting", "ceiling light", 9_000)]);
+    lit.frame = FrameId("scene/1".into());
+    let ceiling = "Is there a ceiling light in the image?".to_owned();
+    assert_eq!(
+        denied(&[wall.clone(), lit.clone()]),
+        [lamp, ceiling.clone()].into()
+    );
+    // Where segments have names, only names count.
+    lit.segments[0].source = WordSource::Name;
+    assert_eq!(denied(&[wall, lit]), [ceiling].into());
 }
 
 #[test]

@@ -1,9 +1,12 @@
 //! Statistics of a set of questions: a table, files of all counts, and a figure.
 
+pub(crate) mod checks;
 pub(crate) mod figure;
 pub(crate) mod review;
 
 use std::fmt::{Display, Write as _};
+
+use serde::Serialize;
 
 use super::table::ColumnKind::{Count, Text};
 use super::table::TableBuilder;
@@ -11,6 +14,7 @@ use super::words::counted;
 use super::{csv as files, terminal};
 use crate::error::{Error, Result};
 use crate::questions::summary::{Baselines, CandidateCounts, QuestionSummary};
+use crate::score::checks::Checks;
 use crate::types::Family;
 
 /// Maximum number of reasons in a line of the table.
@@ -133,13 +137,26 @@ fn variant_words<T: serde::Serialize>(value: &T) -> String {
     json.as_str().unwrap_or_default().replace('_', " ")
 }
 
-/// The summary as JSON.
+/// The summary, with what people found about the questions.
+#[derive(Serialize)]
+struct WrittenSummary<'a> {
+    #[serde(flatten)]
+    summary: &'a QuestionSummary,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    checks: Option<serde_json::Value>,
+}
+
+/// The summary as JSON, with what people found about the questions.
 ///
 /// # Errors
 /// If the statistics cannot be written.
-pub(crate) fn json(summary: &QuestionSummary) -> Result<String> {
-    let text = serde_json::to_string_pretty(summary).map_err(|e| Error::data("statistics", e))?;
-    Ok(text + "\n")
+pub(crate) fn json(summary: &QuestionSummary, checks: &Checks) -> Result<String> {
+    let wrong = |e: serde_json::Error| Error::data("statistics", e);
+    let written = WrittenSummary {
+        summary,
+        checks: (!checks.is_empty()).then(|| checks::json(checks)),
+    };
+    Ok(serde_json::to_string_pretty(&written).map_err(wrong)? + "\n")
 }
 
 /// All counts as CSV: `table, row, column, count`.

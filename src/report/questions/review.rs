@@ -1,4 +1,4 @@
-//! The page on which a person accepts or rejects each question: [`page`].
+//! The page on which a person checks each question: [`page`].
 
 use serde::Serialize;
 
@@ -50,13 +50,14 @@ impl<'a> ReviewItem<'a> {
 /// The data of the page.
 #[derive(Serialize)]
 struct ReviewPage<'a> {
-    /// Digest of the question ids. The browser stores verdicts under it until they are saved.
+    /// Digest of the question ids. The browser stores what a person found under it and the person's name until it is saved.
     set: Digest,
     items: &'a [ReviewItem<'a>],
 }
 
-/// The page as one HTML file. It shows each question with its image, its answer and the boxes of its evidence, takes verdicts
-/// from the keyboard, and saves them as lines of JSON.
+/// The page as one HTML file. It shows each question with its image, and takes the person's own answer. Only then does it show
+/// the answer of the rule with its evidence, so that the shares found wrong are those of people who did not know it. It saves
+/// lines of JSON under the person's name.
 ///
 /// # Errors
 /// If the questions cannot be written.

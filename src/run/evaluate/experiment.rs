@@ -102,8 +102,12 @@ impl Experiment for ChoiceSetup<'_> {
 
     fn notes(&self) -> Vec<(&'static str, Value)> {
         let bank = self.config.bank.iter();
-        bank.map(|bank| ("questions without answers", json!(bank.words())))
-            .collect()
+        let bank = bank.map(|bank| ("questions without answers", json!(bank.words())));
+        let reading = match self.dataset.reading() {
+            [] => None,
+            lines => Some(("reading of the data", json!(lines))),
+        };
+        bank.chain(reading).collect()
     }
 
     fn columns(&self) -> Columns {

@@ -1,5 +1,6 @@
 //! The evaluation: questions with choices about each frame ([`evaluate`]).
 
+mod check;
 mod choice_order;
 mod controls;
 mod experiment;
@@ -14,6 +15,7 @@ use crate::job::batch::{BatchFileArgs, BatchRunArgs};
 use crate::job::progress::Progress;
 use crate::job::{Job, Outcome};
 
+pub(crate) use check::{CheckArgs, check};
 pub(crate) use settings::{EvaluateArgs, ShrinkArgs};
 use setup::ChoiceSetup;
 
@@ -24,7 +26,16 @@ use setup::ChoiceSetup;
 pub(crate) fn evaluate(args: EvaluateArgs, progress: &Progress) -> Result<Outcome> {
     let config = args.resolve()?;
     let (setup, files) = ChoiceSetup::open(&config, progress)?;
+    setup.say_reading(progress);
     Job::new(&setup, files, progress)?.run()
+}
+
+/// The estimate of what a run would take, in words.
+fn estimate(args: EvaluateArgs, progress: &Progress) -> Result<String> {
+    let config = args.resolve()?;
+    let (setup, files) = ChoiceSetup::open(&config, progress)?;
+    let outcome = Job::new(&setup, files, progress)?.run()?;
+    Ok(outcome.output)
 }
 
 /// Writes the remaining trials as files of a Batch API, and marks them in the run as sent.
@@ -38,6 +49,7 @@ pub(crate) fn export_batch(
 ) -> Result<Outcome> {
     let config = args.resolve()?;
     let (setup, models) = ChoiceSetup::open(&config, progress)?;
+    setup.say_reading(progress);
     Job::new(&setup, models, progress)?.export_batch(files)
 }
 
@@ -53,5 +65,6 @@ pub(crate) fn run_batch(
 ) -> Result<Outcome> {
     let config = args.resolve()?;
     let (setup, models) = ChoiceSetup::open(&config, progress)?;
+    setup.say_reading(progress);
     Job::new(&setup, models, progress)?.run_batch(files, batch)
 }

@@ -1,15 +1,13 @@
 //! The flags of an evaluation ([`EvaluateArgs`]) and its validated settings ([`Evaluation`]).
 
 use std::num::NonZeroU32;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
 use super::choice_order::{ChoiceOrder, Repeats};
 use crate::ask::{Constrain, Prompts};
-use crate::dataset::{
-    BankArgs, CodesArgs, DataArgs, DataPlace, PixelLimit, ReadingRule, SelectionArgs,
-};
+use crate::dataset::{BankArgs, CodesArgs, DataArgs, PixelLimit, ReadingRule, SelectionArgs};
 use crate::error::{Error, Result};
 use crate::job::models::{ModelName, TextBaseline};
 use crate::job::questions::{QuestionBank, rules};
@@ -121,23 +119,10 @@ impl EvaluateArgs {
             return Err(self.job.no_model_error());
         }
         let prompts = self.choice.prompts.as_deref();
-        let data = match &self.data.data {
-            DataPlace::Path(path) => Some(path.clone()),
-            DataPlace::Rooms(_) => None,
-        };
+        let experiment = self.experiment();
         let bank = QuestionBank::open(&self.bank)?;
         let truths = bank.as_ref().map_or(Truths::Known, |_| Truths::Unknown);
-        let job = self.job.resolve(&ExperimentSettings {
-            constrain: self.choice.constrain,
-            probabilities: self.choice.probabilities,
-            max_side: self.shrink.max_side,
-            sampling_seed: None,
-            data,
-            text_baseline: match truths {
-                Truths::Known => TextBaseline::AsSaid,
-                Truths::Unknown => TextBaseline::Always,
-            },
-        })?;
+        let job = self.job.resolve(&experiment)?;
         if truths == Truths::Unknown {
             check_without_truths(&job)?;
         }
@@ -158,6 +143,21 @@ impl EvaluateArgs {
             prompts: prompts.map_or_else(Prompts::built_in, Prompts::load)?,
             job,
         })
+    }
+
+    /// The settings that not every experiment has.
+    pub(super) fn experiment(&self) -> ExperimentSettings {
+        ExperimentSettings {
+            constrain: self.choice.constrain,
+            probabilities: self.choice.probabilities,
+            max_side: self.shrink.max_side,
+            sampling_seed: None,
+            data: self.data.data.path().map(Path::to_owned),
+            text_baseline: match self.bank.ask {
+                None => TextBaseline::AsSaid,
+                Some(_) => TextBaseline::Always,
+            },
+        }
     }
 }
 

@@ -57,11 +57,12 @@ impl<'a> ChoiceSetup<'a> {
             Vec::new()
         };
         let place = &config.data.data;
+        let set = &config.data.set;
         let dataset = if let Some(bank) = &config.bank {
-            bank.data(place, config.rule, progress)?
+            bank.data(place, set, config.rule, progress)?
         } else {
             let (selection, rules) = (&config.selection, &config.rules);
-            open_data(place, selection, rules, config.rule, progress)?
+            open_data(place, set, selection, rules, config.rule, progress)?
         };
         let dataset = Arc::new(dataset);
         let all = select(&dataset, &config.selection)?;
@@ -104,6 +105,13 @@ impl<'a> ChoiceSetup<'a> {
         setup.recipe.check(&setup.sources, &setup.conditions)?;
         controls.print(progress);
         Ok((setup, files))
+    }
+
+    /// Says what was taken for what in a ready-made set.
+    pub(super) fn say_reading(&self, progress: &Progress) {
+        for line in self.dataset.reading_to_say() {
+            progress.note(line);
+        }
     }
 
     /// Adds the questions that are asked with the image of another frame, if that image is of this run or shard.

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::ask::png;
-use crate::dataset::{self, CodesArgs, DataPlace, Dataset, PixelLimit, SelectionArgs};
+use crate::dataset::{self, CodesArgs, DataPlace, Dataset, PixelLimit, SelectionArgs, SetArgs};
 use crate::enhance::EnhancerArgs;
 use crate::error::{Error, Result};
 use crate::job::Outcome;
@@ -34,12 +34,15 @@ pub(crate) struct ExportArgs {
     /// The form of the sets
     #[arg(value_name = "KIND", value_enum, add = Decides::Nothing)]
     pub kind: SetForm,
-    /// A folder of frames, or a ready-made set (.tsv, .jsonl)
+    /// A folder of frames, or a ready-made set (.parquet, .tsv, .csv, .json, .jsonl, a folder of them)
     #[arg(value_name = "DATA", value_parser = dataset::place, add = Decides::Reply)]
     pub data: DataPlace,
     /// Where the sets go, one for each condition
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: PathBuf,
+    /// How a ready-made set is read.
+    #[command(flatten)]
+    pub set: SetArgs,
     /// The flags that select questions.
     #[command(flatten)]
     pub selection: SelectionArgs,
@@ -72,7 +75,17 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
     check_used(&light, &args.enhancers)?;
     let rules = rules(args.selection.rules.as_deref())?;
     let rule = args.codes.rule(args.limit);
-    let dataset = open_data(&args.data, &args.selection, &rules, rule, progress)?;
+    let dataset = open_data(
+        &args.data,
+        &args.set,
+        &args.selection,
+        &rules,
+        rule,
+        progress,
+    )?;
+    for line in dataset.reading_to_say() {
+        progress.note(line);
+    }
     let questions = select(&dataset, &args.selection)?;
     let files = enhancers::read(&args.enhancers.llie)?;
     let recipe = Recipe::lossless(&light.kinds, &files);

@@ -1,6 +1,7 @@
 //! The check of questions by people: the page, and the verdicts that it saves.
 
 use std::collections::BTreeSet;
+use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 use serde::Deserialize;
@@ -11,13 +12,59 @@ use crate::files::{reading, write};
 use crate::questions::GeneratedQuestion;
 use crate::questions::statistics::FrameStatistics;
 use crate::report::questions::review::{ReviewItem, page};
-use crate::types::QuestionId;
+use crate::score::checks::{Check, CheckFinding, Checks};
+use crate::types::{Family, FrameId, QuestionId};
 
 /// A line of a file of verdicts.
 #[derive(Deserialize)]
 struct CheckedLine {
     id: QuestionId,
     verdict: Decision,
+    /// Name of the person; empty in files without names.
+    #[serde(default)]
+    person: String,
+    /// What the person found before the answer was shown; `None` in files of verdicts alone.
+    #[serde(default)]
+    found: Option<Found>,
+    #[serde(default)]
+    family: Option<Family>,
+    #[serde(default)]
+    frame: Option<FrameId>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Found {
+    Right,
+    Wrong,
+    Ambiguous,
+}
+
+impl CheckedLine {
+    /// What the person found about the question, if the line says it.
+    fn check(&self) -> Option<Check> {
+        let frame = &self.frame.as_ref()?.0;
+        let scene = frame.rsplit_once('/').map_or(&**frame, |(scene, _)| scene);
+        Some(Check {
+            person: self.person.clone(),
+            family: self.family.clone()?,
+            scene: scene.to_owned(),
+            finding: match self.found? {
+                Found::Right => CheckFinding::Right,
+                Found::Wrong => CheckFinding::Wrong,
+                Found::Ambiguous => CheckFinding::Ambiguous,
+            },
+        })
+    }
+}
+
+/// What people decided about questions.
+#[derive(Default)]
+pub(super) struct Verdicts {
+    /// The questions that some person rejected.
+    pub(super) rejected: BTreeSet<QuestionId>,
+    /// What each person found about each question.
+    pub(super) checks: Checks,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -27,25 +74,33 @@ enum Decision {
     Reject,
 }
 
-/// The questions that people rejected. If several lines are about one question, the last one counts.
+/// The verdicts in files. If several lines of a person are about one question, the last one counts. A question is rejected if any
+/// person rejects it.
 ///
 /// # Errors
 /// If a line is not a verdict; the error names the file and the line.
-pub(super) fn rejected(files: &[PathBuf]) -> Result<BTreeSet<QuestionId>> {
-    let mut rejected = BTreeSet::new();
+pub(super) fn verdicts(files: &[PathBuf]) -> Result<Verdicts> {
+    let mut rejections: BTreeSet<(QuestionId, String)> = BTreeSet::new();
+    let mut verdicts = Verdicts::default();
     for path in files {
         let text = reading::text(path)?;
         let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
         for (i, line) in lines.filter(|(_, line)| !line.trim().is_empty()) {
             let verdict_line: CheckedLine =
                 serde_json::from_str(line).map_err(|e| Error::json_line(path, i + 1, &e))?;
+            if let Some(check) = verdict_line.check() {
+                let key = (verdict_line.person.clone(), verdict_line.id.clone());
+                verdicts.checks.insert(key, check);
+            }
+            let key = (verdict_line.id, verdict_line.person);
             match verdict_line.verdict {
-                Decision::Reject => drop(rejected.insert(verdict_line.id)),
-                Decision::Accept => drop(rejected.remove(&verdict_line.id)),
+                Decision::Reject => drop(rejections.insert(key)),
+                Decision::Accept => drop(rejections.remove(&key)),
             }
         }
     }
-    Ok(rejected)
+    verdicts.rejected = rejections.into_iter().map(|(id, _)| id).collect();
+    Ok(verdicts)
 }
 
 /// Writes the page on which people check all questions.
@@ -55,7 +110,13 @@ pub(super) fn review(
     frames: &[FrameStatistics],
     questions: &[GeneratedQuestion],
 ) -> Result<()> {
-    let folder = path.parent().unwrap_or(Path::new(""));
+    // The parent of a bare file name is empty, which stands for the folder in which the command runs.
+    let parent = path
+        .parent()
+        .filter(|parent| !parent.as_os_str().is_empty());
+    let folder = parent.unwrap_or(Path::new("."));
+    // Links lead out of the folder as it is on disk, so it must be there before they are made.
+    fs::create_dir_all(folder).map_err(|e| Error::file(folder, "make", e))?;
     let items = questions.iter().filter_map(|generated| {
         let frame = &generated.question.frame;
         let size = frames.iter().find(|known| known.frame == *frame)?.size;
@@ -117,13 +178,42 @@ mod tests {
         ]
         .map(|(id, verdict)| format!(r#"{{"id":"{id}","verdict":"{verdict}","frame":"x"}}"#));
         fs::write(&path, lines.join("\n\n")).unwrap();
-        let rejected = rejected(std::slice::from_ref(&path)).unwrap();
-        assert_eq!(rejected, [QuestionId("b".into())].into());
+        let found = verdicts(std::slice::from_ref(&path)).unwrap();
+        assert_eq!(found.rejected, [QuestionId("b".into())].into());
+        assert!(found.checks.is_empty());
         fs::write(&path, "\n{\"id\":\"a\",\"verdict\":\"perhaps\"}\n").unwrap();
-        let error = super::rejected(&[path]).unwrap_err().to_string();
+        let error = super::verdicts(&[path])
+            .map(|_| ())
+            .unwrap_err()
+            .to_string();
         assert!(
             error.contains("v.jsonl, line 2: unknown variant `perhaps`"),
             "{error}"
+        );
+    }
+
+    #[test]
+    fn one_of_two_people_rejects() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |person: &str| folder.path().join(format!("{person}.jsonl"));
+        let line = |person: &str, id: &str, verdict: &str, found: &str| {
+            let line = serde_json::json!({
+                "id": id, "person": person, "verdict": verdict, "found": found,
+                "family": "color", "frame": "scene-1/a",
+            });
+            format!("{line}\n")
+        };
+        let anna = line("anna", "a", "reject", "wrong") + &line("anna", "b", "accept", "right");
+        let ben = line("ben", "a", "accept", "right") + &line("ben", "b", "accept", "right");
+        fs::write(path("anna"), anna).unwrap();
+        fs::write(path("ben"), ben).unwrap();
+        let found = verdicts(&[path("anna"), path("ben")]).unwrap();
+        assert_eq!(found.rejected, [QuestionId("a".into())].into());
+        assert_eq!(found.checks.len(), 4);
+        let check = &found.checks[&("anna".to_owned(), QuestionId("a".into()))];
+        assert_eq!(
+            (&*check.scene, check.finding),
+            ("scene-1", CheckFinding::Wrong)
         );
     }
 

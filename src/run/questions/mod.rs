@@ -67,10 +67,12 @@ pub(crate) struct QuestionsArgs {
     /// Write the statistics of frames, questions and answers: JSON, CSV and a figure; default: not written
     #[arg(long, value_name = "DIR", help_heading = "Checking", add = Decides::Nothing)]
     pub stats: Option<PathBuf>,
-    /// Write a page on which a person accepts or rejects each question; default: not written
+    /// Write a page on which a person answers each question before the rule's answer is shown, and which saves what was found;
+    /// default: not written
     #[arg(long, value_name = "FILE.html", help_heading = "Checking", add = Decides::Nothing)]
     pub review: Option<PathBuf>,
-    /// Leave out what a person has rejected on such a page; repeatable; default: nothing
+    /// Leave out what a person has rejected on such a page, and show the shares found wrong and ambiguous; with the files of two
+    /// people also Cohen's κ; repeatable; default: nothing
     #[arg(long, value_name = "FILE", help_heading = "Checking", add = Decides::Trials)]
     pub verdicts: Vec<PathBuf>,
     /// Print the statistics as JSON instead of a table
@@ -142,13 +144,14 @@ fn read<T>(path: Option<&Path>, parse: fn(&str) -> Result<T>) -> Result<Option<T
 /// If there are no frames or no classes, or a file cannot be written.
 pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Outcome> {
     let making = &QuestionMaking::read(args)?;
-    let dataset = Dataset::of_frames(&args.data)?;
+    let dataset = Dataset::of_frames(&args.data, &[])?;
     let dataset = dataset.with_rule(args.codes.rule(args.limit));
     let labels = dataset.labels().ok_or_else(|| {
         let problem = "no classes.json in this folder, which gives the class of each number in its maps; `darkqa-eval import` writes one";
         Error::data(args.data.display(), problem)
     })?;
     let (frames, failed) = measured(making, &dataset, labels, progress)?;
+    let verdicts = checked::verdicts(&args.verdicts)?;
     let request = QuestionRequest {
         dataset: dataset.title(),
         labels,
@@ -161,7 +164,7 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
         },
         room_source: args.room,
         balance: args.balance,
-        rejected: checked::rejected(&args.verdicts)?,
+        rejected: verdicts.rejected,
     };
     let mut candidates = Vec::new();
     let generated = generate(&frames, &request, |frame, result| {
@@ -177,7 +180,7 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
         write(path, &lines(candidates)?)?;
     }
     let summary = QuestionSummary::new(&frames, &generated, &request, failed);
-    let json = report::questions::json(&summary)?;
+    let json = report::questions::json(&summary, &verdicts.checks)?;
     if let Some(folder) = &args.stats {
         write(&folder.join("statistics.json"), json.as_bytes())?;
         write(
@@ -201,8 +204,9 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
             json
         } else {
             format!(
-                "{}{}\n",
+                "{}{}{}\n",
                 report::questions::table(&summary),
+                report::questions::checks::text(&verdicts.checks),
                 args.out.display()
             )
         },

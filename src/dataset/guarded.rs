@@ -13,7 +13,7 @@ thread_local! {
 }
 
 /// The result of a decoder; an error if it panics. Nothing that it worked on is used afterwards.
-pub(super) fn guarded<T>(decode: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+pub(crate) fn guarded<T>(decode: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
         let print = panic::take_hook();
@@ -27,7 +27,7 @@ pub(super) fn guarded<T>(decode: impl FnOnce() -> Result<T, String>) -> Result<T
     let decoded = panic::catch_unwind(AssertUnwindSafe(decode));
     GUARDED.set(outer);
     decoded.unwrap_or_else(|_| {
-        let problem = "not a whole image: its decoder broke down; copy or export it again";
+        let problem = "not a whole file: its decoder broke down; copy or export it again";
         Err(problem.to_owned())
     })
 }

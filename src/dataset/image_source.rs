@@ -1,0 +1,37 @@
+//! Where an image lies: [`ImageSource`].
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::maps::MapPaths;
+use super::ready_made::{Archive, EmbeddedImage};
+use super::view::FrameFacts;
+use crate::rooms;
+
+/// The place of one image and of its maps.
+#[derive(Debug, Clone)]
+pub(crate) enum ImageSource {
+    /// An image file, its map files, and the other facts about the frame.
+    File {
+        rgb: PathBuf,
+        maps: MapPaths,
+        view: FrameFacts,
+    },
+    /// An image of this name in a ZIP file.
+    Member(Arc<Archive>),
+    /// An image inside a file of rows.
+    Embedded(EmbeddedImage),
+    /// A frame of the built-in rooms.
+    Room(rooms::Room),
+}
+
+impl ImageSource {
+    /// An image file without maps.
+    pub(super) fn image(rgb: PathBuf) -> Self {
+        Self::File {
+            rgb,
+            maps: MapPaths::default(),
+            view: FrameFacts::default(),
+        }
+    }
+}

@@ -1,0 +1,280 @@
+//! A value in a row of a ready-made set: [`Cell`].
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use serde_json::Value;
+
+use super::text_list::list;
+use crate::types::Digest;
+
+/// The maximum length of a text that may be a path or the id of a row. A longer one of the base64 alphabet is a file (the rule of
+/// VLMEvalKit, `vlmeval/dataset/image_base.py`).
+pub(super) const LONGEST_NAME: usize = 64;
+
+/// The length from which on a text of the base64 alphabet is not kept: its file is read again when it is shown.
+const LONGEST_KEPT: usize = 1024;
+
+/// A value in a row. The bytes of files are not kept.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Cell {
+    /// Null, or no such column in this row.
+    Absent,
+    Bool(bool),
+    /// A number as its file writes it.
+    Number(String),
+    Text(String),
+    /// Bytes, of a row that is read to show its image.
+    Bytes(Vec<u8>),
+    /// Bytes that were looked at and not kept, of a row that is read for its question.
+    File(FileFacts),
+    List(Vec<Cell>),
+    Fields(Vec<(String, Cell)>),
+}
+
+/// What is known of bytes that are not kept.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct FileFacts {
+    pub(super) digest: Digest,
+    /// The first bytes, by which the format is known.
+    pub(super) head: Vec<u8>,
+}
+
+impl FileFacts {
+    pub(super) fn of(bytes: &[u8]) -> Self {
+        Self {
+            digest: Digest::of(bytes),
+            head: bytes[..bytes.len().min(16)].to_vec(),
+        }
+    }
+}
+
+impl Cell {
+    /// The cell without the bytes of files.
+    pub(super) fn without_files(self) -> Self {
+        match self {
+            Self::Bytes(bytes) => Self::File(FileFacts::of(&bytes)),
+            Self::Text(text) if text.len() > LONGEST_KEPT => match (decoded(&text), list(&text)) {
+                (Some(bytes), _) => Self::File(FileFacts::of(&bytes)),
+                (None, Some(items)) => {
+                    let items = items.into_iter();
+                    Self::List(items.map(|item| Self::Text(item).without_files()).collect())
+                }
+                (None, None) => Self::Text(text),
+            },
+            Self::List(cells) => Self::List(cells.into_iter().map(Self::without_files).collect()),
+            Self::Fields(fields) => {
+                let fields = fields.into_iter();
+                Self::Fields(
+                    fields
+                        .map(|(name, cell)| (name, cell.without_files()))
+                        .collect(),
+                )
+            }
+            other => other,
+        }
+    }
+
+    /// Whether nothing is there: null, an empty text or list, or a word by which tables write that (`nan`, `N/A`, `None`, `null`).
+    pub(super) fn is_absent(&self) -> bool {
+        match self {
+            Self::Absent => true,
+            Self::Text(text) => {
+                let text = text.trim().to_ascii_lowercase();
+                matches!(&*text, "" | "nan" | "n/a" | "none" | "null")
+            }
+            Self::List(cells) => cells.is_empty(),
+            Self::Fields(fields) => fields.iter().all(|(_, cell)| cell.is_absent()),
+            _ => false,
+        }
+    }
+
+    /// The cell as text; `None` if it is absent, or neither a text nor a number nor a truth value.
+    pub(super) fn text(&self) -> Option<String> {
+        match self {
+            Self::Bool(is_true) => Some(is_true.to_string()),
+            Self::Number(text) => Some(whole(text)),
+            Self::Text(text) if !text.trim().is_empty() => Some(text.clone()),
+            _ => None,
+        }
+    }
+
+    /// The field of a struct, by its name.
+    pub(super) fn field(&self, name: &str) -> Option<&Self> {
+        let Self::Fields(fields) = self else {
+            return None;
+        };
+        let mut fields = fields.iter();
+        fields
+            .find(|(field, _)| field == name)
+            .map(|(_, cell)| cell)
+    }
+
+    /// The kind of value, for messages.
+    pub(super) fn kind(&self) -> &'static str {
+        match self {
+            Self::Absent => "nothing",
+            Self::Bool(_) => "truth",
+            Self::Number(_) => "number",
+            Self::Text(_) => "text",
+            Self::Bytes(_) | Self::File(_) => "file",
+            Self::List(_) => "list",
+            Self::Fields(_) => "struct",
+        }
+    }
+
+    /// The value in at most about `most` characters, for messages.
+    pub(super) fn shown(&self, most: usize) -> String {
+        let whole = match self {
+            Self::Absent => String::new(),
+            Self::Bool(_) | Self::Number(_) => self.text().unwrap_or_default(),
+            Self::Text(text) => format!("{text:?}"),
+            Self::Bytes(bytes) => format!("{} bytes", bytes.len()),
+            Self::File(_) => "bytes".to_owned(),
+            Self::List(cells) => {
+                let cells: Vec<String> = cells.iter().map(|cell| cell.shown(most)).collect();
+                format!("[{}]", cells.join(", "))
+            }
+            Self::Fields(fields) => {
+                let fields = fields.iter();
+                let fields: Vec<String> = fields
+                    .map(|(name, cell)| format!("{name}: {}", cell.shown(most)))
+                    .collect();
+                format!("{{{}}}", fields.join(", "))
+            }
+        };
+        shortened(&whole, most)
+    }
+}
+
+impl From<&Cell> for Value {
+    /// The value as JSON; of bytes, null.
+    fn from(cell: &Cell) -> Self {
+        match cell {
+            Cell::Absent | Cell::Bytes(_) | Cell::File(_) => Self::Null,
+            Cell::Bool(is_true) => Self::Bool(*is_true),
+            Cell::Number(text) => text
+                .parse()
+                .map_or_else(|_| text.as_str().into(), Self::Number),
+            Cell::Text(text) => text.as_str().into(),
+            Cell::List(cells) => cells.iter().map(Self::from).collect(),
+            Cell::Fields(fields) => {
+                let fields = fields.iter();
+                Self::Object(
+                    fields
+                        .map(|(name, cell)| (name.clone(), Self::from(cell)))
+                        .collect(),
+                )
+            }
+        }
+    }
+}
+
+impl From<Value> for Cell {
+    fn from(value: Value) -> Self {
+        match value {
+            Value::Null => Self::Absent,
+            Value::Bool(is_true) => Self::Bool(is_true),
+            Value::Number(number) => Self::Number(number.to_string()),
+            Value::String(text) => Self::Text(text),
+            Value::Array(values) => Self::List(values.into_iter().map(Self::from).collect()),
+            Value::Object(fields) => {
+                let fields = fields.into_iter();
+                Self::Fields(
+                    fields
+                        .map(|(name, value)| (name, Self::from(value)))
+                        .collect(),
+                )
+            }
+        }
+    }
+}
+
+/// The text of a number without a fraction of zero: `3.0` is `3`.
+fn whole(number: &str) -> String {
+    number.strip_suffix(".0").unwrap_or(number).to_owned()
+}
+
+/// A text in at most about `most` characters, on one line.
+pub(super) fn shortened(text: &str, most: usize) -> String {
+    let line: String = text
+        .chars()
+        .map(|c| if c.is_control() { ' ' } else { c })
+        .collect();
+    if line.chars().count() <= most {
+        return line;
+    }
+    let head: String = line.chars().take(most.saturating_sub(1)).collect();
+    format!("{head}…")
+}
+
+/// The file in a text, if the text is base64 and longer than a name. The head of a `data:` address is cut.
+pub(super) fn decoded(text: &str) -> Option<Vec<u8>> {
+    let text = text.trim();
+    let text = match text.strip_prefix("data:") {
+        Some(address) => address.split_once(',')?.1,
+        None => text,
+    };
+    if text.len() <= LONGEST_NAME {
+        return None;
+    }
+    let is_base64 = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'+' | b'/' | b'=');
+    if text.bytes().all(is_base64) {
+        return STANDARD.decode(text).ok();
+    }
+    if !text
+        .bytes()
+        .all(|byte| is_base64(byte) || byte.is_ascii_whitespace())
+    {
+        return None;
+    }
+    let dense: Vec<u8> = text
+        .bytes()
+        .filter(|byte| !byte.is_ascii_whitespace())
+        .collect();
+    STANDARD.decode(dense).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_text_of_base64_is_a_file_and_a_sentence_is_none() {
+        let file = vec![7; 90];
+        let text = STANDARD.encode(&file);
+        let wrapped = format!("{}\n{}", &text[..76], &text[76..]);
+        for form in [
+            text.clone(),
+            wrapped,
+            format!("data:image/png;base64,{text}"),
+        ] {
+            assert_eq!(decoded(&form).unwrap(), file, "{form}");
+        }
+        let path = "a/long/path/of/an/image/that/has/more/than/sixty/four/characters/0.png";
+        for text in [&text[..60], path, "What is this? ".repeat(9).as_str()] {
+            assert_eq!(decoded(text), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn files_are_known_by_their_digest_and_not_kept() {
+        let file = vec![9; 4000];
+        let text = Cell::Text(STANDARD.encode(&file)).without_files();
+        assert_eq!(text, Cell::Bytes(file.clone()).without_files());
+        assert_eq!(text, Cell::File(FileFacts::of(&file)));
+        assert_ne!(text, Cell::File(FileFacts::of(&file[1..])));
+    }
+
+    #[test]
+    fn words_for_nothing_are_nothing() {
+        for nothing in ["", " ", "nan", "N/A", "None", "null"] {
+            assert!(Cell::Text(nothing.to_owned()).is_absent(), "{nothing:?}");
+        }
+        for something in ["0", "no", "none of these"] {
+            assert!(
+                !Cell::Text(something.to_owned()).is_absent(),
+                "{something:?}"
+            );
+        }
+    }
+}

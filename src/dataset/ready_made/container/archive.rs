@@ -1,0 +1,166 @@
+//! A set in a ZIP file, which is not unpacked: [`Archive`].
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufReader, Read as _};
+use std::path::{Component, Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use tempfile::NamedTempFile;
+use zip::ZipArchive;
+
+use crate::error::{Error, Result};
+use crate::types::FrameId;
+
+/// The maximum number of entries.
+const MOST_ENTRIES: usize = 1_000_000;
+
+/// The maximum length of an image, in bytes.
+const LONGEST_IMAGE: u64 = 1 << 30;
+
+/// A ZIP file whose directory is read.
+pub(crate) struct Archive {
+    pub(in crate::dataset::ready_made) path: PathBuf,
+    /// The place of each file, by its name.
+    names: BTreeMap<String, usize>,
+    zip: Mutex<ZipArchive<BufReader<File>>>,
+}
+
+impl std::fmt::Debug for Archive {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Archive({})", self.path.display())
+    }
+}
+
+impl Archive {
+    /// The directory of a file.
+    ///
+    /// # Errors
+    /// If it is no ZIP file, or a name in it is absolute, leads out of it or is a link.
+    pub(super) fn open(path: &Path) -> Result<Self> {
+        let wrong = |problem: String| Error::data(path.display(), problem);
+        let file = File::open(path).map_err(|e| Error::file(path, "read", e))?;
+        let mut zip = ZipArchive::new(BufReader::new(file))
+            .map_err(|e| wrong(format!("not a whole ZIP file: {e}")))?;
+        if zip.len() > MOST_ENTRIES {
+            return Err(wrong(format!(
+                "{} entries; at most {MOST_ENTRIES} are read",
+                zip.len()
+            )));
+        }
+        let mut names = BTreeMap::new();
+        for at in 0..zip.len() {
+            let entry = zip.by_index_raw(at).map_err(|e| wrong(e.to_string()))?;
+            let name = entry.name().to_owned();
+            if entry.is_symlink() || !stays_inside(&name) {
+                return Err(wrong(format!(
+                    "the entry {name:?} leads out of the file, or is a link; such files are not read"
+                )));
+            }
+            if entry.is_file() {
+                names.insert(name, at);
+            }
+        }
+        Ok(Self {
+            path: path.to_owned(),
+            names,
+            zip: Mutex::new(zip),
+        })
+    }
+
+    /// The path of the file.
+    pub(in crate::dataset) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The paths of all files, without hidden ones.
+    pub(super) fn files(&self) -> Vec<PathBuf> {
+        let names = self.names.keys();
+        let names = names.filter(|name| {
+            !name
+                .split('/')
+                .any(|part| part.starts_with('.') || part == "__MACOSX")
+        });
+        names.map(PathBuf::from).collect()
+    }
+
+    /// The bytes of an image.
+    ///
+    /// # Errors
+    /// If it cannot be read, or is longer than an image may be, whatever the directory says.
+    pub(in crate::dataset) fn image(&self, name: &str) -> Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        self.copy(name, LONGEST_IMAGE, &mut bytes)?;
+        Ok(bytes)
+    }
+
+    /// A file of rows, unpacked until it is closed.
+    pub(super) fn unpacked(&self, name: &str) -> Result<NamedTempFile> {
+        let mut file =
+            NamedTempFile::new().map_err(|e| Error::file(std::env::temp_dir(), "write", e))?;
+        self.copy(name, u64::MAX, &mut file)?;
+        Ok(file)
+    }
+
+    /// The text of a file.
+    pub(super) fn text(&self, name: &str) -> Result<String> {
+        let mut bytes = Vec::new();
+        self.copy(name, 1 << 22, &mut bytes)?;
+        Ok(String::from_utf8_lossy(&bytes).into_owned())
+    }
+
+    fn copy(&self, name: &str, most: u64, to: &mut impl std::io::Write) -> Result<()> {
+        let place = format!("{}, {name}", self.path.display());
+        let at = self.names.get(name).copied();
+        let at = at.ok_or_else(|| Error::data(&place, "no such file in it"))?;
+        let mut zip = self.zip.lock().unwrap_or_else(PoisonError::into_inner);
+        let entry = zip.by_index(at).map_err(|e| Error::data(&place, e))?;
+        let copied = std::io::copy(&mut entry.take(most.saturating_add(1)), to);
+        let copied = copied.map_err(|e| Error::data(&place, e))?;
+        if copied > most {
+            return Err(Error::data(
+                &place,
+                format_args!("longer than {} MB", most >> 20),
+            ));
+        }
+        Ok(())
+    }
+
+    /// The name of the image that data spell relative to a folder of the file.
+    ///
+    /// # Errors
+    /// If it leads out of the file, or is not in it.
+    pub(in crate::dataset::ready_made) fn find(
+        &self,
+        base: &Path,
+        spelled: &str,
+    ) -> Result<FrameId, String> {
+        let mut parts: Vec<String> = Vec::new();
+        for part in base.join(spelled).components() {
+            let inside = match part {
+                Component::CurDir => true,
+                Component::Normal(name) => {
+                    parts.push(name.to_string_lossy().into_owned());
+                    true
+                }
+                Component::ParentDir => parts.pop().is_some(),
+                Component::RootDir | Component::Prefix(_) => false,
+            };
+            if !inside {
+                return Err(format!("{spelled:?} lies outside {}", self.path.display()));
+            }
+        }
+        let name = parts.join("/");
+        if self.names.contains_key(&name) {
+            return Ok(FrameId(name));
+        }
+        Err(format!("no such file: {name:?} in {}", self.path.display()))
+    }
+}
+
+/// Whether a name is a path below the file.
+fn stays_inside(name: &str) -> bool {
+    let mut parts = Path::new(name).components();
+    !name.contains(['\\', '\0'])
+        && parts.all(|part| matches!(part, Component::Normal(_) | Component::CurDir))
+}

@@ -1,0 +1,199 @@
+//! The files of a tree that hold the rows: [`chosen`].
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use glob::{MatchOptions, Pattern};
+
+use super::card::{Config, configs};
+use super::splits::Candidate;
+use super::tree::Tree;
+use super::{READ, ending, splits};
+use crate::dataset::ready_made::settings::SetArgs;
+use crate::error::{Error, Result};
+
+/// The card of a repository.
+const CARD: &str = "README.md";
+
+/// The names of the tables of an image folder (Hugging Face, "ImageFolder").
+const METADATA: [&str; 3] = ["metadata.jsonl", "metadata.csv", "metadata.parquet"];
+
+/// Whether some files of a tree look like a set.
+pub(super) fn is_set(tree: &Tree, files: &[PathBuf]) -> bool {
+    let is_arrow = tree.has("state.json") && tree.has("dataset_info.json");
+    is_arrow
+        || !named(tree).is_empty()
+        || files.iter().any(|path| is_metadata(path))
+        || by_kind(tree, files.to_vec()).is_ok()
+}
+
+/// The configurations that the card of a tree names; a card that cannot be read names none.
+fn named(tree: &Tree) -> Vec<Config> {
+    if !tree.has(CARD) {
+        return Vec::new();
+    }
+    tree.text(CARD)
+        .map_or_else(|_| Vec::new(), |card| configs(&card))
+}
+
+/// The files that are asked: those of a configuration of the card, else the metadata, else by their endings; of one split.
+///
+/// # Errors
+/// If there are none, or it is not clear which are meant; the error names what is there.
+pub(super) fn chosen(tree: &Tree, files: Vec<PathBuf>, args: &SetArgs) -> Result<Vec<Candidate>> {
+    if tree.has("dataset_info.json") && tree.has("state.json") {
+        let problem = "a folder of Arrow files, which are not read; write Parquet: python -c \"import datasets; datasets.load_from_disk('.').to_parquet('set.parquet')\" in it";
+        return Err(Error::data(tree.place().display(), problem));
+    }
+    let configs = named(tree);
+    let candidates = if configs.is_empty() {
+        if let Some(name) = &args.config_name {
+            let place = tree.place().display();
+            let problem = format_args!("{place}: no configurations to choose {name:?} from");
+            return Err(Error::usage("--config-name", problem));
+        }
+        let files = by_kind(tree, files)?.into_iter();
+        let candidates = files.map(|path| Candidate {
+            split: splits::of_name(&path),
+            config: String::new(),
+            path,
+        });
+        candidates.collect()
+    } else {
+        of_card(tree, &configs, &files, args.config_name.as_deref())?
+    };
+    splits::chosen(tree, candidates, args.split.as_deref())
+}
+
+/// The files of the configuration that is asked, or of all.
+fn of_card(
+    tree: &Tree,
+    configs: &[Config],
+    files: &[PathBuf],
+    wanted: Option<&str>,
+) -> Result<Vec<Candidate>> {
+    let names: Vec<&str> = configs.iter().map(|config| config.name.as_str()).collect();
+    let of_name = |name: &str| configs.iter().find(|config| config.name == name);
+    let default = configs.iter().find(|config| config.is_default);
+    let only = if let [only] = configs {
+        Some(only)
+    } else {
+        None
+    };
+    let chosen: Vec<&Config> = match wanted {
+        Some("all") => configs.iter().collect(),
+        Some(name) => vec![of_name(name).ok_or_else(|| {
+            let problem = format_args!("no configuration {name:?}; there are {}", names.join(", "));
+            Error::usage("--config-name", problem)
+        })?],
+        None => vec![default.or_else(|| of_name("default")).or(only).ok_or_else(|| {
+            let problem = format_args!(
+                "{} configurations, {}; --config-name NAME names one, --config-name all takes them together",
+                names.len(),
+                names.join(", ")
+            );
+            Error::data(tree.place().display(), problem)
+        })?],
+    };
+    let several = chosen.len() > 1;
+    let mut candidates = Vec::new();
+    for config in chosen {
+        for (split, pattern) in &config.files {
+            for path in matching(tree, pattern, files)? {
+                candidates.push(Candidate {
+                    split: match &**split {
+                        "" => splits::of_name(&path),
+                        split => split.to_owned(),
+                    },
+                    config: if several {
+                        config.name.clone()
+                    } else {
+                        String::new()
+                    },
+                    path,
+                });
+            }
+        }
+    }
+    Ok(candidates)
+}
+
+/// The files that fit a pattern of the card.
+fn matching(tree: &Tree, pattern: &str, files: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    let wrong = |problem: String| Error::data(tree.whole(Path::new(CARD)).display(), problem);
+    if pattern.split('/').any(|part| part == "..") || pattern.starts_with('/') {
+        return Err(wrong(format!(
+            "the files {pattern:?} lie outside the folder of the card"
+        )));
+    }
+    let glob = Pattern::new(pattern.trim_start_matches("./"))
+        .map_err(|e| wrong(format!("the files {pattern:?}: not a pattern: {e}")))?;
+    let options = MatchOptions {
+        require_literal_separator: true,
+        ..MatchOptions::default()
+    };
+    let fitting = files
+        .iter()
+        .filter(|path| glob.matches_path_with(path, options));
+    let fitting: Vec<PathBuf> = fitting.cloned().collect();
+    if fitting.is_empty() {
+        return Err(wrong(format!(
+            "no file {pattern:?} beside it; download the whole repository"
+        )));
+    }
+    Ok(fitting)
+}
+
+fn is_metadata(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default();
+    METADATA.iter().any(|known| name == *known)
+}
+
+/// The files of a tree without a card: metadata files, else Parquet, else the other tables, of one kind.
+fn by_kind(tree: &Tree, files: Vec<PathBuf>) -> Result<Vec<PathBuf>> {
+    let (metadata, others): (Vec<PathBuf>, Vec<PathBuf>) =
+        files.into_iter().partition(|path| is_metadata(path));
+    if !metadata.is_empty() {
+        return one_kind(tree, metadata);
+    }
+    let (parquet, others): (Vec<PathBuf>, Vec<PathBuf>) = others
+        .into_iter()
+        .partition(|path| ending(path) == "parquet");
+    if !parquet.is_empty() {
+        return Ok(parquet);
+    }
+    // Tables deeper in the tree may be anything.
+    let is_table = |path: &PathBuf| {
+        let own = ["dataset.json", "classes.json", "info.json"];
+        let is_here = path.parent() == Some(Path::new(""));
+        is_here && !own.iter().any(|own| path == Path::new(own)) && is_text_table(path)
+    };
+    let tables: Vec<PathBuf> = others.into_iter().filter(is_table).collect();
+    if tables.is_empty() {
+        let problem = format_args!("no file of questions in it: {READ} expected");
+        return Err(Error::data(tree.place().display(), problem));
+    }
+    one_kind(tree, tables)
+}
+
+fn is_text_table(path: &Path) -> bool {
+    matches!(&*ending(path), "tsv" | "csv" | "jsonl" | "ndjson" | "json")
+}
+
+/// The files, if they are of one kind.
+fn one_kind(tree: &Tree, files: Vec<PathBuf>) -> Result<Vec<PathBuf>> {
+    let kinds: BTreeSet<String> = files.iter().map(|path| ending(path)).collect();
+    if kinds.len() == 1 {
+        return Ok(files);
+    }
+    let names: Vec<String> = files
+        .iter()
+        .map(|path| path.display().to_string())
+        .collect();
+    let problem = format!(
+        "files of several kinds, {}; name the one that is meant: --data {}",
+        names.join(", "),
+        tree.whole(&files[0]).display()
+    );
+    Err(Error::data(tree.place().display(), problem))
+}

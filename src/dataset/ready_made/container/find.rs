@@ -1,0 +1,134 @@
+//! The files of a set in a folder, a repository of a hub on disk, a ZIP file, a pattern or a file: [`find`].
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::archive::Archive;
+use super::choose::{chosen, is_set};
+use super::shards::{check_shards, shard_alone};
+use super::tree::Tree;
+use super::{SetFile, ending};
+use crate::dataset::ready_made::settings::SetArgs;
+use crate::error::{Error, Result};
+
+/// The files of a set, and the folders that the files they name may lie in.
+#[derive(Debug)]
+pub(in crate::dataset::ready_made) struct FoundFiles {
+    pub(in crate::dataset::ready_made) files: Vec<SetFile>,
+    /// The folder of the set.
+    pub(in crate::dataset::ready_made) folder: PathBuf,
+    /// A folder outside it into which the links of a hub's cache lead.
+    pub(in crate::dataset::ready_made) blobs: Option<PathBuf>,
+    /// The ZIP file that holds the set.
+    pub(in crate::dataset::ready_made) archive: Option<Arc<Archive>>,
+    /// What was passed over, in words.
+    pub(in crate::dataset::ready_made) notes: Vec<String>,
+}
+
+/// Whether a folder holds a set of other tools.
+pub(in crate::dataset) fn holds_files(folder: &Path) -> bool {
+    let Ok(tree) = Tree::of_folder(folder) else {
+        return true;
+    };
+    tree.files().is_ok_and(|(files, _)| is_set(&tree, &files))
+}
+
+/// The files at a place.
+///
+/// # Errors
+/// If there are none, or it is not clear which are meant; the error names what is there.
+pub(in crate::dataset::ready_made) fn find(place: &Path, args: &SetArgs) -> Result<FoundFiles> {
+    if place.is_dir() {
+        return of_tree(&Tree::of_folder(place)?, args);
+    }
+    let text = place.to_string_lossy();
+    if !place.is_file() && !text.contains(['*', '?', '[']) {
+        let problem = format_args!("{text}: no such file or folder");
+        return Err(Error::usage("--data", problem));
+    }
+    if place.is_file() && ending(place) == "zip" {
+        let archive = Arc::new(Archive::open(place)?);
+        return of_tree(&Tree::Archive(archive), args);
+    }
+    for (flag, value) in [
+        ("--config-name", &args.config_name),
+        ("--split", &args.split),
+    ] {
+        if let Some(value) = value {
+            let problem = format_args!("{text} is no folder that {value:?} could be chosen from");
+            return Err(Error::usage(flag, problem));
+        }
+    }
+    if place.is_file() {
+        return Ok(FoundFiles {
+            files: vec![SetFile::open(place.to_owned(), String::new())?],
+            folder: place.parent().unwrap_or(Path::new("")).to_owned(),
+            blobs: None,
+            archive: None,
+            notes: shard_alone(place).into_iter().collect(),
+        });
+    }
+    of_pattern(place, &text)
+}
+
+/// The files whose names fit a pattern.
+fn of_pattern(place: &Path, text: &str) -> Result<FoundFiles> {
+    let wrong = |problem: String| Error::usage("--data", format_args!("{text}: {problem}"));
+    let paths = glob::glob(text).map_err(|e| wrong(format!("not a pattern: {e}")))?;
+    let files: Vec<PathBuf> = paths
+        .filter_map(std::result::Result::ok)
+        .filter(|path| path.is_file())
+        .collect();
+    if files.is_empty() {
+        return Err(wrong("no file has such a name".to_owned()));
+    }
+    check_shards(&files)?;
+    let wild = |part: &&std::ffi::OsStr| part.to_string_lossy().contains(['*', '?', '[']);
+    let folder = place.iter().take_while(|part| !wild(part)).collect();
+    let files = files
+        .into_iter()
+        .map(|path| SetFile::open(path, String::new()));
+    Ok(FoundFiles {
+        files: files.collect::<Result<_>>()?,
+        folder,
+        blobs: None,
+        archive: None,
+        notes: Vec::new(),
+    })
+}
+
+/// The files of a tree.
+fn of_tree(tree: &Tree, args: &SetArgs) -> Result<FoundFiles> {
+    let (all, outside) = tree.files()?;
+    let chosen = chosen(tree, all, args)?;
+    let paths: Vec<PathBuf> = chosen.iter().map(|file| tree.whole(&file.path)).collect();
+    check_shards(&paths)?;
+    let files = chosen
+        .into_iter()
+        .map(|file| tree.open(&file.path, file.config));
+    let files = files.collect::<Result<_>>()?;
+    let notes = outside.first().map(|first| {
+        format!(
+            "{} links lead out of the folder or nowhere, as {}, and were passed over",
+            outside.len(),
+            first.display()
+        )
+    });
+    let notes = notes.into_iter().collect();
+    Ok(match tree {
+        Tree::Folder { folder, blobs } => FoundFiles {
+            files,
+            folder: folder.clone(),
+            blobs: blobs.clone(),
+            archive: None,
+            notes,
+        },
+        Tree::Archive(archive) => FoundFiles {
+            files,
+            folder: archive.path.parent().unwrap_or(Path::new("")).to_owned(),
+            blobs: None,
+            archive: Some(Arc::clone(archive)),
+            notes,
+        },
+    })
+}

@@ -1,0 +1,190 @@
+//! The files of a ready-made set: [`SetFile`].
+
+mod archive;
+mod card;
+mod choose;
+mod find;
+mod json;
+mod json_scan;
+mod parquet;
+mod shards;
+mod splits;
+mod table;
+mod tree;
+
+use std::fs::File;
+use std::io::{BufReader, Read as _};
+use std::path::{Path, PathBuf};
+
+use super::cell::Cell;
+use super::row::{FileLabel, RowPlace, Table};
+use super::step::Step;
+use flate2::read::MultiGzDecoder;
+use tempfile::NamedTempFile;
+
+use crate::error::{Error, Result};
+
+pub(in crate::dataset) use archive::Archive;
+pub(in crate::dataset) use find::holds_files;
+pub(super) use find::{FoundFiles, find};
+
+/// The endings of the files that are read.
+pub(super) const READ: &str =
+    ".parquet, .tsv, .csv, .jsonl, .ndjson or .json (the texts also as .gz), or a .zip of these";
+
+/// One file of rows.
+#[derive(Debug)]
+pub(in crate::dataset) struct SetFile {
+    pub(super) label: FileLabel,
+    kind: FileKind,
+    /// The unpacked copy of a compressed file, gone when the file is closed.
+    unpacked: Option<NamedTempFile>,
+}
+
+/// How rows stand in a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum FileKind {
+    Table { delimiter: u8 },
+    JsonLines,
+    Json,
+    Parquet,
+}
+
+impl SetFile {
+    /// The file at a path, whose ending tells its kind.
+    pub(super) fn open(path: PathBuf, config: String) -> Result<Self> {
+        check_content(&path)?;
+        let unpacked = if ending(&path) == "gz" {
+            Some(unpacked(&path)?)
+        } else {
+            None
+        };
+        Self::of(path, unpacked, config)
+    }
+
+    /// A file of an archive.
+    pub(super) fn of_member(archive: &Archive, name: &Path, config: String) -> Result<Self> {
+        let unpacked = archive.unpacked(&name.to_string_lossy())?;
+        let file = Self::of(archive.path.join(name), Some(unpacked), config)?;
+        let inner = Some(name.parent().unwrap_or(Path::new("")).to_owned());
+        let label = FileLabel {
+            inner,
+            ..file.label
+        };
+        Ok(Self { label, ..file })
+    }
+
+    fn of(path: PathBuf, unpacked: Option<NamedTempFile>, config: String) -> Result<Self> {
+        let bare = match &*ending(&path) {
+            "gz" => path.with_extension(""),
+            _ => path.clone(),
+        };
+        let read = unpacked
+            .as_ref()
+            .map_or(path.as_path(), NamedTempFile::path);
+        let kind = match &*ending(&bare) {
+            name @ ("tsv" | "csv") => FileKind::Table {
+                delimiter: table::delimiter(read, name)?,
+            },
+            "jsonl" | "ndjson" => FileKind::JsonLines,
+            "json" => FileKind::Json,
+            "parquet" => FileKind::Parquet,
+            _ => {
+                let problem = format_args!("not a file of questions: {READ} expected");
+                return Err(Error::data(path.display(), problem));
+            }
+        };
+        let label = FileLabel {
+            path,
+            inner: None,
+            config,
+        };
+        Ok(Self {
+            label,
+            kind,
+            unpacked,
+        })
+    }
+
+    /// The file that is read: the unpacked copy of a compressed one.
+    fn read_path(&self) -> &Path {
+        self.unpacked
+            .as_ref()
+            .map_or(&self.label.path, NamedTempFile::path)
+    }
+
+    /// Adds the rows of the file to a table.
+    pub(super) fn read(&self, rows: Option<&str>, table: &mut Table) -> Result<()> {
+        table.files.push(self.label.clone());
+        let path = self.read_path();
+        match self.kind {
+            FileKind::Table { delimiter } => table::read(path, delimiter, table),
+            FileKind::JsonLines => json::read_lines(path, table),
+            FileKind::Json => json::read(path, rows, table),
+            FileKind::Parquet => parquet::read(path, table),
+        }
+    }
+
+    /// The bytes or the text of a value: in a row, in a column, at the steps inside its cell.
+    pub(super) fn value(&self, row: &RowPlace, column: &str, steps: &[Step]) -> Result<Vec<u8>> {
+        let cell = match (row, self.kind) {
+            (RowPlace::Parquet { group, row, .. }, _) => {
+                return parquet::bytes(self.read_path(), (*group, *row), column, steps);
+            }
+            (RowPlace::Record(position), FileKind::Table { delimiter }) => {
+                table::cell(self.read_path(), delimiter, position, column)?
+            }
+            (
+                RowPlace::Json {
+                    offset,
+                    length,
+                    inner,
+                    ..
+                },
+                _,
+            ) => {
+                let inner = inner.as_ref().map(|(at, list)| (*at, &**list));
+                json::cell(self.read_path(), (*offset, *length), inner, column)?
+            }
+            (RowPlace::Record(_), _) => Cell::Absent,
+        };
+        match cell.at(steps) {
+            Some(Cell::Bytes(bytes)) => Ok(bytes),
+            Some(Cell::Text(text)) => Ok(text.into_bytes()),
+            _ => {
+                let place = format!("{}, {row}", self.label.path.display());
+                let problem = format_args!("the column {column:?} has changed since it was read");
+                Err(Error::data(place, problem))
+            }
+        }
+    }
+}
+
+/// The ending of a name, in lower case.
+fn ending(path: &Path) -> String {
+    let ending = path.extension().and_then(|ending| ending.to_str());
+    ending.unwrap_or_default().to_ascii_lowercase()
+}
+
+/// An unpacked copy of a compressed file. Images are read at their places in it, which a compressed file does not have.
+fn unpacked(path: &Path) -> Result<NamedTempFile> {
+    let file = File::open(path).map_err(|e| Error::file(path, "read", e))?;
+    let mut copy =
+        NamedTempFile::new().map_err(|e| Error::file(std::env::temp_dir(), "write", e))?;
+    std::io::copy(&mut MultiGzDecoder::new(BufReader::new(file)), &mut copy)
+        .map_err(|e| Error::data(path.display(), format_args!("cannot be unpacked: {e}")))?;
+    Ok(copy)
+}
+
+/// Refuses a pointer of Git LFS, which stands where a file was not downloaded.
+fn check_content(path: &Path) -> Result<()> {
+    const POINTER: &[u8] = b"version https://git-lfs.github.com/spec";
+    let mut file = File::open(path).map_err(|e| Error::file(path, "read", e))?;
+    let mut head = [0; POINTER.len()];
+    if file.read_exact(&mut head).is_ok() && head == POINTER {
+        let problem =
+            "not downloaded, only its pointer: git lfs pull in its folder brings the file";
+        return Err(Error::data(path.display(), problem));
+    }
+    Ok(())
+}

@@ -1,0 +1,230 @@
+//! Parquet files, as hubs of data sets ship them.
+//!
+//! Pass 1 goes over the rows one at a time and keeps the digests of images alone. Later the pages before an image are skipped by
+//! their headers, and one value is read.
+
+use std::collections::HashMap;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use parquet::basic::Compression;
+use parquet::column::reader::{ColumnReader, get_column_reader};
+use parquet::data_type::ByteArray;
+use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader, RowGroupMetaData};
+use parquet::file::reader::{FileReader as _, SerializedFileReader};
+use parquet::file::serialized_reader::SerializedPageReader;
+use parquet::record::{Field, Row as Record};
+
+use super::super::cell::Cell;
+use super::super::row::{RowPlace, Table};
+use super::super::step::Step;
+use crate::dataset::guarded::guarded;
+use crate::error::{Error, Result};
+
+/// How many rows are decoded at a time. Each holds its image until the next.
+const ROWS_AT_A_TIME: usize = 8;
+
+/// The footers of files, each parsed once.
+static FOOTERS: Mutex<Option<HashMap<PathBuf, Arc<ParquetMetaData>>>> = Mutex::new(None);
+
+fn open(path: &Path) -> Result<File> {
+    File::open(path).map_err(|e| Error::file(path, "read", e))
+}
+
+/// The footer of a file.
+fn footer(path: &Path) -> Result<Arc<ParquetMetaData>> {
+    let mut known = FOOTERS.lock().unwrap_or_else(PoisonError::into_inner);
+    let known = known.get_or_insert_default();
+    if let Some(footer) = known.get(path) {
+        return Ok(Arc::clone(footer));
+    }
+    let file = open(path)?;
+    let footer = guarded(|| {
+        let mut reader = ParquetMetaDataReader::new();
+        reader
+            .try_parse(&file)
+            .and_then(|()| reader.finish())
+            .map_err(|e| e.to_string())
+    });
+    let footer = Arc::new(footer.map_err(|problem| wrong(path, &problem))?);
+    known.insert(path.to_owned(), Arc::clone(&footer));
+    Ok(footer)
+}
+
+fn wrong(path: &Path, problem: &str) -> Error {
+    let problem = problem.trim_start_matches("Parquet error: ");
+    Error::data(
+        path.display(),
+        format_args!("not a whole Parquet file: {problem}; download or write it again"),
+    )
+}
+
+/// The number of rows in a file, from its footer.
+pub(super) fn count(path: &Path) -> Result<u64> {
+    let rows = footer(path)?.file_metadata().num_rows();
+    Ok(u64::try_from(rows).unwrap_or(0))
+}
+
+/// Adds the rows of a file.
+pub(super) fn read(path: &Path, table: &mut Table) -> Result<()> {
+    check_codecs(path, &*footer(path)?)?;
+    let file = open(path)?;
+    let mut columns: Vec<(String, usize)> = Vec::new();
+    let mut add = |place: RowPlace, record: Record| {
+        let fields = record.into_columns().into_iter();
+        let cells = fields.enumerate().map(|(at, (name, field))| {
+            if columns.get(at).is_none_or(|(known, _)| *known != name) {
+                let column = table.column(&name);
+                columns.truncate(at);
+                columns.push((name, column));
+            }
+            (columns[at].1, cell_of(field))
+        });
+        let cells = cells.collect();
+        table.push(place, cells);
+    };
+    let walk = || {
+        let reader = SerializedFileReader::new(file).map_err(|e| e.to_string())?;
+        let mut number = 0;
+        for group in 0..reader.num_row_groups() {
+            let rows = reader.get_row_group(group).map_err(|e| e.to_string())?;
+            let records = parquet::record::reader::TreeBuilder::new()
+                .with_batch_size(ROWS_AT_A_TIME)
+                .as_iter(reader.metadata().file_metadata().schema_descr_ptr(), &*rows)
+                .map_err(|e| e.to_string())?;
+            for (row, record) in records.enumerate() {
+                number += 1;
+                let record = record.map_err(|e| format!("row {number}: {e}"))?;
+                add(RowPlace::Parquet { group, row, number }, record);
+            }
+        }
+        Ok(())
+    };
+    guarded(walk).map_err(|problem| wrong(path, &problem))
+}
+
+/// Refuses a column whose compression is not read.
+fn check_codecs(path: &Path, footer: &ParquetMetaData) -> Result<()> {
+    let columns = footer
+        .row_groups()
+        .iter()
+        .flat_map(RowGroupMetaData::columns);
+    for column in columns {
+        let codec = column.compression();
+        let is_read = matches!(
+            codec,
+            Compression::UNCOMPRESSED
+                | Compression::SNAPPY
+                | Compression::GZIP(_)
+                | Compression::ZSTD(_)
+        );
+        if !is_read {
+            let problem = format!(
+                "the column {:?} is compressed by {codec}, which is not read; write the file again: python -c \"import pyarrow.parquet as p; p.write_table(p.read_table('{}'), 'again.parquet')\"",
+                column.column_path().string(),
+                path.display()
+            );
+            return Err(Error::data(path.display(), problem));
+        }
+    }
+    Ok(())
+}
+
+/// A value of a record.
+fn cell_of(field: Field) -> Cell {
+    let number = Cell::Number;
+    match field {
+        Field::Null => Cell::Absent,
+        Field::Bool(is_true) => Cell::Bool(is_true),
+        Field::Str(text) => Cell::Text(text),
+        Field::Bytes(bytes) => Cell::Bytes(bytes.data().to_vec()),
+        Field::Float(value) if value.is_nan() => Cell::Absent,
+        Field::Double(value) if value.is_nan() => Cell::Absent,
+        Field::Float(value) => number(value.to_string()),
+        Field::Double(value) => number(value.to_string()),
+        Field::Byte(value) => number(value.to_string()),
+        Field::Short(value) => number(value.to_string()),
+        Field::Int(value) => number(value.to_string()),
+        Field::Long(value) => number(value.to_string()),
+        Field::UByte(value) => number(value.to_string()),
+        Field::UShort(value) => number(value.to_string()),
+        Field::UInt(value) => number(value.to_string()),
+        Field::ULong(value) => number(value.to_string()),
+        Field::Group(record) => {
+            let fields = record.into_columns().into_iter();
+            Cell::Fields(fields.map(|(name, field)| (name, cell_of(field))).collect())
+        }
+        Field::ListInternal(list) => {
+            Cell::List(list.elements().iter().cloned().map(cell_of).collect())
+        }
+        other => Cell::Text(other.to_string()),
+    }
+}
+
+/// The bytes of a value of bytes or text: in a column, at the steps inside its cell.
+pub(super) fn bytes(
+    path: &Path,
+    (group, row): (usize, usize),
+    column: &str,
+    steps: &[Step],
+) -> Result<Vec<u8>> {
+    let footer = footer(path)?;
+    let file = Arc::new(open(path)?);
+    let read = || {
+        let group = footer.row_groups().get(group).ok_or("no such row group")?;
+        let leaf = leaf(group.columns(), column, steps).ok_or("no such column")?;
+        let chunk = &group.columns()[leaf];
+        let rows = usize::try_from(group.num_rows()).unwrap_or(0);
+        let pages =
+            SerializedPageReader::new(file, chunk, rows, None).map_err(|e| e.to_string())?;
+        let reader = get_column_reader(chunk.column_descr_ptr(), Box::new(pages));
+        let ColumnReader::ByteArrayColumnReader(mut reader) = reader else {
+            return Err("no column of bytes".to_owned());
+        };
+        reader.skip_records(row).map_err(|e| e.to_string())?;
+        let (mut defined, mut repeated) = (Vec::new(), Vec::new());
+        let mut values: Vec<ByteArray> = Vec::new();
+        reader
+            .read_records(1, Some(&mut defined), Some(&mut repeated), &mut values)
+            .map_err(|e| e.to_string())?;
+        let most = chunk.column_descr().max_def_level();
+        let item = steps.iter().find_map(|step| match step {
+            Step::Item(at) => Some(*at),
+            Step::Field(_) => None,
+        });
+        let item = match item {
+            Some(item) if chunk.column_descr().max_rep_level() > 0 => item,
+            _ => 0,
+        };
+        // Values are stored without the nulls between them.
+        let before = defined.iter().take(item).filter(|level| **level == most);
+        let at = if defined.is_empty() {
+            item
+        } else {
+            before.count()
+        };
+        values
+            .get(at)
+            .map(|value| value.data().to_vec())
+            .ok_or_else(|| "the value is gone".to_owned())
+    };
+    guarded(read).map_err(|problem| wrong(path, &problem))
+}
+
+/// The index of the leaf of a column at some steps: that of the last field named, or the only one.
+fn leaf(
+    columns: &[parquet::file::metadata::ColumnChunkMetaData],
+    column: &str,
+    steps: &[Step],
+) -> Option<usize> {
+    let field = steps.iter().rev().find_map(|step| match step {
+        Step::Field(name) => Some(name.as_str()),
+        Step::Item(_) => None,
+    });
+    columns.iter().position(|chunk| {
+        let path = chunk.column_path().parts();
+        path.first().is_some_and(|first| first == column)
+            && field.is_none_or(|field| path.last().is_some_and(|last| last == field))
+    })
+}

@@ -1,0 +1,172 @@
+//! The files below a folder or inside a ZIP file: [`Tree`].
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::SetFile;
+use super::archive::Archive;
+use crate::error::{Error, Result};
+use crate::files::reading;
+
+/// A folder or a ZIP file. Paths are relative to it.
+pub(super) enum Tree {
+    Folder {
+        folder: PathBuf,
+        /// The folder of a hub's cache into which the links of a snapshot lead.
+        blobs: Option<PathBuf>,
+    },
+    Archive(Arc<Archive>),
+}
+
+/// The deepest folder that is looked into, counted from the first.
+const DEEPEST: usize = 4;
+
+impl Tree {
+    /// The tree at a folder; of a repository in a hub's cache, its newest snapshot.
+    ///
+    /// # Errors
+    /// If the cache names no snapshot.
+    pub(super) fn of_folder(place: &Path) -> Result<Self> {
+        let name = place.canonicalize().unwrap_or_else(|_| place.to_owned());
+        let is_cached = |path: &Path| {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            name.starts_with("datasets--")
+        };
+        if !(is_cached(&name) && place.join("snapshots").is_dir()) {
+            let repository = name.ancestors().nth(2).filter(|path| is_cached(path));
+            return Ok(Self::Folder {
+                folder: place.to_owned(),
+                blobs: repository.map(|path| path.join("blobs")),
+            });
+        }
+        let head = reading::text(&place.join("refs/main"))?;
+        let snapshot = place.join("snapshots").join(head.trim());
+        if !snapshot.is_dir() || head.trim().contains(['/', '\\']) {
+            let problem = "refs/main names no folder in snapshots; download the repository again";
+            return Err(Error::data(place.display(), problem));
+        }
+        Ok(Self::Folder {
+            folder: snapshot,
+            blobs: Some(place.join("blobs")),
+        })
+    }
+
+    /// The place, for messages.
+    pub(super) fn place(&self) -> &Path {
+        match self {
+            Self::Folder { folder, .. } => folder,
+            Self::Archive(archive) => &archive.path,
+        }
+    }
+
+    /// All files, sorted, without hidden ones; and the links that lead out of the tree, which are passed over.
+    pub(super) fn files(&self) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
+        match self {
+            Self::Archive(archive) => Ok((archive.files(), Vec::new())),
+            Self::Folder { folder, blobs } => {
+                let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
+                let mut roots = vec![real(folder)];
+                roots.extend(blobs.as_deref().map(real));
+                let mut scan = Scan {
+                    roots,
+                    files: Vec::new(),
+                    outside: Vec::new(),
+                };
+                scan.folder(folder, 0)?;
+                let below = |path: PathBuf| {
+                    path.strip_prefix(folder)
+                        .map_or_else(|_| path.clone(), Path::to_owned)
+                };
+                Ok((scan.files.into_iter().map(below).collect(), scan.outside))
+            }
+        }
+    }
+
+    /// Whether there is a file of this path.
+    pub(super) fn has(&self, path: &str) -> bool {
+        match self {
+            Self::Folder { folder, .. } => folder.join(path).is_file(),
+            Self::Archive(archive) => archive.files().iter().any(|file| file == Path::new(path)),
+        }
+    }
+
+    /// The text of a file.
+    pub(super) fn text(&self, path: &str) -> Result<String> {
+        match self {
+            Self::Folder { folder, .. } => reading::text(&folder.join(path)),
+            Self::Archive(archive) => archive.text(path),
+        }
+    }
+
+    /// A file of rows.
+    pub(super) fn open(&self, path: &Path, config: String) -> Result<SetFile> {
+        match self {
+            Self::Folder { folder, .. } => SetFile::open(folder.join(path), config),
+            Self::Archive(archive) => SetFile::of_member(archive, path, config),
+        }
+    }
+
+    /// The whole path of a file, for messages.
+    pub(super) fn whole(&self, path: &Path) -> PathBuf {
+        self.place().join(path)
+    }
+}
+
+/// A walk over a folder.
+struct Scan {
+    /// The real paths of the folders that links may lead into.
+    roots: Vec<PathBuf>,
+    files: Vec<PathBuf>,
+    outside: Vec<PathBuf>,
+}
+
+impl Scan {
+    fn folder(&mut self, folder: &Path, depth: usize) -> Result<()> {
+        for path in reading::entries(folder)? {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            if name.starts_with('.') {
+                continue;
+            }
+            let is_link = fs::symlink_metadata(&path).is_ok_and(|facts| facts.is_symlink());
+            if is_link && !self.stays_inside(&path) {
+                self.outside.push(path);
+            } else if path.is_dir() && !is_link {
+                if depth < DEEPEST {
+                    self.folder(&path, depth + 1)?;
+                }
+            } else if path.is_file() {
+                self.files.push(path);
+            }
+        }
+        Ok(())
+    }
+
+    fn stays_inside(&self, link: &Path) -> bool {
+        let Ok(real) = link.canonicalize() else {
+            return false;
+        };
+        self.roots.iter().any(|root| real.starts_with(root))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn links_that_lead_out_are_passed_over() {
+        let outer = tempfile::tempdir().unwrap();
+        let at = |name: &str| outer.path().join(name);
+        fs::create_dir_all(at("set/inner")).unwrap();
+        for name in ["secret.csv", "set/a.csv", "set/.hidden.csv"] {
+            fs::write(at(name), "a").unwrap();
+        }
+        std::os::unix::fs::symlink(at("secret.csv"), at("set/b.csv")).unwrap();
+        std::os::unix::fs::symlink(at("set/a.csv"), at("set/inner/c.csv")).unwrap();
+        let (files, outside) = Tree::of_folder(&at("set")).unwrap().files().unwrap();
+        assert_eq!(files, [Path::new("a.csv"), Path::new("inner/c.csv")]);
+        assert_eq!(outside, [at("set/b.csv")]);
+    }
+}

@@ -1,0 +1,187 @@
+//! The images of a row: [`images`], and the place of one inside a file of rows: [`EmbeddedImage`].
+
+use std::sync::Arc;
+
+use super::cell::{Cell, FileFacts, LONGEST_NAME, decoded};
+use super::container::SetFile;
+use super::roles::{Images, Roles, braces};
+use super::row::{Row, RowPlace, Table};
+use super::step::Step;
+use super::text_list::list;
+use crate::dataset::image_file::format::FileFormat;
+use crate::dataset::{ImageFile, ReadingRule};
+use crate::error::{Error, Result};
+
+/// An image of a row.
+#[derive(Debug, Clone)]
+pub(super) enum RowImage {
+    /// Bytes or base64 in a cell.
+    Embedded {
+        column: usize,
+        steps: Vec<Step>,
+        facts: FileFacts,
+    },
+    /// A file, by the path in a cell.
+    File(String),
+    /// A short text that may be the id of another row, or a path.
+    RowOrFile(String),
+    /// The name of a frame of other data.
+    Frame(String),
+}
+
+/// What the columns of images hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ImagesAre {
+    /// Images, or the paths of files.
+    Files,
+    /// The names of frames of other data.
+    Frames,
+}
+
+/// The frames that a row names.
+pub(super) fn named_frames(row: &Row, roles: &Roles) -> Vec<RowImage> {
+    let (Images::First(columns) | Images::All(columns)) = &roles.images else {
+        return Vec::new();
+    };
+    let names = columns.iter().filter_map(|column| column.text(row));
+    names.take(1).map(RowImage::Frame).collect()
+}
+
+/// The images of a row, in order.
+pub(super) fn images(table: &Table, row: &Row, roles: &Roles) -> Vec<RowImage> {
+    let mut found = Vec::new();
+    match &roles.images {
+        Images::First(columns) => {
+            for column in columns {
+                let steps = field_steps(column.field.as_deref());
+                collect(column.of(row), column.at, &steps, &mut found);
+                if !found.is_empty() {
+                    break;
+                }
+            }
+        }
+        Images::All(columns) => {
+            for column in columns {
+                let steps = field_steps(column.field.as_deref());
+                collect(column.of(row), column.at, &steps, &mut found);
+            }
+        }
+        Images::Template(template) => {
+            found.extend(filled(table, row, template).map(RowImage::File));
+        }
+    }
+    found
+}
+
+fn field_steps(field: Option<&str>) -> Vec<Step> {
+    let fields = field.into_iter().flat_map(|field| field.split('.'));
+    fields.map(|field| Step::Field(field.to_owned())).collect()
+}
+
+/// The template with the cells of a row; `None` if one is absent.
+fn filled(table: &Table, row: &Row, template: &str) -> Option<String> {
+    let mut text = template.to_owned();
+    for name in braces(template).ok()? {
+        let cell = row.cell(table.find(name)?);
+        let value = (!cell.is_absent()).then(|| cell.text()).flatten()?;
+        text = text.replace(&format!("{{{name}}}"), value.trim());
+    }
+    Some(text)
+}
+
+/// Adds the images of a cell.
+fn collect(cell: &Cell, column: usize, steps: &[Step], found: &mut Vec<RowImage>) {
+    if cell.is_absent() {
+        return;
+    }
+    let with = |step: Step| [steps, &[step]].concat();
+    match cell {
+        Cell::File(facts) => found.push(RowImage::Embedded {
+            column,
+            steps: steps.to_vec(),
+            facts: facts.clone(),
+        }),
+        Cell::List(cells) => {
+            for (at, cell) in cells.iter().enumerate() {
+                collect(cell, column, &with(Step::Item(at)), found);
+            }
+        }
+        Cell::Fields(_) => {
+            let fields = ["bytes", "path"].into_iter();
+            let field = fields
+                .filter_map(|name| Some((name, cell.field(name)?)))
+                .find(|(_, cell)| !cell.is_absent());
+            if let Some((name, cell)) = field {
+                collect(cell, column, &with(Step::Field(name.to_owned())), found);
+            }
+        }
+        Cell::Text(text) => text_image(text, column, steps, found),
+        Cell::Number(text) => found.push(RowImage::RowOrFile(text.clone())),
+        Cell::Absent | Cell::Bool(_) | Cell::Bytes(_) => {}
+    }
+}
+
+/// Adds the images of a text: a file in base64, a list of such texts, a path, or the id of a row.
+fn text_image(text: &str, column: usize, steps: &[Step], found: &mut Vec<RowImage>) {
+    if let Some(bytes) = decoded(text) {
+        let (steps, facts) = (steps.to_vec(), FileFacts::of(&bytes));
+        found.push(RowImage::Embedded {
+            column,
+            steps,
+            facts,
+        });
+        return;
+    }
+    if let Some(items) = text
+        .trim_start()
+        .starts_with('[')
+        .then(|| list(text))
+        .flatten()
+    {
+        for (at, item) in items.into_iter().enumerate() {
+            let steps = [steps, &[Step::Item(at)]].concat();
+            collect(&Cell::Text(item), column, &steps, found);
+        }
+        return;
+    }
+    found.push(if text.len() <= LONGEST_NAME {
+        RowImage::RowOrFile(text.trim().to_owned())
+    } else {
+        RowImage::File(text.trim().to_owned())
+    });
+}
+
+/// The place of an image inside a file of rows. It is read when needed, so that files of gigabytes are never in memory.
+#[derive(Debug, Clone)]
+pub(crate) struct EmbeddedImage {
+    pub(super) file: Arc<SetFile>,
+    pub(super) row: RowPlace,
+    pub(super) column: String,
+    pub(super) steps: Vec<Step>,
+    pub(super) facts: FileFacts,
+}
+
+impl EmbeddedImage {
+    /// The name of the format, by its first bytes.
+    pub(super) fn format(&self) -> &'static str {
+        FileFormat::of(&self.facts.head).map_or("other", FileFormat::name)
+    }
+
+    /// The image file in the cell.
+    ///
+    /// # Errors
+    /// If the file of rows cannot be read, or has changed since it was opened.
+    pub(in crate::dataset) fn image(&self, rule: ReadingRule) -> Result<ImageFile> {
+        let place = format!("{}, {}", self.file.label.path.display(), self.row);
+        let value = self.file.value(&self.row, &self.column, &self.steps)?;
+        let value = match std::str::from_utf8(&value).ok().and_then(decoded) {
+            Some(bytes) => bytes,
+            None => value,
+        };
+        if FileFacts::of(&value) != self.facts {
+            let problem = "the image has changed since the file was opened; start again";
+            return Err(Error::data(place, problem));
+        }
+        Ok(ImageFile::new(value, place, rule))
+    }
+}

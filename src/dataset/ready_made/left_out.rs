@@ -1,0 +1,148 @@
+//! Rows that cannot be asked, by the reason: [`LeftOut`].
+
+use std::collections::BTreeMap;
+
+use super::settings::{LeaveOut, SetArgs};
+
+/// Why a row cannot be asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Why {
+    SeveralImages,
+    NoImage,
+    Open,
+    SeveralTruths,
+    Bad,
+    /// A copy of a question in another order of its options, which a preset leaves out.
+    Rotation,
+}
+
+impl Why {
+    /// The name in the manifest and in messages.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::SeveralImages => "several images",
+            Self::NoImage => "no image",
+            Self::Open => "no options",
+            Self::SeveralTruths => "several truths",
+            Self::Bad => "bad rows",
+            Self::Rotation => "rotated copies",
+        }
+    }
+
+    /// The flag that leaves such rows out.
+    fn flag(self) -> &'static str {
+        match self {
+            Self::SeveralImages => "--multi-image skip",
+            Self::NoImage => "--no-image skip",
+            Self::Open => "--open skip",
+            Self::SeveralTruths => "--several skip",
+            Self::Bad | Self::Rotation => "--bad skip",
+        }
+    }
+
+    fn is_left_out(self, args: &SetArgs) -> bool {
+        let flag = match self {
+            Self::SeveralImages => args.multi_image,
+            Self::NoImage => args.no_image,
+            Self::Open => args.open,
+            Self::SeveralTruths => args.several,
+            Self::Bad => args.bad,
+            Self::Rotation => Some(LeaveOut::Skip),
+        };
+        flag.is_some()
+    }
+}
+
+/// The rows that are not asked: how many, and the place and problem of the first.
+#[derive(Debug, Default)]
+pub(super) struct LeftOut {
+    counts: BTreeMap<Why, (usize, String)>,
+}
+
+/// The largest share of bad rows that can be left out.
+const MOST_BAD: f64 = 0.05;
+
+impl LeftOut {
+    /// Adds a row with its problem.
+    pub(super) fn add(&mut self, why: Why, problem: impl FnOnce() -> String) {
+        let entry = self.counts.entry(why).or_insert_with(|| (0, problem()));
+        entry.0 += 1;
+    }
+
+    /// How many rows are left out, by the reason.
+    pub(super) fn counts(&self) -> impl Iterator<Item = (Why, usize)> {
+        self.counts.iter().map(|(why, (count, _))| (*why, *count))
+    }
+
+    /// Checks that the user allows all of it.
+    ///
+    /// # Errors
+    /// One line for each reason that no flag allows: the count, the first row, and the flag.
+    pub(super) fn check(&self, rows: usize, args: &SetArgs) -> Result<(), String> {
+        let mut problems = Vec::new();
+        for (why, (count, first)) in &self.counts {
+            let (why, head) = (*why, format!("{count} of {rows} rows"));
+            let head = match why {
+                Why::SeveralImages => format!("{head} show {first}"),
+                Why::NoImage => format!("no image in {head}"),
+                Why::Open => format!("no options in {head}, where the answer is e.g. {first}"),
+                Why::SeveralTruths => format!("{head} have several true options, e.g. {first}"),
+                Why::Bad | Why::Rotation => format!("{head} are broken; the first: {first}"),
+            };
+            if !why.is_left_out(args) {
+                let verb = match count {
+                    1 => "leaves it out",
+                    _ => "leaves them out",
+                };
+                problems.push(format!("{head}; {} {verb}", why.flag()));
+            } else if why == Why::Bad && *count as f64 > MOST_BAD * rows as f64 {
+                problems.push(format!(
+                    "{head}; --bad skip leaves out at most 5 %: mend the file"
+                ));
+            }
+        }
+        if problems.is_empty() {
+            return Ok(());
+        }
+        Err(problems.join("\n "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_left_out_without_a_word_of_the_user() {
+        let mut left = LeftOut::default();
+        assert!(left.check(40, &SetArgs::default()).is_ok());
+        left.add(Why::NoImage, String::new);
+        left.add(Why::SeveralImages, || "2 images".into());
+        left.add(Why::SeveralImages, || "3 images".into());
+        let problem = left.check(40, &SetArgs::default()).unwrap_err();
+        assert!(problem.contains("2 of 40 rows show 2 images; --multi-image skip leaves them out\n no image in 1 of 40 rows; --no-image skip leaves it out"), "{problem}");
+        let args = SetArgs {
+            no_image: Some(LeaveOut::Skip),
+            multi_image: Some(LeaveOut::Skip),
+            ..SetArgs::default()
+        };
+        assert!(left.check(40, &args).is_ok());
+        assert_eq!(left.counts().map(|(_, count)| count).sum::<usize>(), 3);
+    }
+
+    #[test]
+    fn many_bad_rows_are_never_left_out() {
+        let args = SetArgs {
+            bad: Some(LeaveOut::Skip),
+            ..SetArgs::default()
+        };
+        let mut left = LeftOut::default();
+        left.add(Why::Bad, || "a.csv, line 3: empty".into());
+        assert!(left.check(20, &args).is_ok());
+        let problem = left.check(19, &args).unwrap_err();
+        assert!(
+            problem.contains("line 3: empty; --bad skip leaves out at most 5 %"),
+            "{problem}"
+        );
+    }
+}

@@ -1,0 +1,327 @@
+//! Ready-made sets of multiple-choice questions about images, in any of the forms in which they are published.
+//!
+//! 1. The files are found and opened (`container/`): TSV, CSV, JSON, JSON lines and Parquet; alone, in shards, or in a folder with or
+//!    without the card of a hub.
+//! 2. The columns are told by their names (`names.rs`, `roles.rs`), or by the user (`map.rs`).
+//! 3. Each row has its images (`images.rs`), its text and its options (`items.rs`, `options.rs`, `lettered.rs`).
+//! 4. The answers of all rows are read in one way (`answers.rs`, `truths.rs`). Where two ways fit and differ, nothing is guessed.
+//! 5. Rows that cannot be asked stop the reading, unless the user leaves them out (`left_out.rs`).
+//! 6. Questions get ids, families and frames (`frames.rs`), and it is said what was taken for what (`summary.rs`).
+//!
+//! No code is for one set alone; what well-known sets need beyond these rules stands in `sets.toml`.
+
+mod answers;
+mod cell;
+mod container;
+mod frames;
+mod images;
+mod items;
+mod left_out;
+mod lettered;
+mod map;
+mod names;
+mod offered;
+mod options;
+mod preset;
+mod python_list;
+mod roles;
+mod row;
+mod settings;
+mod step;
+mod summary;
+mod text_list;
+mod truths;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use super::family::{checked, other};
+use super::image_source::ImageSource;
+use super::root::Root;
+use crate::error::{Error, Result};
+use crate::types::{Family, FrameId, Question};
+
+pub(super) use container::{Archive, holds_files};
+pub(super) use images::EmbeddedImage;
+pub(super) use preset::{is_known as is_known_set, names as known_sets};
+pub use settings::SetArgs;
+
+use container::{FoundFiles, SetFile};
+use frames::Frames;
+use images::ImagesAre;
+use items::{Cut, Endings, items};
+use left_out::{LeftOut, Why};
+use map::{How, Map};
+use names::Role;
+use roles::Roles;
+use row::Table;
+use summary::Summary;
+use truths::{Answered, is_own, truths};
+
+/// The set at a place: a file, a pattern of files, or a folder.
+///
+/// # Errors
+/// If it cannot be read without guessing. The error shows the columns, what was taken for what, and a flag that mends it.
+pub(super) fn open(place: &Path, stem: &str, args: &SetArgs) -> Result<ReadySet> {
+    let preset = preset::named(args.preset.as_deref());
+    let args = &preset.map_or_else(|| args.clone(), |preset| preset.beneath(args));
+    let found = container::find(place, args)?;
+    let FoundFiles {
+        files,
+        folder,
+        blobs,
+        archive,
+        notes,
+    } = found;
+    let info = FolderInfo::of(&folder)?;
+    let map = Map::joined(info.map.iter().chain(&args.map));
+    let mut further = args.data_root.clone();
+    further.extend(blobs);
+    let root = Root::of(&folder, &further)?;
+    let mut table = Table::default();
+    let files: Vec<Arc<SetFile>> = files.into_iter().map(Arc::new).collect();
+    for file in &files {
+        file.read(args.rows.as_deref(), &mut table)?;
+    }
+    let wrong = |table: &Table, problem: String| {
+        let hint = preset::recognised(&table.columns, args.preset.as_deref());
+        let hint = hint.map_or_else(String::new, |hint| format!("\n {hint}"));
+        Error::data(place.display(), format_args!("{problem}{hint}"))
+    };
+    let set = read(&table, &map, args, preset, ImagesAre::Files)
+        .map_err(|problem| wrong(&table, problem))?;
+    let name = match &*info.name {
+        "" => stem.to_owned(),
+        name => name.to_owned(),
+    };
+    let mut frames = Frames::new(&table, &root, archive.as_ref(), &files, &set.roles);
+    let ids = frames.ids(&set.answered)?;
+    let (questions, sources) = questions(&table, &set, &ids, &mut frames)?;
+    let mut notes = notes;
+    notes.extend(preset.map(preset::Preset::source));
+    notes.extend(ids.note());
+    notes.extend(preset::recognised(&table.columns, args.preset.as_deref()));
+    let summary = Summary {
+        name: &name,
+        table: &table,
+        roles: &set.roles,
+        answers: &set.said,
+        ids: ids.name(),
+        cut: &set.cut,
+        left: &set.left,
+        sources: &sources,
+        questions: &questions,
+        notes,
+    };
+    let lines = summary.lines();
+    Ok(ReadySet {
+        reading: lines,
+        form: if is_own(&table) {
+            Form::Own
+        } else {
+            Form::Foreign
+        },
+        title: info.name,
+        name,
+        sources,
+        questions,
+    })
+}
+
+/// A set that was read.
+pub(super) struct ReadySet {
+    /// The name in `dataset.json`, else that of the file or folder.
+    pub(super) name: String,
+    /// The name in `dataset.json`; empty if there is none.
+    pub(super) title: String,
+    pub(super) sources: BTreeMap<FrameId, ImageSource>,
+    pub(super) questions: Vec<Question>,
+    /// What was taken for what, one fact a line.
+    pub(super) reading: Vec<String>,
+    pub(super) form: Form,
+}
+
+/// Whose form a set has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Form {
+    /// This program's, in which nothing has to be found out.
+    Own,
+    /// That of other tools.
+    Foreign,
+}
+
+/// The questions of a file about frames of other data, and what was taken for what.
+///
+/// # Errors
+/// As [`open`].
+pub(super) fn about_frames(file: &Path, args: &SetArgs) -> Result<(Vec<Question>, Vec<String>)> {
+    let mut table = Table::default();
+    SetFile::open(file.to_owned(), String::new())?.read(args.rows.as_deref(), &mut table)?;
+    let own: Option<Map> = table.find("frame").and_then(|_| "image=frame".parse().ok());
+    let map = Map::joined(own.iter().chain(&args.map));
+    let set = read(&table, &map, args, None, ImagesAre::Frames)
+        .map_err(|problem| Error::data(file.display(), problem))?;
+    let root = Root::of(file.parent().unwrap_or(Path::new("")), &[])?;
+    let mut frames = Frames::new(&table, &root, None, &[], &set.roles);
+    let ids = frames.ids(&set.answered)?;
+    let (questions, sources) = questions(&table, &set, &ids, &mut frames)?;
+    if is_own(&table) {
+        return Ok((questions, Vec::new()));
+    }
+    let summary = Summary {
+        name: &file.display().to_string(),
+        table: &table,
+        roles: &set.roles,
+        answers: &set.said,
+        ids: ids.name(),
+        cut: &set.cut,
+        left: &set.left,
+        sources: &sources,
+        questions: &questions,
+        notes: ids.note().into_iter().collect(),
+    };
+    let lines = summary.lines();
+    Ok((questions, lines))
+}
+
+/// The rows of a set with their truths.
+struct ReadSet {
+    roles: Roles,
+    answered: Vec<Answered>,
+    said: Vec<String>,
+    cut: Cut,
+    left: LeftOut,
+}
+
+/// Steps 2 to 5: from rows to questions with truths.
+fn read(
+    table: &Table,
+    map: &Map,
+    args: &SetArgs,
+    preset: Option<&preset::Preset>,
+    kind: ImagesAre,
+) -> Result<ReadSet, String> {
+    if table.rows.is_empty() {
+        return Err("no questions in it".to_owned());
+    }
+    let roles = Roles::of(table, map)?;
+    let (mut left, mut cut) = (LeftOut::default(), Cut::new());
+    let endings = if args.keep_instructions {
+        Endings::Kept
+    } else {
+        Endings::Cut
+    };
+    let all = items(table, &roles, kind, endings, &mut left, &mut cut)?;
+    let (kept, rotated): (Vec<_>, Vec<_>) = all
+        .into_iter()
+        .partition(|item| !preset.is_some_and(|preset| preset.is_rotation(table, item.row)));
+    for item in rotated {
+        left.add(Why::Rotation, || table.place(item.row));
+    }
+    if kept.is_empty() {
+        left.check(table.rows.len(), args)
+            .map_err(|problem| image_hint(table, &roles, problem))?;
+        return Err("no row is left to ask".to_owned());
+    }
+    let how = map
+        .of(Role::Answer)
+        .map_or(&How::ByRule, |entry| &entry.how);
+    let truths = truths(table, &roles, how, kept, &mut left)?;
+    left.check(table.rows.len(), args)
+        .map_err(|problem| image_hint(table, &roles, problem))?;
+    if truths.answered.is_empty() {
+        return Err("no row is left to ask".to_owned());
+    }
+    Ok(ReadSet {
+        roles,
+        answered: truths.answered,
+        said: truths.said,
+        cut,
+        left,
+    })
+}
+
+/// Adds the columns and a `--map` for images to a problem, if no row has any.
+fn image_hint(table: &Table, roles: &Roles, problem: String) -> String {
+    let are_there = table
+        .rows
+        .iter()
+        .any(|row| !images::images(table, row, roles).is_empty());
+    if are_there {
+        return problem;
+    }
+    let key = roles.ids.first().map(|column| column.name.as_str());
+    let key = key
+        .or(table.columns.first().map(String::as_str))
+        .unwrap_or("id");
+    format!(
+        "{problem}\n its columns:\n{}\n if files hold the images, say how they are named, e.g. --map image='images/{{{key}}}.jpg'",
+        roles::shown(table)
+    )
+}
+
+/// Step 6: the questions and the sources of their frames.
+fn questions(
+    table: &Table,
+    set: &ReadSet,
+    ids: &frames::Ids,
+    frames: &mut Frames<'_>,
+) -> Result<(Vec<Question>, BTreeMap<FrameId, ImageSource>)> {
+    let mut questions = Vec::with_capacity(set.answered.len());
+    for (at, answered) in set.answered.iter().enumerate() {
+        let row = answered.item.row;
+        let frame = frames.frame(answered)?;
+        let cells = &table.rows[row];
+        let family = set
+            .roles
+            .family
+            .as_ref()
+            .and_then(|column| column.text(cells));
+        let config = &table.files[cells.file].config;
+        let family = match family {
+            Some(family) => family.trim().to_owned(),
+            None if !config.is_empty() => config.clone(),
+            None => other().name().to_owned(),
+        };
+        let family = checked(Family::from(family.as_str())).map_err(|e| e.at(table.place(row)))?;
+        let evidence = set.roles.evidence.as_ref();
+        let evidence = evidence.map_or(serde_json::Value::Null, |column| column.of(cells).into());
+        questions.push(Question {
+            id: ids.id(at),
+            frame,
+            family,
+            text: answered.item.text.clone(),
+            choices: answered.choices.clone(),
+            evidence,
+        });
+    }
+    Ok((questions, frames.take_sources()))
+}
+
+/// What the `dataset.json` of a folder says of a set.
+#[derive(Debug, Default)]
+struct FolderInfo {
+    name: String,
+    map: Option<Map>,
+}
+
+impl FolderInfo {
+    fn of(folder: &Path) -> Result<Self> {
+        let path = folder.join("dataset.json");
+        if !path.is_file() {
+            return Ok(Self::default());
+        }
+        let info: serde_json::Value = crate::files::reading::json(&path)?;
+        let text = |key: &str| info.get(key).and_then(serde_json::Value::as_str);
+        let map = text("map").map(str::parse).transpose();
+        let wrong = |problem: String| Error::data(path.display(), format_args!("map: {problem}"));
+        Ok(Self {
+            name: text("name").unwrap_or_default().to_owned(),
+            map: map.map_err(wrong)?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,103 @@
+//! A list of texts as Python prints it: [`python_list`].
+
+/// The texts of a list in Python's notation, as `['it\'s', "b", 3]`; `None` if the text is anything else. Nothing is evaluated.
+///
+/// Read are texts in single or double quotes with the escapes of Python's `repr` (The Python Language Reference, 2.4.1), numbers and
+/// the words `True`, `False` and `None`.
+pub(super) fn python_list(text: &str) -> Option<Vec<String>> {
+    let mut rest = text.trim().strip_prefix('[')?.trim_start();
+    let mut items = Vec::new();
+    loop {
+        if let Some(end) = rest.strip_prefix(']') {
+            return end.trim().is_empty().then_some(items);
+        }
+        let (item, after) = match rest.chars().next()? {
+            quote @ ('\'' | '"') => quoted(&rest[1..], quote)?,
+            _ => bare(rest)?,
+        };
+        items.push(item);
+        rest = after.trim_start();
+        match rest.strip_prefix(',') {
+            Some(more) => rest = more.trim_start(),
+            None if rest.starts_with(']') => {}
+            None => return None,
+        }
+    }
+}
+
+/// The text up to the closing quote, and what follows it.
+fn quoted(text: &str, quote: char) -> Option<(String, &str)> {
+    let mut item = String::new();
+    let mut chars = text.char_indices();
+    while let Some((at, c)) = chars.next() {
+        match c {
+            '\\' => item.push(escaped(&mut chars)?),
+            c if c == quote => return Some((item, &text[at + 1..])),
+            c => item.push(c),
+        }
+    }
+    None
+}
+
+/// The character that an escape stands for, after its backslash.
+fn escaped(chars: &mut std::str::CharIndices<'_>) -> Option<char> {
+    let digits = match chars.next()?.1 {
+        'n' => return Some('\n'),
+        'r' => return Some('\r'),
+        't' => return Some('\t'),
+        c @ ('\\' | '\'' | '"') => return Some(c),
+        'x' => 2,
+        'u' => 4,
+        'U' => 8,
+        _ => return None,
+    };
+    let code: String = chars.by_ref().take(digits).map(|(_, c)| c).collect();
+    (code.len() == digits)
+        .then(|| u32::from_str_radix(&code, 16).ok())
+        .flatten()
+        .and_then(char::from_u32)
+}
+
+/// A number or a word of Python, and what follows it.
+fn bare(text: &str) -> Option<(String, &str)> {
+    let (item, rest) = text.split_at(text.find([',', ']'])?);
+    let item = item.trim();
+    let is_known = matches!(item, "True" | "False" | "None") || item.parse::<f64>().is_ok();
+    is_known.then(|| (item.to_owned(), rest))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lists_of_python_are_read_and_code_is_not() {
+        for (text, items) in [
+            (r#"['a', "b"]"#, vec!["a", "b"]),
+            (
+                r#"['it\'s', "it's", "say \"x\""]"#,
+                vec!["it's", "it's", "say \"x\""],
+            ),
+            (
+                r"['caf\xe9', 'caf\u00e9', 'a\nb']",
+                vec!["café", "café", "a\nb"],
+            ),
+            ("[1, 2.5, None, ]", vec!["1", "2.5", "None"]),
+            ("[]", vec![]),
+        ] {
+            assert_eq!(python_list(text).unwrap(), items, "{text}");
+        }
+        for text in [
+            "['a'",
+            "['a' 'b']",
+            "['a'] + x",
+            "[open('x')]",
+            "('a', 'b')",
+            "['\\x4']",
+            "a, b",
+            "[,]",
+        ] {
+            assert_eq!(python_list(text), None, "{text}");
+        }
+    }
+}

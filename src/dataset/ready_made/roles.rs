@@ -1,0 +1,291 @@
+//! Which column of a set is which: [`Roles`].
+
+use std::collections::BTreeSet;
+
+use super::cell::Cell;
+use super::map::{How, Map};
+use super::names::{Role, known, plain};
+use super::row::{Row, Table};
+use crate::types::Choices;
+use crate::types::question::letter;
+
+/// The columns by role.
+#[derive(Debug)]
+pub(super) struct Roles {
+    pub(super) question: Column,
+    /// The columns of images; the first that has any wins, or all of a numbered family.
+    pub(super) images: Images,
+    /// Columns of lists or texts of options.
+    pub(super) options: Vec<Column>,
+    /// Columns of one option each, in order.
+    pub(super) cells: Vec<Column>,
+    pub(super) answers: Vec<Column>,
+    pub(super) ids: Vec<Column>,
+    pub(super) hint: Option<Column>,
+    pub(super) family: Option<Column>,
+    pub(super) evidence: Option<Column>,
+    pub(super) split_options: Option<String>,
+}
+
+/// Where the images of a row stand.
+#[derive(Debug)]
+pub(super) enum Images {
+    /// In the first of these columns that has one.
+    First(Vec<Column>),
+    /// In all of these columns.
+    All(Vec<Column>),
+    /// In a file of this name, with the cells of columns in braces.
+    Template(String),
+}
+
+/// A column, or a field of structs in it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Column {
+    pub(super) at: usize,
+    pub(super) field: Option<String>,
+    pub(super) name: String,
+}
+
+impl Column {
+    /// The cell of the column in a row.
+    pub(super) fn of<'a>(&self, row: &'a Row) -> &'a Cell {
+        let cell = row.cell(self.at);
+        match &self.field {
+            None => cell,
+            Some(field) => {
+                let mut fields = field.split('.');
+                fields
+                    .try_fold(cell, |cell, field| cell.field(field))
+                    .unwrap_or(&Cell::Absent)
+            }
+        }
+    }
+
+    /// The cell as text, if it holds one.
+    pub(super) fn text(&self, row: &Row) -> Option<String> {
+        let cell = self.of(row);
+        (!cell.is_absent()).then(|| cell.text()).flatten()
+    }
+}
+
+impl Roles {
+    /// The roles of the columns of a table, by a map and else by their names.
+    ///
+    /// # Errors
+    /// If a column of the map is not there, no column is the question, or the columns hold several questions a row.
+    pub(super) fn of(table: &Table, map: &Map) -> Result<Self, String> {
+        let named = |role| Self::named(table, map, role);
+        let question = named(Role::Question)?;
+        refuse_wide(table, map)?;
+        let question = question.into_iter().next();
+        let question =
+            question.ok_or_else(|| format!(
+                "no question among its columns:\n{}\n say which is which: --map question=COLUMN,image=COLUMN,options=COLUMN,answer=COLUMN",
+                shown(table)
+            ))?;
+        let how = map.of(Role::Options);
+        let mut options = named(Role::Options)?;
+        let is_of_cells = how.is_some_and(|entry| entry.columns.len() > 1);
+        let cells = match how {
+            Some(_) if is_of_cells => std::mem::take(&mut options),
+            Some(_) => Vec::new(),
+            None => cells(table),
+        };
+        let evidence = named(Role::Evidence)?.into_iter().next();
+        Ok(Self {
+            question,
+            images: Self::images(table, map)?,
+            options,
+            cells,
+            answers: named(Role::Answer)?,
+            ids: named(Role::Id)?,
+            hint: named(Role::Hint)?.into_iter().next(),
+            family: family(table, &named(Role::Family)?),
+            evidence,
+            split_options: how.and_then(|entry| match &entry.how {
+                How::Split(signs) => Some(signs.clone()),
+                How::ByRule | How::Answer(_) => None,
+            }),
+        })
+    }
+
+    /// The columns of a role: those of the map, or those with one of its names, the best first.
+    fn named(table: &Table, map: &Map, role: Role) -> Result<Vec<Column>, String> {
+        if let Some(entry) = map.of(role) {
+            let columns = entry.columns.iter();
+            return columns.map(|name| column(table, name)).collect();
+        }
+        let names = known(role).iter();
+        let columns = names.flat_map(|name| {
+            let columns = table.columns.iter().enumerate();
+            let same = columns.filter(move |(_, column)| plain(column) == *name);
+            same.map(|(at, column)| Column {
+                at,
+                field: None,
+                name: column.clone(),
+            })
+        });
+        Ok(columns.collect())
+    }
+
+    fn images(table: &Table, map: &Map) -> Result<Images, String> {
+        let entry = map.of(Role::Image);
+        if let Some([template]) = entry.map(|entry| &*entry.columns)
+            && template.contains('{')
+        {
+            for name in braces(template)? {
+                column(table, name)?;
+            }
+            return Ok(Images::Template(template.clone()));
+        }
+        let columns = Self::named(table, map, Role::Image)?;
+        if entry.is_some_and(|entry| entry.columns.len() > 1) {
+            return Ok(Images::All(columns));
+        }
+        if !columns.is_empty() {
+            return Ok(Images::First(columns));
+        }
+        let numbered = numbered(table, &["image", "img"]);
+        Ok(Images::All(numbered))
+    }
+}
+
+/// The column of a name, or the field of structs in it, as `meta.source`.
+fn column(table: &Table, name: &str) -> Result<Column, String> {
+    let own = |name: &str, field: Option<&str>| {
+        table.find(name).map(|at| Column {
+            at,
+            field: field.map(str::to_owned),
+            name: field.map_or_else(|| name.to_owned(), |field| format!("{name}.{field}")),
+        })
+    };
+    let inner = || {
+        let (name, field) = name.split_once('.')?;
+        own(name, Some(field))
+    };
+    own(name, None).or_else(inner).ok_or_else(|| {
+        let near = table
+            .columns
+            .iter()
+            .find(|known| plain(known) == plain(name));
+        let near = near.map_or_else(String::new, |near| format!("; did you mean {near:?}?"));
+        format!(
+            "--map names the column {name:?}, which is not there{near}\n{}",
+            shown(table)
+        )
+    })
+}
+
+/// The names in braces of a template.
+pub(super) fn braces(template: &str) -> Result<Vec<&str>, String> {
+    let mut names = Vec::new();
+    let mut rest = template;
+    while let Some((_, after)) = rest.split_once('{') {
+        let (name, after) = after
+            .split_once('}')
+            .ok_or_else(|| format!("{template:?}: '}}' is missing"))?;
+        names.push(name);
+        rest = after;
+    }
+    Ok(names)
+}
+
+/// The columns `NAME` and a number, in the order of the numbers.
+fn numbered(table: &Table, names: &[&str]) -> Vec<Column> {
+    let mut found: Vec<(u32, Column)> = Vec::new();
+    for (at, column) in table.columns.iter().enumerate() {
+        let plain = plain(column);
+        let digits = names.iter().find_map(|name| plain.strip_prefix(name));
+        if let Some(number) = digits.and_then(|digits| digits.parse().ok()) {
+            let name = column.clone();
+            found.push((
+                number,
+                Column {
+                    at,
+                    field: None,
+                    name,
+                },
+            ));
+        }
+    }
+    found.sort_by_key(|(number, _)| *number);
+    found.into_iter().map(|(_, column)| column).collect()
+}
+
+/// The columns of one option each: `A`, `B`, … (at least these two), or `option0`, `option_a`, `choice_a` and so on.
+fn cells(table: &Table) -> Vec<Column> {
+    let of = |name: &str| {
+        table.find(name).map(|at| Column {
+            at,
+            field: None,
+            name: name.to_owned(),
+        })
+    };
+    let letters: Vec<Column> = (0..Choices::MOST)
+        .map_while(|index| of(&letter(index).to_string()))
+        .collect();
+    if letters.len() > 1 {
+        return letters;
+    }
+    let digits = numbered(table, &["option", "choice"]);
+    if digits.len() > 1 {
+        return digits;
+    }
+    let named = |index: usize| {
+        let name = letter(index).to_ascii_lowercase();
+        let names = [format!("option{name}"), format!("choice{name}")];
+        let column = table
+            .columns
+            .iter()
+            .find(|column| names.contains(&plain(column)))?;
+        of(column)
+    };
+    let named: Vec<Column> = (0..Choices::MOST).map_while(named).collect();
+    if named.len() > 1 { named } else { Vec::new() }
+}
+
+/// The first column of families with more than one value; if all are constant, the first.
+fn family(table: &Table, columns: &[Column]) -> Option<Column> {
+    let varies = |column: &&Column| {
+        let texts = table.rows.iter().map(|row| column.text(row));
+        let mut seen = BTreeSet::new();
+        texts.into_iter().any(|text| {
+            seen.insert(text);
+            seen.len() > 1
+        })
+    };
+    let chosen = columns.iter().find(varies).or(columns.first());
+    chosen.cloned()
+}
+
+/// Refuses a table that has several questions a row.
+fn refuse_wide(table: &Table, map: &Map) -> Result<(), String> {
+    let wide = numbered(table, &["question"]);
+    if wide.len() < 2 || map.of(Role::Question).is_some() {
+        return Ok(());
+    }
+    let names: Vec<&str> = wide.iter().map(|column| column.name.as_str()).collect();
+    Err(format!(
+        "several questions a row, in the columns {}; one question a row is read: write a row for each, or take the ones in a column with --map question={}",
+        names.join(", "),
+        names[0]
+    ))
+}
+
+/// The columns with their kinds and a short value each, one a line.
+pub(super) fn shown(table: &Table) -> String {
+    let width = table.columns.iter().map(|name| name.chars().count()).max();
+    let width = width.unwrap_or(0).min(24);
+    let lines = table.columns.iter().enumerate().take(40).map(|(at, name)| {
+        let mut cells = table.rows.iter().map(|row| row.cell(at));
+        let cell = cells
+            .find(|cell| !cell.is_absent())
+            .unwrap_or(&Cell::Absent);
+        format!("   {name:width$}  {:8} {}", cell.kind(), cell.shown(60))
+    });
+    let mut lines: Vec<String> = lines.collect();
+    if table.columns.len() > lines.len() {
+        lines.push(format!("   and {} more", table.columns.len() - lines.len()));
+    }
+    lines.join("\n")
+}

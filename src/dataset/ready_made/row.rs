@@ -1,0 +1,125 @@
+//! The rows of a ready-made set: [`Table`].
+
+use std::collections::HashMap;
+use std::fmt;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use csv::Position;
+
+use super::cell::Cell;
+
+/// All rows of a set, in the order of its files.
+#[derive(Debug, Default)]
+pub(super) struct Table {
+    pub(super) files: Vec<FileLabel>,
+    pub(super) columns: Vec<String>,
+    places: HashMap<String, usize>,
+    pub(super) rows: Vec<Row>,
+}
+
+/// What is known of a file of rows besides its rows.
+#[derive(Debug, Clone)]
+pub(super) struct FileLabel {
+    /// The path of the file, for messages; of a file in an archive, behind that of the archive.
+    pub(super) path: PathBuf,
+    /// The folder inside the archive that holds the file; `None` outside archives.
+    pub(super) inner: Option<PathBuf>,
+    /// The configuration of the repository that it belongs to; empty if there is none.
+    pub(super) config: String,
+}
+
+/// One row. Cells of columns that come later than its own may lack.
+#[derive(Debug)]
+pub(super) struct Row {
+    /// The index of its file.
+    pub(super) file: usize,
+    pub(super) place: RowPlace,
+    cells: Vec<Cell>,
+}
+
+/// Where a row stands in its file.
+#[derive(Debug, Clone)]
+pub(super) enum RowPlace {
+    /// A record of a table of text.
+    Record(Position),
+    /// A value of a JSON file: its first byte, its length, and the number of its line or of the value, counted from 1.
+    Json {
+        offset: u64,
+        length: usize,
+        number: u64,
+        unit: &'static str,
+        /// The place of the row in a list inside the value, and the field that holds the list, if rows are nested.
+        inner: Option<(usize, Arc<str>)>,
+    },
+    /// A row of a row group, and its number in the file, counted from 1.
+    Parquet {
+        group: usize,
+        row: usize,
+        number: u64,
+    },
+}
+
+impl fmt::Display for RowPlace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Record(position) => write!(f, "line {}", position.line()),
+            Self::Json {
+                number,
+                unit,
+                inner,
+                ..
+            } => {
+                write!(f, "{unit} {number}")?;
+                let inner = inner.as_ref();
+                inner.map_or(Ok(()), |(inner, _)| write!(f, ".{}", inner + 1))
+            }
+            Self::Parquet { number, .. } => write!(f, "row {number}"),
+        }
+    }
+}
+
+impl Table {
+    /// The index of a column; a new one if there is none of this name.
+    pub(super) fn column(&mut self, name: &str) -> usize {
+        if let Some(&at) = self.places.get(name) {
+            return at;
+        }
+        let at = self.columns.len();
+        self.columns.push(name.to_owned());
+        self.places.insert(name.to_owned(), at);
+        at
+    }
+
+    /// The index of a column; `None` if there is none of this name.
+    pub(super) fn find(&self, name: &str) -> Option<usize> {
+        self.places.get(name).copied()
+    }
+
+    /// Adds a row of the last file. Files in the cells are not kept.
+    pub(super) fn push(&mut self, place: RowPlace, cells: Vec<(usize, Cell)>) {
+        let width = cells.iter().map(|(at, _)| at + 1).max().unwrap_or(0);
+        let mut row = vec![Cell::Absent; width];
+        for (at, cell) in cells {
+            row[at] = cell.without_files();
+        }
+        self.rows.push(Row {
+            file: self.files.len().saturating_sub(1),
+            place,
+            cells: row,
+        });
+    }
+
+    /// The file and place of a row, for messages.
+    pub(super) fn place(&self, row: usize) -> String {
+        let row = &self.rows[row];
+        format!("{}, {}", self.files[row.file].path.display(), row.place)
+    }
+}
+
+impl Row {
+    /// The cell of a column.
+    pub(super) fn cell(&self, column: usize) -> &Cell {
+        self.cells.get(column).unwrap_or(&Cell::Absent)
+    }
+}

@@ -1,0 +1,58 @@
+//! The flags for ready-made sets: [`SetArgs`].
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::map::Map;
+use crate::types::Decides;
+
+/// The flags for how a ready-made set is read.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Ready-made sets")]
+pub struct SetArgs {
+    /// Which column of a ready-made set is which, as question=frage,image=pics/{bild}.png,options=auswahl:split(|),answer=richtig:index1;
+    /// default: by their names
+    #[arg(long, value_name = "ROLE=COLUMN,…", add = Decides::Reply)]
+    pub map: Vec<Map>,
+    /// The well-known set that `--data NAME:FILE` names.
+    #[arg(skip)]
+    pub preset: Option<String>,
+    /// The configuration of a repository of several, or all of them; default: the one that its card makes the default
+    #[arg(long, value_name = "NAME|all", add = Decides::Reply)]
+    pub config_name: Option<String>,
+    /// The split, or all of them; default: the only one, or test
+    #[arg(long, value_name = "NAME|all", add = Decides::Reply)]
+    pub split: Option<String>,
+    /// Where the rows are in a JSON file, as items or images.*.qa; default: the whole file
+    #[arg(long, value_name = "FIELD", add = Decides::Reply)]
+    pub rows: Option<String>,
+    /// What is done about rows that show several images; default: stop
+    #[arg(long, value_name = "skip", add = Decides::Trials)]
+    pub multi_image: Option<LeaveOut>,
+    /// What is done about rows without an image; default: stop
+    #[arg(long, value_name = "skip", add = Decides::Trials)]
+    pub no_image: Option<LeaveOut>,
+    /// What is done about open questions, which have no options; default: stop
+    #[arg(long, value_name = "skip", add = Decides::Trials)]
+    pub open: Option<LeaveOut>,
+    /// What is done about rows with several true options; default: stop
+    #[arg(long, value_name = "skip", add = Decides::Trials)]
+    pub several: Option<LeaveOut>,
+    /// What is done about rows that are broken, at most 5 % of all; default: stop
+    #[arg(long, value_name = "skip", add = Decides::Trials)]
+    pub bad: Option<LeaveOut>,
+    /// A further folder in which files that the data name may lie; repeatable; default: the folder of the data alone
+    #[arg(long, value_name = "DIR", add = Decides::Reply)]
+    pub data_root: Vec<PathBuf>,
+    /// Keep sentences at the end of questions that say in what form to answer; default: cut, because the prompt says it too
+    #[arg(long, add = Decides::Reply)]
+    pub keep_instructions: bool,
+}
+
+/// What is done about rows that cannot be asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum LeaveOut {
+    /// Leave them out, and say how many
+    Skip,
+}

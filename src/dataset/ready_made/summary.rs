@@ -1,0 +1,125 @@
+//! What was taken for what when a set was read: [`Summary`].
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::items::Cut;
+use super::left_out::LeftOut;
+use super::roles::{Images, Roles};
+use super::row::Table;
+use crate::dataset::image_source::ImageSource;
+use crate::types::{FrameId, Question};
+
+/// The facts of a set that was read, for messages and the manifest.
+pub(super) struct Summary<'a> {
+    pub(super) name: &'a str,
+    pub(super) table: &'a Table,
+    pub(super) roles: &'a Roles,
+    pub(super) answers: &'a [String],
+    pub(super) ids: String,
+    pub(super) cut: &'a Cut,
+    pub(super) left: &'a LeftOut,
+    pub(super) sources: &'a BTreeMap<FrameId, ImageSource>,
+    pub(super) questions: &'a [Question],
+    /// Further facts, one a line.
+    pub(super) notes: Vec<String>,
+}
+
+/// The number of families from which on tables are hard to read.
+const MANY_FAMILIES: usize = 60;
+
+impl Summary<'_> {
+    /// One fact a line.
+    pub(super) fn lines(&self) -> Vec<String> {
+        let families: BTreeSet<&str> = self
+            .questions
+            .iter()
+            .map(|question| question.family.name())
+            .collect();
+        let by = self.roles.family.as_ref().map_or_else(
+            || "no column of families".to_owned(),
+            |column| format!("column {}", column.name),
+        );
+        let mut lines = vec![
+            format!(
+                "{}: {} on {} in {} ({by})",
+                self.name,
+                count(self.questions.len(), "question", "questions"),
+                count(self.sources.len(), "image", "images"),
+                count(families.len(), "family", "families")
+            ),
+            self.columns(),
+        ];
+        for (why, number) in self.left.counts() {
+            lines.push(format!(
+                "left out: {} of {} rows ({})",
+                number,
+                self.table.rows.len(),
+                why.name()
+            ));
+        }
+        for (ending, number) in self.cut {
+            lines.push(format!("cut from the question: {ending:?} {number} times"));
+        }
+        if families.len() > MANY_FAMILIES {
+            lines.push(format!(
+                "{} families make tables that are hard to read; --map family=COLUMN names another column, --map family= none",
+                families.len()
+            ));
+        }
+        lines.extend(self.notes.iter().cloned());
+        lines
+    }
+
+    /// Which column was taken for what.
+    fn columns(&self) -> String {
+        let roles = self.roles;
+        let image = match &roles.images {
+            Images::First(columns) => columns
+                .first()
+                .map_or("none", |column| &column.name)
+                .to_owned(),
+            Images::All(columns) => {
+                let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
+                names.join(", ")
+            }
+            Images::Template(template) => template.clone(),
+        };
+        let mut parts = vec![
+            format!("question = {}", roles.question.name),
+            format!("image = {image} ({})", self.formats()),
+        ];
+        let cells: Vec<&str> = roles.cells.iter().map(|cell| cell.name.as_str()).collect();
+        match (&*cells, &*roles.options) {
+            ([], []) => {}
+            ([], [column, ..]) => parts.push(format!("options = {}", column.name)),
+            (cells, _) => parts.push(format!("options = {}", cells.join(" "))),
+        }
+        if let Some(hint) = &roles.hint {
+            parts.push(format!("hint = {}", hint.name));
+        }
+        parts.push(format!("answer = {}", self.answers.join(" and ")));
+        parts.push(format!("id = {}", self.ids));
+        parts.join(", ")
+    }
+
+    /// How many images are of which format, as `PNG 3, files 2`.
+    fn formats(&self) -> String {
+        let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+        for source in self.sources.values() {
+            let format = match source {
+                ImageSource::Embedded(image) => image.format(),
+                _ => "files",
+            };
+            *counts.entry(format).or_default() += 1;
+        }
+        let counts = counts
+            .iter()
+            .map(|(format, count)| format!("{format} {count}"));
+        counts.collect::<Vec<String>>().join(", ")
+    }
+}
+
+/// A number with its noun.
+fn count(number: usize, one: &str, many: &str) -> String {
+    format!("{number} {}", if number == 1 { one } else { many })
+}

@@ -1,0 +1,245 @@
+//! Broken files and rows are named, and nothing breaks down.
+
+use std::fs;
+
+use serde_json::{Value, json};
+
+use super::fixture::{base64, row, set};
+use super::{open, refusal};
+use crate::dataset::ready_made::SetArgs;
+use crate::types::FrameId;
+
+/// Values that stand where something else is expected.
+fn damages() -> Vec<Value> {
+    vec![
+        Value::Null,
+        json!(""),
+        json!(7),
+        json!(true),
+        json!([]),
+        json!([[["x"]]]),
+        json!({"bytes": null, "path": null}),
+        json!({"a": {"b": 1}}),
+        json!("x".repeat(1 << 20)),
+        json!("no base64! ".repeat(9)),
+        json!("\u{202e}\u{0}\u{1b}[31m"),
+    ]
+}
+
+#[test]
+fn a_row_damaged_in_each_column_is_named_or_asked() {
+    let good = |id: i64| {
+        row(
+            json!({"id": id, "question": "What is it?", "options": ["x", "y"], "answer": "x", "category": "c", "hint": "h", "image": base64(1)}),
+        )
+    };
+    for column in [
+        "id", "question", "options", "answer", "category", "hint", "image",
+    ] {
+        for damage in damages() {
+            for form in ["json", "jsonl", "csv", "tsv"] {
+                let mut bad = good(2);
+                let is_plain = !damage.is_object() || form.starts_with("json");
+                if !is_plain {
+                    continue;
+                }
+                bad.insert(column.to_owned(), damage.clone());
+                let (_folder, path) = set(&format!("set.{form}"), &[good(1), bad, good(3)]);
+                match open(&path, &SetArgs::default()) {
+                    Ok(dataset) => {
+                        for frame in dataset.frames() {
+                            let shown = dataset.picture(frame).and_then(|picture| picture.decode());
+                            if let Err(e) = shown {
+                                assert!(e.to_string().contains("set."), "{column} {form}: {e}");
+                            }
+                        }
+                    }
+                    Err(e) => {
+                        let text = e.to_string();
+                        assert!(
+                            text.contains("set.") && text.len() < 3000,
+                            "{column} {form}: {text}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_cut_or_damaged_parquet_file_is_an_error() {
+    let rows: Vec<_> = (0..20).map(|id| row(json!({"id": id, "question": "?", "options": ["x", "y"], "answer": "x", "image": {"bytes": base64(id as u8), "path": null}}))).collect();
+    let (_folder, path) = set("set.parquet", &rows);
+    let whole = fs::read(&path).unwrap();
+    for cut in [0, 3, 4, 100, whole.len() / 2, whole.len() - 1] {
+        let copy = path.with_file_name(format!("cut{cut}.parquet"));
+        fs::write(&copy, &whole[..cut]).unwrap();
+        let problem = refusal(&copy, &SetArgs::default());
+        assert!(
+            problem.contains("not a whole Parquet file"),
+            "{cut}: {problem}"
+        );
+    }
+    for at in (0..whole.len()).step_by(29) {
+        let copy = path.with_file_name(format!("flipped{at}.parquet"));
+        let mut bytes = whole.clone();
+        bytes[at] ^= 0x55;
+        fs::write(&copy, &bytes).unwrap();
+        // Any outcome but a breakdown: a byte of a picture is found when that is decoded.
+        if let Ok(dataset) = open(&copy, &SetArgs::default()) {
+            for frame in dataset.frames() {
+                let _ = dataset.picture(frame).and_then(|picture| picture.decode());
+            }
+        }
+    }
+}
+
+#[test]
+fn broken_text_files_name_their_place() {
+    let (folder, _) = set("set.json", &[]);
+    for (name, content, says) in [
+        ("a.jsonl", &b"{\"id\": 1}\n{\n"[..], "a.jsonl, line 2: EOF"),
+        ("a.json", b"[{\"id\": 1}, {\"id\"", "the file ends at byte"),
+        ("b.json", b"3", "neither a list nor an object"),
+        ("c.json", b"[1, 2]", "is not an object"),
+        (
+            "a.tsv",
+            b"index\tquestion\n1\ta\tstray\n",
+            "a.tsv, line 2: 3 cells, but the header has 2",
+        ),
+        (
+            "b.tsv",
+            b"index\tquestion\n1\ta\xff\n",
+            "b.tsv, line 2: column \"question\": byte 2 of the cell is not UTF-8",
+        ),
+        (
+            "c.csv",
+            b"question,question\na,b\n",
+            "two columns are called",
+        ),
+        ("d.csv", b"", "no questions in it"),
+        (
+            "e.parquet",
+            b"version https://git-lfs.github.com/spec/v1\noid sha256:1\nsize 5\n",
+            "only its pointer: git lfs pull",
+        ),
+        ("f.txt", b"x", "not a file of questions"),
+    ] {
+        let path = folder.path().join(name);
+        fs::write(&path, content).unwrap();
+        let problem = refusal(&path, &SetArgs::default());
+        assert!(problem.contains(says), "{name}: {problem}");
+    }
+}
+
+#[test]
+fn paths_that_lead_out_and_images_that_are_none_are_named() {
+    let question = |image: &str| {
+        row(json!({"id": 1, "question": "?", "options": ["x", "y"], "answer": "x", "image": image}))
+    };
+    for (image, says) in [
+        ("../secret.png", "lies outside"),
+        ("/etc/hostname", "lies outside"),
+        ("https://example.org/0.png", "download them first"),
+        ("none.png", "no such file"),
+        ("17", "no row with an image has the id 17"),
+    ] {
+        for form in ["tsv", "jsonl", "parquet"] {
+            let (_folder, path) = set(&format!("set.{form}"), &[question(image)]);
+            let problem = refusal(&path, &SetArgs::default());
+            assert!(problem.contains(says), "{form}: {problem}");
+        }
+    }
+    for (cell, says) in [
+        (base64(1)[..80].to_owned(), "not a"),
+        ("QUJD".repeat(40), "not an image"),
+    ] {
+        let (_folder, path) = set("set.tsv", &[question(&cell)]);
+        let dataset = open(&path, &SetArgs::default()).unwrap();
+        let picture = dataset
+            .picture(&FrameId("1".into()))
+            .and_then(|picture| picture.decode());
+        let problem = picture.unwrap_err().to_string();
+        assert!(
+            problem.contains("set.tsv, line 2: ") && problem.contains(says),
+            "{problem}"
+        );
+    }
+}
+
+#[test]
+fn a_file_that_changes_after_it_was_opened_is_not_shown() {
+    let question = |colour| {
+        row(
+            json!({"id": 1, "question": "?", "options": ["x", "y"], "answer": "x", "image": base64(colour)}),
+        )
+    };
+    let (_folder, path) = set("set.tsv", &[question(1)]);
+    let dataset = open(&path, &SetArgs::default()).unwrap();
+    super::fixture::write(&path, &[question(2)]);
+    let problem = dataset
+        .picture(&FrameId("1".into()))
+        .unwrap_err()
+        .to_string();
+    assert!(
+        problem.contains("the image has changed since the file was opened"),
+        "{problem}"
+    );
+}
+
+#[test]
+fn an_archive_that_climbs_or_lies_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let line = |image: &str| {
+        json!({"file_name": image, "question": "?", "options": ["x", "y"], "answer": "x"})
+            .to_string()
+    };
+    for (name, entries, says) in [
+        (
+            "a.zip",
+            vec![("../a.png", "x".to_owned())],
+            "leads out of the file",
+        ),
+        (
+            "b.zip",
+            vec![("/etc/a.png", "x".to_owned())],
+            "leads out of the file",
+        ),
+        (
+            "c.zip",
+            vec![("metadata.jsonl", line("../a.png"))],
+            "lies outside",
+        ),
+        (
+            "d.zip",
+            vec![("metadata.jsonl", line("/etc/hostname"))],
+            "lies outside",
+        ),
+        (
+            "e.zip",
+            vec![("metadata.jsonl", line("none.png"))],
+            "no such file: \"none.png\"",
+        ),
+        (
+            "f.zip",
+            vec![("a.txt", String::new())],
+            "no file of questions in it",
+        ),
+    ] {
+        let path = folder.path().join(name);
+        let entries: Vec<(&str, &[u8])> = entries
+            .iter()
+            .map(|(name, text)| (*name, text.as_bytes()))
+            .collect();
+        super::shapes::pack(&path, &entries);
+        let problem = refusal(&path, &SetArgs::default());
+        assert!(problem.contains(says), "{name}: {problem}");
+    }
+    let path = folder.path().join("g.zip");
+    fs::write(&path, b"PK no").unwrap();
+    assert!(refusal(&path, &SetArgs::default()).contains("not a whole ZIP file"));
+    let path = folder.path().join("h.jsonl.gz");
+    fs::write(&path, b"no gzip").unwrap();
+    assert!(refusal(&path, &SetArgs::default()).contains("cannot be unpacked"));
+}

@@ -1,0 +1,299 @@
+//! Sets that tests make: rows as JSON values, written in each form.
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use image::{ImageFormat, RgbImage};
+use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
+use parquet::data_type::{ByteArray, ByteArrayType, Int64Type};
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::types::{Type, TypePtr};
+use serde_json::{Map, Value, json};
+
+/// The bytes of a PNG of one colour, large enough for its base64 to be longer than any name.
+pub(super) fn png(colour: u8) -> Vec<u8> {
+    let image = RgbImage::from_fn(8, 8, |x, y| {
+        image::Rgb([colour, (x * 9) as u8, (y * 17) as u8])
+    });
+    let mut file = std::io::Cursor::new(Vec::new());
+    image.write_to(&mut file, ImageFormat::Png).unwrap();
+    file.into_inner()
+}
+
+/// The base64 of a PNG.
+pub(super) fn base64(colour: u8) -> String {
+    STANDARD.encode(png(colour))
+}
+
+/// A row from its fields.
+pub(super) fn row(fields: Value) -> Map<String, Value> {
+    match fields {
+        Value::Object(fields) => fields,
+        other => panic!("{other} is no row"),
+    }
+}
+
+/// A temporary folder with a file of rows, whose ending decides the form. Images in `bytes` of an object are base64.
+pub(super) fn set(name: &str, rows: &[Map<String, Value>]) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    write(&path, rows);
+    (folder, path)
+}
+
+/// Writes rows in the form that the ending names.
+pub(super) fn write(path: &Path, rows: &[Map<String, Value>]) {
+    let text = match path.extension().unwrap().to_str().unwrap() {
+        "json" => serde_json::to_string_pretty(rows).unwrap(),
+        "jsonl" => rows.iter().fold(String::new(), |text, row| {
+            text + &json!(row).to_string() + "\n"
+        }),
+        "tsv" => table(rows, b'\t'),
+        "csv" => table(rows, b','),
+        "parquet" => return parquet(path, rows),
+        other => panic!("no form {other}"),
+    };
+    fs::write(path, text).unwrap();
+}
+
+fn columns(rows: &[Map<String, Value>]) -> Vec<String> {
+    let mut columns: Vec<String> = Vec::new();
+    for name in rows.iter().flat_map(Map::keys) {
+        if !columns.contains(name) {
+            columns.push(name.clone());
+        }
+    }
+    columns
+}
+
+fn table(rows: &[Map<String, Value>], delimiter: u8) -> String {
+    let columns = columns(rows);
+    let mut writer = csv::WriterBuilder::new()
+        .delimiter(delimiter)
+        .from_writer(Vec::new());
+    writer.write_record(&columns).unwrap();
+    for row in rows {
+        let cells = columns.iter().map(|column| match row.get(column) {
+            None | Some(Value::Null) => String::new(),
+            Some(Value::String(text)) => text.clone(),
+            Some(Value::Object(fields)) => fields["bytes"].as_str().unwrap().to_owned(),
+            Some(other) => other.to_string(),
+        });
+        writer.write_record(cells).unwrap();
+    }
+    String::from_utf8(writer.into_inner().unwrap()).unwrap()
+}
+
+/// The form of a column of Parquet, from its first value.
+#[derive(Clone, Copy, PartialEq)]
+enum Form {
+    Text,
+    Number,
+    Texts,
+    Image,
+    Images,
+}
+
+fn form(rows: &[Map<String, Value>], column: &str) -> Form {
+    match rows
+        .iter()
+        .find_map(|row| row.get(column).filter(|value| !value.is_null()))
+    {
+        Some(Value::Number(_)) => Form::Number,
+        Some(Value::Array(items)) if items[0].is_object() => Form::Images,
+        Some(Value::Array(_)) => Form::Texts,
+        Some(Value::Object(_)) => Form::Image,
+        _ => Form::Text,
+    }
+}
+
+fn leaf(name: &str, physical: Physical, logical: Option<LogicalType>) -> TypePtr {
+    Arc::new(
+        Type::primitive_type_builder(name, physical)
+            .with_repetition(Repetition::OPTIONAL)
+            .with_logical_type(logical)
+            .build()
+            .unwrap(),
+    )
+}
+
+fn group(
+    name: &str,
+    repetition: Repetition,
+    logical: Option<LogicalType>,
+    fields: Vec<TypePtr>,
+) -> TypePtr {
+    Arc::new(
+        Type::group_type_builder(name)
+            .with_repetition(repetition)
+            .with_logical_type(logical)
+            .with_fields(fields)
+            .build()
+            .unwrap(),
+    )
+}
+
+fn list(name: &str, item: TypePtr) -> TypePtr {
+    let items = group("list", Repetition::REPEATED, None, vec![item]);
+    group(
+        name,
+        Repetition::OPTIONAL,
+        Some(LogicalType::List),
+        vec![items],
+    )
+}
+
+fn image(name: &str) -> TypePtr {
+    let fields = vec![
+        leaf("bytes", Physical::BYTE_ARRAY, None),
+        leaf("path", Physical::BYTE_ARRAY, Some(LogicalType::String)),
+    ];
+    group(name, Repetition::OPTIONAL, None, fields)
+}
+
+/// The values of a leaf with their definition and repetition levels.
+#[derive(Default)]
+struct Levels {
+    values: Vec<ByteArray>,
+    defined: Vec<i16>,
+    repeated: Vec<i16>,
+}
+
+impl Levels {
+    fn add(&mut self, value: Option<Vec<u8>>, defined: i16, absent: i16, repeated: i16) {
+        self.defined
+            .push(if value.is_some() { defined } else { absent });
+        self.repeated.push(repeated);
+        self.values.extend(value.map(ByteArray::from));
+    }
+}
+
+/// Writes a Parquet file of two row groups, with columns in the forms in which hubs ship them.
+fn parquet(path: &Path, rows: &[Map<String, Value>]) {
+    let columns = columns(rows);
+    let text = || Some(LogicalType::String);
+    let forms: Vec<Form> = columns.iter().map(|column| form(rows, column)).collect();
+    let fields = columns.iter().zip(&forms).map(|(column, form)| match form {
+        Form::Text => leaf(column, Physical::BYTE_ARRAY, text()),
+        Form::Number => leaf(column, Physical::INT64, None),
+        Form::Texts => list(column, leaf("element", Physical::BYTE_ARRAY, text())),
+        Form::Image => image(column),
+        Form::Images => list(column, image("element")),
+    });
+    let schema = group("schema", Repetition::REQUIRED, None, fields.collect());
+    let schema = Arc::new(
+        Type::group_type_builder("schema")
+            .with_fields(schema.get_fields().to_vec())
+            .build()
+            .unwrap(),
+    );
+    let properties = WriterProperties::builder()
+        .set_compression(Compression::SNAPPY)
+        .build();
+    let file = File::create(path).unwrap();
+    let mut writer = SerializedFileWriter::new(file, schema, Arc::new(properties)).unwrap();
+    let half = rows.len().div_ceil(2).max(1);
+    for rows in rows.chunks(half) {
+        let mut group = writer.next_row_group().unwrap();
+        for (column, form) in columns.iter().zip(&forms) {
+            let numbers = *form == Form::Number;
+            if numbers {
+                let mut leaf = group.next_column().unwrap().unwrap();
+                let values: Vec<i64> = rows
+                    .iter()
+                    .filter_map(|row| row.get(column)?.as_i64())
+                    .collect();
+                let defined: Vec<i16> = rows
+                    .iter()
+                    .map(|row| i16::from(row.get(column).is_some_and(Value::is_number)))
+                    .collect();
+                leaf.typed::<Int64Type>()
+                    .write_batch(&values, Some(&defined), None)
+                    .unwrap();
+                leaf.close().unwrap();
+                continue;
+            }
+            for levels in leaves(rows, column, *form) {
+                let mut leaf = group.next_column().unwrap().unwrap();
+                leaf.typed::<ByteArrayType>()
+                    .write_batch(
+                        &levels.values,
+                        Some(&levels.defined),
+                        Some(&levels.repeated),
+                    )
+                    .unwrap();
+                leaf.close().unwrap();
+            }
+        }
+        group.close().unwrap();
+    }
+    writer.close().unwrap();
+}
+
+/// The leaves of a column of texts, lists or images.
+fn leaves(rows: &[Map<String, Value>], column: &str, form: Form) -> Vec<Levels> {
+    let bytes = |value: &Value| {
+        let text = value["bytes"].as_str()?;
+        Some(STANDARD.decode(text).unwrap())
+    };
+    let path = |value: &Value| value["path"].as_str().map(|text| text.as_bytes().to_vec());
+    let cells = rows
+        .iter()
+        .map(|row| row.get(column).filter(|value| !value.is_null()));
+    match form {
+        Form::Text | Form::Number => {
+            let mut levels = Levels::default();
+            for cell in cells {
+                let value = cell.map(|cell| {
+                    cell.as_str()
+                        .map_or_else(|| cell.to_string(), str::to_owned)
+                });
+                levels.add(value.map(String::into_bytes), 1, 0, 0);
+            }
+            vec![levels]
+        }
+        Form::Texts => {
+            let mut levels = Levels::default();
+            for cell in cells {
+                let Some(items) = cell.and_then(Value::as_array) else {
+                    levels.add(None, 3, 0, 0);
+                    continue;
+                };
+                for (at, item) in items.iter().enumerate() {
+                    let text = item.as_str().map(|text| text.as_bytes().to_vec());
+                    levels.add(text, 3, 2, i16::from(at > 0));
+                }
+            }
+            vec![levels]
+        }
+        Form::Image => {
+            let (mut first, mut second) = (Levels::default(), Levels::default());
+            for cell in cells {
+                let absent = i16::from(cell.is_some());
+                first.add(cell.and_then(bytes), 2, absent, 0);
+                second.add(cell.and_then(path), 2, absent, 0);
+            }
+            vec![first, second]
+        }
+        Form::Images => {
+            let (mut first, mut second) = (Levels::default(), Levels::default());
+            for cell in cells {
+                let Some(items) = cell.and_then(Value::as_array) else {
+                    first.add(None, 4, 0, 0);
+                    second.add(None, 4, 0, 0);
+                    continue;
+                };
+                for (at, item) in items.iter().enumerate() {
+                    first.add(bytes(item), 4, 3, i16::from(at > 0));
+                    second.add(path(item), 4, 3, i16::from(at > 0));
+                }
+            }
+            vec![first, second]
+        }
+    }
+}

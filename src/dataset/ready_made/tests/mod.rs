@@ -1,0 +1,74 @@
+//! Sets in the shapes in which benchmarks ship, read and refused.
+
+mod broken;
+mod fixture;
+mod refusals;
+mod shapes;
+
+use std::path::Path;
+
+use super::SetArgs;
+use crate::dataset::{DataPlace, Dataset, Picture};
+use crate::error::Result;
+
+/// The set at a path, read with these flags.
+fn open(path: &Path, args: &SetArgs) -> Result<Dataset> {
+    Dataset::open(&DataPlace::Path(path.to_owned()), None, args)
+}
+
+/// The flags with a map.
+fn map(text: &str) -> SetArgs {
+    SetArgs {
+        map: vec![text.parse().unwrap()],
+        ..SetArgs::default()
+    }
+}
+
+/// What a set refuses to be read for.
+fn refusal(path: &Path, args: &SetArgs) -> String {
+    open(path, args)
+        .err()
+        .map_or_else(|| "it was read".to_owned(), |e| e.to_string())
+}
+
+/// A question as the tests compare it: id, family, text, choices, true choice, and the first sample of its image.
+type Read = (String, String, String, Vec<String>, String, u8);
+
+/// All questions of a set, with the red of their images.
+fn read(dataset: &Dataset) -> Vec<Read> {
+    let questions = dataset.questions().iter().map(|question| {
+        let picture = dataset.picture(&question.frame).unwrap();
+        let texts = question.choices.texts();
+        (
+            question.id.0.clone(),
+            question.family.name().to_owned(),
+            question.text.clone(),
+            texts.to_vec(),
+            texts[question.choices.truth().unwrap()].clone(),
+            picture.decode().unwrap().samples()[0],
+        )
+    });
+    questions.collect()
+}
+
+/// The digests of the images, by frame.
+fn digests(dataset: &Dataset) -> Vec<(String, String)> {
+    let frames = dataset.frames();
+    let digests = frames.map(|frame| match dataset.picture(frame).unwrap() {
+        picture @ Picture::Encoded(_) => (frame.0.clone(), picture.digest().to_string()),
+        Picture::Drawn(..) => panic!("a room"),
+    });
+    digests.collect()
+}
+
+fn expected(id: &str, family: &str, text: &str, choices: &[&str], truth: &str, red: u8) -> Read {
+    let choices = choices.iter().map(ToString::to_string).collect();
+    (
+        id.into(),
+        family.into(),
+        text.into(),
+        choices,
+        truth.into(),
+        red,
+    )
+}

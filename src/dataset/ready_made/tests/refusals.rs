@@ -1,0 +1,170 @@
+//! What has two meanings is refused, with a command that names one; the command works as it is printed.
+
+use serde_json::{Value, json};
+
+use super::fixture::{base64, row, set};
+use super::{map, open, read, refusal};
+use crate::dataset::ready_made::SetArgs;
+
+/// A set of rows with these fields beside a question and an image.
+fn with(fields: &[Value]) -> (tempfile::TempDir, std::path::PathBuf) {
+    let rows: Vec<_> = fields
+        .iter()
+        .map(|fields| {
+            let mut row = row(fields.clone());
+            row.entry("question").or_insert(json!("What is it?"));
+            row.entry("image").or_insert(json!(base64(1)));
+            row
+        })
+        .collect();
+    set("set.json", &rows)
+}
+
+#[test]
+fn two_readings_of_an_answer_are_refused() {
+    let numbers = json!({"options": ["red", "green", "blue"], "answer": 1});
+    let (_folder, path) = with(&[numbers.clone(), numbers.clone()]);
+    let problem = refusal(&path, &SetArgs::default());
+    assert!(
+        problem.contains("object 1: the answer \"1\" may be read as index0 or as index1"),
+        "{problem}"
+    );
+    assert!(
+        problem.contains("--map answer=answer:index0 or --map answer=answer:index1"),
+        "{problem}"
+    );
+    let read_as = |how: &str| read(&open(&path, &map(how)).unwrap())[0].4.clone();
+    assert_eq!(
+        (
+            read_as("answer=answer:index0"),
+            read_as("answer=answer:index1")
+        ),
+        ("green".into(), "red".into())
+    );
+    // One row that only one reading fits decides for all.
+    let (_folder, path) = with(&[numbers, json!({"options": ["red", "green"], "answer": 0})]);
+    assert_eq!(
+        read(&open(&path, &SetArgs::default()).unwrap())[0].4,
+        "green"
+    );
+}
+
+#[test]
+fn two_columns_that_differ_are_refused_and_two_that_agree_are_one() {
+    let (_folder, path) =
+        with(&[json!({"options": ["B", "A"], "choices": ["x", "y"], "answer": "A"})]);
+    let problem = refusal(&path, &SetArgs::default());
+    assert!(
+        problem.contains("--map options=options or --map options=choices"),
+        "{problem}"
+    );
+    let problem = refusal(&path, &map("options=options"));
+    assert!(problem.contains("as letter or as text"), "{problem}");
+    assert_eq!(
+        read(&open(&path, &map("options=options,answer=answer:text")).unwrap())[0].4,
+        "A"
+    );
+    let (_folder, path) = with(&[json!({"options": ["x", "y"], "answer": "x", "label": "B"})]);
+    let problem = refusal(&path, &SetArgs::default());
+    assert!(
+        problem.contains("--map answer=answer or --map answer=label"),
+        "{problem}"
+    );
+    let (_folder, path) = with(&[
+        json!({"options": ["A. x", "B. y"], "choices": ["x", "y"], "answer": "x", "label": "A"}),
+    ]);
+    assert_eq!(read(&open(&path, &SetArgs::default()).unwrap())[0].4, "x");
+    // A column that no reading fits is no column of answers.
+    let (_folder, path) =
+        with(&[json!({"options": ["x", "y"], "answer": "x", "target": "the chair"})]);
+    assert_eq!(read(&open(&path, &SetArgs::default()).unwrap())[0].4, "x");
+}
+
+#[test]
+fn what_cannot_be_found_is_said_with_the_columns() {
+    let (folder, path) = set(
+        "set.json",
+        &[row(json!({"nr": 0, "frage": "?", "bild": "0"}))],
+    );
+    let problem = refusal(&path, &SetArgs::default());
+    assert!(
+        problem.contains("no question among its columns")
+            && problem.contains("frage")
+            && problem.contains("number   0"),
+        "{problem}"
+    );
+    let problem = refusal(&path, &map("question=Frage"));
+    assert!(problem.contains("did you mean \"frage\"?"), "{problem}");
+    std::fs::write(
+        &path,
+        json!({"info": {"v": 1}, "items": [{"frage": "?"}]}).to_string(),
+    )
+    .unwrap();
+    let problem = refusal(&path, &SetArgs::default());
+    assert!(
+        problem.contains("--rows items")
+            && problem.contains("frage")
+            && problem.contains("--map question="),
+        "{problem}"
+    );
+    drop(folder);
+    let wide = row(json!({"Question_0": "?", "Question_1": "?", "Image_0": base64(1)}));
+    let (_folder, path) = set("set.json", &[wide]);
+    assert!(
+        refusal(&path, &SetArgs::default()).contains("Question_0, Question_1; one question a row")
+    );
+    let (_folder, path) = set(
+        "set.json",
+        &[row(
+            json!({"id": 1, "question": "?", "options": ["x", "y"], "answer": "x"}),
+        )],
+    );
+    let problem = refusal(&path, &SetArgs::default());
+    assert!(
+        problem.contains("no image in 1 of 1 rows")
+            && problem.contains("--map image='images/{id}.jpg'"),
+        "{problem}"
+    );
+}
+
+#[test]
+fn a_test_split_without_answers_is_named_so() {
+    let (_folder, path) = with(&[
+        json!({"options": ["x", "y"], "answer": null}),
+        json!({"options": ["x", "y"], "answer": ""}),
+    ]);
+    assert!(refusal(&path, &SetArgs::default()).contains("no answer in any row"));
+    let (_folder, path) = with(&[json!({"options": ["x", "y"]})]);
+    assert!(refusal(&path, &SetArgs::default()).contains("no answers among its columns"));
+    let (_folder, path) = with(&[
+        json!({"options": ["x", "y"], "answer": ["x", "y"]}),
+        json!({"options": ["x", "y"], "answer": "['x', 'y']"}),
+    ]);
+    let problem = refusal(&path, &SetArgs::default());
+    assert!(
+        problem.contains("2 of 2 rows have several true options")
+            && problem.contains("--several skip"),
+        "{problem}"
+    );
+}
+
+#[test]
+fn bad_rows_are_left_out_up_to_a_share() {
+    let good = json!({"options": ["x", "y"], "answer": "x"});
+    let mut rows = vec![good; 39];
+    rows.push(json!({"options": ["x", "y"], "answer": "z"}));
+    let (_folder, path) = with(&rows);
+    let problem = refusal(&path, &SetArgs::default());
+    assert!(
+        problem.contains("1 of 40 rows are broken; the first: ")
+            && problem.contains("object 40: the answer \"z\""),
+        "{problem}"
+    );
+    let skip = SetArgs {
+        bad: Some(crate::dataset::ready_made::settings::LeaveOut::Skip),
+        ..SetArgs::default()
+    };
+    assert_eq!(open(&path, &skip).unwrap().questions().len(), 39);
+    let (_folder, path) = with(&rows[30..]);
+    assert!(refusal(&path, &skip).contains("at most 5 %"));
+}

@@ -1,0 +1,317 @@
+//! The true option of each question of a set: [`Truths`].
+
+use super::answers::{
+    AnswerOf, OneReading, Reading, asks_yes_or_no, digit, one_reading, yes_or_no,
+};
+use super::items::{AnswerCell, Item};
+use super::left_out::{LeftOut, Why};
+use super::map::How;
+use super::offered::Offered;
+use super::roles::{Column, Roles};
+use super::row::Table;
+use crate::types::Choices;
+
+/// A question with its choices.
+#[derive(Debug)]
+pub(super) struct Answered {
+    pub(super) item: Item,
+    pub(super) choices: Choices,
+}
+
+/// The questions with their truths, and how these were read.
+#[derive(Debug)]
+pub(super) struct Truths {
+    pub(super) answered: Vec<Answered>,
+    /// The column and the reading, in words.
+    pub(super) said: Vec<String>,
+}
+
+/// The smallest share of questions that begin with a verb, for digits to mean no and yes.
+const SHARE_OF_VERBS: f64 = 0.9;
+
+/// The truths of all questions: one reading for those with options, another for those of yes and no.
+///
+/// # Errors
+/// If there are no answers, no reading fits all of them, or two readings fit and differ.
+pub(super) fn truths(
+    table: &Table,
+    roles: &Roles,
+    how: &How,
+    items: Vec<Item>,
+    left: &mut LeftOut,
+) -> Result<Truths, String> {
+    if roles.answers.is_empty() && items.iter().all(|item| item.options.is_none()) {
+        for item in items {
+            left.add(Why::Open, || {
+                format!("not in a column that is known ({})", table.place(item.row))
+            });
+        }
+        return Ok(Truths {
+            answered: Vec::new(),
+            said: Vec::new(),
+        });
+    }
+    if roles.answers.is_empty() {
+        return Err(format!(
+            "no answers among its columns: a test split without them? (--ask FILE asks questions without answers about every image.) Its columns:\n{}",
+            super::roles::shown(table)
+        ));
+    }
+    let (listed, bare): (Vec<Item>, Vec<Item>) =
+        items.into_iter().partition(|item| item.options.is_some());
+    let mut truths = Truths {
+        answered: Vec::new(),
+        said: Vec::new(),
+    };
+    of_options(table, roles, how, listed, left, &mut truths)?;
+    of_yes_or_no(table, roles, bare, left, &mut truths)?;
+    truths.answered.sort_by_key(|answered| answered.item.row);
+    Ok(truths)
+}
+
+/// Whether the lines are of this program's own form, in which the answer is the text of a choice.
+pub(super) fn is_own(table: &Table) -> bool {
+    const FIELDS: [&str; 8] = [
+        "id", "frame", "image", "family", "question", "choices", "answer", "evidence",
+    ];
+    let has = |name: &&str| table.find(name).is_some();
+    ["question", "choices", "answer"].iter().all(has)
+        && table
+            .columns
+            .iter()
+            .all(|column| FIELDS.contains(&column.as_str()))
+}
+
+/// Items with an answer each. Those without one, or with several, are counted.
+fn with_answers(
+    table: &Table,
+    column: &Column,
+    items: Vec<Item>,
+    left: &mut LeftOut,
+) -> Result<Vec<(Item, String)>, String> {
+    let count = items.len();
+    let mut absent = Vec::new();
+    let mut found = Vec::new();
+    for item in items {
+        match AnswerCell::of(&table.rows[item.row], column) {
+            AnswerCell::One(answer) => found.push((item, answer)),
+            AnswerCell::Several(shown) => left.add(Why::SeveralTruths, || shown),
+            AnswerCell::Absent => absent.push(item.row),
+        }
+    }
+    if absent.len() == count && count > 0 {
+        return Err(format!(
+            "no answer in any row (column {:?}): a test split without them? --split names another",
+            column.name
+        ));
+    }
+    for row in absent {
+        left.add(Why::Bad, || {
+            format!("{}: no answer (column {:?})", table.place(row), column.name)
+        });
+    }
+    Ok(found)
+}
+
+/// The questions with options.
+fn of_options(
+    table: &Table,
+    roles: &Roles,
+    how: &How,
+    items: Vec<Item>,
+    left: &mut LeftOut,
+    truths: &mut Truths,
+) -> Result<(), String> {
+    if items.is_empty() {
+        return Ok(());
+    }
+    let column = column_of_options(table, roles, &items)?;
+    let items = with_answers(table, column, items, left)?;
+    let none = Offered::default();
+    let rows: Vec<AnswerOf<'_>> = items
+        .iter()
+        .map(|(item, answer)| (answer.as_str(), item.options.as_ref().unwrap_or(&none)))
+        .collect();
+    let fits = |reading: Reading| {
+        rows.iter()
+            .all(|(answer, options)| reading.truth(answer, options).is_some())
+    };
+    let (reading, unfit) = match how {
+        How::Answer(reading) => {
+            let unfit =
+                (0..rows.len()).filter(|&row| reading.truth(rows[row].0, rows[row].1).is_none());
+            (*reading, unfit.collect())
+        }
+        How::ByRule | How::Split(_) if is_own(table) && fits(Reading::Text) => {
+            (Reading::Text, Vec::new())
+        }
+        How::ByRule | How::Split(_) => match one_reading(&rows) {
+            OneReading::Fits(reading) => (reading, Vec::new()),
+            OneReading::None { best, unfit } => (best, unfit),
+            OneReading::Ambiguous { readings, row } => {
+                let [one, other] = readings.map(Reading::name);
+                return Err(format!(
+                    "{}: the answer {:?} may be read as {one} or as {other}, which differ among the options {:?}; --map answer={name}:{one} or --map answer={name}:{other} says which is meant",
+                    table.place(items[row].0.row),
+                    rows[row].0,
+                    rows[row].1.texts,
+                    name = column.name,
+                ));
+            }
+        },
+    };
+    if unfit.len() == rows.len() && !rows.is_empty() {
+        let (item, answer) = &items[0];
+        return Err(format!(
+            "{}: the answer {answer:?} (column {:?}) is none of the options {:?}, neither by letter nor by text nor by number",
+            table.place(item.row),
+            column.name,
+            rows[0].1.texts
+        ));
+    }
+    let fit = rows.len() - unfit.len();
+    truths
+        .said
+        .push(format!("{} ({})", column.name, reading.name()));
+    for (item, answer) in items {
+        let options = item.options.clone().unwrap_or_default();
+        let texts = &options.texts;
+        let choices = match reading.truth(&answer, &options) {
+            Some(truth) => Choices::new(texts.clone(), truth).map_err(|e| e.to_string()),
+            None => Err(format!(
+                "the answer {answer:?} is none of the options {texts:?} (read as {}, which fits {fit} rows)",
+                reading.name()
+            )),
+        };
+        match choices {
+            Ok(choices) => truths.answered.push(Answered { item, choices }),
+            Err(problem) => left.add(Why::Bad, || format!("{}: {problem}", table.place(item.row))),
+        }
+    }
+    Ok(())
+}
+
+/// The column of answers that are read against options: the only one, or the first of those that say the same in every row.
+fn column_of_options<'a>(
+    table: &Table,
+    roles: &'a Roles,
+    items: &[Item],
+) -> Result<&'a Column, String> {
+    let fitting = roles.answers.iter().filter_map(|column| {
+        let answers: Option<Vec<(String, &Offered)>> = items
+            .iter()
+            .map(|item| match AnswerCell::of(&table.rows[item.row], column) {
+                AnswerCell::One(answer) => Some((answer, item.options.as_ref()?)),
+                AnswerCell::Absent | AnswerCell::Several(_) => None,
+            })
+            .collect();
+        let answers = answers?;
+        let rows: Vec<AnswerOf<'_>> = answers
+            .iter()
+            .map(|(answer, options)| (answer.as_str(), *options))
+            .collect();
+        match one_reading(&rows) {
+            OneReading::Fits(reading) => {
+                let truths = rows
+                    .iter()
+                    .map(|(answer, options)| reading.truth(answer, options));
+                Some((column, truths.collect::<Vec<_>>()))
+            }
+            OneReading::None { .. } | OneReading::Ambiguous { .. } => None,
+        }
+    });
+    one_of(table, fitting, |at| items[at].row, &roles.answers[0])
+}
+
+/// The first of some columns, if all say the same in every row; `otherwise` if there are none.
+fn one_of<'a, T: PartialEq>(
+    table: &Table,
+    columns: impl Iterator<Item = (&'a Column, Vec<T>)>,
+    row: impl Fn(usize) -> usize,
+    otherwise: &'a Column,
+) -> Result<&'a Column, String> {
+    let mut columns = columns;
+    let Some((first, truths)) = columns.next() else {
+        return Ok(otherwise);
+    };
+    for (other, others) in columns {
+        if let Some(at) = (0..truths.len()).find(|&at| truths[at] != others[at]) {
+            return Err(format!(
+                "{}: the answers of {:?} and {:?} differ; --map answer={} or --map answer={} says which is meant",
+                table.place(row(at)),
+                first.name,
+                other.name,
+                first.name,
+                other.name
+            ));
+        }
+    }
+    Ok(first)
+}
+
+/// The questions without options: of yes and no, or open.
+fn of_yes_or_no(
+    table: &Table,
+    roles: &Roles,
+    items: Vec<Item>,
+    left: &mut LeftOut,
+    truths: &mut Truths,
+) -> Result<(), String> {
+    if items.is_empty() {
+        return Ok(());
+    }
+    let of = |column: &Column, item: &Item| match AnswerCell::of(&table.rows[item.row], column) {
+        AnswerCell::One(answer) => Some(answer),
+        AnswerCell::Absent | AnswerCell::Several(_) => None,
+    };
+    let fitting = roles.answers.iter().filter_map(|column| {
+        let words: Option<Vec<usize>> = items
+            .iter()
+            .map(|item| of(column, item).and_then(|answer| yes_or_no(&answer)))
+            .collect();
+        words.map(|words| (column, words))
+    });
+    let column = one_of(table, fitting, |at| items[at].row, &roles.answers[0])?;
+    let answers: Vec<Option<String>> = items.iter().map(|item| of(column, item)).collect();
+    let verbs = items
+        .iter()
+        .filter(|item| asks_yes_or_no(last_line(&item.text)))
+        .count();
+    let are_digits = verbs as f64 >= SHARE_OF_VERBS * items.len() as f64
+        && answers.iter().all(|answer| {
+            answer
+                .as_deref()
+                .is_some_and(|answer| digit(answer).is_some())
+        });
+    let mut count = 0;
+    for (item, answer) in items.into_iter().zip(answers) {
+        let truth = answer.as_deref().and_then(|answer| {
+            let read = if are_digits { digit(answer) } else { None };
+            read.or_else(|| yes_or_no(answer))
+        });
+        let choices =
+            truth.map(|truth| Choices::new(vec!["yes".to_owned(), "no".to_owned()], truth));
+        match choices {
+            Some(Ok(choices)) => {
+                count += 1;
+                truths.answered.push(Answered { item, choices });
+            }
+            _ => left.add(Why::Open, || match answer {
+                Some(answer) => format!("{:?}", super::cell::shortened(&answer, 60)),
+                None => "a list, or nothing".to_owned(),
+            }),
+        }
+    }
+    if count > 0 {
+        let digits = if are_digits { ", 1 is yes" } else { "" };
+        truths
+            .said
+            .push(format!("{} (yes/no{digits})", column.name));
+    }
+    Ok(())
+}
+
+/// The last line of a text, behind a hint.
+fn last_line(text: &str) -> &str {
+    text.lines().next_back().unwrap_or(text)
+}

@@ -1,0 +1,48 @@
+//! Colours relative to the light: [`relative`].
+
+use std::sync::LazyLock;
+
+/// Linear light of each sRGB code in 65,535ths (IEC 61966-2-1), rounded.
+static LINEAR: LazyLock<[u64; 256]> = LazyLock::new(|| {
+    let linear = |code: usize| {
+        let value = code as f64 / 255.0;
+        let light = if value > 0.04045 {
+            libm::pow((value + 0.055) / 1.055, 2.4)
+        } else {
+            value / 12.92
+        };
+        (light * 65_535.0).round() as u64
+    };
+    std::array::from_fn(linear)
+});
+
+/// The code that a surface would have if light with code `light` were white: linear light, divided by that of `light` (von Kries
+/// 1902, for each channel), and the nearest code again. White where the surface is brighter than the light.
+pub(super) fn relative(code: u8, light: u8) -> u8 {
+    let white = LINEAR[usize::from(light)].max(1);
+    let share = (LINEAR[usize::from(code)] * 65_535 / white).min(65_535);
+    let above = LINEAR.partition_point(|value| *value < share).min(255);
+    let below = above.saturating_sub(1);
+    let nearer_below = share.abs_diff(LINEAR[below]) < share.abs_diff(LINEAR[above]);
+    (if nearer_below { below } else { above }) as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn relative_to_white_nothing_changes() {
+        for code in 0..=255 {
+            assert_eq!(relative(code, 255), code);
+            assert_eq!(relative(code, code.max(1)), if code == 0 { 0 } else { 255 });
+        }
+    }
+
+    #[test]
+    fn half_the_light_is_made_up_for() {
+        // Code 188 is half of the linear light of white (0.5029); code 137 (0.2502) is 0.4975 of that, and 187 is 0.4969 of white.
+        assert_eq!((relative(188, 188), relative(137, 188)), (255, 187));
+        assert_eq!(relative(200, 188), 255);
+    }
+}

@@ -1,0 +1,87 @@
+//! What people found when they checked questions, as text and as JSON: [`text`], [`json`].
+
+use std::fmt::Write as _;
+
+use serde_json::{Value, json};
+
+use super::super::table::ColumnKind::{Count, Text};
+use super::super::table::TableBuilder;
+use super::super::terminal;
+use super::super::words::with_interval;
+use crate::score::checks::{Checks, agreements, shares};
+use crate::score::estimate::Estimate;
+use crate::types::Family;
+
+/// The table of each person's findings by family, with a line about each two people; empty without checks.
+#[must_use]
+pub(crate) fn text(checks: &Checks) -> String {
+    if checks.is_empty() {
+        return String::new();
+    }
+    let table = TableBuilder::new("checks", shares(checks))
+        .column(Text, "terminal checked by", |share| share.person.clone())
+        .column(Text, "terminal family", |share| {
+            let name = share.family.as_ref().map_or(Family::TOTAL, Family::name);
+            name.to_owned()
+        })
+        .column(Count, "terminal questions", |share| share.wrong.n)
+        .column(Text, "terminal wrong % [95 %]", |share| {
+            with_interval(share.wrong)
+        })
+        .column(Text, "terminal ambiguous % [95 %]", |share| {
+            with_interval(share.ambiguous)
+        })
+        .build();
+    let mut text = terminal::table(&[table]);
+    for pair in agreements(checks) {
+        let [first, second] = &pair.people;
+        let kappa = match (pair.kappa, pair.interval) {
+            (Some(kappa), Some([low, high])) => format!("{kappa:.2} [{low:.2}, {high:.2}]"),
+            (Some(kappa), None) => {
+                format!("{kappa:.2}, without an interval, because they vary in too few scenes")
+            }
+            (None, _) => {
+                "undefined, because one of them found all questions right, or none".to_owned()
+            }
+        };
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "{first} and {second} found the same of {} % of {} questions; Cohen's κ of finding a question right: {kappa}",
+            with_interval(pair.same),
+            pair.same.n
+        );
+    }
+    text
+}
+
+/// The same as JSON.
+#[must_use]
+pub(crate) fn json(checks: &Checks) -> Value {
+    let estimate = |estimate: Estimate| json!({"value": estimate.value, "low": estimate.low, "high": estimate.high});
+    let shares: Vec<Value> = shares(checks)
+        .into_iter()
+        .map(|share| {
+            json!({
+                "person": share.person,
+                "family": share.family.as_ref().map_or(Family::TOTAL, Family::name),
+                "questions": share.wrong.n,
+                "wrong": estimate(share.wrong),
+                "ambiguous": estimate(share.ambiguous),
+            })
+        })
+        .collect();
+    let agreements: Vec<Value> = agreements(checks)
+        .into_iter()
+        .map(|pair| {
+            json!({
+                "people": pair.people,
+                "questions": pair.same.n,
+                "same": estimate(pair.same),
+                "kappa": pair.kappa,
+                "kappa_interval": pair.interval,
+            })
+        })
+        .collect();
+    json!({"shares": shares, "agreements": agreements})
+}

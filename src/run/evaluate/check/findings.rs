@@ -1,0 +1,146 @@
+//! What a check finds, one line a finding: [`Findings`].
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+/// How grave a finding is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Mark {
+    /// As it should be.
+    Ok,
+    /// A run goes on, and its numbers may not mean what they seem to.
+    Warning,
+    /// A run stops here.
+    Problem,
+}
+
+impl Mark {
+    fn word(self) -> &'static str {
+        match self {
+            Self::Ok => "ok     ",
+            Self::Warning => "warning",
+            Self::Problem => "problem",
+        }
+    }
+}
+
+/// One finding.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Finding {
+    pub(super) mark: Mark,
+    pub(super) text: String,
+}
+
+/// The number of findings of one kind that are shown.
+const SHOWN: usize = 5;
+
+/// All findings, in the order in which they were made.
+#[derive(Debug, Default)]
+pub(super) struct Findings {
+    all: Vec<Finding>,
+    /// The number of findings of each kind, and the place of the last one shown.
+    kinds: BTreeMap<&'static str, (usize, usize)>,
+}
+
+impl Findings {
+    pub(super) fn ok(&mut self, text: impl Into<String>) {
+        self.add(Mark::Ok, text);
+    }
+
+    pub(super) fn warn(&mut self, text: impl Into<String>) {
+        self.add(Mark::Warning, text);
+    }
+
+    pub(super) fn problem(&mut self, text: impl Into<String>) {
+        self.add(Mark::Problem, text);
+    }
+
+    fn add(&mut self, mark: Mark, text: impl Into<String>) {
+        let text = text.into();
+        self.all.push(Finding { mark, text });
+    }
+
+    /// Adds a finding of a kind of which there may be many: the first five are shown.
+    pub(super) fn one_of(&mut self, kind: &'static str, mark: Mark, text: impl Into<String>) {
+        let count = self.kinds.entry(kind).or_default();
+        count.0 += 1;
+        if count.0 <= SHOWN {
+            count.1 = self.all.len();
+            self.add(mark, text);
+        }
+    }
+
+    /// The findings, with a line for those of a kind that are not shown.
+    pub(super) fn finish(mut self) -> Vec<Finding> {
+        let mut rest: Vec<(usize, Finding)> = self
+            .kinds
+            .iter()
+            .filter(|(_, (count, _))| *count > SHOWN)
+            .map(|(kind, (count, last))| {
+                let mark = self.all[*last].mark;
+                let text = format!("and {} more: {kind}", count - SHOWN);
+                (*last, Finding { mark, text })
+            })
+            .collect();
+        rest.sort_by_key(|(last, _)| std::cmp::Reverse(*last));
+        for (last, finding) in rest {
+            self.all.insert(last + 1, finding);
+        }
+        self.all
+    }
+
+    /// How many problems there are.
+    pub(super) fn problems(&self) -> usize {
+        let problems = self
+            .all
+            .iter()
+            .filter(|finding| finding.mark == Mark::Problem);
+        let hidden = self
+            .kinds
+            .values()
+            .map(|(count, last)| match self.all[*last].mark {
+                Mark::Problem => count.saturating_sub(SHOWN),
+                Mark::Ok | Mark::Warning => 0,
+            });
+        problems.count() + hidden.sum::<usize>()
+    }
+}
+
+/// The findings as lines of text.
+pub(super) fn lines(findings: &[Finding]) -> String {
+    let lines = findings.iter().map(|finding| {
+        let text = finding.text.replace('\n', "\n         ");
+        format!("{}  {text}\n", finding.mark.word())
+    });
+    lines.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn many_findings_of_a_kind_are_counted() {
+        let mut findings = Findings::default();
+        findings.ok("files");
+        for n in 0..7 {
+            findings.one_of(
+                "missing images",
+                Mark::Problem,
+                format!("{n}.png is missing"),
+            );
+        }
+        findings.one_of("grey images", Mark::Warning, "x.png is grey");
+        assert_eq!(findings.problems(), 7);
+        let text = lines(&findings.finish());
+        assert!(
+            text.contains(
+                "problem  4.png is missing\nproblem  and 2 more: missing images\nwarning  x.png"
+            ),
+            "{text}"
+        );
+        assert!(!text.contains("5.png"), "{text}");
+    }
+}

@@ -1,0 +1,150 @@
+//! The images of a check: [`images`].
+
+use std::collections::{BTreeMap, HashMap};
+
+use rayon::prelude::*;
+
+use super::findings::{Findings, Mark};
+use crate::dataset::{Dataset, Picture};
+use crate::enhance::brightness;
+use crate::error::Result;
+use crate::job::progress::Progress;
+use crate::job::source::first_asked;
+use crate::types::{Digest, FrameId, InputSummary, Question};
+
+/// Whether the pixels of images are looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Depth {
+    /// The head of each file, and the pixels of a sample.
+    Heads,
+    /// Every pixel.
+    Pixels,
+}
+
+/// The number of images whose brightness is measured.
+const SAMPLED: usize = 32;
+
+/// The mean luma, of 255, below which images are dark already (as in a run).
+const DARK: f64 = 40.0;
+
+/// What is known of one image.
+struct Looked {
+    id: FrameId,
+    facts: Result<((u32, u32), Digest, crate::types::InputNote)>,
+    bytes: u64,
+}
+
+/// Looks at the images that the questions are about.
+pub(super) fn images(
+    dataset: &Dataset,
+    questions: &[Question],
+    depth: Depth,
+    progress: &Progress,
+    findings: &mut Findings,
+) {
+    let asked = first_asked(questions);
+    let bar = progress.bar("reading images", asked.len());
+    let looked: Vec<Looked> = asked
+        .par_iter()
+        .map(|question| {
+            let looked = look(dataset, &question.frame, depth);
+            bar.inc();
+            looked
+        })
+        .collect();
+    drop(bar);
+    let (mut by_digest, mut sizes) = (HashMap::new(), BTreeMap::new());
+    let (mut bytes, mut notes) = (0, InputSummary::default());
+    for Looked {
+        id,
+        facts,
+        bytes: of,
+    } in looked
+    {
+        match facts {
+            Err(e) => findings.one_of("images that cannot be used", Mark::Problem, e.to_string()),
+            Ok((size, digest, note)) => {
+                bytes += of;
+                *sizes.entry(size).or_insert(0_usize) += 1;
+                notes.add(&id, &note);
+                if let Some(first) = by_digest.insert(digest, id.clone()) {
+                    let text = format!(
+                        "{:?} and {:?} are the same image under two names: each gets noise of its own",
+                        first.0, id.0
+                    );
+                    findings.one_of("images that stand there twice", Mark::Warning, text);
+                }
+            }
+        }
+    }
+    findings.ok(format!(
+        "{} images, {}, {}",
+        asked.len(),
+        megabytes(bytes),
+        listed(&sizes)
+    ));
+    for line in notes.lines() {
+        findings.warn(line);
+    }
+    light(dataset, &asked, findings);
+}
+
+fn look(dataset: &Dataset, id: &FrameId, depth: Depth) -> Looked {
+    let picture = dataset.picture(id);
+    let bytes = match &picture {
+        Ok(Picture::Encoded(file)) => file.bytes().len() as u64,
+        _ => 0,
+    };
+    let facts = picture.and_then(|picture| {
+        let size = picture.check()?;
+        if depth == Depth::Pixels {
+            picture.decode()?;
+        }
+        Ok((size, picture.digest(), picture.note()))
+    });
+    let id = id.clone();
+    Looked { id, facts, bytes }
+}
+
+/// Measures the brightness of a sample of the images.
+fn light(dataset: &Dataset, asked: &[&Question], findings: &mut Findings) {
+    let number = asked.len().min(SAMPLED);
+    let sample = (0..number).into_par_iter().filter_map(|index| {
+        let question = asked[index * asked.len() / number];
+        let picture = dataset.picture(&question.frame).ok()?;
+        Some(brightness(&picture.decode().ok()?))
+    });
+    let mut sample: Vec<f64> = sample.collect();
+    sample.sort_by(f64::total_cmp);
+    let Some(median) = sample.get(sample.len() / 2) else {
+        return;
+    };
+    if *median < DARK {
+        findings.warn(format!(
+            "the images are dark already: median brightness {median:.0} of 255; --levels L0 --llie-on l0 asks about them as they are and enhanced"
+        ));
+    } else {
+        findings.ok(format!(
+            "median brightness {median:.0} of 255 ({number} images)"
+        ));
+    }
+}
+
+fn listed(sizes: &BTreeMap<(u32, u32), usize>) -> String {
+    let text =
+        |((width, height), count): (&(u32, u32), &usize)| format!("{count} of {width}×{height}");
+    if sizes.len() <= 4 {
+        let sizes: Vec<String> = sizes.iter().map(text).collect();
+        return sizes.join(", ");
+    }
+    let first = sizes.first_key_value().map_or_else(String::new, text);
+    let last = sizes.last_key_value().map_or_else(String::new, text);
+    format!("{} sizes, {first} to {last}", sizes.len())
+}
+
+fn megabytes(bytes: u64) -> String {
+    match bytes {
+        0..1_000_000 => format!("{:.0} kB", bytes as f64 / 1e3),
+        _ => format!("{:.1} MB", bytes as f64 / 1e6),
+    }
+}

@@ -1,0 +1,205 @@
+//! `check`: everything that a run needs, looked at before anything is spent. No network and no key is used.
+//!
+//! Cheap steps come before dear ones, and a problem ends no step but those that need what is broken.
+
+mod findings;
+mod images;
+mod questions;
+mod settings;
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::json;
+use sha2::{Digest as _, Sha256};
+
+use super::estimate;
+use super::settings::EvaluateArgs;
+use crate::dataset::{DataPlace, Dataset, Picture};
+use crate::error::{Error, Result};
+use crate::files::write;
+use crate::job::Outcome;
+use crate::job::progress::Progress;
+use crate::job::questions::{QuestionBank, open_data, rules, select};
+use crate::types::Decides;
+use crate::types::Question;
+use crate::types::manifest::Status;
+
+use findings::{Finding, Findings, Mark, lines};
+use images::Depth;
+
+/// The flags of `check` besides those of the evaluation.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct CheckArgs {
+    /// The data, in place of --data; default: --data
+    #[arg(value_name = "DATA", value_parser = crate::dataset::place, add = Decides::Nothing)]
+    pub place: Option<DataPlace>,
+    /// Decode every image, so that a truncated file is found
+    #[arg(long, help_heading = "Check", add = Decides::Nothing)]
+    pub deep: bool,
+    /// Write the questions as they were read, one a line, with the SHA-256 of each image; default: none
+    #[arg(long, value_name = "FILE", help_heading = "Check", add = Decides::Nothing)]
+    pub save_questions: Option<PathBuf>,
+}
+
+/// Checks data, questions, images, models, enhancers and prompts.
+///
+/// # Errors
+/// If the flags contradict each other. What else is wrong is a finding, and the exit code is 1.
+pub(crate) fn check(
+    mut args: EvaluateArgs,
+    check: &CheckArgs,
+    progress: &Progress,
+) -> Result<Outcome> {
+    if let Some(place) = &check.place {
+        args.data.data = place.clone();
+    }
+    let is_json = std::mem::take(&mut args.job.output.show.json);
+    args.job.money.dry_run = true;
+    let mut findings = Findings::default();
+    settings::settings(&args, &mut findings);
+    let asked = data(&args, check, progress, &mut findings)?;
+    plan(args, progress, &mut findings);
+    let problems = findings.problems();
+    let findings = findings.finish();
+    let warnings = findings
+        .iter()
+        .filter(|finding| finding.mark == Mark::Warning)
+        .count();
+    let output = if is_json {
+        json_of(&findings, asked, problems)
+    } else {
+        format!(
+            "{}{}\n",
+            lines(&findings),
+            verdict(asked, problems, warnings)
+        )
+    };
+    let status = match problems {
+        0 => Status::Complete,
+        _ => Status::Incomplete,
+    };
+    Ok(Outcome { status, output })
+}
+
+fn verdict(asked: usize, problems: usize, warnings: usize) -> String {
+    let many = |count: usize, noun: &str| match count {
+        1 => format!("1 {noun}"),
+        count => format!("{count} {noun}s"),
+    };
+    let warnings = match warnings {
+        0 => String::new(),
+        count => format!(", {}", many(count, "warning")),
+    };
+    match problems {
+        0 => format!("ok: {}{warnings}", many(asked, "question")),
+        count => format!("{}{warnings}", many(count, "problem")),
+    }
+}
+
+fn json_of(findings: &[Finding], questions: usize, problems: usize) -> String {
+    let value = json!({"findings": findings, "questions": questions, "problems": problems});
+    format!("{value:#}\n")
+}
+
+/// The steps about data; returns the number of questions that would be asked.
+fn data(
+    args: &EvaluateArgs,
+    check: &CheckArgs,
+    progress: &Progress,
+    findings: &mut Findings,
+) -> Result<usize> {
+    let rule = args.codes.rule(args.limit);
+    let selection = &args.selection;
+    let set = &args.data.set;
+    let bank = QuestionBank::open(&args.bank);
+    let opened = bank.and_then(|bank| {
+        if let Some(bank) = bank {
+            return bank.data(&args.data.data, set, rule, progress);
+        }
+        let rules = rules(selection.rules.as_deref())?;
+        open_data(&args.data.data, set, selection, &rules, rule, progress)
+    });
+    let dataset = match opened {
+        Ok(dataset) => dataset,
+        Err(e) => {
+            findings.problem(e.to_string());
+            return Ok(0);
+        }
+    };
+    for line in dataset.reading() {
+        findings.ok(line);
+    }
+    let asked = match select(&dataset, selection) {
+        Ok(asked) => asked,
+        Err(e) => {
+            findings.problem(e.to_string());
+            return Ok(0);
+        }
+    };
+    questions::questions(&asked, findings);
+    let depth = if check.deep {
+        Depth::Pixels
+    } else {
+        Depth::Heads
+    };
+    images::images(&dataset, &asked, depth, progress, findings);
+    if let Some(path) = &check.save_questions {
+        save(path, &dataset, &asked)?;
+        findings.ok(format!(
+            "{}: the questions as they were read",
+            path.display()
+        ));
+    }
+    Ok(asked.len())
+}
+
+/// The models, and what a run would take. Nothing is sent, and no key is read.
+fn plan(args: EvaluateArgs, progress: &Progress, findings: &mut Findings) {
+    if args.job.models.is_empty() {
+        findings.warn(
+            "no model is named: --model NAME adds it to the check, and what a run would take",
+        );
+        return;
+    }
+    if findings.problems() > 0 {
+        findings.warn("what a run would take is not estimated, as long as there are problems");
+        return;
+    }
+    match estimate(args, progress) {
+        Ok(estimate) => findings.ok(format!("a run would take:\n{}", estimate.trim_end())),
+        Err(e) => findings.problem(e.to_string()),
+    }
+}
+
+/// Writes the questions, one a line.
+fn save(path: &Path, dataset: &Dataset, questions: &[Question]) -> Result<()> {
+    let mut text = String::new();
+    for question in questions {
+        let digest = match dataset.picture(&question.frame) {
+            Ok(Picture::Encoded(file)) => Some(hex(&Sha256::digest(file.bytes()))),
+            _ => None,
+        };
+        let line = json!({
+            "id": question.id,
+            "frame": question.frame,
+            "family": question.family,
+            "question": question.text,
+            "choices": question.choices.texts(),
+            "answer": question.choices.truth().map(|truth| &question.choices.texts()[truth]),
+            "image_sha256": digest,
+        });
+        let line = serde_json::to_string(&line).map_err(|e| Error::data(path.display(), e))?;
+        text.push_str(&line);
+        text.push('\n');
+    }
+    write(path, text.as_bytes())
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}

@@ -1,0 +1,120 @@
+//! The questions of a check: [`questions`].
+
+use std::collections::{BTreeMap, HashMap};
+
+use super::findings::{Findings, Mark};
+use crate::types::Question;
+use crate::types::question::letter;
+
+/// The share of one answer or letter from which on a model that always says it scores well.
+const COMMON: f64 = 0.6;
+
+/// Looks at the questions: families, numbers of choices, chance, and what gives answers away.
+pub(super) fn questions(questions: &[Question], findings: &mut Findings) {
+    let (mut families, mut sizes) = (BTreeMap::new(), BTreeMap::new());
+    let mut chance = 0.0;
+    for question in questions {
+        *families.entry(question.family.name()).or_insert(0_usize) += 1;
+        *sizes.entry(question.choices.len()).or_insert(0_usize) += 1;
+        chance += 1.0 / question.choices.len() as f64;
+    }
+    let sizes: Vec<String> = sizes
+        .iter()
+        .map(|(size, count)| format!("{count} with {size} choices"))
+        .collect();
+    findings.ok(format!(
+        "{} questions, {}; chance {:.1} %",
+        questions.len(),
+        sizes.join(", "),
+        100.0 * chance / questions.len().max(1) as f64
+    ));
+    let mut families: Vec<(&str, usize)> = families.into_iter().collect();
+    families.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+    let shown: Vec<String> = families
+        .iter()
+        .take(12)
+        .map(|(family, count)| format!("{family} {count}"))
+        .collect();
+    let more = match families.len() {
+        count @ 13.. => format!(" and {} more", count - 12),
+        _ => String::new(),
+    };
+    findings.ok(format!("families: {}{more}", shown.join(", ")));
+    commonest(questions, findings);
+    repeats(questions, findings);
+    given_away(questions, findings);
+}
+
+/// Warns of an answer or a letter that is true so often that a blind model scores by always saying it.
+fn commonest(questions: &[Question], findings: &mut Findings) {
+    let letters = questions
+        .iter()
+        .filter_map(|question| Some(letter(question.choices.truth()?).to_string()));
+    let texts = questions.iter().filter_map(|question| {
+        let truth = question.choices.truth()?;
+        Some(question.choices.texts()[truth].to_lowercase())
+    });
+    let all: [(&str, Vec<String>); 2] =
+        [("letter", letters.collect()), ("answer", texts.collect())];
+    for (what, answers) in all {
+        let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+        for answer in &answers {
+            *counts.entry(answer).or_default() += 1;
+        }
+        let most = counts.iter().max_by_key(|(_, count)| **count);
+        let Some((answer, count)) = most else {
+            continue;
+        };
+        let share = *count as f64 / questions.len() as f64;
+        if share >= COMMON {
+            findings.warn(format!(
+                "always the {what} {answer:?} scores {:.0} %; ask the blind model too (--blind), or show the choices in other orders (--shuffle-options)",
+                100.0 * share
+            ));
+        }
+    }
+}
+
+/// Warns of questions that stand there twice.
+fn repeats(questions: &[Question], findings: &mut Findings) {
+    let mut seen = HashMap::new();
+    for question in questions {
+        let content = (&question.frame, &question.text, question.choices.texts());
+        if let Some(first) = seen.insert(content, &question.id) {
+            let text = format!(
+                "the questions {:?} and {:?} are the same",
+                first.0, question.id.0
+            );
+            findings.one_of("questions that stand there twice", Mark::Warning, text);
+        }
+    }
+}
+
+/// Warns of questions whose text holds the true choice and no other.
+fn given_away(questions: &[Question], findings: &mut Findings) {
+    for question in questions {
+        let text = format!(" {} ", words(&question.text));
+        let held = |choice: &String| text.contains(&format!(" {} ", words(choice)));
+        let texts = question.choices.texts();
+        let Some(truth) = question.choices.truth().map(|truth| &texts[truth]) else {
+            continue;
+        };
+        let others = texts.iter().filter(|choice| *choice != truth);
+        if words(truth).len() > 2 && held(truth) && !others.clone().any(held) {
+            let line = format!(
+                "the question {:?} holds its answer {truth:?}: {:?}",
+                question.id.0, question.text
+            );
+            findings.one_of("questions that hold their answers", Mark::Warning, line);
+        }
+    }
+}
+
+/// The words of a text in lower case, between single spaces.
+fn words(text: &str) -> String {
+    let lower = text.to_lowercase();
+    let words = lower
+        .split(|c: char| !c.is_alphanumeric())
+        .filter(|word| !word.is_empty());
+    words.collect::<Vec<&str>>().join(" ")
+}

@@ -1,0 +1,206 @@
+//! `init`: a folder of data that a run takes as it is, to put one's own images and questions in.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::json;
+
+use crate::ask::png;
+use crate::dataset::{DataPlace, Dataset, ReadingRule, SelectionArgs, SetArgs};
+use crate::error::{Error, Result};
+use crate::files::write;
+use crate::job::Outcome;
+use crate::job::progress::Progress;
+use crate::job::questions::open_data;
+use crate::questions::rules::Rules;
+use crate::types::manifest::Status;
+use crate::types::question::letter;
+use crate::types::{Choices, Decides, Question};
+
+/// The flags of `init`.
+#[derive(Debug, Args)]
+pub(crate) struct InitArgs {
+    /// The folder to make
+    #[arg(value_name = "DIR", add = Decides::Nothing)]
+    pub folder: PathBuf,
+    /// Write lines about the images in this folder; default: three pictures of built-in rooms are written
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
+    pub frames: Option<PathBuf>,
+}
+
+/// The rooms whose pictures are written.
+const ROOMS: &str = "frames=3,seed=11,size=480x360";
+/// The number of questions about each picture, and of pictures of a folder that lines are written about.
+const EACH: usize = 2;
+const PICTURES: usize = 3;
+/// The number of columns of choices.
+const COLUMNS: usize = 4;
+
+const README: &str = "\
+This folder is a data set of darkqa-eval: images, and questions about them.
+
+questions.csv   one question a line; a spreadsheet can edit it
+  image         the image, as a path from this folder
+  question      the text, without the choices
+  A B C D       the choices; leave cells empty for fewer than four, add E, F, ... for more
+  answer        the letter of the true choice
+  category      the kind of question, by which the report groups
+images/         the images: PNG, JPEG, WebP, TIFF, BMP or OpenEXR
+dataset.json    the name of the data set
+
+Replace the images and the lines by your own, then run the check again.
+";
+
+/// Writes the folder. Nothing is overwritten.
+///
+/// # Errors
+/// If a file exists already, or cannot be written.
+pub(crate) fn init(args: &InitArgs, progress: &Progress) -> Result<Outcome> {
+    let at = |name: &str| args.folder.join(name);
+    let files = ["README.txt", "questions.csv", "dataset.json"];
+    if let Some(exists) = files.iter().map(|name| at(name)).find(|path| path.exists()) {
+        let problem = "there already; init overwrites nothing: name another folder";
+        return Err(Error::data(exists.display(), problem));
+    }
+    let lines = match &args.frames {
+        Some(frames) => of_frames(frames, &args.folder)?,
+        None => of_rooms(&args.folder, progress)?,
+    };
+    let mut table = csv::Writer::from_writer(Vec::new());
+    let wrong = |e: csv::Error| Error::data("questions.csv", e);
+    let header = [
+        "image", "question", "A", "B", "C", "D", "answer", "category",
+    ];
+    table.write_record(header).map_err(wrong)?;
+    for line in &lines {
+        table.write_record(line).map_err(wrong)?;
+    }
+    let table = table
+        .into_inner()
+        .map_err(|e| Error::data("questions.csv", e))?;
+    write(&at("questions.csv"), &table)?;
+    let name = args
+        .folder
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy();
+    let info = json!({"schema": "darkqa.dataset/1", "name": name});
+    write(&at("dataset.json"), format!("{info:#}\n").as_bytes())?;
+    write(&at("README.txt"), README.as_bytes())?;
+    let data = words(&args.folder, args.frames.as_deref());
+    Ok(Outcome {
+        status: Status::Complete,
+        output: format!(
+            "{}: {} questions\n\nnext:\n  darkqa-eval check {data}\n  darkqa-eval --data {data} --model gpt-4o --dry-run\n  darkqa-eval --data {data} --model gpt-4o\n",
+            args.folder.display(),
+            lines.len()
+        ),
+    })
+}
+
+/// The folder as words of a command, with the flag for images that lie outside it.
+fn words(folder: &Path, frames: Option<&Path>) -> String {
+    let quoted = |path: &Path| {
+        let text = path.display().to_string();
+        if text.contains([' ', '\'', '(', ')', '&', ';']) {
+            format!("'{}'", text.replace('\'', "'\\''"))
+        } else {
+            text
+        }
+    };
+    let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let outside = frames.filter(|frames| !real(frames).starts_with(real(folder)));
+    let root = outside.map_or_else(String::new, |frames| {
+        format!(" --data-root {}", quoted(frames))
+    });
+    format!("{}{root}", quoted(folder))
+}
+
+/// A line of the table.
+type Line = Vec<String>;
+
+fn line(image: &str, question: &str, choices: &[String], truth: usize, category: &str) -> Line {
+    let mut line = vec![image.to_owned(), question.to_owned()];
+    line.extend(choices.iter().cloned());
+    line.resize(2 + COLUMNS, String::new());
+    line.extend([letter(truth).to_string(), category.to_owned()]);
+    line
+}
+
+/// Writes pictures of built-in rooms, and returns lines about them: what the rules ask, with true answers.
+fn of_rooms(folder: &Path, progress: &Progress) -> Result<Vec<Line>> {
+    let rooms = ROOMS.parse().map_err(|e: String| Error::data("rooms", e))?;
+    let (place, rules) = (DataPlace::Rooms(rooms), Rules::built_in()?);
+    let (set, selection) = (SetArgs::default(), SelectionArgs::default());
+    let dataset = open_data(
+        &place,
+        &set,
+        &selection,
+        &rules,
+        ReadingRule::default(),
+        progress,
+    )?;
+    let mut lines = Vec::new();
+    for (number, frame) in dataset.frames().enumerate() {
+        let name = format!("images/room{}.png", number + 1);
+        write(
+            &folder.join(&name),
+            &png(&dataset.picture(frame)?.decode()?)?,
+        )?;
+        let of_frame = dataset
+            .questions()
+            .iter()
+            .filter(|question| question.frame == *frame);
+        let mut families: BTreeMap<&str, &Question> = BTreeMap::new();
+        for question in of_frame.filter(|question| question.choices.len() <= COLUMNS) {
+            families.entry(question.family.name()).or_insert(question);
+        }
+        let families: Vec<&Question> = families.into_values().collect();
+        let start = number.min(families.len().saturating_sub(EACH));
+        lines.extend(families[start..].iter().take(EACH).map(|question| {
+            let choices: &Choices = &question.choices;
+            let family = question.family.name();
+            line(
+                &name,
+                &question.text,
+                choices.texts(),
+                choices.truth().unwrap_or_default(),
+                family,
+            )
+        }));
+    }
+    Ok(lines)
+}
+
+/// Lines about the images of a folder that are true of any image: whether it has colours, and its form.
+fn of_frames(frames: &Path, folder: &Path) -> Result<Vec<Line>> {
+    let dataset = Dataset::of_images(frames)?;
+    let mut lines = Vec::new();
+    let yes_no = ["yes".to_owned(), "no".to_owned()];
+    for frame in dataset.frames().take(PICTURES) {
+        let path = dataset.image_file(frame).unwrap_or(frames);
+        let image = from(folder, path);
+        let picture = dataset.picture(frame)?.decode()?;
+        let is_wide = picture.width() > picture.height();
+        let mut pixels = picture.samples().chunks_exact(3);
+        let has_colours = pixels
+            .any(|p| p.iter().max() > p.iter().min().map(|least| least.saturating_add(8)).as_ref());
+        let ask = |question: &str, is_true: bool| {
+            line(&image, question, &yes_no, usize::from(!is_true), "form")
+        };
+        lines.push(ask("Is this photograph wider than it is high?", is_wide));
+        lines.push(ask("Does this photograph have colours?", has_colours));
+    }
+    Ok(lines)
+}
+
+/// The path of a file from a folder.
+fn from(folder: &Path, file: &Path) -> String {
+    let real = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let file = real(file);
+    file.strip_prefix(real(folder))
+        .unwrap_or(&file)
+        .to_string_lossy()
+        .replace('\\', "/")
+}

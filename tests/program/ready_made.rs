@@ -1,0 +1,186 @@
+//! Ready-made sets, `check` and `init` from the command line.
+
+use std::fs;
+
+use serde_json::{Value, json};
+
+use crate::support::run::{Bench, words};
+
+/// A folder with `set.json`: two questions whose answers are numbers from 0 or from 1, and one that is open.
+fn bench() -> Bench {
+    let bench = Bench::new();
+    for (name, shade) in [("a.png", 40), ("b.png", 90)] {
+        let picture = image::RgbImage::from_pixel(64, 48, image::Rgb([shade, 60, 30]));
+        picture.save(bench.path(name)).unwrap();
+    }
+    let rows = json!([
+        {"id": 1, "image": "a.png", "question": "Which?", "options": ["x", "y", "z"], "answer": 1},
+        {"id": 2, "image": "b.png", "question": "Which?", "options": ["x", "y", "z"], "answer": 1},
+        {"id": 3, "image": "b.png", "question": "How many?", "answer": 7},
+    ]);
+    bench.file("set.json", rows.to_string());
+    bench
+}
+
+#[test]
+fn a_set_with_two_readings_is_asked_as_the_user_says() {
+    let bench = bench();
+    let run = |line: &str| {
+        bench.call(&words(&format!(
+            "--data set.json --model random --levels L0 {line}"
+        )))
+    };
+    let called = run("");
+    assert_eq!(called.code, Some(2));
+    assert!(
+        called.stderr.contains("index0 or as index1"),
+        "{}",
+        called.stderr
+    );
+    let called = run("--map answer=answer:index1");
+    assert!(
+        called
+            .stderr
+            .contains("no options in 1 of 3 rows, where the answer is e.g. \"7\"; --open skip"),
+        "{}",
+        called.stderr
+    );
+    let called = run("--map answer=answer:index1 --open skip --out run");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert!(
+        called.stderr.contains("left out: 1 of 3 rows (no options)"),
+        "{}",
+        called.stderr
+    );
+    let manifest: Value =
+        serde_json::from_slice(&fs::read(bench.path("run/manifest.json")).unwrap()).unwrap();
+    let reading = manifest["settings"]["reading of the data"].to_string();
+    assert!(
+        reading.contains("set: 2 questions on 2 images")
+            && reading.contains("answer = answer (index1)"),
+        "{reading}"
+    );
+    let records = fs::read_to_string(bench.path("run/records.jsonl")).unwrap();
+    assert!(
+        records.lines().all(|line| line.contains("\"truth\":0")),
+        "{records}"
+    );
+    // The other reading makes other truths of the same questions: nothing is mixed.
+    let called = run("--map answer=answer:index0 --open skip --out run");
+    assert_eq!(called.code, Some(2), "{called:?}");
+    // Images are made again from the flags in the manifest.
+    let called = bench.call(&words("show run 1 --condition L0"));
+    assert_eq!(called.code, Some(0), "{called:?}");
+}
+
+#[test]
+fn paths_that_lead_out_are_allowed_by_name_alone() {
+    let bench = bench();
+    fs::create_dir(bench.path("set")).unwrap();
+    let line = json!({"id": 1, "image": "../a.png", "question": "?", "choices": ["x", "y"], "answer": "x"});
+    bench.file("set/set.jsonl", line.to_string());
+    let called = bench.call(&words("--data set/set.jsonl --model random --levels L0"));
+    assert_eq!(called.code, Some(2));
+    for part in [
+        "set.jsonl, line 1: \"../a.png\" lies outside set/",
+        "--data-root ",
+    ] {
+        assert!(called.stderr.contains(part), "{}", called.stderr);
+    }
+    bench.complete(&words(
+        "--data set/set.jsonl --model random --levels L0 --data-root .",
+    ));
+    let frames = json!({"scene": "s", "frame": "0", "rgb": "../a.png"});
+    bench.file("frames/frames.jsonl", frames.to_string());
+    let question =
+        json!({"id": 1, "frame": "s/0", "question": "?", "choices": ["x", "y"], "answer": "x"});
+    bench.file("frames/questions.jsonl", question.to_string());
+    let called = bench.call(&words("--data frames --model random --levels L0"));
+    assert!(
+        called
+            .stderr
+            .contains("frames.jsonl, line 1: \"../a.png\" lies outside frames/"),
+        "{}",
+        called.stderr
+    );
+    bench.complete(&words(
+        "--data frames --model random --levels L0 --data-root .",
+    ));
+}
+
+#[test]
+fn a_check_names_everything_that_is_wrong() {
+    let bench = bench();
+    let line = "check --data set.json --map answer=answer:index1 --open skip";
+    let called = bench.call(&words(line));
+    assert_eq!(called.code, Some(0), "{called:?}");
+    for part in [
+        "ok       set: 2 questions on 2 images",
+        "warning  always the letter \"A\" scores 100 %",
+        "ok: 2 questions, ",
+    ] {
+        assert!(called.stdout.contains(part), "{}", called.stdout);
+    }
+    let called = bench.call(&words(&format!(
+        "{line} --model gpt-4o --llie none.onnx --prompts nowhere"
+    )));
+    assert_eq!(called.code, Some(1), "{called:?}");
+    for part in ["problem  none.onnx", "problem  OPENAI_API_KEY", "nowhere"] {
+        assert!(called.stdout.contains(part), "{part}: {}", called.stdout);
+    }
+    assert!(
+        called.stdout.ends_with(" warnings\n") && called.stdout.contains("3 problems"),
+        "{}",
+        called.stdout
+    );
+    let cut = fs::read(bench.path("a.png")).unwrap();
+    fs::write(bench.path("a.png"), &cut[..cut.len() - 20]).unwrap();
+    let called = bench.call(&words(&format!("{line} --deep")));
+    assert!(
+        called.stdout.contains("problem  ") && called.stdout.contains("a.png: not a whole image"),
+        "{}",
+        called.stdout
+    );
+    fs::remove_file(bench.path("a.png")).unwrap();
+    let called = bench.call(&words(&format!("{line} --json")));
+    let report: Value = serde_json::from_str(&called.stdout).unwrap();
+    assert_eq!(
+        (called.code, &report["problems"]),
+        (Some(1), &json!(1)),
+        "{report}"
+    );
+}
+
+#[test]
+fn the_template_can_be_checked_and_run_as_it_is() {
+    let bench = Bench::new();
+    let made = bench.complete(&words("init my-data"));
+    for line in made
+        .lines()
+        .filter(|line| line.starts_with("  darkqa-eval "))
+    {
+        assert!(line.contains("my-data"), "{made}");
+    }
+    let table = fs::read_to_string(bench.path("my-data/questions.csv")).unwrap();
+    assert_eq!(table.lines().count(), 7, "{table}");
+    let checked = bench.complete(&words("check my-data"));
+    assert!(checked.contains("ok: 6 questions"), "{checked}");
+    bench.complete(&words("--data my-data --model random --levels L0,L3"));
+    let again = bench.call(&words("init my-data"));
+    assert_eq!(again.code, Some(2));
+    assert!(
+        again.stderr.contains("init overwrites nothing"),
+        "{}",
+        again.stderr
+    );
+    let own = bench.call(&words("init own --frames my-data/images"));
+    assert_eq!(own.code, Some(0), "{own:?}");
+    let check = own
+        .stdout
+        .lines()
+        .find(|line| line.contains(" check "))
+        .unwrap();
+    let command: Vec<&str> = check.split_whitespace().skip(1).collect();
+    let checked = bench.complete(&command);
+    assert!(checked.contains("ok: 6 questions"), "{checked}");
+}
