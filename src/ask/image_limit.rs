@@ -213,6 +213,7 @@ mod tests {
             format: "png".into(),
             orientation: None,
             exposure: None,
+            pair: None,
         }
     }
 

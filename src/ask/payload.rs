@@ -14,7 +14,7 @@ use image::{ExtendedColorType, ImageBuffer, ImageEncoder as _, imageops};
 
 use super::plain_png;
 use crate::error::{Error, Result};
-use crate::types::{Decides, Digest, ExposureFacts, ImageFacts, Rgb};
+use crate::types::{Decides, Digest, ExposureFacts, ImageFacts, PairFacts, Rgb};
 
 /// The file format in which images are sent: PNG or JPEG, because servers refuse others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -154,6 +154,13 @@ impl Payload {
         self
     }
 
+    /// The image with the darkness of the photograph of its frame.
+    #[must_use]
+    pub(crate) fn paired_by(mut self, pair: Option<PairFacts>) -> Self {
+        self.facts.pair = pair;
+        self
+    }
+
     /// The facts for the record: digest and size of the encoded file, width, height and format.
     #[must_use]
     pub fn facts(&self) -> &ImageFacts {
@@ -222,6 +229,7 @@ impl Payload {
                 format: format.name().to_owned(),
                 orientation: None,
                 exposure: None,
+                pair: None,
             },
             data_url: url.into(),
         }

@@ -20,6 +20,7 @@ use crate::run::synthesize::Sheet;
 use crate::score::realism::residual::Bins;
 use crate::synthesis::{CameraArgs, LightArgs, SensorArgs};
 use crate::types::degradation::Kind;
+use crate::types::{AxisLevel, SetLight};
 
 /// One line for each reason why flags of the call have no effect.
 pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
@@ -161,7 +162,10 @@ impl NoEffect {
             let why = "no model at an endpoint is shown an image";
             self.because(why, &["image_first".to_owned()]);
         }
-        if args.data.data.path().is_none() {
+        if args.scene.pairs.is_some() {
+            self.because("--pairs names the data", &["data".to_owned()]);
+        }
+        if args.scene.pairs.is_none() && args.data.data.path().is_none() {
             self.because("the built-in rooms are no files", &ids::<SetArgs>());
         }
         self.job(&args.job, &images, &replies, None);
@@ -257,7 +261,8 @@ impl NoEffect {
     /// Checks the flags of light against the levels and variants.
     fn light(&mut self, args: &LightArgs) {
         let kinds: Vec<Kind> = args.variant.kinds().collect();
-        if args.levels.0.iter().all(|level| level.severity().is_none()) {
+        let levels = args.levels(SetLight::Lit).0;
+        if levels.iter().all(|level| *level == AxisLevel::L0) {
             let idle = [sensor(), camera(), vec!["variant".into()]].concat();
             self.because("the only level is L0, which is not degraded", &idle);
             return;

@@ -6,9 +6,11 @@
 //!   maps of the size of the image: `depth`, in metres as `.npy` or in units of `depth_scale` metres as PNG; `sem`, the
 //!   classes; and `over`, the segments. `over_source` is `renderer` or `connected_components` (objects) or `superpixel`
 //!   (parts). Also optional: `depth_kind` (`planar` or `euclid`), `intrinsics` (`{"fx", "fy", "cx", "cy"}`), `room_gt`,
-//!   `t` (seconds) and `pose`.
+//!   `t` (seconds) and `pose`; and `dark`, photographs of the same scene in the dark: a path, `{"path", "ev", "name"}`, or a list of
+//!   them ([`dark_photos`](super::dark_photos)).
 //! - `classes.json`: the class of each number in `sem` ([`crate::labels`]).
-//! - `dataset.json`: `{"schema": "darkqa.dataset/1", "name", "depth_kind"}`; the last two are optional.
+//! - `dataset.json`: `{"schema": "darkqa.dataset/1", "name", "depth_kind", "light"}`; the last three are optional. `light` is `lit`, or
+//!   `dark` for photographs that were taken in the dark.
 //! - `scenes/<scene>/segments.json`: the segments that have names, `{"7": {"name", "canonical", "region"}}`.
 //!
 //! Without the list, every PNG, JPEG, WebP and TIFF file in the folder is a frame, named by its file name. The questions are in
@@ -21,6 +23,7 @@ use std::sync::Arc;
 
 use serde::Deserialize;
 
+use super::dark_photos::DarkField;
 use super::image_file::format::READ;
 use super::image_names::{ImageNames, is_image};
 use super::maps::{DepthFile, MapPaths};
@@ -29,7 +32,7 @@ use super::{Dataset, ImageSource, Root, SetArgs, ready_made, stem};
 use crate::error::{Error, Result};
 use crate::files::reading::{entries, json, json_lines};
 use crate::labels;
-use crate::types::{DepthKind, FrameId, Intrinsics, Labels, SegmentName, Segmentation};
+use crate::types::{DepthKind, FrameId, Intrinsics, Labels, SegmentName, Segmentation, SetLight};
 
 /// The file that lists the frames of the common interface.
 pub(super) const FRAMES: &str = "frames.jsonl";
@@ -50,6 +53,7 @@ struct DataSetInfo {
     schema: String,
     name: Option<String>,
     depth_kind: Option<DepthKind>,
+    light: Option<SetLight>,
 }
 
 /// Scene → segment number → name. The file of each scene is read once.
@@ -69,6 +73,7 @@ struct FrameLine {
     depth_kind: Option<DepthKind>,
     intrinsics: Option<Intrinsics>,
     room_gt: Option<String>,
+    dark: Option<DarkField>,
 }
 
 /// The way in which a map of segments was made.
@@ -90,6 +95,8 @@ impl FrameLine {
     ) -> Result<ImageSource, String> {
         let existing = |file: PathBuf| root.file(root.folder(), &file);
         let rgb = existing(self.rgb)?;
+        let dark = self.dark.map(|dark| dark.photos(existing)).transpose()?;
+        let dark = dark.unwrap_or_default();
         let depth = self.depth.map(existing).transpose()?;
         let maps = MapPaths {
             depth: depth
@@ -119,7 +126,12 @@ impl FrameLine {
             room: self.room_gt,
             scene: self.scene,
         };
-        Ok(ImageSource::File { rgb, maps, view })
+        Ok(ImageSource::File {
+            rgb,
+            maps,
+            view,
+            dark,
+        })
     }
 }
 
@@ -159,6 +171,11 @@ fn data_set_info(folder: &Path) -> Result<DataSetInfo> {
         return Err(Error::data(path.display(), problem));
     }
     Ok(info)
+}
+
+/// The light in which the photographs of a folder were taken: as `dataset.json` says, else lit.
+pub(super) fn light(folder: &Path) -> Result<SetLight> {
+    Ok(data_set_info(folder)?.light.unwrap_or_default())
 }
 
 /// Segment number → name in a scene; empty without a `segments.json`.

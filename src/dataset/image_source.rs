@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::dark_photos::DarkPhoto;
 use super::maps::MapPaths;
 use super::ready_made::{Archive, EmbeddedImage};
 use super::view::FrameFacts;
@@ -11,11 +12,12 @@ use crate::rooms;
 /// The place of one image and of its maps.
 #[derive(Debug, Clone)]
 pub(crate) enum ImageSource {
-    /// An image file, its map files, and the other facts about the frame.
+    /// An image file, its map files, the other facts about the frame, and photographs of its scene in the dark.
     File {
         rgb: PathBuf,
         maps: MapPaths,
         view: FrameFacts,
+        dark: Vec<DarkPhoto>,
     },
     /// An image of this name in a ZIP file.
     Member(Arc<Archive>),
@@ -32,6 +34,7 @@ impl ImageSource {
             rgb,
             maps: MapPaths::default(),
             view: FrameFacts::default(),
+            dark: Vec::new(),
         }
     }
 }

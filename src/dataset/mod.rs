@@ -5,6 +5,7 @@
 
 mod bank;
 mod colour;
+mod dark_photos;
 mod family;
 pub(crate) mod frame_folder;
 pub(crate) mod frames;
@@ -13,9 +14,11 @@ pub(crate) mod image_file;
 pub(crate) mod image_names;
 mod image_source;
 pub(crate) mod inputs;
+mod label_folders;
 pub(crate) mod maps;
 pub(crate) mod npy;
 pub(crate) mod openeqa;
+mod pair_frames;
 pub(crate) mod pairs;
 mod photographs;
 pub(crate) mod picture;
@@ -23,6 +26,7 @@ pub(crate) mod raw_png;
 pub(crate) mod reading_rule;
 mod ready_made;
 mod root;
+mod scene_args;
 mod settings;
 mod view;
 
@@ -32,9 +36,10 @@ use std::sync::LazyLock;
 
 use crate::error::{Error, Result};
 use crate::rooms::{self, Rooms};
-use crate::types::{Frame, FrameId, Labels, Question};
+use crate::types::{Frame, FrameId, Labels, PhotoName, Question};
 
 pub(crate) use bank::{Bank, BankPlace};
+use dark_photos::DarkPhoto;
 pub(crate) use image_file::ImageFile;
 pub(crate) use image_source::ImageSource;
 use maps::MapPaths;
@@ -44,6 +49,7 @@ pub(crate) use reading_rule::ReadingRule;
 use ready_made::Form;
 pub use ready_made::SetArgs;
 pub(crate) use root::Root;
+pub(crate) use scene_args::SceneArgs;
 pub(crate) use settings::{BankArgs, CodesArgs, DataArgs, PixelLimit, SelectionArgs, place};
 use view::FrameFacts;
 pub(crate) use view::FrameFiles;
@@ -342,6 +348,28 @@ impl Dataset {
                 format_args!("no frame {:?} in it", frame.0),
             )),
         }
+    }
+
+    /// The photographs of a frame's scene in the dark, in their order.
+    #[must_use]
+    pub(crate) fn photographs(&self, frame: &FrameId) -> &[DarkPhoto] {
+        match self.sources.get(frame) {
+            Some(ImageSource::File { dark, .. }) => dark,
+            _ => &[],
+        }
+    }
+
+    /// A photograph of a frame's scene in the dark as it is stored, not decoded.
+    ///
+    /// # Errors
+    /// If the frame has no photograph of this name, or its file cannot be read.
+    pub(crate) fn photograph(&self, frame: &FrameId, name: &PhotoName) -> Result<Picture> {
+        let mut photos = self.photographs(frame).iter();
+        let Some(photo) = photos.find(|photo| photo.name == *name) else {
+            let problem = format_args!("no photograph {name} of the frame {:?} in it", frame.0);
+            return Err(Error::data(&self.name, problem));
+        };
+        ImageFile::open(&photo.path, self.rule).map(Picture::Encoded)
     }
 
     /// The focal length of a frame along a row, in pixels of its image; `None` if the data set does not state it.

@@ -11,7 +11,7 @@ use super::runtime::{Install, RuntimeSearch};
 use super::tiles::Tiling;
 use super::time_limit::TimeLimit;
 use super::usage::Implausible;
-use crate::types::{Decides, TreatmentSet};
+use crate::types::{Decides, SetLight, TreatmentSet};
 
 /// The enhancers, and the images that they enhance.
 #[derive(Debug, Clone, Args)]
@@ -22,10 +22,31 @@ pub(crate) struct EnhancerArgs {
     /// restormer, mirnet, kind); repeatable: each is shown beside raw; default: none
     #[arg(long, value_name = "NAME|FILE", add = Decides::Trials)]
     pub llie: Vec<PathBuf>,
-    /// Which images are enhanced: the dark ones of a variant, or l0, the untouched ones, for photographs that are dark already;
-    /// several with commas; both is ev,noise
-    #[arg(long, value_name = "l0|noise|ev|both|all", default_value_t = TreatmentSet::NOISE, add = Decides::Trials)]
-    pub llie_on: TreatmentSet,
+    /// Which images are enhanced: the dark ones of a variant, l0, the untouched ones, for photographs that are dark already, or dark,
+    /// photographs in the dark beside their frames; several with commas; both is ev,noise; default: noise, of sets in the dark l0
+    #[arg(long, value_name = "l0|noise|ev|both|dark|all", add = Decides::Trials)]
+    pub llie_on: Option<TreatmentSet>,
+}
+
+impl EnhancerArgs {
+    /// The images that are enhanced: those that are named, else those with noise.
+    #[must_use]
+    pub(crate) fn on(&self) -> TreatmentSet {
+        self.llie_on.unwrap_or(TreatmentSet::NOISE)
+    }
+
+    /// The same flags for a set in this light, of which the untouched photographs are enhanced by default if it is dark.
+    #[must_use]
+    pub(crate) fn for_set(self, set: SetLight) -> Self {
+        let of_set = match set {
+            SetLight::Lit => None,
+            SetLight::Dark => Some(TreatmentSet::only(None)),
+        };
+        Self {
+            llie_on: self.llie_on.or(of_set),
+            ..self
+        }
+    }
 }
 
 /// Size in which images are enhanced.

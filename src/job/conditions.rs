@@ -3,24 +3,30 @@
 use crate::enhance::EnhancerArgs;
 use crate::error::{Error, Result};
 use crate::synthesis::LightSettings;
-use crate::types::{Condition, Degradation, Digest, EnhancerName, TreatmentSet};
+use crate::types::{
+    Condition, Degradation, Digest, EnhancerName, PairDark, PhotoName, Treatment, TreatmentSet,
+};
 
-/// Every condition in which a frame is shown, level by level: first raw, then with each enhancer. In this order a frame is degraded
-/// once for all enhancers.
+/// Every condition in which a frame is shown, level by level, then in the darkness of its photographs: first raw, then with each
+/// enhancer. In this order a frame is degraded once for all enhancers.
 pub(crate) fn conditions(
     light: &LightSettings,
+    photographs: &[PhotoName],
     on: TreatmentSet,
     enhancers: &[(EnhancerName, Digest)],
 ) -> Vec<Condition> {
     let mut all = Vec::new();
-    for degradation in light.degradations() {
-        let treatment = degradation.as_ref().map(Degradation::kind);
-        let raw = Condition::raw(degradation);
+    let degradations = light.degradations().into_iter().map(Treatment::from);
+    let photographs = photographs.iter().cloned().map(PairDark::Photograph);
+    let pairs = light.matches.iter().cloned().chain(photographs);
+    for treatment in degradations.chain(pairs.map(Treatment::Paired)) {
+        let is_enhanced = on.has(&treatment);
+        let raw = Condition::raw(treatment);
         let enhanced = |(name, _): &(EnhancerName, Digest)| Condition {
             enhancer: Some(name.clone()),
             ..raw.clone()
         };
-        let enhanced: Vec<Condition> = if on.includes(treatment) {
+        let enhanced: Vec<Condition> = if is_enhanced {
             enhancers.iter().map(enhanced).collect()
         } else {
             Vec::new()
@@ -44,8 +50,10 @@ pub(crate) fn check_used(light: &LightSettings, args: &EnhancerArgs) -> Result<(
     let Some(asked) = treatments.reduce(TreatmentSet::or) else {
         return Ok(());
     };
-    let on = args.llie_on;
-    if args.llie.is_empty() || asked.and(on).is_some() {
+    let on = args.on();
+    // Whether there are photographs in the dark is known when the data are open.
+    let may_be = on.and(TreatmentSet::DARK).is_some() || !light.matches.is_empty();
+    if args.llie.is_empty() || may_be || asked.and(on).is_some() {
         return Ok(());
     }
     let problem = match asked.and(light.variants.into()) {
@@ -60,10 +68,29 @@ pub(crate) fn check_used(light: &LightSettings, args: &EnhancerArgs) -> Result<(
     ))
 }
 
+/// Checks against the conditions of open data what [`check_used`] leaves open.
+///
+/// # Errors
+/// [`Error::Usage`] if enhancers are named and no condition has one.
+pub(crate) fn check_enhanced(conditions: &[Condition], args: &EnhancerArgs) -> Result<()> {
+    let is_used = conditions
+        .iter()
+        .any(|condition| condition.enhancer.is_some());
+    if args.llie.is_empty() || is_used || conditions.is_empty() {
+        return Ok(());
+    }
+    let problem = format_args!(
+        "the enhancer would never be used: --llie-on {} is not among the images asked; the data have no photographs in the dark",
+        args.on()
+    );
+    Err(Error::usage("--llie", problem))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::synthesis::LightArgs;
+    use crate::types::SetLight;
     use clap::Parser;
 
     #[derive(Parser)]
@@ -78,7 +105,7 @@ mod tests {
     fn check(words: &str) -> Result<()> {
         let flags = Flags::try_parse_from(words.split_whitespace()).unwrap();
         check_used(
-            &LightSettings::resolve(&flags.light).unwrap(),
+            &LightSettings::resolve(&flags.light, SetLight::Lit).unwrap(),
             &flags.enhancers,
         )
     }

@@ -3,11 +3,13 @@
 use rayon::prelude::*;
 
 use super::experiment::Experiment;
+use super::progress::Progress;
 use super::settings::JobSettings;
 use super::source::{Frames, Source, SourceFrame};
 use crate::dataset::Picture;
-use crate::enhance::brightness;
-use crate::types::AxisLevel;
+use crate::enhance::brightness as brightness_in_codes;
+use crate::synthesis::mean_luminance;
+use crate::types::{AxisLevel, Rgb, SetLight};
 
 /// Maximum number of frames that are measured; chosen.
 const SAMPLED: usize = 24;
@@ -15,16 +17,41 @@ const SAMPLED: usize = 24;
 /// Mean luma, of 255, below which a frame is dark. Chosen: a well-lit frame has about 100.
 const DARK: f64 = 40.0;
 
+/// Says what a set in the dark is asked by default, and why, or what is odd about the levels that are named.
+pub(crate) fn tell(job: &JobSettings, progress: &Progress) {
+    if job.set_light == SetLight::Lit {
+        return;
+    }
+    if job.light.levels == [AxisLevel::L0] {
+        progress.say(
+            "photographed in the dark: asked as photographed (L0); synthetic levels would add to noise that is in the photographs already, so --levels must name them",
+        );
+    } else {
+        tracing::warn!(
+            "the photographs were taken in the dark, and --levels darkens them further: their own noise is in them already, so a level is \
+             darker and noisier than its name says, and L0 is no image in the light"
+        );
+    }
+}
+
+/// Mean linear luminance of up to [`SAMPLED`] frames, evenly spread, and their number; `None` without frames that can be decoded.
+pub(crate) fn brightness(frames: &dyn Frames, sources: &[Source]) -> Option<(f64, usize)> {
+    let sample = sampled(frames, sources, mean_luminance);
+    let mean = sample.iter().sum::<f64>() / sample.len() as f64;
+    (!sample.is_empty()).then_some((mean, sample.len()))
+}
+
 /// Warns if the frames of an experiment are dark already, and it does more than to ask about them as they are and enhanced.
 pub(super) fn warn<E: Experiment>(experiment: &E) {
-    if asks_as_they_are(experiment.settings()) {
+    let settings = experiment.settings();
+    if settings.set_light == SetLight::Dark || asks_as_they_are(settings) {
         return;
     }
     let median = median_luma(experiment.frames(), experiment.sources());
     if let Some(luma) = median.filter(|luma| *luma < DARK) {
         tracing::warn!(
             "these images are dark already (median brightness {luma:.0} of 255); --levels L0 --llie-on l0 asks about them as they are \
-             and enhanced"
+             and enhanced, and --light dark does so by default"
         );
     }
 }
@@ -34,23 +61,28 @@ fn asks_as_they_are(settings: &JobSettings) -> bool {
     let enhancers = &settings.enhancers;
     settings.light.levels == [AxisLevel::L0]
         && !enhancers.llie.is_empty()
-        && enhancers.llie_on.includes(None)
+        && enhancers.on().includes(None)
 }
 
 /// The median of the mean luma of up to [`SAMPLED`] frames, evenly spread; the upper of two. `None` without frames in files. Built-in
 /// rooms are lit. A file that cannot be decoded is left out: the trial that needs its image says so.
 fn median_luma(frames: &dyn Frames, sources: &[Source]) -> Option<f64> {
+    let mut sample = sampled(frames, sources, brightness_in_codes);
+    sample.sort_by(f64::total_cmp);
+    sample.get(sample.len() / 2).copied()
+}
+
+/// A number of up to [`SAMPLED`] frames in files, evenly spread.
+fn sampled(frames: &dyn Frames, sources: &[Source], of: impl Fn(&Rgb) -> f64 + Sync) -> Vec<f64> {
     let all: Vec<&SourceFrame> = sources.iter().flat_map(|source| &source.frames).collect();
     let number = all.len().min(SAMPLED);
     let sample = (0..number).into_par_iter().filter_map(|index| {
         let frame = all[index * all.len() / number];
         let picture = frames.picture(&frame.id).ok()?;
         match picture {
-            Picture::Encoded(_) => Some(brightness(&picture.decode().ok()?)),
+            Picture::Encoded(_) => Some(of(&picture.decode().ok()?)),
             Picture::Drawn(..) => None,
         }
     });
-    let mut sample: Vec<f64> = sample.collect();
-    sample.sort_by(f64::total_cmp);
-    sample.get(sample.len() / 2).copied()
+    sample.collect()
 }

@@ -53,7 +53,8 @@ pub(super) fn dark_frames<I>(
                 continue;
             };
             if found.len() < FRAMES && round < conditions.len() {
-                let image = work.degraded(condition.degradation.as_ref())?;
+                let resolved = work.resolved(condition)?;
+                let image = resolved.work.degraded(resolved.condition.degradation())?;
                 if brightness(image) <= DARK {
                     found.push(image.clone());
                 }

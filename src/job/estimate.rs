@@ -149,10 +149,7 @@ fn lines<E: Experiment>(
         let price = model.price(&experiment.settings().money.prices);
         let mut by_reading = BTreeMap::<Option<ReadingName>, Tokens>::new();
         for (place, group) in plan.groups() {
-            let degradation = group
-                .condition
-                .as_ref()
-                .and_then(|c| c.degradation.as_ref());
+            let degradation = group.condition.as_ref().and_then(|c| c.degradation());
             let reading = degradation.and_then(Degradation::reading).cloned();
             let tokens = by_reading.entry(reading).or_default();
             let own = group.trials.iter().filter(|trial| trial.model == index);

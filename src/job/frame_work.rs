@@ -1,9 +1,13 @@
 //! The steps from one frame to its images: [`FrameWork`], with their shared settings [`ImageSteps`].
 
+pub(crate) mod pairs;
+
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::bilinear::bilinear;
+use super::photograph::SourcePhotograph;
 use super::recipe::Recipe;
 use super::scaling::Scaling;
 use super::source::{Frames, Source, SourceFrame};
@@ -14,7 +18,8 @@ use crate::dataset::Picture;
 use crate::error::{Error, Result};
 use crate::synthesis::{AppliedDegradation, Exposures, FrameView, NoiseKey};
 use crate::types::{
-    Condition, Degradation, Digest, EnhancerName, ExposureFacts, FrameId, InputNote, Pixels, Rgb,
+    Condition, Degradation, Digest, EnhancerName, ExposureFacts, FrameId, InputNote, PairFacts,
+    PhotoName, Pixels, Rgb,
 };
 
 /// Files, settings and timings that all images share.
@@ -80,6 +85,8 @@ pub(crate) enum StagedFrame {
         note: InputNote,
         /// What the camera did; `None` for a kind that leaves it open.
         exposure: Option<ExposureFacts>,
+        /// How dark the photograph of the frame is; `None` without a darkness of pairs.
+        pair: Option<PairFacts>,
         enhancer: EnhancerName,
     },
 }
@@ -101,6 +108,12 @@ pub(crate) struct FrameWork<'a> {
     clean_as_sent: Option<Arc<Rgb>>,
     exposures: Exposures,
     degraded: Option<(Option<Degradation>, Rgb)>,
+    /// Photographs of the scene in the dark.
+    photographs: Vec<SourcePhotograph>,
+    /// Work on these photographs, by name.
+    dark: BTreeMap<PhotoName, Box<Self>>,
+    /// The frame and the photograph of it that this is work on; `None` for work on the frame itself.
+    photograph: Option<(FrameId, PhotoName)>,
 }
 
 impl<'a> FrameWork<'a> {
@@ -109,6 +122,7 @@ impl<'a> FrameWork<'a> {
         let key = steps.recipe.noise(source, &frame.id);
         Self {
             size: Some(frame.size),
+            photographs: frame.photographs.clone(),
             ..Self::new(steps, frame.id.clone(), key, Some(frame.digest))
         }
     }
@@ -132,34 +146,15 @@ impl<'a> FrameWork<'a> {
             clean_as_sent: None,
             exposures: Exposures::default(),
             degraded: None,
+            photographs: Vec::new(),
+            dark: BTreeMap::new(),
+            photograph: None,
         }
     }
 
     /// The name of the frame.
     pub(crate) fn frame(&self) -> &FrameId {
         &self.frame
-    }
-
-    /// The frame in a condition: as it is sent, or as the enhancer takes it.
-    pub(crate) fn stage(&mut self, condition: &Condition) -> Result<StagedFrame> {
-        if let Some(payload) = self.unchanged_file(condition)? {
-            return Ok(StagedFrame::Ready(payload));
-        }
-        let steps = self.steps;
-        let note = self.note()?;
-        let exposure = self.exposure(condition)?;
-        let degraded = self.degraded(condition.degradation.as_ref())?;
-        match &condition.enhancer {
-            None => Ok(StagedFrame::Ready(
-                steps.payload(degraded, &note, exposure)?.0,
-            )),
-            Some(name) => Ok(StagedFrame::ToEnhance {
-                degraded: degraded.clone(),
-                note,
-                exposure,
-                enhancer: name.clone(),
-            }),
-        }
     }
 
     /// How the file of the frame is read.
@@ -192,8 +187,12 @@ impl<'a> FrameWork<'a> {
     /// The frame's file; an error if its digest is not that of the plan.
     pub(crate) fn picture(&mut self) -> Result<&Picture> {
         let (steps, frame, planned) = (self.steps, &self.frame, self.planned);
+        let photograph = self.photograph.as_ref();
         once(&mut self.picture, || {
-            let read = || steps.frames.picture(frame);
+            let read = || match photograph {
+                None => steps.frames.picture(frame),
+                Some((of, name)) => steps.frames.photograph(of, name),
+            };
             let picture = steps.timings.time(TimedStep::Decode, read)?;
             if planned.is_none_or(|planned| planned == picture.digest()) {
                 return Ok(picture);
@@ -265,7 +264,7 @@ impl<'a> FrameWork<'a> {
 
     /// What the camera did in a condition; `None` for a kind that leaves it open.
     pub(crate) fn exposure(&mut self, condition: &Condition) -> Result<Option<ExposureFacts>> {
-        let how = condition.degradation.as_ref();
+        let how = condition.degradation();
         let how = how.filter(|how| how.kind().has_motion());
         let applied = how.map(|how| self.applied(how)).transpose()?;
         Ok(applied.and_then(|applied| applied.exposure()))

@@ -11,7 +11,7 @@ use super::settings::JobSettings;
 use crate::enhance::{self, SizeArgs, Tiling};
 use crate::synthesis::{KindSettings, Synthesis, version};
 use crate::types::degradation::Kind;
-use crate::types::{Degradation, Digest, ReadingName};
+use crate::types::{Degradation, Digest, PairDark, ReadingName};
 
 /// Settings that all trials of a run share and no column tells apart, by flag.
 pub(crate) type Identity = BTreeMap<String, Value>;
@@ -57,12 +57,14 @@ pub(crate) fn columns<'a>(
     let readings = degradations
         .iter()
         .flatten()
-        .filter_map(Degradation::reading);
+        .filter_map(Degradation::reading)
+        .chain(settings.light.matches.iter().filter_map(PairDark::reading));
     let readings: BTreeSet<&ReadingName> = readings.collect();
     let kinds: BTreeSet<Kind> = degradations
         .iter()
         .flatten()
         .map(Degradation::kind)
+        .chain(settings.light.matches.iter().filter_map(PairDark::kind))
         .collect();
     let kinds = kinds.into_iter().filter(|kind| !PAPER.contains(kind));
     let kinds = kinds.map(|kind| (kind.word().to_owned(), variant(kind, &recipe.kinds)));

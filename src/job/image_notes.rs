@@ -61,8 +61,9 @@ impl MissingNotes {
             let image = (frame.clone(), condition.clone());
             self.measured.contains(&image)
         };
-        // An untouched frame may be dark itself, so that it is no reference for its enhanced image.
-        let has_reference = condition.degradation.is_some();
+        // An untouched frame may be dark itself, so that it is no reference for its enhanced image; a photograph in the dark need not
+        // be aligned with its frame.
+        let has_reference = condition.degradation().is_some();
         WantedNotes {
             thumbnail: self.thumbnails.lacks(frame, condition),
             fidelity: has_reference && !is_measured(),

@@ -12,6 +12,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use rayon::prelude::*;
 use tokio::sync::mpsc::Sender;
 
+use super::frame_work::pairs::{Resolved, paired};
 use super::frame_work::{FrameWork, ImageSteps, StagedFrame};
 use super::image_notes::{ImageNotes, MissingNotes, WantedNotes, fidelity};
 use super::plan::{SourcePlan, TrialGroup};
@@ -199,13 +200,19 @@ impl<'a> ImagePipeline<'a> {
         name: &FrameId,
         wanted: WantedNotes,
     ) -> Result<(Arc<Payload>, ImageNotes)> {
+        let Resolved {
+            work,
+            condition: made,
+            pair,
+        } = work.resolved(condition)?;
         let steps = work.steps;
         let thumbnail = |image: &Payload, encoded: &Rgb| {
             let make = || try_thumbnail(name, condition, image, Some(encoded));
             steps.timings.time(TimedStep::Encode, make)
         };
         let mut notes = ImageNotes::default();
-        if let Some(image) = work.unchanged_file(condition)? {
+        if let Some(image) = work.unchanged_file(&made)? {
+            let image = paired(image, pair);
             // The file is decoded only for its thumbnail.
             if wanted.thumbnail {
                 notes.thumbnail = thumbnail(&image, work.clean()?);
@@ -213,9 +220,10 @@ impl<'a> ImagePipeline<'a> {
             return Ok((image, notes));
         }
         let clean = wanted.fidelity.then(|| work.clean_as_sent()).transpose()?;
-        let (read, exposure) = (work.note()?, work.exposure(condition)?);
-        let pixels = self.pixels(work, condition)?;
+        let (read, exposure) = (work.note()?, work.exposure(&made)?);
+        let pixels = self.pixels(work, &made)?;
         let (image, encoded) = steps.payload(&pixels, &read, exposure)?;
+        let image = paired(image, pair);
         if wanted.thumbnail {
             notes.thumbnail = thumbnail(&image, &encoded);
         }
@@ -267,13 +275,18 @@ impl<'a> ImagePipeline<'a> {
         work: &mut FrameWork<'_>,
         condition: &Condition,
     ) -> Result<Arc<Payload>> {
-        if let Some(image) = work.unchanged_file(condition)? {
-            return Ok(image);
+        let Resolved {
+            work,
+            condition,
+            pair,
+        } = work.resolved(condition)?;
+        if let Some(image) = work.unchanged_file(&condition)? {
+            return Ok(paired(image, pair));
         }
         let (steps, note) = (work.steps, work.note()?);
-        let exposure = work.exposure(condition)?;
-        let pixels = self.pixels(work, condition)?;
-        Ok(steps.payload(&pixels, &note, exposure)?.0)
+        let exposure = work.exposure(&condition)?;
+        let pixels = self.pixels(work, &condition)?;
+        Ok(paired(steps.payload(&pixels, &note, exposure)?.0, pair))
     }
 
     /// The pixels of a frame in a condition, in the size of the frame.
@@ -282,12 +295,15 @@ impl<'a> ImagePipeline<'a> {
         work: &'w mut FrameWork<'_>,
         condition: &Condition,
     ) -> Result<Cow<'w, Rgb>> {
+        let Resolved {
+            work, condition, ..
+        } = work.resolved(condition)?;
         let frame = work.frame().clone();
-        let degraded = work.degraded(condition.degradation.as_ref())?;
+        let degraded = work.degraded(condition.degradation())?;
         match &condition.enhancer {
             None => Ok(Cow::Borrowed(degraded)),
             Some(name) => {
-                let enhanced = self.enhanced(degraded, name, [&frame, condition]);
+                let enhanced = self.enhanced(degraded, name, [&frame, &condition]);
                 enhanced.map(Cow::Owned)
             }
         }
@@ -300,10 +316,11 @@ impl<'a> ImagePipeline<'a> {
                 degraded,
                 note,
                 exposure,
+                pair,
                 enhancer,
             } => {
                 let image = self.enhanced(&degraded, &enhancer, place)?;
-                Ok(self.steps.payload(&image, &note, exposure)?.0)
+                Ok(paired(self.steps.payload(&image, &note, exposure)?.0, pair))
             }
         }
     }

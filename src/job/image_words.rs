@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use super::walk::Walk;
 use crate::ask::ImageArgs;
-use crate::dataset::{CodesArgs, DataArgs, PixelLimit};
+use crate::dataset::{CodesArgs, DataArgs, PixelLimit, SceneArgs};
 use crate::enhance::SizeArgs;
 use crate::error::{Error, Result};
 use crate::synthesis::{CameraArgs, SensorArgs};
@@ -25,6 +25,8 @@ pub(crate) type ImageWords = BTreeMap<String, Value>;
 pub(crate) struct ImageFlags {
     #[command(flatten)]
     pub(crate) data: DataArgs,
+    #[command(flatten)]
+    pub(crate) scene: SceneArgs,
     #[command(flatten)]
     pub(crate) limit: PixelLimit,
     #[command(flatten)]

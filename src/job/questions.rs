@@ -7,7 +7,8 @@ use std::path::Path;
 use super::progress::Progress;
 use super::questions_by_rule::by_rule;
 use crate::dataset::{
-    Bank, BankArgs, BankPlace, DataPlace, Dataset, Photographs, ReadingRule, SelectionArgs, SetArgs,
+    Bank, BankArgs, BankPlace, DataPlace, Dataset, Photographs, ReadingRule, SceneArgs,
+    SelectionArgs, SetArgs,
 };
 use crate::error::{Error, Result};
 use crate::files::reading;
@@ -27,14 +28,14 @@ pub(crate) fn rules(path: Option<&Path>) -> Result<Rules> {
 
 /// The opened data. If they have no questions, these are made by rule.
 pub(crate) fn open_data(
-    place: &DataPlace,
-    set: &SetArgs,
+    (place, scene, set): (&DataPlace, &SceneArgs, &SetArgs),
     selection: &SelectionArgs,
     rules: &Rules,
     rule: ReadingRule,
     progress: &Progress,
 ) -> Result<Dataset> {
-    let dataset = Dataset::open(place, selection.questions.as_deref(), set)?.with_rule(rule);
+    let dataset = scene.open(place, selection.questions.as_deref(), set)?;
+    let dataset = dataset.with_rule(rule);
     if !dataset.questions().is_empty() {
         return Ok(dataset);
     }

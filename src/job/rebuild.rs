@@ -9,6 +9,7 @@ use super::enhancers::{self, EnhancerRunArgs, OpenEnhancers};
 use super::frame_work::ImageSteps;
 use super::image_pipeline::ImagePipeline;
 use super::image_words::ImageFlags;
+use super::photographs;
 use super::questions::ASK;
 use super::recipe::Recipe;
 use super::source::{Frames, Source, SourceFrame};
@@ -88,6 +89,8 @@ impl ImageRebuilder {
         } else {
             let dataset = if manifest.identity.contains_key(ASK) {
                 Photographs::at(&flags.data.data, &flags.data.set)?.dataset
+            } else if let Some(dataset) = flags.scene.apart(&flags.data.data)? {
+                dataset
             } else {
                 frames(&flags.data)?
             };
@@ -113,7 +116,7 @@ impl ImageRebuilder {
         name: &FrameId,
         conditions: &[Condition],
     ) -> Result<Vec<Vec<Arc<Payload>>>> {
-        let source = self.source(name).map_err(|e| {
+        let mut source = self.source(name).map_err(|e| {
             let problem =
                 format_args!("{e}; if the data were moved, name their folder with --data");
             Error::data(name, problem)
@@ -122,6 +125,12 @@ impl ImageRebuilder {
             FrameFolder::Frames(dataset) => dataset,
             FrameFolder::Walks(folder, _) => folder,
         };
+        if conditions
+            .iter()
+            .any(|condition| condition.pair().is_some())
+        {
+            photographs::measure(frames, std::slice::from_mut(&mut source))?;
+        }
         let mut pipeline = ImagePipeline {
             steps: ImageSteps {
                 frames,

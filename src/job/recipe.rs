@@ -102,13 +102,13 @@ impl Recipe {
         frame: &'a SourceFrame,
         condition: &Condition,
     ) -> Result<ImageKeyFacts<'a>> {
-        let how = condition.degradation.as_ref();
-        let degradation = how.map(|how| self.degradation(source, frame, how));
+        let how = frame.degradation(condition)?;
+        let degradation = how.map(|how| self.degradation(source, frame, &how));
         let enhancer = condition.enhancer.as_ref();
         let enhancer =
             enhancer.and_then(|name| self.enhancers.iter().find(|(known, _)| known == name));
         Ok(ImageKeyFacts {
-            picture: frame.digest,
+            picture: frame.picture(condition)?,
             degradation: degradation.transpose()?,
             enhancer: enhancer.map(|(_, digest)| EnhancerFacts {
                 digest: *digest,
@@ -127,13 +127,12 @@ impl Recipe {
     /// # Errors
     /// If a picture would move too far during an exposure; names the frame.
     pub(crate) fn check(&self, sources: &[Source], conditions: &[Condition]) -> Result<()> {
-        let moved = conditions
-            .iter()
-            .filter_map(|condition| condition.degradation.as_ref());
-        let moved: BTreeSet<&Degradation> = moved.filter(|how| how.kind().has_motion()).collect();
         for source in sources {
             for frame in &source.frames {
-                for how in &moved {
+                let shown = conditions.iter().filter(|of| frame.can_show(of));
+                let how = shown.map(|condition| frame.degradation(condition));
+                let how = how.collect::<Result<BTreeSet<Option<Degradation>>>>()?;
+                for how in how.iter().flatten().filter(|how| how.kind().has_motion()) {
                     self.applied(source, frame, how)?;
                 }
             }

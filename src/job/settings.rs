@@ -20,7 +20,7 @@ use crate::ask::{
 use crate::enhance::{EnhancerArgs, ModelFile};
 use crate::error::{Error, Result};
 use crate::synthesis::{LightArgs, LightSettings};
-use crate::types::{Decides, View};
+use crate::types::{Decides, SetLight, View};
 
 /// The flags that every experiment has.
 #[derive(Debug, Args)]
@@ -102,6 +102,8 @@ pub(crate) struct OutputArgs {
 pub(crate) struct JobSettings {
     /// Levels and kinds of degradation.
     pub light: LightSettings,
+    /// The light in which the photographs of the data were taken.
+    pub set_light: SetLight,
     /// Enhancers, and the images they are for.
     pub enhancers: EnhancerArgs,
     /// Running of the enhancers.
@@ -142,6 +144,8 @@ pub(crate) struct ExperimentSettings {
     pub data: Option<PathBuf>,
     /// Which models are asked without images, too.
     pub text_baseline: TextBaseline,
+    /// The light in which the photographs of the data were taken.
+    pub set_light: SetLight,
 }
 
 impl JobSettings {
@@ -232,9 +236,10 @@ impl JobArgs {
             text_baseline: experiment.text_baseline,
         };
         Ok(JobSettings {
-            light: LightSettings::resolve(&self.light)?,
+            light: LightSettings::resolve(&self.light, experiment.set_light)?,
+            set_light: experiment.set_light,
             ask: AskSettings::resolve(&self.models, &asking, context)?,
-            enhancers: self.enhancers,
+            enhancers: self.enhancers.for_set(experiment.set_light),
             loading: self.loading,
             format: self.images.image,
             max_side: experiment.max_side,

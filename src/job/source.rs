@@ -4,10 +4,13 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
+use super::photograph::{SourcePhotograph, matched};
 use super::progress::Progress;
 use crate::dataset::{Dataset, Picture};
 use crate::error::{Error, Result};
-use crate::types::{Digest, FrameId, InputNote, InputSummary, Question};
+use crate::types::{
+    Condition, Degradation, Digest, FrameId, InputNote, InputSummary, PairDark, PhotoName, Question,
+};
 
 /// A reader of frames' files.
 pub(crate) trait Frames: Sync {
@@ -16,6 +19,19 @@ pub(crate) trait Frames: Sync {
 
     /// The focal length of a frame along a row, in pixels of its image; `None` if it is not known.
     fn focal(&self, frame: &FrameId) -> Option<f64>;
+
+    /// The names of the photographs of a frame's scene in the dark, with the exposure drop that the data state; by default none.
+    fn photographs(&self, _frame: &FrameId) -> Vec<(PhotoName, Option<f64>)> {
+        Vec::new()
+    }
+
+    /// The file of a photograph of a frame's scene in the dark, which is not decoded.
+    fn photograph(&self, frame: &FrameId, name: &PhotoName) -> Result<Picture> {
+        Err(Error::data(
+            frame,
+            format_args!("no photograph {name} of it"),
+        ))
+    }
 }
 
 impl Frames for Dataset {
@@ -25,6 +41,15 @@ impl Frames for Dataset {
 
     fn focal(&self, frame: &FrameId) -> Option<f64> {
         self.focal(frame)
+    }
+
+    fn photographs(&self, frame: &FrameId) -> Vec<(PhotoName, Option<f64>)> {
+        let photos = self.photographs(frame).iter();
+        photos.map(|photo| (photo.name.clone(), photo.ev)).collect()
+    }
+
+    fn photograph(&self, frame: &FrameId, name: &PhotoName) -> Result<Picture> {
+        self.photograph(frame, name)
     }
 }
 
@@ -41,6 +66,8 @@ pub(crate) struct SourceFrame {
     pub(crate) size: (u32, u32),
     /// Focal length along a row, in pixels; `None` if it is not known.
     pub(crate) focal: Option<f64>,
+    /// Photographs of the same scene in the dark.
+    pub(crate) photographs: Vec<SourcePhotograph>,
 }
 
 impl SourceFrame {
@@ -53,8 +80,70 @@ impl SourceFrame {
             digest: picture.digest(),
             note: picture.note(),
             focal: frames.focal(id),
+            photographs: inspect_photographs(frames, id)?,
         })
     }
+
+    /// The photograph of this name.
+    pub(crate) fn photograph(&self, name: &PhotoName) -> Option<&SourcePhotograph> {
+        self.photographs.iter().find(|photo| photo.name == *name)
+    }
+
+    /// The digest of the file that is shown in a condition.
+    ///
+    /// # Errors
+    /// If the frame has no such photograph.
+    pub(crate) fn picture(&self, condition: &Condition) -> Result<Digest> {
+        let Some(name) = condition.photograph() else {
+            return Ok(self.digest);
+        };
+        let photo = self.photograph(name).map(|photo| photo.digest);
+        photo.ok_or_else(|| Error::data(&self.id, format_args!("no photograph {name} of it")))
+    }
+
+    /// The degradation of this frame in a condition; `None` for untouched frames and photographs.
+    ///
+    /// # Errors
+    /// If the darkness of the frame's photograph is not known, or cannot be synthesised.
+    pub(crate) fn degradation(&self, condition: &Condition) -> Result<Option<Degradation>> {
+        match condition.pair() {
+            Some(PairDark::Match(kind, reading)) => {
+                let how = matched(&self.photographs, *kind, reading.as_ref());
+                let problem = "no photograph of it in the dark with a known exposure drop";
+                let how = how.ok_or_else(|| Error::data(&self.id, problem))?;
+                Ok(Some(how.0))
+            }
+            _ => Ok(condition.degradation().cloned()),
+        }
+    }
+
+    /// Whether the frame can be shown in a condition: it has the photograph, or one whose darkness is known and can be synthesised.
+    pub(crate) fn can_show(&self, condition: &Condition) -> bool {
+        match condition.pair() {
+            None => true,
+            Some(PairDark::Photograph(name)) => self.photograph(name).is_some(),
+            Some(PairDark::Match(kind, reading)) => {
+                matched(&self.photographs, *kind, reading.as_ref()).is_some()
+            }
+        }
+    }
+}
+
+/// The photographs of a frame. Their files are read, and must be images.
+fn inspect_photographs(frames: &dyn Frames, id: &FrameId) -> Result<Vec<SourcePhotograph>> {
+    let photos = frames.photographs(id).into_iter();
+    let photos = photos.map(|(name, stated)| {
+        let picture = frames.photograph(id, &name)?;
+        picture.check()?;
+        Ok(SourcePhotograph {
+            digest: picture.digest(),
+            note: picture.note(),
+            name,
+            stated,
+            facts: None,
+        })
+    });
+    photos.collect()
 }
 
 /// The frames that are shown together: one frame, or those of a walk.
@@ -91,6 +180,11 @@ impl Source {
         }
     }
 
+    /// Whether all its frames can be shown in a condition.
+    pub(crate) fn can_show(&self, condition: &Condition) -> bool {
+        self.frames.iter().all(|frame| frame.can_show(condition))
+    }
+
     /// The frame in the middle, or the only one; `None` without frames.
     pub(crate) fn middle(&self) -> Option<&SourceFrame> {
         self.frames.get(self.frames.len() / 2)
@@ -112,6 +206,12 @@ pub(crate) fn input_summary(sources: &[Source]) -> InputSummary {
     let mut summary = InputSummary::default();
     for frame in sources.iter().flat_map(|source| &source.frames) {
         summary.add(&frame.id, &frame.note);
+        for photo in &frame.photographs {
+            summary.add(
+                &FrameId(format!("{} ({})", frame.id, photo.name)),
+                &photo.note,
+            );
+        }
     }
     summary
 }

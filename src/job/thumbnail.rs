@@ -65,10 +65,16 @@ pub(crate) fn thumbnail(
     let image = sent.received(encoded)?;
     let ev = match condition.enhancer {
         // Of automatic exposure, what the camera left dark.
-        None => match (&condition.degradation, sent.facts().exposure) {
+        None => match (condition.degradation(), sent.facts().exposure) {
             (Some(_), Some(exposure)) => exposure.dark.unwrap_or_default() as f32,
             (Some(how), None) => how.kind().relight(how.severity()),
-            (None, _) => 0.0,
+            // Of a pair, as much darker as its photograph is.
+            (None, _) => sent
+                .facts()
+                .pair
+                .and_then(|pair| pair.ev())
+                .unwrap_or(0.0)
+                .max(0.0) as f32,
         },
         Some(_) => 0.0,
     };

@@ -68,6 +68,8 @@ pub enum AlertKind {
     Version,
     /// Levels that differ in brightness and not in noise.
     Noise,
+    /// Photographs in the dark that are no pair of one exposure with their frames.
+    Pairs,
     /// What the observer's numbers do not show.
     Observer,
 }

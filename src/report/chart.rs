@@ -4,6 +4,9 @@
 //! they can be distinguished without colour. A page may replace the colours `INK`, `GRID` and `BACKGROUND` by those of its
 //! theme.
 
+pub(crate) mod bars;
+mod marks;
+
 use plotters::coord::Shift;
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
@@ -99,6 +102,17 @@ pub(crate) enum PanelContent {
     Curve(Vec<(AxisLevel, Estimate)>),
     /// A share that is the same at all levels.
     Flat(f64),
+    /// Shares at a darkness that is no level.
+    Marks(Vec<DarkMark>),
+}
+
+/// A share at a darkness that is no level: a photograph in the dark. It is never joined to a curve, which is of synthetic images.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct DarkMark {
+    /// Lower quartile, median and upper quartile of the exposure drop, in EV.
+    pub ev: [f64; 3],
+    /// The share with its interval.
+    pub share: Estimate,
 }
 
 /// One line of a panel.
@@ -195,14 +209,17 @@ impl Chart {
         let top = rows * PANEL.1;
         for (line, (x, y)) in legend {
             let (x, y) = (*x, top + *y + ROW / 2);
-            draw_line(
-                root,
-                line.style,
-                is_flat(&line.content),
-                &[(x, y), (x + 34, y)],
-            )?;
-            if matches!(line.content, PanelContent::Curve(_)) {
-                draw_marker(root, line.style, (x + 17, y))?;
+            let ends = [(x, y), (x + 34, y)];
+            match line.content {
+                PanelContent::Marks(_) => {
+                    draw_path(root, &ends, line.style.colour().stroke_width(1))?;
+                }
+                _ => draw_line(root, line.style, is_flat(&line.content), &ends)?,
+            }
+            match line.content {
+                PanelContent::Curve(_) => draw_marker(root, line.style, (x + 17, y))?,
+                PanelContent::Marks(_) => line.style.hollow(root, (x + 17, y))?,
+                PanelContent::Flat(_) => {}
             }
             draw_text(root, &line.name, (x + 42, y), 13, LEFT)?;
         }
@@ -228,6 +245,8 @@ struct AxisFrame {
     width: i32,
     height: i32,
     levels: Vec<AxisLevel>,
+    /// The right end of the axis, in the unit of the levels.
+    farthest: f64,
 }
 
 impl AxisFrame {
@@ -237,24 +256,35 @@ impl AxisFrame {
             .iter()
             .flat_map(|line| match &line.content {
                 PanelContent::Curve(points) => points.iter().map(|(level, _)| *level).collect(),
-                PanelContent::Flat(_) => Vec::new(),
+                PanelContent::Flat(_) | PanelContent::Marks(_) => Vec::new(),
             })
             .collect();
         levels.sort_unstable();
         levels.dedup();
+        let marks = panel.lines.iter().flat_map(|line| match &line.content {
+            PanelContent::Marks(marks) => &marks[..],
+            PanelContent::Flat(_) | PanelContent::Curve(_) => &[],
+        });
+        let marks = marks.map(|mark| mark.ev[2]);
+        let farthest = levels.iter().map(|level| level.value()).chain(marks);
         Self {
             left: x + MARGIN[0],
             top: y + MARGIN[1],
             width: PANEL.0 - MARGIN[0] - MARGIN[2],
             height: PANEL.1 - MARGIN[1] - MARGIN[3],
+            farthest: farthest.fold(0.0, f64::max),
             levels,
         }
     }
 
     /// Horizontal position of a level. The axis is to scale in the unit of the levels.
     fn x(&self, level: AxisLevel) -> i32 {
-        let darkest = self.levels.last().copied().unwrap_or(AxisLevel::L0);
-        let (drop, max_drop) = (level.value() as f32, darkest.value() as f32);
+        self.x_of(level.value())
+    }
+
+    /// Horizontal position of a number in the unit of the levels.
+    fn x_of(&self, value: f64) -> i32 {
+        let (drop, max_drop) = (value as f32, self.farthest as f32);
         let share = if max_drop > 0.0 { drop / max_drop } else { 0.5 };
         self.left + 10 + ((self.width - 20) as f32 * share).round() as i32
     }
@@ -330,6 +360,10 @@ impl AxisFrame {
                 let y = self.y(*share);
                 let ends = [(self.left, y), (self.left + self.width, y)];
                 return draw_line(root, line.style, true, &ends);
+            }
+            PanelContent::Marks(marks) => {
+                let mut marks = marks.iter();
+                return marks.try_for_each(|mark| self.mark(root, line.style, mark));
             }
             PanelContent::Curve(points) => points,
         };
@@ -436,10 +470,17 @@ mod tests {
             top: 0,
             width: PANEL.0 - MARGIN[0] - MARGIN[2],
             height: 1,
+            farthest: 0.0,
             levels: std::iter::once(AxisLevel::L0)
                 .chain(drops.into_iter().map(of))
                 .collect(),
         };
+        let farthest = frame
+            .levels
+            .iter()
+            .map(|level| level.value())
+            .fold(0.0, f64::max);
+        let frame = AxisFrame { farthest, ..frame };
         frame.labelled().iter().map(ToString::to_string).collect()
     }
 

@@ -5,9 +5,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::table::ColumnKind::Text;
 use super::table::{ColumnKind, TableBuilder, TableCell, TableFormat};
 use super::words::light;
+use crate::score::findings::Findings;
+use crate::score::pair_darkness::PairDarkness;
 use crate::score::subject::Subject;
 use crate::types::degradation::{Axis, Kind};
-use crate::types::{AxisLevel, EnhancerName, KindReading, LightGroup, ModelListing, View};
+use crate::types::{
+    AxisLevel, EnhancerName, KindReading, LightGroup, ModelListing, SetLight, View,
+};
 
 /// A model in one variant, raw or with one enhancer.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -29,14 +33,21 @@ impl<'a> Series<'a> {
         }
     }
 
-    /// The quantity over which the series runs; `None` for untouched frames.
+    /// The quantity over which the series runs, which is light for the darkness of pairs; `None` for untouched frames.
     pub(super) fn axis(&self) -> Option<Axis> {
-        self.variant.kind.map(Kind::axis)
+        let pair = self.variant.pair.as_ref().map(|_| Axis::LIGHT);
+        self.variant.kind.map(Kind::axis).or(pair)
     }
 
-    /// The variant and the enhancer in words.
-    pub(super) fn light(&self) -> String {
-        light(self.variant, self.enhancer)
+    /// The variant and the enhancer in words, of photographs with how dark they are.
+    pub(super) fn light(&self, pairs: &[PairDarkness]) -> String {
+        let mut pairs = pairs.iter();
+        let of = |pair: &&PairDarkness| Some(&pair.name) == self.variant.photograph();
+        let words = light(self.variant, self.enhancer);
+        match pairs.find(of) {
+            None => words,
+            Some(pair) => words.replacen("(real)", &format!("(real, {})", pair.short()), 1),
+        }
     }
 }
 
@@ -53,6 +64,10 @@ pub(super) struct Ladder<'a, C> {
     pub(super) series: BTreeMap<Series<'a>, SeriesByLevel<'a, C>>,
     /// Cells without a level: models without images, and chance.
     pub(super) without_level: Vec<(&'a Subject, &'a C)>,
+    /// How dark the photographs in the dark are.
+    pub(super) pairs: &'a [PairDarkness],
+    /// The light in which the photographs of the set were taken.
+    pub(super) set: SetLight,
 }
 
 impl<'a, C> Ladder<'a, C> {
@@ -62,6 +77,8 @@ impl<'a, C> Ladder<'a, C> {
             levels: BTreeSet::new(),
             series: BTreeMap::new(),
             without_level: Vec::new(),
+            pairs: &[],
+            set: SetLight::Lit,
         };
         for (subject, cell) in cells {
             let place = ladder.place(&subject.model).unwrap_or_else(|| {
@@ -80,6 +97,32 @@ impl<'a, C> Ladder<'a, C> {
         ladder
     }
 
+    /// The same, which says how dark the photographs in the dark are, and calls L0 as the light of the set wants it.
+    pub(super) fn in_light_of(self, findings: &'a Findings<'_>) -> Self {
+        Self {
+            pairs: &findings.pairs,
+            set: findings.set.light,
+            ..self
+        }
+    }
+
+    /// The variant and the enhancer of a series in words.
+    pub(super) fn light(&self, series: &Series<'_>) -> String {
+        let words = series.light(self.pairs);
+        match self.set {
+            SetLight::Lit => words,
+            SetLight::Dark => words.replacen("untouched", self.set.untouched(), 1),
+        }
+    }
+
+    /// The name of a level at the head of a column.
+    pub(super) fn head(&self, level: AxisLevel) -> String {
+        match level {
+            AxisLevel::L0 => self.set.untouched().to_owned(),
+            level => level.to_string(),
+        }
+    }
+
     /// The place of a model among those of the ladder.
     fn place(&self, model: &str) -> Option<usize> {
         self.models.iter().position(|known| *known == model)
@@ -88,7 +131,7 @@ impl<'a, C> Ladder<'a, C> {
     /// Adds the cells of the clean frames to every series of the same model without an enhancer, and those of the enhanced clean
     /// frames to every series with that enhancer. They stay a separate series only if the model has no such series.
     pub(super) fn with_clean(mut self) -> Self {
-        let is_clean = |series: &Series<'_>| series.variant.kind.is_none();
+        let is_clean = |series: &Series<'_>| series.variant.is_untouched();
         let (clean, mut degraded): (BTreeMap<_, _>, BTreeMap<_, _>) = self
             .series
             .into_iter()
@@ -130,13 +173,13 @@ impl<'a, C> Ladder<'a, C> {
             let levels = self.levels.iter().copied();
             let ladder = Self {
                 models: self.models.clone(),
-                levels: levels
-                    .filter(|level| level.axis().is_none_or(|on| on == axis))
-                    .collect(),
+                levels: levels.filter(|level| level.is_shown_on(axis)).collect(),
                 series: series
                     .map(|(series, cells)| (series.clone(), cells.clone()))
                     .collect(),
                 without_level: self.without_level.clone(),
+                pairs: self.pairs,
+                set: self.set,
             };
             (axis, ladder)
         });
@@ -147,7 +190,7 @@ impl<'a, C> Ladder<'a, C> {
     /// without an enhancer.
     pub(super) fn start(&self, series: &Series<'_>) -> Option<&'a C> {
         let raw = self.series.iter().filter(|(other, _)| {
-            let is_clean = other.variant.kind.is_none();
+            let is_clean = other.variant.is_untouched();
             let groups = [*other, series].map(|series| series.variant.group.as_ref());
             (other.model, other.enhancer) == (series.model, None)
                 && (other.variant == series.variant
@@ -189,14 +232,15 @@ impl<'a, C> Ladder<'a, C> {
             .column(Text, "page model | terminal model", |line| {
                 listing.label(line.model())
             })
-            .column(Text, "page light | terminal light", LadderRow::light)
+            .column(Text, "page light | terminal light", |line| line.light(self))
             .column(Text, "latex Model", |line| line.label(listing))
             .column(Text, "latex Light", |line| match line {
-                LadderRow::Series(series, _) => TableCell::from(series.light()),
+                LadderRow::Series(series, _) => TableCell::from(self.light(series)),
                 LadderRow::WithoutLevel(..) => TableCell::Blank,
             });
         for (index, level) in self.levels.iter().enumerate() {
-            let names = format!("page {level} | terminal {level} | latex {level}");
+            let head = self.head(*level);
+            let names = format!("page {head} | terminal {head} | latex {head}");
             table = table.column(ColumnKind::Accuracy, &*names, |line| match line {
                 LadderRow::Series(_, cells) => cell(cells.get(level).copied()),
                 LadderRow::WithoutLevel(_, number) if index == 0 => cell(Some(number)),
@@ -236,9 +280,9 @@ impl<C> LadderRow<'_, C> {
         }
     }
 
-    fn light(&self) -> String {
+    fn light(&self, ladder: &Ladder<'_, C>) -> String {
         match self {
-            Self::Series(series, _) => series.light(),
+            Self::Series(series, _) => ladder.light(series),
             Self::WithoutLevel(subject, _) if subject.view.is_none() => "guessing".to_owned(),
             Self::WithoutLevel(..) => "without images".to_owned(),
         }

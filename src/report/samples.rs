@@ -52,7 +52,7 @@ pub(super) fn samples(thumbnails: &[Thumbnail]) -> Vec<SamplePage> {
     let pages = axes.into_iter().filter_map(|on| {
         let all = thumbnails.iter();
         let all: Vec<&Thumbnail> = all
-            .filter(|of| axis(of).is_none_or(|axis| axis == on))
+            .filter(|of| of.condition.level().is_shown_on(on))
             .collect();
         of_axis(&all, on)
     });
@@ -97,9 +97,10 @@ fn of_axis(thumbnails: &[&Thumbnail], axis: Axis) -> Option<SamplePage> {
             });
         }
     }
-    let level_names = levels
-        .iter()
-        .map(|level| format!("{level}, {} {}", level.value(), axis.unit));
+    let level_names = levels.iter().map(|level| match *level {
+        AxisLevel::PAIR => level.to_string(),
+        _ => format!("{level}, {} {}", level.value(), axis.unit),
+    });
     (!rows.is_empty()).then(|| SamplePage {
         name: match axis {
             Axis::MOTION => "blur_samples",
@@ -117,7 +118,7 @@ fn lines<'a>(thumbnails: &[&'a Thumbnail]) -> BTreeSet<(KindReading, Option<&'a 
         .iter()
         .map(|t| (t.condition.kind_reading(), t.condition.enhancer.as_ref()));
     let (mut lines, clean): (BTreeSet<_>, BTreeSet<_>) =
-        all.partition(|(variant, _)| variant.kind.is_some());
+        all.partition(|(variant, _)| variant.is_degraded());
     for (_, enhancer) in clean {
         if lines.iter().all(|(_, other)| *other != enhancer) {
             lines.insert((KindReading::NONE, enhancer));

@@ -11,7 +11,7 @@ use self::wrapped::WIDTH;
 pub(super) use self::wrapped::wrapped;
 use super::alert::lines;
 use super::choice_report::ChoiceReport;
-use super::ladder::{Ladder, Series, SeriesByLevel};
+use super::ladder::{Ladder, SeriesByLevel};
 use super::light_readings::LightReadings;
 use super::sentences::{FIRST, HOW_TO_READ, Sentence};
 use super::terminal::render;
@@ -154,14 +154,17 @@ fn table(report: &ChoiceReport<'_>) -> String {
     let common = report.findings.common.as_ref();
     let summary = common.map_or(&report.findings.summary, |common| &common.summary);
     let cells = summary.of(None, ReadingMode::Strict);
-    let ladder = Ladder::new(cells.map(|cell| (&cell.subject, cell))).with_clean();
+    let ladder = Ladder::new(cells.map(|cell| (&cell.subject, cell)))
+        .in_light_of(report.findings)
+        .with_clean();
     let mut models: Vec<&str> = ladder.series.keys().map(|series| series.model).collect();
     models.dedup();
     let mut rows: Vec<TableLine<'_>> = Vec::new();
     let one = models.len() == 1;
     for (series, cells) in &ladder.series {
         let listing = &report.findings.grid.listing;
-        let (block, name) = block_and_name(series, &listing.label(series.model), one);
+        let (block, name) =
+            block_and_name(&ladder.light(series), &listing.label(series.model), one);
         let group = listing.group(series.model);
         rows.push(TableLine {
             block,
@@ -178,9 +181,7 @@ fn table(report: &ChoiceReport<'_>) -> String {
     let longest = rows.iter().map(|row| row.name.chars().count()).max();
     let titles = rows.iter().map(|row| row.block.chars().count()).max();
     let most = Axis::ALL.map(|axis| {
-        let on = levels
-            .iter()
-            .filter(|level| level.axis().is_none_or(|on| on == axis));
+        let on = levels.iter().filter(|level| level.is_shown_on(axis));
         on.count()
     });
     let most = most.into_iter().max().unwrap_or_default();
@@ -195,7 +196,7 @@ fn table(report: &ChoiceReport<'_>) -> String {
     let mut text = format!(" accuracy in %{}\n", shared.unwrap_or_default());
     for block in rows.chunk_by(|a, b| a.block == b.block) {
         for axis in Axis::ALL {
-            let is_on = |level: &AxisLevel| level.axis().is_none_or(|on| on == axis);
+            let is_on = |level: &AxisLevel| level.is_shown_on(axis);
             let has_level = |row: &&TableLine<'_>| {
                 let mut axes = row.cells.keys().filter_map(|level| level.axis());
                 axes.next().unwrap_or(Axis::LIGHT) == axis
@@ -248,11 +249,11 @@ fn block_lines(
 }
 
 /// The title of the block and the name of the row of a series.
-fn block_and_name(series: &Series<'_>, model: &str, is_single: bool) -> (String, String) {
+fn block_and_name(light: &str, model: &str, is_single: bool) -> (String, String) {
     if is_single {
-        (model.to_owned(), series.light())
+        (model.to_owned(), light.to_owned())
     } else {
-        (series.light(), model.to_owned())
+        (light.to_owned(), model.to_owned())
     }
 }
 

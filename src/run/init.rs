@@ -7,7 +7,7 @@ use clap::Args;
 use serde_json::json;
 
 use crate::ask::png;
-use crate::dataset::{DataPlace, Dataset, ReadingRule, SelectionArgs, SetArgs};
+use crate::dataset::{DataPlace, Dataset, ReadingRule, SceneArgs, SelectionArgs, SetArgs};
 use crate::error::{Error, Result};
 use crate::files::write;
 use crate::job::Outcome;
@@ -134,8 +134,7 @@ fn of_rooms(folder: &Path, progress: &Progress) -> Result<Vec<Line>> {
     let (place, rules) = (DataPlace::Rooms(rooms), Rules::built_in()?);
     let (set, selection) = (SetArgs::default(), SelectionArgs::default());
     let dataset = open_data(
-        &place,
-        &set,
+        (&place, &SceneArgs::default(), &set),
         &selection,
         &rules,
         ReadingRule::default(),

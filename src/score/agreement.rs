@@ -32,6 +32,20 @@ pub struct AgreementCounts {
     pub second: f64,
 }
 
+/// Agreement of each model with itself in two lights that show the same: photographed in the dark against synthetic, and with an
+/// enhancer against without, of photographs in the dark and of untouched frames.
+#[must_use]
+pub(crate) fn light_agreements(grid: &Grid<'_>) -> Vec<Agreement> {
+    let of = |kind| pairs(grid, kind).into_iter();
+    let untouched = of(ComparisonKind::Enhancer)
+        .filter(|(first, _)| grid.subjects[*first].variant.is_untouched());
+    of(ComparisonKind::RealSynthetic)
+        .chain(of(ComparisonKind::RealEnhanced))
+        .chain(untouched)
+        .filter_map(|(first, second)| agreement(grid, first, second))
+        .collect()
+}
+
 /// Agreement of every pair of models in every condition.
 #[must_use]
 pub(crate) fn agreements(grid: &Grid<'_>) -> Vec<Agreement> {

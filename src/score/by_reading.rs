@@ -261,6 +261,7 @@ impl Sides<'_, '_> {
         let light = |kind: Option<Kind>, reading: Option<&ReadingName>| KindReading {
             kind,
             reading: reading.cloned(),
+            pair: None,
             group: self.group.cloned(),
         };
         let noisy = light(Some(Kind::Sensor), Some(reading));

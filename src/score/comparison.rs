@@ -1,5 +1,7 @@
 //! Paired differences between subjects, with their tests: [`Comparison`].
 
+mod real_synthetic;
+
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::choice::ReadingMode;
@@ -7,7 +9,7 @@ use super::grid::Grid;
 use super::paired::PairedComparison;
 use super::significance::{Significance, holm, least_p};
 use super::subject::{Subject, judged};
-use crate::types::{AxisLevel, Family, KindReading, View};
+use crate::types::{AxisLevel, Family, KindReading, PairDark, View};
 use rayon::prelude::*;
 
 /// The two sides of a comparison.
@@ -25,17 +27,23 @@ pub enum ComparisonKind {
     Blind,
     /// A model in one light against the same model in another: other images of the same frames at the same level.
     Light,
+    /// A photograph in the dark against synthetic images that are as dark, raw or with the same enhancer.
+    RealSynthetic,
+    /// A photograph in the dark, enhanced against raw.
+    RealEnhanced,
 }
 
 impl ComparisonKind {
     /// All kinds in the order of the tables.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 8] = [
         Self::Level,
         Self::Variant,
         Self::Enhancer,
         Self::Model,
         Self::Blind,
         Self::Light,
+        Self::RealSynthetic,
+        Self::RealEnhanced,
     ];
 
     /// The name of the kind in CSV files.
@@ -48,6 +56,8 @@ impl ComparisonKind {
             Self::Model => "model",
             Self::Blind => "blind",
             Self::Light => "light",
+            Self::RealSynthetic => "real-synthetic",
+            Self::RealEnhanced => "real-enhanced",
         }
     }
 }
@@ -182,7 +192,7 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)
         let against: Vec<usize> = match kind {
             // Only raw images show what darkness costs. The curves show how much of it an enhancer recovers.
             ComparisonKind::Level
-                if subject.variant.kind.is_some() && subject.enhancer.is_none() =>
+                if subject.variant.is_degraded() && subject.enhancer.is_none() =>
             {
                 let clean = Subject::seeing(&subject.model, AxisLevel::L0, &subject.variant, None);
                 grid.stand_in(&clean).into_iter().collect()
@@ -198,12 +208,20 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)
                     other.variant = KindReading {
                         kind: base,
                         reading: None,
+                        pair: None,
                         group: subject.variant.group.clone(),
                     };
                 }),
             },
-            ComparisonKind::Enhancer if subject.enhancer.is_some() => {
+            ComparisonKind::Enhancer | ComparisonKind::RealEnhanced
+                if subject.enhancer.is_some()
+                    && subject.variant.photograph().is_some()
+                        == (kind == ComparisonKind::RealEnhanced) =>
+            {
                 changed(grid, subject, |other| other.enhancer = None)
+            }
+            ComparisonKind::RealSynthetic if subject.variant.photograph().is_some() => {
+                real_synthetic::as_dark(grid, index)
             }
             ComparisonKind::Model => later_models(grid, index, &judged),
             ComparisonKind::Light => later_lights(grid, index),
@@ -252,6 +270,8 @@ fn later_lights(grid: &Grid<'_>, index: usize) -> Vec<usize> {
 fn is_other_light(one: &Subject, other: &Subject) -> bool {
     (one.view, one.level) == (other.view, other.level)
         && (one.variant.kind, &one.enhancer) == (other.variant.kind, &other.enhancer)
+        && one.variant.pair.as_ref().map(PairDark::sort)
+            == other.variant.pair.as_ref().map(PairDark::sort)
         && one.variant != other.variant
 }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::accuracy::{AccuracySummary, summarize};
-use super::agreement::{Agreement, agreements};
+use super::agreement::{Agreement, agreements, light_agreements};
 use super::best::{BestInTheDark, best_in_the_dark};
 use super::bootstrap::Resamples;
 use super::by_reading::{FindingByReading, by_reading};
@@ -19,6 +19,8 @@ use super::flips::{FirstFailure, first_failures};
 use super::grid::Grid;
 use super::health::{Health, healths};
 use super::observed::ObserverSummary;
+use super::pair_darkness::{self, PairDarkness};
+use super::photographed_set::PhotographedSet;
 use super::pooled::{LevelsLeftOut, PooledFinding, levels_left_out, pooled};
 use super::significance::Significance;
 use super::subject::{Subject, is_control, is_observer};
@@ -57,6 +59,12 @@ pub struct Findings<'a> {
     pub first_failures: Vec<FirstFailure>,
     /// Agreement of models in each condition.
     pub agreements: Vec<Agreement>,
+    /// Agreement of each model with itself in two lights that show the same.
+    pub(crate) light_agreements: Vec<Agreement>,
+    /// The light in which the photographs of the set were taken.
+    pub(crate) set: PhotographedSet,
+    /// How dark the photographs in the dark are beside their frames, by name.
+    pub(crate) pairs: Vec<PairDarkness>,
     /// What the similarity of images to their clean frames says about the answers; `None` if it was not measured.
     pub fidelity: Option<FidelityFindings>,
     /// What the models share; `None` if all were asked the same questions.
@@ -115,6 +123,15 @@ impl<'a> Findings<'a> {
         }
     }
 
+    /// The same results of a set whose photographs were taken in this light.
+    #[must_use]
+    pub(crate) fn of_set(mut self, set: PhotographedSet) -> Self {
+        self.set = set;
+        let shown = self.without_observer.take();
+        self.without_observer = shown.map(|shown| Box::new(shown.of_set(set)));
+        self
+    }
+
     /// What is shown: without the observer, if one of its controls is not at chance or none was asked.
     #[must_use]
     pub fn shown(&self) -> &Self {
@@ -149,6 +166,9 @@ impl<'a> Findings<'a> {
             hallucinations: hallucinations(&grid),
             first_failures: first_failures(&grid),
             agreements: agreements(&grid),
+            light_agreements: light_agreements(&grid),
+            set: PhotographedSet::default(),
+            pairs: pair_darkness::of_grid(&grid),
             fidelity: FidelityFindings::new(&grid, measured),
             common: CommonItems::of(&grid),
             observer,

@@ -89,7 +89,9 @@ impl PooledSet {
     /// All sets for which the grid may have both sides.
     fn all(grid: &Grid<'_>) -> BTreeSet<Self> {
         let seeing = grid.subjects.iter();
-        let seeing = seeing.filter(|subject| subject.view == Some(View::Image));
+        // Findings are about levels, and the darkness of pairs is none: it has comparisons of its own.
+        let seeing = seeing
+            .filter(|subject| subject.view == Some(View::Image) && subject.variant.pair.is_none());
         let sets = seeing.flat_map(|subject| {
             let raw = PooledKind::of_raw(subject.variant.kind);
             let kinds = match subject.enhancer {
@@ -123,6 +125,7 @@ impl PooledSet {
                 let base = KindReading {
                     kind: self.variant.kind.and_then(Kind::base),
                     reading: None,
+                    pair: None,
                     group: self.variant.group.clone(),
                 };
                 seeing(level, &base, None)

@@ -104,13 +104,14 @@ impl Subject {
         let Some(level) = self.level else {
             return "blind".to_owned();
         };
-        let variant = match self.variant.kind {
-            None => String::new(),
-            Some(_) => format!("-{}", self.variant.kind_and_reading()),
+        let light = match (&self.variant.pair, self.variant.kind) {
+            (Some(pair), _) => pair.to_string(),
+            (None, None) => level.to_string(),
+            (None, Some(_)) => format!("{level}-{}", self.variant.kind_and_reading()),
         };
         let enhancer = self.enhancer.as_ref().map(|name| format!("+{name}"));
         let group = self.variant.group_suffix();
-        format!("{level}{variant}{}{group}", enhancer.unwrap_or_default())
+        format!("{light}{}{group}", enhancer.unwrap_or_default())
     }
 
     /// Whether a subject of a report stands for this one: they are equal, but that their groups of runs need only meet.
@@ -119,7 +120,7 @@ impl Subject {
         let (one, two) = (&self.variant, &other.variant);
         self.model == other.model
             && (self.view, self.level) == (other.view, other.level)
-            && (one.kind, &one.reading) == (two.kind, &two.reading)
+            && (one.kind, &one.reading, &one.pair) == (two.kind, &two.reading, &two.pair)
             && self.enhancer == other.enhancer
             && LightGroup::meet(one.group.as_ref(), two.group.as_ref())
     }

@@ -1,9 +1,10 @@
 //! The levels of the kinds of a run: those that are named, or each kind's own ladder.
 
 use super::levels::{LIGHT, Levels, ladder};
+use super::reading::Readings;
 use crate::error::{Error, Result};
 use crate::types::degradation::{Axis, Kind};
-use crate::types::{AxisLevel, KindSet};
+use crate::types::{AxisLevel, KindSet, PairDark};
 
 impl Levels {
     /// The levels of a run with these kinds. Kinds of an axis on which no level is named have their own ladder, if L0 to L5 are
@@ -13,6 +14,7 @@ impl Levels {
     /// If a kind has no level, or a level no kind.
     pub(super) fn of_kinds(&self, kinds: KindSet) -> Result<Vec<AxisLevel>> {
         let mut levels = self.0.clone();
+        levels.retain(|level| *level != AxisLevel::PAIR);
         let on = |axis: Axis| move |level: &&AxisLevel| level.axis() == Some(axis);
         let is_clean = levels.iter().all(|level| level.severity().is_none());
         let light = levels
@@ -48,6 +50,33 @@ impl Levels {
         levels.sort_unstable();
         levels.dedup();
         Ok(levels)
+    }
+
+    /// The kinds and readings whose synthetic images are as dark as each frame's own photograph; empty unless `match` is among the
+    /// levels.
+    ///
+    /// # Errors
+    /// If it is, and no kind reduces the light.
+    pub(super) fn matches(&self, kinds: KindSet, readings: &Readings) -> Result<Vec<PairDark>> {
+        if !self.0.contains(&AxisLevel::PAIR) {
+            return Ok(Vec::new());
+        }
+        let mut all = Vec::new();
+        for kind in kinds.kinds().filter(|kind| kind.can_match()) {
+            if kind.has_readings() {
+                let readings = readings.iter().map(|(name, _)| Some(name.clone()));
+                all.extend(readings.map(|reading| PairDark::Match(kind, reading)));
+            } else {
+                all.push(PairDark::Match(kind, None));
+            }
+        }
+        if all.is_empty() {
+            let problem = format_args!(
+                "match reduces the light, which --variant {kinds} does not; add ev or noise to it"
+            );
+            return Err(Error::usage("--levels", problem));
+        }
+        Ok(all)
     }
 }
 

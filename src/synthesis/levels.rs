@@ -13,19 +13,24 @@ pub(crate) struct Levels(pub Vec<AxisLevel>);
 /// Maximum number of levels of a run; chosen.
 const MAX_LEVELS: usize = 200;
 
+/// The word for the darkness of each frame's own photograph.
+const MATCH: &str = "match";
+
 /// Kind whose labels (L1 to L5) the light levels have.
 pub(super) const LIGHT: Kind = Kind::ALL[0];
 
 impl FromStr for Levels {
     type Err = String;
 
-    /// Parses items between commas, in any order: `L3`, `L0-L5`, a number of EV, `0..10:0.5`, or exposure times as `T33.33`. Sorts
-    /// the levels and removes duplicates.
+    /// Parses items between commas, in any order: `L3`, `L0-L5`, a number of EV, `0..10:0.5`, exposure times as `T33.33`, or `match`
+    /// for the darkness of each frame's own photograph. Sorts the levels and removes duplicates.
     fn from_str(text: &str) -> Result<Self, String> {
         let mut levels = Vec::new();
         for item in text.split(',').map(str::trim) {
             if item.is_empty() {
                 return Err("a level is missing; write levels as L3, L0-L5, 3.3 (EV), 0..10:0.5 or T33.33 (ms), between commas".to_owned());
+            } else if item.eq_ignore_ascii_case(MATCH) {
+                levels.push(AxisLevel::PAIR);
             } else if let Some((from, rest)) = item.split_once("..") {
                 levels.extend(steps(item, from.trim(), rest.trim())?);
             } else if let Some((first, last)) = item.split_once('-') {
@@ -241,6 +246,13 @@ mod tests {
         assert_eq!(names("0..16:0.1").len(), 161);
         assert_eq!(names("14.01..16:0.01").len(), 200);
         assert_eq!(names("L0,3..4:0.25,L1-L2").len(), 7);
+    }
+
+    #[test]
+    fn the_darkness_of_pairs_is_a_level() {
+        assert_eq!(names("match,L0"), ["L0", "dark"]);
+        assert_eq!("match".parse(), Ok(Levels(vec![AxisLevel::PAIR])));
+        assert!("match-L3".parse::<Levels>().is_err());
     }
 
     #[test]

@@ -9,25 +9,26 @@ use serde::Serialize;
 
 use super::applied::AppliedDegradation;
 use super::auto::AutoExposure;
-use super::levels::Levels;
+use super::levels::{LIGHT, Levels, ladder};
 use super::motion::{FrameView, Motion};
 use super::random::NoiseKey;
 use super::reading::{Amplify, Coupling, Draws, LightReading, Readings, Synthesis, Tone};
 use super::{Calibration, CameraModel, Sampling};
 use crate::error::{Error, Result};
 use crate::types::degradation::Kind;
-use crate::types::{AxisLevel, Decides, Degradation, KindSet, ReadingName};
+use crate::types::{AxisLevel, Decides, Degradation, KindSet, PairDark, ReadingName, SetLight};
 
 /// The levels and kinds of degradation.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Light")]
 pub(crate) struct LightArgs {
     /// Levels, as L0-L5 or L0,L3, exposure drops in EV up to 16, as L0,3.3, and ranges of them, as 0..10:0.5; of motion,
-    /// exposure times in ms, as T33.33 or T8.33-T133.33
+    /// exposure times in ms, as T33.33 or T8.33-T133.33; match is as dark as the photograph of each frame in the dark; default: L0-L5,
+    /// of photographs in the dark L0
     ///
     /// L0-L5 is also the ladder of motion, T8.33-T133.33, unless exposure times are named.
-    #[arg(long, value_name = "LEVELS", default_value = "L0-L5", add = Decides::Trials)]
-    pub levels: Levels,
+    #[arg(long, value_name = "LEVELS", add = Decides::Trials)]
+    pub levels: Option<Levels>,
     /// Which variants, one or several as ev,auto: ev (exposure drop alone), noise (with sensor noise), both (of these two), auto (as
     /// a camera with automatic exposure meets the drop), motion (motion blur alone), all
     #[arg(long, value_name = "LIST", default_value_t = KindSet::BOTH, add = Decides::Trials)]
@@ -38,6 +39,18 @@ pub(crate) struct LightArgs {
     /// The camera's automatic exposure and its motion.
     #[command(flatten)]
     pub camera: CameraArgs,
+}
+
+impl LightArgs {
+    /// The levels: those that are named, else L0 to L5, and of photographs in the dark L0 alone, because their own noise is in them.
+    pub(crate) fn levels(&self, set: SetLight) -> Levels {
+        self.levels.clone().unwrap_or_else(|| {
+            Levels(match set {
+                SetLight::Lit => ladder(LIGHT),
+                SetLight::Dark => vec![AxisLevel::L0],
+            })
+        })
+    }
 }
 
 /// The camera's automatic exposure and its motion.
@@ -144,6 +157,8 @@ impl Profile {
 pub(crate) struct LightSettings {
     /// Levels in ascending order of degradation, axis by axis, without duplicates.
     pub levels: Vec<AxisLevel>,
+    /// Synthetic images that are as dark as each frame's own photograph; none unless `--levels` has `match`.
+    pub matches: Vec<PairDark>,
     /// Kinds of degradation at all levels of their axis except L0.
     pub variants: KindSet,
     /// Settings of each kind.
@@ -175,16 +190,33 @@ impl LightSettings {
     ///
     /// # Errors
     /// [`Error::Usage`] with the flag that cannot be used.
-    pub(crate) fn resolve(args: &LightArgs) -> Result<Self> {
+    pub(crate) fn resolve(args: &LightArgs, set: SetLight) -> Result<Self> {
+        let levels = args.levels(set);
+        let kinds = KindSettings::resolve(&args.sensor, &args.camera)?;
         let light = Self {
-            levels: args.levels.of_kinds(args.variant)?,
+            levels: levels.of_kinds(args.variant)?,
+            matches: levels.matches(args.variant, &kinds.sensor.readings)?,
             variants: args.variant,
-            kinds: KindSettings::resolve(&args.sensor, &args.camera)?,
+            kinds,
         };
         for how in light.degradations().iter().flatten() {
             light.kinds.check(how)?;
         }
         Ok(light)
+    }
+
+    /// Refuses synthetic images that are as dark as photographs, because there are none; `why` says why.
+    ///
+    /// # Errors
+    /// If `--levels` has `match`.
+    pub(crate) fn refuse_matches(&self, why: &str) -> Result<()> {
+        if self.matches.is_empty() {
+            return Ok(());
+        }
+        let problem = format_args!(
+            "match makes each frame as dark as its photograph in the dark, and {why}; name levels as L0-L5"
+        );
+        Err(Error::usage("--levels", problem))
     }
 
     /// Degradations of each frame, level by level: each kind, in each light reading if it has readings; `None` is L0.

@@ -1,39 +1,69 @@
 //! The values of the columns `level` and `variant` of tables: [`AxisLevel`] and [`KindReading`].
 
+use std::borrow::Cow;
 use std::fmt;
 
 use super::degradation::{Axis, Degradation, Kind, ReadingName, Severity};
 use super::light_group::LightGroup;
+use super::pair_dark::{PairDark, PhotoName};
+use super::treatment::Treatment;
 use super::words::written_as_text;
 
 /// A point on the axis of a curve: L0 (the untouched frame) or a severity. All kinds of one axis share their points. The points of
-/// an axis follow each other by severity.
+/// an axis follow each other by severity. The darkness of pairs is on no axis, because it differs by frame; it follows all others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct AxisLevel(Option<(Kind, Severity)>);
+pub struct AxisLevel(Point);
+
+/// What an [`AxisLevel`] is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+enum Point {
+    Untouched,
+    Degraded(Kind, Severity),
+    Pair,
+}
 
 impl AxisLevel {
     /// The untouched frame, the first point of every axis.
-    pub const L0: Self = Self(None);
+    pub const L0: Self = Self(Point::Untouched);
+
+    /// The darkness of pairs, photographed or synthetic.
+    pub const PAIR: Self = Self(Point::Pair);
 
     /// The level of a severity of a kind.
     #[must_use]
     pub fn new(kind: Kind, severity: Severity) -> Self {
-        Self(Some((kind.first_of_axis(), severity)))
+        Self(Point::Degraded(kind.first_of_axis(), severity))
     }
 
-    /// The severity; `None` for L0.
+    /// The severity; `None` for L0 and for pairs.
     #[must_use]
     pub fn severity(self) -> Option<Severity> {
-        self.0.map(|(_, severity)| severity)
+        match self.0 {
+            Point::Degraded(_, severity) => Some(severity),
+            Point::Untouched | Point::Pair => None,
+        }
     }
 
-    /// The axis; `None` for L0, which is on all axes.
+    /// The axis; `None` for L0, which is on all axes, and for pairs, which are on none.
     #[must_use]
     pub fn axis(self) -> Option<Axis> {
-        self.0.map(|(kind, _)| kind.axis())
+        match self.0 {
+            Point::Degraded(kind, _) => Some(kind.axis()),
+            Point::Untouched | Point::Pair => None,
+        }
     }
 
-    /// The distance from L0 in the unit of the axis.
+    /// Whether the level has a place in the tables of an axis: L0 in all of them, pairs in those of light.
+    #[must_use]
+    pub fn is_shown_on(self, axis: Axis) -> bool {
+        match self.0 {
+            Point::Untouched => true,
+            Point::Degraded(kind, _) => kind.axis() == axis,
+            Point::Pair => axis == Axis::LIGHT,
+        }
+    }
+
+    /// The distance from L0 in the unit of the axis; 0 for pairs, which have none of their own.
     #[must_use]
     pub fn value(self) -> f64 {
         self.severity().map_or(0.0, Severity::value)
@@ -46,19 +76,32 @@ impl From<Option<&Degradation>> for AxisLevel {
     }
 }
 
-impl fmt::Display for AxisLevel {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.0 {
-            None => f.pad("L0"),
-            Some((kind, severity)) => f.pad(&kind.label(severity)),
+impl From<&Treatment> for AxisLevel {
+    fn from(treatment: &Treatment) -> Self {
+        match treatment {
+            Treatment::Paired(_) => Self::PAIR,
+            Treatment::Untouched | Treatment::Degraded(_) => treatment.degradation().into(),
         }
     }
 }
 
-/// A kind of degradation in one light reading, at any severity: the levels of one curve share it.
+impl fmt::Display for AxisLevel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Point::Untouched => f.pad("L0"),
+            Point::Degraded(kind, severity) => f.pad(&kind.label(severity)),
+            Point::Pair => f.pad("dark"),
+        }
+    }
+}
+
+/// A kind of degradation in one light reading, at any severity: the levels of one curve share it. Or the darkness of pairs, which is
+/// on no curve: it has no kind.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct KindReading {
-    /// The kind; `None` for untouched frames.
+    /// The darkness of pairs; `None` for untouched frames and degradations. It is the first field, so that pairs follow all others.
+    pub pair: Option<PairDark>,
+    /// The kind; `None` for untouched frames and pairs.
     pub kind: Option<Kind>,
     /// The light reading; `None` if the kind has none.
     pub reading: Option<ReadingName>,
@@ -71,28 +114,64 @@ impl KindReading {
     pub const NONE: Self = Self {
         kind: None,
         reading: None,
+        pair: None,
         group: None,
     };
 
-    /// The kind's word in files and flags, or `none`.
+    /// Whether these are untouched frames, of whichever runs.
     #[must_use]
-    pub fn word(&self) -> &'static str {
-        self.kind.map_or("none", Kind::word)
+    pub fn is_untouched(&self) -> bool {
+        self.kind.is_none() && self.pair.is_none()
+    }
+
+    /// Whether these frames have less light than untouched ones, or a degradation of another kind.
+    #[must_use]
+    pub fn is_degraded(&self) -> bool {
+        !self.is_untouched()
+    }
+
+    /// The kind's word in files and flags, or `none`; for pairs the name of their darkness.
+    #[must_use]
+    pub fn word(&self) -> Cow<'static, str> {
+        match &self.pair {
+            None => Cow::Borrowed(self.kind.map_or("none", Kind::word)),
+            Some(pair) => Cow::Owned(pair.to_string()),
+        }
+    }
+
+    /// The name of the photograph in the dark; `None` for all other images.
+    #[must_use]
+    pub fn photograph(&self) -> Option<&PhotoName> {
+        self.pair.as_ref().and_then(PairDark::photograph)
+    }
+
+    /// The kind of synthesis with a light exposure drop, also one that differs by frame; `None` for images that are not synthetic.
+    #[must_use]
+    pub fn synthetic_kind(&self) -> Option<Kind> {
+        match &self.pair {
+            Some(PairDark::Match(kind, _)) => Some(*kind),
+            Some(PairDark::Photograph(_)) => None,
+            None => self.kind,
+        }
     }
 
     /// The name in captions, as `with noise`; with the light reading if it is not the paper's, without the group of runs.
     #[must_use]
     pub fn title(&self) -> String {
+        if let Some(pair) = &self.pair {
+            return pair.title();
+        }
         let kind = self.kind.map_or("untouched", Kind::title);
         self.named_reading()
             .map_or(kind.to_owned(), |reading| format!("{kind} @{reading}"))
     }
 
-    /// The kind's word with the light reading if it is not the paper's, as `noise@eld`; without the group of runs.
+    /// The kind's word with the light reading if it is not the paper's, as `noise@eld`, or the name of a pair's darkness; without
+    /// the group of runs.
     #[must_use]
     pub fn kind_and_reading(&self) -> String {
         match self.named_reading() {
-            None => self.word().to_owned(),
+            None => self.word().into_owned(),
             Some(reading) => format!("{}@{reading}", self.word()),
         }
     }
@@ -117,7 +196,16 @@ impl From<Option<&Degradation>> for KindReading {
         Self {
             kind: degradation.map(Degradation::kind),
             reading: degradation.and_then(|how| how.reading().cloned()),
-            group: None,
+            ..Self::NONE
+        }
+    }
+}
+
+impl From<&Treatment> for KindReading {
+    fn from(treatment: &Treatment) -> Self {
+        Self {
+            pair: treatment.pair().cloned(),
+            ..treatment.degradation().into()
         }
     }
 }

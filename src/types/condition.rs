@@ -1,4 +1,4 @@
-//! The state in which a frame is shown to a model: [`Condition`] = degradation × enhancer.
+//! The state in which a frame is shown to a model: [`Condition`] = treatment × enhancer.
 
 use std::fmt;
 use std::str::FromStr;
@@ -8,6 +8,8 @@ use serde::{Deserialize, Deserializer, Serialize};
 use super::axis_level::{AxisLevel, KindReading};
 use super::degradation::Degradation;
 use super::light_group::LightGroup;
+use super::pair_dark::{PairDark, PhotoName};
+use super::treatment::Treatment;
 use super::words::as_text;
 use crate::error::Error;
 
@@ -43,13 +45,14 @@ impl fmt::Display for EnhancerName {
     }
 }
 
-/// A degradation with or without an enhancer: the state in which a frame is shown.
+/// A treatment with or without an enhancer: the state in which a frame is shown.
 ///
-/// The name is `LABEL-KIND[@READING][+ENHANCER]` or `L0[+ENHANCER]`; `&` is reserved for several degradations in sequence.
+/// The name is `LABEL-KIND[@READING][+ENHANCER]` or `L0[+ENHANCER]`, of a photograph in the dark `NAME[+ENHANCER]`, and of synthetic
+/// images as dark as it `match-KIND[@READING][+ENHANCER]`; `&` is reserved for several degradations in sequence.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Condition {
-    /// The degradation of the frame; `None` for L0, the untouched frame.
-    pub degradation: Option<Degradation>,
+    /// What becomes of the frame before it is enhanced.
+    pub treatment: Treatment,
     /// The enhancer; `None` if the image is not enhanced.
     pub enhancer: Option<EnhancerName>,
     /// The runs that show these images, in a report on runs that show different ones; else `None`.
@@ -59,43 +62,58 @@ pub struct Condition {
 impl Condition {
     /// The untouched frame without an enhancer.
     pub const L0: Self = Self {
-        degradation: None,
+        treatment: Treatment::Untouched,
         enhancer: None,
         group: None,
     };
 
     /// The condition without an enhancer.
     #[must_use]
-    pub fn raw(degradation: Option<Degradation>) -> Self {
+    pub fn raw(treatment: impl Into<Treatment>) -> Self {
         Self {
-            degradation,
+            treatment: treatment.into(),
             enhancer: None,
             group: None,
         }
     }
 
+    /// The degradation of the frame; `None` for L0, a photograph in the dark, and synthetic images that are as dark as it.
+    #[must_use]
+    pub fn degradation(&self) -> Option<&Degradation> {
+        self.treatment.degradation()
+    }
+
+    /// The darkness of a pair; `None` for L0 and for degradations.
+    #[must_use]
+    pub fn pair(&self) -> Option<&PairDark> {
+        self.treatment.pair()
+    }
+
+    /// The name of the photograph in the dark; `None` for images that are made from the frame itself.
+    #[must_use]
+    pub fn photograph(&self) -> Option<&PhotoName> {
+        self.pair().and_then(PairDark::photograph)
+    }
+
     /// The value of the column `level`.
     #[must_use]
     pub fn level(&self) -> AxisLevel {
-        self.degradation.as_ref().into()
+        (&self.treatment).into()
     }
 
-    /// The value of the column `variant`: the kind with its light reading and its group of runs.
+    /// The value of the column `variant`: the kind with its light reading, or the darkness of a pair; and its group of runs.
     #[must_use]
     pub fn kind_reading(&self) -> KindReading {
         KindReading {
             group: self.group.clone(),
-            ..self.degradation.as_ref().into()
+            ..(&self.treatment).into()
         }
     }
 }
 
 impl fmt::Display for Condition {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match &self.degradation {
-            None => f.write_str("L0")?,
-            Some(degradation) => write!(f, "{degradation}")?,
-        }
+        self.treatment.fmt(f)?;
         if let Some(name) = &self.enhancer {
             write!(f, "+{name}")?;
         }
@@ -110,16 +128,12 @@ impl FromStr for Condition {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self, Error> {
-        let (degradation, enhancer) = match text.split_once('+') {
+        let (treatment, enhancer) = match text.split_once('+') {
             None => (text, None),
-            Some((degradation, name)) => (degradation, Some(EnhancerName::new(name)?)),
-        };
-        let degradation = match degradation {
-            "L0" => None,
-            other => Some(other.parse()?),
+            Some((treatment, name)) => (treatment, Some(EnhancerName::new(name)?)),
         };
         Ok(Self {
-            degradation,
+            treatment: treatment.parse()?,
             enhancer,
             group: None,
         })
@@ -149,6 +163,10 @@ mod tests {
             "L3-noise@physical",
             "E3.3-noise@eld+zerodce",
             "E0.01-noise@my-own.reading_2+a",
+            "dark",
+            "dark-2+zero-dce.v2",
+            "match-noise@eld",
+            "match-ev+ruas",
         ] {
             assert_eq!(text.parse::<Condition>().unwrap().to_string(), text);
         }
@@ -176,6 +194,9 @@ mod tests {
             ("E0-ev", "0 or too large"),
             ("E16.01-ev", "above E16"),
             ("E1e1-ev", "not a decimal number"),
+            ("match-raw", "the forms are match-ev"),
+            ("Dark", "not of that form"),
+            ("dark+", "not a valid name of an enhancer"),
         ];
         for (text, expected) in cases {
             let error = text.parse::<Condition>().unwrap_err().to_string();
@@ -185,12 +206,28 @@ mod tests {
 
     #[test]
     fn order_is_by_severity() {
-        let mut names = ["L3-ev", "L0", "E5-noise@eld", "E5-noise", "L2-noise"];
+        let mut names = [
+            "dark",
+            "L3-ev",
+            "match-ev",
+            "L0",
+            "E5-noise@eld",
+            "E5-noise",
+            "L2-noise",
+        ];
         let key = |name: &&str| name.parse::<Condition>().unwrap();
         names.sort_by_key(key);
         assert_eq!(
             names,
-            ["L0", "L2-noise", "E5-noise", "E5-noise@eld", "L3-ev"]
+            [
+                "L0",
+                "L2-noise",
+                "E5-noise",
+                "E5-noise@eld",
+                "L3-ev",
+                "match-ev",
+                "dark"
+            ]
         );
     }
 }

@@ -228,6 +228,12 @@ impl Kind {
         matches!(self, Self::Auto | Self::Motion)
     }
 
+    /// Whether the kind can be as dark as a photograph: its severity is an exposure drop.
+    #[must_use]
+    pub fn can_match(self) -> bool {
+        self.axis() == Axis::LIGHT
+    }
+
     /// The kind that this one extends and is compared with: noise extends the exposure drop.
     #[must_use]
     pub fn base(self) -> Option<Self> {

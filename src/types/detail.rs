@@ -8,6 +8,7 @@ use super::exposure_facts::ExposureFacts;
 use super::frame::FrameId;
 use super::observed::Observed;
 use super::option_probabilities::OptionProbabilities;
+use super::pair_facts::PairFacts;
 use super::question::{Answer, Family, QuestionId, UnreadReason};
 use super::record::{Failure, Record, Via, View};
 use super::reply::{Finish, Usage};
@@ -234,4 +235,7 @@ pub struct ImageFacts {
     /// What the camera did for the image; not in the file for kinds that leave it open.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure: Option<ExposureFacts>,
+    /// How dark the photograph of the frame is, of images in its darkness; not in the file for others.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pair: Option<PairFacts>,
 }

@@ -26,6 +26,8 @@ pub(crate) mod model_listing;
 pub(crate) mod model_views;
 pub(crate) mod observed;
 pub(crate) mod option_probabilities;
+pub(crate) mod pair_dark;
+mod pair_facts;
 pub(crate) mod pixels;
 pub(crate) mod question;
 pub(crate) mod recent;
@@ -33,8 +35,10 @@ pub(crate) mod record;
 pub(crate) mod recorded_names;
 pub(crate) mod reply;
 pub(crate) mod run_question;
+mod set_light;
 pub(crate) mod severity;
 mod shown_codes;
+pub(crate) mod treatment;
 pub(crate) mod treatment_set;
 pub(crate) mod trial_key;
 pub(crate) mod words;
@@ -61,13 +65,17 @@ pub use light_group::LightGroup;
 pub use model_listing::{ListedModel, ModelColumn, ModelListing};
 pub use observed::{AnswerSource, Observed};
 pub use option_probabilities::{OptionProbabilities, Thought, TokenChances, TokenPosition};
+pub use pair_dark::{PairDark, PhotoName};
+pub use pair_facts::PairFacts;
 pub use pixels::Pixels;
 pub(crate) use question::Truths;
 pub use question::{Answer, Choices, Family, Question, QuestionId, UnreadReason};
 pub use record::{Detail, Failure, FailureKind, Via, View};
 pub use reply::{Finish, Reply, Usage};
 pub use run_question::RunQuestion;
+pub use set_light::SetLight;
 pub use severity::{Axis, Severity};
+pub use treatment::Treatment;
 pub use treatment_set::TreatmentSet;
 pub use trial_key::TrialKey;
 
@@ -99,7 +107,7 @@ mod tests {
         #[test]
         fn conditions_read_back(degradation in degradation(), enhancer in prop::option::of("[A-Za-z0-9_.-]{1,12}")) {
             let enhancer = enhancer.map(|name| EnhancerName::new(&name).unwrap());
-            let condition = Condition { degradation, enhancer, group: None };
+            let condition = Condition { treatment: degradation.into(), enhancer, group: None };
             prop_assert_eq!(&condition.to_string().parse::<Condition>().unwrap(), &condition);
             let json = serde_json::to_string(&condition).unwrap();
             prop_assert_eq!(serde_json::from_str::<Condition>(&json).unwrap(), condition);

@@ -196,13 +196,13 @@ mod condition_columns {
     use serde::{Serialize, Serializer};
 
     use crate::types::degradation::{Axis, Degradation, ReadingName, Severity};
-    use crate::types::{AxisLevel, Condition, EnhancerName};
+    use crate::types::{AxisLevel, Condition, EnhancerName, PairDark};
 
     #[derive(Serialize)]
     struct Columns<'a> {
         condition: Option<&'a Condition>,
         level: Option<AxisLevel>,
-        variant: &'static str,
+        variant: String,
         ev: Option<f64>,
         /// The severity of kinds that are not measured in EV; they have no `ev`.
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -217,17 +217,27 @@ mod condition_columns {
         serializer: S,
     ) -> Result<S::Ok, S::Error> {
         let condition = condition.as_ref();
-        let degradation = condition.and_then(|condition| condition.degradation.as_ref());
+        let degradation = condition.and_then(|condition| condition.degradation());
         let level = condition.map(Condition::level);
-        let light = level.filter(|level| level.axis().is_none_or(|axis| axis == Axis::LIGHT));
+        // The darkness of pairs differs by frame; it is in the facts about the image.
+        let same = level.filter(|level| *level != AxisLevel::PAIR);
+        let light = same.filter(|level| level.axis().is_none_or(|axis| axis == Axis::LIGHT));
         let severity = degradation.map(Degradation::severity);
         Columns {
             condition,
             level,
-            variant: degradation.map_or("none", |how| how.kind().word()),
+            variant: match condition.and_then(Condition::pair) {
+                Some(pair) => pair.to_string(),
+                None => degradation
+                    .map_or("none", |how| how.kind().word())
+                    .to_owned(),
+            },
             ev: light.map(AxisLevel::value),
             severity: severity.filter(|_| light.is_none()),
-            reading: degradation.and_then(Degradation::reading),
+            reading: degradation.and_then(Degradation::reading).or_else(|| {
+                let pair = condition.and_then(Condition::pair);
+                pair.and_then(PairDark::reading)
+            }),
             enhancer: condition.and_then(|condition| condition.enhancer.as_ref()),
         }
         .serialize(serializer)

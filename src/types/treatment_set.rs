@@ -5,14 +5,19 @@ use std::str::FromStr;
 
 use super::degradation::Kind;
 use super::kind_set::KindSet;
+use super::pair_dark::PairDark;
+use super::treatment::Treatment;
 
 /// The word for the untouched frame.
 const UNTOUCHED: &str = "l0";
 
-/// The word for the untouched frame and every kind of degradation.
+/// The word for the darkness of pairs: photographs in the dark.
+const PHOTOGRAPHS: &str = "dark";
+
+/// The word for the untouched frame, every kind of degradation, and photographs in the dark.
 const ALL: &str = "all";
 
-/// A set of treatments of a frame: untouched, and the kinds of degradation.
+/// A set of treatments of a frame: untouched, the kinds of degradation, and photographed in the dark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TreatmentSet(u16);
 
@@ -22,6 +27,9 @@ impl TreatmentSet {
 
     /// Sensor noise, the images that enhancers work on if nothing else is said.
     pub const NOISE: Self = Self::only(Some(Kind::Sensor));
+
+    /// Photographs in the dark.
+    pub const DARK: Self = Self(1 << 15);
 
     /// The set of a single treatment; `None` is the untouched frame.
     #[must_use]
@@ -38,6 +46,17 @@ impl TreatmentSet {
         self.0 & Self::only(treatment).0 != 0
     }
 
+    /// Whether the set includes a treatment of a frame. Synthetic images that are as dark as a photograph belong to their kind.
+    #[must_use]
+    pub fn has(self, treatment: &Treatment) -> bool {
+        match treatment {
+            Treatment::Untouched => self.includes(None),
+            Treatment::Degraded(how) => self.includes(Some(how.kind())),
+            Treatment::Paired(PairDark::Match(kind, _)) => self.includes(Some(*kind)),
+            Treatment::Paired(PairDark::Photograph(_)) => self.and(Self::DARK).is_some(),
+        }
+    }
+
     /// The treatments that either set includes.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
@@ -51,10 +70,11 @@ impl TreatmentSet {
         (both != 0).then_some(Self(both))
     }
 
-    /// All treatments: the untouched frame and every kind of degradation.
+    /// All treatments: the untouched frame, every kind of degradation, and photographs in the dark.
     fn all() -> Self {
         let kinds = Kind::ALL.map(|kind| Self::only(Some(kind)));
-        kinds.into_iter().fold(Self::only(None), Self::or)
+        let both = Self::only(None).or(Self::DARK);
+        kinds.into_iter().fold(both, Self::or)
     }
 
     /// The set with the two kinds of the paper, `both`.
@@ -68,19 +88,23 @@ impl TreatmentSet {
         let all = std::iter::once(None).chain(kinds);
         all.filter(|treatment| self.includes(*treatment))
             .map(|treatment| treatment.map_or(UNTOUCHED, Kind::word))
+            .chain(self.and(Self::DARK).map(|_| PHOTOGRAPHS))
             .collect()
     }
 
     fn of_word(word: &str) -> Result<Self, String> {
         match word {
             UNTOUCHED => Ok(Self::only(None)),
+            PHOTOGRAPHS => Ok(Self::DARK),
             ALL => Ok(Self::all()),
             "both" => Ok(Self::both()),
             _ => {
                 let kind = Kind::of_word(word).map(|kind| Self::only(Some(kind)));
                 let words = Kind::ALL.map(Kind::word).join(", ");
                 kind.ok_or_else(|| {
-                    format!("{word:?} is not one of {UNTOUCHED}, {words}, both, {ALL}")
+                    format!(
+                        "{word:?} is not one of {UNTOUCHED}, {words}, both, {PHOTOGRAPHS}, {ALL}"
+                    )
                 })
             }
         }
@@ -131,7 +155,10 @@ mod tests {
             ("ev,l0", "l0,ev"),
             ("l0,both", "l0,ev,noise"),
             ("motion,auto", "auto,motion"),
-            ("l0,both,auto,motion", "all"),
+            ("l0,both,auto,motion", "l0,ev,noise,auto,motion"),
+            ("dark,l0,both,auto,motion", "all"),
+            ("dark", "dark"),
+            ("dark,noise", "noise,dark"),
             ("all", "all"),
             ("noise,all", "all"),
         ] {
@@ -142,7 +169,7 @@ mod tests {
         for wrong in ["L0", "raw", "", "l0,", "l0,raw"] {
             let error = wrong.parse::<TreatmentSet>().unwrap_err();
             assert!(
-                error.contains("one of l0, ev, noise, auto, motion, both, all"),
+                error.contains("one of l0, ev, noise, auto, motion, both, dark, all"),
                 "{error}"
             );
         }
@@ -155,5 +182,12 @@ mod tests {
         assert!(!TreatmentSet::NOISE.includes(Some(Kind::Exposure)));
         let both: TreatmentSet = "both".parse().unwrap();
         assert!(!both.includes(None) && both.includes(Some(Kind::Exposure)));
+        let has = |set: &str, condition: &str| {
+            let set: TreatmentSet = set.parse().unwrap();
+            let condition: crate::types::Condition = condition.parse().unwrap();
+            set.has(&condition.treatment)
+        };
+        assert!(!has("noise", "dark") && has("dark", "dark-2") && has("all", "lamp"));
+        assert!(has("noise", "match-noise") && !has("dark", "match-noise") && !has("l0", "dark"));
     }
 }

@@ -52,6 +52,7 @@ fn facts(digest: Digest) -> ImageFacts {
         format: "png".to_owned(),
         orientation: None,
         exposure: None,
+        pair: None,
     }
 }
 

@@ -428,7 +428,7 @@ fn what_decides_nothing_asks_nothing() {
 }
 
 /// Flags that the tables here leave out, and where they are held.
-const ELSEWHERE: [(&str, &str); 46] = [
+const ELSEWHERE: [(&str, &str); 50] = [
     ("--map", "tests/program/ready_made.rs"),
     ("--config-name", "src/dataset/ready_made/tests/shapes.rs"),
     ("--split", "src/dataset/ready_made/tests/shapes.rs"),
@@ -443,6 +443,10 @@ const ELSEWHERE: [(&str, &str); 46] = [
         "--keep-instructions",
         "src/dataset/ready_made/tests/shapes.rs",
     ),
+    ("--light", "tests/program/photographs.rs"),
+    ("--pairs", "tests/program/photographs.rs"),
+    ("--label-folders", "tests/program/photographs.rs"),
+    ("--choices", "tests/program/photographs.rs"),
     (
         "--transfer",
         "it changes images of 16 bits: tests/program/inputs/depth.rs",

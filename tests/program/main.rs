@@ -38,6 +38,7 @@ mod money;
 mod observer;
 mod openeqa;
 mod own_requests;
+mod photographs;
 mod pins;
 mod questions;
 mod ready_made;

@@ -3,7 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use super::join::{Joined, join};
+use serde_json::json;
+
+use super::join::{Joined, JoinedRun, join};
 use super::listing::listing;
 use crate::error::{Error, Result};
 use crate::job::stored::StoredRun;
@@ -12,8 +14,9 @@ use crate::score::chance::OfferedChoices;
 use crate::score::cluster::{ClusterUnit, Clusters};
 use crate::score::findings::Findings;
 use crate::score::grid::Grid;
+use crate::score::photographed_set::PhotographedSet;
 use crate::types::manifest::RunManifest;
-use crate::types::{ChoiceDetail, FrameId, QuestionId, Record, RunQuestion, Truths};
+use crate::types::{ChoiceDetail, FrameId, QuestionId, Record, RunQuestion, SetLight, Truths};
 
 /// Several runs of questions with choices, joined.
 pub(super) type Combined = Joined<ChoiceDetail>;
@@ -29,6 +32,7 @@ impl Combined {
             &self.fidelity,
             &self.listing,
         );
+        let findings = findings.of_set(set(&self.runs));
         // Replies differ from time to time: that is no other model.
         let apart = self.models.apart.iter();
         let by_replies = apart.filter(|apart| apart.differs_by_replies_alone());
@@ -216,4 +220,24 @@ pub(super) fn check_comparable(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// The light of the set of these runs: dark if all say so, with the brightness that the first of them measured.
+fn set(runs: &[JoinedRun]) -> PhotographedSet {
+    let is_dark =
+        |run: &JoinedRun| run.manifest.settings.get("--light") == Some(&json!(SetLight::Dark));
+    if runs.is_empty() || !runs.iter().all(is_dark) {
+        return PhotographedSet::default();
+    }
+    let brightness = runs.iter().find_map(|run| {
+        let measured = run.manifest.settings.get("brightness")?;
+        Some((
+            measured.get("mean")?.as_f64()?,
+            measured.get("frames")?.as_u64()? as usize,
+        ))
+    });
+    PhotographedSet {
+        light: SetLight::Dark,
+        brightness,
+    }
 }

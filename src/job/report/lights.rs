@@ -42,9 +42,10 @@ impl LightCurve {
 
     /// The name of the curve without levels, as `noise+lift`; `L0` for untouched frames.
     pub(super) fn name(&self) -> String {
-        let kind = match self.variant.kind {
-            None => "L0".to_owned(),
-            Some(_) => self.variant.kind_and_reading(),
+        let kind = if self.variant.is_untouched() {
+            "L0".to_owned()
+        } else {
+            self.variant.kind_and_reading()
         };
         match &self.enhancer {
             None => kind,
@@ -279,16 +280,17 @@ fn same_by_manifest(curve: &LightCurve, one: &RunManifest, other: &RunManifest) 
     let runs = [one, other];
     let own = |run: &RunManifest| {
         let mut all = some(run, &settings::ENCODING);
-        if curve.variant.kind.is_some() || curve.enhancer.is_some() {
+        let kind = curve.variant.synthetic_kind();
+        if kind.is_some() || curve.enhancer.is_some() {
             all.extend(settings::pixels(run));
         }
-        if curve.variant.kind == Some(Kind::Exposure) {
+        if kind == Some(Kind::Exposure) {
             all.remove("--seed");
         }
-        if let Some(kind) = curve.variant.kind {
+        if let Some(kind) = kind {
             all.extend(settings::variant(run, kind));
         }
-        if curve.variant.reading.is_some() {
+        if kind.is_some_and(Kind::has_readings) {
             all.extend(settings::noise(run, &runs));
         }
         if curve.enhancer.is_some() {

@@ -20,7 +20,7 @@ impl Overview<'_> {
             });
             let n = lines.iter().find_map(|line| match &line.content {
                 PanelContent::Curve(points) => points.first().map(|(_, rate)| rate.n),
-                PanelContent::Flat(_) => None,
+                PanelContent::Flat(_) | PanelContent::Marks(_) => None,
             });
             let title = format!("{title}, n {}", n.unwrap_or(0));
             Panel { title, lines }

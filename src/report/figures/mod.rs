@@ -2,12 +2,13 @@
 
 mod answers;
 mod confidence;
+mod photographed;
 mod story;
 mod thresholds;
 
 use std::collections::BTreeSet;
 
-use super::chart::{Chart, Figure, LineStyle, Panel, PanelContent, PlotLine};
+use super::chart::{Chart, DarkMark, Figure, LineStyle, Panel, PanelContent, PlotLine};
 use super::words::{family as family_name, light};
 use crate::error::Result;
 use crate::score::choice::ReadingMode;
@@ -42,6 +43,7 @@ pub(crate) fn figures(findings: &Findings<'_>) -> Result<Vec<Figure>> {
         let svg = chart.svg()?;
         figures.push(Figure { name, caption, svg });
     }
+    figures.extend(overview.photographed()?);
     figures.extend(thresholds::figures(findings)?);
     Ok(figures)
 }
@@ -185,6 +187,31 @@ impl<'a> Overview<'a> {
         lines
     }
 
+    /// Marks of the accuracy of all models on photographs in the dark, raw.
+    fn photographs(&self) -> Vec<PlotLine> {
+        let mut lines = Vec::new();
+        for model in &self.models {
+            for pair in &self.findings.pairs {
+                let subjects = self.findings.grid.subjects.iter().filter(|subject| {
+                    subject.model == *model
+                        && subject.enhancer.is_none()
+                        && subject.variant.photograph() == Some(&pair.name)
+                });
+                let shares = subjects.filter_map(|subject| self.accuracy_of(subject, None));
+                let marks = shares.map(|share| DarkMark { ev: pair.ev, share });
+                let marks: Vec<DarkMark> = marks.collect();
+                if !marks.is_empty() {
+                    lines.push(PlotLine {
+                        name: format!("{model}, {} (real)", pair.name),
+                        style: self.style(model),
+                        content: PanelContent::Marks(marks),
+                    });
+                }
+            }
+        }
+        lines
+    }
+
     /// Note on the number of items and on the intervals.
     fn note(&self) -> String {
         let (grid, unit) = (&self.findings.grid, self.findings.unit);
@@ -202,12 +229,29 @@ impl<'a> Overview<'a> {
 
     fn accuracy(&self) -> Option<(String, Chart)> {
         let variants = self.tested_variants();
-        let panels = variants.iter().map(|variant| Panel {
-            title: format!("{}, n {}", light(variant, None), self.n(None)),
-            lines: self.accuracies(variant, None),
+        let panels = variants.iter().map(|variant| {
+            let mut lines = self.accuracies(variant, None);
+            if variant.kind.map(Kind::axis) == Some(Axis::LIGHT) {
+                lines.extend(self.photographs());
+            }
+            Panel {
+                title: format!("{}, n {}", light(variant, None), self.n(None)),
+                lines,
+            }
         });
-        let panels: Vec<Panel> = panels.collect();
-        let caption = "Accuracy of each model by level, without enhancement. Broken lines: without images, and chance.";
+        let mut panels: Vec<Panel> = panels.collect();
+        let mut marks = self.photographs();
+        if panels.is_empty() && !marks.is_empty() {
+            let mut lines = self.accuracies(&KindReading::NONE, None);
+            lines.append(&mut marks);
+            let title = format!("photographed in the dark, n {}", self.n(None));
+            panels.push(Panel { title, lines });
+        }
+        let caption = if self.findings.pairs.is_empty() {
+            "Accuracy of each model by level, without enhancement. Broken lines: without images, and chance."
+        } else {
+            "Accuracy of each model by level, without enhancement. Broken lines: without images, and chance. Hollow: photographed in the dark, at the median exposure drop, with a bar from quartile to quartile."
+        };
         self.chart(ACCURACY, panels, 2, caption)
     }
 

@@ -78,7 +78,7 @@ fn panel(
         let points = start.into_iter().chain(dark);
         let points = points.filter_map(|(level, cell)| Some((level, cell.score?)));
         PlotLine {
-            name: format!("{}, {}", series.model, series.light()),
+            name: format!("{}, {}", series.model, series.light(&[])),
             style: LineStyle(index.unwrap_or(seeing)),
             content: PanelContent::Curve(points.collect()),
         }

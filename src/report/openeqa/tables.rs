@@ -65,7 +65,7 @@ fn summary(summary: &OpenSummary) -> Table {
     };
     let drop = "csv drop drop_low drop_high drop_n";
     TableBuilder::new(SUMMARY, &summary.cells)
-        .subject(|cell| &cell.subject, |variant| variant.word().to_owned())
+        .subject(|cell| &cell.subject, |variant| variant.word().into_owned())
         .column(Text, "csv by", |cell| cell.group.kind())
         .column(Text, "csv group", |cell| cell.group.name().to_owned())
         .column(Count, "csv due", |cell| cell.planned)
@@ -167,7 +167,7 @@ fn by_group(
             String::new()
         }
     };
-    let light = series.light();
+    let light = series.light(&[]);
     let mut builder = TableBuilder::new("groups", rows)
         .page(SECTION, &format!("{}, {light}", series.model))
         .column(Text, "terminal model", |(index, _)| {

@@ -249,7 +249,11 @@ fn levels(grid: &Grid<'_>) -> Vec<[String; 2]> {
     let levels: BTreeSet<AxisLevel> = levels.collect();
     let named = levels.into_iter().map(|level| {
         let unit = level.axis().unwrap_or(Axis::LIGHT).unit;
-        [level.to_string(), format!("{} {unit}", level.value())]
+        let severity = match level {
+            AxisLevel::PAIR => "by frame".to_owned(),
+            _ => format!("{} {unit}", level.value()),
+        };
+        [level.to_string(), severity]
     });
     named.collect()
 }

@@ -89,7 +89,7 @@ fn panels(
     // One level is no line.
     for (series, cells) in degraded.filter(|(series, _)| series.axis().is_some()) {
         let line = line(found, series, cells, &number);
-        let title = series.light();
+        let title = series.light(&[]);
         match panels.iter_mut().find(|(known, _)| *known == title) {
             Some((_, lines)) => lines.push(line),
             None => panels.push((title, vec![line])),

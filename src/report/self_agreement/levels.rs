@@ -167,7 +167,7 @@ fn of_axis(found: &SelfAgreement<'_>, axis: Axis, ladder: &Ladder<'_, AgreementC
                 None => TableCell::Blank,
             };
             rows.push(MeasureRow {
-                series: format!("{model}, {}", series.light()),
+                series: format!("{model}, {}", series.light(&[])),
                 measure,
                 cells: levels.iter().map(cell).collect(),
             });

@@ -39,7 +39,7 @@ pub(super) fn tables(found: &SelfAgreement<'_>) -> Vec<Table> {
 /// The columns that all reports have, with the measure as the last one. There is no number of right replies: nothing is known to be right.
 pub(super) fn summary(found: &SelfAgreement<'_>) -> Table {
     let builder = TableBuilder::new(SUMMARY, &found.cells)
-        .subject(|cell| &cell.subject, |variant| variant.word().to_owned())
+        .subject(|cell| &cell.subject, |variant| variant.word().into_owned())
         .family(|cell| cell.family.as_ref())
         .column(Text, "csv mode", |cell| mode(cell.mode))
         .column(Count, "csv n", |cell| cell.replies())

@@ -16,6 +16,7 @@ mod lights;
 mod models;
 mod pooled;
 mod readings;
+mod real;
 mod sample;
 mod self_agreement;
 mod sentence;
@@ -51,6 +52,7 @@ pub(crate) fn sentences(findings: &Findings<'_>) -> Vec<Sentence> {
     sentences.extend(sample::left_out(findings));
     sentences.extend(readings::readings(&findings.by_reading, findings.unit));
     sentences.extend(darkness::darkness(findings));
+    sentences.extend(real::real(findings));
     sentences.extend(in_each_light(findings, about_light));
     sentences.extend(about_clean(findings));
     sentences.extend(models::best(findings));

@@ -204,6 +204,8 @@ fn draw_curves(sheet: &mut SheetCanvas, layout: &Layout, top: usize, story: &Sto
                 sheet.path(&[[ends[0], y], [ends[1], y]], Some([6.0, 4.0]), 1.5, colour);
                 y
             }
+            // The story is of levels alone.
+            PanelContent::Marks(_) => continue,
             PanelContent::Curve(points) => {
                 let points = points
                     .iter()

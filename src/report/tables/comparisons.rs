@@ -1,7 +1,7 @@
 //! Tables of all differences with their tests, for each kind of comparison: all families together, and by family.
 
 use super::pooled::too_few_clusters;
-use super::sections::ENHANCERS;
+use super::sections::{ENHANCERS, REAL};
 use crate::report::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
 use crate::report::table::{Column, Table, TableBuilder, TableFormat};
 use crate::report::words::{counted, name};
@@ -59,7 +59,10 @@ fn tables_of(
         let least = least.map(|comparison| (comparison.least_holm, comparison.paired.clusters));
         let note = too_few_clusters(least, &unit.to_string());
         let mut total = table(kind, caption, &whole);
-        total.is_folded = kind != ComparisonKind::Enhancer;
+        total.is_folded = !matches!(
+            kind,
+            ComparisonKind::Enhancer | ComparisonKind::RealSynthetic | ComparisonKind::RealEnhanced
+        );
         if !whole.is_empty() {
             total.heading = heading.map(str::to_owned);
             if kind == ComparisonKind::Enhancer {
@@ -102,6 +105,14 @@ fn titles(kind: ComparisonKind) -> (&'static str, Option<&'static str>) {
             "Light less light",
             Some("One light against another, same model, paired by question"),
         ),
+        ComparisonKind::RealSynthetic => (
+            "Photographed in the dark less synthetic",
+            Some("Photographed in the dark against synthetic, paired by question"),
+        ),
+        ComparisonKind::RealEnhanced => (
+            "Photographed in the dark: enhanced less raw",
+            Some("Photographed in the dark, enhanced against raw, paired by question"),
+        ),
     }
 }
 
@@ -128,6 +139,14 @@ fn titles_against_light(kind: ComparisonKind) -> (&'static str, Option<&'static 
         ComparisonKind::Light => (
             "Agreement in one light less another",
             Some("Agreement in one light against another, same model, paired by question"),
+        ),
+        ComparisonKind::RealSynthetic => (
+            "Agreement on photographs in the dark less synthetic",
+            Some("Agreement on photographs in the dark against synthetic, paired by question"),
+        ),
+        ComparisonKind::RealEnhanced => (
+            "Agreement on photographs in the dark: enhanced less raw",
+            Some("Agreement on photographs in the dark, enhanced against raw, paired by question"),
         ),
     }
 }
@@ -175,6 +194,7 @@ fn shorten(table: &mut Table, kind: ComparisonKind, comparisons: &[&Comparison])
 fn table(kind: ComparisonKind, caption: &str, comparisons: &[&Comparison]) -> Table {
     let section = match kind {
         ComparisonKind::Enhancer => ENHANCERS,
+        ComparisonKind::RealSynthetic | ComparisonKind::RealEnhanced => REAL,
         _ => "comparisons",
     };
     let builder =
@@ -211,13 +231,19 @@ fn subjects(builder: TableBuilder<&Comparison>, kind: ComparisonKind) -> TableBu
             comparison.first.condition()
         });
     let builder = match kind {
-        ComparisonKind::Model | ComparisonKind::Blind | ComparisonKind::Light => {
+        ComparisonKind::Model
+        | ComparisonKind::Blind
+        | ComparisonKind::Light
+        | ComparisonKind::RealSynthetic => {
             builder.column(Text, "terminal less | page less", |comparison| {
                 against(comparison)
             })
         }
         // The kind says what the first side is compared with.
-        ComparisonKind::Level | ComparisonKind::Variant | ComparisonKind::Enhancer => builder,
+        ComparisonKind::Level
+        | ComparisonKind::Variant
+        | ComparisonKind::Enhancer
+        | ComparisonKind::RealEnhanced => builder,
     };
     builder.family(|comparison| comparison.family.as_ref())
 }
@@ -270,7 +296,7 @@ fn against(comparison: &Comparison) -> String {
     match (first.model != second.model, comparison.kind) {
         (true, ComparisonKind::Light) => name(second),
         (true, _) => second.model.clone(),
-        (false, ComparisonKind::Light) => second.condition(),
+        (false, ComparisonKind::Light | ComparisonKind::RealSynthetic) => second.condition(),
         (false, _) => String::new(),
     }
 }

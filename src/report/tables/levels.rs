@@ -30,7 +30,7 @@ pub(super) fn levels(findings: &Findings<'_>) -> Vec<Table> {
 /// The table of each axis; `what` says on which items, if not on all.
 fn of_summary(findings: &Findings<'_>, summary: &AccuracySummary, what: &str) -> Vec<Table> {
     let strict = summary.of(None, ReadingMode::Strict);
-    let ladder = Ladder::new(strict.map(|cell| (&cell.subject, cell)));
+    let ladder = Ladder::new(strict.map(|cell| (&cell.subject, cell))).in_light_of(findings);
     let notes = notes(summary, &ladder);
     let ladders = ladder.by_axis().into_iter();
     let mut tables: Vec<Table> = ladders

@@ -14,6 +14,7 @@ mod flips;
 mod health;
 mod levels;
 mod observer;
+mod pairs;
 mod pooled;
 mod sections;
 mod subjects;
@@ -67,6 +68,8 @@ fn all(findings: &Findings<'_>) -> Vec<Table> {
         calibration::calibration(findings),
         vec![flips::flips(findings)],
         Vec::from_iter(fidelity::fidelity(findings.fidelity.as_ref())),
+        vec![pairs::darkness(&findings.pairs)],
+        vec![pairs::light_agreement(&findings.light_agreements)],
         vec![agreement::agreement(&findings.agreements)],
         vec![health::health(&findings.health)],
     ]

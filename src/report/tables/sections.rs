@@ -12,7 +12,7 @@ pub(in crate::report) type Section = (
 );
 
 /// The sections of the page in order.
-pub(in crate::report) const SECTIONS: [Section; 13] = [
+pub(in crate::report) const SECTIONS: [Section; 14] = [
     (
         BASELINE,
         "Against the baseline",
@@ -24,7 +24,7 @@ pub(in crate::report) const SECTIONS: [Section; 13] = [
         "accuracy",
         "Accuracy in the dark",
         "",
-        &["accuracy", "variants"],
+        &["accuracy", "variants", "photographed"],
     ),
     (
         "thresholds",
@@ -69,6 +69,14 @@ pub(in crate::report) const SECTIONS: [Section; 13] = [
         &["hallucination", "collapse"],
     ),
     (
+        REAL,
+        "Photographed in the dark",
+        "Photographs of the same scenes in the dark, beside synthetic images that are as dark, and enhanced. How dark they are is log₂ of the \
+         ratio of mean linear luminances, frame by frame, or what the data state. The row of images as dark as real says whether \
+         synthetic darkness stands for real darkness: the difference, the share of the same answers, and κ of being right.",
+        &[],
+    ),
+    (
         CONFIDENCE,
         "Confidence",
         "How likely the model held its answer, and how often it was right; replies with reasoning before the answer are left out. \
@@ -107,6 +115,9 @@ pub(in crate::report) const SECTIONS: [Section; 13] = [
         &[],
     ),
 ];
+
+/// Id of the section on photographs in the dark.
+pub(in crate::report) const REAL: &str = "real";
 
 /// Id of the section that has thumbnails of the frames.
 pub(in crate::report) const ENHANCERS: &str = "enhancers";

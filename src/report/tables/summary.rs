@@ -5,7 +5,7 @@ use crate::report::table::{Table, TableBuilder, TableCell};
 use crate::score::accuracy::{AccuracyCell, AccuracySummary};
 use crate::score::choice::ReadingMode;
 use crate::score::subject::Subject;
-use crate::types::{LightGroup, ModelListing};
+use crate::types::{LightGroup, ModelListing, PairDark};
 
 /// Name of the summary table.
 pub(in crate::report) const SUMMARY: &str = "summary";
@@ -13,7 +13,7 @@ pub(in crate::report) const SUMMARY: &str = "summary";
 /// A row for each accuracy.
 pub(in crate::report) fn summary(summary: &AccuracySummary, listing: &ModelListing) -> Table {
     let builder = TableBuilder::new(SUMMARY, &summary.cells)
-        .subject(|cell| &cell.subject, |variant| variant.word().to_owned())
+        .subject(|cell| &cell.subject, |variant| variant.word().into_owned())
         .family(|cell| cell.family.as_ref())
         .column(Text, "csv mode", |cell| match cell.mode {
             ReadingMode::Strict => "strict",
@@ -49,5 +49,8 @@ fn group(cell: &AccuracyCell) -> Option<&str> {
 
 /// The light reading of a subject, if it has one.
 pub(in crate::report) fn reading(subject: &Subject) -> TableCell {
-    TableCell::from(subject.variant.reading.as_ref().map(ToString::to_string))
+    let variant = &subject.variant;
+    let of_pair = variant.pair.as_ref().and_then(PairDark::reading);
+    let reading = variant.reading.as_ref().or(of_pair);
+    TableCell::from(reading.map(ToString::to_string))
 }

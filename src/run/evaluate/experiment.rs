@@ -21,7 +21,7 @@ use crate::job::stored::StoredRun;
 use crate::job::{Outcome, StdoutFormat};
 use crate::questions::rules::Rules;
 use crate::store::Store;
-use crate::types::{ChoiceDetail, QuestionId, Record, RunQuestion};
+use crate::types::{ChoiceDetail, QuestionId, Record, RunQuestion, SetLight};
 
 impl Experiment for ChoiceSetup<'_> {
     type Item = ChoiceItem;
@@ -107,7 +107,13 @@ impl Experiment for ChoiceSetup<'_> {
             [] => None,
             lines => Some(("reading of the data", json!(lines))),
         };
-        bank.chain(reading).collect()
+        let set = self.config.job.set_light;
+        let light = (set == SetLight::Dark).then(|| ("--light", json!(set)));
+        let measured = self.brightness.map(|(mean, frames)| {
+            let note = json!({"mean": mean, "frames": frames});
+            ("brightness", note)
+        });
+        bank.chain(reading).chain(light).chain(measured).collect()
     }
 
     fn columns(&self) -> Columns {

@@ -55,7 +55,9 @@ pub(super) fn trials(setup: &ChoiceSetup<'_>) -> Result<Vec<SourcePlan<ChoiceIte
         }
     }
     let plan = by_source.into_iter().enumerate().map(|(source, asked)| {
-        let all = std::iter::once(None).chain(setup.conditions.iter().map(Some));
+        let shown = &setup.sources[source];
+        let shown = setup.conditions.iter().filter(|of| shown.can_show(of));
+        let all = std::iter::once(None).chain(shown.map(Some));
         let groups =
             all.filter_map(|condition| group(setup, source, condition, &asked).transpose());
         Ok(SourcePlan {

@@ -7,13 +7,15 @@ use clap::Args;
 
 use super::choice_order::{ChoiceOrder, Repeats};
 use crate::ask::{Constrain, Prompts};
-use crate::dataset::{BankArgs, CodesArgs, DataArgs, PixelLimit, ReadingRule, SelectionArgs};
+use crate::dataset::{
+    BankArgs, CodesArgs, DataArgs, PixelLimit, ReadingRule, SceneArgs, SelectionArgs,
+};
 use crate::error::{Error, Result};
 use crate::job::models::{ModelName, TextBaseline};
 use crate::job::questions::{QuestionBank, rules};
 use crate::job::settings::{ExperimentSettings, JobArgs, JobSettings};
 use crate::questions::rules::Rules;
-use crate::types::{Decides, Truths, View};
+use crate::types::{Decides, SetLight, Truths, View};
 
 /// The flags of an evaluation, by help heading.
 #[derive(Debug, Args)]
@@ -21,6 +23,9 @@ pub(crate) struct EvaluateArgs {
     /// The place of the data.
     #[command(flatten)]
     pub data: DataArgs,
+    /// The light of the photographs, pairs, and classes by folder.
+    #[command(flatten)]
+    pub scene: SceneArgs,
     /// The flags that select questions.
     #[command(flatten)]
     pub selection: SelectionArgs,
@@ -91,6 +96,7 @@ pub(crate) struct ShrinkArgs {
 #[derive(Debug)]
 pub(super) struct Evaluation {
     pub(super) data: DataArgs,
+    pub(super) scene: SceneArgs,
     pub(super) selection: SelectionArgs,
     /// The rule by which images are read.
     pub(super) rule: ReadingRule,
@@ -119,7 +125,16 @@ impl EvaluateArgs {
             return Err(self.job.no_model_error());
         }
         let prompts = self.choice.prompts.as_deref();
-        let experiment = self.experiment();
+        let data = DataArgs {
+            data: self.scene.place(self.data.data.clone()),
+            ..self.data.clone()
+        };
+        let set_light = self.scene.set_light(&data.data)?;
+        let experiment = ExperimentSettings {
+            data: data.data.path().map(Path::to_owned),
+            set_light,
+            ..self.experiment()
+        };
         let bank = QuestionBank::open(&self.bank)?;
         let truths = bank.as_ref().map_or(Truths::Known, |_| Truths::Unknown);
         let job = self.job.resolve(&experiment)?;
@@ -134,7 +149,8 @@ impl EvaluateArgs {
             } else {
                 ImagePlace::AfterWords
             },
-            data: self.data,
+            data,
+            scene: self.scene,
             selection: self.selection,
             rule: self.codes.rule(self.limit),
             repeats: self.order.repeats(truths),
@@ -157,6 +173,7 @@ impl EvaluateArgs {
                 None => TextBaseline::AsSaid,
                 Some(_) => TextBaseline::Always,
             },
+            set_light: SetLight::default(),
         }
     }
 }

@@ -10,15 +10,17 @@ use crate::ask::{Model, Random};
 use crate::dataset::Dataset;
 use crate::enhance::ModelFile;
 use crate::error::Result;
-use crate::job::conditions::conditions;
+use crate::job::conditions::{check_enhanced, conditions};
+use crate::job::dark_already;
 use crate::job::models::{self, ModelName, ModelUnderTest};
 use crate::job::observer::Observer;
+use crate::job::photographs;
 use crate::job::progress::Progress;
 use crate::job::questions::{QuestionBank, open_data, select};
 use crate::job::recipe::Recipe;
 use crate::job::shard::part;
 use crate::job::source::{Source, SourceFrame, first_asked, inspect_all};
-use crate::types::{Condition, Digest, FrameId, Question, QuestionId};
+use crate::types::{Condition, Digest, FrameId, Question, QuestionId, SetLight, TreatmentSet};
 
 /// All data and models of an evaluation, opened and checked. Nothing is asked or written yet.
 pub(super) struct ChoiceSetup<'a> {
@@ -40,6 +42,8 @@ pub(super) struct ChoiceSetup<'a> {
     pub(super) recipe: Recipe,
     /// The digest of the questions that are asked about every image; `None` if questions have answers.
     pub(super) bank: Option<Digest>,
+    /// Mean linear luminance of a sample of the frames and the size of the sample, of a set in the dark; `None` for others.
+    pub(super) brightness: Option<(f64, usize)>,
 }
 
 impl<'a> ChoiceSetup<'a> {
@@ -62,7 +66,13 @@ impl<'a> ChoiceSetup<'a> {
             bank.data(place, set, config.rule, progress)?
         } else {
             let (selection, rules) = (&config.selection, &config.rules);
-            open_data(place, set, selection, rules, config.rule, progress)?
+            open_data(
+                (place, &config.scene, set),
+                selection,
+                rules,
+                config.rule,
+                progress,
+            )?
         };
         let dataset = Arc::new(dataset);
         let all = select(&dataset, &config.selection)?;
@@ -70,7 +80,7 @@ impl<'a> ChoiceSetup<'a> {
         let controls = AddedControls::of(config, other_rooms.is_some())?;
         let questions = part(all.clone(), job.shard, |question| question.frame.0.clone())?;
         let models = open_models(config, &controls, &dataset, &all)?;
-        let sources = if shows_images {
+        let mut sources = if shows_images {
             inspect_all(&dataset, &questions, progress)?
         } else {
             let frames = first_asked(&questions).into_iter();
@@ -78,7 +88,26 @@ impl<'a> ChoiceSetup<'a> {
                 .map(|question| Source::unseen(question.frame.clone()))
                 .collect()
         };
+        if !job.light.matches.is_empty() {
+            photographs::measure(&*dataset, &mut sources)?;
+        }
+        photographs::check_matches(&sources, &job.light.matches)?;
+        photographs::tell(&*dataset, &sources, progress);
+        dark_already::tell(job, progress);
+        if !job.enhancers.llie.is_empty()
+            && job.enhancers.on().and(TreatmentSet::DARK).is_none()
+            && !photographs::names(&sources).is_empty()
+        {
+            let line = "the photographs in the dark are not enhanced; --llie-on noise,dark enhances them too";
+            progress.say(line);
+        }
         let recipe = Recipe::new(&job.light.kinds, job.format, job.max_side, &files);
+        let photographed = photographs::names(&sources);
+        let on = job.enhancers.on();
+        let conditions = conditions(&job.light, &photographed, on, &recipe.enhancers);
+        let brightness = (job.set_light == SetLight::Dark)
+            .then(|| dark_already::brightness(&*dataset, &sources))
+            .flatten();
         let names = sources.iter().map(|source| source.name.clone());
         let mut setup = Self {
             config,
@@ -92,7 +121,8 @@ impl<'a> ChoiceSetup<'a> {
             sources,
             models,
             bank: config.bank.as_ref().map(QuestionBank::digest).transpose()?,
-            conditions: conditions(&job.light, job.enhancers.llie_on, &recipe.enhancers),
+            conditions,
+            brightness,
             recipe,
             questions,
             with_other_rooms: Vec::new(),
@@ -101,6 +131,9 @@ impl<'a> ChoiceSetup<'a> {
         };
         if shows_images && setup.models.iter().any(is_other_room) {
             setup.add_other_rooms(all)?;
+        }
+        if shows_images {
+            check_enhanced(&setup.conditions, &job.enhancers)?;
         }
         setup.recipe.check(&setup.sources, &setup.conditions)?;
         controls.print(progress);

@@ -8,14 +8,17 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::ask::png;
-use crate::dataset::{self, CodesArgs, DataPlace, Dataset, PixelLimit, SelectionArgs, SetArgs};
+use crate::dataset::{
+    self, CodesArgs, DataPlace, Dataset, PixelLimit, SceneArgs, SelectionArgs, SetArgs,
+};
 use crate::enhance::EnhancerArgs;
 use crate::error::{Error, Result};
 use crate::job::Outcome;
-use crate::job::conditions::{check_used, conditions};
+use crate::job::conditions::{check_enhanced, check_used, conditions};
 use crate::job::enhancers::{self, EnhancerRunArgs, OpenEnhancers};
 use crate::job::frame_work::{FrameWork, ImageSteps};
 use crate::job::image_pipeline::ImagePipeline;
+use crate::job::photographs;
 use crate::job::progress::Progress;
 use crate::job::questions::{open_data, rules, select};
 use crate::job::recipe::Recipe;
@@ -43,6 +46,9 @@ pub(crate) struct ExportArgs {
     /// How a ready-made set is read.
     #[command(flatten)]
     pub set: SetArgs,
+    /// The light of the photographs, pairs, and classes by folder.
+    #[command(flatten)]
+    pub scene: SceneArgs,
     /// The flags that select questions.
     #[command(flatten)]
     pub selection: SelectionArgs,
@@ -71,13 +77,18 @@ pub(crate) struct ExportArgs {
 /// # Errors
 /// If the data cannot be read, a set exists already, or a file cannot be written.
 pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> {
-    let light = LightSettings::resolve(&args.light)?;
-    check_used(&light, &args.enhancers)?;
+    if args.scene.pairs.is_some() {
+        let problem = "export takes pairs from a folder whose frames.jsonl names the photographs in the dark (\"dark\")";
+        return Err(Error::usage("--pairs", problem));
+    }
+    let set = args.scene.set_light(&args.data)?;
+    let light = LightSettings::resolve(&args.light, set)?;
+    let enhancement = args.enhancers.clone().for_set(set);
+    check_used(&light, &enhancement)?;
     let rules = rules(args.selection.rules.as_deref())?;
     let rule = args.codes.rule(args.limit);
     let dataset = open_data(
-        &args.data,
-        &args.set,
+        (&args.data, &args.scene, &args.set),
         &args.selection,
         &rules,
         rule,
@@ -89,9 +100,16 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
     let questions = select(&dataset, &args.selection)?;
     let files = enhancers::read(&args.enhancers.llie)?;
     let recipe = Recipe::lossless(&light.kinds, &files);
-    let conditions = conditions(&light, args.enhancers.llie_on, &recipe.enhancers);
     let workers = pool(args.loading.threads.threads)?;
-    let sources = workers.install(|| inspect_all(&dataset, &questions, progress))?;
+    let mut sources = workers.install(|| inspect_all(&dataset, &questions, progress))?;
+    if !light.matches.is_empty() {
+        workers.install(|| photographs::measure(&dataset, &mut sources))?;
+    }
+    photographs::check_matches(&sources, &light.matches)?;
+    let photographed = photographs::names(&sources);
+    let on = enhancement.on();
+    let conditions = conditions(&light, &photographed, on, &recipe.enhancers);
+    check_enhanced(&conditions, &enhancement)?;
     warn_of_inputs(&input_summary(&sources));
     recipe.check(&sources, &conditions)?;
     let mut sets = open_sets(args, &dataset, &conditions, &questions)?;
@@ -123,6 +141,9 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
             for source_frame in &source.frames {
                 let mut work = FrameWork::planned(pipeline.steps, source, source_frame);
                 for (condition, set) in conditions.iter().zip(&mut sets) {
+                    if !source_frame.can_show(condition) {
+                        continue;
+                    }
                     let pixels = pipeline.pixels(&mut work, condition)?;
                     set.add(&names[frame], &png(&pixels)?, &frame_questions)?;
                     bar.inc();

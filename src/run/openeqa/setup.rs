@@ -11,7 +11,7 @@ use crate::ask::Parameters;
 use crate::dataset::openeqa::{self, OpenQuestion};
 use crate::enhance::ModelFile;
 use crate::error::{Error, Result};
-use crate::job::conditions::conditions;
+use crate::job::conditions::{check_enhanced, conditions};
 use crate::job::models::{self, ModelUnderTest};
 use crate::job::progress::Progress;
 use crate::job::recipe::Recipe;
@@ -69,8 +69,11 @@ impl<'a> OpenSetup<'a> {
         let (sources, conditions) = if shows_frames {
             let sources = walks.inspect(&names, &config.walk, progress);
             warn_of_unseen(&sources, &questions)?;
-            let on = job.enhancers.llie_on;
-            (sources, conditions(&job.light, on, &recipe.enhancers))
+            let on = job.enhancers.on();
+            job.light.refuse_matches("the frames of walks have none")?;
+            let conditions = conditions(&job.light, &[], on, &recipe.enhancers);
+            check_enhanced(&conditions, &job.enhancers)?;
+            (sources, conditions)
         } else {
             let unseen = |name| Source::unseen(FrameId(name));
             (names.into_iter().map(unseen).collect(), Vec::new())

@@ -127,7 +127,7 @@ impl SheetItem {
         // The picture has one axis, that of the curves.
         let axis = curves.variant.kind.map(Kind::axis);
         let levels = conditions.map(Condition::level);
-        let levels = levels.filter(|level| level.axis().is_none() || level.axis() == axis);
+        let levels = levels.filter(|level| *level == AxisLevel::L0 || level.axis() == axis);
         Ok(Self {
             levels: levels.collect(),
             question: vec![question, choices.join("   ").replace("  (true)", " (true)")],

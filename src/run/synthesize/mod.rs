@@ -25,7 +25,7 @@ use crate::job::timings::Timings;
 use crate::job::workers::{ThreadArgs, pool};
 use crate::synthesis::{LightArgs, LightSettings, NoiseKey};
 use crate::types::manifest::Status;
-use crate::types::{Condition, Decides, Degradation, FrameId};
+use crate::types::{Condition, Decides, Degradation, FrameId, SetLight};
 use placed::{ImageOutcome, Placed, Sidecar};
 
 pub(crate) use sheet::Sheet;
@@ -91,8 +91,9 @@ pub(crate) fn synthesize(args: &SynthesizeArgs, progress: &Progress) -> Result<O
     let making = &ImageMaking {
         args,
         out,
-        light: LightSettings::resolve(&args.light)?,
+        light: LightSettings::resolve(&args.light, SetLight::Lit)?,
     };
+    making.light.refuse_matches("synthesize knows none")?;
     let frames = Inputs::open(&args.inputs, args.codes.rule(args.limit))?;
     let workers = pool(args.threads.threads)?;
     fs::create_dir_all(out).map_err(|e| Error::file(out, "make", e))?;

@@ -116,7 +116,7 @@ impl ImageRecipe {
 
     fn image(&self, picture: &Picture, program: &str, path: &Path) -> Result<Rgb> {
         let wrong = |problem: String| Error::data(path.display(), problem);
-        let how = self.condition.degradation.as_ref();
+        let how = self.condition.degradation();
         if self.source != picture.digest().to_string() {
             let problem = "made from another image than INPUT (their contents differ, or the flags by which they are read)";
             return Err(wrong(problem.to_owned()));

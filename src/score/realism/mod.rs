@@ -3,7 +3,7 @@
 
 pub(crate) mod gain;
 pub(crate) mod mean;
-mod quantile;
+pub(in crate::score) mod quantile;
 pub(crate) mod residual;
 pub(crate) mod scene;
 pub(crate) mod smooth;

@@ -2,7 +2,7 @@
 
 /// Quantile of ascending numbers, linear between neighbours, as numpy's default; `None` without numbers.
 #[must_use]
-pub(super) fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
+pub(in crate::score) fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let place = share * sorted.len().checked_sub(1)? as f64;
     let below = place.floor();
     let low = *sorted.get(below as usize)?;

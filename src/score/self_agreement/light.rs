@@ -6,8 +6,8 @@ use crate::score::choice::ReadingMode;
 use crate::score::estimate::Estimate;
 use crate::types::question::CANNOT_TELL;
 use crate::types::{
-    AnswerReading, ChoiceDetail, Condition, LightGroup, QuestionId, Record, TrialOutcome,
-    UnreadReason, View,
+    AnswerReading, ChoiceDetail, Condition, LightGroup, QuestionId, Record, Treatment,
+    TrialOutcome, UnreadReason, View,
 };
 
 /// What identifies a question to a model: its name, and the order of its choices.
@@ -56,7 +56,7 @@ pub(super) fn is_light(record: &Record) -> bool {
 }
 
 fn is_untouched(condition: &Condition) -> bool {
-    condition.degradation.is_none() && condition.enhancer.is_none()
+    condition.treatment == Treatment::Untouched && condition.enhancer.is_none()
 }
 
 /// The index of the choice that a reading of a record names; `None` if it names none.

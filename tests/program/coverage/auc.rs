@@ -134,6 +134,7 @@ impl MadeRun {
                         format: "png".to_owned(),
                         orientation: None,
                         exposure: None,
+                        pair: None,
                     });
                     records.push(reply);
                 }

@@ -194,7 +194,11 @@ fn an_enhancer_without_an_image_is_an_error() {
         ("--levels L3 --llie-on l0", "--llie-on both is"),
         (
             "--llie-on dark",
-            "is not one of l0, ev, noise, auto, motion, both, all",
+            "--llie-on dark is not among the images asked; the data have no photographs in the dark",
+        ),
+        (
+            "--llie-on dusk",
+            "is not one of l0, ev, noise, auto, motion, both, dark, all",
         ),
     ];
     check_rows(rows, |(flags, problem)| {

@@ -22,6 +22,7 @@ use super::join::{Joined, JoinedRun};
 use crate::report::alert::{Alert, AlertKind};
 use crate::score::cluster::{ClusterUnit, MIN_SCENES};
 use crate::score::findings::Findings;
+use crate::score::pair_darkness::PairDarkness;
 use crate::score::self_agreement::SelfAgreement;
 use crate::types::manifest::Status;
 use crate::types::{Detail, InputSummary};
@@ -41,6 +42,10 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
     alerts.extend(questions::of_repeats(combined));
     alerts.extend(questions::of_items(findings));
     alerts.extend(of_clusters(findings.grid.clusters, findings.unit));
+    let notice = findings.set.notice().into_iter();
+    alerts.extend(notice.map(|text| Alert::new(AlertKind::Pairs, text)));
+    let oddities = findings.pairs.iter().flat_map(PairDarkness::oddities);
+    alerts.extend(oddities.map(|text| Alert::new(AlertKind::Pairs, text)));
     alerts.sort_by_key(|alert| alert.kind);
     alerts
 }

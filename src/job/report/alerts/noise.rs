@@ -81,9 +81,5 @@ pub(super) fn of_rounding<D: Detail>(joined: &Joined<D>) -> Option<Alert> {
 
 /// How the image of a record was made; `None` if it is as the frame, or there is none.
 fn degradation<D: Detail>(joined: &Joined<D>, place: usize) -> Option<&Degradation> {
-    joined.records[place]
-        .condition
-        .as_ref()?
-        .degradation
-        .as_ref()
+    joined.records[place].condition.as_ref()?.degradation()
 }

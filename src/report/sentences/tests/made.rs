@@ -280,7 +280,7 @@ fn families_are_compared_two_by_two() {
         let is_dark = record
             .condition
             .as_ref()
-            .is_some_and(|condition| condition.degradation.is_some());
+            .is_some_and(|condition| condition.degradation().is_some());
         if is_dark && record.detail.family == Family::RoomType {
             let right = Some(AnswerReading {
                 chosen: Some(0),

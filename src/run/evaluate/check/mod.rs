@@ -112,14 +112,21 @@ fn data(
 ) -> Result<usize> {
     let rule = args.codes.rule(args.limit);
     let selection = &args.selection;
+    let place = args.scene.place(args.data.data.clone());
     let set = &args.data.set;
     let bank = QuestionBank::open(&args.bank);
     let opened = bank.and_then(|bank| {
         if let Some(bank) = bank {
-            return bank.data(&args.data.data, set, rule, progress);
+            return bank.data(&place, set, rule, progress);
         }
         let rules = rules(selection.rules.as_deref())?;
-        open_data(&args.data.data, set, selection, &rules, rule, progress)
+        open_data(
+            (&place, &args.scene, set),
+            selection,
+            &rules,
+            rule,
+            progress,
+        )
     });
     let dataset = match opened {
         Ok(dataset) => dataset,

@@ -15,10 +15,13 @@ use crate::types::Rgb;
 
 /// Looks at the flags and the files that they name; no data is read.
 pub(super) fn settings(args: &EvaluateArgs, findings: &mut Findings) {
-    let light = LightSettings::resolve(&args.job.light);
+    let place = args.scene.place(args.data.data.clone());
+    let set = args.scene.set_light(&place);
+    let enhancers = |set| args.job.enhancers.clone().for_set(set);
+    let light = set.and_then(|set| Ok((set, LightSettings::resolve(&args.job.light, set)?)));
     match &light {
-        Ok(light) => {
-            let used = check_used(light, &args.job.enhancers);
+        Ok((set, light)) => {
+            let used = check_used(light, &enhancers(*set));
             said(findings, used.map(|()| None));
         }
         Err(e) => findings.problem(e.to_string()),

@@ -1,0 +1,29 @@
+//! The light in which the photographs of a set were taken, for a report: [`PhotographedSet`].
+
+use crate::types::SetLight;
+
+/// The light in which the photographs of a set were taken.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct PhotographedSet {
+    /// Whether they were taken in the dark.
+    pub(crate) light: SetLight,
+    /// Mean linear luminance of a sample of the photographs, from 0 to 1, and the size of the sample; `None` if it was not measured.
+    pub(crate) brightness: Option<(f64, usize)>,
+}
+
+impl PhotographedSet {
+    /// What a reader must know of a set in the dark; `None` of one in the light.
+    pub(crate) fn notice(self) -> Option<String> {
+        if self.light == SetLight::Lit {
+            return None;
+        }
+        let brightness = self.brightness.map(|(mean, frames)| {
+            format!(" Their mean linear brightness is {mean:.4} of 1 (measured on {frames}); a mid-grey, code 128, is 0.22.")
+        });
+        Some(format!(
+            "These photographs were taken in the dark: L0 is each as photographed, there is no image in the light to compare with, and \
+             no darkness threshold.{}",
+            brightness.unwrap_or_default()
+        ))
+    }
+}

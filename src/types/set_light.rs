@@ -1,0 +1,39 @@
+//! The light in which the photographs of a set were taken: [`SetLight`].
+
+use clap::ValueEnum;
+use serde::{Deserialize, Serialize};
+
+/// The light in which the photographs of a set were taken.
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Default,
+    Serialize,
+    Deserialize,
+    ValueEnum,
+)]
+#[serde(rename_all = "lowercase")]
+pub enum SetLight {
+    /// Well lit: L0 is the frame in the light
+    #[default]
+    Lit,
+    /// In the dark: L0 is the photograph as it was taken, and nothing is darker by default
+    Dark,
+}
+
+impl SetLight {
+    /// The name of L0 where it is shown: `L0`, or `as photographed`.
+    #[must_use]
+    pub fn untouched(self) -> &'static str {
+        match self {
+            Self::Lit => "L0",
+            Self::Dark => "as photographed",
+        }
+    }
+}

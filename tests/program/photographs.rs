@@ -1,0 +1,517 @@
+//! Photographs in the dark: beside their frames, sets that are dark from the start, pairs in two folders, and classes by folder.
+
+use std::fs;
+
+use crate::support::endpoint::{Answer, MockEndpoint};
+use crate::support::run::{Bench, Called, assert_same_products, model_args, records, words};
+use image::{Rgb, RgbImage};
+use serde_json::{Value, json};
+
+/// Number of scenes.
+const SCENES: u32 = 12;
+
+/// A scene with structure of its own.
+fn scene(number: u32) -> RgbImage {
+    RgbImage::from_fn(96, 72, |x, y| {
+        let block = (x / 12 * 7 + y / 12 * 13 + number * 29).wrapping_mul(2_654_435_761) >> 24;
+        let code = 70 + (block % 150) as u8;
+        Rgb([code, code.saturating_sub((number * 3) as u8), 60 + code / 2])
+    })
+}
+
+/// The image with so many EV less light, in linear sRGB.
+fn darker(image: &RgbImage, ev: f64) -> RgbImage {
+    let linear = |code: f64| {
+        if code <= 0.04045 {
+            code / 12.92
+        } else {
+            ((code + 0.055) / 1.055).powf(2.4)
+        }
+    };
+    let code = |light: f64| {
+        if light <= 0.003_130_8 {
+            12.92 * light
+        } else {
+            1.055 * light.powf(1.0 / 2.4) - 0.055
+        }
+    };
+    let mut dark = image.clone();
+    for sample in dark.iter_mut() {
+        let light = linear(f64::from(*sample) / 255.0) * (-ev).exp2();
+        *sample = (255.0 * code(light).min(1.0)).round() as u8;
+    }
+    dark
+}
+
+/// Questions of all scenes about frames with these names.
+fn questions(name: impl Fn(u32) -> String) -> String {
+    let line = |number| {
+        let question = json!({
+            "id": format!("q{number}"), "frame": name(number), "family": "color", "question": "What color is it?",
+            "choices": ["red", "blue", "brown"], "answer": "brown",
+        });
+        format!("{question}\n")
+    };
+    (0..SCENES).map(line).collect()
+}
+
+/// A folder `set` of frames whose photographs in the dark are these of `dark`, by scene; with extra keys in each line.
+fn with_photographs(dark: impl Fn(u32) -> RgbImage, extra: &str) -> Bench {
+    let bench = Bench::new();
+    bench.file(
+        "set/questions.jsonl",
+        questions(|number| format!("room{number}/0")),
+    );
+    fs::create_dir_all(bench.path("set/low")).unwrap();
+    let mut lines = String::new();
+    for number in 0..SCENES {
+        scene(number)
+            .save(bench.path(&format!("set/{number}.png")))
+            .unwrap();
+        dark(number)
+            .save(bench.path(&format!("set/low/{number}.png")))
+            .unwrap();
+        let extra = extra.replace("{}", &number.to_string());
+        let line = format!(
+            "{{\"scene\":\"room{number}\",\"frame\":\"0\",\"rgb\":\"{number}.png\"{extra}}}\n"
+        );
+        lines.push_str(&line);
+    }
+    bench.file("set/frames.jsonl", lines);
+    bench
+}
+
+const DARK: &str = ",\"dark\":\"low/{}.png\"";
+
+/// Replies that are right, but for these conditions, each with so many scenes answered wrongly.
+fn script(bench: &Bench, wrong: &[(&str, u32)]) {
+    let mut lines = "{\"default\":\"brown\"}\n".to_owned();
+    for (condition, count) in wrong {
+        for number in 0..*count {
+            let line =
+                json!({"question": format!("q{number}"), "condition": condition, "reply": "red"});
+            lines.push_str(&line.to_string());
+            lines.push('\n');
+        }
+    }
+    bench.file("script.jsonl", lines);
+}
+
+/// A row of a table of a run as a map from heads to cells.
+fn rows(bench: &Bench, file: &str) -> Vec<Value> {
+    let mut reader = csv::Reader::from_path(bench.path(file)).unwrap();
+    let rows = reader.deserialize::<std::collections::BTreeMap<String, String>>();
+    rows.map(|row| json!(row.unwrap())).collect()
+}
+
+fn run(bench: &Bench, more: &str) -> String {
+    let args = format!("--data set --model script:script.jsonl --out run --full {more}");
+    bench.complete(&words(&args))
+}
+
+/// Whether a cell is this number.
+fn is(row: &Value, field: &str, expected: f64) -> bool {
+    (number(row, field) - expected).abs() < 1e-9
+}
+
+fn number(row: &Value, field: &str) -> f64 {
+    row[field].as_str().unwrap().parse().unwrap()
+}
+
+#[test]
+fn a_photograph_is_a_condition_of_its_own_beside_synthetic_ones() {
+    let bench = with_photographs(|number| darker(&scene(number), 3.6), DARK);
+    script(
+        &bench,
+        &[("dark", 6), ("dark+lift", 2), ("L2-ev", 5), ("L2-noise", 7)],
+    );
+    let table = run(&bench, "--levels L0,L2 --llie lift --llie-on dark,noise");
+    assert!(table.contains("dark (real, 3.6 EV)"), "{table}");
+    assert!(table.contains("Photographed in the dark"), "{table}");
+    let all = records(&bench.path("run"));
+    let of = |condition: &str| -> Vec<&Value> {
+        all.iter()
+            .filter(|record| record["condition"] == condition)
+            .collect()
+    };
+    for condition in [
+        "L0",
+        "L2-ev",
+        "L2-noise",
+        "L2-noise+lift",
+        "dark",
+        "dark+lift",
+    ] {
+        assert_eq!(of(condition).len(), SCENES as usize, "{condition}");
+    }
+    assert!(of("L0+lift").is_empty() && of("L2-ev+lift").is_empty());
+    let dark = of("dark")[0];
+    assert_eq!(
+        (&dark["level"], &dark["variant"], &dark["ev"]),
+        (&json!("dark"), &json!("dark"), &Value::Null)
+    );
+    let pair = &dark["image"]["pair"];
+    assert!(
+        (pair["mean"].as_f64().unwrap() - 3.6).abs() < 0.05,
+        "{pair}"
+    );
+    let rows = rows(&bench, "run/comparisons.csv");
+    let compared = |kind: &str| -> Vec<&Value> {
+        rows.iter()
+            .filter(|row| row["kind"] == kind && row["family"] == "all")
+            .collect()
+    };
+    // The nearest level is compared where none is matched.
+    let synthetic = compared("real-synthetic");
+    let against: Vec<&str> = synthetic
+        .iter()
+        .map(|row| row["against_condition"].as_str().unwrap())
+        .collect();
+    assert_eq!(
+        against,
+        ["L2-ev", "L2-noise", "L2-noise+lift"],
+        "{synthetic:?}"
+    );
+    assert!((number(synthetic[0], "difference") + 1.0 / 12.0).abs() < 1e-9);
+    assert!((number(synthetic[1], "difference") - 1.0 / 12.0).abs() < 1e-9);
+    let enhanced = compared("real-enhanced");
+    assert_eq!(enhanced.len(), 1);
+    assert!((number(enhanced[0], "difference") - 4.0 / 12.0).abs() < 1e-9);
+    assert_eq!(
+        (
+            number(enhanced[0], "only_first"),
+            number(enhanced[0], "only_second")
+        ),
+        (4.0, 0.0)
+    );
+    assert!(
+        compared("enhancer")
+            .iter()
+            .all(|row| row["condition"] == "L2-noise+lift")
+    );
+    let dark = compared("level");
+    assert!(
+        dark.iter()
+            .any(|row| row["condition"] == "dark" && is(row, "difference", -0.5))
+    );
+    let curves = fs::read_to_string(bench.path("run/thresholds.csv")).unwrap();
+    let curves: Vec<&str> = curves.lines().skip(1).collect();
+    assert!(
+        !curves.is_empty() && curves.iter().all(|line| !line.contains("dark")),
+        "{curves:?}"
+    );
+    let figure = fs::read_to_string(bench.path("run/figures/accuracy.svg")).unwrap();
+    assert!(figure.contains("dark (real)"), "no mark in the legend");
+    let pairs = self::rows(&bench, "run/pairs.csv");
+    assert!((number(&pairs[0], "ev") - 3.6).abs() < 0.05, "{pairs:?}");
+}
+
+#[test]
+fn the_bytes_of_a_photograph_are_sent_as_they_lie() {
+    let bench = with_photographs(|number| darker(&scene(number), 3.0), DARK);
+    let endpoint = MockEndpoint::start([Answer::text("C")]);
+    let base = endpoint.base_url();
+    let args = model_args(&base, "--data set --levels L0 --out run");
+    bench.complete(&args);
+    let records = records(&bench.path("run"));
+    for record in records
+        .iter()
+        .filter(|record| record["condition"] == "dark")
+    {
+        let number: u32 = record["question"].as_str().unwrap()[1..].parse().unwrap();
+        let file = fs::read(bench.path(&format!("set/low/{number}.png"))).unwrap();
+        let digest = blake3::hash(&file).to_hex().to_string();
+        assert_eq!(record["image"]["digest"], digest, "{record}");
+        assert_eq!(record["image"]["bytes"], file.len());
+    }
+    // A resumed run asks nothing again, and the images are made again byte by byte.
+    let asked = endpoint.requests().len();
+    bench.complete(&args);
+    assert_eq!(endpoint.requests().len(), asked);
+    let shown = bench.complete(&words("show run q3 --condition dark --out shown"));
+    assert!(
+        shown.contains("dark: the very bytes that were sent"),
+        "{shown}"
+    );
+    // A photograph that was changed since is told.
+    scene(5).save(bench.path("set/low/3.png")).unwrap();
+    let changed = bench.call(&words("show run q3 --condition dark --out shown"));
+    assert!(
+        changed.stdout.contains("NOT the bytes that were sent"),
+        "{changed:?}"
+    );
+}
+
+#[test]
+fn shards_merge_into_the_same_products() {
+    let bench = with_photographs(|number| darker(&scene(number), 4.0), DARK);
+    script(&bench, &[("dark", 4), ("match-ev", 3)]);
+    let flags = "--data set --model script:script.jsonl --levels L0,match";
+    bench.complete(&words(&format!("{flags} --out whole")));
+    for part in ["1/2", "2/2"] {
+        bench.complete(&words(&format!(
+            "{flags} --out part-{} --shard {part}",
+            &part[..1]
+        )));
+    }
+    bench.complete(&words("merge part-1 part-2 --out merged"));
+    assert!(assert_same_products(&bench.path("whole"), &bench.path("merged")) > 3);
+    bench.complete(&words("report whole merged"));
+    bench.complete(&words("report whole --rescore"));
+}
+
+#[test]
+fn match_is_as_dark_as_the_photograph_of_each_frame() {
+    let ev = |number| 2.0 + 0.25 * f64::from(number);
+    let bench = with_photographs(|number| darker(&scene(number), ev(number)), DARK);
+    script(&bench, &[("dark", 6), ("match-ev", 6), ("match-noise", 9)]);
+    let table = run(&bench, "--levels L0,match");
+    let all = records(&bench.path("run"));
+    let of = |condition: &'static str| {
+        all.iter()
+            .filter(move |record| record["condition"] == condition)
+    };
+    assert_eq!(
+        (of("match-ev").count(), of("match-noise").count()),
+        (12, 12)
+    );
+    for record in of("match-ev") {
+        let number: u32 = record["question"].as_str().unwrap()[1..].parse().unwrap();
+        let measured = record["image"]["pair"]["mean"].as_f64().unwrap();
+        assert!((measured - ev(number)).abs() < 0.06, "{record}");
+    }
+    let rows = rows(&bench, "run/comparisons.csv");
+    let real: Vec<&Value> = rows
+        .iter()
+        .filter(|row| row["kind"] == "real-synthetic" && row["family"] == "all")
+        .collect();
+    assert_eq!(real.len(), 2, "{real:?}");
+    assert_eq!(
+        (number(real[0], "difference"), number(real[0], "n")),
+        (0.0, 12.0)
+    );
+    assert!((number(real[1], "difference") - 0.25).abs() < 1e-9);
+    let agreement = self::rows(&bench, "run/light_agreement.csv");
+    assert_eq!(agreement[0]["against_condition"], "match-ev");
+    assert!(is(&agreement[0], "same_answer", 1.0), "{table}");
+    assert!(is(&agreement[1], "same_answer", 0.75));
+    // Synthesis at the same exposure gives the same pixels as a level of that number would.
+    let shown = bench.complete(&words("show run q4 --condition match-noise --out shown"));
+    assert!(
+        shown.contains("match-noise: the very bytes that were sent"),
+        "{shown}"
+    );
+}
+
+#[test]
+fn the_same_image_is_no_darker_and_gives_no_difference() {
+    let bench = with_photographs(scene, DARK);
+    script(&bench, &[]);
+    let called = bench.call(&words(
+        "--data set --model script:script.jsonl --levels L0 --out run --full",
+    ));
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert!(
+        called
+            .stderr
+            .contains("12 of 12 photographs dark are not darker than their frames"),
+        "{}",
+        called.stderr
+    );
+    let rows = rows(&bench, "run/comparisons.csv");
+    let level = rows
+        .iter()
+        .find(|row| row["kind"] == "level" && row["condition"] == "dark")
+        .unwrap();
+    assert!(is(level, "difference", 0.0));
+    assert!(is(&self::rows(&bench, "run/pairs.csv")[0], "ev", 0.0));
+    // There is nothing to match.
+    let matched = bench.call(&words(
+        "--data set --model random --levels L0,match --out other",
+    ));
+    assert_eq!(matched.code, Some(2), "{matched:?}");
+    assert!(
+        matched
+            .stderr
+            .contains("no frame has one that is darker than it"),
+        "{matched:?}"
+    );
+}
+
+#[test]
+fn odd_pairs_are_told() {
+    let told = |dark: &dyn Fn(u32) -> RgbImage, extra: &str| -> Called {
+        let bench = with_photographs(dark, extra);
+        bench.call(&words("--data set --model random --levels L0 --out run"))
+    };
+    let swapped = told(&|number| darker(&scene(number), -1.0), DARK);
+    assert!(
+        swapped
+            .stderr
+            .contains("were normal and low light swapped?"),
+        "{swapped:?}"
+    );
+    assert!(swapped.stdout.contains("light swapped?"), "{swapped:?}");
+    let elsewhere = told(&|number| darker(&scene(number + 50), 3.0), DARK);
+    assert!(elsewhere.stderr.contains("another scene"), "{elsewhere:?}");
+    let fair = told(&|number| darker(&scene(number), 3.0), DARK);
+    assert_eq!(fair.code, Some(0));
+    for word in ["another scene", "swapped", "one exposure"] {
+        assert!(!fair.stderr.contains(word), "{word}: {fair:?}");
+    }
+    let missing = told(
+        &|number| darker(&scene(number), 3.0),
+        ",\"dark\":\"low/{}.jpg\"",
+    );
+    assert_eq!(missing.code, Some(2));
+    assert!(
+        missing
+            .stderr
+            .contains("frames.jsonl, line 1: no such file"),
+        "{missing:?}"
+    );
+    let stated = told(
+        &|number| darker(&scene(number), 3.0),
+        ",\"dark\":[{\"path\":\"low/{}.png\",\"ev\":7.5,\"name\":\"lamp\"}]",
+    );
+    assert!(stated.stdout.contains("lamp (real, 7.5 EV)"), "{stated:?}");
+}
+
+#[test]
+fn pairs_in_two_folders_are_frames_named_by_their_files() {
+    let bench = Bench::new();
+    for folder in ["normal", "low"] {
+        fs::create_dir_all(bench.path(folder)).unwrap();
+    }
+    for number in 0..SCENES {
+        scene(number)
+            .save(bench.path(&format!("normal/{number}.png")))
+            .unwrap();
+        darker(&scene(number), 3.0)
+            .save(bench.path(&format!("low/{number}.png")))
+            .unwrap();
+    }
+    scene(3).save(bench.path("low/alone.png")).unwrap();
+    bench.file("q.jsonl", questions(|number| format!("{number}.png")));
+    script(&bench, &[("dark", 4)]);
+    let flags = "--model script:script.jsonl --levels L0 --out run --full";
+    let called = bench.call(&words(&format!(
+        "--pairs normal,low --questions q.jsonl {flags}"
+    )));
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert!(
+        called.stderr.contains("1 images have no partner"),
+        "{called:?}"
+    );
+    assert!(called.stdout.contains("dark (real, 3.0 EV)"), "{called:?}");
+    let shown = bench.complete(&words("show run q2 --condition dark --out shown"));
+    assert!(shown.contains("the very bytes that were sent"), "{shown}");
+    let bare = bench.call(&words("--pairs normal,low --model random --out other"));
+    assert!(
+        bare.stderr.contains("--questions FILE names some"),
+        "{bare:?}"
+    );
+}
+
+#[test]
+fn a_set_in_the_dark_is_asked_as_photographed_and_enhanced() {
+    let bench = Bench::new();
+    fs::create_dir_all(bench.path("set")).unwrap();
+    for number in 0..SCENES {
+        darker(&scene(number), 4.0)
+            .save(bench.path(&format!("set/{number}.png")))
+            .unwrap();
+    }
+    bench.file(
+        "set/questions.jsonl",
+        questions(|number| format!("{number}.png")),
+    );
+    bench.file(
+        "set/dataset.json",
+        "{\"schema\":\"darkqa.dataset/1\",\"light\":\"dark\"}",
+    );
+    script(&bench, &[("L0", 6), ("L0+lift", 3)]);
+    let table = run(&bench, "--llie lift");
+    let conditions: std::collections::BTreeSet<String> = records(&bench.path("run"))
+        .iter()
+        .map(|record| record["condition"].as_str().unwrap().to_owned())
+        .collect();
+    assert_eq!(Vec::from_iter(conditions), ["L0", "L0+lift"]);
+    assert!(table.contains("as photographed"), "{table}");
+    assert!(table.contains("mean linear brightness is 0.0"), "{table}");
+    let svg = fs::read_to_string(bench.path("run/figures/photographed.svg")).unwrap();
+    assert!(svg.contains("50.0") && svg.contains("75.0"), "bars");
+    assert!(!bench.path("run/figures/accuracy.svg").exists());
+    let agreement = rows(&bench, "run/light_agreement.csv");
+    assert!(is(&agreement[0], "same_answer", 0.75));
+    // Levels are darkened where they are named, and that is told.
+    let called = bench.call(&words(
+        "--data set --model random --levels L0,L2 --out dark",
+    ));
+    assert!(
+        called.stderr.contains("their own noise is in them already"),
+        "{called:?}"
+    );
+    // The flag goes before the file.
+    let lit = bench.call(&words("--data set --light lit --model random --out lit"));
+    assert_eq!(records(&bench.path("lit")).len(), 12 * 11, "{lit:?}");
+    bench.file(
+        "set/dataset.json",
+        "{\"schema\":\"darkqa.dataset/1\",\"light\":\"dim\"}",
+    );
+    let wrong = bench.call(&words("--data set --model random --out wrong"));
+    assert_eq!(wrong.code, Some(2));
+    assert!(
+        wrong.stderr.contains("dataset.json") && wrong.stderr.contains("dark"),
+        "{wrong:?}"
+    );
+}
+
+#[test]
+fn folders_of_classes_have_one_question() {
+    let bench = Bench::new();
+    for (place, class) in ["Bicycle", "Boat", "Cup", "Dog", "empty"]
+        .into_iter()
+        .enumerate()
+    {
+        fs::create_dir_all(bench.path(&format!("set/{class}"))).unwrap();
+        for number in 0..3_u32 {
+            if class != "empty" {
+                let name = format!("set/{class}/{number}.png");
+                scene(10 * place as u32 + number)
+                    .save(bench.path(&name))
+                    .unwrap();
+            }
+        }
+    }
+    let asked = |more: &str, out: &str| {
+        let mut args = words("--data set --light dark --model random --label-folders");
+        args.push("Which of these is in the photograph?");
+        args.extend(words(more));
+        args.extend(["--out", out]);
+        bench.call(&args)
+    };
+    let called = asked("", "all");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert!(
+        called.stderr.contains("may show things of several"),
+        "{called:?}"
+    );
+    assert!(called.stderr.contains("it is no class"), "{called:?}");
+    let all = records(&bench.path("all"));
+    assert_eq!(all.len(), 12);
+    for record in &all {
+        let frame = record["frame"].as_str().unwrap();
+        let truth = &record["choices"][record["truth"].as_u64().unwrap() as usize];
+        assert_eq!(record["choices"], json!(["Bicycle", "Boat", "Cup", "Dog"]));
+        assert_eq!(truth, frame.split_once('/').unwrap().0);
+    }
+    asked("--choices 2", "two");
+    for record in records(&bench.path("two")) {
+        assert_eq!(record["choices"].as_array().unwrap().len(), 2, "{record}");
+    }
+    let many = asked("--choices 9", "nine");
+    assert!(many.stderr.contains("has only 4 classes"), "{many:?}");
+    let shown = bench.complete(&words("show all Cup/1.png --out shown"));
+    assert!(shown.contains("the very bytes that were sent"), "{shown}");
+}
