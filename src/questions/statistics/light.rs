@@ -2,7 +2,7 @@
 
 use ndarray::{CowArray, Ix2};
 
-use super::{DepthAxis, FrameDepth, Segment, SegmentDepth, reference};
+use super::{DepthAxis, FrameDepth, Segment, SegmentDepth};
 use crate::questions::colors::{BINS, Palette};
 use crate::questions::rules::MeasureRule;
 use crate::types::{DepthKind, Frame, Intrinsics};
@@ -190,7 +190,13 @@ pub(super) fn luma(frame: &Frame) -> [u8; 3] {
     let mut counts = [0; 256];
     let (pixels, _) = frame.rgb.samples().as_chunks::<3>();
     for pixel in pixels {
-        counts[usize::from(reference::luma(*pixel))] += 1;
+        counts[usize::from(pixel_luma(*pixel))] += 1;
     }
     [10, 50, 90].map(|percent| quantile(&counts, pixels.len() as u64, percent))
+}
+
+/// The luma of a pixel (weights of ITU-R BT.709 in 256ths).
+pub(super) fn pixel_luma([red, green, blue]: [u8; 3]) -> u8 {
+    let luma = 54 * u32::from(red) + 183 * u32::from(green) + 19 * u32::from(blue);
+    (luma >> 8) as u8
 }

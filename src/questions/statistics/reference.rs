@@ -5,7 +5,7 @@
 //! max-RGB of colour constancy (Land and McCann 1971, J. Opt. Soc. Am. 61:1). A quantile replaces the maximum, because single pixels
 //! are glints (Funt and Shi 2010, "The rehabilitation of MaxRGB", CIC 18:256).
 
-use super::light::quantile;
+use super::light::{pixel_luma, quantile};
 use super::scene::SceneMaps;
 use crate::questions::rules::MeasureRule;
 use crate::types::Frame;
@@ -75,7 +75,7 @@ impl LightSamples {
             .partition_point(|sample| sample.place[1] < rows.end);
         let near = self.samples[first..last].iter();
         let near = near.filter(|sample| sample.mask != mask && columns.contains(&sample.place[0]));
-        high(near.map(|sample| luma(sample.rgb)), self.percents[1])
+        high(near.map(|sample| pixel_luma(sample.rgb)), self.percents[1])
     }
 }
 
@@ -87,10 +87,4 @@ fn high(codes: impl Iterator<Item = u8>, percent: u64) -> Option<u8> {
         count += 1;
     }
     (count > 0).then(|| quantile(&counts, count, percent))
-}
-
-/// The luma of a pixel (weights of ITU-R BT.709 in 256ths).
-pub(super) fn luma([red, green, blue]: [u8; 3]) -> u8 {
-    let luma = 54 * u32::from(red) + 183 * u32::from(green) + 19 * u32::from(blue);
-    (luma >> 8) as u8
 }
