@@ -214,8 +214,9 @@ pub(super) fn open(folder: &Path, questions: Option<&Path>, set: &SetArgs) -> Re
         );
         return Err(Error::data(folder.display(), problem));
     }
+    let read = ready_made::about_frames(&file, set)?;
     Dataset::new(stem(folder), sources(folder, &set.data_root)?, Vec::new())
-        .with_questions_of(&file, set)
+        .with_questions_of(&file, read)
 }
 
 /// Whether a place is a folder of frames, and not a ready-made set.

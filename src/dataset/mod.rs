@@ -46,8 +46,8 @@ use maps::MapPaths;
 pub(crate) use photographs::Photographs;
 pub(crate) use picture::Picture;
 pub(crate) use reading_rule::ReadingRule;
-use ready_made::Form;
 pub use ready_made::SetArgs;
+use ready_made::{Form, ReadQuestions};
 pub(crate) use root::Root;
 pub(crate) use scene_args::SceneArgs;
 pub(crate) use settings::{BankArgs, CodesArgs, DataArgs, PixelLimit, SelectionArgs, place};
@@ -157,8 +157,8 @@ impl Dataset {
     }
 
     /// The same data set with the questions of a file. Each must be about one of its frames.
-    fn with_questions_of(self, file: &Path, set: &SetArgs) -> Result<Self> {
-        let (questions, reading) = ready_made::about_frames(file, set)?;
+    fn with_questions_of(self, file: &Path, read: ReadQuestions) -> Result<Self> {
+        let (questions, reading) = read;
         let unmatched = questions
             .iter()
             .find(|question| !self.sources.contains_key(&question.frame));
@@ -252,7 +252,9 @@ impl Dataset {
             DataPlace::Rooms(rooms) => {
                 let rooms = Self::of_rooms(*rooms);
                 match questions {
-                    Some(file) => rooms.with_questions_of(file, set)?,
+                    Some(file) => {
+                        rooms.with_questions_of(file, ready_made::about_frames(file, set)?)?
+                    }
                     None => rooms,
                 }
             }

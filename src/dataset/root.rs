@@ -102,7 +102,7 @@ impl Root {
             return Err(format!("no such file: {}", path.display()));
         };
         if !self.real.iter().any(|root| real.starts_with(root)) {
-            return Err(self.outside(spelled, &written));
+            return Err(self.outside(spelled, &real));
         }
         if !real.is_file() {
             return Err(format!("no such file: {}", path.display()));

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::pairs::Pairs;
-use super::{DataPlace, Dataset, SetArgs, frames, label_folders, pair_frames};
+use super::{DataPlace, Dataset, SetArgs, frames, label_folders, pair_frames, ready_made};
 use crate::error::{Error, Result};
 use crate::types::{Decides, SetLight};
 
@@ -116,7 +116,7 @@ impl SceneArgs {
                     let problem = "pairs of photographs have no questions; --questions FILE names some about the files in normal light";
                     return Err(Error::usage("--pairs", problem));
                 };
-                dataset.with_questions_of(file, set)
+                dataset.with_questions_of(file, ready_made::about_frames(file, set)?)
             }
             Some(dataset) => {
                 let why = "the folders make the questions of --label-folders";

@@ -46,7 +46,7 @@ questions.csv   one question a line; a spreadsheet can edit it
   A B C D       the choices; leave cells empty for fewer than four, add E, F, ... for more
   answer        the letter of the true choice
   category      the kind of question, by which the report groups
-images/         the images: PNG, JPEG, WebP, TIFF, BMP or OpenEXR
+images/         the images: PNG, JPEG, WebP, TIFF or OpenEXR
 dataset.json    the name of the data set
 
 Replace the images and the lines by your own, then run the check again.
@@ -58,7 +58,12 @@ Replace the images and the lines by your own, then run the check again.
 /// If a file exists already, or cannot be written.
 pub(crate) fn init(args: &InitArgs, progress: &Progress) -> Result<Outcome> {
     let at = |name: &str| args.folder.join(name);
-    let files = ["README.txt", "questions.csv", "dataset.json"];
+    let files = [
+        "README.txt",
+        "questions.csv",
+        "dataset.json",
+        "images/room1.png",
+    ];
     if let Some(exists) = files.iter().map(|name| at(name)).find(|path| path.exists()) {
         let problem = "there already; init overwrites nothing: name another folder";
         return Err(Error::data(exists.display(), problem));

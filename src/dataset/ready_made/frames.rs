@@ -66,8 +66,8 @@ pub(super) struct Frames<'a> {
     /// The ZIP file that holds the set.
     archive: Option<&'a Arc<Archive>>,
     files: &'a [Arc<SetFile>],
-    /// The row of each id whose own cell holds an image.
-    holders: HashMap<String, usize>,
+    /// The row of each file and id whose own cell holds an image.
+    holders: HashMap<(usize, String), usize>,
     roles: &'a Roles,
     /// The name of each image in a cell.
     names: HashMap<Digest, FrameId>,
@@ -105,19 +105,26 @@ impl<'a> Frames<'a> {
             let texts = self.table.rows.iter().map(|row| column.text(row));
             texts
                 .into_iter()
-                .all(|text| text.is_some_and(|text| seen.insert(text)))
+                .all(|text| text.is_some_and(|text| seen.insert(text.trim().to_owned())))
         });
         let unique = ids.next();
+        // Within a file, rows are named by the first column whose values differ there.
+        let differs = |column: &&Column| {
+            let mut seen = HashSet::new();
+            self.table.rows.iter().all(|row| {
+                let text = column.text(row);
+                text.is_some_and(|text| seen.insert((row.file, text.trim().to_owned())))
+            })
+        };
+        let named = unique.or_else(|| self.roles.ids.iter().find(differs));
         for (at, row) in self.table.rows.iter().enumerate() {
             let found = images(self.table, row, self.roles);
             let [RowImage::Embedded { facts, .. }] = &*found else {
                 continue;
             };
-            for column in &self.roles.ids {
-                let id = column.text(row).map(|id| id.trim().to_owned());
-                if let Some(id) = id {
-                    self.holders.entry(id).or_insert(at);
-                }
+            if let Some(id) = named.and_then(|column| column.text(row)) {
+                let key = (row.file, id.trim().to_owned());
+                self.holders.entry(key).or_insert(at);
             }
             let id = unique.and_then(|column| column.text(row));
             let name = id.map_or_else(|| content_name(&facts.digest), |id| id.trim().to_owned());
@@ -164,7 +171,8 @@ impl<'a> Frames<'a> {
 
     /// The image in the cell of the row with this id.
     fn holder(&self, row: usize, id: &str) -> Option<Found> {
-        let holder = *self.holders.get(id)?;
+        let file = self.table.rows[row].file;
+        let holder = *self.holders.get(&(file, id.trim().to_owned()))?;
         let own = images(self.table, &self.table.rows[holder], self.roles);
         let [
             RowImage::Embedded {

@@ -100,6 +100,10 @@ fn item(
         let column = &roles.question.name;
         return Ok(Err(format!("the question is empty (column {column:?})")));
     };
+    if text.len() > LONGEST_TEXT {
+        let problem = format!("a question of more than {} KB", LONGEST_TEXT >> 10);
+        return Ok(Err(problem));
+    }
     let text = match &*IMAGE_MARK {
         Some(mark) => mark.replace_all(&text, "").trim().to_owned(),
         None => text,

@@ -74,7 +74,10 @@ pub(super) fn open(place: &Path, stem: &str, args: &SetArgs) -> Result<ReadySet>
         archive,
         notes,
     } = found;
-    let info = FolderInfo::of(&folder)?;
+    let info = match &archive {
+        Some(_) => FolderInfo::default(),
+        None => FolderInfo::of(&folder)?,
+    };
     let map = Map::joined(info.map.iter().chain(&args.map));
     let mut further = args.data_root.clone();
     further.extend(blobs);
@@ -151,11 +154,14 @@ pub(super) enum Form {
     Foreign,
 }
 
+/// Questions, and what was taken for what when they were read, one fact a line.
+pub(super) type ReadQuestions = (Vec<Question>, Vec<String>);
+
 /// The questions of a file about frames of other data, and what was taken for what.
 ///
 /// # Errors
 /// As [`open`].
-pub(super) fn about_frames(file: &Path, args: &SetArgs) -> Result<(Vec<Question>, Vec<String>)> {
+pub(super) fn about_frames(file: &Path, args: &SetArgs) -> Result<ReadQuestions> {
     let mut table = Table::default();
     SetFile::open(file.to_owned(), String::new())?.read(args.rows.as_deref(), &mut table)?;
     let own: Option<Map> = table.find("frame").and_then(|_| "image=frame".parse().ok());

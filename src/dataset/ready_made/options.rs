@@ -27,7 +27,7 @@ impl Options {
     pub(super) fn of(row: &Row, roles: &Roles) -> Self {
         let mut found: Vec<(String, Offered)> = Vec::new();
         let cells = roles.cells.iter().enumerate();
-        let cells = cells.filter_map(|(place, cell)| Some((cell.text(row)?, place)));
+        let cells = cells.filter_map(|(place, cell)| Some((option(cell.of(row))?, place)));
         let (texts, places): (Vec<String>, Vec<usize>) = cells.unzip();
         if !texts.is_empty() {
             let texts = without_letters(texts);
@@ -39,6 +39,7 @@ impl Options {
                 continue;
             }
             match options(cell, roles.split_options.as_deref()) {
+                Some(options) if options.is_empty() => {}
                 Some(options) => {
                     let offered = Offered::listed(without_letters(options));
                     found.push((column.name.clone(), offered));
@@ -66,6 +67,13 @@ impl Options {
 fn cell_names(cells: &[Column]) -> String {
     let names: Vec<&str> = cells.iter().map(|cell| cell.name.as_str()).collect();
     names.join(",")
+}
+
+/// The option in a cell of its own. `None` is a word that a choice may be, so it is none only where nothing stands at all.
+fn option(cell: &Cell) -> Option<String> {
+    let text = cell.text()?;
+    let is_nothing = matches!(&*text.trim().to_ascii_lowercase(), "nan" | "n/a");
+    (!is_nothing).then_some(text)
 }
 
 /// The options in a cell.

@@ -91,7 +91,7 @@ impl Preset {
         let mut args = args.clone();
         let map = self.map.as_deref().and_then(|map| map.parse::<Map>().ok());
         args.map.splice(0..0, map);
-        args.config_name = args.config_name.or_else(|| self.config.clone());
+        args.preset_config.clone_from(&self.config);
         let skip = |kind, flag: Option<LeaveOut>| {
             flag.or(self.skip.contains(&kind).then_some(LeaveOut::Skip))
         };

@@ -142,10 +142,15 @@ impl Roles {
         if entry.is_some_and(|entry| entry.columns.len() > 1) {
             return Ok(Images::All(columns));
         }
+        let numbered = numbered(table, &["image", "img"]);
+        if let (Some(first), false) = (columns.first(), numbered.is_empty()) {
+            // A picture beside numbered ones is one of several.
+            let all = std::iter::once(first.clone()).chain(numbered);
+            return Ok(Images::All(all.collect()));
+        }
         if !columns.is_empty() {
             return Ok(Images::First(columns));
         }
-        let numbered = numbered(table, &["image", "img"]);
         Ok(Images::All(numbered))
     }
 }

@@ -18,6 +18,9 @@ pub struct SetArgs {
     /// The well-known set that `--data NAME:FILE` names.
     #[arg(skip)]
     pub preset: Option<String>,
+    /// The configuration that the rules of that set name.
+    #[arg(skip)]
+    pub preset_config: Option<String>,
     /// The configuration of a repository of several, or all of them; default: the one that its card makes the default
     #[arg(long, value_name = "NAME|all", add = Decides::Reply)]
     pub config_name: Option<String>,

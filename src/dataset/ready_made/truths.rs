@@ -3,6 +3,7 @@
 use super::answers::{
     AnswerOf, OneReading, Reading, asks_yes_or_no, digit, one_reading, yes_or_no,
 };
+use super::cell::Cell;
 use super::items::{AnswerCell, Item};
 use super::left_out::{LeftOut, Why};
 use super::map::How;
@@ -82,6 +83,12 @@ pub(super) fn is_own(table: &Table) -> bool {
             .all(|column| FIELDS.contains(&column.as_str()))
 }
 
+/// Whether every answer is written as a text, and none as a number.
+fn are_texts(table: &Table, column: &Column) -> bool {
+    let mut cells = table.rows.iter().map(|row| column.of(row));
+    cells.all(|cell| matches!(cell, Cell::Text(_)))
+}
+
 /// Items with an answer each. Those without one, or with several, are counted.
 fn with_answers(
     table: &Table,
@@ -142,21 +149,24 @@ fn of_options(
                 (0..rows.len()).filter(|&row| reading.truth(rows[row].0, rows[row].1).is_none());
             (*reading, unfit.collect())
         }
-        How::ByRule | How::Split(_) if is_own(table) && fits(Reading::Text) => {
+        How::ByRule | How::Split(_)
+            if is_own(table) && are_texts(table, column) && fits(Reading::Text) =>
+        {
             (Reading::Text, Vec::new())
         }
         How::ByRule | How::Split(_) => match one_reading(&rows) {
             OneReading::Fits(reading) => (reading, Vec::new()),
-            OneReading::None { best, unfit } => (best, unfit),
+            OneReading::None { best, unfit } => {
+                let read: Vec<usize> = (0..rows.len()).filter(|row| !unfit.contains(row)).collect();
+                let kept: Vec<AnswerOf<'_>> = read.iter().map(|&row| rows[row]).collect();
+                if let OneReading::Ambiguous { readings, row } = one_reading(&kept) {
+                    let row = read[row];
+                    return Err(ambiguous(table, &items[row].0, rows[row], readings, column));
+                }
+                (best, unfit)
+            }
             OneReading::Ambiguous { readings, row } => {
-                let [one, other] = readings.map(Reading::name);
-                return Err(format!(
-                    "{}: the answer {:?} may be read as {one} or as {other}, which differ among the options {:?}; --map answer={name}:{one} or --map answer={name}:{other} says which is meant",
-                    table.place(items[row].0.row),
-                    rows[row].0,
-                    rows[row].1.texts,
-                    name = column.name,
-                ));
+                return Err(ambiguous(table, &items[row].0, rows[row], readings, column));
             }
         },
     };
@@ -189,6 +199,23 @@ fn of_options(
         }
     }
     Ok(())
+}
+
+/// The error for an answer that two readings understand in two ways.
+fn ambiguous(
+    table: &Table,
+    item: &Item,
+    (answer, options): AnswerOf<'_>,
+    readings: [Reading; 2],
+    column: &Column,
+) -> String {
+    let [one, other] = readings.map(Reading::name);
+    format!(
+        "{}: the answer {answer:?} may be read as {one} or as {other}, which differ among the options {:?}; --map 'answer={name}:{one}' or --map 'answer={name}:{other}' says which is meant",
+        table.place(item.row),
+        options.texts,
+        name = column.name,
+    )
 }
 
 /// The column of answers that are read against options: the only one, or the first of those that say the same in every row.
@@ -272,7 +299,11 @@ fn of_yes_or_no(
         words.map(|words| (column, words))
     });
     let column = one_of(table, fitting, |at| items[at].row, &roles.answers[0])?;
-    let answers: Vec<Option<String>> = items.iter().map(|item| of(column, item)).collect();
+    let (items, answers): (Vec<Item>, Vec<Option<String>>) =
+        with_answers(table, column, items, left)?
+            .into_iter()
+            .map(|(item, answer)| (item, Some(answer)))
+            .unzip();
     let verbs = items
         .iter()
         .filter(|item| asks_yes_or_no(last_line(&item.text)))

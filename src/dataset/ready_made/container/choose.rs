@@ -24,7 +24,7 @@ pub(super) fn is_set(tree: &Tree, files: &[PathBuf]) -> bool {
     is_arrow
         || !named(tree).is_empty()
         || files.iter().any(|path| is_metadata(path))
-        || by_kind(tree, files.to_vec()).is_ok()
+        || files.iter().any(|path| is_rows(path))
 }
 
 /// The configurations that the card of a tree names; a card that cannot be read names none.
@@ -60,7 +60,13 @@ pub(super) fn chosen(tree: &Tree, files: Vec<PathBuf>, args: &SetArgs) -> Result
         });
         candidates.collect()
     } else {
-        of_card(tree, &configs, &files, args.config_name.as_deref())?
+        {
+            let wanted = args
+                .config_name
+                .as_deref()
+                .or(args.preset_config.as_deref());
+            of_card(tree, &configs, &files, wanted)?
+        }
     };
     splits::chosen(tree, candidates, args.split.as_deref())
 }
@@ -174,6 +180,14 @@ fn by_kind(tree: &Tree, files: Vec<PathBuf>) -> Result<Vec<PathBuf>> {
         return Err(Error::data(tree.place().display(), problem));
     }
     one_kind(tree, tables)
+}
+
+/// Whether a file can hold the rows of a tree without a card.
+fn is_rows(path: &Path) -> bool {
+    let own = ["dataset.json", "classes.json", "info.json"];
+    let is_here = path.parent() == Some(Path::new(""));
+    let is_table = is_here && !own.iter().any(|own| path == Path::new(own)) && is_text_table(path);
+    is_table || ending(path) == "parquet"
 }
 
 fn is_text_table(path: &Path) -> bool {

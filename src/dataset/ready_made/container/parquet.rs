@@ -3,14 +3,16 @@
 //! Pass 1 goes over the rows one at a time and keeps the digests of images alone. Later the pages before an image are skipped by
 //! their headers, and one value is read.
 
+use std::cell::RefCell;
 use std::collections::HashMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use parquet::basic::Compression;
-use parquet::column::reader::{ColumnReader, get_column_reader};
-use parquet::data_type::ByteArray;
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
+use parquet::data_type::{ByteArray, ByteArrayType};
+use parquet::errors::ParquetError;
 use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader, RowGroupMetaData};
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::file::serialized_reader::SerializedPageReader;
@@ -162,6 +164,84 @@ fn cell_of(field: Field) -> Cell {
     }
 }
 
+/// A reader of one leaf that stays where it is: the next image is mostly a few rows further on.
+struct Cursor {
+    path: PathBuf,
+    group: usize,
+    leaf: usize,
+    /// The row that is read next.
+    next: usize,
+    reader: ColumnReaderImpl<ByteArrayType>,
+    /// The level of a value that is there.
+    defined: i16,
+    /// Whether a row may hold several values.
+    is_list: bool,
+}
+
+thread_local! {
+    /// The cursor of this thread. Each thread goes through the images in the order of their file.
+    static CURSOR: RefCell<Option<Cursor>> = const { RefCell::new(None) };
+}
+
+impl Cursor {
+    fn open(
+        path: &Path,
+        footer: &ParquetMetaData,
+        group: usize,
+        leaf: usize,
+    ) -> Result<Self, String> {
+        let file = File::open(path).map_err(|e| e.to_string())?;
+        let of_group = &footer.row_groups()[group];
+        let chunk = &of_group.columns()[leaf];
+        let rows = usize::try_from(of_group.num_rows()).unwrap_or(0);
+        let pages = SerializedPageReader::new(Arc::new(file), chunk, rows, None);
+        let pages = pages.map_err(|e| e.to_string())?;
+        let reader = get_column_reader(chunk.column_descr_ptr(), Box::new(pages));
+        let ColumnReader::ByteArrayColumnReader(reader) = reader else {
+            return Err("no column of bytes".to_owned());
+        };
+        Ok(Self {
+            path: path.to_owned(),
+            group,
+            leaf,
+            next: 0,
+            reader,
+            defined: chunk.column_descr().max_def_level(),
+            is_list: chunk.column_descr().max_rep_level() > 0,
+        })
+    }
+
+    /// Whether the reader can go on to a row of a leaf.
+    fn reaches(&self, path: &Path, group: usize, leaf: usize, row: usize) -> bool {
+        self.path == path && (self.group, self.leaf) == (group, leaf) && self.next <= row
+    }
+
+    /// The value of a row; of a list, that of the item.
+    fn value(&mut self, row: usize, item: usize) -> Result<Vec<u8>, String> {
+        let text = |e: ParquetError| e.to_string();
+        self.reader.skip_records(row - self.next).map_err(text)?;
+        self.next = row + 1;
+        let (mut defined, mut repeated) = (Vec::new(), Vec::new());
+        let mut values: Vec<ByteArray> = Vec::new();
+        self.reader
+            .read_records(1, Some(&mut defined), Some(&mut repeated), &mut values)
+            .map_err(text)?;
+        let item = if self.is_list { item } else { 0 };
+        // Values are stored without the nulls between them.
+        let before = defined
+            .iter()
+            .take(item)
+            .filter(|level| **level == self.defined);
+        let at = if defined.is_empty() {
+            item
+        } else {
+            before.count()
+        };
+        let value = values.get(at).map(|value| value.data().to_vec());
+        value.ok_or_else(|| "the value is gone".to_owned())
+    }
+}
+
 /// The bytes of a value of bytes or text: in a column, at the steps inside its cell.
 pub(super) fn bytes(
     path: &Path,
@@ -170,44 +250,26 @@ pub(super) fn bytes(
     steps: &[Step],
 ) -> Result<Vec<u8>> {
     let footer = footer(path)?;
-    let file = Arc::new(open(path)?);
+    let item = steps.iter().find_map(|step| match step {
+        Step::Item(at) => Some(*at),
+        Step::Field(_) => None,
+    });
     let read = || {
-        let group = footer.row_groups().get(group).ok_or("no such row group")?;
-        let leaf = leaf(group.columns(), column, steps).ok_or("no such column")?;
-        let chunk = &group.columns()[leaf];
-        let rows = usize::try_from(group.num_rows()).unwrap_or(0);
-        let pages =
-            SerializedPageReader::new(file, chunk, rows, None).map_err(|e| e.to_string())?;
-        let reader = get_column_reader(chunk.column_descr_ptr(), Box::new(pages));
-        let ColumnReader::ByteArrayColumnReader(mut reader) = reader else {
-            return Err("no column of bytes".to_owned());
+        let columns = footer
+            .row_groups()
+            .get(group)
+            .ok_or("no such row group")?
+            .columns();
+        let leaf = leaf(columns, column, steps).ok_or("no such column")?;
+        let kept = CURSOR.take();
+        let kept = kept.filter(|kept| kept.reaches(path, group, leaf, row));
+        let mut cursor = match kept {
+            Some(cursor) => cursor,
+            None => Cursor::open(path, &footer, group, leaf)?,
         };
-        reader.skip_records(row).map_err(|e| e.to_string())?;
-        let (mut defined, mut repeated) = (Vec::new(), Vec::new());
-        let mut values: Vec<ByteArray> = Vec::new();
-        reader
-            .read_records(1, Some(&mut defined), Some(&mut repeated), &mut values)
-            .map_err(|e| e.to_string())?;
-        let most = chunk.column_descr().max_def_level();
-        let item = steps.iter().find_map(|step| match step {
-            Step::Item(at) => Some(*at),
-            Step::Field(_) => None,
-        });
-        let item = match item {
-            Some(item) if chunk.column_descr().max_rep_level() > 0 => item,
-            _ => 0,
-        };
-        // Values are stored without the nulls between them.
-        let before = defined.iter().take(item).filter(|level| **level == most);
-        let at = if defined.is_empty() {
-            item
-        } else {
-            before.count()
-        };
-        values
-            .get(at)
-            .map(|value| value.data().to_vec())
-            .ok_or_else(|| "the value is gone".to_owned())
+        let value = cursor.value(row, item.unwrap_or(0))?;
+        CURSOR.set(Some(cursor));
+        Ok(value)
     };
     guarded(read).map_err(|problem| wrong(path, &problem))
 }
