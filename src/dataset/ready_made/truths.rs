@@ -211,10 +211,11 @@ fn ambiguous(
 ) -> String {
     let [one, other] = readings.map(Reading::name);
     format!(
-        "{}: the answer {answer:?} may be read as {one} or as {other}, which differ among the options {:?}; --map 'answer={name}:{one}' or --map 'answer={name}:{other}' says which is meant",
+        "{}: the answer {answer:?} may be read as {one} or as {other}, which differ among the options {:?}; --map answer={q}{name}:{one}{q} or --map answer={q}{name}:{other}{q} says which is meant",
         table.place(item.row),
         options.texts,
         name = column.name,
+        q = if column.name.contains(' ') { "'" } else { "" },
     )
 }
 

@@ -2,6 +2,7 @@
 
 mod broken;
 mod fixture;
+mod gaps;
 mod refusals;
 mod shapes;
 

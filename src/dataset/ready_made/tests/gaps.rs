@@ -1,0 +1,108 @@
+//! Rows in which something is missing or stands twice do not change how the others are read.
+
+use serde_json::{Value, json};
+
+use super::super::settings::LeaveOut;
+use super::fixture::{base64, row, set, write};
+use super::{open, read, refusal};
+use crate::dataset::ready_made::SetArgs;
+
+fn with(rows: Vec<Value>) -> (tempfile::TempDir, std::path::PathBuf) {
+    let rows: Vec<_> = rows.into_iter().map(row).collect();
+    set("set.json", &rows)
+}
+
+fn skipping() -> SetArgs {
+    SetArgs {
+        bad: Some(LeaveOut::Skip),
+        open: Some(LeaveOut::Skip),
+        ..SetArgs::default()
+    }
+}
+
+#[test]
+fn a_broken_row_does_not_decide_between_two_readings() {
+    let question = |answer: i64| json!({"question": "?", "options": ["a", "b", "c", "d"], "answer": answer, "image": base64(answer as u8)});
+    let rows = (0..39).map(|n| question(1 + n % 3)).chain([question(9)]);
+    let (_folder, path) = with(rows.collect());
+    let problem = refusal(&path, &skipping());
+    assert!(problem.contains("index0 or as index1"), "{problem}");
+}
+
+#[test]
+fn yes_or_no_without_an_answer_is_broken_and_not_open() {
+    let question =
+        |answer: Value| json!({"question": "Is it?", "answer": answer, "image": base64(1)});
+    let (_folder, path) = with(vec![question(json!("yes")), question(Value::Null)]);
+    let problem = refusal(&path, &skipping());
+    assert!(
+        problem.contains("1 of 2 rows are broken") && problem.contains("at most 5 %"),
+        "{problem}"
+    );
+    let (_folder, path) = with(vec![question(Value::Null), question(json!(""))]);
+    let problem = refusal(&path, &skipping());
+    assert!(problem.contains("no answer in any row"), "{problem}");
+}
+
+#[test]
+fn an_empty_list_of_options_is_none_and_the_word_none_is_one() {
+    let (_folder, path) = with(vec![
+        json!({"question": "Which?", "options": "['x', 'y']", "answer": "B", "image": base64(1)}),
+        json!({"question": "How many?", "options": "[]", "answer": "7", "image": base64(2)}),
+    ]);
+    assert_eq!(read(&open(&path, &skipping()).unwrap()).len(), 1);
+    let (_folder, path) = with(vec![
+        json!({"question": "Which?", "A": "x", "B": "None", "C": "n/a", "answer": "A", "image": base64(1)}),
+    ]);
+    assert_eq!(read(&open(&path, &skipping()).unwrap())[0].3, ["x", "None"]);
+}
+
+#[test]
+fn a_picture_beside_numbered_ones_is_one_of_several() {
+    let (_folder, path) = with(vec![
+        json!({"question": "?", "options": ["x", "y"], "answer": "x", "image": base64(1), "image_2": base64(2)}),
+    ]);
+    assert!(refusal(&path, &skipping()).contains("1 of 1 rows show 2 images"));
+}
+
+#[test]
+fn another_row_s_image_is_that_of_the_same_file() {
+    let question = |id: i64, image: &str| {
+        row(
+            json!({"index": id, "question": format!("{id}?"), "options": ["x", "y"], "answer": "x", "image": image}),
+        )
+    };
+    let (folder, first) = set("a.tsv", &[question(1, &base64(1)), question(2, "1")]);
+    write(
+        &first.with_file_name("b.tsv"),
+        &[question(1, &base64(3)), question(4, "1")],
+    );
+    let dataset = open(&folder.path().join("*.tsv"), &skipping()).unwrap();
+    let reds: Vec<u8> = read(&dataset).into_iter().map(|read| read.5).collect();
+    assert_eq!(reds, [1, 1, 3, 3]);
+}
+
+#[test]
+fn ids_that_differ_in_space_alone_are_no_ids() {
+    let question = |id: &str, red| {
+        row(
+            json!({"index": id, "question": "?", "options": ["x", "y"], "answer": "x", "image": base64(red)}),
+        )
+    };
+    let (_folder, path) = set("set.csv", &[question("1", 1), question("1 ", 2)]);
+    let reds: Vec<u8> = read(&open(&path, &skipping()).unwrap())
+        .into_iter()
+        .map(|read| read.5)
+        .collect();
+    assert_eq!(reds, [1, 2]);
+}
+
+#[test]
+fn a_well_known_set_of_configurations_may_be_one_file() {
+    let (_folder, path) = with(vec![
+        json!({"question": "?", "options": "['x', 'y']", "answer": "A", "image_1": base64(1), "image_2": null}),
+    ]);
+    let place = crate::dataset::place(&format!("mmmu:{}", path.display())).unwrap();
+    let dataset = crate::dataset::Dataset::open(&place, None, &SetArgs::default()).unwrap();
+    assert_eq!(dataset.questions().len(), 1);
+}
