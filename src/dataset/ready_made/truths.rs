@@ -108,7 +108,7 @@ fn with_answers(
     }
     if absent.len() == count && count > 0 {
         return Err(format!(
-            "no answer in any row (column {:?}): a test split without them? --split names another",
+            "no answer in any row (column {:?}): a test split without them? --split names another, and --ask FILE asks questions without answers about every image",
             column.name
         ));
     }
