@@ -172,7 +172,7 @@ mod tests {
     fn a_wrong_map_is_refused_with_what_was_expected() {
         for (text, says) in [
             ("frage", "one of the roles question, image"),
-            ("quesion=frage", "one of the roles question, image"),
+            ("colour=frage", "one of the roles question, image"),
             ("id=a,id=b", "id stands twice"),
             ("answer=a:second", "one of letter, text, index0, index1"),
             ("options=a:split()", "split(|) expected"),
