@@ -15,7 +15,7 @@ use crate::types::{AxisLevel, Rgb, SetLight};
 const SAMPLED: usize = 24;
 
 /// Mean luma, of 255, below which a frame is dark. Chosen: a well-lit frame has about 100.
-const DARK: f64 = 40.0;
+pub(crate) const DARK: f64 = 40.0;
 
 /// Says what a set in the dark is asked by default, and why, or what is odd about the levels that are named.
 pub(crate) fn tell(job: &JobSettings, progress: &Progress) {

@@ -1,5 +1,6 @@
 //! All files of a report: [`products`].
 
+use super::chart::Figure;
 use super::choice_report::ChoiceReport;
 use super::figures::figures;
 use super::page::{PageInputs, page};
@@ -19,7 +20,18 @@ pub fn products<'a>(
 ) -> Result<Vec<(String, Vec<u8>)>> {
     let figures = figures(report.findings)?;
     let page = page(report, &figures, inputs)?;
-    let mut files = table_files(&report.tables, &report.sentences, "Findings and tables")?;
+    files(&report.tables, &report.sentences, figures, page, inputs)
+}
+
+/// The files of a report with its figures, samples and page.
+pub(super) fn files(
+    tables: &[Table],
+    sentences: &[Sentence],
+    figures: Vec<Figure>,
+    page: String,
+    inputs: &PageInputs<'_>,
+) -> Result<Vec<(String, Vec<u8>)>> {
+    let mut files = table_files(tables, sentences, "Findings and tables")?;
     files.extend(chart::files(figures));
     for samples in samples(inputs.thumbnails) {
         let name = format!("figures/{}.svg", samples.name);

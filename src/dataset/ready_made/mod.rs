@@ -98,28 +98,13 @@ pub(super) fn open(place: &Path, stem: &str, args: &SetArgs) -> Result<ReadySet>
         "" => stem.to_owned(),
         name => name.to_owned(),
     };
-    let mut frames = Frames::new(&table, &root, archive.as_ref(), &files, &set.roles);
-    let ids = frames.ids(&set.answered)?;
-    let (questions, sources) = questions(&table, &set, &ids, &mut frames)?;
+    let frames = Frames::new(&table, &root, archive.as_ref(), &files, &set.roles);
     let mut notes = notes;
     notes.extend(preset.map(preset::Preset::source));
-    notes.extend(ids.note());
-    notes.extend(preset::recognised(&table.columns, args.preset.as_deref()));
-    let summary = Summary {
-        name: &name,
-        table: &table,
-        roles: &set.roles,
-        answers: &set.said,
-        ids: ids.name(),
-        cut: &set.cut,
-        left: &set.left,
-        sources: &sources,
-        questions: &questions,
-        notes,
-    };
-    let lines = summary.lines();
+    let hint = preset::recognised(&table.columns, args.preset.as_deref());
+    let asked = finish(&name, &table, &set, frames, notes, hint)?;
     Ok(ReadySet {
-        reading: lines,
+        reading: asked.reading,
         form: if is_own(&table) {
             Form::Own
         } else {
@@ -127,8 +112,8 @@ pub(super) fn open(place: &Path, stem: &str, args: &SetArgs) -> Result<ReadySet>
         },
         title: info.name,
         name,
-        sources,
-        questions,
+        sources: asked.sources,
+        questions: asked.questions,
     })
 }
 
@@ -169,15 +154,38 @@ pub(super) fn about_frames(file: &Path, args: &SetArgs) -> Result<ReadQuestions>
     let set = read(&table, &map, args, None, ImagesAre::Frames)
         .map_err(|problem| Error::data(file.display(), problem))?;
     let root = Root::of(file.parent().unwrap_or(Path::new("")), &[])?;
-    let mut frames = Frames::new(&table, &root, None, &[], &set.roles);
-    let ids = frames.ids(&set.answered)?;
-    let (questions, sources) = questions(&table, &set, &ids, &mut frames)?;
+    let frames = Frames::new(&table, &root, None, &[], &set.roles);
+    let name = file.display().to_string();
+    let asked = finish(&name, &table, &set, frames, Vec::new(), None)?;
     if is_own(&table) {
-        return Ok((questions, Vec::new()));
+        return Ok((asked.questions, Vec::new()));
     }
+    Ok((asked.questions, asked.reading))
+}
+
+/// The questions of a set, the sources of their frames, and what was taken for what.
+struct Finished {
+    questions: Vec<Question>,
+    sources: BTreeMap<FrameId, ImageSource>,
+    reading: Vec<String>,
+}
+
+/// Step 6. `notes` stand before the note about ids, and `hint` behind it.
+fn finish(
+    name: &str,
+    table: &Table,
+    set: &ReadSet,
+    mut frames: Frames<'_>,
+    mut notes: Vec<String>,
+    hint: Option<String>,
+) -> Result<Finished> {
+    let ids = frames.ids(&set.answered)?;
+    let (questions, sources) = questions(table, set, &ids, &mut frames)?;
+    notes.extend(ids.note());
+    notes.extend(hint);
     let summary = Summary {
-        name: &file.display().to_string(),
-        table: &table,
+        name,
+        table,
         roles: &set.roles,
         answers: &set.said,
         ids: ids.name(),
@@ -185,10 +193,14 @@ pub(super) fn about_frames(file: &Path, args: &SetArgs) -> Result<ReadQuestions>
         left: &set.left,
         sources: &sources,
         questions: &questions,
-        notes: ids.note().into_iter().collect(),
+        notes,
     };
-    let lines = summary.lines();
-    Ok((questions, lines))
+    let reading = summary.lines();
+    Ok(Finished {
+        questions,
+        sources,
+        reading,
+    })
 }
 
 /// The rows of a set with their truths.
@@ -267,7 +279,7 @@ fn image_hint(table: &Table, roles: &Roles, problem: String) -> String {
     )
 }
 
-/// Step 6: the questions and the sources of their frames.
+/// The questions and the sources of their frames.
 fn questions(
     table: &Table,
     set: &ReadSet,

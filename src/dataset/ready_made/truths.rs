@@ -3,7 +3,7 @@
 use super::answers::{
     AnswerOf, OneReading, Reading, asks_yes_or_no, digit, one_reading, yes_or_no,
 };
-use super::cell::Cell;
+use super::cell::{Cell, shortened};
 use super::items::{AnswerCell, Item};
 use super::left_out::{LeftOut, Why};
 use super::map::How;
@@ -139,14 +139,11 @@ fn of_options(
         .iter()
         .map(|(item, answer)| (answer.as_str(), item.options.as_ref().unwrap_or(&none)))
         .collect();
-    let fits = |reading: Reading| {
-        rows.iter()
-            .all(|(answer, options)| reading.truth(answer, options).is_some())
-    };
+    let is_read = |reading: Reading, row: usize| reading.truth(rows[row].0, rows[row].1).is_some();
+    let fits = |reading: Reading| (0..rows.len()).all(|row| is_read(reading, row));
     let (reading, unfit) = match how {
         How::Answer(reading) => {
-            let unfit =
-                (0..rows.len()).filter(|&row| reading.truth(rows[row].0, rows[row].1).is_none());
+            let unfit = (0..rows.len()).filter(|&row| !is_read(*reading, row));
             (*reading, unfit.collect())
         }
         How::ByRule | How::Split(_)
@@ -157,7 +154,7 @@ fn of_options(
         How::ByRule | How::Split(_) => match one_reading(&rows) {
             OneReading::Fits(reading) => (reading, Vec::new()),
             OneReading::None { best, unfit } => {
-                let read: Vec<usize> = (0..rows.len()).filter(|row| !unfit.contains(row)).collect();
+                let read: Vec<usize> = (0..rows.len()).filter(|&row| is_read(best, row)).collect();
                 let kept: Vec<AnswerOf<'_>> = read.iter().map(|&row| rows[row]).collect();
                 if let OneReading::Ambiguous { readings, row } = one_reading(&kept) {
                     let row = read[row];
@@ -300,27 +297,17 @@ fn of_yes_or_no(
         words.map(|words| (column, words))
     });
     let column = one_of(table, fitting, |at| items[at].row, &roles.answers[0])?;
-    let (items, answers): (Vec<Item>, Vec<Option<String>>) =
-        with_answers(table, column, items, left)?
-            .into_iter()
-            .map(|(item, answer)| (item, Some(answer)))
-            .unzip();
+    let items = with_answers(table, column, items, left)?;
     let verbs = items
         .iter()
-        .filter(|item| asks_yes_or_no(last_line(&item.text)))
+        .filter(|(item, _)| asks_yes_or_no(last_line(&item.text)))
         .count();
     let are_digits = verbs as f64 >= SHARE_OF_VERBS * items.len() as f64
-        && answers.iter().all(|answer| {
-            answer
-                .as_deref()
-                .is_some_and(|answer| digit(answer).is_some())
-        });
+        && items.iter().all(|(_, answer)| digit(answer).is_some());
     let mut count = 0;
-    for (item, answer) in items.into_iter().zip(answers) {
-        let truth = answer.as_deref().and_then(|answer| {
-            let read = if are_digits { digit(answer) } else { None };
-            read.or_else(|| yes_or_no(answer))
-        });
+    for (item, answer) in items {
+        let read = if are_digits { digit(&answer) } else { None };
+        let truth = read.or_else(|| yes_or_no(&answer));
         let choices =
             truth.map(|truth| Choices::new(vec!["yes".to_owned(), "no".to_owned()], truth));
         match choices {
@@ -328,10 +315,7 @@ fn of_yes_or_no(
                 count += 1;
                 truths.answered.push(Answered { item, choices });
             }
-            _ => left.add(Why::Open, || match answer {
-                Some(answer) => format!("{:?}", super::cell::shortened(&answer, 60)),
-                None => "a list, or nothing".to_owned(),
-            }),
+            _ => left.add(Why::Open, || format!("{:?}", shortened(&answer, 60))),
         }
     }
     if count > 0 {

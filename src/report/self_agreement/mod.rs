@@ -16,12 +16,10 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::alert::Alert;
-use super::chart;
 use super::json::{ComparedRun, Rows, RunList, document};
 use super::light_readings::LightReadings;
 use super::page::{PageContent, PageInputs, page_of};
-use super::products::{PAGE, table_files};
-use super::samples::{figure, samples};
+use super::products::files;
 use super::sentences::Sentence;
 use super::words::counted;
 use crate::error::Result;
@@ -54,14 +52,7 @@ pub(crate) fn products<'a>(
         answers_title: "Answers given against those in the light",
     };
     let page = page_of(content, &figures, inputs)?;
-    let mut files = table_files(&report.tables, &report.sentences, "Findings and tables")?;
-    files.extend(chart::files(figures));
-    for samples in samples(inputs.thumbnails) {
-        let name = format!("figures/{}.svg", samples.name);
-        files.push((name, figure(&samples).into_bytes()));
-    }
-    files.push((PAGE.to_owned(), page.into_bytes()));
-    Ok(files)
+    files(&report.tables, &report.sentences, figures, page, inputs)
 }
 
 /// Lines at the top of the page.

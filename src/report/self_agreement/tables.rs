@@ -4,7 +4,9 @@ use super::levels::{levels, why};
 use super::measure::AGREEMENT;
 use crate::report::table::ColumnKind::{self, Count, Number, Percent, Ratio, Share, Text};
 use crate::report::table::{Table, TableBuilder, TableCell};
-use crate::report::tables::{SUMMARY, comparisons_of, health, level_words, reading};
+use crate::report::tables::{
+    SUMMARY, comparisons_of, counted_answers, health, level_words, reading,
+};
 use crate::report::words::{counted, light};
 use crate::score::choice::ReadingMode;
 use crate::score::confusion::{Confusion, Hallucination};
@@ -324,26 +326,7 @@ fn commonest(confusions: &[Confusion]) -> Table {
     table
 }
 
-/// A row for each answer at L0 and each answer given instead. The answer given is empty if none could be read.
+/// A row for each answer at L0 and each answer given instead.
 fn against_light(confusions: &[Confusion]) -> Table {
-    let cells = confusions.iter().flat_map(|confusion| {
-        let rows = confusion.counts.iter().enumerate();
-        let cells = rows.flat_map(|(light, row)| {
-            let given = row.iter().enumerate();
-            given.map(move |(given, count)| (light, given, *count))
-        });
-        cells.map(move |cell| (confusion, cell))
-    });
-    let counted = cells.filter(|(_, (_, _, count))| *count > 0);
-    TableBuilder::new("answers_against_light", counted)
-        .subject(|(confusion, _)| &confusion.subject, ToString::to_string)
-        .family(|(confusion, _)| Some(&confusion.family))
-        .column(Text, "csv at_l0", |(confusion, (light, _, _))| {
-            confusion.labels[*light].clone()
-        })
-        .column(Text, "csv given", |(confusion, (_, given, _))| {
-            confusion.labels.get(*given).cloned()
-        })
-        .column(Count, "csv count", |(_, (_, _, count))| *count)
-        .build()
+    counted_answers("answers_against_light", "csv at_l0", confusions)
 }

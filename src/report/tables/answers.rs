@@ -69,6 +69,16 @@ fn collapse(confusions: &[Confusion]) -> Table {
 
 /// A row for each true answer and each answer given to it. The answer given is empty if none could be read.
 fn confusion(confusions: &[Confusion]) -> Table {
+    counted_answers("confusion", "csv truth", confusions)
+}
+
+/// A row for each answer that was due (`due` heads its column) and each answer given instead, with their number. The answer given is
+/// empty if none could be read.
+pub(in crate::report) fn counted_answers(
+    name: &'static str,
+    due: &'static str,
+    confusions: &[Confusion],
+) -> Table {
     let cells = confusions.iter().flat_map(|confusion| {
         let rows = confusion.counts.iter().enumerate();
         let cells = rows.flat_map(|(truth, row)| {
@@ -78,10 +88,10 @@ fn confusion(confusions: &[Confusion]) -> Table {
         cells.map(move |cell| (confusion, cell))
     });
     let non_empty = cells.filter(|(_, (_, _, count))| *count > 0);
-    TableBuilder::new("confusion", non_empty)
+    TableBuilder::new(name, non_empty)
         .subject(|(confusion, _)| &confusion.subject, ToString::to_string)
         .family(|(confusion, _)| Some(&confusion.family))
-        .column(Text, "csv truth", |(confusion, (truth, _, _))| {
+        .column(Text, due, |(confusion, (truth, _, _))| {
             confusion.labels[*truth].clone()
         })
         .column(Text, "csv given", |(confusion, (_, answer, _))| {

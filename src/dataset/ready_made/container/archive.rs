@@ -84,6 +84,11 @@ impl Archive {
         names.map(PathBuf::from).collect()
     }
 
+    /// Whether there is a file of this name.
+    pub(super) fn has(&self, name: &str) -> bool {
+        self.names.contains_key(name)
+    }
+
     /// The bytes of an image.
     ///
     /// # Errors

@@ -168,13 +168,7 @@ fn by_kind(tree: &Tree, files: Vec<PathBuf>) -> Result<Vec<PathBuf>> {
     if !parquet.is_empty() {
         return Ok(parquet);
     }
-    // Tables deeper in the tree may be anything.
-    let is_table = |path: &PathBuf| {
-        let own = ["dataset.json", "classes.json", "info.json"];
-        let is_here = path.parent() == Some(Path::new(""));
-        is_here && !own.iter().any(|own| path == Path::new(own)) && is_text_table(path)
-    };
-    let tables: Vec<PathBuf> = others.into_iter().filter(is_table).collect();
+    let tables: Vec<PathBuf> = others.into_iter().filter(|path| is_table(path)).collect();
     if tables.is_empty() {
         let problem = format_args!("no file of questions in it: {READ} expected");
         return Err(Error::data(tree.place().display(), problem));
@@ -184,14 +178,15 @@ fn by_kind(tree: &Tree, files: Vec<PathBuf>) -> Result<Vec<PathBuf>> {
 
 /// Whether a file can hold the rows of a tree without a card.
 fn is_rows(path: &Path) -> bool {
-    let own = ["dataset.json", "classes.json", "info.json"];
-    let is_here = path.parent() == Some(Path::new(""));
-    let is_table = is_here && !own.iter().any(|own| path == Path::new(own)) && is_text_table(path);
-    is_table || ending(path) == "parquet"
+    is_table(path) || ending(path) == "parquet"
 }
 
-fn is_text_table(path: &Path) -> bool {
-    matches!(&*ending(path), "tsv" | "csv" | "jsonl" | "ndjson" | "json")
+/// Whether a file is a table of text at the top of a tree. Tables deeper in it may be anything.
+fn is_table(path: &Path) -> bool {
+    let own = ["dataset.json", "classes.json", "info.json"];
+    let is_here = path.parent() == Some(Path::new(""));
+    let is_text = matches!(&*ending(path), "tsv" | "csv" | "jsonl" | "ndjson" | "json");
+    is_here && is_text && !own.iter().any(|own| path == Path::new(own))
 }
 
 /// The files, if they are of one kind.

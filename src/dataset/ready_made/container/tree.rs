@@ -87,7 +87,7 @@ impl Tree {
     pub(super) fn has(&self, path: &str) -> bool {
         match self {
             Self::Folder { folder, .. } => folder.join(path).is_file(),
-            Self::Archive(archive) => archive.files().iter().any(|file| file == Path::new(path)),
+            Self::Archive(archive) => archive.has(path),
         }
     }
 

@@ -8,6 +8,7 @@ use super::findings::{Findings, Mark};
 use crate::dataset::{Dataset, Picture};
 use crate::enhance::brightness;
 use crate::error::Result;
+use crate::job::dark_already::DARK;
 use crate::job::progress::Progress;
 use crate::job::source::first_asked;
 use crate::types::{Digest, FrameId, InputSummary, Question};
@@ -23,9 +24,6 @@ pub(super) enum Depth {
 
 /// The number of images whose brightness is measured.
 const SAMPLED: usize = 32;
-
-/// The mean luma, of 255, below which images are dark already (as in a run).
-const DARK: f64 = 40.0;
 
 /// What is known of one image.
 struct Looked {
