@@ -207,7 +207,7 @@ pub(super) fn open(folder: &Path, questions: Option<&Path>, set: &SetArgs) -> Re
     let file = questions.map_or_else(|| folder.join(QUESTIONS), Path::to_owned);
     if questions.is_none() && !file.exists() {
         if folder.join(FRAMES).exists() && folder.join(CLASSES).exists() {
-            return frames(folder, &set.data_root);
+            return frames(folder, &set.root.data_root);
         }
         let problem = format_args!(
             "no {QUESTIONS} in this folder, and no {FRAMES} with {CLASSES} to make questions of; --questions FILE names some"
@@ -215,8 +215,12 @@ pub(super) fn open(folder: &Path, questions: Option<&Path>, set: &SetArgs) -> Re
         return Err(Error::data(folder.display(), problem));
     }
     let read = ready_made::about_frames(&file, set)?;
-    Dataset::new(stem(folder), sources(folder, &set.data_root)?, Vec::new())
-        .with_questions_of(&file, read)
+    Dataset::new(
+        stem(folder),
+        sources(folder, &set.root.data_root)?,
+        Vec::new(),
+    )
+    .with_questions_of(&file, read)
 }
 
 /// Whether a place is a folder of frames, and not a ready-made set.
@@ -235,7 +239,7 @@ pub(super) fn sources(
     if list.exists() {
         frames_of_list(&Root::of(folder, further)?, &list)
     } else {
-        images(folder)
+        images(&Root::of(folder, further)?)
     }
 }
 
@@ -268,9 +272,20 @@ fn frames_of_list(root: &Root, list: &Path) -> Result<BTreeMap<FrameId, ImageSou
     Ok(sources)
 }
 
-fn images(folder: &Path) -> Result<BTreeMap<FrameId, ImageSource>> {
+/// Every image of a folder. Links that lead out of it are not followed, and a warning names them.
+fn images(root: &Root) -> Result<BTreeMap<FrameId, ImageSource>> {
+    let folder = root.folder();
     let mut sources = BTreeMap::new();
-    let all = entries(folder)?;
+    let (mut all, mut links_out) = (Vec::new(), Vec::new());
+    for path in entries(folder)? {
+        match path.canonicalize() {
+            Ok(real) if root.holds(&real) => all.push(path),
+            Ok(_) => links_out.push(path),
+            // A link to nowhere is no image.
+            Err(_) => {}
+        }
+    }
+    root.warn_of_links_out(&links_out);
     let names = ImageNames::of(all.clone());
     for path in &names.images {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -347,7 +362,7 @@ mod tests {
     #[test]
     fn a_folder_of_folders_of_images_names_one_of_them() {
         let folder = tempfile::tempdir().unwrap();
-        let problem = || images(folder.path()).err().unwrap().to_string();
+        let problem = || sources(folder.path(), &[]).err().unwrap().to_string();
         assert!(problem().ends_with("in this folder"), "{}", problem());
         fs::create_dir(folder.path().join("inner")).unwrap();
         RgbImage::new(2, 1)

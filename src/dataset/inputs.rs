@@ -22,14 +22,14 @@ pub(crate) struct InputFrame {
 }
 
 impl Inputs {
-    /// The frames of the inputs; no image is read.
+    /// The frames of the inputs; `further` are folders that paths in them may lead to. No image is read.
     ///
     /// # Errors
     /// If an input is missing, two frames would have the same name, or a name leads out of the output folder.
-    pub(crate) fn open(inputs: &[PathBuf], rule: ReadingRule) -> Result<Self> {
+    pub(crate) fn open(inputs: &[PathBuf], further: &[PathBuf], rule: ReadingRule) -> Result<Self> {
         let sets: Vec<Dataset> = inputs
             .iter()
-            .map(|path| Ok(Dataset::of_images(path)?.with_rule(rule)))
+            .map(|path| Ok(Dataset::of_images(path, further)?.with_rule(rule)))
             .collect::<Result<_>>()?;
         let mut entries = Vec::new();
         let mut used_names: BTreeMap<String, String> = BTreeMap::new();

@@ -49,6 +49,7 @@ pub(crate) use reading_rule::ReadingRule;
 pub use ready_made::SetArgs;
 use ready_made::{Form, ReadQuestions};
 pub(crate) use root::Root;
+pub(crate) use root::RootArgs;
 pub(crate) use scene_args::SceneArgs;
 pub(crate) use settings::{BankArgs, CodesArgs, DataArgs, PixelLimit, SelectionArgs, place};
 use view::FrameFacts;
@@ -114,15 +115,15 @@ impl Dataset {
         }
     }
 
-    /// The frames at a place, without questions. No image is read.
+    /// The frames at a place, without questions; `further` are folders that its paths may lead to. No image is read.
     ///
     /// # Errors
     /// If the place is not a folder of frames.
-    pub fn open_without_questions(place: &DataPlace) -> Result<Self> {
+    pub fn open_without_questions(place: &DataPlace, further: &[PathBuf]) -> Result<Self> {
         match place {
             DataPlace::Rooms(rooms) => Ok(Self::of_rooms(*rooms)),
             DataPlace::Path(folder) | DataPlace::Known { path: folder, .. } => {
-                Self::of_frames(folder, &[])
+                Self::of_frames(folder, further)
             }
         }
     }
@@ -182,10 +183,11 @@ impl Dataset {
         })
     }
 
-    /// The images of an image file or a folder of frames, without questions. No image is read.
-    pub fn of_images(path: &Path) -> Result<Self> {
+    /// The images of an image file or a folder of frames, without questions; `further` are folders that its paths may lead to. No image
+    /// is read.
+    pub fn of_images(path: &Path, further: &[PathBuf]) -> Result<Self> {
         let sources = if path.is_dir() {
-            frames::sources(path, &[])?
+            frames::sources(path, further)?
         } else {
             frames::image(path)?
         };

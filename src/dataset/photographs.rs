@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::image_file::format::READ;
 use super::image_names::{ImageNames, is_image};
+use super::root::Root;
 use super::{DataPlace, Dataset, ImageSource, SetArgs, frames, stem};
 use crate::error::{Error, Result};
 use crate::files::reading::entries;
@@ -32,9 +33,9 @@ impl Photographs {
         let dataset = match place {
             DataPlace::Rooms(rooms) => Dataset::of_rooms(*rooms),
             DataPlace::Path(path) if path.is_dir() => {
-                return Self::in_folder(path, &set.data_root);
+                return Self::in_folder(path, &set.root.data_root);
             }
-            DataPlace::Path(path) if is_image(path) => Dataset::of_images(path)?,
+            DataPlace::Path(path) if is_image(path) => Dataset::of_images(path, &[])?,
             DataPlace::Path(path) | DataPlace::Known { path, .. } => {
                 let set = Dataset::open(place, None, set)?;
                 let count = set.questions().len();
@@ -64,8 +65,9 @@ impl Photographs {
             let dataset = Dataset::of_frames(folder, further)?;
             return Ok(Self { dataset, notes });
         }
+        let root = Root::of(folder, further)?;
         let mut scan = Scan::default();
-        scan.add(folder, folder)?;
+        scan.add(&root, folder)?;
         let names = ImageNames::of(scan.files);
         let mut sources = BTreeMap::new();
         for path in &names.images {
@@ -82,13 +84,7 @@ impl Photographs {
             return Err(Error::data(folder.display(), problem));
         }
         names.warn_of_unread(folder);
-        if scan.links_out > 0 {
-            tracing::warn!(
-                "{}: {} links lead out of the folder and are not followed",
-                folder.display(),
-                scan.links_out
-            );
-        }
+        root.warn_of_links_out(&scan.links_out);
         if sources.keys().any(|id| id.0.contains('/')) {
             notes.push(format!(
                 "{}: {} images in it and in the folders below, each named by its path from there",
@@ -109,20 +105,18 @@ struct Scan {
     files: Vec<PathBuf>,
     /// The folders that were looked through, as they really lie: a link to one of them is not followed again.
     seen: BTreeSet<PathBuf>,
-    /// Number of links that lead out of the folder.
-    links_out: usize,
+    /// The links that lead out of the folder.
+    links_out: Vec<PathBuf>,
 }
 
 impl Scan {
-    fn add(&mut self, root: &Path, folder: &Path) -> Result<()> {
-        let real = |path: &Path| {
-            path.canonicalize()
-                .map_err(|e| Error::file(path, "read", e))
-        };
-        if !self.seen.insert(real(folder)?) {
+    fn add(&mut self, root: &Root, folder: &Path) -> Result<()> {
+        let real = folder
+            .canonicalize()
+            .map_err(|e| Error::file(folder, "read", e))?;
+        if !self.seen.insert(real) {
             return Ok(());
         }
-        let root_really = real(root)?;
         for path in entries(folder)? {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
             if name.starts_with('.') {
@@ -132,8 +126,8 @@ impl Scan {
             let Ok(target) = path.canonicalize() else {
                 continue;
             };
-            if !target.starts_with(&root_really) {
-                self.links_out += 1;
+            if !root.holds(&target) {
+                self.links_out.push(path);
             } else if path.is_dir() {
                 self.add(root, &path)?;
             } else {

@@ -5,8 +5,18 @@
 
 use std::path::{self, Component, Path, PathBuf};
 
+use clap::Args;
+
 use crate::error::{Error, Result};
-use crate::types::FrameId;
+use crate::types::{Decides, FrameId};
+
+/// The flag for folders beside that of the data.
+#[derive(Debug, Clone, Default, Args)]
+pub struct RootArgs {
+    /// A further folder in which files that the data name may lie; repeatable; default: the folder of the data alone
+    #[arg(long, value_name = "DIR", add = Decides::Reply)]
+    pub data_root: Vec<PathBuf>,
+}
 
 /// Names that are no paths of this machine.
 const SCHEMES: [&str; 6] = ["http:", "https:", "ftp:", "file:", "s3:", "gs:"];
@@ -101,13 +111,36 @@ impl Root {
         let Ok(real) = path.canonicalize() else {
             return Err(format!("no such file: {}", path.display()));
         };
-        if !self.real.iter().any(|root| real.starts_with(root)) {
+        if !self.holds(&real) {
             return Err(self.outside(spelled, &real));
         }
         if !real.is_file() {
             return Err(format!("no such file: {}", path.display()));
         }
         Ok(path)
+    }
+
+    /// Whether a path, links followed, lies below one of the folders.
+    pub(crate) fn holds(&self, real: &Path) -> bool {
+        self.real.iter().any(|root| real.starts_with(root))
+    }
+
+    /// Warns of links that lead out of the folders, by the first of them.
+    pub(crate) fn warn_of_links_out(&self, links: &[PathBuf]) {
+        let Some(first) = links.first() else {
+            return;
+        };
+        let count = match links.len() {
+            1 => "1 link leads out of the folder and is not followed".to_owned(),
+            n => format!("{n} links lead out of the folder and are not followed"),
+        };
+        let real = first.canonicalize().unwrap_or_else(|_| first.clone());
+        tracing::warn!(
+            "{}: {count}: {}; --data-root {} allows the folder that it leads to",
+            self.folder.display(),
+            first.strip_prefix(&self.folder).unwrap_or(first).display(),
+            real.parent().unwrap_or(&real).display()
+        );
     }
 
     fn outside(&self, spelled: &Path, written: &Path) -> String {

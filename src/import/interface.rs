@@ -1,6 +1,6 @@
 //! A folder of the common interface, imported unchanged, so that key frames can be chosen from it.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
@@ -28,8 +28,8 @@ struct InterfaceLine {
 }
 
 impl Interface {
-    pub(super) fn open(folder: &Path) -> Result<Self> {
-        let dataset = Dataset::of_frames(folder, &[])?;
+    pub(super) fn open(folder: &Path, further: &[PathBuf]) -> Result<Self> {
+        let dataset = Dataset::of_frames(folder, further)?;
         let Some(labels) = dataset.labels().cloned() else {
             return Err(Error::data(
                 folder.display(),

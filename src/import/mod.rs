@@ -19,7 +19,7 @@ mod scannet;
 mod sunrgbd;
 mod thor;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 use crate::types::flag::flag_words;
@@ -45,7 +45,7 @@ pub(crate) enum DataSetKind {
 
 flag_words!(DataSetKind);
 
-/// Opens the folder of a data set.
+/// Opens the folder of a data set. `further` are folders that paths in a list of frames may lead to.
 ///
 /// # Errors
 /// With the file or folder that is missing or has another layout, or with the flag that is required.
@@ -53,6 +53,7 @@ pub(crate) fn open(
     kind: DataSetKind,
     folder: &Path,
     stated: &StatedArgs,
+    further: &[PathBuf],
 ) -> Result<Box<dyn Adapter>> {
     if !folder.is_dir() {
         return Err(Error::usage(
@@ -67,7 +68,7 @@ pub(crate) fn open(
         DataSetKind::Sunrgbd => Box::new(sunrgbd::SunRgbd::open(folder)?),
         DataSetKind::Thor => Box::new(thor::Thor::open(folder, stated)?),
         DataSetKind::Folder if folder.join("frames.jsonl").exists() => {
-            Box::new(interface::Interface::open(folder)?)
+            Box::new(interface::Interface::open(folder, further)?)
         }
         DataSetKind::Folder => Box::new(folder::Folder::open(folder, stated)?),
     };

@@ -176,11 +176,11 @@ fn with_new_paths(mut flags: ImageFlags, args: &RebuildArgs) -> Result<ImageFlag
 fn frames(data: &DataArgs) -> Result<Dataset> {
     match &data.data {
         DataPlace::Path(path) if path.join("frames.jsonl").is_file() => {
-            Dataset::of_frames(path, &data.set.data_root)
+            Dataset::of_frames(path, &data.set.root.data_root)
         }
         place @ (DataPlace::Path(_) | DataPlace::Known { .. }) => {
             Dataset::open(place, None, &data.set)
         }
-        place @ DataPlace::Rooms(_) => Dataset::open_without_questions(place),
+        place @ DataPlace::Rooms(_) => Dataset::open_without_questions(place, &[]),
     }
 }

@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 
 use crate::ask::png;
 use crate::dataset::frame_folder::{self, FramePaths};
-use crate::dataset::{CodesArgs, ImageFile, PixelLimit};
+use crate::dataset::{CodesArgs, ImageFile, PixelLimit, RootArgs};
 use crate::error::{Error, Result};
 use crate::import::keyframes::{KeyFrameArgs, choose};
 use crate::import::{Adapter, DataSetKind, FrameMaps, ListedFrame, StatedArgs, open};
@@ -63,6 +63,9 @@ pub(crate) struct ImportArgs {
     /// What the codes of images mean.
     #[command(flatten)]
     pub codes: CodesArgs,
+    /// Further folders of the frames.
+    #[command(flatten)]
+    pub root: RootArgs,
     /// The number of threads.
     #[command(flatten)]
     pub threads: ThreadArgs,
@@ -105,7 +108,7 @@ fn import_frames(
             "the folder has frames already; --force overwrites them, another --out keeps both";
         return Err(Error::data(list.display(), problem));
     }
-    let adapter = open(args.kind, src, &args.stated)?;
+    let adapter = open(args.kind, src, &args.stated, &args.root.data_root)?;
     let frames = choose(
         &adapter.listing().frames,
         args.key_frames.selection(),

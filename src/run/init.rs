@@ -179,7 +179,7 @@ fn of_rooms(folder: &Path, progress: &Progress) -> Result<Vec<Line>> {
 
 /// Lines about the images of a folder that are true of any image: whether it has colours, and its form.
 fn of_frames(frames: &Path, folder: &Path) -> Result<Vec<Line>> {
-    let dataset = Dataset::of_images(frames)?;
+    let dataset = Dataset::of_images(frames, &[])?;
     let mut lines = Vec::new();
     let yes_no = ["yes".to_owned(), "no".to_owned()];
     for frame in dataset.frames().take(PICTURES) {

@@ -106,6 +106,38 @@ fn paths_that_lead_out_are_allowed_by_name_alone() {
     bench.complete(&words(
         "--data frames --model random --levels L0 --data-root .",
     ));
+    let line = "synthesize frames --out dark --levels L5 --variant ev";
+    let called = bench.call(&words(line));
+    assert_eq!(called.code, Some(2));
+    assert!(called.stderr.contains("--data-root "), "{}", called.stderr);
+    bench.complete(&words(&format!("{line} --data-root .")));
+}
+
+#[cfg(unix)]
+#[test]
+fn links_that_lead_out_of_a_folder_of_images_are_named_and_not_sent() {
+    let bench = bench();
+    fs::create_dir(bench.path("images")).unwrap();
+    fs::copy(bench.path("a.png"), bench.path("images/own.png")).unwrap();
+    std::os::unix::fs::symlink(bench.path("b.png"), bench.path("images/b.png")).unwrap();
+    let line = "synthesize images --out dark --levels L5 --variant ev";
+    let called = bench.call(&words(line));
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert!(
+        called.stderr.contains(
+            "images: 1 link leads out of the folder and is not followed: b.png; --data-root "
+        ),
+        "{}",
+        called.stderr
+    );
+    assert!(bench.path("dark/own_L5-ev.png").exists() && !bench.path("dark/b_L5-ev.png").exists());
+    let called = bench.call(&words(&format!("{line} --data-root .")));
+    assert_eq!(
+        (called.code, called.stderr.contains("link")),
+        (Some(0), false),
+        "{called:?}"
+    );
+    assert!(bench.path("dark/b_L5-ev.png").exists());
 }
 
 #[test]

@@ -287,7 +287,7 @@ fn rooms_on_disk_are_those_in_the_program() {
         size: [160, 120],
         ..Rooms::default()
     };
-    let built_in = Dataset::open_without_questions(&DataPlace::Rooms(rooms)).unwrap();
+    let built_in = Dataset::open_without_questions(&DataPlace::Rooms(rooms), &[]).unwrap();
     assert_eq!(folder.labels(), built_in.labels());
     assert_eq!(folder.title(), built_in.title());
     let mut count = 0;

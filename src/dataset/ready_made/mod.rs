@@ -79,7 +79,7 @@ pub(super) fn open(place: &Path, stem: &str, args: &SetArgs) -> Result<ReadySet>
         None => FolderInfo::of(&folder)?,
     };
     let map = Map::joined(info.map.iter().chain(&args.map));
-    let mut further = args.data_root.clone();
+    let mut further = args.root.data_root.clone();
     further.extend(blobs);
     let root = Root::of(&folder, &further)?;
     let mut table = Table::default();

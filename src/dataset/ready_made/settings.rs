@@ -1,10 +1,9 @@
 //! The flags for ready-made sets: [`SetArgs`].
 
-use std::path::PathBuf;
-
 use clap::{Args, ValueEnum};
 
 use super::map::Map;
+use crate::dataset::root::RootArgs;
 use crate::types::Decides;
 
 /// The flags for how a ready-made set is read.
@@ -45,9 +44,9 @@ pub struct SetArgs {
     /// What is done about rows that are broken, at most 5 % of all; default: stop
     #[arg(long, value_name = "skip", add = Decides::Trials)]
     pub bad: Option<LeaveOut>,
-    /// A further folder in which files that the data name may lie; repeatable; default: the folder of the data alone
-    #[arg(long, value_name = "DIR", add = Decides::Reply)]
-    pub data_root: Vec<PathBuf>,
+    /// Further folders of the data.
+    #[command(flatten)]
+    pub root: RootArgs,
     /// Keep sentences at the end of questions that say in what form to answer; default: cut, because the prompt says it too
     #[arg(long, add = Decides::Reply)]
     pub keep_instructions: bool,

@@ -21,7 +21,7 @@ fn frame() -> (tempfile::TempDir, Dataset, Source) {
         .unwrap()
         .file();
     std::fs::write(folder.path().join("a.png"), file.unwrap()).unwrap();
-    let dataset = Dataset::of_images(folder.path()).unwrap();
+    let dataset = Dataset::of_images(folder.path(), &[]).unwrap();
     let name = dataset.frames().next().unwrap().clone();
     let source = Source::of_frame(SourceFrame::inspect(&dataset, &name).unwrap());
     (folder, dataset, source)

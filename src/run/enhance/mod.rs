@@ -8,7 +8,7 @@ use clap::Args;
 
 use crate::ask::png;
 use crate::dataset::inputs::{InputFrame, Inputs};
-use crate::dataset::{CodesArgs, PixelLimit};
+use crate::dataset::{CodesArgs, PixelLimit, RootArgs};
 use crate::enhance::{Enhancer, FRAMES, ImageOutput, ModelFile};
 use crate::error::{Error, Result};
 use crate::files::write;
@@ -56,6 +56,9 @@ pub(crate) struct EnhanceArgs {
     /// What the codes of images mean.
     #[command(flatten)]
     pub codes: CodesArgs,
+    /// Further folders of the images.
+    #[command(flatten)]
+    pub root: RootArgs,
 }
 
 /// Enhances the images, or describes the model.
@@ -72,7 +75,11 @@ pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome
             output: enhancer.describe(),
         });
     };
-    let images = Inputs::open(&args.inputs, args.codes.rule(args.limit))?;
+    let images = Inputs::open(
+        &args.inputs,
+        &args.root.data_root,
+        args.codes.rule(args.limit),
+    )?;
     let sample = evenly(images.entries.len(), FRAMES).into_iter();
     let sample = sample.map(|place| images.picture(&images.entries[place])?.decode());
     // An image that cannot be read is named when its turn comes.

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::dataset::{CodesArgs, Dataset, PixelLimit};
+use crate::dataset::{CodesArgs, Dataset, PixelLimit, RootArgs};
 use crate::error::{Error, Result};
 use crate::files::{reading, write};
 use crate::job::Outcome;
@@ -84,6 +84,9 @@ pub(crate) struct QuestionsArgs {
     /// What the codes of images mean.
     #[command(flatten)]
     pub codes: CodesArgs,
+    /// Further folders of the frames.
+    #[command(flatten)]
+    pub root: RootArgs,
     /// The number of threads.
     #[command(flatten)]
     pub threads: ThreadArgs,
@@ -144,7 +147,7 @@ fn read<T>(path: Option<&Path>, parse: fn(&str) -> Result<T>) -> Result<Option<T
 /// If there are no frames or no classes, or a file cannot be written.
 pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Outcome> {
     let making = &QuestionMaking::read(args)?;
-    let dataset = Dataset::of_frames(&args.data, &[])?;
+    let dataset = Dataset::of_frames(&args.data, &args.root.data_root)?;
     let dataset = dataset.with_rule(args.codes.rule(args.limit));
     let labels = dataset.labels().ok_or_else(|| {
         let problem = "no classes.json in this folder, which gives the class of each number in its maps; `darkqa-eval import` writes one";

@@ -23,7 +23,7 @@ use clap::Args;
 use tokio::runtime;
 
 use crate::ask::{Call, Message, Model, Query, Random};
-use crate::dataset::{self, DataPlace, Dataset};
+use crate::dataset::{self, DataPlace, Dataset, RootArgs};
 use crate::error::{Error, Result};
 use crate::job::Outcome;
 use crate::job::interrupt::Interrupt;
@@ -53,6 +53,9 @@ pub(crate) struct ServeArgs {
     /// The seed of the guesses
     #[arg(long, value_name = "N", default_value_t = 0, add = Decides::Pixels)]
     pub seed: u64,
+    /// Further folders of the frames.
+    #[command(flatten)]
+    pub root: RootArgs,
 }
 
 /// The state that all requests share.
@@ -67,7 +70,10 @@ struct ServerState {
 /// # Errors
 /// If the frames cannot be read, or another process uses the port.
 pub(crate) fn serve(args: &ServeArgs, progress: &Progress) -> Result<Outcome> {
-    let dataset = Arc::new(Dataset::open_without_questions(&args.data)?);
+    let dataset = Arc::new(Dataset::open_without_questions(
+        &args.data,
+        &args.root.data_root,
+    )?);
     let prior = Random { seed: args.seed };
     let observer = Observer::open(&dataset, &args.data, &[], Rules::built_in()?)?;
     let models = [

@@ -13,7 +13,7 @@ use clap::Args;
 use rayon::prelude::*;
 
 use crate::dataset::inputs::{InputFrame, Inputs, stem};
-use crate::dataset::{CodesArgs, Picture, PixelLimit};
+use crate::dataset::{CodesArgs, Picture, PixelLimit, RootArgs};
 use crate::error::{Error, Result};
 use crate::job::Outcome;
 use crate::job::frame_work::{FrameWork, ImageSteps};
@@ -63,6 +63,9 @@ pub(crate) struct SynthesizeArgs {
     /// What the codes of images mean.
     #[command(flatten)]
     pub codes: CodesArgs,
+    /// Further folders of the images.
+    #[command(flatten)]
+    pub root: RootArgs,
     /// The number of threads.
     #[command(flatten)]
     pub threads: ThreadArgs,
@@ -94,7 +97,11 @@ pub(crate) fn synthesize(args: &SynthesizeArgs, progress: &Progress) -> Result<O
         light: LightSettings::resolve(&args.light, SetLight::Lit)?,
     };
     making.light.refuse_matches("synthesize knows none")?;
-    let frames = Inputs::open(&args.inputs, args.codes.rule(args.limit))?;
+    let frames = Inputs::open(
+        &args.inputs,
+        &args.root.data_root,
+        args.codes.rule(args.limit),
+    )?;
     let workers = pool(args.threads.threads)?;
     fs::create_dir_all(out).map_err(|e| Error::file(out, "make", e))?;
     if let Some(file) = &args.from {
