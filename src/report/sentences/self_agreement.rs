@@ -66,10 +66,16 @@ fn cannot_tell(found: &SelfAgreement<'_>, model: &str) -> Sentence {
     let own = found.questions.iter();
     let images = own.filter(|question| question.model == model);
     let images = images.map(|question| question.images);
-    let fewest = numbers.count("fewest_images", images.clone().min().unwrap_or_default());
-    let most = numbers.count("most_images", images.max().unwrap_or_default());
+    let (least, greatest) = (images.clone().min(), images.max());
+    let fewest = numbers.count("fewest_images", least.unwrap_or_default());
+    let most = numbers.count("most_images", greatest.unwrap_or_default());
+    let images = match (least, greatest) {
+        (Some(1), Some(1)) => "1 image".to_owned(),
+        (least, greatest) if least == greatest => format!("{most} images"),
+        _ => format!("{fewest} to {most} images"),
+    };
     let detail = format!(
-        "each question has an answer about {fewest} to {most} images; such a model agrees with itself whether it sees or not: ask other questions, \
+        "each question has an answer about {images}; such a model agrees with itself whether it sees or not: ask other questions, \
          or about more images"
     );
     numbers.sentence("bank_cannot_tell", Tone::Note, text, detail)
