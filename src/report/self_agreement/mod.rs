@@ -1,4 +1,4 @@
-//! The report of a run without true answers: its files ([`products`]), its summary ([`summary`]) and its text ([`text`]).
+//! The report of a run without true answers: its files ([`products`]), its summary ([`summary`]) and its text ([`text()`]).
 //!
 //! The measure is agreement with the model's own answer in the light. It never stands without what keeps it honest, and the word
 //! accuracy never stands over it.

@@ -119,7 +119,7 @@ impl EvaluateArgs {
     /// The settings, after reading the files and environment variables that the flags name.
     ///
     /// # Errors
-    /// [`Error::Usage`](crate::error::Error::Usage), which names the flag with the invalid value.
+    /// [`Error::Usage`], which names the flag with the invalid value.
     pub(super) fn resolve(self) -> Result<Evaluation> {
         if self.job.models.is_empty() {
             return Err(self.job.no_model_error());
