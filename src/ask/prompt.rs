@@ -161,6 +161,7 @@ fn sample() -> Result<Question> {
         family: Family::RoomType,
         text: "sample-question?".into(),
         choices: Choices::new(texts, 0)?,
+        group: None,
         evidence: serde_json::Value::Null,
     })
 }

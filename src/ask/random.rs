@@ -61,6 +61,7 @@ mod tests {
             family: Family::Presence,
             text: "?".into(),
             choices: Choices::new(texts, 0).unwrap(),
+            group: None,
             evidence: serde_json::Value::Null,
         }
     }

@@ -195,6 +195,7 @@ impl BankQuestion {
             family: self.family.clone(),
             text: self.text.clone(),
             choices: self.choices.clone(),
+            group: None,
             evidence: json!({ BANK_ID: self.id }),
         }
     }

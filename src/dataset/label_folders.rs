@@ -48,6 +48,7 @@ pub(super) fn dataset(
                 family: Family::Other("label".to_owned()),
                 text: question.to_owned(),
                 choices: Choices::new(texts, truth.unwrap_or(usize::MAX))?,
+                group: None,
                 evidence: serde_json::Value::Null,
             });
             sources.insert(FrameId(id), ImageSource::image(path.clone()));

@@ -190,6 +190,7 @@ mod tests {
             family,
             text: format!("{about}?"),
             choices: Choices::new(texts, answer).unwrap(),
+            group: None,
             evidence: Value::Null,
         };
         GeneratedQuestion {

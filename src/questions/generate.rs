@@ -318,6 +318,7 @@ fn question(
         family: candidate.family,
         text: candidate.text,
         choices,
+        group: None,
         evidence: Value::clone(&evidence),
     };
     Ok(GeneratedQuestion {

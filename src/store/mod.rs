@@ -158,7 +158,7 @@ impl<D: Detail> Store<D> {
     /// Writes the questions of the run, new and stored ones, in the order of the data.
     ///
     /// # Errors
-    /// If a stored question now has other words, choices, another answer or image.
+    /// If a stored question now has other words, choices, another answer, image or group.
     pub(crate) fn add_questions(&self, mut questions: Vec<RunQuestion>) -> Result<()> {
         let ids = questions.iter().map(|question| question.id.clone());
         let places: HashMap<QuestionId, usize> = ids.zip(0..).collect();
@@ -171,7 +171,7 @@ impl<D: Detail> Store<D> {
             if !stored.is_same(question) {
                 let problem = format!(
                     "the question {} is not the one stored in this run: --data or --questions give it other words, choices, another \
-                     answer or image; use another --out",
+                     answer, image or group; use another --out",
                     stored.id
                 );
                 let path = self.folder.clone();
@@ -179,6 +179,8 @@ impl<D: Detail> Store<D> {
             }
             // A run of blind models alone does not read the image.
             question.image = question.image.or(stored.image);
+            // A group decides no reply: it can be named later, and stays.
+            question.group = question.group.take().or(stored.group);
         }
         questions.sort_by_key(|question| question.place);
         self.write_questions(&questions)

@@ -5,6 +5,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::frame::FrameId;
+use super::strict_group::StrictGroup;
 use crate::error::Error;
 
 /// The name of a question, unique in its data set.
@@ -207,6 +208,8 @@ pub struct Question {
     pub text: String,
     /// The answers that the model may choose from.
     pub choices: Choices,
+    /// The questions that this one is scored with; `None` if the data set has no groups.
+    pub group: Option<StrictGroup>,
     /// The facts from which the generator derived the answer; `Null` if the data set states none.
     pub evidence: serde_json::Value,
 }

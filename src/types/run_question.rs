@@ -6,6 +6,7 @@ use serde_json::Value;
 use super::digest::Digest;
 use super::frame::FrameId;
 use super::question::{Family, Question, QuestionId};
+use super::strict_group::StrictGroup;
 
 /// The key in [`RunQuestion::evidence`] under which a question that is asked about every image has its name among such questions.
 pub(crate) const BANK_ID: &str = "bank_id";
@@ -41,20 +42,27 @@ pub struct RunQuestion {
     /// The digest of the frame's file, or of the walk's files in the order shown. `None` if all models were blind.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub image: Option<Digest>,
+    /// The questions that this one is scored with, as `group` and `group_size`; not in the file if the data set has no groups.
+    #[serde(default, flatten, skip_serializing_if = "Option::is_none")]
+    pub group: Option<StrictGroup>,
 }
 
 impl RunQuestion {
-    /// Whether two questions are the same, evidence and place aside; images are compared if both are known.
+    /// Whether two questions are the same, evidence and place aside; images and groups are compared if both are known.
     #[must_use]
     pub fn is_same(&self, other: &Self) -> bool {
         let words = |question: &Self| Self {
             image: None,
+            group: None,
             evidence: Value::Null,
             place: 0,
             ..question.clone()
         };
         let images = self.image.zip(other.image);
-        words(self) == words(other) && images.is_none_or(|(image, other)| image == other)
+        let groups = self.group.as_ref().zip(other.group.as_ref());
+        words(self) == words(other)
+            && images.is_none_or(|(image, other)| image == other)
+            && groups.is_none_or(|(group, other)| group == other)
     }
 
     /// The name of the question among those that are asked about every image; its own name if it is about one image alone.
@@ -80,6 +88,7 @@ impl RunQuestion {
             extra_answers: None,
             evidence: question.evidence.clone(),
             image: None,
+            group: question.group.clone(),
         }
     }
 }

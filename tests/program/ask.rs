@@ -51,6 +51,7 @@ fn question(id: &str, text: &str) -> Question {
         family: Family::Presence,
         text: text.into(),
         choices: Choices::new(vec!["yes".into(), "no".into()], 0).unwrap(),
+        group: None,
         evidence: Value::Null,
     }
 }

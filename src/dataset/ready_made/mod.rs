@@ -14,6 +14,7 @@ mod answers;
 mod cell;
 mod container;
 mod frames;
+mod groups;
 mod images;
 mod items;
 mod left_out;
@@ -49,6 +50,7 @@ pub use settings::SetArgs;
 
 use container::{FoundFiles, SetFile};
 use frames::Frames;
+use groups::Groups;
 use images::ImagesAre;
 use items::{Cut, Endings, items};
 use left_out::{LeftOut, Why};
@@ -78,7 +80,6 @@ pub(super) fn open(place: &Path, stem: &str, args: &SetArgs) -> Result<ReadySet>
         Some(_) => FolderInfo::default(),
         None => FolderInfo::of(&folder)?,
     };
-    let map = Map::joined(info.map.iter().chain(&args.map));
     let mut further = args.root.data_root.clone();
     further.extend(blobs);
     let root = Root::of(&folder, &further)?;
@@ -87,6 +88,8 @@ pub(super) fn open(place: &Path, stem: &str, args: &SetArgs) -> Result<ReadySet>
     for file in &files {
         file.read(args.rows.as_deref(), &mut table)?;
     }
+    let (group, no_group) = preset.map_or((None, None), |preset| preset.group(&table));
+    let map = Map::joined(group.iter().chain(&info.map).chain(&args.map));
     let wrong = |table: &Table, problem: String| {
         let hint = preset::recognised(&table.columns, args.preset.as_deref());
         let hint = hint.map_or_else(String::new, |hint| format!("\n {hint}"));
@@ -101,6 +104,7 @@ pub(super) fn open(place: &Path, stem: &str, args: &SetArgs) -> Result<ReadySet>
     let frames = Frames::new(&table, &root, archive.as_ref(), &files, &set.roles);
     let mut notes = notes;
     notes.extend(preset.map(preset::Preset::source));
+    notes.extend(no_group.filter(|_| map.of(Role::Group).is_none()));
     let hint = preset::recognised(&table.columns, args.preset.as_deref());
     let asked = finish(&name, &table, &set, frames, notes, hint)?;
     Ok(ReadySet {
@@ -191,6 +195,7 @@ fn finish(
         ids: ids.name(),
         cut: &set.cut,
         left: &set.left,
+        groups: set.groups.said(&questions),
         sources: &sources,
         questions: &questions,
         notes,
@@ -210,6 +215,7 @@ struct ReadSet {
     said: Vec<String>,
     cut: Cut,
     left: LeftOut,
+    groups: Groups,
 }
 
 /// Steps 2 to 5: from rows to questions with truths.
@@ -251,7 +257,10 @@ fn read(
     if truths.answered.is_empty() {
         return Err("no row is left to ask".to_owned());
     }
+    let is_copy = |row| preset.is_some_and(|preset| preset.is_rotation(table, row));
+    let groups = roles.group.as_ref();
     Ok(ReadSet {
+        groups: groups.map_or_else(Groups::default, |rule| Groups::of(table, rule, is_copy)),
         roles,
         answered: truths.answered,
         said: truths.said,
@@ -311,6 +320,7 @@ fn questions(
             family,
             text: answered.item.text.clone(),
             choices: answered.choices.clone(),
+            group: set.groups.group(row),
             evidence,
         });
     }

@@ -5,6 +5,7 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
+use super::groups::columns;
 use super::map::Map;
 use super::names::plain;
 use super::row::Table;
@@ -22,6 +23,9 @@ pub(super) struct Preset {
     recognise: Vec<String>,
     map: Option<String>,
     config: Option<String>,
+    /// Templates of groups, of which the first whose columns are there counts.
+    #[serde(default)]
+    group: Vec<String>,
     #[serde(default)]
     skip: Vec<Skip>,
     rotations: Option<Rotations>,
@@ -100,6 +104,26 @@ impl Preset {
         args.open = skip(Skip::Open, args.open);
         args.several = skip(Skip::Several, args.several);
         args
+    }
+
+    /// The groups of the set's own strict score as a map, and what is said if its columns are not there.
+    pub(super) fn group(&self, table: &Table) -> (Option<Map>, Option<String>) {
+        let is_there = |template: &&String| {
+            columns(template)
+                .iter()
+                .all(|name| table.find(name).is_some())
+        };
+        let map = self.group.iter().find(is_there);
+        let map = map.and_then(|template| format!("group={template}").parse().ok());
+        let none = map.is_none() && !self.group.is_empty();
+        let said = none.then(|| {
+            format!(
+                "no groups: {} scores questions together by {}, which are not among its columns; --map group=COLUMN names another",
+                self.title,
+                self.group.join(" or ")
+            )
+        });
+        (map, said)
     }
 
     /// Whether a row repeats a question with its options in another order.

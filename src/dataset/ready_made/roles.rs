@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::cell::Cell;
+use super::groups::GroupRule;
 use super::map::{How, Map};
 use super::names::{Role, known, plain};
 use super::row::{Row, Table};
@@ -23,6 +24,7 @@ pub(super) struct Roles {
     pub(super) ids: Vec<Column>,
     pub(super) hint: Option<Column>,
     pub(super) family: Option<Column>,
+    pub(super) group: Option<GroupRule>,
     pub(super) evidence: Option<Column>,
     pub(super) split_options: Option<String>,
 }
@@ -101,6 +103,7 @@ impl Roles {
             ids: named(Role::Id)?,
             hint: named(Role::Hint)?.into_iter().next(),
             family: family(table, &named(Role::Family)?),
+            group: GroupRule::of(table, map)?,
             evidence,
             split_options: how.and_then(|entry| match &entry.how {
                 How::Split(signs) => Some(signs.clone()),
@@ -156,7 +159,7 @@ impl Roles {
 }
 
 /// The column of a name, or the field of structs in it, as `meta.source`.
-fn column(table: &Table, name: &str) -> Result<Column, String> {
+pub(super) fn column(table: &Table, name: &str) -> Result<Column, String> {
     let own = |name: &str, field: Option<&str>| {
         table.find(name).map(|at| Column {
             at,

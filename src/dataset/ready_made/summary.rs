@@ -18,6 +18,8 @@ pub(super) struct Summary<'a> {
     pub(super) ids: String,
     pub(super) cut: &'a Cut,
     pub(super) left: &'a LeftOut,
+    /// What the groups of questions are like; `None` without groups.
+    pub(super) groups: Option<String>,
     pub(super) sources: &'a BTreeMap<FrameId, ImageSource>,
     pub(super) questions: &'a [Question],
     /// Further facts, one a line.
@@ -49,6 +51,7 @@ impl Summary<'_> {
             ),
             self.columns(),
         ];
+        lines.extend(self.groups.clone());
         for (why, number) in self.left.counts() {
             lines.push(format!(
                 "left out: {} of {} rows ({})",

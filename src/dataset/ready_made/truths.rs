@@ -72,8 +72,17 @@ pub(super) fn truths(
 
 /// Whether the lines are of this program's own form, in which the answer is the text of a choice.
 pub(super) fn is_own(table: &Table) -> bool {
-    const FIELDS: [&str; 8] = [
-        "id", "frame", "image", "family", "question", "choices", "answer", "evidence",
+    const FIELDS: [&str; 10] = [
+        "id",
+        "frame",
+        "image",
+        "family",
+        "question",
+        "choices",
+        "answer",
+        "evidence",
+        "group",
+        "group_size",
     ];
     let has = |name: &&str| table.find(name).is_some();
     ["question", "choices", "answer"].iter().all(has)

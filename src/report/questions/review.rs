@@ -82,6 +82,7 @@ mod tests {
             family: Family::Presence,
             text: "\u{2028}</SCRIPT>".into(),
             choices: Choices::new(choices, 0).unwrap(),
+            group: None,
             evidence: json!({ "segments": [] }),
         };
         let generated = GeneratedQuestion {

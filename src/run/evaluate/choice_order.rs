@@ -142,6 +142,7 @@ mod tests {
             family: Family::Closest,
             text: "?".into(),
             choices: Choices::new(texts, 1).unwrap(),
+            group: None,
             evidence: serde_json::Value::Null,
         }
     }

@@ -62,6 +62,7 @@ mod tests {
             family: Family::Closest,
             text: "?".into(),
             choices: Choices::new(vec!["a".into(), "b".into()], 0).unwrap(),
+            group: None,
             evidence: serde_json::Value::Null,
         };
         let questions: Vec<Question> = frames.chars().enumerate().map(question).collect();

@@ -83,6 +83,7 @@ impl Experiment for OpenSetup<'_> {
                 choices: Vec::new(),
                 answer: Some(question.answer.clone()),
                 extra_answers: question.extra.clone(),
+                group: None,
                 evidence: Value::Null,
                 image: walk.map(|walk| walk.digest()),
             }

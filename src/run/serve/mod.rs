@@ -171,6 +171,7 @@ impl ServerState {
             text: puzzle.question,
             choices: Choices::new(puzzle.choices, 0)
                 .map_err(|e| RequestFault::new(StatusCode::BAD_REQUEST, e.to_string()))?,
+            group: None,
             evidence: serde_json::Value::Null,
             frame: frame.cloned().unwrap_or(FrameId(String::new())),
         };

@@ -90,6 +90,7 @@ pub(super) fn questions() -> Vec<RunQuestion> {
         choices: ["yes", "no"].map(str::to_owned).to_vec(),
         answer: None,
         extra_answers: None,
+        group: None,
         evidence: json!({ BANK_ID: format!("q{question:02}") }),
         image: None,
     };

@@ -1,0 +1,252 @@
+//! Questions that a set scores together: [`GroupRule`], [`Groups`].
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use super::cell::Cell;
+use super::map::Map;
+use super::names::Role;
+use super::roles::{Column, column};
+use super::row::{Row, Table};
+use super::truths::is_own;
+use crate::types::{Question, StrictGroup};
+
+/// How the group of a row follows from its cells.
+#[derive(Debug)]
+pub(super) struct GroupRule {
+    /// The column or template as the user or the preset says it.
+    text: String,
+    parts: Vec<Part>,
+    /// The column that holds the number of questions in the group, in files that a run wrote.
+    size: Option<Column>,
+}
+
+/// A part of the name of a group.
+#[derive(Debug)]
+enum Part {
+    /// The same in every row.
+    Words(String),
+    /// A cell.
+    Cell(Column),
+    /// The numbers of a column in runs of one length, from a first number: `{Index:2 from 1}` takes 1 and 2, 3 and 4 together.
+    Run {
+        column: Column,
+        length: u64,
+        first: u64,
+    },
+}
+
+/// The columns by which files of this program name groups.
+const OWN: [&str; 2] = ["group", "group_size"];
+
+impl GroupRule {
+    /// The rule of a map; without one, that of a file of this program; `None` if questions have no groups.
+    ///
+    /// # Errors
+    /// If the map names a column that is not there, or a template cannot be read.
+    pub(super) fn of(table: &Table, map: &Map) -> Result<Option<Self>, String> {
+        let [name, size] = OWN;
+        let own = |name| table.find(name).and_then(|_| column(table, name).ok());
+        let text = match map.of(Role::Group).map(|entry| &*entry.columns) {
+            Some([text]) => text.clone(),
+            Some(_) => return Ok(None),
+            None if own(name).is_some() && (own(size).is_some() || is_own(table)) => {
+                name.to_owned()
+            }
+            None => return Ok(None),
+        };
+        let parts = if text.contains('{') {
+            parts(table, &text)?
+        } else {
+            vec![Part::Cell(column(table, &text)?)]
+        };
+        let size = own(size).filter(|_| text == name);
+        Ok(Some(Self { text, parts, size }))
+    }
+
+    /// The name of the group of a row; `None` if a cell is absent, or no number where one is needed.
+    fn name(&self, row: &Row) -> Option<String> {
+        self.parts.iter().map(|part| part.text(row)).collect()
+    }
+}
+
+impl Part {
+    fn text(&self, row: &Row) -> Option<String> {
+        match self {
+            Self::Words(words) => Some(words.clone()),
+            Self::Cell(column) => match column.of(row) {
+                Cell::File(facts) => Some(facts.digest.to_string()[..12].to_owned()),
+                _ => column.text(row).map(|text| text.trim().to_owned()),
+            },
+            Self::Run {
+                column,
+                length,
+                first,
+            } => {
+                let number: u64 = column.text(row)?.trim().parse().ok()?;
+                Some((number.checked_sub(*first)? / length).to_string())
+            }
+        }
+    }
+}
+
+/// The parts of a template.
+fn parts(table: &Table, template: &str) -> Result<Vec<Part>, String> {
+    let mut parts = Vec::new();
+    let mut rest = template;
+    while let Some((words, after)) = rest.split_once('{') {
+        let (field, after) = after
+            .split_once('}')
+            .ok_or_else(|| format!("group={template}: '}}' is missing"))?;
+        if !words.is_empty() {
+            parts.push(Part::Words(words.to_owned()));
+        }
+        parts.push(part(table, field)?);
+        rest = after;
+    }
+    if !rest.is_empty() {
+        parts.push(Part::Words(rest.to_owned()));
+    }
+    Ok(parts)
+}
+
+/// What stands in the braces of a template: a column, or a column and how many of its numbers are one group.
+fn part(table: &Table, field: &str) -> Result<Part, String> {
+    let Some((name, run)) = run_of(field).filter(|_| table.find(field).is_none()) else {
+        return column(table, field).map(Part::Cell);
+    };
+    let wrong = || {
+        format!(
+            "group={{{field}}}: {{COLUMN:2}} or {{COLUMN:2 from 1}} expected, with how many numbers are one group and the first of them"
+        )
+    };
+    let (length, first) = run.split_once(" from ").unwrap_or((run, "0"));
+    let length: u64 = length.trim().parse().map_err(|_| wrong())?;
+    let first = first.trim().parse().map_err(|_| wrong())?;
+    if length == 0 {
+        return Err(wrong());
+    }
+    Ok(Part::Run {
+        column: column(table, name)?,
+        length,
+        first,
+    })
+}
+
+/// The column in the braces of a template, and what follows its colon.
+fn run_of(field: &str) -> Option<(&str, &str)> {
+    field.rsplit_once(':')
+}
+
+/// The columns that a template names.
+pub(super) fn columns(template: &str) -> Vec<&str> {
+    let fields = template
+        .split('{')
+        .skip(1)
+        .filter_map(|part| part.split('}').next());
+    fields
+        .map(|field| run_of(field).map_or(field, |(name, _)| name))
+        .collect()
+}
+
+/// The groups of the rows of a set.
+#[derive(Debug, Default)]
+pub(super) struct Groups {
+    /// The rule as text; empty if there are no groups.
+    rule: String,
+    /// The name by row.
+    names: Vec<Option<String>>,
+    sizes: HashMap<String, usize>,
+}
+
+impl Groups {
+    /// The groups by a rule. Rows that cannot be asked count as members, so that it is known what a group lacks; copies do not.
+    pub(super) fn of(table: &Table, rule: &GroupRule, is_copy: impl Fn(usize) -> bool) -> Self {
+        let mut groups = Self {
+            rule: rule.text.clone(),
+            ..Self::default()
+        };
+        for (at, row) in table.rows.iter().enumerate() {
+            let name = rule.name(row).filter(|name| !name.is_empty());
+            if let Some(name) = name.clone().filter(|_| !is_copy(at)) {
+                *groups.sizes.entry(name).or_default() += 1;
+            }
+            groups.names.push(name);
+        }
+        let Some(size) = &rule.size else {
+            return groups;
+        };
+        // A file of a run may hold a part of a group.
+        for (row, name) in table.rows.iter().zip(&groups.names) {
+            let stated = size.text(row).and_then(|text| text.trim().parse().ok());
+            if let (Some(name), Some(stated)) = (name, stated) {
+                let known = groups.sizes.entry(name.clone()).or_default();
+                *known = (*known).max(stated);
+            }
+        }
+        groups
+    }
+
+    /// The group of a row; `None` if it has none.
+    pub(super) fn group(&self, row: usize) -> Option<StrictGroup> {
+        let name = self.names.get(row)?.clone()?;
+        let size = self.sizes.get(&name).copied().unwrap_or(1);
+        Some(StrictGroup { name, size })
+    }
+
+    /// What the groups of these questions are like, in words; `None` if there are no groups.
+    pub(super) fn said(&self, questions: &[Question]) -> Option<String> {
+        if self.rule.is_empty() {
+            return None;
+        }
+        let mut groups = BTreeMap::<&StrictGroup, Vec<&Question>>::new();
+        for question in questions {
+            if let Some(group) = &question.group {
+                groups.entry(group).or_default().push(question);
+            }
+        }
+        let sizes: BTreeSet<usize> = groups.keys().map(|group| group.size).collect();
+        let of = match (sizes.first(), sizes.last()) {
+            (Some(1), Some(1)) => " of one question, so that the strict score is accuracy".into(),
+            (Some(least), Some(most)) if least == most => format!(" of {most} questions"),
+            (Some(least), Some(most)) => format!(" of {least} to {most} questions"),
+            _ => String::new(),
+        };
+        let frames = |questions: &Vec<&Question>| {
+            let frames = questions.iter().map(|question| &question.frame);
+            frames.collect::<BTreeSet<_>>().len()
+        };
+        let count = |is: &dyn Fn(&StrictGroup, &Vec<&Question>) -> bool| {
+            let found = groups.iter().filter(|(group, members)| is(group, members));
+            found.count()
+        };
+        let ungrouped = questions.iter().filter(|question| question.group.is_none());
+        let facts = [
+            (
+                if sizes.len() > 1 {
+                    count(&|group, _| group.size == 1)
+                } else {
+                    0
+                },
+                "of one question",
+            ),
+            (
+                count(&|_, members| frames(members) > 1),
+                "about several images",
+            ),
+            (
+                count(&|group, members| members.len() < group.size),
+                "with questions that are left out, never complete",
+            ),
+            (ungrouped.count(), "questions without a group"),
+        ];
+        let facts = facts.into_iter().filter(|(number, _)| *number > 0);
+        let facts = facts.map(|(number, what)| format!(", {number} {what}"));
+        Some(format!(
+            "group = {}: {} {}{of}{}",
+            self.rule,
+            groups.len(),
+            if groups.len() == 1 { "group" } else { "groups" },
+            facts.collect::<String>()
+        ))
+    }
+}
