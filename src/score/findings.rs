@@ -23,8 +23,9 @@ use super::pair_darkness::{self, PairDarkness};
 use super::photographed_set::PhotographedSet;
 use super::pooled::{LevelsLeftOut, PooledFinding, levels_left_out, pooled};
 use super::significance::Significance;
+use super::strict_score::StrictScore;
 use super::subject::{Subject, is_control, is_observer};
-use crate::types::{Family, FrameId, ImageFidelity, ModelListing, Record};
+use crate::types::{Family, FrameId, ImageFidelity, ModelListing, Record, RunQuestion};
 
 /// All results that are computed from the records of a run.
 #[derive(Debug)]
@@ -69,6 +70,8 @@ pub struct Findings<'a> {
     pub fidelity: Option<FidelityFindings>,
     /// What the models share; `None` if all were asked the same questions.
     pub common: Option<CommonItems>,
+    /// Shares of groups of which all questions are right; `None` if questions have no groups.
+    pub(crate) strict: Option<StrictScore>,
     /// Results of the observer and its controls. The controls are in no other result.
     pub observer: ObserverSummary,
     /// The results without the observer, if one of its controls is not at chance; these are shown then.
@@ -132,6 +135,15 @@ impl<'a> Findings<'a> {
         self
     }
 
+    /// The same results with the strict score of the groups that these questions name.
+    #[must_use]
+    pub(crate) fn of_groups(mut self, questions: &[RunQuestion]) -> Self {
+        self.strict = StrictScore::of(&self.grid, questions);
+        let shown = self.without_observer.take();
+        self.without_observer = shown.map(|shown| Box::new(shown.of_groups(questions)));
+        self
+    }
+
     /// What is shown: without the observer, if one of its controls is not at chance or none was asked.
     #[must_use]
     pub fn shown(&self) -> &Self {
@@ -171,6 +183,7 @@ impl<'a> Findings<'a> {
             pairs: pair_darkness::of_grid(&grid),
             fidelity: FidelityFindings::new(&grid, measured),
             common: CommonItems::of(&grid),
+            strict: None,
             observer,
             without_observer: None,
             grid,

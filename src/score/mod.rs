@@ -52,6 +52,7 @@ mod residuals;
 pub(crate) mod self_agreement;
 pub(crate) mod significance;
 mod split_mix;
+pub(crate) mod strict_score;
 pub(crate) mod subject;
 #[cfg(test)]
 mod tests;

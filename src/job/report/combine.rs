@@ -32,7 +32,7 @@ impl Combined {
             &self.fidelity,
             &self.listing,
         );
-        let findings = findings.of_set(set(&self.runs));
+        let findings = findings.of_set(set(&self.runs)).of_groups(&self.questions);
         // Replies differ from time to time: that is no other model.
         let apart = self.models.apart.iter();
         let by_replies = apart.filter(|apart| apart.differs_by_replies_alone());

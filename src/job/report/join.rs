@@ -1,6 +1,6 @@
 //! Joining several runs of either kind: [`join`].
 
-use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::PathBuf;
 
 use super::cost::cost;
@@ -104,7 +104,7 @@ pub(super) fn join<D: Detail>(
 struct Known {
     /// Places of the records with a reply, by key and by the group of the model's name.
     trials: HashMap<(TrialKey, usize), usize>,
-    questions: HashSet<QuestionId>,
+    questions: HashMap<QuestionId, usize>,
     thumbnails: BTreeSet<(FrameId, Condition)>,
 }
 
@@ -149,8 +149,12 @@ impl<D: Detail> Joined<D> {
             self.records.push(record);
         }
         for question in &run.questions {
-            if known.questions.insert(question.id.clone()) {
+            let next = self.questions.len();
+            let place = *known.questions.entry(question.id.clone()).or_insert(next);
+            if place == next {
                 self.questions.push(question.clone());
+            } else if self.questions[place].group.is_none() {
+                self.questions[place].group.clone_from(&question.group);
             }
         }
         let thumbnails = run.thumbnails.into_iter();

@@ -17,6 +17,7 @@ mod observer;
 mod pairs;
 mod pooled;
 mod sections;
+mod strict_groups;
 mod subjects;
 mod summary;
 mod thresholds;
@@ -63,6 +64,7 @@ fn all(findings: &Findings<'_>) -> Vec<Table> {
         by_reading::by_reading(findings),
         vec![best::best(findings)],
         vec![families::families(findings)],
+        strict_groups::strict_groups(findings),
         pooled::pooled(findings),
         comparisons::comparisons(findings),
         answers::answers(findings),

@@ -12,7 +12,7 @@ pub(in crate::report) type Section = (
 );
 
 /// The sections of the page in order.
-pub(in crate::report) const SECTIONS: [Section; 14] = [
+pub(in crate::report) const SECTIONS: [Section; 15] = [
     (
         BASELINE,
         "Against the baseline",
@@ -55,6 +55,14 @@ pub(in crate::report) const SECTIONS: [Section; 14] = [
         "Families of questions",
         "Underlined: shown to be below a model without images (its own, if it was asked so). There images in the dark do more harm than none.",
         &["families"],
+    ),
+    (
+        "groups",
+        "Whole groups right",
+        "The benchmark’s strict score: a group is right if all its questions are right, every time they were asked. It counts if every \
+         question that the set holds of it has a reply; groups that share frames are one cluster. Chance is the mean over groups of \
+         the product of 1 / number of choices.",
+        &[],
     ),
     (
         ENHANCERS,

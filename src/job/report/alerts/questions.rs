@@ -75,6 +75,17 @@ pub(super) fn of_questions<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
         );
         alerts.push(Alert::new(AlertKind::Data, text));
     }
+    let groups = differ(&|one, other| {
+        let groups = one.group.as_ref().zip(other.group.as_ref());
+        groups.is_some_and(|(group, other)| group != other)
+    });
+    if groups > 0 {
+        let text = format!(
+            "The groups of {} differ; those of the first run by name count.",
+            counted(groups, "shared question")
+        );
+        alerts.push(Alert::new(AlertKind::Questions, text));
+    }
     alerts
 }
 
