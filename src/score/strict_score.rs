@@ -10,7 +10,7 @@ use crate::types::{Family, QuestionId, RunQuestion, StrictGroup};
 
 /// The share of groups of which all questions are answered rightly, of one subject in one reading.
 #[derive(Debug, Clone, PartialEq)]
-pub struct GroupCell {
+pub(crate) struct GroupCell {
     pub subject: Subject,
     /// Question family, with the groups that are wholly of it; `None` for all groups.
     pub family: Option<Family>,
@@ -28,7 +28,7 @@ pub struct GroupCell {
 
 /// The chance that a uniform guess is right on all questions of a group.
 #[derive(Debug, Clone, PartialEq)]
-pub struct GroupChance {
+pub(crate) struct GroupChance {
     /// Question family; `None` for all groups.
     pub family: Option<Family>,
     /// The mean over the groups of which the run asks every question; `None` without such a group.
@@ -40,7 +40,7 @@ pub struct GroupChance {
 /// A group is one unit, and right if all its questions are right, in every order of choices and every repeat in which they were asked.
 /// It counts if every question that the set holds of it has a reply. Groups that share a cluster are one cluster.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct StrictScore {
+pub(crate) struct StrictScore {
     /// Ordered by subject, family and reading.
     pub cells: Vec<GroupCell>,
     /// All groups first, then by family.
@@ -283,3 +283,6 @@ fn chance(grid: &Grid<'_>, groups: &[&Group<'_>]) -> Option<Estimate> {
     let n = groups.len();
     (n > 0).then(|| Estimate::exact(sum / n as f64, n))
 }
+
+#[cfg(test)]
+mod tests;

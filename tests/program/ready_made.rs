@@ -216,3 +216,142 @@ fn the_template_can_be_checked_and_run_as_it_is() {
     let checked = bench.complete(&command);
     assert!(checked.contains("ok: 6 questions"), "{checked}");
 }
+
+/// A set of eight yes-or-no questions, two about each of four images, of which the last two pairs have one that says no.
+fn pairs() -> Bench {
+    let bench = Bench::new();
+    let mut rows = Vec::new();
+    for number in 0..8 {
+        let name = format!("{}.png", number / 2);
+        let picture =
+            image::RgbImage::from_pixel(64, 48, image::Rgb([20 * (number as u8 / 2), 60, 30]));
+        picture.save(bench.path(&name)).unwrap();
+        let answer = if [5, 7].contains(&number) {
+            "no"
+        } else {
+            "yes"
+        };
+        rows.push(json!({"id": number, "image": name, "pair": number / 2, "question": format!("Is it {number}?"), "answer": answer}));
+    }
+    bench.file("set.json", json!(rows).to_string());
+    bench
+}
+
+/// The fields of the first line of a CSV file whose first fields are these.
+fn line_of(table: &str, starts: &str) -> Vec<String> {
+    let line = table.lines().find(|line| line.starts_with(starts));
+    let line = line.unwrap_or_else(|| panic!("no line {starts}: {table}"));
+    line.split(',').map(str::to_owned).collect()
+}
+
+#[test]
+fn a_set_with_groups_has_its_strict_score() {
+    let bench = pairs();
+    let line = "--data set.json --model random --levels L0,L3 --blind";
+    bench.complete(&words(&format!("{line} --out plain")));
+    // Without groups there is no such table, and nothing is stored.
+    assert!(!bench.path("plain/groups.csv").exists());
+    let read = |name: &str| fs::read_to_string(bench.path(name)).unwrap();
+    assert!(!read("plain/questions.jsonl").contains("group"));
+    assert!(!read("plain/report.html").contains("Whole groups right"));
+    let printed = bench.complete(&words(&format!("{line} --out run --map group=pair --full")));
+    assert!(
+        printed.contains("All questions of a group right"),
+        "{printed}"
+    );
+    // The same trials, the same replies.
+    assert_eq!(
+        read("plain/records.jsonl").lines().count(),
+        read("run/records.jsonl").lines().count()
+    );
+    let keys = |name: &str| {
+        let records = read(name);
+        let mut keys: Vec<String> = records
+            .lines()
+            .map(|line| serde_json::from_str::<Value>(line).unwrap()["key"].to_string())
+            .collect();
+        keys.sort();
+        keys
+    };
+    assert_eq!(keys("plain/records.jsonl"), keys("run/records.jsonl"));
+    let question: Value =
+        serde_json::from_str(read("run/questions.jsonl").lines().next().unwrap()).unwrap();
+    assert_eq!(
+        (&question["group"], &question["group_size"]),
+        (&json!("0"), &json!(2))
+    );
+    // The table is what the records say.
+    let table = read("run/groups.csv");
+    let head: Vec<&str> = table.lines().next().unwrap().split(',').collect();
+    let at = |name: &str| head.iter().position(|head| *head == name).unwrap();
+    for level in ["L0", "L3"] {
+        let mut right = [true; 4];
+        for line in read("run/records.jsonl").lines() {
+            let record: Value = serde_json::from_str(line).unwrap();
+            if record["level"] == level {
+                let number: usize = record["question"].as_str().unwrap().parse().unwrap();
+                right[number / 2] &= record["outcome"] == "right";
+            }
+        }
+        let row = line_of(&table, &format!("random,image,{level},"));
+        let expected = right.iter().filter(|right| **right).count();
+        assert_eq!(row[at("right")], expected.to_string(), "{table}");
+        assert_eq!((&*row[at("n")], &*row[at("incomplete")]), ("4", "0"));
+        assert_eq!(row[at("value")], (expected as f64 / 4.0).to_string());
+    }
+    assert_eq!(line_of(&table, "random,blind,")[at("n")], "4");
+    assert_eq!(line_of(&table, "chance,")[at("value")], "0.25");
+    for name in ["run/report.html", "run/tables.tex"] {
+        assert!(read(name).contains("group"), "{name}");
+    }
+    assert!(read("run/report.html").contains("Whole groups right"));
+}
+
+#[test]
+fn drawn_questions_break_groups_and_the_report_says_so() {
+    let bench = pairs();
+    let line = "--data set.json --model random --levels L0 --map group=pair";
+    bench.complete(&words(&format!("{line} --limit 5 --out run")));
+    let table = fs::read_to_string(bench.path("run/groups.csv")).unwrap();
+    let head: Vec<&str> = table.lines().next().unwrap().split(',').collect();
+    let at = |name: &str| head.iter().position(|head| *head == name).unwrap();
+    let row = line_of(&table, "random,image,L0,");
+    assert_eq!(
+        (&*row[at("n")], &*row[at("incomplete")]),
+        ("2", "1"),
+        "{table}"
+    );
+    let page = fs::read_to_string(bench.path("run/report.html")).unwrap();
+    assert!(
+        page.contains("1 group of which questions of the set are left out or not drawn"),
+        "{page}"
+    );
+    // The run goes on with the rest, without the flag too: stored groups stay.
+    bench.complete(&words(
+        "--data set.json --model random --levels L0 --limit 5 --out run",
+    ));
+    let questions = fs::read_to_string(bench.path("run/questions.jsonl")).unwrap();
+    assert_eq!(
+        questions.matches("\"group_size\":2").count(),
+        5,
+        "{questions}"
+    );
+    bench.complete(&words(&format!("{line} --out run")));
+    let table = fs::read_to_string(bench.path("run/groups.csv")).unwrap();
+    let row = line_of(&table, "random,image,L0,");
+    assert_eq!(
+        (&*row[at("n")], &*row[at("incomplete")]),
+        ("4", "0"),
+        "{table}"
+    );
+    // A question cannot change its group within a run.
+    let called = bench.call(&words(
+        "--data set.json --model random --levels L0 --map group=image --out run",
+    ));
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert!(
+        called.stderr.contains("image or group; use another --out"),
+        "{}",
+        called.stderr
+    );
+}

@@ -3,6 +3,7 @@
 mod broken;
 mod fixture;
 mod gaps;
+mod groups;
 mod refusals;
 mod shapes;
 

@@ -1,0 +1,178 @@
+//! The groups in which questions of a set are scored together.
+
+use std::fs;
+
+use serde_json::{Map, Value, json};
+
+use super::super::settings::LeaveOut;
+use super::fixture::{png, row, set};
+use super::{map, open, refusal};
+use crate::dataset::{Dataset, SetArgs};
+
+/// Six rows about three images: numbers from 1, and two columns that make a group together. The last row is an open question.
+fn rows() -> Vec<Map<String, Value>> {
+    let rows = (1..=6).map(|number| {
+        let answer = if number == 6 { "seven" } else { "yes" };
+        row(json!({
+            "nr": number, "image": format!("{}.png", (number - 1) / 2), "question": format!("Is it {number}?"), "answer": answer,
+            "set": format!("s{}", number / 4), "figure": if number == 3 { Value::Null } else { json!(number % 2) },
+        }))
+    });
+    rows.collect()
+}
+
+fn made(rows: &[Map<String, Value>]) -> (tempfile::TempDir, std::path::PathBuf) {
+    let (folder, path) = set("set.jsonl", rows);
+    for name in ["0.png", "1.png", "2.png"] {
+        fs::write(folder.path().join(name), png(name.as_bytes()[0])).unwrap();
+    }
+    (folder, path)
+}
+
+/// Name and size of the group of each question.
+fn groups(dataset: &Dataset) -> Vec<Option<(&str, usize)>> {
+    let questions = dataset.questions().iter();
+    questions
+        .map(|question| {
+            let group = question.group.as_ref();
+            group.map(|group| (&*group.name, group.size))
+        })
+        .collect()
+}
+
+fn with(text: &str) -> SetArgs {
+    SetArgs {
+        open: Some(LeaveOut::Skip),
+        ..map(text)
+    }
+}
+
+#[test]
+fn a_group_is_a_column_a_template_or_a_run_of_numbers() {
+    let (_folder, path) = made(&rows());
+    let read = |text: &str| open(&path, &with(text)).unwrap();
+    // By rule nothing is a group.
+    assert_eq!(groups(&read("id=nr")), [None; 5]);
+    let by_image = read("id=nr,group=image");
+    assert_eq!(
+        groups(&by_image)[..3],
+        [Some(("0.png", 2)), Some(("0.png", 2)), Some(("1.png", 2))]
+    );
+    // The open question is left out, and its group knows that it lacks one.
+    assert_eq!(groups(&by_image)[4], Some(("2.png", 2)));
+    let said = by_image.reading().join("\n");
+    assert!(
+        said.contains("group = image: 3 groups of 2 questions, 1 with questions that are left out, never complete"),
+        "{said}"
+    );
+    let template = read("id=nr,group={set}_{figure}");
+    assert_eq!(
+        groups(&template),
+        [
+            Some(("s0_1", 1)),
+            Some(("s0_0", 1)),
+            None,
+            Some(("s1_0", 2)),
+            Some(("s1_1", 1))
+        ]
+    );
+    let said = template.reading().join("\n");
+    assert!(
+        said.contains("group = {set}_{figure}: 4 groups of 1 to 2 questions, 3 of one question, 1 with questions that are left out, never complete, 1 questions without a group"),
+        "{said}"
+    );
+    let from_one: Vec<&str> = vec!["0", "0", "1", "1", "2"];
+    let runs = read("id=nr,group={nr:2 from 1}");
+    let names: Vec<&str> = groups(&runs)
+        .into_iter()
+        .flatten()
+        .map(|(name, _)| name)
+        .collect();
+    assert_eq!(names, from_one);
+    let from_nought = read("id=nr,group={nr:2}");
+    assert_ne!(groups(&from_nought), groups(&runs));
+    assert!(
+        from_nought
+            .reading()
+            .join("\n")
+            .contains("about several images")
+    );
+}
+
+#[test]
+fn a_wrong_group_is_refused_with_what_was_expected() {
+    let (_folder, path) = made(&rows());
+    for (text, says) in [
+        (
+            "group=figures",
+            "names the column \"figures\", which is not there",
+        ),
+        ("group={set}_{Figure}", "did you mean \"figure\"?"),
+        ("group={set", "'}' is missing"),
+        ("group={nr:two}", "{COLUMN:2} or {COLUMN:2 from 1} expected"),
+        ("group={nr:0}", "{COLUMN:2} or {COLUMN:2 from 1} expected"),
+    ] {
+        let problem = refusal(&path, &with(text));
+        assert!(problem.contains(says), "{text}: {problem}");
+    }
+}
+
+#[test]
+fn what_a_run_stores_keeps_its_groups() {
+    // A part of the questions of a run, whose group had three.
+    let own = |id: &str| {
+        row(json!({
+            "id": id, "image": "0.png", "family": "f", "question": "?", "choices": ["x", "y"], "answer": "x", "group": "g", "group_size": 3,
+        }))
+    };
+    let (_folder, path) = made(&[own("a"), own("b")]);
+    let dataset = open(&path, &SetArgs::default()).unwrap();
+    assert_eq!(groups(&dataset), [Some(("g", 3)); 2]);
+    let off = open(&path, &map("group=")).unwrap();
+    assert_eq!(groups(&off), [None; 2]);
+    // A stranger's column of this name is nothing by itself.
+    let strange = |id: &str| {
+        let mut row = own(id);
+        row.remove("group_size");
+        row.insert("level".to_owned(), json!("easy"));
+        row
+    };
+    let (_folder, path) = made(&[strange("a"), strange("b")]);
+    assert_eq!(
+        groups(&open(&path, &SetArgs::default()).unwrap()),
+        [None; 2]
+    );
+}
+
+#[test]
+fn known_sets_bring_their_groups() {
+    let known = |name: &str, path: &std::path::Path, args: &SetArgs| {
+        let place = crate::dataset::place(&format!("{name}:{}", path.display())).unwrap();
+        Dataset::open(&place, None, args).unwrap()
+    };
+    let mme = |number: usize| {
+        row(json!({
+            "question_id": format!("{}.png", number / 2), "image": format!("{}.png", number / 2), "question": format!("Is it {number}?"),
+            "answer": "Yes", "category": "colour",
+        }))
+    };
+    let rows: Vec<Map<String, Value>> = (0..4).map(mme).collect();
+    let (_folder, path) = made(&rows);
+    let dataset = known("mme", &path, &SetArgs::default());
+    assert_eq!(groups(&dataset)[0], Some(("colour_0.png", 2)));
+    let own = known("mme", &path, &map("group=question"));
+    assert_eq!(groups(&own)[0], Some(("Is it 0?", 1)));
+    // Of a copy without the column it is said that there are no groups.
+    let without = rows.into_iter().map(|mut row| {
+        row.remove("question_id");
+        row
+    });
+    let (_folder, path) = made(&without.collect::<Vec<_>>());
+    let dataset = known("mme", &path, &SetArgs::default());
+    assert_eq!(groups(&dataset), [None; 4]);
+    let said = dataset.reading().join("\n");
+    assert!(
+        said.contains("no groups: MME scores questions together by {category}_{question_id} or"),
+        "{said}"
+    );
+}
