@@ -247,7 +247,7 @@ fn line_of(table: &str, starts: &str) -> Vec<String> {
 #[test]
 fn a_set_with_groups_has_its_strict_score() {
     let bench = pairs();
-    let line = "--data set.json --model random --levels L0,L3 --blind";
+    let line = "--data set.json --model random --blind-model random --levels L0,L3";
     bench.complete(&words(&format!("{line} --out plain")));
     // Without groups there is no such table, and nothing is stored.
     assert!(!bench.path("plain/groups.csv").exists());
