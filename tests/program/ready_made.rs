@@ -284,16 +284,20 @@ fn a_set_with_groups_has_its_strict_score() {
     let table = read("run/groups.csv");
     let head: Vec<&str> = table.lines().next().unwrap().split(',').collect();
     let at = |name: &str| head.iter().position(|head| *head == name).unwrap();
-    for level in ["L0", "L3"] {
+    for (condition, starts) in [
+        ("L0", "L0,none,"),
+        ("L3-ev", "L3,ev,"),
+        ("L3-noise", "L3,noise,"),
+    ] {
         let mut right = [true; 4];
         for line in read("run/records.jsonl").lines() {
             let record: Value = serde_json::from_str(line).unwrap();
-            if record["level"] == level {
+            if record["condition"] == condition {
                 let number: usize = record["question"].as_str().unwrap().parse().unwrap();
                 right[number / 2] &= record["outcome"] == "right";
             }
         }
-        let row = line_of(&table, &format!("random,image,{level},"));
+        let row = line_of(&table, &format!("random,image,{starts}"));
         let expected = right.iter().filter(|right| **right).count();
         assert_eq!(row[at("right")], expected.to_string(), "{table}");
         assert_eq!((&*row[at("n")], &*row[at("incomplete")]), ("4", "0"));

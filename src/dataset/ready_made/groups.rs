@@ -46,13 +46,11 @@ impl GroupRule {
     pub(super) fn of(table: &Table, map: &Map) -> Result<Option<Self>, String> {
         let [name, size] = OWN;
         let own = |name| table.find(name).and_then(|_| column(table, name).ok());
+        let is_own = || own(name).is_some() && (own(size).is_some() || is_own(table));
         let text = match map.of(Role::Group).map(|entry| &*entry.columns) {
             Some([text]) => text.clone(),
-            Some(_) => return Ok(None),
-            None if own(name).is_some() && (own(size).is_some() || is_own(table)) => {
-                name.to_owned()
-            }
-            None => return Ok(None),
+            None if is_own() => name.to_owned(),
+            _ => return Ok(None),
         };
         let parts = if text.contains('{') {
             parts(table, &text)?

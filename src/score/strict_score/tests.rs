@@ -44,8 +44,8 @@ fn questions(records: &[Record], group: impl Fn(usize) -> Option<String>) -> Vec
 }
 
 /// The two questions about a frame.
-fn by_frame(item: usize) -> Option<String> {
-    Some(format!("frame {}", item / 2))
+fn by_frame(item: usize) -> String {
+    format!("frame {}", item / 2)
 }
 
 fn score(records: &[Record], questions: &[RunQuestion]) -> StrictScore {
@@ -71,7 +71,7 @@ fn one_wrong_member_makes_its_group_wrong() {
         records("m", "", |item| Some(item % 2 == 0)),
     ]
     .concat();
-    let score = score(&made, &questions(&made, by_frame));
+    let score = score(&made, &questions(&made, |item| Some(by_frame(item))));
     let light = strict(&score, "L0");
     assert_eq!((light.right, light.incomplete), (12, 0));
     let dark = strict(&score, "L3-noise");
@@ -96,7 +96,7 @@ fn a_group_without_all_replies_is_incomplete_and_not_scored() {
     let made = records("m", "L0", |item| {
         (item != 7).then_some(item != 6 && item != 0)
     });
-    let all = questions(&made, by_frame);
+    let all = questions(&made, |item| Some(by_frame(item)));
     let cell = score(&made, &all);
     let cell = strict(&cell, "L0");
     // Group 3 failed in part, though its other member is wrong; group 0 is wrong.
@@ -130,7 +130,7 @@ fn chance_is_the_mean_product_of_one_over_the_choices() {
     let group = |item: usize| match item {
         22 => Some("alone".to_owned()),
         23 => None,
-        _ => by_frame(item),
+        _ => Some(by_frame(item)),
     };
     let score = score(&made, &questions(&made, group));
     let chance = score.chance[0].share.unwrap();
@@ -183,7 +183,7 @@ fn a_question_asked_again_must_be_right_again() {
         record
     });
     let made: Vec<Record> = first.into_iter().chain(again).collect();
-    let all = questions(&made, by_frame);
+    let all = questions(&made, |item| Some(by_frame(item)));
     let twice = score(&made, &all);
     assert_eq!(strict(&twice, "L0").right, 11);
     let chance = twice.chance[0].share.unwrap().value;
