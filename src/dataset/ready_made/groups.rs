@@ -7,6 +7,7 @@ use super::map::Map;
 use super::names::Role;
 use super::roles::{Column, column};
 use super::row::{Row, Table};
+use super::summary::count;
 use super::truths::is_own;
 use crate::types::{Question, StrictGroup};
 
@@ -202,6 +203,7 @@ impl Groups {
                 groups.entry(group).or_default().push(question);
             }
         }
+        let number = count(groups.len(), "group", "groups");
         let sizes: BTreeSet<usize> = groups.keys().map(|group| group.size).collect();
         let of = match (sizes.first(), sizes.last()) {
             (Some(1), Some(1)) => " of one question, so that the strict score is accuracy".into(),
@@ -209,42 +211,43 @@ impl Groups {
             (Some(least), Some(most)) => format!(" of {least} to {most} questions"),
             _ => String::new(),
         };
-        let frames = |questions: &Vec<&Question>| {
-            let frames = questions.iter().map(|question| &question.frame);
-            frames.collect::<BTreeSet<_>>().len()
-        };
-        let count = |is: &dyn Fn(&StrictGroup, &Vec<&Question>) -> bool| {
-            let found = groups.iter().filter(|(group, members)| is(group, members));
-            found.count()
-        };
-        let ungrouped = questions.iter().filter(|question| question.group.is_none());
+        let single = groups.keys().filter(|group| group.size == 1).count();
+        let across = groups.values().filter(|members| frames(members) > 1);
+        let parts = groups
+            .iter()
+            .filter(|(group, members)| members.len() < group.size);
+        let without = questions.iter().filter(|question| question.group.is_none());
         let facts = [
+            (if sizes.len() > 1 { single } else { 0 }, "of one question"),
+            (across.count(), "about several images"),
             (
-                if sizes.len() > 1 {
-                    count(&|group, _| group.size == 1)
-                } else {
-                    0
-                },
-                "of one question",
-            ),
-            (
-                count(&|_, members| frames(members) > 1),
-                "about several images",
-            ),
-            (
-                count(&|group, members| members.len() < group.size),
+                parts.count(),
                 "with questions that are left out, never complete",
             ),
-            (ungrouped.count(), "questions without a group"),
+            (
+                self.sizes.len().saturating_sub(groups.len()),
+                "more of which every question is left out",
+            ),
         ];
         let facts = facts.into_iter().filter(|(number, _)| *number > 0);
         let facts = facts.map(|(number, what)| format!(", {number} {what}"));
+        let without = match without.count() {
+            0 => String::new(),
+            number => format!(
+                "; {} without a group",
+                count(number, "question", "questions")
+            ),
+        };
+        let facts: String = facts.collect();
         Some(format!(
-            "group = {}: {} {}{of}{}",
-            self.rule,
-            groups.len(),
-            if groups.len() == 1 { "group" } else { "groups" },
-            facts.collect::<String>()
+            "group = {}: {number}{of}{facts}{without}",
+            self.rule
         ))
     }
+}
+
+/// The number of frames that questions are about.
+fn frames(questions: &[&Question]) -> usize {
+    let frames = questions.iter().map(|question| &question.frame);
+    frames.collect::<BTreeSet<_>>().len()
 }

@@ -78,7 +78,13 @@ fn a_group_is_a_column_a_template_or_a_run_of_numbers() {
     );
     let said = template.reading().join("\n");
     assert!(
-        said.contains("group = {set}_{figure}: 4 groups of 1 to 2 questions, 3 of one question, 1 with questions that are left out, never complete, 1 questions without a group"),
+        said.contains("group = {set}_{figure}: 4 groups of 1 to 2 questions, 3 of one question, 1 with questions that are left out, never complete; 1 question without a group"),
+        "{said}"
+    );
+    let alone = read("id=nr,group={nr:1}");
+    let said = alone.reading().join("\n");
+    assert!(
+        said.contains("5 groups of one question, so that the strict score is accuracy, 1 more of which every question is left out"),
         "{said}"
     );
     let from_one: Vec<&str> = vec!["0", "0", "1", "1", "2"];
