@@ -50,7 +50,7 @@ pub use settings::SetArgs;
 
 use container::{FoundFiles, SetFile};
 use frames::Frames;
-use groups::Groups;
+use groups::{GroupRule, Groups};
 use images::ImagesAre;
 use items::{Cut, Endings, items};
 use left_out::{LeftOut, Why};
@@ -230,6 +230,7 @@ fn read(
         return Err("no questions in it".to_owned());
     }
     let roles = Roles::of(table, map)?;
+    let rule = GroupRule::of(table, map)?;
     let (mut left, mut cut) = (LeftOut::default(), Cut::new());
     let endings = if args.keep_instructions {
         Endings::Kept
@@ -258,9 +259,8 @@ fn read(
         return Err("no row is left to ask".to_owned());
     }
     let is_copy = |row| preset.is_some_and(|preset| preset.is_rotation(table, row));
-    let groups = roles.group.as_ref();
     Ok(ReadSet {
-        groups: groups.map_or_else(Groups::default, |rule| Groups::of(table, rule, is_copy)),
+        groups: rule.map_or_else(Groups::default, |rule| Groups::of(table, &rule, is_copy)),
         roles,
         answered: truths.answered,
         said: truths.said,

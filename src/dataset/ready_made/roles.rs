@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 
 use super::cell::Cell;
-use super::groups::GroupRule;
 use super::map::{How, Map};
 use super::names::{Role, known, plain};
 use super::row::{Row, Table};
@@ -24,7 +23,6 @@ pub(super) struct Roles {
     pub(super) ids: Vec<Column>,
     pub(super) hint: Option<Column>,
     pub(super) family: Option<Column>,
-    pub(super) group: Option<GroupRule>,
     pub(super) evidence: Option<Column>,
     pub(super) split_options: Option<String>,
 }
@@ -103,7 +101,6 @@ impl Roles {
             ids: named(Role::Id)?,
             hint: named(Role::Hint)?.into_iter().next(),
             family: family(table, &named(Role::Family)?),
-            group: GroupRule::of(table, map)?,
             evidence,
             split_options: how.and_then(|entry| match &entry.how {
                 How::Split(signs) => Some(signs.clone()),
