@@ -8,7 +8,7 @@ use std::path::{self, Component, Path, PathBuf};
 use clap::Args;
 
 use crate::error::{Error, Result};
-use crate::types::{Decides, FrameId};
+use crate::types::{Decides, FrameId, shell_word};
 
 /// The flag for folders beside that of the data.
 #[derive(Debug, Clone, Default, Args)]
@@ -150,7 +150,7 @@ impl Root {
             "{:?} lies outside {}/, the folder of the data; --data-root {} allows the folder that it names",
             spelled.to_string_lossy(),
             name.to_string_lossy(),
-            parent.display()
+            shell_word(&parent.display().to_string())
         )
     }
 }

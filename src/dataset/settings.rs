@@ -12,7 +12,7 @@ use super::reading_rule::{ColourRule, MOST_PIXELS, ReadingRule, Transfer};
 use super::ready_made::{is_known_set, known_sets};
 use super::{DataPlace, SetArgs};
 use crate::rooms::Rooms;
-use crate::types::{Decides, Family};
+use crate::types::{Decides, Family, shell_word};
 
 /// The flag for the place of the data.
 #[derive(Debug, Clone, Args)]
@@ -117,8 +117,9 @@ pub(crate) fn place(text: &str) -> Result<DataPlace, String> {
             }),
             // A letter before a colon is a drive.
             Some((name, place)) if name.len() > 1 && PathBuf::from(place).exists() => Err(format!(
-                "no rules for a set named {name:?}; there are {}; other sets are read by the names of their columns: --data {place}",
-                known_sets().join(", ")
+                "no rules for a set named {name:?}; there are {}; other sets are read by the names of their columns: --data {}",
+                known_sets().join(", "),
+                shell_word(place)
             )),
             _ => Ok(DataPlace::Path(path)),
         },

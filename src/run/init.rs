@@ -16,7 +16,7 @@ use crate::job::questions::open_data;
 use crate::questions::rules::Rules;
 use crate::types::manifest::Status;
 use crate::types::question::letter;
-use crate::types::{Choices, Decides, Question};
+use crate::types::{Choices, Decides, Question, shell_word};
 
 /// The flags of `init`.
 #[derive(Debug, Args)]
@@ -106,14 +106,7 @@ pub(crate) fn init(args: &InitArgs, progress: &Progress) -> Result<Outcome> {
 
 /// The folder as words of a command, with the flag for images that lie outside it.
 fn words(folder: &Path, frames: Option<&Path>) -> String {
-    let quoted = |path: &Path| {
-        let text = path.display().to_string();
-        if text.contains([' ', '\'', '(', ')', '&', ';']) {
-            format!("'{}'", text.replace('\'', "'\\''"))
-        } else {
-            text
-        }
-    };
+    let quoted = |path: &Path| shell_word(&path.display().to_string()).into_owned();
     let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let outside = frames.filter(|frames| !real(frames).starts_with(real(folder)));
     let root = outside.map_or_else(String::new, |frames| {

@@ -1,6 +1,6 @@
 //! What the answers of a set mean: [`Reading`], and the one of all rows: [`one_reading`].
 
-use super::offered::Offered;
+use super::offered::{Offered, Origin};
 use crate::types::Choices;
 use crate::types::question::letter;
 
@@ -62,6 +62,18 @@ impl Reading {
     }
 }
 
+impl Reading {
+    /// The index of the choice that an answer means, where the user names no reading: numbers say nothing about options with letters
+    /// in the text of a question.
+    pub(super) fn by_rule(self, answer: &str, options: &Offered) -> Option<usize> {
+        let is_number = matches!(self, Self::Index0 | Self::Index1);
+        if is_number && options.origin == Origin::Question {
+            return None;
+        }
+        self.truth(answer, options)
+    }
+}
+
 /// A text without letter case, space around it and a full stop at its end.
 pub(super) fn folded(text: &str) -> String {
     let text = text.trim().trim_end_matches('.').trim_end();
@@ -93,7 +105,7 @@ pub(super) enum OneReading {
 pub(super) fn one_reading(rows: &[AnswerOf<'_>]) -> OneReading {
     let unfit = Reading::ALL.map(|reading| {
         let unfit =
-            (0..rows.len()).filter(|&row| reading.truth(rows[row].0, rows[row].1).is_none());
+            (0..rows.len()).filter(|&row| reading.by_rule(rows[row].0, rows[row].1).is_none());
         (reading, unfit.collect::<Vec<usize>>())
     });
     let fitting = unfit.iter().filter(|(_, unfit)| unfit.is_empty());
@@ -107,7 +119,7 @@ pub(super) fn one_reading(rows: &[AnswerOf<'_>]) -> OneReading {
     };
     for (row, (answer, options)) in rows.iter().enumerate() {
         let differs =
-            |other: &&Reading| other.truth(answer, options) != first.truth(answer, options);
+            |other: &&Reading| other.by_rule(answer, options) != first.by_rule(answer, options);
         if let Some(&other) = others.iter().find(differs) {
             let readings = [first, other];
             return OneReading::Ambiguous { readings, row };
@@ -161,6 +173,7 @@ mod tests {
         let offered = Offered {
             texts: vec!["red".to_owned(), "blue".to_owned()],
             places: vec![0, 2],
+            origin: Origin::Columns,
         };
         let read = |answer: &str| Reading::ALL.map(|reading| reading.truth(answer, &offered));
         assert_eq!(read("C"), [Some(1), None, None, None]);

@@ -2,11 +2,12 @@
 
 use super::images::{ImagesAre, RowImage, images, named_frames};
 use super::left_out::{LeftOut, Why};
-use super::lettered::in_question;
-use super::names::without_endings;
+use super::lettered::{Lettered, in_question};
+use super::map::flag;
+use super::names::{Role, without_endings};
 use super::offered::Offered;
 use super::options::Options;
-use super::roles::Roles;
+use super::roles::{InQuestion, Roles};
 use super::row::{Row, Table};
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -26,8 +27,23 @@ pub(super) struct Item {
     pub(super) row: usize,
     pub(super) image: RowImage,
     pub(super) text: String,
+    /// The text with the options in it, if they were found there.
+    pub(super) whole: Option<String>,
     /// The options; `None` if neither columns nor the question hold any.
     pub(super) options: Option<Offered>,
+}
+
+impl Item {
+    /// The question as it stands, without the options that were found in it.
+    pub(super) fn without_options(self) -> Self {
+        let text = self.whole.unwrap_or(self.text);
+        Self {
+            text,
+            whole: None,
+            options: None,
+            ..self
+        }
+    }
 }
 
 /// What is done about instructions at the end of questions.
@@ -69,10 +85,15 @@ pub(super) fn items(
             continue;
         };
         let item = match item(table, at, roles, ending, cut)? {
-            Ok((text, options)) => Item {
+            Ok(Parts {
+                text,
+                whole,
+                options,
+            }) => Item {
                 row: at,
                 image,
                 text,
+                whole,
                 options,
             },
             Err(problem) => {
@@ -85,16 +106,21 @@ pub(super) fn items(
     Ok(items)
 }
 
-/// The text and the options of a row; the inner error is the fault of a bad row.
-type Parts = Result<(String, Option<Offered>), String>;
+/// The text and the options of a row.
+struct Parts {
+    text: String,
+    whole: Option<String>,
+    options: Option<Offered>,
+}
 
+/// The parts of a row; the inner error is the fault of a bad row.
 fn item(
     table: &Table,
     at: usize,
     roles: &Roles,
     ending: Endings,
     cut: &mut Cut,
-) -> Result<Parts, String> {
+) -> Result<Result<Parts, String>, String> {
     let row = &table.rows[at];
     let Some(text) = roles.question.text(row) else {
         let column = &roles.question.name;
@@ -118,32 +144,39 @@ fn item(
         }
         rest.to_owned()
     };
-    let (text, options) = match Options::of(row, roles) {
-        Options::Found(options) => (without(&text), Some(options)),
+    let (text, whole, options) = match Options::of(row, roles) {
+        Options::Found(options) => (without(&text), None, Some(options)),
+        Options::None if roles.in_question == InQuestion::None => (without(&text), None, None),
         Options::None => {
             let text = without(&text);
             match in_question(&text) {
-                Some((question, options)) => (without(&question), Some(Offered::listed(options))),
-                None => (text, None),
+                Lettered::Found { question, options } => {
+                    let options = Offered::lettered(options);
+                    (without(&question), Some(text), Some(options))
+                }
+                Lettered::None => (text, None, None),
+                Lettered::Unclear(problem) => return Ok(Err(problem)),
             }
         }
         Options::Differ([one, other]) => {
             return Err(format!(
-                "{}: the options of {one:?} and {other:?} differ; --map options={one} or --map options={other} says which are meant",
-                table.place(at)
+                "{}: the options of {one:?} and {other:?} differ; {} or {} says which are meant",
+                table.place(at),
+                flag(Role::Options, &one, None),
+                flag(Role::Options, &other, None)
             ));
         }
-        Options::Unread { column, cell } => {
-            return Ok(Err(format!(
-                "the column {column:?} holds no list of options: {cell}; --map options='{column}:split(|)' names the signs between them"
-            )));
-        }
+        Options::Unread(problem) => return Ok(Err(problem)),
     };
     if text.is_empty() {
         return Ok(Err("nothing but options in the question".to_owned()));
     }
     let hint = roles.hint.as_ref().and_then(|hint| hint.text(row));
-    let text = hint.map_or_else(|| text.clone(), |hint| format!("{}\n{text}", hint.trim()));
+    let below = |text: String| match &hint {
+        Some(hint) => format!("{}\n{text}", hint.trim()),
+        None => text,
+    };
+    let (text, whole) = (below(text), whole.map(below));
     let is_long = |text: &String| text.len() > LONGEST_TEXT;
     if is_long(&text)
         || options
@@ -154,7 +187,11 @@ fn item(
         let problem = format!("a text of more than {} KB", LONGEST_TEXT >> 10);
         return Ok(Err(problem));
     }
-    Ok(Ok((text, options)))
+    Ok(Ok(Parts {
+        text,
+        whole,
+        options,
+    }))
 }
 
 /// The answer in a column of a row, as text; a list of one is that one.

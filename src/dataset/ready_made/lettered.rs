@@ -1,5 +1,11 @@
 //! Options with their letters in a text: [`in_question`], [`in_cell`], [`without_letters`].
 
+use std::sync::LazyLock;
+
+use regex::Regex;
+
+use super::cell::shortened;
+use super::names::without_endings;
 use crate::types::Choices;
 use crate::types::question::letter;
 
@@ -12,27 +18,127 @@ struct Mark {
     letter: char,
 }
 
-/// The question and the options of a text that ends with options: those of the last run of the marks A, B, … in order, at least two.
-/// A mark stands at the start, or after space, a comma, a semicolon or a colon.
-pub(super) fn in_question(text: &str) -> Option<(String, Vec<String>)> {
-    let marks = marks(text);
+/// What a question has of options with letters.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Lettered {
+    None,
+    /// The question, with what stands behind the options as its last line, and the options.
+    Found {
+        question: String,
+        options: Vec<String>,
+    },
+    /// It cannot be told where the options begin or end; in words.
+    Unclear(String),
+}
+
+/// Words of a sentence that says how to answer, by which it is told from an option.
+static INSTRUCTION: LazyLock<Option<Regex>> = LazyLock::new(|| {
+    Regex::new(concat!(
+        r"(?i)\b(?:please|answer (?:with|using|by|in|the|directly|only)|(?:select|choose|pick) (?:the|one|from|your)",
+        r"|(?:respond|reply) (?:with|in|by|only)|letter of the)\b"
+    ))
+    .ok()
+});
+
+/// The question and the options of a text that holds options: those of the last run of the marks A, B, … in order, at least two, whose
+/// options have a letter or a digit each. A mark stands at the start, or after space, a comma, a semicolon or a colon. The last option
+/// ends with its line, if the others stand on one line each; what follows belongs to the question.
+pub(super) fn in_question(text: &str) -> Lettered {
+    let (body, _) = without_endings(text);
+    let tail = text[body.len()..].trim();
+    let marks = marks(body);
+    let begins_line = |mark: &&Mark| {
+        let before = body[..mark.start].trim_end_matches([' ', '\t']);
+        before.is_empty() || before.ends_with('\n')
+    };
     let starts = (0..marks.len()).rev();
-    let mut starts = starts.filter(|&at| marks[at].letter == 'A');
-    let run = starts.find_map(|start| {
-        let run = run(&marks[start..]);
-        (run.len() > 1).then_some(run)
-    })?;
-    let options = texts(text, &run);
-    let head = text[..run[0].start].trim_end();
-    let head = ["options:", "option:", "choices:"]
-        .iter()
-        .find_map(|word| {
-            let cut = head.len().checked_sub(word.len())?;
-            let tail = head.get(cut..)?;
-            tail.eq_ignore_ascii_case(word).then(|| &head[..cut])
-        })
-        .unwrap_or(head);
-    Some((head.trim().to_owned(), options))
+    let runs = starts
+        .filter(|&at| marks[at].letter == 'A')
+        .map(|start| run(&marks[start..]))
+        .filter(|run| run.len() > 1);
+    let mut found = None;
+    for run in runs {
+        let (options, rest) = match split(body, &run) {
+            Ok(parts) => parts,
+            Err(problem) if found.is_none() => return Lettered::Unclear(problem),
+            Err(_) => continue,
+        };
+        let are_options = options
+            .iter()
+            .all(|option| option.contains(char::is_alphanumeric));
+        if !are_options {
+            continue;
+        }
+        let are_lines = run.iter().all(begins_line);
+        match &found {
+            None => {
+                found = Some((run[0].start, options, rest));
+                if are_lines {
+                    break;
+                }
+            }
+            Some(_) if are_lines => {
+                return Lettered::Unclear(
+                    "letters of options stand twice in the question, and it cannot be told which are meant; write the options in columns of their own".to_owned(),
+                );
+            }
+            Some(_) => {}
+        }
+    }
+    let Some((start, options, rest)) = found else {
+        return Lettered::None;
+    };
+    let parts = [head(&body[..start]), rest, tail];
+    let parts = parts.into_iter().filter(|part| !part.is_empty());
+    Lettered::Found {
+        question: parts.collect::<Vec<&str>>().join("\n"),
+        options,
+    }
+}
+
+/// The text before options, without the word that announces them.
+fn head(text: &str) -> &str {
+    let text = text.trim();
+    let words = ["options:", "option:", "choices:"];
+    let announced = words.iter().find_map(|word| {
+        let cut = text.len().checked_sub(word.len())?;
+        let tail = text.get(cut..)?;
+        tail.eq_ignore_ascii_case(word).then(|| text[..cut].trim())
+    });
+    announced.unwrap_or(text)
+}
+
+/// The options of a run, and the text behind the last one.
+fn split<'a>(text: &'a str, run: &[&Mark]) -> Result<(Vec<String>, &'a str), String> {
+    let mut options = texts(text, run);
+    let Some(last) = options.pop() else {
+        return Ok((options, ""));
+    };
+    let tells = |option: &String| {
+        INSTRUCTION
+            .as_ref()
+            .is_some_and(|words| words.is_match(option))
+    };
+    let unclear = || {
+        format!(
+            "it cannot be told where the last option ends: {:?}; write a line break behind it, or the options in columns of their own",
+            shortened(&last, 80)
+        )
+    };
+    let (only, rest) = match last.split_once('\n') {
+        None => (last.as_str(), ""),
+        Some((only, _)) if !options.iter().any(|option| option.contains('\n')) => {
+            let at = run.last().map_or(text.len(), |mark| mark.end + only.len());
+            (only, text[at..].trim())
+        }
+        Some(_) => return Err(unclear()),
+    };
+    if tells(&only.to_owned()) && !options.iter().any(tells) {
+        return Err(unclear());
+    }
+    let only = only.trim_end_matches(|c: char| c.is_whitespace() || c == ',' || c == ';');
+    options.push(only.to_owned());
+    Ok((options, rest))
 }
 
 /// The options of a cell that has nothing else, as `(a) Open (b) Closed`.
@@ -163,13 +269,32 @@ mod tests {
                 vec!["one", "two"],
             ),
             ("Which?\nChoices:\nA.1\nB.2", "Which?", vec!["1", "2"]),
+            (
+                "Which?\n(A) red\n(B) blue\nThink of it first.",
+                "Which?\nThink of it first.",
+                vec!["red", "blue"],
+            ),
+            (
+                "Which? (A) red (B) blue\nThink of it.\n\nAnswer with the letter.",
+                "Which?\nThink of it.\nAnswer with the letter.",
+                vec!["red", "blue"],
+            ),
+            (
+                "Which? (A) red (B) blue. Please answer yes or no.",
+                "Which?\nPlease answer yes or no.",
+                vec!["red", "blue."],
+            ),
+            (
+                "Which?\n(A) red\n(B) blue\nAnswer with (A) or (B).",
+                "Which?\nAnswer with (A) or (B).",
+                vec!["red", "blue"],
+            ),
         ] {
-            let found = in_question(text).unwrap();
-            assert_eq!(
-                (found.0.as_str(), found.1),
-                (question, options.iter().map(ToString::to_string).collect()),
-                "{text}"
-            );
+            let found = Lettered::Found {
+                question: question.to_owned(),
+                options: options.iter().map(ToString::to_string).collect(),
+            };
+            assert_eq!(in_question(text), found, "{text}");
         }
         for text in [
             "Which?",
@@ -177,8 +302,18 @@ mod tests {
             "Vitamin A. and no more",
             "B. one C. two",
             "e.g.A.x",
+            "Is person (A) left of person (B)?",
+            "Which? (A) (B)",
         ] {
-            assert_eq!(in_question(text), None, "{text}");
+            assert_eq!(in_question(text), Lettered::None, "{text}");
+        }
+        for text in [
+            "Which? (A) red (B) blue Answer with the right one.",
+            "Which?\nA. one\nof two\nB. three\nof four",
+            "Which?\nA. one\nB. two\nSay (A) or (B) only",
+        ] {
+            let found = in_question(text);
+            assert!(matches!(found, Lettered::Unclear(_)), "{text}: {found:?}");
         }
     }
 

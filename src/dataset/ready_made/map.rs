@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use super::answers::Reading;
 use super::names::Role;
+use crate::types::shell_word;
 
 /// The value of `--map`: roles and their columns.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -19,6 +20,8 @@ pub(super) struct Entry {
     pub(super) role: Role,
     /// A column, several (cells of options, images) or a template with `{Column}`; none turns the role off.
     pub(super) columns: Vec<String>,
+    /// The same names as one, which holds commas if there are several: a column of that name goes first.
+    pub(super) whole: String,
     pub(super) how: How,
 }
 
@@ -31,6 +34,20 @@ pub(super) enum How {
     Split(String),
     /// Answers by this reading.
     Answer(Reading),
+}
+
+/// A column for a role as a flag that a shell can read, with the reading of answers if one is named.
+pub(super) fn flag(role: Role, column: &str, reading: Option<Reading>) -> String {
+    let how = match reading {
+        Some(reading) => format!(":{}", reading.name()),
+        // What follows the last colon is how the column is read: here, by rule.
+        None if column.contains(':') && matches!(role, Role::Options | Role::Answer) => {
+            ":".to_owned()
+        }
+        None => String::new(),
+    };
+    let value = format!("{column}{how}");
+    format!("--map {}={}", role.name(), shell_word(&value))
 }
 
 impl Map {
@@ -103,6 +120,7 @@ fn entry(text: &str) -> Result<Entry, String> {
     let role = Role::ALL.into_iter().find(|role| role.name() == name);
     let role = role.ok_or_else(|| format!("no role {name:?}"))?;
     let (column, how) = match (role, value.rsplit_once(':')) {
+        (Role::Options | Role::Answer, Some((column, ""))) => (column, How::ByRule),
         (Role::Options, Some((column, how))) => {
             let signs = how
                 .strip_prefix("split(")
@@ -133,7 +151,12 @@ fn entry(text: &str) -> Result<Entry, String> {
     } else {
         vec![column.trim().to_owned()]
     };
-    Ok(Entry { role, columns, how })
+    Ok(Entry {
+        role,
+        columns,
+        whole: column.trim().to_owned(),
+        how,
+    })
 }
 
 #[cfg(test)]

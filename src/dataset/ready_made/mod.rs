@@ -10,6 +10,7 @@
 //!
 //! No code is for one set alone; what well-known sets need beyond these rules stands in `sets.toml`.
 
+mod answer_column;
 mod answers;
 mod cell;
 mod container;
@@ -283,8 +284,9 @@ fn image_hint(table: &Table, roles: &Roles, problem: String) -> String {
         .or(table.columns.first().map(String::as_str))
         .unwrap_or("id");
     format!(
-        "{problem}\n its columns:\n{}\n if files hold the images, say how they are named, e.g. --map image='images/{{{key}}}.jpg'",
-        roles::shown(table)
+        "{problem}\n its columns:\n{}\n if files hold the images, say how they are named, e.g. {}",
+        roles::shown(table),
+        map::flag(Role::Image, &format!("images/{{{key}}}.jpg"), None)
     )
 }
 

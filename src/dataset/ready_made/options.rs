@@ -2,10 +2,12 @@
 
 use super::cell::Cell;
 use super::lettered::{in_cell, without_letters};
-use super::offered::Offered;
+use super::offered::{Offered, Origin};
 use super::roles::{Column, Roles};
 use super::row::Row;
-use super::text_list::list;
+use super::text_list::{dict, list};
+use crate::types::question::letter;
+use crate::types::shell_word;
 
 /// What the columns of a row offer as options.
 #[derive(Debug, PartialEq, Eq)]
@@ -15,11 +17,8 @@ pub(super) enum Options {
     Found(Offered),
     /// Two columns differ.
     Differ([String; 2]),
-    /// A cell that is no list of options.
-    Unread {
-        column: String,
-        cell: String,
-    },
+    /// A cell that is no list of options, in words.
+    Unread(String),
 }
 
 impl Options {
@@ -31,25 +30,33 @@ impl Options {
         let (texts, places): (Vec<String>, Vec<usize>) = cells.unzip();
         if !texts.is_empty() {
             let texts = without_letters(texts);
-            found.push((cell_names(&roles.cells), Offered { texts, places }));
+            let origin = Origin::Columns;
+            let offered = Offered {
+                texts,
+                places,
+                origin,
+            };
+            found.push((cell_names(&roles.cells), offered));
         }
         for column in &roles.options {
             let cell = column.of(row);
             if cell.is_absent() {
                 continue;
             }
-            match options(cell, roles.split_options.as_deref()) {
-                Some(options) if options.is_empty() => {}
-                Some(options) => {
-                    let offered = Offered::listed(without_letters(options));
-                    found.push((column.name.clone(), offered));
-                }
-                None => {
-                    return Self::Unread {
-                        column: column.name.clone(),
-                        cell: cell.shown(60),
-                    };
-                }
+            let split = roles.split_options.as_deref();
+            let offered = match by_letter(cell).filter(|_| split.is_none()) {
+                Some(fields) => of_fields(&fields).map_err(|problem| {
+                    let shown = cell.shown(60);
+                    format!("the options in the column {:?} {problem}: {shown}", column.name)
+                }),
+                None => options(cell, split)
+                    .map(|texts| Offered::listed(without_letters(texts)))
+                    .ok_or_else(|| no_list(column, cell)),
+            };
+            match offered {
+                Ok(offered) if offered.texts.is_empty() => {}
+                Ok(offered) => found.push((column.name.clone(), offered)),
+                Err(problem) => return Self::Unread(problem),
             }
         }
         let mut found = found.into_iter();
@@ -61,6 +68,62 @@ impl Options {
             None => Self::Found(options),
         }
     }
+}
+
+fn no_list(column: &Column, cell: &Cell) -> String {
+    let split = format!("{}:split(|)", column.name);
+    format!(
+        "the column {:?} holds no list of options: {}; --map options={} names the signs between them",
+        column.name,
+        cell.shown(60),
+        shell_word(&split)
+    )
+}
+
+/// The fields of a cell that is an object, or the text of one in JSON or in Python's notation.
+fn by_letter(cell: &Cell) -> Option<Vec<(String, Cell)>> {
+    match cell {
+        Cell::Fields(fields) => Some(fields.clone()),
+        Cell::Text(text) => {
+            let pairs = dict(text)?.into_iter();
+            Some(pairs.map(|(name, text)| (name, text.map_or(Cell::Absent, Cell::Text))).collect())
+        }
+        _ => None,
+    }
+}
+
+/// The options of an object whose fields are the letters from A on, of either case.
+fn of_fields(fields: &[(String, Cell)]) -> Result<Offered, String> {
+    let mut sorted: Vec<(char, &Cell)> = Vec::with_capacity(fields.len());
+    for (name, cell) in fields {
+        let mut chars = name.trim().chars();
+        match (chars.next(), chars.next()) {
+            (Some(name), None) if name.is_ascii_alphabetic() => {
+                sorted.push((name.to_ascii_uppercase(), cell));
+            }
+            _ => return Err(format!("have the name {name:?}, where a letter is expected")),
+        }
+    }
+    sorted.sort_by_key(|(name, _)| *name);
+    for (place, (name, _)) in sorted.iter().enumerate() {
+        let expected = letter(place);
+        if *name != expected {
+            return Err(format!("have {name} where {expected} is expected"));
+        }
+    }
+    let mut offered = Offered::default();
+    for (place, (name, cell)) in sorted.into_iter().enumerate() {
+        match option(cell) {
+            Some(text) => {
+                offered.texts.push(text);
+                offered.places.push(place);
+            }
+            None if cell.is_absent() => {}
+            None => return Err(format!("hold no text at {name}")),
+        }
+    }
+    offered.texts = without_letters(offered.texts);
+    Ok(offered)
 }
 
 /// The names of the columns of options as `--map` takes them.

@@ -1,4 +1,4 @@
-//! A list of texts as Python prints it: [`python_list`].
+//! A list of texts and an object as Python prints them: [`python_list`], [`python_dict`].
 
 /// The texts of a list in Python's notation, as `['it\'s', "b", 3]`; `None` if the text is anything else. Nothing is evaluated.
 ///
@@ -20,6 +20,31 @@ pub(super) fn python_list(text: &str) -> Option<Vec<String>> {
         match rest.strip_prefix(',') {
             Some(more) => rest = more.trim_start(),
             None if rest.starts_with(']') => {}
+            None => return None,
+        }
+    }
+}
+
+/// The names and texts of an object in Python's notation, as `{'A': 'red', "B": 2}`; `None` is no text. Nothing is evaluated.
+pub(super) fn python_dict(text: &str) -> Option<Vec<(String, Option<String>)>> {
+    let mut rest = text.trim().strip_prefix('{')?.trim_start();
+    let mut fields = Vec::new();
+    loop {
+        if let Some(end) = rest.strip_prefix('}') {
+            return end.trim().is_empty().then_some(fields);
+        }
+        let quote = rest.chars().next().filter(|c| matches!(c, '\'' | '"'))?;
+        let (name, after) = quoted(&rest[1..], quote)?;
+        let after = after.trim_start().strip_prefix(':')?.trim_start();
+        let (value, after) = match after.chars().next()? {
+            quote @ ('\'' | '"') => quoted(&after[1..], quote).map(|(value, end)| (Some(value), end))?,
+            _ => bare(after).map(|(value, end)| ((value != "None").then_some(value), end))?,
+        };
+        fields.push((name, value));
+        rest = after.trim_start();
+        match rest.strip_prefix(',') {
+            Some(more) => rest = more.trim_start(),
+            None if rest.starts_with('}') => {}
             None => return None,
         }
     }
@@ -60,7 +85,7 @@ fn escaped(chars: &mut std::str::CharIndices<'_>) -> Option<char> {
 
 /// A number or a word of Python, and what follows it.
 fn bare(text: &str) -> Option<(String, &str)> {
-    let (item, rest) = text.split_at(text.find([',', ']'])?);
+    let (item, rest) = text.split_at(text.find([',', ']', '}'])?);
     let item = item.trim();
     let is_known = matches!(item, "True" | "False" | "None") || item.parse::<f64>().is_ok();
     is_known.then(|| (item.to_owned(), rest))
@@ -83,6 +108,14 @@ mod tests {
             ("[]", vec![]),
         ] {
             assert_eq!(python_list(text).unwrap(), items, "{text}");
+        }
+        let pair = |name: &str, text: Option<&str>| (name.to_owned(), text.map(str::to_owned));
+        assert_eq!(
+            python_dict(r#"{'A': 'it\'s', "B": 2, 'C': None}"#).unwrap(),
+            [pair("A", Some("it's")), pair("B", Some("2")), pair("C", None)]
+        );
+        for text in ["{'a'}", "{'a': }", "{a: 'b'}", "{'a': open('x')}", "{'a': 'b'"] {
+            assert_eq!(python_dict(text), None, "{text}");
         }
         for text in [
             "['a'",

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::cell::Cell;
-use super::map::{How, Map};
+use super::map::{How, Map, flag};
 use super::names::{Role, known, plain};
 use super::row::{Row, Table};
 use crate::types::Choices;
@@ -25,6 +25,15 @@ pub(super) struct Roles {
     pub(super) family: Option<Column>,
     pub(super) evidence: Option<Column>,
     pub(super) split_options: Option<String>,
+    pub(super) in_question: InQuestion,
+}
+
+/// Whether options are looked for in the text of a question whose columns have none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum InQuestion {
+    Searched,
+    /// The user says that there are no options.
+    None,
 }
 
 /// Where the images of a row stand.
@@ -85,7 +94,7 @@ impl Roles {
             ))?;
         let how = map.of(Role::Options);
         let mut options = named(Role::Options)?;
-        let is_of_cells = how.is_some_and(|entry| entry.columns.len() > 1);
+        let is_of_cells = how.is_some() && options.len() > 1;
         let cells = match how {
             Some(_) if is_of_cells => std::mem::take(&mut options),
             Some(_) => Vec::new(),
@@ -102,6 +111,10 @@ impl Roles {
             hint: named(Role::Hint)?.into_iter().next(),
             family: family(table, &named(Role::Family)?),
             evidence,
+            in_question: match how {
+                Some(entry) if entry.columns.is_empty() => InQuestion::None,
+                _ => InQuestion::Searched,
+            },
             split_options: how.and_then(|entry| match &entry.how {
                 How::Split(signs) => Some(signs.clone()),
                 How::ByRule | How::Answer(_) => None,
@@ -112,6 +125,13 @@ impl Roles {
     /// The columns of a role: those of the map, or those with one of its names, the best first.
     fn named(table: &Table, map: &Map, role: Role) -> Result<Vec<Column>, String> {
         if let Some(entry) = map.of(role) {
+            if entry.columns.len() > 1
+                && let Some(at) = table.find(&entry.whole)
+            {
+                let name = entry.whole.clone();
+                let field = None;
+                return Ok(vec![Column { at, field, name }]);
+            }
             let columns = entry.columns.iter();
             return columns.map(|name| column(table, name)).collect();
         }
@@ -139,7 +159,7 @@ impl Roles {
             return Ok(Images::Template(template.clone()));
         }
         let columns = Self::named(table, map, Role::Image)?;
-        if entry.is_some_and(|entry| entry.columns.len() > 1) {
+        if entry.is_some() && columns.len() > 1 {
             return Ok(Images::All(columns));
         }
         let numbered = numbered(table, &["image", "img"]);
@@ -271,9 +291,9 @@ fn refuse_wide(table: &Table, map: &Map) -> Result<(), String> {
     }
     let names: Vec<&str> = wide.iter().map(|column| column.name.as_str()).collect();
     Err(format!(
-        "several questions a row, in the columns {}; one question a row is read: write a row for each, or take the ones in a column with --map question={}",
+        "several questions a row, in the columns {}; one question a row is read: write a row for each, or take the ones in a column with {}",
         names.join(", "),
-        names[0]
+        flag(Role::Question, names[0], None)
     ))
 }
 

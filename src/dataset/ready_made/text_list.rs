@@ -1,8 +1,8 @@
-//! A list in a text: [`list`].
+//! A list or an object in a text: [`list`], [`dict`].
 
 use serde_json::Value;
 
-use super::python_list::python_list;
+use super::python_list::{python_dict, python_list};
 
 /// The texts of a list in a text: JSON, then Python's notation; `None` if the text is no list of texts and numbers.
 pub(super) fn list(text: &str) -> Option<Vec<String>> {
@@ -13,6 +13,25 @@ pub(super) fn list(text: &str) -> Option<Vec<String>> {
     let items = serde_json::from_str::<Vec<Value>>(text).ok();
     let texts = items.and_then(|items| items.iter().map(item).collect());
     texts.or_else(|| python_list(text))
+}
+
+/// The names and the texts of an object in a text: JSON, then Python's notation; `None` if the text is no object of texts and numbers.
+pub(super) fn dict(text: &str) -> Option<Vec<(String, Option<String>)>> {
+    let text = text.trim();
+    if !text.starts_with('{') {
+        return None;
+    }
+    let fields = serde_json::from_str::<serde_json::Map<String, Value>>(text).ok();
+    let texts = fields.and_then(|fields| {
+        let fields = fields.iter();
+        fields
+            .map(|(name, value)| match value {
+                Value::Null => Some((name.clone(), None)),
+                value => Some((name.clone(), Some(item(value)?))),
+            })
+            .collect()
+    });
+    texts.or_else(|| python_dict(text))
 }
 
 fn item(value: &Value) -> Option<String> {

@@ -1,12 +1,14 @@
 //! The true option of each question of a set: [`Truths`].
 
+use super::answer_column;
 use super::answers::{
     AnswerOf, OneReading, Reading, asks_yes_or_no, digit, one_reading, yes_or_no,
 };
 use super::cell::{Cell, shortened};
 use super::items::{AnswerCell, Item};
 use super::left_out::{LeftOut, Why};
-use super::map::How;
+use super::map::{How, flag};
+use super::names::Role;
 use super::offered::Offered;
 use super::roles::{Column, Roles};
 use super::row::Table;
@@ -58,8 +60,14 @@ pub(super) fn truths(
             super::roles::shown(table)
         ));
     }
-    let (listed, bare): (Vec<Item>, Vec<Item>) =
-        items.into_iter().partition(|item| item.options.is_some());
+    let items = items.into_iter().map(|item| {
+        if names_no_options(table, roles, &item) {
+            item.without_options()
+        } else {
+            item
+        }
+    });
+    let (listed, bare): (Vec<Item>, Vec<Item>) = items.partition(|item| item.options.is_some());
     let mut truths = Truths {
         answered: Vec::new(),
         said: Vec::new(),
@@ -68,6 +76,28 @@ pub(super) fn truths(
     of_yes_or_no(table, roles, bare, left, &mut truths)?;
     truths.answered.sort_by_key(|answered| answered.item.row);
     Ok(truths)
+}
+
+/// Whether the letters in a question name things in the image and no options, because its answer is yes or no and none of them.
+fn names_no_options(table: &Table, roles: &Roles, item: &Item) -> bool {
+    let Some(options) = item.options.as_ref().filter(|_| item.whole.is_some()) else {
+        return false;
+    };
+    let answers: Vec<String> = roles
+        .answers
+        .iter()
+        .filter_map(|column| match AnswerCell::of(&table.rows[item.row], column) {
+            AnswerCell::One(answer) => Some(answer),
+            AnswerCell::Absent | AnswerCell::Several(_) => None,
+        })
+        .collect();
+    let is_option = |answer: &String| {
+        let readings = [Reading::Letter, Reading::Text];
+        readings
+            .iter()
+            .any(|reading| reading.truth(answer, options).is_some())
+    };
+    answers.iter().any(|answer| yes_or_no(answer).is_some()) && !answers.iter().any(is_option)
 }
 
 /// Whether the lines are of this program's own form, in which the answer is the text of a choice.
@@ -141,14 +171,18 @@ fn of_options(
     if items.is_empty() {
         return Ok(());
     }
-    let column = column_of_options(table, roles, &items)?;
+    let column = answer_column::of_options(table, roles, &items)?;
     let items = with_answers(table, column, items, left)?;
     let none = Offered::default();
     let rows: Vec<AnswerOf<'_>> = items
         .iter()
         .map(|(item, answer)| (answer.as_str(), item.options.as_ref().unwrap_or(&none)))
         .collect();
-    let is_read = |reading: Reading, row: usize| reading.truth(rows[row].0, rows[row].1).is_some();
+    let read_as = |reading: Reading, (answer, options): AnswerOf<'_>| match how {
+        How::Answer(_) => reading.truth(answer, options),
+        How::ByRule | How::Split(_) => reading.by_rule(answer, options),
+    };
+    let is_read = |reading: Reading, row: usize| read_as(reading, rows[row]).is_some();
     let fits = |reading: Reading| (0..rows.len()).all(|row| is_read(reading, row));
     let (reading, unfit) = match how {
         How::Answer(reading) => {
@@ -192,7 +226,7 @@ fn of_options(
     for (item, answer) in items {
         let options = item.options.clone().unwrap_or_default();
         let texts = &options.texts;
-        let choices = match reading.truth(&answer, &options) {
+        let choices = match read_as(reading, (&answer, &options)) {
             Some(truth) => Choices::new(texts.clone(), truth).map_err(|e| e.to_string()),
             None => Err(format!(
                 "the answer {answer:?} is none of the options {texts:?} (read as {}, which fits {fit} rows)",
@@ -216,71 +250,13 @@ fn ambiguous(
     column: &Column,
 ) -> String {
     let [one, other] = readings.map(Reading::name);
+    let [first, second] =
+        readings.map(|reading| flag(Role::Answer, &column.name, Some(reading)));
     format!(
-        "{}: the answer {answer:?} may be read as {one} or as {other}, which differ among the options {:?}; --map answer={q}{name}:{one}{q} or --map answer={q}{name}:{other}{q} says which is meant",
+        "{}: the answer {answer:?} may be read as {one} or as {other}, which differ among the options {:?}; {first} or {second} says which is meant",
         table.place(item.row),
         options.texts,
-        name = column.name,
-        q = if column.name.contains(' ') { "'" } else { "" },
     )
-}
-
-/// The column of answers that are read against options: the only one, or the first of those that say the same in every row.
-fn column_of_options<'a>(
-    table: &Table,
-    roles: &'a Roles,
-    items: &[Item],
-) -> Result<&'a Column, String> {
-    let fitting = roles.answers.iter().filter_map(|column| {
-        let answers: Option<Vec<(String, &Offered)>> = items
-            .iter()
-            .map(|item| match AnswerCell::of(&table.rows[item.row], column) {
-                AnswerCell::One(answer) => Some((answer, item.options.as_ref()?)),
-                AnswerCell::Absent | AnswerCell::Several(_) => None,
-            })
-            .collect();
-        let answers = answers?;
-        let rows: Vec<AnswerOf<'_>> = answers
-            .iter()
-            .map(|(answer, options)| (answer.as_str(), *options))
-            .collect();
-        match one_reading(&rows) {
-            OneReading::Fits(reading) => {
-                let truths = rows
-                    .iter()
-                    .map(|(answer, options)| reading.truth(answer, options));
-                Some((column, truths.collect::<Vec<_>>()))
-            }
-            OneReading::None { .. } | OneReading::Ambiguous { .. } => None,
-        }
-    });
-    one_of(table, fitting, |at| items[at].row, &roles.answers[0])
-}
-
-/// The first of some columns, if all say the same in every row; `otherwise` if there are none.
-fn one_of<'a, T: PartialEq>(
-    table: &Table,
-    columns: impl Iterator<Item = (&'a Column, Vec<T>)>,
-    row: impl Fn(usize) -> usize,
-    otherwise: &'a Column,
-) -> Result<&'a Column, String> {
-    let mut columns = columns;
-    let Some((first, truths)) = columns.next() else {
-        return Ok(otherwise);
-    };
-    for (other, others) in columns {
-        if let Some(at) = (0..truths.len()).find(|&at| truths[at] != others[at]) {
-            return Err(format!(
-                "{}: the answers of {:?} and {:?} differ; --map answer={} or --map answer={} says which is meant",
-                table.place(row(at)),
-                first.name,
-                other.name,
-                first.name,
-                other.name
-            ));
-        }
-    }
-    Ok(first)
 }
 
 /// The questions without options: of yes and no, or open.
@@ -294,18 +270,7 @@ fn of_yes_or_no(
     if items.is_empty() {
         return Ok(());
     }
-    let of = |column: &Column, item: &Item| match AnswerCell::of(&table.rows[item.row], column) {
-        AnswerCell::One(answer) => Some(answer),
-        AnswerCell::Absent | AnswerCell::Several(_) => None,
-    };
-    let fitting = roles.answers.iter().filter_map(|column| {
-        let words: Option<Vec<usize>> = items
-            .iter()
-            .map(|item| of(column, item).and_then(|answer| yes_or_no(&answer)))
-            .collect();
-        words.map(|words| (column, words))
-    });
-    let column = one_of(table, fitting, |at| items[at].row, &roles.answers[0])?;
+    let column = answer_column::of_words(table, roles, &items)?;
     let items = with_answers(table, column, items, left)?;
     let verbs = items
         .iter()

@@ -11,6 +11,7 @@ use super::tree::Tree;
 use super::{READ, ending, splits};
 use crate::dataset::ready_made::settings::SetArgs;
 use crate::error::{Error, Result};
+use crate::types::shell_word;
 
 /// The card of a repository.
 const CARD: &str = "README.md";
@@ -202,7 +203,7 @@ fn one_kind(tree: &Tree, files: Vec<PathBuf>) -> Result<Vec<PathBuf>> {
     let problem = format!(
         "files of several kinds, {}; name the one that is meant: --data {}",
         names.join(", "),
-        tree.whole(&files[0]).display()
+        shell_word(&tree.whole(&files[0]).display().to_string())
     );
     Err(Error::data(tree.place().display(), problem))
 }

@@ -11,6 +11,7 @@ use super::super::cell::Cell;
 use super::super::row::{RowPlace, Table};
 use super::json_scan::{Found, JsonScan, Kind, LONGEST_ROW};
 use crate::error::{Error, Result};
+use crate::types::shell_word;
 
 type Scan = JsonScan<BufReader<File>>;
 
@@ -187,9 +188,10 @@ fn rows_by_id(path: &Path, table: &mut Table) -> Result<(), String> {
     };
     let names: Vec<&str> = lists.iter().map(|(name, _)| name.as_str()).collect();
     Err(format!(
-        "an object with the lists {}; {name:?} has the columns {}; say where the rows are: --rows {name}, and which column is which if these are no common names: --map question=…,image=…,options=…,answer=…",
+        "an object with the lists {}; {name:?} has the columns {}; say where the rows are: --rows {}, and which column is which if these are no common names: --map question=…,image=…,options=…,answer=…",
         names.join(", "),
-        columns.join(", ")
+        columns.join(", "),
+        shell_word(name)
     ))
 }
 

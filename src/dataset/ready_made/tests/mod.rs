@@ -2,8 +2,10 @@
 
 mod broken;
 mod fixture;
+mod columns;
 mod gaps;
 mod groups;
+mod marks;
 mod refusals;
 mod shapes;
 
