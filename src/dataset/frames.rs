@@ -13,7 +13,7 @@
 //!   `dark` for photographs that were taken in the dark.
 //! - `scenes/<scene>/segments.json`: the segments that have names, `{"7": {"name", "canonical", "region"}}`.
 //!
-//! Without the list, every PNG, JPEG, WebP and TIFF file in the folder is a frame, named by its file name. The questions are in
+//! Without the list, every PNG, JPEG, WebP, TIFF and BMP file in the folder is a frame, named by its file name. The questions are in
 //! `questions.jsonl` in the same folder.
 
 use std::collections::BTreeMap;

@@ -29,7 +29,7 @@ use crate::types::{
     Codes16, ColourHandling, ColourNote, DepthNote, Digest, InputNote, Light, Pixels, Rgb,
 };
 
-/// A PNG, JPEG, WebP, TIFF or OpenEXR file that is not decoded.
+/// A PNG, JPEG, WebP, TIFF, BMP or OpenEXR file that is not decoded.
 #[derive(Debug)]
 pub struct ImageFile {
     bytes: Vec<u8>,

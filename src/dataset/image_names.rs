@@ -6,10 +6,10 @@ use super::image_file::format::READ;
 use crate::types::frame::is_image_ending;
 
 /// Endings of the names of images in formats that are not read.
-const UNREAD: [&str; 29] = [
-    "heic", "heif", "hif", "avif", "gif", "bmp", "jxl", "jp2", "j2k", "jpf", "psd", "tga", "ico",
-    "ppm", "pgm", "pnm", "pfm", "hdr", "dng", "cr2", "cr3", "nef", "arw", "orf", "raf", "rw2",
-    "pef", "srw", "svg",
+const UNREAD: [&str; 28] = [
+    "heic", "heif", "hif", "avif", "gif", "jxl", "jp2", "j2k", "jpf", "psd", "tga", "ico", "ppm",
+    "pgm", "pnm", "pfm", "hdr", "dng", "cr2", "cr3", "nef", "arw", "orf", "raf", "rw2", "pef",
+    "srw", "svg",
 ];
 
 /// The image files among some paths, and those that look like images in formats that are not read.
@@ -89,7 +89,7 @@ mod tests {
         assert_eq!(images, ["a.PNG", "b.webp", "c.tiff"]);
         assert_eq!(
             names.unread().unwrap(),
-            "2 files look like images and are not read, as d.HEIC; PNG, JPEG, WebP, TIFF or OpenEXR expected, so convert them first"
+            "2 files look like images and are not read, as d.HEIC; PNG, JPEG, WebP, TIFF, BMP or OpenEXR expected, so convert them first"
         );
         assert_eq!(ImageNames::of([folder.path().join("f.txt")]).unread(), None);
     }

@@ -36,7 +36,8 @@ impl fmt::Display for FrameId {
 }
 
 /// The endings of the names of image files that are read, in lower case.
-pub(crate) const IMAGE_ENDINGS: [&str; 7] = ["png", "jpg", "jpeg", "webp", "tif", "tiff", "exr"];
+pub(crate) const IMAGE_ENDINGS: [&str; 8] =
+    ["png", "jpg", "jpeg", "webp", "tif", "tiff", "bmp", "exr"];
 
 /// Whether the ending of a name is that of an image file that is read, in any case of its letters.
 pub(crate) fn is_image_ending(ending: &str) -> bool {

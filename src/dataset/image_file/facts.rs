@@ -93,6 +93,7 @@ impl<'a> FileFacts<'a> {
                     depth: deep(outline.bits),
                 }
             }
+            FileFormat::Bmp => Self::NONE,
             FileFormat::OpenExr => {
                 let opened = guarded(|| ExrFile::open(file, &ReadingRule::UNBOUNDED)).ok();
                 let layers = opened.as_ref().map_or(0, |file| file.layers);
@@ -145,6 +146,12 @@ pub(super) fn fault(file: &[u8], format: FileFormat) -> Option<String> {
         FileFormat::Tiff => {
             let end = TiffOutline::of(file).end;
             (end > file.len() as u64).then(|| short(end))
+        }
+        FileFormat::Bmp => {
+            // The length of the file stands behind its mark; some programs leave it at 0.
+            let length = file.get(2..6).and_then(|bytes| bytes.try_into().ok());
+            let length = u64::from(length.map_or(0, u32::from_le_bytes));
+            (length > file.len() as u64).then(|| short(length))
         }
         // Its reader names what is missing.
         FileFormat::OpenExr => None,

@@ -9,18 +9,19 @@ pub(in crate::dataset) enum FileFormat {
     Jpeg,
     WebP,
     Tiff,
+    Bmp,
     OpenExr,
 }
 
 /// The names of the formats that are read, for messages.
-pub(in crate::dataset) const READ: &str = "PNG, JPEG, WebP, TIFF or OpenEXR";
+pub(in crate::dataset) const READ: &str = "PNG, JPEG, WebP, TIFF, BMP or OpenEXR";
 
 /// What to do with images of formats that are not read.
 const CONVERT: &str = "convert it to PNG, TIFF or JPEG first";
 const DEVELOP: &str = "develop it to a 16-bit TIFF or PNG first";
 
 /// Formats that are not read: where their mark stands in the file, the mark, the name, and what to do.
-const UNREAD: [(usize, &[u8], &str, &str); 24] = [
+const UNREAD: [(usize, &[u8], &str, &str); 23] = [
     (4, b"ftypavif", "an AVIF image", CONVERT),
     (4, b"ftypavis", "an AVIF image sequence", CONVERT),
     (4, b"ftypheic", HEIC, CONVERT),
@@ -42,7 +43,6 @@ const UNREAD: [(usize, &[u8], &str, &str); 24] = [
     (4, b"jP  \r\n", "a JPEG 2000 image", CONVERT),
     (0, b"\xFF\x4F\xFF\x51", "a JPEG 2000 image", CONVERT),
     (0, b"GIF8", "a GIF image", CONVERT),
-    (0, b"BM", "a BMP image", CONVERT),
     (0, b"8BPS", "a Photoshop file", CONVERT),
     (8, b"CR\x02", "a camera's RAW file (CR2)", DEVELOP),
     (0, b"IIRO", "a camera's RAW file (ORF)", DEVELOP),
@@ -65,7 +65,7 @@ impl FileFormat {
         if let Some((.., name, remedy)) = UNREAD.iter().find(|(at, mark, ..)| has(*at, mark)) {
             return Err(format!("{name}, which is not read; {remedy}"));
         }
-        let marks: [(&[u8], Self); 7] = [
+        let marks: [(&[u8], Self); 8] = [
             (super::png_chunks::SIGNATURE, Self::Png),
             (b"\xFF\xD8\xFF", Self::Jpeg),
             (super::exr_layers::SIGNATURE, Self::OpenExr),
@@ -73,6 +73,7 @@ impl FileFormat {
             (b"MM\0*", Self::Tiff),
             (b"II+\0", Self::Tiff),
             (b"MM\0+", Self::Tiff),
+            (b"BM", Self::Bmp),
         ];
         if has(0, b"RIFF") && has(8, b"WEBP") {
             return Ok(Self::WebP);
@@ -90,6 +91,7 @@ impl FileFormat {
             Self::Jpeg => Some(ImageFormat::Jpeg),
             Self::WebP => Some(ImageFormat::WebP),
             Self::Tiff => Some(ImageFormat::Tiff),
+            Self::Bmp => Some(ImageFormat::Bmp),
             Self::OpenExr => None,
         }
     }
@@ -101,6 +103,7 @@ impl FileFormat {
             Self::Jpeg => "JPEG",
             Self::WebP => "WebP",
             Self::Tiff => "TIFF",
+            Self::Bmp => "BMP",
             Self::OpenExr => "OpenEXR",
         }
     }
@@ -112,6 +115,7 @@ impl FileFormat {
             Self::Jpeg => "jpg",
             Self::WebP => "webp",
             Self::Tiff => "tif",
+            Self::Bmp => "bmp",
             Self::OpenExr => "exr",
         }
     }
@@ -127,6 +131,7 @@ mod tests {
         assert_eq!(of(b"\xFF\xD8\xFF\xE0"), Ok(FileFormat::Jpeg));
         assert_eq!(of(b"RIFF\x10\0\0\0WEBPVP8 "), Ok(FileFormat::WebP));
         assert_eq!(of(b"MM\0*\0\0\0\x08"), Ok(FileFormat::Tiff));
+        assert_eq!(of(b"BM\x36\0\0\0"), Ok(FileFormat::Bmp));
         for (file, says) in [
             (
                 &b"\0\0\0\x18ftypheic\0\0\0\0"[..],
@@ -144,7 +149,7 @@ mod tests {
             (b"GIF89a", "GIF"),
             (
                 b"RIFF\x10\0\0\0WAVE",
-                "not an image: PNG, JPEG, WebP, TIFF or OpenEXR expected",
+                "not an image: PNG, JPEG, WebP, TIFF, BMP or OpenEXR expected",
             ),
             (b"", "not an image"),
             (b"ab", "not an image"),

@@ -24,9 +24,16 @@ pub(super) struct Ids {
     /// The column, or that they follow from the content.
     name: String,
     note: Option<String>,
+    /// The places of two questions that differ in their answers alone.
+    contradictory: Vec<[usize; 2]>,
 }
 
 impl Ids {
+    /// The pairs of questions that differ in their answers alone, by their places.
+    pub(super) fn contradictory(&self) -> &[[usize; 2]] {
+        &self.contradictory
+    }
+
     pub(super) fn id(&self, question: usize) -> QuestionId {
         QuestionId(self.texts[question].clone())
     }
@@ -41,6 +48,9 @@ impl Ids {
         self.note.clone()
     }
 }
+
+/// Ids by content, the number of repeats, and the pairs that differ in their answers alone.
+type ContentIds = (Vec<String>, usize, Vec<[usize; 2]>);
 
 /// The image of a question, found.
 enum Found {
@@ -196,7 +206,7 @@ impl<'a> Frames<'a> {
     fn file(&self, row: usize, path: &str) -> Result<Found, String> {
         let file = &self.table.files[self.table.rows[row].file];
         if let (Some(archive), Some(inner)) = (self.archive, &file.inner) {
-            return archive.find(inner, path).map(Found::Member);
+            return member(archive, inner, path).map(Found::Member);
         }
         let table = &file.path;
         let base = table.parent().unwrap_or(Path::new(""));
@@ -278,10 +288,11 @@ impl<'a> Frames<'a> {
                     texts,
                     name,
                     note: None,
+                    contradictory: Vec::new(),
                 });
             }
         }
-        let (texts, repeats) = self.ids_by_content(answered)?;
+        let (texts, repeats, contradictory) = self.ids_by_content(answered)?;
         let name = match &*self.roles.ids {
             [] => "content".to_owned(),
             [column, ..] => format!("content ({} does not tell all rows apart)", column.name),
@@ -289,17 +300,23 @@ impl<'a> Frames<'a> {
         let note = (repeats > 0).then(|| {
             format!("{repeats} questions repeat an earlier one, with its image and options; each is asked again")
         });
-        Ok(Ids { texts, name, note })
+        Ok(Ids {
+            texts,
+            name,
+            note,
+            contradictory,
+        })
     }
 
     /// The first 12 hexadecimal digits of a digest over image, question and options. The k-th repeat gets `-k`. So an id depends
     /// neither on the order of rows nor on the name of a file.
-    fn ids_by_content(&self, answered: &[Answered]) -> Result<(Vec<String>, usize)> {
+    fn ids_by_content(&self, answered: &[Answered]) -> Result<ContentIds> {
         let mut files: HashMap<FrameId, Digest> = HashMap::new();
-        let (mut seen, mut repeats): (HashMap<String, usize>, usize) = (HashMap::new(), 0);
+        let mut seen: HashMap<String, (usize, usize)> = HashMap::new();
+        let (mut repeats, mut contradictory) = (0, Vec::new());
         let mut texts = Vec::with_capacity(answered.len());
-        for answered in answered {
-            let image = match self.find(answered)? {
+        for (at, question) in answered.iter().enumerate() {
+            let image = match self.find(question)? {
                 Found::Cell { facts, .. } => facts.digest,
                 Found::Frame(name) => Digest::of(name.0.as_bytes()),
                 Found::Member(name) => {
@@ -315,11 +332,14 @@ impl<'a> Frames<'a> {
                     files[&name]
                 }
             };
-            let options = answered.choices.texts().iter().map(String::as_bytes);
-            let parts = [image.as_bytes(), answered.item.text.as_bytes()];
+            let options = question.choices.texts().iter().map(String::as_bytes);
+            let parts = [image.as_bytes(), question.item.text.as_bytes()];
             let digest = Digest::of_parts(parts.into_iter().chain(options));
             let id = digest.to_string()[..12].to_owned();
-            let count = seen.entry(id.clone()).or_default();
+            let (first, count) = seen.entry(id.clone()).or_insert((at, 0));
+            if answered[*first].choices.truth() != question.choices.truth() {
+                contradictory.push([*first, at]);
+            }
             texts.push(match *count {
                 0 => id,
                 earlier => format!("{id}-{earlier}"),
@@ -327,7 +347,25 @@ impl<'a> Frames<'a> {
             repeats += usize::from(*count > 0);
             *count += 1;
         }
-        Ok((texts, repeats))
+        Ok((texts, repeats, contradictory))
+    }
+}
+
+/// The file of an archive that a row names: below the folder of its table, or from the top.
+///
+/// # Errors
+/// If there is none, or both are there.
+fn member(archive: &Archive, folder: &Path, path: &str) -> Result<FrameId, String> {
+    let top = archive.find(Path::new(""), path);
+    match (archive.find(folder, path), top) {
+        (Ok(near), Ok(top)) if near != top => Err(format!(
+            "{path:?} may be {:?} or {:?} in {}; write the one that is meant as it stands from the top, and remove or rename the other",
+            near.0,
+            top.0,
+            archive.path().display()
+        )),
+        (Err(_), Ok(top)) => Ok(top),
+        (near, _) => near,
     }
 }
 

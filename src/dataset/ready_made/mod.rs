@@ -14,6 +14,7 @@ mod answer_column;
 mod answers;
 mod cell;
 mod container;
+mod family_column;
 mod frames;
 mod groups;
 mod images;
@@ -34,7 +35,7 @@ mod summary;
 mod text_list;
 mod truths;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -50,6 +51,7 @@ pub(super) use preset::{is_known as is_known_set, names as known_sets};
 pub use settings::SetArgs;
 
 use container::{FoundFiles, SetFile};
+use family_column::FamilyOf;
 use frames::Frames;
 use groups::{GroupRule, Groups};
 use images::ImagesAre;
@@ -78,7 +80,7 @@ pub(super) fn open(place: &Path, stem: &str, args: &SetArgs) -> Result<ReadySet>
         notes,
     } = found;
     let info = match &archive {
-        Some(_) => FolderInfo::default(),
+        Some(archive) => FolderInfo::in_archive(archive)?,
         None => FolderInfo::of(&folder)?,
     };
     let mut further = args.root.data_root.clone();
@@ -96,18 +98,26 @@ pub(super) fn open(place: &Path, stem: &str, args: &SetArgs) -> Result<ReadySet>
         let hint = hint.map_or_else(String::new, |hint| format!("\n {hint}"));
         Error::data(place.display(), format_args!("{problem}{hint}"))
     };
-    let set = read(&table, &map, args, preset, ImagesAre::Files)
+    let (roles, set) = read(&table, &map, args, preset, ImagesAre::Files)
         .map_err(|problem| wrong(&table, problem))?;
     let name = match &*info.name {
         "" => stem.to_owned(),
         name => name.to_owned(),
     };
-    let frames = Frames::new(&table, &root, archive.as_ref(), &files, &set.roles);
+    let frames = Frames::new(&table, &root, archive.as_ref(), &files, &roles);
     let mut notes = notes;
+    notes.append(&mut table.notes.clone());
     notes.extend(preset.map(preset::Preset::source));
     notes.extend(no_group.filter(|_| map.of(Role::Group).is_none()));
     let hint = preset::recognised(&table.columns, args.preset.as_deref());
-    let asked = finish(&name, &table, &set, frames, notes, hint)?;
+    let opened = Opened {
+        place,
+        name: &name,
+        table: &table,
+        roles: &roles,
+        args,
+    };
+    let asked = finish(&opened, set, frames, notes, hint)?;
     Ok(ReadySet {
         reading: asked.reading,
         form: if is_own(&table) {
@@ -155,14 +165,24 @@ pub(super) fn about_frames(file: &Path, args: &SetArgs) -> Result<ReadQuestions>
     let mut table = Table::default();
     SetFile::open(file.to_owned(), String::new())?.read(args.rows.as_deref(), &mut table)?;
     let own: Option<Map> = table.find("frame").and_then(|_| "image=frame".parse().ok());
-    let map = Map::joined(own.iter().chain(&args.map));
-    let set = read(&table, &map, args, None, ImagesAre::Frames)
+    let folder = file.parent().unwrap_or(Path::new(""));
+    let info = FolderInfo::of(folder)?;
+    let map = Map::joined(own.iter().chain(&info.map).chain(&args.map));
+    let (roles, set) = read(&table, &map, args, None, ImagesAre::Frames)
         .map_err(|problem| Error::data(file.display(), problem))?;
-    let root = Root::of(file.parent().unwrap_or(Path::new("")), &[])?;
-    let frames = Frames::new(&table, &root, None, &[], &set.roles);
+    let root = Root::of(folder, &[])?;
+    let frames = Frames::new(&table, &root, None, &[], &roles);
     let name = file.display().to_string();
-    let asked = finish(&name, &table, &set, frames, Vec::new(), None)?;
-    if is_own(&table) {
+    let opened = Opened {
+        place: file,
+        name: &name,
+        table: &table,
+        roles: &roles,
+        args,
+    };
+    let notes = table.notes.clone();
+    let asked = finish(&opened, set, frames, notes, None)?;
+    if is_own(&table) && info.map.is_none() {
         return Ok((asked.questions, Vec::new()));
     }
     Ok((asked.questions, asked.reading))
@@ -175,23 +195,37 @@ struct Finished {
     reading: Vec<String>,
 }
 
+/// A set that is being read.
+struct Opened<'a> {
+    place: &'a Path,
+    name: &'a str,
+    table: &'a Table,
+    roles: &'a Roles,
+    args: &'a SetArgs,
+}
+
 /// Step 6. `notes` stand before the note about ids, and `hint` behind it.
 fn finish(
-    name: &str,
-    table: &Table,
-    set: &ReadSet,
+    opened: &Opened<'_>,
+    mut set: ReadSet,
     mut frames: Frames<'_>,
     mut notes: Vec<String>,
     hint: Option<String>,
 ) -> Result<Finished> {
-    let ids = frames.ids(&set.answered)?;
-    let (questions, sources) = questions(table, set, &ids, &mut frames)?;
+    let mut ids = frames.ids(&set.answered)?;
+    if !ids.contradictory().is_empty() {
+        leave_out(opened, &mut set, ids.contradictory())?;
+        ids = frames.ids(&set.answered)?;
+    }
+    let family = FamilyOf::of(opened.table, &opened.roles.families, &set.answered);
+    let (questions, sources) = questions(opened, (&family, &set.groups), set.answered, &ids, &mut frames)?;
     notes.extend(ids.note());
     notes.extend(hint);
     let summary = Summary {
-        name,
-        table,
-        roles: &set.roles,
+        name: opened.name,
+        table: opened.table,
+        roles: opened.roles,
+        family: &family,
         answers: &set.said,
         ids: ids.name(),
         cut: &set.cut,
@@ -209,9 +243,46 @@ fn finish(
     })
 }
 
+/// Leaves out both questions of each pair that differs in its answers alone, if the user allows it.
+fn leave_out(opened: &Opened<'_>, set: &mut ReadSet, pairs: &[[usize; 2]]) -> Result<()> {
+    let mut wrong = BTreeSet::new();
+    for pair in pairs {
+        for at in pair {
+            let is_new = wrong.insert(*at);
+            if is_new {
+                set.left.add(Why::Bad, || {
+                    contradiction(opened.table, &set.answered, *pair)
+                });
+            }
+        }
+    }
+    let problem = |problem: String| Error::data(opened.place.display(), problem);
+    set.left
+        .check(opened.table.rows.len(), opened.args)
+        .map_err(problem)?;
+    let mut at = 0;
+    set.answered.retain(|_| {
+        at += 1;
+        !wrong.contains(&(at - 1))
+    });
+    if set.answered.is_empty() {
+        return Err(problem("no row is left to ask".to_owned()));
+    }
+    Ok(())
+}
+
+/// Two questions that differ in their answers alone, in words.
+fn contradiction(table: &Table, answered: &[Answered], pair: [usize; 2]) -> String {
+    let [one, other] = pair.map(|at| {
+        let (item, choices) = (&answered[at].item, &answered[at].choices);
+        let truth = choices.truth().map_or("", |truth| &choices.texts()[truth]);
+        format!("{} ({truth:?})", table.place(item.row))
+    });
+    format!("{one} and {other} ask the same of the same image, and their answers differ")
+}
+
 /// The rows of a set with their truths.
 struct ReadSet {
-    roles: Roles,
     answered: Vec<Answered>,
     said: Vec<String>,
     cut: Cut,
@@ -226,7 +297,7 @@ fn read(
     args: &SetArgs,
     preset: Option<&preset::Preset>,
     kind: ImagesAre,
-) -> Result<ReadSet, String> {
+) -> Result<(Roles, ReadSet), String> {
     if table.rows.is_empty() {
         return Err("no questions in it".to_owned());
     }
@@ -260,14 +331,14 @@ fn read(
         return Err("no row is left to ask".to_owned());
     }
     let is_copy = |row| preset.is_some_and(|preset| preset.is_rotation(table, row));
-    Ok(ReadSet {
+    let set = ReadSet {
         groups: rule.map_or_else(Groups::default, |rule| Groups::of(table, &rule, is_copy)),
-        roles,
         answered: truths.answered,
         said: truths.said,
         cut,
         left,
-    })
+    };
+    Ok((roles, set))
 }
 
 /// Adds the columns and a `--map` for images to a problem, if no row has any.
@@ -292,38 +363,29 @@ fn image_hint(table: &Table, roles: &Roles, problem: String) -> String {
 
 /// The questions and the sources of their frames.
 fn questions(
-    table: &Table,
-    set: &ReadSet,
+    opened: &Opened<'_>,
+    (families, groups): (&FamilyOf, &Groups),
+    answered: Vec<Answered>,
     ids: &frames::Ids,
     frames: &mut Frames<'_>,
 ) -> Result<(Vec<Question>, BTreeMap<FrameId, ImageSource>)> {
-    let mut questions = Vec::with_capacity(set.answered.len());
-    for (at, answered) in set.answered.iter().enumerate() {
+    let (table, evidence) = (opened.table, opened.roles.evidence.as_ref());
+    let mut questions = Vec::with_capacity(answered.len());
+    for (at, answered) in answered.into_iter().enumerate() {
         let row = answered.item.row;
-        let frame = frames.frame(answered)?;
+        let frame = frames.frame(&answered)?;
         let cells = &table.rows[row];
-        let family = set
-            .roles
-            .family
-            .as_ref()
-            .and_then(|column| column.text(cells));
-        let config = &table.files[cells.file].config;
-        let family = match family {
-            Some(family) => family.trim().to_owned(),
-            None if !config.is_empty() => config.clone(),
-            None => other().name().to_owned(),
-        };
+        let family = families.text(table, cells);
+        let family = family.unwrap_or_else(|| other().name().to_owned());
         let family = checked(Family::from(family.as_str())).map_err(|e| e.at(table.place(row)))?;
-        let evidence = set.roles.evidence.as_ref();
-        let evidence = evidence.map_or(serde_json::Value::Null, |column| column.of(cells).into());
         questions.push(Question {
             id: ids.id(at),
             frame,
             family,
-            text: answered.item.text.clone(),
-            choices: answered.choices.clone(),
-            group: set.groups.group(row),
-            evidence,
+            text: answered.item.text,
+            choices: answered.choices,
+            group: groups.group(row),
+            evidence: evidence.map_or(serde_json::Value::Null, |column| column.of(cells).into()),
         });
     }
     Ok((questions, frames.take_sources()))
@@ -337,12 +399,27 @@ struct FolderInfo {
 }
 
 impl FolderInfo {
+    const FILE: &str = "dataset.json";
+
     fn of(folder: &Path) -> Result<Self> {
-        let path = folder.join("dataset.json");
+        let path = folder.join(Self::FILE);
         if !path.is_file() {
             return Ok(Self::default());
         }
-        let info: serde_json::Value = crate::files::reading::json(&path)?;
+        Self::read(&path, &crate::files::reading::json(&path)?)
+    }
+
+    fn in_archive(archive: &Archive) -> Result<Self> {
+        if !archive.has(Self::FILE) {
+            return Ok(Self::default());
+        }
+        let path = archive.path().join(Self::FILE);
+        let text = archive.text(Self::FILE)?;
+        let info = serde_json::from_str(&text).map_err(|e| Error::data(path.display(), e))?;
+        Self::read(&path, &info)
+    }
+
+    fn read(path: &Path, info: &serde_json::Value) -> Result<Self> {
         let text = |key: &str| info.get(key).and_then(serde_json::Value::as_str);
         let map = text("map").map(str::parse).transpose();
         let wrong = |problem: String| Error::data(path.display(), format_args!("map: {problem}"));

@@ -47,7 +47,10 @@ impl Options {
             let offered = match by_letter(cell).filter(|_| split.is_none()) {
                 Some(fields) => of_fields(&fields).map_err(|problem| {
                     let shown = cell.shown(60);
-                    format!("the options in the column {:?} {problem}: {shown}", column.name)
+                    format!(
+                        "the options in the column {:?} {problem}: {shown}",
+                        column.name
+                    )
                 }),
                 None => options(cell, split)
                     .map(|texts| Offered::listed(without_letters(texts)))
@@ -86,7 +89,11 @@ fn by_letter(cell: &Cell) -> Option<Vec<(String, Cell)>> {
         Cell::Fields(fields) => Some(fields.clone()),
         Cell::Text(text) => {
             let pairs = dict(text)?.into_iter();
-            Some(pairs.map(|(name, text)| (name, text.map_or(Cell::Absent, Cell::Text))).collect())
+            Some(
+                pairs
+                    .map(|(name, text)| (name, text.map_or(Cell::Absent, Cell::Text)))
+                    .collect(),
+            )
         }
         _ => None,
     }
@@ -101,7 +108,11 @@ fn of_fields(fields: &[(String, Cell)]) -> Result<Offered, String> {
             (Some(name), None) if name.is_ascii_alphabetic() => {
                 sorted.push((name.to_ascii_uppercase(), cell));
             }
-            _ => return Err(format!("have the name {name:?}, where a letter is expected")),
+            _ => {
+                return Err(format!(
+                    "have the name {name:?}, where a letter is expected"
+                ));
+            }
         }
     }
     sorted.sort_by_key(|(name, _)| *name);

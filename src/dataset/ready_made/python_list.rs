@@ -37,7 +37,9 @@ pub(super) fn python_dict(text: &str) -> Option<Vec<(String, Option<String>)>> {
         let (name, after) = quoted(&rest[1..], quote)?;
         let after = after.trim_start().strip_prefix(':')?.trim_start();
         let (value, after) = match after.chars().next()? {
-            quote @ ('\'' | '"') => quoted(&after[1..], quote).map(|(value, end)| (Some(value), end))?,
+            quote @ ('\'' | '"') => {
+                quoted(&after[1..], quote).map(|(value, end)| (Some(value), end))?
+            }
             _ => bare(after).map(|(value, end)| ((value != "None").then_some(value), end))?,
         };
         fields.push((name, value));
@@ -112,9 +114,19 @@ mod tests {
         let pair = |name: &str, text: Option<&str>| (name.to_owned(), text.map(str::to_owned));
         assert_eq!(
             python_dict(r#"{'A': 'it\'s', "B": 2, 'C': None}"#).unwrap(),
-            [pair("A", Some("it's")), pair("B", Some("2")), pair("C", None)]
+            [
+                pair("A", Some("it's")),
+                pair("B", Some("2")),
+                pair("C", None)
+            ]
         );
-        for text in ["{'a'}", "{'a': }", "{a: 'b'}", "{'a': open('x')}", "{'a': 'b'"] {
+        for text in [
+            "{'a'}",
+            "{'a': }",
+            "{a: 'b'}",
+            "{'a': open('x')}",
+            "{'a': 'b'",
+        ] {
             assert_eq!(python_dict(text), None, "{text}");
         }
         for text in [

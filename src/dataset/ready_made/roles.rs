@@ -1,7 +1,5 @@
 //! Which column of a set is which: [`Roles`].
 
-use std::collections::BTreeSet;
-
 use super::cell::Cell;
 use super::map::{How, Map, flag};
 use super::names::{Role, known, plain};
@@ -22,10 +20,19 @@ pub(super) struct Roles {
     pub(super) answers: Vec<Column>,
     pub(super) ids: Vec<Column>,
     pub(super) hint: Option<Column>,
-    pub(super) family: Option<Column>,
+    pub(super) families: Families,
     pub(super) evidence: Option<Column>,
     pub(super) split_options: Option<String>,
     pub(super) in_question: InQuestion,
+}
+
+/// The columns that may name families.
+#[derive(Debug)]
+pub(super) enum Families {
+    /// By their names, the best first.
+    Known(Vec<Column>),
+    /// The one that the user names, or none.
+    Said(Option<Column>),
 }
 
 /// Whether options are looked for in the text of a question whose columns have none.
@@ -109,7 +116,10 @@ impl Roles {
             answers: named(Role::Answer)?,
             ids: named(Role::Id)?,
             hint: named(Role::Hint)?.into_iter().next(),
-            family: family(table, &named(Role::Family)?),
+            families: match map.of(Role::Family) {
+                Some(_) => Families::Said(named(Role::Family)?.into_iter().next()),
+                None => Families::Known(named(Role::Family)?),
+            },
             evidence,
             in_question: match how {
                 Some(entry) if entry.columns.is_empty() => InQuestion::None,
@@ -267,20 +277,6 @@ fn cells(table: &Table) -> Vec<Column> {
     };
     let named: Vec<Column> = (0..Choices::MOST).map_while(named).collect();
     if named.len() > 1 { named } else { Vec::new() }
-}
-
-/// The first column of families with more than one value; if all are constant, the first.
-fn family(table: &Table, columns: &[Column]) -> Option<Column> {
-    let varies = |column: &&Column| {
-        let texts = table.rows.iter().map(|row| column.text(row));
-        let mut seen = BTreeSet::new();
-        texts.into_iter().any(|text| {
-            seen.insert(text);
-            seen.len() > 1
-        })
-    };
-    let chosen = columns.iter().find(varies).or(columns.first());
-    chosen.cloned()
 }
 
 /// Refuses a table that has several questions a row.

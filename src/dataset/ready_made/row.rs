@@ -8,6 +8,10 @@ use std::sync::Arc;
 use csv::Position;
 
 use super::cell::Cell;
+use super::names::{Role, known, plain};
+
+/// The maximum number of columns of a set.
+const MOST_COLUMNS: usize = 4096;
 
 /// All rows of a set, in the order of its files.
 #[derive(Debug, Default)]
@@ -16,6 +20,8 @@ pub(super) struct Table {
     pub(super) columns: Vec<String>,
     places: HashMap<String, usize>,
     pub(super) rows: Vec<Row>,
+    /// What was done with the rows, in words.
+    pub(super) notes: Vec<String>,
 }
 
 /// What is known of a file of rows besides its rows.
@@ -81,14 +87,22 @@ impl fmt::Display for RowPlace {
 
 impl Table {
     /// The index of a column; a new one if there is none of this name.
-    pub(super) fn column(&mut self, name: &str) -> usize {
+    ///
+    /// # Errors
+    /// If there are more than [`MOST_COLUMNS`].
+    pub(super) fn column(&mut self, name: &str) -> Result<usize, String> {
         if let Some(&at) = self.places.get(name) {
-            return at;
+            return Ok(at);
         }
         let at = self.columns.len();
+        if at == MOST_COLUMNS {
+            return Err(format!(
+                "more than {MOST_COLUMNS} columns; is it a table of questions?"
+            ));
+        }
         self.columns.push(name.to_owned());
         self.places.insert(name.to_owned(), at);
-        at
+        Ok(at)
     }
 
     /// The index of a column; `None` if there is none of this name.
@@ -108,6 +122,29 @@ impl Table {
             place,
             cells: row,
         });
+    }
+
+    /// Adds a column of ids from a row on, if there is no column of ids.
+    ///
+    /// # Errors
+    /// As [`Self::column`].
+    pub(super) fn add_ids(&mut self, from: usize, ids: Vec<String>) -> Result<(), String> {
+        let names = known(Role::Id);
+        if self
+            .columns
+            .iter()
+            .any(|column| names.contains(&plain(column)))
+        {
+            return Ok(());
+        }
+        let at = self.column("id")?;
+        for (row, id) in self.rows[from..].iter_mut().zip(ids) {
+            row.cells.resize(row.cells.len().max(at + 1), Cell::Absent);
+            row.cells[at] = Cell::Text(id);
+        }
+        let note = "the names under which the rows stand in the file are the column id";
+        self.notes.push(note.to_owned());
+        Ok(())
     }
 
     /// The file and place of a row, for messages.

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::family_column::FamilyOf;
 use super::items::Cut;
 use super::left_out::LeftOut;
 use super::roles::{Images, Roles};
@@ -14,6 +15,7 @@ pub(super) struct Summary<'a> {
     pub(super) name: &'a str,
     pub(super) table: &'a Table,
     pub(super) roles: &'a Roles,
+    pub(super) family: &'a FamilyOf,
     pub(super) answers: &'a [String],
     pub(super) ids: String,
     pub(super) cut: &'a Cut,
@@ -37,10 +39,7 @@ impl Summary<'_> {
             .iter()
             .map(|question| question.family.name())
             .collect();
-        let by = self.roles.family.as_ref().map_or_else(
-            || "no column of families".to_owned(),
-            |column| format!("column {}", column.name),
-        );
+        let by = self.family.said();
         let mut lines = vec![
             format!(
                 "{}: {} on {} in {} ({by})",

@@ -7,7 +7,7 @@ use super::python_list::{python_dict, python_list};
 /// The texts of a list in a text: JSON, then Python's notation; `None` if the text is no list of texts and numbers.
 pub(super) fn list(text: &str) -> Option<Vec<String>> {
     let text = text.trim();
-    if !text.starts_with('[') {
+    if !text.starts_with('[') || !is_short(text) {
         return None;
     }
     let items = serde_json::from_str::<Vec<Value>>(text).ok();
@@ -18,7 +18,7 @@ pub(super) fn list(text: &str) -> Option<Vec<String>> {
 /// The names and the texts of an object in a text: JSON, then Python's notation; `None` if the text is no object of texts and numbers.
 pub(super) fn dict(text: &str) -> Option<Vec<(String, Option<String>)>> {
     let text = text.trim();
-    if !text.starts_with('{') {
+    if !text.starts_with('{') || !is_short(text) {
         return None;
     }
     let fields = serde_json::from_str::<serde_json::Map<String, Value>>(text).ok();
@@ -32,6 +32,14 @@ pub(super) fn dict(text: &str) -> Option<Vec<(String, Option<String>)>> {
             .collect()
     });
     texts.or_else(|| python_dict(text))
+}
+
+/// Whether a text holds so few signs between values that these may be held in memory.
+fn is_short(text: &str) -> bool {
+    let signs = text
+        .bytes()
+        .filter(|byte| matches!(byte, b',' | b'[' | b'{'));
+    signs.count() <= 1 << 20
 }
 
 fn item(value: &Value) -> Option<String> {

@@ -86,10 +86,12 @@ fn names_no_options(table: &Table, roles: &Roles, item: &Item) -> bool {
     let answers: Vec<String> = roles
         .answers
         .iter()
-        .filter_map(|column| match AnswerCell::of(&table.rows[item.row], column) {
-            AnswerCell::One(answer) => Some(answer),
-            AnswerCell::Absent | AnswerCell::Several(_) => None,
-        })
+        .filter_map(
+            |column| match AnswerCell::of(&table.rows[item.row], column) {
+                AnswerCell::One(answer) => Some(answer),
+                AnswerCell::Absent | AnswerCell::Several(_) => None,
+            },
+        )
         .collect();
     let is_option = |answer: &String| {
         let readings = [Reading::Letter, Reading::Text];
@@ -250,8 +252,7 @@ fn ambiguous(
     column: &Column,
 ) -> String {
     let [one, other] = readings.map(Reading::name);
-    let [first, second] =
-        readings.map(|reading| flag(Role::Answer, &column.name, Some(reading)));
+    let [first, second] = readings.map(|reading| flag(Role::Answer, &column.name, Some(reading)));
     format!(
         "{}: the answer {answer:?} may be read as {one} or as {other}, which differ among the options {:?}; {first} or {second} says which is meant",
         table.place(item.row),

@@ -32,7 +32,7 @@ pub(crate) struct EnhanceArgs {
     /// restormer, mirnet, kind)
     #[arg(value_name = "MODEL", add = Decides::Trials)]
     pub model: PathBuf,
-    /// Images (PNG, JPEG, WebP, TIFF) and folders of frames
+    /// Images (PNG, JPEG, WebP, TIFF, BMP) and folders of frames
     #[arg(value_name = "INPUT", required_unless_present = "describe", add = Decides::Pixels)]
     pub inputs: Vec<PathBuf>,
     /// Where the enhanced images go, as PNG under their own names; default: nowhere, with --describe

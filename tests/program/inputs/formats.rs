@@ -257,7 +257,7 @@ fn a_run_reads_all_formats_of_a_folder() {
         "--data set --model random --levels L0,L2 --variant ev --out run",
     ));
     assert_eq!(called.code, Some(0), "{called:?}");
-    let unread = "set: 2 files look like images and are not read, as IMG_1.HEIC; PNG, JPEG, WebP, TIFF or OpenEXR expected, so convert them first";
+    let unread = "set: 2 files look like images and are not read, as IMG_1.HEIC; PNG, JPEG, WebP, TIFF, BMP or OpenEXR expected, so convert them first";
     assert_eq!(called.stderr.matches(unread).count(), 1, "{called:?}");
     let first = "1 image is the first picture of a file with several (TIFF of several pages: 1; for example b.TIF)";
     assert_eq!(called.stderr.matches(first).count(), 1, "{called:?}");

@@ -9,6 +9,7 @@ use std::sync::{Mutex, PoisonError};
 use tempfile::NamedTempFile;
 use zip::ZipArchive;
 
+use super::most_unpacked;
 use crate::error::{Error, Result};
 use crate::types::FrameId;
 
@@ -85,7 +86,7 @@ impl Archive {
     }
 
     /// Whether there is a file of this name.
-    pub(super) fn has(&self, name: &str) -> bool {
+    pub(in crate::dataset::ready_made) fn has(&self, name: &str) -> bool {
         self.names.contains_key(name)
     }
 
@@ -103,15 +104,26 @@ impl Archive {
     pub(super) fn unpacked(&self, name: &str) -> Result<NamedTempFile> {
         let mut file =
             NamedTempFile::new().map_err(|e| Error::file(std::env::temp_dir(), "write", e))?;
-        self.copy(name, u64::MAX, &mut file)?;
+        let packed = self.packed(name)?;
+        self.copy(name, most_unpacked(packed), &mut file)?;
         Ok(file)
     }
 
     /// The text of a file.
-    pub(super) fn text(&self, name: &str) -> Result<String> {
+    pub(in crate::dataset::ready_made) fn text(&self, name: &str) -> Result<String> {
         let mut bytes = Vec::new();
         self.copy(name, 1 << 22, &mut bytes)?;
         Ok(String::from_utf8_lossy(&bytes).into_owned())
+    }
+
+    /// The length of a file as it is packed.
+    fn packed(&self, name: &str) -> Result<u64> {
+        let place = format!("{}, {name}", self.path.display());
+        let at = self.names.get(name).copied();
+        let at = at.ok_or_else(|| Error::data(&place, "no such file in it"))?;
+        let mut zip = self.zip.lock().unwrap_or_else(PoisonError::into_inner);
+        let entry = zip.by_index_raw(at).map_err(|e| Error::data(&place, e))?;
+        Ok(entry.compressed_size())
     }
 
     fn copy(&self, name: &str, most: u64, to: &mut impl std::io::Write) -> Result<()> {

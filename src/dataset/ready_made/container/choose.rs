@@ -23,34 +23,48 @@ const METADATA: [&str; 3] = ["metadata.jsonl", "metadata.csv", "metadata.parquet
 pub(super) fn is_set(tree: &Tree, files: &[PathBuf]) -> bool {
     let is_arrow = tree.has("state.json") && tree.has("dataset_info.json");
     is_arrow
-        || !named(tree).is_empty()
+        || !named(tree).0.is_empty()
         || files.iter().any(|path| is_metadata(path))
         || files.iter().any(|path| is_rows(path))
 }
 
-/// The configurations that the card of a tree names; a card that cannot be read names none.
-fn named(tree: &Tree) -> Vec<Config> {
+/// The configurations that the card of a tree names; of a card that cannot be read, none, and why.
+fn named(tree: &Tree) -> (Vec<Config>, Option<String>) {
     if !tree.has(CARD) {
-        return Vec::new();
+        return (Vec::new(), None);
     }
-    tree.text(CARD)
-        .map_or_else(|_| Vec::new(), |card| configs(&card))
+    let card = tree.text(CARD).map_err(|e| e.to_string());
+    match card.and_then(|card| configs(&card)) {
+        Ok(configs) => (configs, None),
+        Err(problem) => {
+            let note = format!(
+                "the configurations in {} cannot be read ({problem}), so the names of files decide",
+                tree.whole(Path::new(CARD)).display()
+            );
+            (Vec::new(), Some(note))
+        }
+    }
 }
 
-/// The files that are asked: those of a configuration of the card, else the metadata, else by their endings; of one split.
+/// The files that are asked, and what is wrong with the card: those of a configuration of the card, else the metadata, else by their endings; of one split.
 ///
 /// # Errors
 /// If there are none, or it is not clear which are meant; the error names what is there.
-pub(super) fn chosen(tree: &Tree, files: Vec<PathBuf>, args: &SetArgs) -> Result<Vec<Candidate>> {
+pub(super) fn chosen(
+    tree: &Tree,
+    files: Vec<PathBuf>,
+    args: &SetArgs,
+) -> Result<(Vec<Candidate>, Option<String>)> {
     if tree.has("dataset_info.json") && tree.has("state.json") {
         let problem = "a folder of Arrow files, which are not read; write Parquet: python -c \"import datasets; datasets.load_from_disk('.').to_parquet('set.parquet')\" in it";
         return Err(Error::data(tree.place().display(), problem));
     }
-    let configs = named(tree);
+    let (configs, note) = named(tree);
     let candidates = if configs.is_empty() {
         if let Some(name) = &args.config_name {
             let place = tree.place().display();
-            let problem = format_args!("{place}: no configurations to choose {name:?} from");
+            let note = note.map_or_else(String::new, |note| format!("; {note}"));
+            let problem = format_args!("{place}: no configurations to choose {name:?} from{note}");
             return Err(Error::usage("--config-name", problem));
         }
         let files = by_kind(tree, files)?.into_iter();
@@ -69,7 +83,8 @@ pub(super) fn chosen(tree: &Tree, files: Vec<PathBuf>, args: &SetArgs) -> Result
             of_card(tree, &configs, &files, wanted)?
         }
     };
-    splits::chosen(tree, candidates, args.split.as_deref())
+    let candidates = splits::chosen(tree, candidates, args.split.as_deref())?;
+    Ok((candidates, note))
 }
 
 /// The files of the configuration that is asked, or of all.
@@ -105,10 +120,10 @@ fn of_card(
     let several = chosen.len() > 1;
     let mut candidates = Vec::new();
     for config in chosen {
-        for (split, pattern) in &config.files {
-            for path in matching(tree, pattern, files)? {
+        for (split, paths) in of_config(tree, config, files)? {
+            for path in paths {
                 candidates.push(Candidate {
-                    split: match &**split {
+                    split: match &*split {
                         "" => splits::of_name(&path),
                         split => split.to_owned(),
                     },
@@ -123,6 +138,32 @@ fn of_card(
         }
     }
     Ok(candidates)
+}
+
+/// The files of a configuration by the split that the card names.
+fn of_config(
+    tree: &Tree,
+    config: &Config,
+    files: &[PathBuf],
+) -> Result<Vec<(String, Vec<PathBuf>)>> {
+    let folder = config.folder.trim_start_matches("./").trim_matches('/');
+    let Some(patterns) = &config.files else {
+        let inside = files.iter().filter(|path| path.starts_with(folder));
+        let below = |path: &PathBuf| path.strip_prefix(folder).map(Path::to_owned).ok();
+        let found = by_kind(tree, inside.filter_map(below).collect())?;
+        let found = found.into_iter().map(|path| Path::new(folder).join(path));
+        return Ok(vec![(String::new(), found.collect())]);
+    };
+    let patterns = patterns.iter().map(|(split, pattern)| {
+        let pattern = pattern.trim_start_matches("./");
+        let pattern = if folder.is_empty() {
+            pattern.to_owned()
+        } else {
+            format!("{folder}/{pattern}")
+        };
+        Ok((split.clone(), matching(tree, &pattern, files)?))
+    });
+    patterns.collect()
 }
 
 /// The files that fit a pattern of the card.

@@ -100,7 +100,7 @@ fn of_pattern(place: &Path, text: &str) -> Result<FoundFiles> {
 /// The files of a tree.
 fn of_tree(tree: &Tree, args: &SetArgs) -> Result<FoundFiles> {
     let (all, outside) = tree.files()?;
-    let chosen = chosen(tree, all, args)?;
+    let (chosen, card) = chosen(tree, all, args)?;
     let paths: Vec<PathBuf> = chosen.iter().map(|file| tree.whole(&file.path)).collect();
     check_shards(&paths)?;
     let files = chosen
@@ -114,7 +114,7 @@ fn of_tree(tree: &Tree, args: &SetArgs) -> Result<FoundFiles> {
             first.display()
         )
     });
-    let notes = notes.into_iter().collect();
+    let notes = notes.into_iter().chain(card).collect();
     Ok(match tree {
         Tree::Folder { folder, blobs } => FoundFiles {
             files,

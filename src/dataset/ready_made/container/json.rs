@@ -20,6 +20,37 @@ fn open(path: &Path) -> Result<BufReader<File>> {
     Ok(BufReader::with_capacity(1 << 16, file))
 }
 
+/// The maximum number of values in a row. Each takes tens of bytes, however short it is written.
+const MOST_VALUES: usize = 1 << 20;
+
+/// Refuses a row of more values than a question can have.
+fn check_values(bytes: &[u8]) -> Result<(), String> {
+    let signs = |bytes: &[u8]| {
+        bytes
+            .iter()
+            .filter(|byte| matches!(byte, b',' | b'['))
+            .count()
+    };
+    if signs(bytes) <= MOST_VALUES {
+        return Ok(());
+    }
+    // Commas in texts are no values.
+    let (mut count, mut in_text, mut is_escaped) = (0, false, false);
+    for byte in bytes {
+        match byte {
+            _ if is_escaped => is_escaped = false,
+            b'\\' => is_escaped = true,
+            b'"' => in_text = !in_text,
+            b',' | b'[' if !in_text => count += 1,
+            _ => {}
+        }
+    }
+    if count <= MOST_VALUES {
+        return Ok(());
+    }
+    Err(format!("more than {MOST_VALUES} values in a row"))
+}
+
 /// Adds the objects of a file of one object a line. Empty lines and a byte order mark are skipped.
 pub(super) fn read_lines(path: &Path, table: &mut Table) -> Result<()> {
     let mut reader = open(path)?;
@@ -39,6 +70,7 @@ pub(super) fn read_lines(path: &Path, table: &mut Table) -> Result<()> {
         }
         let bytes = line.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&line);
         if !bytes.trim_ascii().is_empty() {
+            check_values(bytes).map_err(|problem| Error::line(path, number, problem))?;
             let value = serde_json::from_slice(bytes);
             let value = value.map_err(|e| Error::json_line(path, number, &e))?;
             let Value::Object(fields) = value else {
@@ -55,7 +87,8 @@ pub(super) fn read_lines(path: &Path, table: &mut Table) -> Result<()> {
                 unit: "line",
                 inner: None,
             };
-            push(table, place, fields, None);
+            let pushed = push(table, place, fields, None);
+            pushed.map_err(|problem| Error::line(path, number, problem))?;
         }
         offset += taken as u64;
     }
@@ -117,8 +150,7 @@ fn add(found: &Found, number: u64, inner: Option<&str>, table: &mut Table) -> Re
         inner,
     };
     let Some(list) = inner else {
-        push(table, place(None), fields, None);
-        return Ok(());
+        return push(table, place(None), fields, None);
     };
     let name: Arc<str> = list.into();
     let mut outer = fields;
@@ -134,12 +166,13 @@ fn add(found: &Found, number: u64, inner: Option<&str>, table: &mut Table) -> Re
             place(Some((at, Arc::clone(&name)))),
             row,
             Some(&outer),
-        );
+        )?;
     }
     Ok(())
 }
 
 fn object(found: &Found, number: u64) -> Result<Map<String, Value>, String> {
+    check_values(&found.bytes).map_err(|problem| format!("object {number}: {problem}"))?;
     match serde_json::from_slice(&found.bytes) {
         Ok(Value::Object(fields)) => Ok(fields),
         Ok(_) => Err(format!("value {number} of the list is not an object")),
@@ -154,12 +187,14 @@ fn object(found: &Found, number: u64) -> Result<Map<String, Value>, String> {
 fn rows_by_id(path: &Path, table: &mut Table) -> Result<(), String> {
     let mut scan = JsonScan::new(open(path).map_err(|e| e.to_string())?);
     let (mut lists, mut number, mut others) = (Vec::new(), 0, 0);
+    let (before, mut keys) = (table.rows.len(), Vec::new());
     scan.object(|scan, name| {
         match scan.kind()? {
             Kind::Object => {
                 number += 1;
                 let found = scan.value(LONGEST_ROW)?;
                 add(&found, number, None, table)?;
+                keys.push(name);
                 return Ok(());
             }
             Kind::List => {
@@ -182,7 +217,7 @@ fn rows_by_id(path: &Path, table: &mut Table) -> Result<(), String> {
     scan.end()?;
     let Some((name, columns)) = lists.first() else {
         return match (number, others) {
-            (1.., 0) => Ok(()),
+            (1.., 0) => table.add_ids(before, keys),
             _ => Err("neither a list of objects, nor objects by their ids".to_owned()),
         };
     };
@@ -201,17 +236,18 @@ fn push(
     place: RowPlace,
     fields: Map<String, Value>,
     around: Option<&Map<String, Value>>,
-) {
+) -> Result<(), String> {
     let mut cells = Vec::new();
     for (name, value) in around.into_iter().flatten() {
         if !fields.contains_key(name) {
-            cells.push((table.column(name), Cell::from(value.clone())));
+            cells.push((table.column(name)?, Cell::from(value.clone())));
         }
     }
     for (name, value) in fields {
-        cells.push((table.column(&name), Cell::from(value)));
+        cells.push((table.column(&name)?, Cell::from(value)));
     }
     table.push(place, cells);
+    Ok(())
 }
 
 /// The cell of a row in a column, whole.

@@ -11,6 +11,7 @@ mod shards;
 mod splits;
 mod table;
 mod tree;
+mod yaml;
 
 use std::fs::File;
 use std::io::{BufReader, Read as _};
@@ -39,6 +40,8 @@ pub(in crate::dataset) struct SetFile {
     kind: FileKind,
     /// The unpacked copy of a compressed file, gone when the file is closed.
     unpacked: Option<NamedTempFile>,
+    /// Of a Parquet file, once it is read.
+    footer: parquet::Footer,
 }
 
 /// How rows stand in a file.
@@ -103,6 +106,7 @@ impl SetFile {
             label,
             kind,
             unpacked,
+            footer: parquet::Footer::default(),
         })
     }
 
@@ -115,13 +119,20 @@ impl SetFile {
 
     /// Adds the rows of the file to a table.
     pub(super) fn read(&self, rows: Option<&str>, table: &mut Table) -> Result<()> {
+        if let Some(rows) = rows.filter(|_| self.kind != FileKind::Json) {
+            let problem = format_args!(
+                "{} is no JSON file of one object that could hold {rows:?}",
+                self.label.path.display()
+            );
+            return Err(Error::usage("--rows", problem));
+        }
         table.files.push(self.label.clone());
         let path = self.read_path();
         match self.kind {
             FileKind::Table { delimiter } => table::read(path, delimiter, table),
             FileKind::JsonLines => json::read_lines(path, table),
             FileKind::Json => json::read(path, rows, table),
-            FileKind::Parquet => parquet::read(path, table),
+            FileKind::Parquet => parquet::read(path, &self.footer, table),
         }
     }
 
@@ -129,7 +140,8 @@ impl SetFile {
     pub(super) fn value(&self, row: &RowPlace, column: &str, steps: &[Step]) -> Result<Vec<u8>> {
         let cell = match (row, self.kind) {
             (RowPlace::Parquet { group, row, .. }, _) => {
-                return parquet::bytes(self.read_path(), (*group, *row), column, steps);
+                let file = (self.read_path(), &self.footer);
+                return parquet::bytes(file, (*group, *row), column, steps);
             }
             (RowPlace::Record(position), FileKind::Table { delimiter }) => {
                 table::cell(self.read_path(), delimiter, position, column)?
@@ -166,13 +178,31 @@ fn ending(path: &Path) -> String {
     ending.unwrap_or_default().to_ascii_lowercase()
 }
 
+/// The longest content of a packed file of so many bytes: no table is packed to less than a two-hundredth, but what is meant to fill a
+/// disk is.
+fn most_unpacked(packed: u64) -> u64 {
+    packed.saturating_mul(200).max(1 << 30)
+}
+
+fn too_long(most: u64) -> String {
+    format!(
+        "unpacks to more than {} MB, which no table of its length does; unpack it and name the file in it",
+        most >> 20
+    )
+}
+
 /// An unpacked copy of a compressed file. Images are read at their places in it, which a compressed file does not have.
 fn unpacked(path: &Path) -> Result<NamedTempFile> {
     let file = File::open(path).map_err(|e| Error::file(path, "read", e))?;
     let mut copy =
         NamedTempFile::new().map_err(|e| Error::file(std::env::temp_dir(), "write", e))?;
-    std::io::copy(&mut MultiGzDecoder::new(BufReader::new(file)), &mut copy)
+    let most = most_unpacked(file.metadata().map_or(0, |facts| facts.len()));
+    let mut content = MultiGzDecoder::new(BufReader::new(file)).take(most + 1);
+    let copied = std::io::copy(&mut content, &mut copy)
         .map_err(|e| Error::data(path.display(), format_args!("cannot be unpacked: {e}")))?;
+    if copied > most {
+        return Err(Error::data(path.display(), too_long(most)));
+    }
     Ok(copy)
 }
 

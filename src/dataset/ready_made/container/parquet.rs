@@ -4,10 +4,9 @@
 //! their headers, and one value is read.
 
 use std::cell::RefCell;
-use std::collections::HashMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, OnceLock};
 
 use parquet::basic::Compression;
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
@@ -21,37 +20,37 @@ use parquet::record::{Field, Row as Record};
 use super::super::cell::Cell;
 use super::super::row::{RowPlace, Table};
 use super::super::step::Step;
+use super::super::text_list::list;
 use crate::dataset::guarded::guarded;
 use crate::error::{Error, Result};
 
 /// How many rows are decoded at a time. Each holds its image until the next.
 const ROWS_AT_A_TIME: usize = 8;
 
-/// The footers of files, each parsed once.
-static FOOTERS: Mutex<Option<HashMap<PathBuf, Arc<ParquetMetaData>>>> = Mutex::new(None);
-
 fn open(path: &Path) -> Result<File> {
     File::open(path).map_err(|e| Error::file(path, "read", e))
 }
 
-/// The footer of a file.
-fn footer(path: &Path) -> Result<Arc<ParquetMetaData>> {
-    let mut known = FOOTERS.lock().unwrap_or_else(PoisonError::into_inner);
-    let known = known.get_or_insert_default();
-    if let Some(footer) = known.get(path) {
-        return Ok(Arc::clone(footer));
+/// The footer of a file, parsed once while the file is open.
+#[derive(Debug, Default)]
+pub(super) struct Footer(OnceLock<Arc<ParquetMetaData>>);
+
+impl Footer {
+    fn of(&self, path: &Path) -> Result<Arc<ParquetMetaData>> {
+        if let Some(known) = self.0.get() {
+            return Ok(Arc::clone(known));
+        }
+        let file = open(path)?;
+        let footer = guarded(|| {
+            let mut reader = ParquetMetaDataReader::new();
+            reader
+                .try_parse(&file)
+                .and_then(|()| reader.finish())
+                .map_err(|e| e.to_string())
+        });
+        let footer = footer.map_err(|problem| wrong(path, &problem))?;
+        Ok(Arc::clone(self.0.get_or_init(|| Arc::new(footer))))
     }
-    let file = open(path)?;
-    let footer = guarded(|| {
-        let mut reader = ParquetMetaDataReader::new();
-        reader
-            .try_parse(&file)
-            .and_then(|()| reader.finish())
-            .map_err(|e| e.to_string())
-    });
-    let footer = Arc::new(footer.map_err(|problem| wrong(path, &problem))?);
-    known.insert(path.to_owned(), Arc::clone(&footer));
-    Ok(footer)
 }
 
 fn wrong(path: &Path, problem: &str) -> Error {
@@ -64,27 +63,27 @@ fn wrong(path: &Path, problem: &str) -> Error {
 
 /// The number of rows in a file, from its footer.
 pub(super) fn count(path: &Path) -> Result<u64> {
-    let rows = footer(path)?.file_metadata().num_rows();
+    let rows = Footer::default().of(path)?.file_metadata().num_rows();
     Ok(u64::try_from(rows).unwrap_or(0))
 }
 
 /// Adds the rows of a file.
-pub(super) fn read(path: &Path, table: &mut Table) -> Result<()> {
-    check_codecs(path, &*footer(path)?)?;
+pub(super) fn read(path: &Path, footer: &Footer, table: &mut Table) -> Result<()> {
+    check_codecs(path, &*footer.of(path)?)?;
     let file = open(path)?;
     let mut columns: Vec<(String, usize)> = Vec::new();
-    let mut add = |place: RowPlace, record: Record| {
-        let fields = record.into_columns().into_iter();
-        let cells = fields.enumerate().map(|(at, (name, field))| {
+    let mut add = |place: RowPlace, record: Record| -> Result<(), String> {
+        let mut cells = Vec::new();
+        for (at, (name, field)) in record.into_columns().into_iter().enumerate() {
             if columns.get(at).is_none_or(|(known, _)| *known != name) {
-                let column = table.column(&name);
+                let column = table.column(&name)?;
                 columns.truncate(at);
                 columns.push((name, column));
             }
-            (columns[at].1, cell_of(field))
-        });
-        let cells = cells.collect();
+            cells.push((columns[at].1, cell_of(field)));
+        }
         table.push(place, cells);
+        Ok(())
     };
     let walk = || {
         let reader = SerializedFileReader::new(file).map_err(|e| e.to_string())?;
@@ -98,7 +97,7 @@ pub(super) fn read(path: &Path, table: &mut Table) -> Result<()> {
             for (row, record) in records.enumerate() {
                 number += 1;
                 let record = record.map_err(|e| format!("row {number}: {e}"))?;
-                add(RowPlace::Parquet { group, row, number }, record);
+                add(RowPlace::Parquet { group, row, number }, record)?;
             }
         }
         Ok(())
@@ -244,12 +243,12 @@ impl Cursor {
 
 /// The bytes of a value of bytes or text: in a column, at the steps inside its cell.
 pub(super) fn bytes(
-    path: &Path,
+    (path, footer): (&Path, &Footer),
     (group, row): (usize, usize),
     column: &str,
     steps: &[Step],
 ) -> Result<Vec<u8>> {
-    let footer = footer(path)?;
+    let footer = footer.of(path)?;
     let item = steps.iter().find_map(|step| match step {
         Step::Item(at) => Some(*at),
         Step::Field(_) => None,
@@ -268,8 +267,17 @@ pub(super) fn bytes(
             None => Cursor::open(path, &footer, group, leaf)?,
         };
         let value = cursor.value(row, item.unwrap_or(0))?;
+        let is_text = !cursor.is_list;
         CURSOR.set(Some(cursor));
-        Ok(value)
+        let Some(item) = item.filter(|_| is_text) else {
+            return Ok(value);
+        };
+        // The text of a list.
+        let items = std::str::from_utf8(&value).ok().and_then(list);
+        let value = items.and_then(|items| items.into_iter().nth(item));
+        value
+            .map(String::into_bytes)
+            .ok_or_else(|| "the value is gone".to_owned())
     };
     guarded(read).map_err(|problem| wrong(path, &problem))
 }

@@ -1,7 +1,7 @@
 //! Tables of text: TSV as VLMEvalKit writes it (`vlmeval/dataset/image_mcq.py`), and CSV.
 
 use std::fs::File;
-use std::io::{BufRead as _, BufReader};
+use std::io::{self, BufRead as _, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
 use csv::{ByteRecord, Position, Reader, ReaderBuilder};
@@ -17,19 +17,56 @@ pub(super) fn delimiter(path: &Path, ending: &str) -> Result<u8> {
     }
     let file = File::open(path).map_err(|e| Error::file(path, "read", e))?;
     let mut header = Vec::new();
-    let mut file = BufReader::new(file);
+    let mut file = BufReader::new(file.take(LONGEST_RECORD));
     file.read_until(b'\n', &mut header)
         .map_err(|e| Error::file(path, "read", e))?;
     let is_comma = header.contains(&b',') || !header.contains(&b';');
     Ok(if is_comma { b',' } else { b';' })
 }
 
-fn reader(path: &Path, delimiter: u8) -> Result<Reader<File>> {
+/// The maximum length of a record, in bytes: an image of 48 MB in base64.
+const LONGEST_RECORD: u64 = 64 << 20;
+
+/// A file of which no record is longer than it may be.
+struct Bounded {
+    file: File,
+    /// How many bytes may be read for the record.
+    left: u64,
+}
+
+impl Bounded {
+    /// A record begins.
+    fn begin(&mut self) {
+        self.left = LONGEST_RECORD;
+    }
+}
+
+impl Read for Bounded {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.file.read(buffer)?;
+        self.left = self
+            .left
+            .checked_sub(count as u64)
+            .ok_or_else(|| io::Error::other(TOO_LONG))?;
+        Ok(count)
+    }
+}
+
+impl Seek for Bounded {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.file.seek(to)
+    }
+}
+
+const TOO_LONG: &str = "more than 64 MB; is a quote missing before it or in it?";
+
+fn reader(path: &Path, delimiter: u8) -> Result<Reader<Bounded>> {
     let file = File::open(path).map_err(|e| Error::file(path, "read", e))?;
+    let left = LONGEST_RECORD;
     Ok(ReaderBuilder::new()
         .delimiter(delimiter)
         .flexible(true)
-        .from_reader(file))
+        .from_reader(Bounded { file, left }))
 }
 
 /// Adds the rows of a file.
@@ -45,10 +82,23 @@ pub(super) fn read(path: &Path, delimiter: u8, table: &mut Table) -> Result<()> 
             let problem = format_args!("two columns are called {name:?}; rename one");
             return Err(Error::line(path, 1, problem));
         }
-        columns.push((name.to_owned(), table.column(name)));
+        let at = table.column(name);
+        let at = at.map_err(|problem| Error::line(path, 1, problem))?;
+        columns.push((name.to_owned(), at));
     }
     let mut record = ByteRecord::new();
-    while reader.read_byte_record(&mut record).map_err(wrong)? {
+    let mut number = 0;
+    loop {
+        number += 1;
+        let line = reader.position().line();
+        let begins = |e: csv::Error| {
+            let place = format!("{}, record {number}, line {line}", path.display());
+            Error::data(place, e)
+        };
+        reader.get_mut().begin();
+        if !reader.read_byte_record(&mut record).map_err(begins)? {
+            break;
+        }
         let position = record.position().cloned().unwrap_or_else(Position::new);
         let at = |problem: String| {
             Error::data(

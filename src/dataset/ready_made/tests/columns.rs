@@ -43,12 +43,18 @@ fn a_gap_does_not_make_a_column_give_way_to_another() {
         rows[7]["answer"] = gap.clone();
         let (_folder, path) = with(rows);
         let problem = refusal(&path, &SetArgs::default());
-        assert!(problem.contains("1 of 40 rows are broken"), "{gap}: {problem}");
+        assert!(
+            problem.contains("1 of 40 rows are broken"),
+            "{gap}: {problem}"
+        );
         let questions = read(&open(&path, &skipping()).unwrap());
         assert_eq!(questions.len(), 39);
         assert!(questions.iter().all(|question| question.4 == "x"));
         // The command in the problem names the other column, which has no gap.
-        assert_eq!(open(&path, &map("answer=label")).unwrap().questions().len(), 40);
+        assert_eq!(
+            open(&path, &map("answer=label")).unwrap().questions().len(),
+            40
+        );
     }
 }
 
@@ -84,7 +90,13 @@ fn yes_and_no_in_two_columns_are_compared_where_both_say_something() {
 
 #[test]
 fn a_printed_command_can_be_pasted_whatever_the_name_of_a_column() {
-    for name in ["Correct Answer", "correct answer's", "correct $answer (1)", "correct, answer", "correct: answer"] {
+    for name in [
+        "Correct Answer",
+        "correct answer's",
+        "correct $answer (1)",
+        "correct, answer",
+        "correct: answer",
+    ] {
         let (_folder, path) = with(vec![
             json!({"question": "?", "options": ["x", "y", "z"], name: 1, "image": base64(1)}),
         ]);
@@ -93,13 +105,23 @@ fn a_printed_command_can_be_pasted_whatever_the_name_of_a_column() {
         let (_, command) = problem.split_once("; --map ").unwrap();
         let (command, _) = command.split_once(" or --map ").unwrap();
         let mut shell = std::process::Command::new("sh");
-        let said = shell.args(["-c", &format!("printf %s {command}")]).output().unwrap();
+        let said = shell
+            .args(["-c", &format!("printf %s {command}")])
+            .output()
+            .unwrap();
         let pasted = String::from_utf8(said.stdout).unwrap();
-        assert_eq!(read(&open(&path, &map(&pasted)).unwrap())[0].4, "y", "{pasted}");
+        assert_eq!(
+            read(&open(&path, &map(&pasted)).unwrap())[0].4,
+            "y",
+            "{pasted}"
+        );
     }
     // A name with a comma is one column, and not two.
     let (_folder, path) = with(vec![
         json!({"question": "?", "the, options": ["x", "y"], "answer": "y", "image": base64(1)}),
     ]);
-    assert_eq!(read(&open(&path, &map("options=the, options")).unwrap())[0].4, "y");
+    assert_eq!(
+        read(&open(&path, &map("options=the, options")).unwrap())[0].4,
+        "y"
+    );
 }

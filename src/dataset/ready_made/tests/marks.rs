@@ -26,18 +26,33 @@ fn a_line_behind_the_last_option_is_no_part_of_it() {
         let (_folder, path) = with(vec![asked(&format!("{text}{ending}"), json!("D"))]);
         let found = read(&open(&path, &SetArgs::default()).unwrap());
         assert_eq!(found[0].3, ["red", "green", "pink", "blue"]);
-        assert_eq!((found[0].2.as_str(), found[0].4.as_str()), (question, "blue"));
+        assert_eq!(
+            (found[0].2.as_str(), found[0].4.as_str()),
+            (question, "blue")
+        );
     }
     let kept = SetArgs {
         keep_instructions: true,
         ..SetArgs::default()
     };
-    let (_folder, path) = with(vec![asked(&format!("{text}Answer with the letter."), json!("D"))]);
+    let (_folder, path) = with(vec![asked(
+        &format!("{text}Answer with the letter."),
+        json!("D"),
+    )]);
     let found = read(&open(&path, &kept).unwrap());
-    assert_eq!((found[0].2.as_str(), found[0].4.as_str()), ("Which colour?\nAnswer with the letter.", "blue"));
-    let (_folder, path) = with(vec![asked("Which? (A) red (B) blue Answer with care", json!("B"))]);
+    assert_eq!(
+        (found[0].2.as_str(), found[0].4.as_str()),
+        ("Which colour?\nAnswer with the letter.", "blue")
+    );
+    let (_folder, path) = with(vec![asked(
+        "Which? (A) red (B) blue Answer with care",
+        json!("B"),
+    )]);
     let problem = refusal(&path, &SetArgs::default());
-    assert!(problem.contains("object 1: it cannot be told where the last option ends"), "{problem}");
+    assert!(
+        problem.contains("object 1: it cannot be told where the last option ends"),
+        "{problem}"
+    );
 }
 
 #[test]
@@ -49,7 +64,10 @@ fn letters_that_name_things_are_no_options() {
     ];
     let (_folder, path) = with(rows);
     let found = read(&open(&path, &SetArgs::default()).unwrap());
-    let texts: Vec<(&str, &str)> = found.iter().map(|read| (read.2.as_str(), read.4.as_str())).collect();
+    let texts: Vec<(&str, &str)> = found
+        .iter()
+        .map(|read| (read.2.as_str(), read.4.as_str()))
+        .collect();
     assert_eq!(
         texts,
         [
@@ -60,7 +78,10 @@ fn letters_that_name_things_are_no_options() {
     );
     // Options of yes and no are options.
     let (_folder, path) = with(vec![asked("Is it? (A) no (B) yes", json!("yes"))]);
-    assert_eq!(read(&open(&path, &SetArgs::default()).unwrap())[0].3, ["no", "yes"]);
+    assert_eq!(
+        read(&open(&path, &SetArgs::default()).unwrap())[0].3,
+        ["no", "yes"]
+    );
 }
 
 #[test]
@@ -68,7 +89,10 @@ fn numbers_say_nothing_of_lettered_options() {
     let (_folder, path) = with(vec![asked("Which? (A) red (B) blue (C) pink", json!(0))]);
     let problem = refusal(&path, &SetArgs::default());
     assert!(problem.contains("none of the options"), "{problem}");
-    assert_eq!(read(&open(&path, &map("answer=answer:index0")).unwrap())[0].4, "red");
+    assert_eq!(
+        read(&open(&path, &map("answer=answer:index0")).unwrap())[0].4,
+        "red"
+    );
 }
 
 #[test]
@@ -76,10 +100,16 @@ fn a_map_without_options_leaves_the_question_whole() {
     let text = "Which is redder? (A) the cup (B) the ball";
     let (_folder, path) = with(vec![asked(text, json!("yes"))]);
     let found = read(&open(&path, &map("options=")).unwrap());
-    assert_eq!((found[0].2.as_str(), found[0].3.as_slice()), (text, &["yes".to_owned(), "no".to_owned()][..]));
+    assert_eq!(
+        (found[0].2.as_str(), found[0].3.as_slice()),
+        (text, &["yes".to_owned(), "no".to_owned()][..])
+    );
     let (_folder, path) = with(vec![asked(text, json!("A"))]);
     assert!(refusal(&path, &map("options=")).contains("no options in 1 of 1 rows"));
-    assert_eq!(read(&open(&path, &SetArgs::default()).unwrap())[0].4, "the cup");
+    assert_eq!(
+        read(&open(&path, &SetArgs::default()).unwrap())[0].4,
+        "the cup"
+    );
 }
 
 #[test]
@@ -88,7 +118,9 @@ fn options_by_letter_in_an_object_are_a_list() {
         let (_folder, path) = with(vec![
             json!({"question": "?", "options": options, "answer": "B", "image": base64(1)}),
         ]);
-        open(&path, &SetArgs::default()).map(|dataset| read(&dataset)[0].clone()).map_err(|e| e.to_string())
+        open(&path, &SetArgs::default())
+            .map(|dataset| read(&dataset)[0].clone())
+            .map_err(|e| e.to_string())
     };
     for options in [
         json!({"A": "red", "B": "green", "C": null}),
@@ -98,17 +130,36 @@ fn options_by_letter_in_an_object_are_a_list() {
         json!({"A": "A. red", "B": "B. green"}),
     ] {
         let found = open_as(options.clone()).unwrap();
-        assert_eq!((found.3.as_slice(), found.4.as_str()), (&["red".to_owned(), "green".to_owned()][..], "green"), "{options}");
+        assert_eq!(
+            (found.3.as_slice(), found.4.as_str()),
+            (&["red".to_owned(), "green".to_owned()][..], "green"),
+            "{options}"
+        );
     }
     for (options, says) in [
-        (json!({"A": "red", "C": "green"}), "have C where B is expected"),
-        (json!({"B": "red", "C": "green"}), "have B where A is expected"),
-        (json!({"A": "red", "a": "green"}), "have A where B is expected"),
-        (json!({"A": "red", "which": "green"}), "have the name \"which\""),
+        (
+            json!({"A": "red", "C": "green"}),
+            "have C where B is expected",
+        ),
+        (
+            json!({"B": "red", "C": "green"}),
+            "have B where A is expected",
+        ),
+        (
+            json!({"A": "red", "a": "green"}),
+            "have A where B is expected",
+        ),
+        (
+            json!({"A": "red", "which": "green"}),
+            "have the name \"which\"",
+        ),
         (json!({"A": "red", "B": ["green"]}), "hold no text at B"),
     ] {
         let problem = open_as(options.clone()).unwrap_err();
-        assert!(problem.contains(says) && problem.contains("object 1"), "{options}: {problem}");
+        assert!(
+            problem.contains(says) && problem.contains("object 1"),
+            "{options}: {problem}"
+        );
     }
 }
 
@@ -116,21 +167,29 @@ fn options_by_letter_in_an_object_are_a_list() {
 fn a_list_of_one_image_in_a_text_is_one_image() {
     for form in ["tsv", "csv", "json", "parquet"] {
         let embedded = [format!("[\"{}\"]", base64(4)), format!("['{}']", base64(4))];
-        let paths = ["[\"images/1.png\"]".to_owned(), "['images/1.png']".to_owned()];
+        let paths = [
+            "[\"images/1.png\"]".to_owned(),
+            "['images/1.png']".to_owned(),
+        ];
         for image in embedded.into_iter().chain(paths) {
             let (folder, path) = set(
                 &format!("set.{form}"),
-                &[row(json!({"question": "?", "options": "['x', 'y']", "answer": "x", "image": image}))],
+                &[row(
+                    json!({"question": "?", "options": "['x', 'y']", "answer": "x", "image": image}),
+                )],
             );
             std::fs::create_dir(folder.path().join("images")).unwrap();
             std::fs::write(folder.path().join("images/1.png"), super::fixture::png(4)).unwrap();
-            let dataset = open(&path, &SetArgs::default()).unwrap_or_else(|e| panic!("{form} {image}: {e}"));
+            let dataset =
+                open(&path, &SetArgs::default()).unwrap_or_else(|e| panic!("{form} {image}: {e}"));
             assert_eq!(read(&dataset)[0].5, 4, "{form}");
         }
     }
     let (_folder, path) = set(
         "set.tsv",
-        &[row(json!({"question": "?", "options": "['x', 'y']", "answer": "x", "image": "['1.png', '2.png']"}))],
+        &[row(
+            json!({"question": "?", "options": "['x', 'y']", "answer": "x", "image": "['1.png', '2.png']"}),
+        )],
     );
     let args = SetArgs {
         bad: Some(LeaveOut::Skip),

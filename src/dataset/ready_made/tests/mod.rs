@@ -1,10 +1,12 @@
 //! Sets in the shapes in which benchmarks ship, read and refused.
 
 mod broken;
-mod fixture;
 mod columns;
+mod fixture;
 mod gaps;
 mod groups;
+mod joined;
+mod limits;
 mod marks;
 mod refusals;
 mod shapes;

@@ -1,0 +1,267 @@
+//! Rows by their names, families of joined configurations, sets in ZIP files, and rows that contradict each other.
+
+use std::fs;
+use std::io::Write as _;
+
+use serde_json::{Value, json};
+
+use super::super::settings::LeaveOut;
+use super::fixture::{base64, png, row, set};
+use super::{open, read, refusal};
+use crate::dataset::ready_made::SetArgs;
+
+fn question(fields: Value) -> Value {
+    let mut row = row(fields);
+    row.entry("question").or_insert(json!("?"));
+    row.entry("options").or_insert(json!(["x", "y"]));
+    row.entry("answer").or_insert(json!("x"));
+    row.entry("image").or_insert(json!(base64(1)));
+    Value::Object(row)
+}
+
+fn written(text: &str) -> (tempfile::TempDir, std::path::PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("set.json");
+    fs::write(&path, text).unwrap();
+    (folder, path)
+}
+
+#[test]
+fn the_names_of_rows_are_their_ids() {
+    let text = json!({"q7": question(json!({})), "q2": question(json!({"question": "Which?"}))})
+        .to_string();
+    let (_folder, path) = written(&text);
+    let dataset = open(&path, &SetArgs::default()).unwrap();
+    let mut ids: Vec<String> = read(&dataset).into_iter().map(|read| read.0).collect();
+    ids.sort();
+    assert_eq!(ids, ["q2", "q7"]);
+    let said = dataset.reading().join("\n");
+    assert!(
+        said.contains("id = id") && said.contains("the names under which the rows stand"),
+        "{said}"
+    );
+    // Their own ids go first.
+    let text = json!({"q7": question(json!({"question_id": 1})), "q2": question(json!({"question_id": 2}))}).to_string();
+    let (_folder, path) = written(&text);
+    let dataset = open(&path, &SetArgs::default()).unwrap();
+    let mut ids: Vec<String> = read(&dataset).into_iter().map(|read| read.0).collect();
+    ids.sort();
+    assert_eq!(ids, ["1", "2"]);
+    assert!(
+        !dataset
+            .reading()
+            .join("\n")
+            .contains("the names under which")
+    );
+}
+
+#[test]
+fn a_family_varies_among_the_questions_that_are_asked() {
+    // The types differ only in rows that are left out.
+    let rows = [
+        json!({"id": 1, "category": "choice", "topic": "cups"}),
+        json!({"id": 2, "category": "choice", "topic": "balls"}),
+        json!({"id": 3, "category": "open", "topic": "balls", "options": "[]", "answer": "7"}),
+    ];
+    let rows: Vec<_> = rows
+        .into_iter()
+        .map(|fields| row(question(fields)))
+        .collect();
+    let (_folder, path) = set("set.json", &rows);
+    let args = SetArgs {
+        open: Some(LeaveOut::Skip),
+        ..SetArgs::default()
+    };
+    let families: Vec<String> = read(&open(&path, &args).unwrap())
+        .into_iter()
+        .map(|read| read.1)
+        .collect();
+    assert_eq!(families, ["cups", "balls"]);
+}
+
+#[test]
+fn a_configuration_is_a_family_where_no_column_varies() {
+    let rows = |id: i64| [row(question(json!({"id": id, "category": "choice"})))];
+    let (folder, path) = set("art/test.jsonl", &rows(1));
+    super::fixture::write(&folder.path().join("music.jsonl"), &rows(2));
+    let card = "---\nconfigs:\n- config_name: Art\n  data_files: art/test.jsonl\n- config_name: Music\n  data_files: music.jsonl\n---\n";
+    fs::write(folder.path().join("README.md"), card).unwrap();
+    let args = SetArgs {
+        config_name: Some("all".to_owned()),
+        split: Some("all".to_owned()),
+        ..SetArgs::default()
+    };
+    let dataset = open(folder.path(), &args).unwrap();
+    let families: Vec<String> = read(&dataset).into_iter().map(|read| read.1).collect();
+    assert_eq!(families, ["Art", "Music"]);
+    assert!(
+        dataset.reading()[0].contains("in 2 families (by configuration)"),
+        "{:?}",
+        dataset.reading()
+    );
+    // A column that the user names goes first, and so does one of a single configuration.
+    let mapped = SetArgs {
+        map: vec!["family=category".parse().unwrap()],
+        ..args
+    };
+    assert_eq!(read(&open(folder.path(), &mapped).unwrap())[0].1, "choice");
+    assert_eq!(
+        read(&open(&path, &SetArgs::default()).unwrap())[0].1,
+        "choice"
+    );
+}
+
+/// A ZIP file of these files.
+fn zip(files: &[(&str, &[u8])]) -> (tempfile::TempDir, std::path::PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("set.zip");
+    let mut zip = zip::ZipWriter::new(fs::File::create(&path).unwrap());
+    for (name, bytes) in files {
+        zip.start_file(*name, zip::write::SimpleFileOptions::default())
+            .unwrap();
+        zip.write_all(bytes).unwrap();
+    }
+    zip.finish().unwrap();
+    (folder, path)
+}
+
+#[test]
+fn a_zip_file_carries_its_name_and_its_map() {
+    let table = b"nr,frage,bild,A,B,richtig\n1,Which?,0,x,y,B\n";
+    let info = br#"{"name": "Probe", "map": "id=nr,question=frage,image=images/{bild}.png,answer=richtig"}"#;
+    let image = png(3);
+    let files: &[(&str, &[u8])] = &[
+        ("set.csv", table),
+        ("dataset.json", info),
+        ("images/0.png", &image),
+    ];
+    let (_folder, path) = zip(files);
+    let dataset = open(&path, &SetArgs::default()).unwrap();
+    assert_eq!(
+        (
+            dataset.name(),
+            dataset.title(),
+            read(&dataset)[0].4.as_str()
+        ),
+        ("Probe", "Probe", "y")
+    );
+    let (_folder, path) = zip(&[
+        files[0],
+        ("dataset.json", b"{\"map\": \"colour=x\"}"),
+        files[2],
+    ]);
+    let problem = refusal(&path, &SetArgs::default());
+    assert!(
+        problem.contains("dataset.json") && problem.contains("one of the roles"),
+        "{problem}"
+    );
+}
+
+#[test]
+fn an_image_in_a_zip_file_is_the_only_one_of_its_name() {
+    let table = b"id,question,image,A,B,answer\n1,Which?,images/0.png,x,y,B\n";
+    let (near, top) = (png(3), png(5));
+    let of = |files: &[(&str, &[u8])]| zip(&[files, &[("data/metadata.csv", table)]].concat());
+    for (name, image, red) in [("data/images/0.png", &near, 3), ("images/0.png", &top, 5)] {
+        let (_folder, path) = of(&[(name, image)]);
+        assert_eq!(read(&open(&path, &SetArgs::default()).unwrap())[0].5, red);
+    }
+    let (_folder, path) = of(&[("data/images/0.png", &near), ("images/0.png", &top)]);
+    let problem = refusal(&path, &SetArgs::default());
+    assert!(
+        problem.contains("may be \"data/images/0.png\" or \"images/0.png\"")
+            && problem.contains("line 2"),
+        "{problem}"
+    );
+}
+
+#[test]
+fn two_rows_that_differ_in_their_answers_alone_contradict_each_other() {
+    let rows = |answers: [&str; 2]| -> Vec<_> {
+        let rows = (0..40).map(|at| {
+            let answer = answers.get(at).unwrap_or(&"x");
+            let text = if at < 2 {
+                "Which?".to_owned()
+            } else {
+                format!("{at}?")
+            };
+            row(question(json!({"question": text, "answer": answer})))
+        });
+        rows.collect()
+    };
+    let (_folder, path) = set("set.jsonl", &rows(["x", "y"]));
+    let problem = refusal(&path, &SetArgs::default());
+    assert!(
+        problem.contains("2 of 40 rows are broken")
+            && problem.contains("line 1 (\"x\")")
+            && problem.contains("line 2 (\"y\") ask the same of the same image, and their answers differ; --bad skip"),
+        "{problem}"
+    );
+    let skip = SetArgs {
+        bad: Some(LeaveOut::Skip),
+        ..SetArgs::default()
+    };
+    let dataset = open(&path, &skip).unwrap();
+    assert_eq!(dataset.questions().len(), 38);
+    assert!(
+        dataset
+            .reading()
+            .join("\n")
+            .contains("left out: 2 of 40 rows")
+    );
+    // An exact repeat is asked again, and said.
+    let (_folder, path) = set("set.jsonl", &rows(["x", "x"]));
+    let dataset = open(&path, &SetArgs::default()).unwrap();
+    assert_eq!(dataset.questions().len(), 40);
+    assert!(dataset.reading().join("\n").contains("1 questions repeat"));
+}
+
+#[test]
+fn a_folder_says_which_column_is_which_of_its_questions() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    fs::write(at("0.png"), png(9)).unwrap();
+    let line = json!({"id": "a", "frame": "0.png", "frage": "Which?", "choices": ["x", "y"], "answer": "y"});
+    fs::write(at("questions.jsonl"), line.to_string()).unwrap();
+    assert!(refusal(folder.path(), &SetArgs::default()).contains("no question among its columns"));
+    fs::write(
+        at("dataset.json"),
+        r#"{"schema": "darkqa.dataset/1", "map": "question=frage"}"#,
+    )
+    .unwrap();
+    let found = read(&open(folder.path(), &SetArgs::default()).unwrap());
+    assert_eq!(
+        (found[0].2.as_str(), found[0].4.as_str(), found[0].5),
+        ("Which?", "y", 9)
+    );
+}
+
+#[test]
+fn a_bmp_image_is_read() {
+    let mut file = std::io::Cursor::new(Vec::new());
+    let image = image::RgbImage::from_fn(8, 8, |x, _| image::Rgb([7, x as u8, 0]));
+    image.write_to(&mut file, image::ImageFormat::Bmp).unwrap();
+    use base64::Engine as _;
+    let text = base64::engine::general_purpose::STANDARD.encode(file.into_inner());
+    let (_folder, path) = set("set.jsonl", &[row(question(json!({"image": text})))]);
+    let dataset = open(&path, &SetArgs::default()).unwrap();
+    assert_eq!(read(&dataset)[0].5, 7);
+    assert!(dataset.reading().join("\n").contains("BMP 1"));
+    let (_folder, path) = set(
+        "set.jsonl",
+        &[row(question(
+            json!({"image": base64::engine::general_purpose::STANDARD.encode([b"GIF89a".as_slice(), &[1; 90]].concat())}),
+        ))],
+    );
+    let dataset = open(&path, &SetArgs::default()).unwrap();
+    let frame = dataset.frames().next().unwrap();
+    let problem = dataset
+        .picture(frame)
+        .and_then(|picture| picture.decode())
+        .unwrap_err()
+        .to_string();
+    assert!(
+        problem.contains("line 1") && problem.contains("a GIF image, which is not read"),
+        "{problem}"
+    );
+}
