@@ -165,7 +165,7 @@ impl NoEffect {
         if args.scene.pairs.is_some() {
             self.because("--pairs names the data", &["data".to_owned()]);
         }
-        if args.scene.pairs.is_none() && args.data.data.path().is_none() {
+        if args.scene.pairs.is_none() && args.data.place().path().is_none() {
             self.because("the built-in rooms are no files", &ids::<SetArgs>());
         }
         self.job(&args.job, &images, &replies, None);

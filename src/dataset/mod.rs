@@ -62,6 +62,8 @@ pub enum DataPlace {
     Rooms(Rooms),
     /// A folder or file of the user.
     Path(PathBuf),
+    /// Several files of one set, in this order.
+    Files(Vec<PathBuf>),
     /// A well-known set, read by its rules.
     Known {
         /// The name of the set.
@@ -72,12 +74,13 @@ pub enum DataPlace {
 }
 
 impl DataPlace {
-    /// The folder or file; `None` for the built-in rooms.
+    /// The folder or file, of several files the first; `None` for the built-in rooms.
     #[must_use]
     pub fn path(&self) -> Option<&Path> {
         match self {
             Self::Rooms(_) => None,
             Self::Path(path) | Self::Known { path, .. } => Some(path),
+            Self::Files(paths) => paths.first().map(PathBuf::as_path),
         }
     }
 }
@@ -125,6 +128,10 @@ impl Dataset {
             DataPlace::Path(folder) | DataPlace::Known { path: folder, .. } => {
                 Self::of_frames(folder, further)
             }
+            DataPlace::Files(_) => Err(Error::usage(
+                "--data",
+                format_args!("{place}: one folder of frames expected"),
+            )),
         }
     }
 
@@ -213,7 +220,7 @@ impl Dataset {
         match place {
             DataPlace::Rooms(_) => Ok(Some(rooms::labels())),
             DataPlace::Path(path) if path.is_dir() => frames::labels(path),
-            DataPlace::Path(_) | DataPlace::Known { .. } => Ok(None),
+            DataPlace::Path(_) | DataPlace::Files(_) | DataPlace::Known { .. } => Ok(None),
         }
     }
 
@@ -265,13 +272,19 @@ impl Dataset {
             }
             DataPlace::Path(path) => {
                 refuse(questions, "a ready-made set brings its own questions")?;
-                Self::of_set(ready_made::open(path, &stem(path), set)?)
+                let places = std::slice::from_ref(path);
+                Self::of_set(ready_made::open(places, &stem(path), set)?)
+            }
+            DataPlace::Files(paths) => {
+                refuse(questions, "a ready-made set brings its own questions")?;
+                let first = paths.first().map_or(Path::new(""), PathBuf::as_path);
+                Self::of_set(ready_made::open(paths, &stem(first), set)?)
             }
             DataPlace::Known { name, path } => {
                 refuse(questions, "a ready-made set brings its own questions")?;
                 let preset = Some(name.clone());
                 Self::of_set(ready_made::open(
-                    path,
+                    std::slice::from_ref(path),
                     &stem(path),
                     &SetArgs {
                         preset,

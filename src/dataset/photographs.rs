@@ -36,12 +36,11 @@ impl Photographs {
                 return Self::in_folder(path, &set.root.data_root);
             }
             DataPlace::Path(path) if is_image(path) => Dataset::of_images(path, &[])?,
-            DataPlace::Path(path) | DataPlace::Known { path, .. } => {
+            DataPlace::Path(_) | DataPlace::Files(_) | DataPlace::Known { .. } => {
                 let set = Dataset::open(place, None, set)?;
                 let count = set.questions().len();
                 let note = format!(
-                    "{}: its {count} questions are left aside, and --ask is asked about its images",
-                    path.display()
+                    "{place}: its {count} questions are left aside, and --ask is asked about its images"
                 );
                 return Ok(Self {
                     dataset: set.with_questions(Vec::new()),

@@ -19,12 +19,31 @@ use crate::types::{Decides, Family, shell_word};
 #[command(next_help_heading = "Data")]
 pub(crate) struct DataArgs {
     /// A folder of frames, a ready-made set (.parquet, .tsv, .csv, .json, .jsonl, a folder of them; a well-known one by its name, as
-    /// mmbench:FILE), or built-in rooms, rooms:frames=N,seed=N,size=WIDTHxHEIGHT,light=linear
-    #[arg(long, value_name = "DIR|FILE|rooms:…", value_parser = place, default_value_t, add = Decides::Reply)]
-    pub data: DataPlace,
+    /// mmbench:FILE), or built-in rooms, rooms:frames=N,seed=N,size=WIDTHxHEIGHT,light=linear; repeatable for the files of one set
+    #[arg(long, value_name = "DIR|FILE|rooms:…", value_parser = place, default_values_t = [DataPlace::default()], add = Decides::Reply)]
+    pub data: Vec<DataPlace>,
     /// How a ready-made set is read.
     #[command(flatten)]
     pub set: SetArgs,
+}
+
+impl DataArgs {
+    /// The place that the flags name together.
+    pub(crate) fn place(&self) -> DataPlace {
+        match &*self.data {
+            [] => DataPlace::default(),
+            [place] => place.clone(),
+            places => DataPlace::Files(
+                places
+                    .iter()
+                    .map(|place| match place {
+                        DataPlace::Path(path) => path.clone(),
+                        other => PathBuf::from(other.to_string()),
+                    })
+                    .collect(),
+            ),
+        }
+    }
 }
 
 /// The flags that select questions.
@@ -142,6 +161,10 @@ impl fmt::Display for DataPlace {
         match self {
             Self::Rooms(rooms) => write!(f, "rooms:{rooms}"),
             Self::Path(path) => path.display().fmt(f),
+            Self::Files(paths) => {
+                let paths = paths.iter().map(|path| path.display().to_string());
+                f.write_str(&paths.collect::<Vec<String>>().join(", "))
+            }
             Self::Known { name, path } => write!(f, "{name}:{}", path.display()),
         }
     }

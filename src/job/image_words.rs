@@ -16,6 +16,9 @@ use crate::error::{Error, Result};
 use crate::synthesis::{CameraArgs, SensorArgs};
 use crate::types::Decides;
 
+/// The flag that may be given several times, and that a later call replaces as a whole.
+const REPLACED: &str = "data";
+
 /// Flags by their long names: a text, a list of texts, or `true` for a switch.
 pub(crate) type ImageWords = BTreeMap<String, Value>;
 
@@ -78,7 +81,7 @@ pub(crate) fn typed_flags(matches: &ArgMatches) -> Result<ImageWords> {
     for argument in flags.get_arguments() {
         let id = argument.get_id().as_str();
         let (flag, action) = (argument.get_long().unwrap_or(id), argument.get_action());
-        let several = matches!(action, ArgAction::Append);
+        let several = matches!(action, ArgAction::Append) && id != REPLACED;
         let source = match matches.try_contains_id(id) {
             Ok(true) => matches.value_source(id),
             _ => None,
@@ -94,7 +97,9 @@ pub(crate) fn typed_flags(matches: &ArgMatches) -> Result<ImageWords> {
         })?;
         let value = match texts.pop() {
             _ if !action.takes_values() => Value::Bool(true),
-            Some(last) if several => Value::Array([texts, vec![last]].concat()),
+            Some(last) if several || !texts.is_empty() => {
+                Value::Array([texts, vec![last]].concat())
+            }
             Some(last) => last,
             None => continue,
         };

@@ -88,8 +88,8 @@ impl ImageRebuilder {
             (FrameFolder::Walks(folder, walk), recipe)
         } else {
             let dataset = if manifest.identity.contains_key(ASK) {
-                Photographs::at(&flags.data.data, &flags.data.set)?.dataset
-            } else if let Some(dataset) = flags.scene.apart(&flags.data.data)? {
+                Photographs::at(&flags.data.place(), &flags.data.set)?.dataset
+            } else if let Some(dataset) = flags.scene.apart(&flags.data.place())? {
                 dataset
             } else {
                 frames(&flags.data)?
@@ -163,7 +163,7 @@ fn with_new_paths(mut flags: ImageFlags, args: &RebuildArgs) -> Result<ImageFlag
     if let Some(data) = &args.data {
         match &mut flags.walk {
             Some(walk) => walk.folder.clone_from(data),
-            None => flags.data.data = place(&data.to_string_lossy())?,
+            None => flags.data.data = vec![place(&data.to_string_lossy())?],
         }
     }
     if !args.llie.is_empty() {
@@ -174,11 +174,11 @@ fn with_new_paths(mut flags: ImageFlags, args: &RebuildArgs) -> Result<ImageFlag
 
 /// The frames of a data set. Its questions are ignored.
 fn frames(data: &DataArgs) -> Result<Dataset> {
-    match &data.data {
+    match &data.place() {
         DataPlace::Path(path) if path.join("frames.jsonl").is_file() => {
             Dataset::of_frames(path, &data.set.root.data_root)
         }
-        place @ (DataPlace::Path(_) | DataPlace::Known { .. }) => {
+        place @ (DataPlace::Path(_) | DataPlace::Files(_) | DataPlace::Known { .. }) => {
             Dataset::open(place, None, &data.set)
         }
         place @ DataPlace::Rooms(_) => Dataset::open_without_questions(place, &[]),

@@ -26,7 +26,7 @@ pub(super) enum Cell {
     /// Bytes, of a row that is read to show its image.
     Bytes(Vec<u8>),
     /// Bytes that were looked at and not kept, of a row that is read for its question.
-    File(FileFacts),
+    File(Box<FileFacts>),
     List(Vec<Cell>),
     Fields(Vec<(String, Cell)>),
 }
@@ -35,15 +35,15 @@ pub(super) enum Cell {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct FileFacts {
     pub(super) digest: Digest,
-    /// The first bytes, by which the format is known.
-    pub(super) head: Vec<u8>,
+    /// The first bytes, by which the format is known, and zeros behind the end of a shorter file.
+    pub(super) head: [u8; 16],
 }
 
 impl FileFacts {
     pub(super) fn of(bytes: &[u8]) -> Self {
         Self {
             digest: Digest::of(bytes),
-            head: bytes[..bytes.len().min(16)].to_vec(),
+            head: std::array::from_fn(|at| bytes.get(at).copied().unwrap_or(0)),
         }
     }
 }
@@ -52,9 +52,9 @@ impl Cell {
     /// The cell without the bytes of files.
     pub(super) fn without_files(self) -> Self {
         match self {
-            Self::Bytes(bytes) => Self::File(FileFacts::of(&bytes)),
+            Self::Bytes(bytes) => Self::File(Box::new(FileFacts::of(&bytes))),
             Self::Text(text) if text.len() > LONGEST_KEPT => match (decoded(&text), list(&text)) {
-                (Some(bytes), _) => Self::File(FileFacts::of(&bytes)),
+                (Some(bytes), _) => Self::File(Box::new(FileFacts::of(&bytes))),
                 (None, Some(items)) => {
                     let items = items.into_iter();
                     Self::List(items.map(|item| Self::Text(item).without_files()).collect())
@@ -261,8 +261,8 @@ mod tests {
         let file = vec![9; 4000];
         let text = Cell::Text(STANDARD.encode(&file)).without_files();
         assert_eq!(text, Cell::Bytes(file.clone()).without_files());
-        assert_eq!(text, Cell::File(FileFacts::of(&file)));
-        assert_ne!(text, Cell::File(FileFacts::of(&file[1..])));
+        assert_eq!(text, Cell::File(Box::new(FileFacts::of(&file))));
+        assert_ne!(text, Cell::File(Box::new(FileFacts::of(&file[1..]))));
     }
 
     #[test]

@@ -99,7 +99,7 @@ fn collect(cell: &Cell, column: usize, steps: &[Step], found: &mut Vec<RowImage>
         Cell::File(facts) => found.push(RowImage::Embedded {
             column,
             steps: steps.to_vec(),
-            facts: facts.clone(),
+            facts: (**facts).clone(),
         }),
         Cell::List(cells) => {
             for (at, cell) in cells.iter().enumerate() {

@@ -36,7 +36,7 @@ mod text_list;
 mod truths;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::family::{checked, other};
@@ -50,7 +50,7 @@ pub(super) use images::EmbeddedImage;
 pub(super) use preset::{is_known as is_known_set, names as known_sets};
 pub use settings::SetArgs;
 
-use container::{FoundFiles, SetFile};
+use container::{FoundFiles, Joined, SetFile};
 use family_column::FamilyOf;
 use frames::Frames;
 use groups::{GroupRule, Groups};
@@ -64,32 +64,52 @@ use row::Table;
 use summary::Summary;
 use truths::{Answered, is_own, truths};
 
-/// The set at a place: a file, a pattern of files, or a folder.
+/// The set at a place: a file, a pattern of files, a folder, or several files.
 ///
 /// # Errors
 /// If it cannot be read without guessing. The error shows the columns, what was taken for what, and a flag that mends it.
-pub(super) fn open(place: &Path, stem: &str, args: &SetArgs) -> Result<ReadySet> {
+pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<ReadySet> {
+    let place = places.first().map_or(Path::new(""), PathBuf::as_path);
     let preset = preset::named(args.preset.as_deref());
     let args = &preset.map_or_else(|| args.clone(), |preset| preset.beneath(args));
-    let found = container::find(place, args)?;
+    let found = container::find(places, args)?;
     let FoundFiles {
         files,
         folder,
-        blobs,
+        further: allowed,
         archive,
         notes,
+        joined,
     } = found;
     let info = match &archive {
         Some(archive) => FolderInfo::in_archive(archive)?,
         None => FolderInfo::of(&folder)?,
     };
     let mut further = args.root.data_root.clone();
-    further.extend(blobs);
+    further.extend(allowed);
     let root = Root::of(&folder, &further)?;
     let mut table = Table::default();
     let files: Vec<Arc<SetFile>> = files.into_iter().map(Arc::new).collect();
+    let mut header: Option<BTreeSet<String>> = None;
     for file in &files {
         file.read(args.rows.as_deref(), &mut table)?;
+        let columns = table.columns_of_last_file();
+        let first = header.get_or_insert_with(|| columns.clone());
+        if joined == Joined::OneTable
+            && let Some(name) = first.symmetric_difference(&columns).next()
+        {
+            let holder = if columns.contains(name) {
+                file
+            } else {
+                &files[0]
+            };
+            let problem = format!(
+                "not the columns of {}: {name:?} stands in {} alone; files that are joined have the same columns, in any order",
+                files[0].label.path.display(),
+                holder.label.path.display()
+            );
+            return Err(Error::data(file.label.path.display(), problem));
+        }
     }
     let (group, no_group) = preset.map_or((None, None), |preset| preset.group(&table));
     let map = Map::joined(group.iter().chain(&info.map).chain(&args.map));

@@ -1,6 +1,6 @@
 //! The rows of a ready-made set: [`Table`].
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -19,6 +19,8 @@ pub(super) struct Table {
     pub(super) files: Vec<FileLabel>,
     pub(super) columns: Vec<String>,
     places: HashMap<String, usize>,
+    /// Whether the last file has a column.
+    in_last_file: Vec<bool>,
     pub(super) rows: Vec<Row>,
     /// What was done with the rows, in words.
     pub(super) notes: Vec<String>,
@@ -86,13 +88,33 @@ impl fmt::Display for RowPlace {
 }
 
 impl Table {
+    /// A file of rows begins.
+    pub(super) fn begin_file(&mut self, file: FileLabel) {
+        self.files.push(file);
+        self.in_last_file.clear();
+    }
+
+    /// The columns of the last file.
+    pub(super) fn columns_of_last_file(&self) -> BTreeSet<String> {
+        let columns = self.columns.iter().zip(&self.in_last_file);
+        let columns = columns.filter(|(_, is_there)| **is_there);
+        columns.map(|(column, _)| column.clone()).collect()
+    }
+
+    fn saw(&mut self, column: usize) -> usize {
+        let length = self.in_last_file.len().max(column + 1);
+        self.in_last_file.resize(length, false);
+        self.in_last_file[column] = true;
+        column
+    }
+
     /// The index of a column; a new one if there is none of this name.
     ///
     /// # Errors
     /// If there are more than [`MOST_COLUMNS`].
     pub(super) fn column(&mut self, name: &str) -> Result<usize, String> {
         if let Some(&at) = self.places.get(name) {
-            return Ok(at);
+            return Ok(self.saw(at));
         }
         let at = self.columns.len();
         if at == MOST_COLUMNS {
@@ -102,7 +124,7 @@ impl Table {
         }
         self.columns.push(name.to_owned());
         self.places.insert(name.to_owned(), at);
-        Ok(at)
+        Ok(self.saw(at))
     }
 
     /// The index of a column; `None` if there is none of this name.

@@ -225,18 +225,22 @@ fn of_options(
     truths
         .said
         .push(format!("{} ({})", column.name, reading.name()));
-    for (item, answer) in items {
-        let options = item.options.clone().unwrap_or_default();
-        let texts = &options.texts;
+    truths.answered.reserve(items.len());
+    for (mut item, answer) in items {
+        let options = item.options.take().unwrap_or_default();
         let choices = match read_as(reading, (&answer, &options)) {
-            Some(truth) => Choices::new(texts.clone(), truth).map_err(|e| e.to_string()),
+            Some(truth) => Choices::new(options.texts, truth).map_err(|e| e.to_string()),
             None => Err(format!(
-                "the answer {answer:?} is none of the options {texts:?} (read as {}, which fits {fit} rows)",
+                "the answer {answer:?} is none of the options {:?} (read as {}, which fits {fit} rows)",
+                options.texts,
                 reading.name()
             )),
         };
         match choices {
-            Ok(choices) => truths.answered.push(Answered { item, choices }),
+            Ok(choices) => {
+                item.whole = None;
+                truths.answered.push(Answered { item, choices });
+            }
             Err(problem) => left.add(Why::Bad, || format!("{}: {problem}", table.place(item.row))),
         }
     }

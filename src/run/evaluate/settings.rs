@@ -8,7 +8,8 @@ use clap::Args;
 use super::choice_order::{ChoiceOrder, Repeats};
 use crate::ask::{Constrain, Prompts};
 use crate::dataset::{
-    BankArgs, CodesArgs, DataArgs, PixelLimit, ReadingRule, SceneArgs, SelectionArgs,
+    BankArgs, CodesArgs, DataArgs, DataPlace, PixelLimit, ReadingRule, SceneArgs, SelectionArgs,
+    SetArgs,
 };
 use crate::error::{Error, Result};
 use crate::job::models::{ModelName, TextBaseline};
@@ -95,7 +96,9 @@ pub(crate) struct ShrinkArgs {
 /// The settings of an evaluation, validated.
 #[derive(Debug)]
 pub(super) struct Evaluation {
-    pub(super) data: DataArgs,
+    pub(super) place: DataPlace,
+    /// How a ready-made set is read.
+    pub(super) set: SetArgs,
     pub(super) scene: SceneArgs,
     pub(super) selection: SelectionArgs,
     /// The rule by which images are read.
@@ -125,13 +128,10 @@ impl EvaluateArgs {
             return Err(self.job.no_model_error());
         }
         let prompts = self.choice.prompts.as_deref();
-        let data = DataArgs {
-            data: self.scene.place(self.data.data.clone()),
-            ..self.data.clone()
-        };
-        let set_light = self.scene.set_light(&data.data)?;
+        let place = self.scene.place(self.data.place());
+        let set_light = self.scene.set_light(&place)?;
         let experiment = ExperimentSettings {
-            data: data.data.path().map(Path::to_owned),
+            data: place.path().map(Path::to_owned),
             set_light,
             ..self.experiment()
         };
@@ -149,7 +149,8 @@ impl EvaluateArgs {
             } else {
                 ImagePlace::AfterWords
             },
-            data,
+            place,
+            set: self.data.set,
             scene: self.scene,
             selection: self.selection,
             rule: self.codes.rule(self.limit),
@@ -168,7 +169,7 @@ impl EvaluateArgs {
             probabilities: self.choice.probabilities,
             max_side: self.shrink.max_side,
             sampling_seed: None,
-            data: self.data.data.path().map(Path::to_owned),
+            data: self.data.place().path().map(Path::to_owned),
             text_baseline: match self.bank.ask {
                 None => TextBaseline::AsSaid,
                 Some(_) => TextBaseline::Always,

@@ -60,8 +60,8 @@ impl<'a> ChoiceSetup<'a> {
         } else {
             Vec::new()
         };
-        let place = &config.data.data;
-        let set = &config.data.set;
+        let place = &config.place;
+        let set = &config.set;
         let dataset = if let Some(bank) = &config.bank {
             bank.data(place, set, config.rule, progress)?
         } else {
@@ -189,7 +189,7 @@ fn open_models(
     let observer = models.any(|model| matches!(model.id, ModelName::Observer(_)));
     let open = || {
         let rules = config.rules.clone();
-        Observer::open(dataset, &config.data.data, questions, rules)
+        Observer::open(dataset, &config.place, questions, rules)
     };
     let observer = observer.then(open).transpose()?;
     models::open_all(ask, &controls.names, |name| {

@@ -17,12 +17,22 @@ pub(in crate::dataset::ready_made) struct FoundFiles {
     pub(in crate::dataset::ready_made) files: Vec<SetFile>,
     /// The folder of the set.
     pub(in crate::dataset::ready_made) folder: PathBuf,
-    /// A folder outside it into which the links of a hub's cache lead.
-    pub(in crate::dataset::ready_made) blobs: Option<PathBuf>,
+    /// Folders outside it in which files may lie: into which the links of a hub's cache lead, or which hold further files of the user.
+    pub(in crate::dataset::ready_made) further: Vec<PathBuf>,
     /// The ZIP file that holds the set.
     pub(in crate::dataset::ready_made) archive: Option<Arc<Archive>>,
     /// What was passed over, in words.
     pub(in crate::dataset::ready_made) notes: Vec<String>,
+    pub(in crate::dataset::ready_made) joined: Joined,
+}
+
+/// What several files are to each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::dataset::ready_made) enum Joined {
+    /// Parts of one table, with the same columns.
+    OneTable,
+    /// Files of a folder, as its makers laid them.
+    Folder,
 }
 
 /// Whether a folder holds a set of other tools.
@@ -37,7 +47,72 @@ pub(in crate::dataset) fn holds_files(folder: &Path) -> bool {
 ///
 /// # Errors
 /// If there are none, or it is not clear which are meant; the error names what is there.
-pub(in crate::dataset::ready_made) fn find(place: &Path, args: &SetArgs) -> Result<FoundFiles> {
+pub(in crate::dataset::ready_made) fn find(
+    places: &[PathBuf],
+    args: &SetArgs,
+) -> Result<FoundFiles> {
+    match places {
+        [place] => at_place(place, args),
+        places => of_files(places, args),
+    }
+}
+
+/// Several files that the user names, in this order.
+fn of_files(places: &[PathBuf], args: &SetArgs) -> Result<FoundFiles> {
+    refuse_choice("several files", args)?;
+    let mut files = Vec::with_capacity(places.len());
+    for place in places {
+        if !place.is_file() || ending(place) == "zip" {
+            let problem = format_args!(
+                "{}: no file of questions; several --data name the files of one set",
+                place.display()
+            );
+            return Err(Error::usage("--data", problem));
+        }
+        if places.iter().filter(|other| *other == place).count() > 1 {
+            let problem = format_args!("{} is named twice", place.display());
+            return Err(Error::usage("--data", problem));
+        }
+        files.push(SetFile::open(place.clone(), String::new())?);
+    }
+    let mut folders = places.iter().map(|place| folder_of(place));
+    Ok(FoundFiles {
+        files,
+        folder: folders.next().unwrap_or_default(),
+        further: folders.collect(),
+        archive: None,
+        notes: check_shards(places)
+            .err()
+            .map(|e| e.to_string())
+            .into_iter()
+            .collect(),
+        joined: Joined::OneTable,
+    })
+}
+
+/// The folder of a file, which may be the current one.
+fn folder_of(file: &Path) -> PathBuf {
+    match file.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
+        _ => PathBuf::from("."),
+    }
+}
+
+/// Refuses flags that choose among the files of a folder.
+fn refuse_choice(text: &str, args: &SetArgs) -> Result<()> {
+    for (flag, value) in [
+        ("--config-name", &args.config_name),
+        ("--split", &args.split),
+    ] {
+        if let Some(value) = value {
+            let problem = format_args!("{text} is no folder that {value:?} could be chosen from");
+            return Err(Error::usage(flag, problem));
+        }
+    }
+    Ok(())
+}
+
+fn at_place(place: &Path, args: &SetArgs) -> Result<FoundFiles> {
     if place.is_dir() {
         return of_tree(&Tree::of_folder(place)?, args);
     }
@@ -50,21 +125,14 @@ pub(in crate::dataset::ready_made) fn find(place: &Path, args: &SetArgs) -> Resu
         let archive = Arc::new(Archive::open(place)?);
         return of_tree(&Tree::Archive(archive), args);
     }
-    for (flag, value) in [
-        ("--config-name", &args.config_name),
-        ("--split", &args.split),
-    ] {
-        if let Some(value) = value {
-            let problem = format_args!("{text} is no folder that {value:?} could be chosen from");
-            return Err(Error::usage(flag, problem));
-        }
-    }
+    refuse_choice(&text, args)?;
     if place.is_file() {
         return Ok(FoundFiles {
             files: vec![SetFile::open(place.to_owned(), String::new())?],
             folder: place.parent().unwrap_or(Path::new("")).to_owned(),
-            blobs: None,
+            further: Vec::new(),
             archive: None,
+            joined: Joined::OneTable,
             notes: shard_alone(place).into_iter().collect(),
         });
     }
@@ -91,8 +159,9 @@ fn of_pattern(place: &Path, text: &str) -> Result<FoundFiles> {
     Ok(FoundFiles {
         files: files.collect::<Result<_>>()?,
         folder,
-        blobs: None,
+        further: Vec::new(),
         archive: None,
+        joined: Joined::OneTable,
         notes: Vec::new(),
     })
 }
@@ -119,14 +188,16 @@ fn of_tree(tree: &Tree, args: &SetArgs) -> Result<FoundFiles> {
         Tree::Folder { folder, blobs } => FoundFiles {
             files,
             folder: folder.clone(),
-            blobs: blobs.clone(),
+            further: blobs.iter().cloned().collect(),
+            joined: Joined::Folder,
             archive: None,
             notes,
         },
         Tree::Archive(archive) => FoundFiles {
             files,
             folder: archive.path.parent().unwrap_or(Path::new("")).to_owned(),
-            blobs: None,
+            further: Vec::new(),
+            joined: Joined::Folder,
             archive: Some(Arc::clone(archive)),
             notes,
         },

@@ -27,7 +27,7 @@ use crate::error::{Error, Result};
 
 pub(in crate::dataset) use archive::Archive;
 pub(in crate::dataset) use find::holds_files;
-pub(super) use find::{FoundFiles, find};
+pub(super) use find::{FoundFiles, Joined, find};
 
 /// The endings of the files that are read.
 pub(super) const READ: &str =
@@ -126,7 +126,7 @@ impl SetFile {
             );
             return Err(Error::usage("--rows", problem));
         }
-        table.files.push(self.label.clone());
+        table.begin_file(self.label.clone());
         let path = self.read_path();
         match self.kind {
             FileKind::Table { delimiter } => table::read(path, delimiter, table),

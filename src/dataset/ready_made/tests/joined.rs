@@ -265,3 +265,44 @@ fn a_bmp_image_is_read() {
         "{problem}"
     );
 }
+
+#[test]
+fn several_files_of_one_set_are_joined_in_their_order() {
+    let rows = |id: i64| {
+        [row(question(
+            json!({"id": id, "image": format!("{id}.png")}),
+        ))]
+    };
+    let (folder, path) = set("b/one.csv", &rows(1));
+    let second = folder.path().join("a/two.tsv");
+    fs::create_dir(second.parent().unwrap()).unwrap();
+    super::fixture::write(&second, &rows(2));
+    fs::write(path.with_file_name("1.png"), png(1)).unwrap();
+    fs::write(second.with_file_name("2.png"), png(2)).unwrap();
+    let joined = |paths: &[&std::path::PathBuf]| {
+        let paths = paths.iter().map(|path| (*path).clone()).collect();
+        let place = crate::dataset::DataPlace::Files(paths);
+        crate::dataset::Dataset::open(&place, None, &SetArgs::default())
+    };
+    let both = read(&joined(&[&path, &second]).unwrap());
+    let ids: Vec<(&str, u8)> = both.iter().map(|read| (read.0.as_str(), read.5)).collect();
+    assert_eq!(ids, [("1", 1), ("2", 2)]);
+    let turned = read(&joined(&[&second, &path]).unwrap());
+    assert_eq!(turned[0].0, "2");
+    // Other columns, a folder, and the same file again are refused.
+    let other = folder.path().join("b/other.csv");
+    super::fixture::write(&other, &[row(question(json!({"id": 3, "hint": "h"})))]);
+    let problem = joined(&[&path, &other]).unwrap_err().to_string();
+    assert!(
+        problem.contains("other.csv")
+            && problem.contains("\"hint\" stands in")
+            && problem.contains("have the same columns"),
+        "{problem}"
+    );
+    let problem = refusal(&folder.path().join("b/*.csv"), &SetArgs::default());
+    assert!(problem.contains("\"hint\" stands in"), "{problem}");
+    for wrong in [&folder.path().to_owned(), &path] {
+        let problem = joined(&[&path, wrong]).unwrap_err().to_string();
+        assert!(problem.contains("--data"), "{problem}");
+    }
+}

@@ -53,7 +53,7 @@ pub(crate) fn check(
     progress: &Progress,
 ) -> Result<Outcome> {
     if let Some(place) = &check.place {
-        args.data.data = place.clone();
+        args.data.data = vec![place.clone()];
     }
     let is_json = std::mem::take(&mut args.job.output.show.json);
     args.job.money.dry_run = true;
@@ -112,7 +112,7 @@ fn data(
 ) -> Result<usize> {
     let rule = args.codes.rule(args.limit);
     let selection = &args.selection;
-    let place = args.scene.place(args.data.data.clone());
+    let place = args.scene.place(args.data.place());
     let set = &args.data.set;
     let bank = QuestionBank::open(&args.bank);
     let opened = bank.and_then(|bank| {

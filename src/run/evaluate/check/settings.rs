@@ -15,7 +15,7 @@ use crate::types::Rgb;
 
 /// Looks at the flags and the files that they name; no data is read.
 pub(super) fn settings(args: &EvaluateArgs, findings: &mut Findings) {
-    let place = args.scene.place(args.data.data.clone());
+    let place = args.scene.place(args.data.place());
     let set = args.scene.set_light(&place);
     let enhancers = |set| args.job.enhancers.clone().for_set(set);
     let light = set.and_then(|set| Ok((set, LightSettings::resolve(&args.job.light, set)?)));
