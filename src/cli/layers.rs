@@ -189,7 +189,7 @@ fn environment_values(
         let flag = key(arg);
         let origin = variable_name(&flag);
         let text = variable(&origin).filter(|text| !text.is_empty())?;
-        let list = matches!(arg.get_action(), ArgAction::Append);
+        let list = matches!(arg.get_action(), ArgAction::Append) && !WITH_COMMAS.contains(&&*flag);
         let values = match text.to_str() {
             Some(text) if list => text.split(',').map(OsString::from).collect(),
             _ => vec![text],
@@ -198,6 +198,9 @@ fn environment_values(
     });
     Ok(values.collect())
 }
+
+/// Repeatable flags of which one value may hold commas.
+const WITH_COMMAS: [&str; 2] = ["data", "map"];
 
 /// The variable of a flag.
 fn variable_name(flag: &str) -> String {

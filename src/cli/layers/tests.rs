@@ -351,3 +351,25 @@ fn words_after_two_dashes_stay_where_they_are() {
     assert_eq!(values(&matches, "inputs"), ["--odd-name.png"]);
     assert_eq!(values(&matches, "seed"), ["9"]);
 }
+
+#[test]
+fn a_place_of_data_with_commas_is_one_value_and_several_are_several() {
+    let rooms = "rooms:frames=4,seed=7";
+    let of = |words: &[&str], variables: &[(&str, &str)], file: &str| {
+        values(&parsed(words, variables, file).unwrap(), "data")
+    };
+    assert_eq!(of(&["check"], &[("DARKQA_DATA", rooms)], ""), [rooms]);
+    assert_eq!(
+        of(&["check"], &[], "data = [\"a.csv\", \"b.csv\"]"),
+        ["a.csv", "b.csv"]
+    );
+    // A call replaces what a variable says, and does not add to it.
+    let typed = ["check", "--data", "a.csv", "--data=b.csv"];
+    assert_eq!(
+        of(&typed, &[("DARKQA_DATA", rooms)], ""),
+        ["a.csv", "b.csv"]
+    );
+    let map = "question=q,options=A,B";
+    let matches = parsed(&["check"], &[("DARKQA_MAP", map)], "").unwrap();
+    assert_eq!(values(&matches, "map"), [map]);
+}

@@ -120,6 +120,7 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
     };
     let (roles, set) = read(&table, &map, args, preset, ImagesAre::Files)
         .map_err(|problem| wrong(&table, problem))?;
+    table.forget(&roles.read_once());
     let name = match &*info.name {
         "" => stem.to_owned(),
         name => name.to_owned(),

@@ -1,5 +1,7 @@
 //! Which column of a set is which: [`Roles`].
 
+use std::collections::BTreeSet;
+
 use super::cell::Cell;
 use super::map::{How, Map, flag};
 use super::names::{Role, known, plain};
@@ -130,6 +132,27 @@ impl Roles {
                 How::ByRule | How::Answer(_) => None,
             }),
         })
+    }
+
+    /// The columns that nobody reads again once the questions have their text, their options and their answers: not those of images,
+    /// ids and families.
+    pub(super) fn read_once(&self) -> BTreeSet<usize> {
+        let (Images::First(images) | Images::All(images)) = &self.images else {
+            // A template may name any column.
+            return BTreeSet::new();
+        };
+        let families = match &self.families {
+            Families::Known(columns) => columns.as_slice(),
+            Families::Said(column) => column.as_slice(),
+        };
+        let kept = images.iter().chain(&self.ids).chain(families);
+        let kept: BTreeSet<usize> = kept.chain(&self.evidence).map(|column| column.at).collect();
+        let read = std::iter::once(&self.question).chain(&self.hint);
+        let read = read.chain(&self.options).chain(&self.cells);
+        read.chain(&self.answers)
+            .map(|column| column.at)
+            .filter(|at| !kept.contains(at))
+            .collect()
     }
 
     /// The columns of a role: those of the map, or those with one of its names, the best first.

@@ -146,6 +146,17 @@ impl Table {
         });
     }
 
+    /// Frees the cells of columns that are not read again.
+    pub(super) fn forget(&mut self, columns: &BTreeSet<usize>) {
+        for row in &mut self.rows {
+            for at in columns {
+                if let Some(cell) = row.cells.get_mut(*at) {
+                    *cell = Cell::Absent;
+                }
+            }
+        }
+    }
+
     /// Adds a column of ids from a row on, if there is no column of ids.
     ///
     /// # Errors
