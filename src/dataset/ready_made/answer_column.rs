@@ -54,7 +54,7 @@ pub(super) fn of_options<'a>(
             .collect()
         };
         let all = Reading::ALL.map(said);
-        let most = all.iter().map(|said| read(said)).max().unwrap_or(0);
+        let most = all.iter().map(read).max().unwrap_or(0);
         // A text that happens to be an option here and there is no column of answers.
         if 2 * most <= filled {
             return None;

@@ -3,6 +3,7 @@
 use std::fs;
 use std::io::Write as _;
 
+use base64::Engine as _;
 use serde_json::{Value, json};
 
 use super::super::settings::LeaveOut;
@@ -241,7 +242,6 @@ fn a_bmp_image_is_read() {
     let mut file = std::io::Cursor::new(Vec::new());
     let image = image::RgbImage::from_fn(8, 8, |x, _| image::Rgb([7, x as u8, 0]));
     image.write_to(&mut file, image::ImageFormat::Bmp).unwrap();
-    use base64::Engine as _;
     let text = base64::engine::general_purpose::STANDARD.encode(file.into_inner());
     let (_folder, path) = set("set.jsonl", &[row(question(json!({"image": text})))]);
     let dataset = open(&path, &SetArgs::default()).unwrap();

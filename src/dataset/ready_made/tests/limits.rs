@@ -27,10 +27,9 @@ fn a_table_of_too_many_columns_is_named() {
         ("set.csv", header.join(",") + "\n1\n"),
         (
             "set.jsonl",
-            header
-                .iter()
-                .map(|name| format!("{{{name:?}: 1}}\n"))
-                .collect(),
+            header.iter().fold(String::new(), |text, name| {
+                text + &format!("{{{name:?}: 1}}\n")
+            }),
         ),
         (
             "set.json",

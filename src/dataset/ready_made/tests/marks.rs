@@ -7,7 +7,8 @@ use super::fixture::{base64, row, set};
 use super::{map, open, read, refusal};
 use crate::dataset::ready_made::SetArgs;
 
-fn asked(question: &str, answer: Value) -> Value {
+fn asked(question: &str, answer: impl Into<Value>) -> Value {
+    let answer = answer.into();
     json!({"question": question, "answer": answer, "image": base64(1)})
 }
 
