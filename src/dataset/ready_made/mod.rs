@@ -14,7 +14,9 @@ mod answer_column;
 mod answers;
 mod cell;
 mod container;
+mod contradiction;
 mod family_column;
+mod folder_info;
 mod frames;
 mod groups;
 mod images;
@@ -52,6 +54,7 @@ pub use settings::SetArgs;
 
 use container::{FoundFiles, Joined, SetFile};
 use family_column::FamilyOf;
+use folder_info::FolderInfo;
 use frames::Frames;
 use groups::{GroupRule, Groups};
 use images::ImagesAre;
@@ -235,7 +238,7 @@ fn finish(
 ) -> Result<Finished> {
     let mut ids = frames.ids(&set.answered)?;
     if !ids.contradictory().is_empty() {
-        leave_out(opened, &mut set, ids.contradictory())?;
+        contradiction::leave_out(opened, &mut set, ids.contradictory())?;
         ids = frames.ids(&set.answered)?;
     }
     let family = FamilyOf::of(opened.table, &opened.roles.families, &set.answered);
@@ -262,44 +265,6 @@ fn finish(
         sources,
         reading,
     })
-}
-
-/// Leaves out both questions of each pair that differs in its answers alone, if the user allows it.
-fn leave_out(opened: &Opened<'_>, set: &mut ReadSet, pairs: &[[usize; 2]]) -> Result<()> {
-    let mut wrong = BTreeSet::new();
-    for pair in pairs {
-        for at in pair {
-            let is_new = wrong.insert(*at);
-            if is_new {
-                set.left.add(Why::Bad, || {
-                    contradiction(opened.table, &set.answered, *pair)
-                });
-            }
-        }
-    }
-    let problem = |problem: String| Error::data(opened.place.display(), problem);
-    set.left
-        .check(opened.table.rows.len(), opened.args)
-        .map_err(problem)?;
-    let mut at = 0;
-    set.answered.retain(|_| {
-        at += 1;
-        !wrong.contains(&(at - 1))
-    });
-    if set.answered.is_empty() {
-        return Err(problem("no row is left to ask".to_owned()));
-    }
-    Ok(())
-}
-
-/// Two questions that differ in their answers alone, in words.
-fn contradiction(table: &Table, answered: &[Answered], pair: [usize; 2]) -> String {
-    let [one, other] = pair.map(|at| {
-        let (item, choices) = (&answered[at].item, &answered[at].choices);
-        let truth = choices.truth().map_or("", |truth| &choices.texts()[truth]);
-        format!("{} ({truth:?})", table.place(item.row))
-    });
-    format!("{one} and {other} ask the same of the same image, and their answers differ")
 }
 
 /// The rows of a set with their truths.
@@ -410,45 +375,6 @@ fn questions(
         });
     }
     Ok((questions, frames.take_sources()))
-}
-
-/// What the `dataset.json` of a folder says of a set.
-#[derive(Debug, Default)]
-struct FolderInfo {
-    name: String,
-    map: Option<Map>,
-}
-
-impl FolderInfo {
-    const FILE: &str = "dataset.json";
-
-    fn of(folder: &Path) -> Result<Self> {
-        let path = folder.join(Self::FILE);
-        if !path.is_file() {
-            return Ok(Self::default());
-        }
-        Self::read(&path, &crate::files::reading::json(&path)?)
-    }
-
-    fn in_archive(archive: &Archive) -> Result<Self> {
-        if !archive.has(Self::FILE) {
-            return Ok(Self::default());
-        }
-        let path = archive.path().join(Self::FILE);
-        let text = archive.text(Self::FILE)?;
-        let info = serde_json::from_str(&text).map_err(|e| Error::data(path.display(), e))?;
-        Self::read(&path, &info)
-    }
-
-    fn read(path: &Path, info: &serde_json::Value) -> Result<Self> {
-        let text = |key: &str| info.get(key).and_then(serde_json::Value::as_str);
-        let map = text("map").map(str::parse).transpose();
-        let wrong = |problem: String| Error::data(path.display(), format_args!("map: {problem}"));
-        Ok(Self {
-            name: text("name").unwrap_or_default().to_owned(),
-            map: map.map_err(wrong)?,
-        })
-    }
 }
 
 #[cfg(test)]
