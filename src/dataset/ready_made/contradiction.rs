@@ -2,40 +2,39 @@
 
 use std::collections::BTreeSet;
 
-use super::left_out::Why;
+use super::left_out::{LeftOut, Why};
 use super::row::Table;
+use super::settings::SetArgs;
 use super::truths::Answered;
-use super::{Opened, ReadSet};
-use crate::error::{Error, Result};
 
 /// Leaves out both questions of each pair that differs in its answers alone, if the user allows it.
+///
+/// # Errors
+/// If the user does not; the error names the first pair.
 pub(super) fn leave_out(
-    opened: &Opened<'_>,
-    set: &mut ReadSet,
+    table: &Table,
+    args: &SetArgs,
+    answered: &mut Vec<Answered>,
+    left: &mut LeftOut,
     pairs: &[[usize; 2]],
-) -> Result<()> {
+) -> Result<(), String> {
     let mut wrong = BTreeSet::new();
     for pair in pairs {
         for at in pair {
             let is_new = wrong.insert(*at);
             if is_new {
-                set.left.add(Why::Bad, || {
-                    contradiction(opened.table, &set.answered, *pair)
-                });
+                left.add(Why::Bad, || contradiction(table, answered, *pair));
             }
         }
     }
-    let problem = |problem: String| Error::data(opened.place.display(), problem);
-    set.left
-        .check(opened.table.rows.len(), opened.args)
-        .map_err(problem)?;
+    left.check(table.rows.len(), args)?;
     let mut at = 0;
-    set.answered.retain(|_| {
+    answered.retain(|_| {
         at += 1;
         !wrong.contains(&(at - 1))
     });
-    if set.answered.is_empty() {
-        return Err(problem("no row is left to ask".to_owned()));
+    if answered.is_empty() {
+        return Err("no row is left to ask".to_owned());
     }
     Ok(())
 }

@@ -53,6 +53,7 @@ pub(super) use preset::{is_known as is_known_set, names as known_sets};
 pub use settings::SetArgs;
 
 use container::{FoundFiles, Joined, SetFile};
+use contradiction::leave_out;
 use family_column::FamilyOf;
 use folder_info::FolderInfo;
 use frames::Frames;
@@ -238,7 +239,15 @@ fn finish(
 ) -> Result<Finished> {
     let mut ids = frames.ids(&set.answered)?;
     if !ids.contradictory().is_empty() {
-        contradiction::leave_out(opened, &mut set, ids.contradictory())?;
+        let pairs = ids.contradictory();
+        leave_out(
+            opened.table,
+            opened.args,
+            &mut set.answered,
+            &mut set.left,
+            pairs,
+        )
+        .map_err(|problem| Error::data(opened.place.display(), problem))?;
         ids = frames.ids(&set.answered)?;
     }
     let family = FamilyOf::of(opened.table, &opened.roles.families, &set.answered);

@@ -9,7 +9,7 @@ use std::sync::{Mutex, PoisonError};
 use tempfile::NamedTempFile;
 use zip::ZipArchive;
 
-use super::most_unpacked;
+use super::packed::most_unpacked;
 use crate::error::{Error, Result};
 use crate::types::FrameId;
 

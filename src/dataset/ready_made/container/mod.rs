@@ -6,6 +6,7 @@ mod choose;
 mod find;
 mod json;
 mod json_scan;
+mod packed;
 mod parquet;
 mod shards;
 mod splits;
@@ -14,13 +15,12 @@ mod tree;
 mod yaml;
 
 use std::fs::File;
-use std::io::{BufReader, Read as _};
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use super::cell::Cell;
 use super::row::{FileLabel, RowPlace, Table};
 use super::step::Step;
-use flate2::read::MultiGzDecoder;
 use tempfile::NamedTempFile;
 
 use crate::error::{Error, Result};
@@ -58,7 +58,7 @@ impl SetFile {
     pub(super) fn open(path: PathBuf, config: String) -> Result<Self> {
         check_content(&path)?;
         let unpacked = if ending(&path) == "gz" {
-            Some(unpacked(&path)?)
+            Some(packed::unpacked(&path)?)
         } else {
             None
         };
@@ -176,34 +176,6 @@ impl SetFile {
 fn ending(path: &Path) -> String {
     let ending = path.extension().and_then(|ending| ending.to_str());
     ending.unwrap_or_default().to_ascii_lowercase()
-}
-
-/// The longest content of a packed file of so many bytes: no table is packed to less than a two-hundredth, but what is meant to fill a
-/// disk is.
-fn most_unpacked(packed: u64) -> u64 {
-    packed.saturating_mul(200).max(1 << 30)
-}
-
-fn too_long(most: u64) -> String {
-    format!(
-        "unpacks to more than {} MB, which no table of its length does; unpack it and name the file in it",
-        most >> 20
-    )
-}
-
-/// An unpacked copy of a compressed file. Images are read at their places in it, which a compressed file does not have.
-fn unpacked(path: &Path) -> Result<NamedTempFile> {
-    let file = File::open(path).map_err(|e| Error::file(path, "read", e))?;
-    let mut copy =
-        NamedTempFile::new().map_err(|e| Error::file(std::env::temp_dir(), "write", e))?;
-    let most = most_unpacked(file.metadata().map_or(0, |facts| facts.len()));
-    let mut content = MultiGzDecoder::new(BufReader::new(file)).take(most + 1);
-    let copied = std::io::copy(&mut content, &mut copy)
-        .map_err(|e| Error::data(path.display(), format_args!("cannot be unpacked: {e}")))?;
-    if copied > most {
-        return Err(Error::data(path.display(), too_long(most)));
-    }
-    Ok(copy)
 }
 
 /// Refuses a pointer of Git LFS, which stands where a file was not downloaded.
