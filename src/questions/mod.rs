@@ -14,6 +14,7 @@ mod color_tree;
 pub(crate) mod colors;
 pub(crate) mod frequency;
 pub(crate) mod generate;
+pub(crate) mod look;
 pub(crate) mod observer;
 pub(crate) mod pick;
 mod presence;

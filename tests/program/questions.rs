@@ -484,6 +484,39 @@ fn statistics_are_written_in_every_form() {
 }
 
 #[test]
+fn two_sets_are_compared_by_how_they_look() {
+    let (data, out, other) = (Data::of(&[bedroom("a")]), folder(), folder());
+    let to_other = ["--against", other.path().to_str().unwrap()];
+    let with_json = [to_other[0], to_other[1], "--json"];
+    data.ask(out.path(), &to_other)
+        .refused(&["neither a frames.jsonl nor any PNG"]);
+    // A folder of plain pictures: half of white, without any edge.
+    let grey = RgbImage::from_pixel(SIZE.0, SIZE.1, Rgb([188; 3]));
+    grey.save(other.path().join("grey.png")).unwrap();
+    let json: Value = serde_json::from_str(&data.ask(out.path(), &with_json).out).unwrap();
+    let rows = &json["against"]["rows"];
+    let [light, edges, segments] = [0, 1, 2].map(|row: usize| rows[row]["quartiles"].clone());
+    assert!(
+        (light[1][1].as_f64().unwrap() + 1.0).abs() < 0.01,
+        "{light}"
+    );
+    assert_eq!(edges[1], json!([0.0, 0.0, 0.0]));
+    assert!(edges[0][1].as_f64().unwrap() > 1.0, "{edges}");
+    // Seven things with maps, and no maps.
+    assert_eq!(segments, json!([[7.0, 7.0, 7.0], null]));
+    // A set is within itself, and what is asked is the same with the comparison as without it.
+    let own = ["--against", data.0.path().to_str().unwrap()];
+    let (alone, compared) = (data.ask(out.path(), &[]), data.ask(out.path(), &own));
+    assert!(
+        compared.out.contains("within") && !compared.out.contains("above"),
+        "{}",
+        compared.out
+    );
+    assert!(!alone.out.contains("within"), "{}", alone.out);
+    assert_eq!(alone.questions, compared.questions);
+}
+
+#[test]
 fn questions_are_evaluated_as_they_are() {
     let (data, out) = (Data::of(&[bedroom("s")]), folder());
     let outcome = data.ask(out.path(), &["--balance", "none"]);

@@ -1,11 +1,13 @@
 //! Statistics of a set of questions: a table, files of all counts, and a figure.
 
+pub(crate) mod against;
 pub(crate) mod checks;
 pub(crate) mod figure;
 pub(crate) mod review;
 
 use std::fmt::{Display, Write as _};
 
+use against::LookComparison;
 use serde::Serialize;
 
 use super::table::ColumnKind::{Count, Text};
@@ -137,24 +139,31 @@ fn variant_words<T: serde::Serialize>(value: &T) -> String {
     json.as_str().unwrap_or_default().replace('_', " ")
 }
 
-/// The summary, with what people found about the questions.
+/// The summary, with what people found about the questions and the comparison with another set.
 #[derive(Serialize)]
 struct WrittenSummary<'a> {
     #[serde(flatten)]
     summary: &'a QuestionSummary,
     #[serde(skip_serializing_if = "Option::is_none")]
     checks: Option<serde_json::Value>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    against: Option<&'a LookComparison>,
 }
 
-/// The summary as JSON, with what people found about the questions.
+/// The summary as JSON, with what people found about the questions and the comparison with another set, if there is one.
 ///
 /// # Errors
 /// If the statistics cannot be written.
-pub(crate) fn json(summary: &QuestionSummary, checks: &Checks) -> Result<String> {
+pub(crate) fn json(
+    summary: &QuestionSummary,
+    checks: &Checks,
+    against: Option<&LookComparison>,
+) -> Result<String> {
     let wrong = |e: serde_json::Error| Error::data("statistics", e);
     let written = WrittenSummary {
         summary,
         checks: (!checks.is_empty()).then(|| checks::json(checks)),
+        against,
     };
     Ok(serde_json::to_string_pretty(&written).map_err(wrong)? + "\n")
 }

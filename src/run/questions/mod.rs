@@ -1,5 +1,6 @@
 //! `questions`: making multiple-choice questions about frames, by rule.
 
+mod against;
 mod checked;
 mod statistics_cache;
 
@@ -29,6 +30,7 @@ use crate::questions::statistics::{self, FrameStatistics, measure, unknown_label
 use crate::questions::summary::QuestionSummary;
 use crate::questions::{Generated, GeneratedQuestion, QuestionRequest, generate};
 use crate::report;
+use crate::report::questions::against::LookComparison;
 use crate::types::manifest::Status;
 use crate::types::{Decides, Digest, Family, FrameId, Labels, QuestionId};
 
@@ -67,6 +69,10 @@ pub(crate) struct QuestionsArgs {
     /// Write the statistics of frames, questions and answers: JSON, CSV and a figure; default: not written
     #[arg(long, value_name = "DIR", help_heading = "Checking", add = Decides::Nothing)]
     pub stats: Option<PathBuf>,
+    /// Compare how the frames look (light, edges, segments, depth, colours) with those of another folder, with or without maps;
+    /// default: not compared
+    #[arg(long, value_name = "DIR", help_heading = "Checking", add = Decides::Nothing)]
+    pub against: Option<PathBuf>,
     /// Write a page on which a person answers each question before the rule's answer is shown, and which saves what was found;
     /// default: not written
     #[arg(long, value_name = "FILE.html", help_heading = "Checking", add = Decides::Nothing)]
@@ -183,15 +189,22 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
         write(path, &lines(candidates)?)?;
     }
     let summary = QuestionSummary::new(&frames, &generated, &request, failed);
-    let json = report::questions::json(&summary, &verdicts.checks)?;
+    let compared = match &args.against {
+        Some(folder) => {
+            let other = Dataset::of_images(folder)?.with_rule(args.codes.rule(args.limit));
+            let sets = [&dataset, &other];
+            Some(against::compare(
+                sets,
+                &making.palette,
+                args.threads,
+                progress,
+            )?)
+        }
+        None => None,
+    };
+    let json = report::questions::json(&summary, &verdicts.checks, compared.as_ref())?;
     if let Some(folder) = &args.stats {
-        write(&folder.join("statistics.json"), json.as_bytes())?;
-        write(
-            &folder.join("statistics.csv"),
-            &report::questions::csv(&summary)?,
-        )?;
-        let figure = report::questions::figure::figure(&summary)?;
-        write(&folder.join("statistics.svg"), figure.as_bytes())?;
+        write_statistics(folder, &summary, &json)?;
     }
     if let Some(page) = &args.review {
         checked::review(page, &dataset, &frames, &generated.asked)?;
@@ -206,14 +219,23 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
         output: if args.json {
             json
         } else {
-            format!(
-                "{}{}{}\n",
-                report::questions::table(&summary),
-                report::questions::checks::text(&verdicts.checks),
-                args.out.display()
-            )
+            let looks = compared
+                .as_ref()
+                .map_or_else(String::new, LookComparison::table);
+            let table = report::questions::table(&summary);
+            let checks = report::questions::checks::text(&verdicts.checks);
+            format!("{table}{looks}{checks}{}\n", args.out.display())
         },
     })
+}
+
+/// Writes the statistics into a folder in every form.
+fn write_statistics(folder: &Path, summary: &QuestionSummary, json: &str) -> Result<()> {
+    let csv = report::questions::csv(summary)?;
+    let figure = report::questions::figure::figure(summary)?;
+    write(&folder.join("statistics.json"), json.as_bytes())?;
+    write(&folder.join("statistics.csv"), &csv)?;
+    write(&folder.join("statistics.svg"), figure.as_bytes())
 }
 
 /// Warns of results that are valid but probably not intended.

@@ -1,0 +1,61 @@
+//! `questions --against`: how the frames look, beside those of another set.
+
+use rayon::prelude::*;
+
+use crate::dataset::Dataset;
+use crate::error::{Error, Result};
+use crate::job::input_tally::InputTally;
+use crate::job::progress::Progress;
+use crate::job::workers::{ThreadArgs, pool};
+use crate::questions::colors::Palette;
+use crate::questions::look::FrameLook;
+use crate::report::questions::against::LookComparison;
+use crate::types::FrameId;
+
+/// The comparison of two sets of frames.
+///
+/// # Errors
+/// If a set has no images, or one of them cannot be read: left out, it would change what is compared.
+pub(super) fn compare(
+    sets: [&Dataset; 2],
+    palette: &Palette,
+    threads: ThreadArgs,
+    progress: &Progress,
+) -> Result<LookComparison> {
+    let looks = |set: &Dataset| {
+        let found = looks(set, palette, threads, progress)?;
+        if found.is_empty() {
+            return Err(Error::data(set.name(), "no images to compare"));
+        }
+        Ok(found)
+    };
+    let [first, other] = [looks(sets[0])?, looks(sets[1])?];
+    Ok(LookComparison::new([
+        (sets[0].name(), &first),
+        (sets[1].name(), &other),
+    ]))
+}
+
+/// The look of each frame.
+fn looks(
+    dataset: &Dataset,
+    palette: &Palette,
+    threads: ThreadArgs,
+    progress: &Progress,
+) -> Result<Vec<FrameLook>> {
+    let (names, tally): (Vec<&FrameId>, _) = (dataset.frames().collect(), InputTally::default());
+    let bar = progress.bar("looks", names.len());
+    let looks = pool(threads.threads)?.install(|| {
+        let frames = names.par_iter().map(|name| {
+            let files = dataset.files(name)?;
+            tally.add(name, &files.note());
+            let look = FrameLook::of(&files.decode()?, palette);
+            bar.inc();
+            Ok(look)
+        });
+        frames.collect::<Result<Vec<FrameLook>>>()
+    });
+    drop(bar);
+    tally.warn();
+    looks
+}
