@@ -7,22 +7,33 @@ use glam::{Vec3, Vec3A};
 pub(super) struct Ray {
     pub(super) from: Vec3,
     pub(super) direction: Vec3,
+    /// The width of the ray per metre of its length.
+    pub(super) spread: f32,
     start: Vec3A,
     invert: Vec3A,
 }
 
 impl Ray {
+    /// The ray with this width per metre of its length.
+    pub(super) fn wide(self, spread: f32) -> Self {
+        Self { spread, ..self }
+    }
+
     pub(super) fn new(from: Vec3, direction: Vec3) -> Self {
         // No component is 0, so that 0 × ∞ cannot occur: its result differs between machines.
         let part = |value: f32| 1.0 / if value.abs() < 1e-9 { 1e-9 } else { value };
         Self {
             from,
             direction,
+            spread: COARSE,
             start: from.into(),
             invert: Vec3A::new(part(direction.x), part(direction.y), part(direction.z)),
         }
     }
 }
+
+/// The width per metre of a ray that looks for light, which sees no details (chosen).
+const COARSE: f32 = 0.06;
 
 /// The point where a ray hits a triangle.
 #[derive(Debug, Clone, Copy)]

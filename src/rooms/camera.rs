@@ -84,7 +84,7 @@ impl Camera {
     pub(super) fn ray(&self, x: f32, y: f32) -> Ray {
         let [cx, cy] = self.middle();
         let direction = vec3((x - cx) / self.focal, (cy - y) / self.focal, -1.0);
-        Ray::new(self.at, self.to_room(direction).normalize())
+        Ray::new(self.at, self.to_room(direction).normalize()).wide(1.0 / self.focal)
     }
 
     /// Whether a point is within the view, hidden or not.

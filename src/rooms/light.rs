@@ -9,9 +9,9 @@ use glam::{Vec3, vec3};
 
 use super::bvh::{Bvh, Ray};
 use super::mesh::cos_sin;
+use super::noise::hash;
 use super::scene::{LightSource, Scene};
 use super::spot::Spot;
-use super::surface::hash;
 
 /// The strata per axis of a sample pattern (chosen). Neighbouring pixels use different strata.
 pub(super) const STRATA: usize = 4;

@@ -226,12 +226,8 @@ impl Mesh {
         }
     }
 
-    /// A solid of revolution about y with sharp edges: (radius, height above `foot`) pairs, from below.
-    pub(super) fn lathe(&mut self, foot: Vec3, profile: &[(f32, f32)], surface: &Surface) {
-        self.oval(foot, profile, 1.0, surface);
-    }
-
-    /// A [lathe](Self::lathe) solid, stretched along z by the factor `depth`.
+    /// A solid of revolution about y with sharp edges, stretched along z by the factor `depth`: (radius, height above `foot`) pairs,
+    /// from below.
     pub(super) fn oval(
         &mut self,
         foot: Vec3,
@@ -367,15 +363,31 @@ impl Mesh {
         }));
     }
 
-    /// The lowest and the highest corner of the bounding box.
-    pub(super) fn bounds(&self) -> [Vec3; 2] {
-        let corners = self.faces.iter().flat_map(|face| face.corners);
-        corners.fold(
-            [Vec3::splat(f32::MAX), Vec3::splat(f32::MIN)],
-            |[low, high], corner| [low.min(corner.at), high.max(corner.at)],
-        )
+    /// The mirror image at x = 0.
+    pub(super) fn mirrored(mut self) -> Self {
+        let flip = vec3(-1.0, 1.0, 1.0);
+        for corner in self.faces.iter_mut().flat_map(|face| &mut face.corners) {
+            (corner.at, corner.normal) = (corner.at * flip, corner.normal * flip);
+        }
+        self
+    }
+
+    /// Multiplies all lengths by a factor.
+    pub(super) fn scale(&mut self, factor: f32) {
+        let corners = self.faces.iter_mut().flat_map(|face| &mut face.corners);
+        corners.for_each(|corner| corner.at *= factor);
     }
 }
+
+/// The lowest and the highest corner of the bounding box of triangles.
+pub(super) fn bounds(faces: &[Face]) -> [Vec3; 2] {
+    let corners = faces.iter().flat_map(|face| face.corners);
+    corners.fold(
+        [Vec3::splat(f32::MAX), Vec3::splat(f32::MIN)],
+        |[low, high], corner| [low.min(corner.at), high.max(corner.at)],
+    )
+}
+
 /// A closed ring of points about y, by its radius and its height above `foot`; `depth` stretches it along z.
 fn ring(foot: Vec3, (radius, height): (f32, f32), depth: f32) -> Vec<Vec3> {
     let point = |side: usize| {

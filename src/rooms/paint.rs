@@ -16,16 +16,16 @@ pub(super) struct Paint {
 /// The sRGB codes of the paints of each name. The colours are strong, so that shade does not change their name.
 const NAMED: [(&str, &[[u8; 3]]); 11] = [
     ("black", &[[24, 24, 26], [30, 28, 28]]),
-    ("grey", &[[128, 128, 130], [118, 120, 122], [136, 134, 132]]),
-    ("white", &[[248, 248, 246], [246, 247, 248]]),
-    ("red", &[[186, 32, 36], [170, 26, 40], [196, 42, 40]]),
-    ("orange", &[[255, 152, 56], [255, 148, 50]]),
-    ("yellow", &[[250, 216, 66], [246, 208, 72]]),
-    ("green", &[[70, 136, 76], [92, 146, 78], [46, 110, 74]]),
-    ("blue", &[[52, 92, 178], [66, 114, 190], [44, 70, 142]]),
-    ("purple", &[[122, 66, 156], [108, 58, 140]]),
-    ("pink", &[[248, 164, 192], [246, 152, 184]]),
-    ("brown", &[[120, 76, 44], [106, 66, 38], [132, 86, 52]]),
+    ("grey", &[[108, 108, 112], [116, 118, 118], [122, 120, 116]]),
+    ("white", &[[250, 250, 248], [248, 249, 250]]),
+    ("red", &[[176, 32, 36], [150, 26, 36], [166, 42, 40]]),
+    ("orange", &[[255, 156, 60], [255, 152, 54]]),
+    ("yellow", &[[250, 218, 84], [248, 214, 92]]),
+    ("green", &[[84, 126, 78], [120, 140, 92], [58, 100, 72]]),
+    ("blue", &[[60, 92, 150], [92, 122, 168], [52, 72, 122]]),
+    ("purple", &[[116, 74, 142], [104, 66, 128], [128, 92, 150]]),
+    ("pink", &[[255, 182, 206], [252, 176, 198]]),
+    ("brown", &[[120, 80, 52], [110, 72, 46], [128, 88, 58]]),
 ];
 
 /// The linear light of one sRGB code (IEC 61966-2-1).
@@ -36,6 +36,11 @@ pub(super) fn linear(code: u8) -> f32 {
     } else {
         libm::powf((value + 0.055) / 1.055, 2.4)
     }
+}
+
+/// The three sRGB codes of a number in the form `0xrrggbb`.
+pub(super) fn codes(number: u32) -> [u8; 3] {
+    [16, 8, 0].map(|shift| (number >> shift) as u8)
 }
 
 /// The linear light of three sRGB codes.
@@ -63,6 +68,12 @@ impl Paint {
         }
     }
 }
+
+/// The names of paints for furniture and textiles. One that is listed twice is twice as likely.
+pub(super) const USUAL: [&str; 16] = [
+    "black", "grey", "grey", "white", "white", "red", "red", "orange", "yellow", "green", "green",
+    "blue", "blue", "purple", "pink", "brown",
+];
 
 /// The eleven names of paints.
 pub(super) const ALL: [&str; 11] = [

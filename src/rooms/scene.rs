@@ -38,6 +38,12 @@ impl Piece {
             light: None,
         }
     }
+
+    /// The piece with another word for it.
+    pub(super) fn named(mut self, word: &'static str) -> Self {
+        self.kind.word = word;
+        self
+    }
 }
 
 /// The position of a piece in metres, and its rotation about y in radians.

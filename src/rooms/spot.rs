@@ -51,7 +51,7 @@ impl Spot {
             return Some(spot);
         }
         let direction = reflected(ray.direction, spot.normal);
-        let back = Ray::new(spot.at + spot.normal * 1e-3, direction);
+        let back = Ray::new(spot.at + spot.normal * 1e-3, direction).wide(ray.spread);
         let mirrored = Self::first(scene, tree, &back)?;
         Some(Self {
             color: mirrored.color * 0.92,
@@ -74,7 +74,10 @@ impl Spot {
         }
         let at = ray.from + ray.direction * hit.distance;
         let pose = &scene.things[thing].pose;
-        let color = surface.color_at(pose.to_piece(at), pose.direction_to_piece(normal));
+        let slant = normal.dot(ray.direction).abs().max(0.1);
+        let pixel = hit.distance * ray.spread / slant.sqrt();
+        let turned = pose.direction_to_piece(normal);
+        let color = surface.color_at(pose.to_piece(at), turned, pixel);
         let (color, glow) = match surface.finish {
             SurfaceFinish::Glow(strength) => (color, color * strength),
             SurfaceFinish::Matte | SurfaceFinish::Glossy | SurfaceFinish::Mirror => {

@@ -114,6 +114,15 @@ fn score(plan: &FloorPlan, visible: &[u32]) -> f32 {
             score -= (share - 0.35).max(0.0) * 3.0;
             continue;
         }
+        if thing.kind.word == "wall/otherroom" {
+            score += if share > 0.01 { 0.25 } else { 0.0 };
+            continue;
+        }
+        if ["objects", "misc", "clothes"].contains(&thing.kind.class) {
+            // Many small things are good, near ones hide the others.
+            score += if share > 0.002 { -0.2 } else { 0.02 };
+            continue;
+        }
         if share > 0.003 {
             score += 0.1 + share.min(0.06) * 4.0;
         }

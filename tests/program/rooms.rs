@@ -159,10 +159,10 @@ fn wrong(asked: &GeneratedQuestion, seen: &Seen) -> Option<String> {
     })
 }
 
-/// Three hundred frames, as many of each kind of room as of any other.
+/// Frames enough for fifteen hundred questions, as many of each kind of room as of any other.
 fn many(seed: u64) -> Rooms {
     Rooms {
-        frames: 312,
+        frames: 468,
         seed,
         size: [240, 180],
         ..Rooms::default()
@@ -171,7 +171,8 @@ fn many(seed: u64) -> Rooms {
 
 #[test]
 fn the_questions_are_right_and_even() {
-    let (made, seen, (colors, lit_wrong)) = asked(many(7));
+    let (made, mut seen, (colors, lit_wrong)) = asked(many(7));
+    assert!(made.asked.len() >= 1500, "{}", made.asked.len());
     // Every colour that passes the rules is that of the paint, in light and in shade.
     assert!(
         lit_wrong.is_empty() && colors >= 200,
@@ -220,6 +221,40 @@ fn the_questions_are_right_and_even() {
         let count = frames.count();
         assert!(count >= 10, "{class}: in {count} frames");
     }
+
+    // No colour is the answer so often that naming it always would pay.
+    let colors = &answers[&Family::Color];
+    let most = colors.values().max().unwrap();
+    assert!(
+        100 * most <= 20 * colors.values().sum::<usize>(),
+        "{colors:?}"
+    );
+
+    // A generator that is wrong about everything is found out by every family; a wrong class is often another that is there.
+    for seen in seen.values_mut() {
+        spoil(&mut seen.truth);
+    }
+    for family in Family::PAPER {
+        let of_family = made
+            .asked
+            .iter()
+            .filter(|asked| asked.question.family == family);
+        let found = of_family
+            .clone()
+            .filter(|asked| wrong(asked, &seen[&asked.question.frame]).is_some());
+        let (found, all) = (found.count(), of_family.count());
+        assert!(4 * found >= all, "{family}: {found} of {all}");
+    }
+}
+
+/// Another room with other colours, whose farthest things are the nearest, and none of whose plain classes are there.
+fn spoil(truth: &mut RoomTruth) {
+    truth.room = "garage";
+    for thing in &mut truth.things {
+        thing.color = if thing.color == "red" { "blue" } else { "red" };
+        thing.near = -thing.near;
+    }
+    truth.things.reverse();
 }
 
 /// The pixels of one small frame.

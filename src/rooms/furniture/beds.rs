@@ -4,9 +4,10 @@ use glam::{Vec3, vec3};
 
 use super::super::dice::Dice;
 use super::super::mesh::Mesh;
-use super::super::paint::{ALL, Paint};
+use super::super::paint::{Paint, USUAL};
+use super::super::pattern::Pattern;
 use super::super::scene::{Piece, kind};
-use super::super::surface::{Pattern, Surface};
+use super::super::surface::Surface;
 use super::{FurnitureSet, at, legs};
 
 /// A bed with its blanket, and one or two pillows.
@@ -20,10 +21,10 @@ pub(in super::super) fn bed(dice: &mut Dice) -> FurnitureSet {
     let half = width / 2.0;
     let length = 2.05;
     let mut mesh = Mesh::default();
-    let wood = Surface::wood(Paint::of(&["brown", "white", "black"], dice), 0);
+    let wood = Surface::wood(Paint::of(&["brown", "brown", "black"], dice), 0);
     let sheet = Surface::cloth(Paint::nameless([238, 236, 230]));
-    let cover = Paint::of(&ALL, dice);
-    let blanket = Surface::cloth(cover);
+    let cover = Paint::of(&USUAL, dice);
+    let blanket = Surface::fabric(cover, dice);
     legs(&mut mesh, vec3(width, 0.2, length), 0.06, 0.07, &wood);
     mesh.board(half, [0.16, 0.3], [0.02, length], &wood);
     let head = dice.between(0.85, 1.1);
@@ -53,7 +54,7 @@ pub(in super::super) fn bed(dice: &mut Dice) -> FurnitureSet {
     );
     let mut set = FurnitureSet::of(Piece::new(kind("bed", "bed"), mesh, cover.name));
     set.size = vec3(width + 0.1, head, length + 0.04);
-    let paint = Paint::of(&["white", "white", "grey", "pink", "yellow", "blue"], dice);
+    let paint = Paint::of(&["white", "grey", "pink", "yellow", "blue", "green"], dice);
     let count = if double { 2 } else { 1 };
     for i in 0..count {
         let x = (i as f32 - (count as f32 - 1.0) / 2.0) * width * 0.48;
@@ -79,8 +80,8 @@ pub(in super::super) fn pillow(
 
 /// A cushion for a sofa or a chair, with its center at the origin.
 pub(in super::super) fn cushion(dice: &mut Dice) -> Piece {
-    let paint = Paint::of(&ALL, dice);
-    let mut surface = Surface::cloth(paint);
+    let paint = Paint::of(&USUAL, dice);
+    let mut surface = Surface::fabric(paint, dice);
     let mut name = paint.name;
     if dice.chance(0.15) {
         let other = Paint::of(&["white", "black"], dice);

@@ -2,9 +2,9 @@
 
 pub(super) mod bath;
 pub(super) mod beds;
-pub(super) mod clutter;
 pub(super) mod kitchen;
-pub(super) mod lamps;
+pub(super) mod parts;
+pub(super) mod plants;
 pub(super) mod seats;
 pub(super) mod storage;
 pub(super) mod tables;
@@ -13,7 +13,7 @@ pub(super) mod walls;
 
 use glam::{Vec3, vec3};
 
-use super::mesh::Mesh;
+use super::mesh::{Mesh, bounds};
 use super::scene::{Piece, Pose};
 use super::surface::Surface;
 
@@ -28,7 +28,7 @@ pub(super) struct FurnitureSet {
 impl FurnitureSet {
     /// A set of one piece, with the size of that piece.
     pub(super) fn of(piece: Piece) -> Self {
-        let [low, high] = piece.mesh.bounds();
+        let [low, high] = bounds(&piece.mesh.faces);
         let width = 2.0 * high.x.max(-low.x);
         let size = vec3(width, high.y, high.z);
         Self {

@@ -1,10 +1,10 @@
 //! Chairs, stools, armchairs and sofas.
 
-use glam::{Vec3, vec3};
+use glam::vec3;
 
 use super::super::dice::Dice;
-use super::super::mesh::{Mesh, cos_sin};
-use super::super::paint::{ALL, Paint};
+use super::super::mesh::Mesh;
+use super::super::paint::{Paint, USUAL};
 use super::super::scene::{Piece, ThingKind, kind};
 use super::super::surface::Surface;
 use super::beds::cushion;
@@ -57,78 +57,9 @@ pub(in super::super) fn chair_of(
     Piece::new(name, mesh, paint.name)
 }
 
-/// An office chair on castors.
-pub(in super::super) fn office_chair(dice: &mut Dice) -> Piece {
-    let paint = Paint::of(
-        &["black", "black", "grey", "blue", "red", "green", "orange"],
-        dice,
-    );
-    let (cloth, frame) = (Surface::cloth(paint), Surface::plain([34, 34, 36]));
-    let mut mesh = Mesh::default();
-    for i in 0..5 {
-        let out = cos_sin(std::f32::consts::TAU * i as f32 / 5.0);
-        let end = vec3(out.x * 0.3, 0.06, 0.3 + out.y * 0.3);
-        mesh.cone(vec3(0.0, 0.1, 0.3), end, [0.03, 0.02], &frame);
-        mesh.ball(vec3(end.x, 0.03, end.z), Vec3::splat(0.03), &frame);
-    }
-    mesh.rod(vec3(0.0, 0.08, 0.3), vec3(0.0, 0.44, 0.3), 0.03, &frame);
-    mesh.cushion(0.25, [0.43, 0.53], [0.05, 0.54], 0.045, &cloth);
-    mesh.cushion(0.23, [0.6, 1.12], [-0.01, 0.08], 0.04, &cloth);
-    mesh.slab(vec3(0.0, 0.46, 0.03), vec3(0.08, 0.3, 0.04), &frame);
-    for x in [-0.28, 0.28] {
-        mesh.slab(vec3(x, 0.5, 0.28), vec3(0.03, 0.2, 0.04), &frame);
-        mesh.soft(
-            vec3(x - 0.035, 0.69, 0.14),
-            vec3(x + 0.035, 0.72, 0.42),
-            0.015,
-            &frame,
-        );
-    }
-    Piece::new(kind("office chair", "chair"), mesh, paint.name)
-}
-
-/// A stool with a round seat.
-pub(in super::super) fn stool(height: f32, dice: &mut Dice) -> Piece {
-    let paint = Paint::of(&ALL, dice);
-    let surface = if dice.chance(0.4) {
-        Surface::wood(paint, 0)
-    } else {
-        Surface::gloss(paint)
-    };
-    let mut mesh = Mesh::default();
-    let radius = 0.18;
-    for i in 0..4 {
-        let out = cos_sin(std::f32::consts::TAU * (i as f32 + 0.5) / 4.0);
-        let foot = vec3(out.x * radius, 0.0, radius + out.y * radius);
-        let top = vec3(
-            out.x * radius * 0.6,
-            height - 0.03,
-            radius + out.y * radius * 0.6,
-        );
-        mesh.rod(foot, top, 0.017, &surface);
-    }
-    if height > 0.55 {
-        let ring = |i: usize| {
-            let out = cos_sin(std::f32::consts::TAU * (i as f32 + 0.5) / 4.0);
-            vec3(
-                out.x * radius * 0.87,
-                height * 0.32,
-                radius + out.y * radius * 0.87,
-            )
-        };
-        (0..4).for_each(|i| mesh.rod(ring(i), ring(i + 1), 0.011, &surface));
-    }
-    mesh.lathe(
-        vec3(0.0, height - 0.045, radius),
-        &[(0.0, 0.0), (radius, 0.0), (radius, 0.045), (0.0, 0.045)],
-        &surface,
-    );
-    Piece::new(kind("stool", "stool"), mesh, paint.name)
-}
-
 /// A sofa for a number of people, with cushions.
 pub(in super::super) fn sofa(seats: usize, dice: &mut Dice) -> FurnitureSet {
-    let paint = Paint::of(&ALL, dice);
+    let paint = Paint::of(&USUAL, dice);
     let set = FurnitureSet::of(upholstered(kind("sofa", "sofa"), seats, paint, dice));
     let mut set = set;
     let width = set.size.x;
@@ -148,12 +79,12 @@ pub(in super::super) fn sofa(seats: usize, dice: &mut Dice) -> FurnitureSet {
 }
 
 pub(in super::super) fn armchair(dice: &mut Dice) -> Piece {
-    let paint = Paint::of(&ALL, dice);
+    let paint = Paint::of(&USUAL, dice);
     upholstered(kind("armchair", "chair"), 1, paint, dice)
 }
 
 fn upholstered(name: ThingKind, seats: usize, paint: Paint, dice: &mut Dice) -> Piece {
-    let cloth = Surface::cloth(paint);
+    let cloth = Surface::fabric(paint, dice);
     let foot = Surface::plain([64, 44, 30]);
     let seat = dice.between(0.6, 0.68);
     let arm = dice.between(0.14, 0.2);

@@ -5,12 +5,13 @@ use glam::{Vec3, vec3};
 use super::super::dice::Dice;
 use super::super::mesh::Mesh;
 use super::super::paint::{ALL, Paint, rgb};
+use super::super::pattern::Pattern;
 use super::super::scene::{Piece, ThingKind, kind};
-use super::super::surface::{Pattern, Surface, SurfaceFinish};
+use super::super::surface::{Surface, SurfaceFinish};
 
 /// The colours of storage. A colour that is listed twice is twice as likely.
 const COLORS: [&str; 10] = [
-    "brown", "white", "brown", "white", "black", "grey", "blue", "green", "red", "yellow",
+    "brown", "brown", "brown", "white", "grey", "grey", "black", "blue", "green", "yellow",
 ];
 
 fn finish(paint: Paint) -> Surface {
@@ -153,7 +154,7 @@ pub(in super::super) fn cabinet_of(
 
 /// Shelves with books and boxes on them.
 pub(in super::super) fn bookshelf(dice: &mut Dice) -> Piece {
-    let paint = Paint::of(&["brown", "white", "black"], dice);
+    let paint = Paint::of(&["brown", "grey", "black"], dice);
     let surface = Surface::wood(paint, 1);
     let (width, height, depth) = (dice.between(0.8, 1.2), dice.between(1.6, 2.0), 0.3);
     let half = width / 2.0;

@@ -4,15 +4,16 @@ use glam::{Vec3, vec2, vec3};
 
 use super::super::dice::Dice;
 use super::super::mesh::Mesh;
-use super::super::paint::{ALL, Paint};
+use super::super::paint::{Paint, USUAL};
+use super::super::pattern::Pattern;
 use super::super::scene::{Piece, kind};
-use super::super::surface::{Pattern, Surface};
+use super::super::surface::Surface;
 
 /// The two curtains at the sides of a window of a width, from y = 0 downwards. Each is one thing; the rod belongs to the
 /// first.
 pub(in super::super) fn curtains(window: f32, drop: f32, dice: &mut Dice) -> [Piece; 2] {
-    let paint = Paint::of(&ALL, dice);
-    let cloth = Surface::cloth(paint);
+    let paint = Paint::of(&USUAL, dice);
+    let cloth = Surface::fabric(paint, dice);
     let width = dice.between(0.42, 0.6);
     let name = kind("curtain", "curtain");
     let half = |left: f32, rod: bool| {
@@ -31,7 +32,7 @@ pub(in super::super) fn curtains(window: f32, drop: f32, dice: &mut Dice) -> [Pi
 
 /// A towel over a rail on the wall, with the rail at y = 0.
 pub(in super::super) fn towel(dice: &mut Dice) -> Piece {
-    let paint = Paint::of(&ALL, dice);
+    let paint = Paint::of(&USUAL, dice);
     let cloth = Surface::paint(paint).with(Pattern::Pile);
     let (width, drop) = (dice.between(0.36, 0.5), dice.between(0.55, 0.75));
     let mut mesh = Mesh::default();
@@ -69,11 +70,11 @@ pub(in super::super) fn towel(dice: &mut Dice) -> Piece {
 /// A rug of a size, with its center at the origin.
 pub(in super::super) fn rug(width: f32, depth: f32, dice: &mut Dice) -> Piece {
     let tints = [
-        [158, 96, 84],
-        [92, 108, 132],
-        [196, 182, 156],
-        [120, 128, 104],
-        [150, 136, 150],
+        [136, 74, 62],
+        [78, 92, 116],
+        [166, 150, 124],
+        [96, 104, 82],
+        [72, 66, 74],
     ];
     let borders = [[226, 216, 196], [70, 58, 56], [206, 188, 140]];
     let border = Surface::plain(dice.pick(&borders)).color;

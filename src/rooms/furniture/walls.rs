@@ -4,9 +4,11 @@ use glam::{Vec3, vec2, vec3};
 
 use super::super::dice::Dice;
 use super::super::mesh::Mesh;
-use super::super::paint::{Paint, rgb};
+use super::super::paint::Paint;
+use super::super::pattern::Pattern;
 use super::super::scene::{LightSource, Piece, kind};
-use super::super::surface::{Pattern, Surface, SurfaceFinish};
+use super::super::surface::{Surface, SurfaceFinish};
+use super::parts;
 
 /// Adds four bars around a rectangle with its lower edge at y = 0.
 fn frame(mesh: &mut Mesh, width: f32, height: f32, bar: f32, thick: f32, surface: &Surface) {
@@ -38,9 +40,10 @@ fn sheet(mesh: &mut Mesh, width: f32, height: f32, z: f32, surface: &Surface) {
 }
 
 pub(in super::super) fn picture(dice: &mut Dice) -> Piece {
-    let (width, height) = (dice.between(0.4, 0.85), dice.between(0.4, 0.65));
-    let wood = Surface::paint(Paint::of(&["black", "brown", "white"], dice));
-    let pattern = Pattern::Canvas(vec2(width, height), dice.below(1000) as u32);
+    let width = dice.between(0.25, 0.9);
+    let height = (width * dice.between(0.6, 1.35)).min(0.75);
+    let wood = Surface::paint(Paint::of(&["black", "brown", "grey"], dice));
+    let pattern = Pattern::Canvas(vec2(width, height), dice.below(100_000) as u32);
     let canvas = Surface::plain([200, 200, 200]).with(pattern);
     let mut mesh = Mesh::default();
     frame(&mut mesh, width, height, 0.03, 0.03, &wood);
@@ -50,7 +53,7 @@ pub(in super::super) fn picture(dice: &mut Dice) -> Piece {
 
 /// A mirror of a size in its frame.
 pub(in super::super) fn mirror(width: f32, height: f32, dice: &mut Dice) -> Piece {
-    let rim = Surface::gloss(Paint::of(&["black", "brown", "grey", "white"], dice));
+    let rim = Surface::gloss(Paint::of(&["black", "brown", "grey"], dice));
     let glass = Surface::plain([255, 255, 255]).finished(SurfaceFinish::Mirror);
     let mut mesh = Mesh::default();
     frame(&mut mesh, width, height, 0.025, 0.03, &rim);
@@ -98,7 +101,7 @@ pub(in super::super) fn window(width: f32, height: f32, daylight: f32) -> Piece 
     let view = Surface {
         color: Vec3::ONE,
         pattern: Pattern::Outdoors(height),
-        finish: SurfaceFinish::Glow(1.15),
+        finish: SurfaceFinish::Glow(1.4),
     };
     let mut mesh = Mesh::default();
     sheet(&mut mesh, width, height, 0.012, &view);
@@ -124,7 +127,12 @@ pub(in super::super) fn window(width: f32, height: f32, daylight: f32) -> Piece 
 /// Blinds in front of a window of a size with its sill at y = 0; `share` is the covered part of the height.
 pub(in super::super) fn blinds(width: f32, height: f32, share: f32, dice: &mut Dice) -> Piece {
     let half = width / 2.0;
-    let paint = Paint::of(&["white", "white", "grey", "brown", "green", "blue"], dice);
+    let paint = Paint::of(
+        &[
+            "white", "grey", "brown", "green", "blue", "yellow", "orange", "red",
+        ],
+        dice,
+    );
     let slat = Surface::paint(paint);
     let mut mesh = Mesh::default();
     mesh.board(half, [height - 0.02, height + 0.04], [0.07, 0.11], &slat);
@@ -144,108 +152,21 @@ pub(in super::super) fn blinds(width: f32, height: f32, share: f32, dice: &mut D
     Piece::new(kind("blinds", "blinds"), mesh, paint.name)
 }
 
-/// A door in its frame.
-pub(in super::super) fn door(dice: &mut Dice) -> Piece {
-    let tints = [[236, 234, 228], [150, 104, 66], [206, 200, 190]];
-    let leaf = Surface::plain(dice.pick(&tints));
-    let rail = Surface::plain([238, 237, 233]);
-    let mut mesh = Mesh::default();
-    let (width, height) = (0.86, 2.02);
+/// A door of a width and height in its frame, turned by an angle into the room behind it.
+pub(in super::super) fn door([width, height]: [f32; 2], turned: f32, dice: &mut Dice) -> Piece {
+    let rail = Surface::plain(dice.pick(&[[196, 192, 182], [92, 64, 44], [150, 146, 138]]));
     let half = width / 2.0;
-    mesh.board(half, [0.0, height], [0.0, 0.025], &leaf);
-    for (low, high) in [(0.18, 0.85), (1.0, 1.86)] {
-        for x in [-0.2, 0.2] {
-            mesh.block(
-                vec3(x - 0.14, low, 0.025),
-                vec3(x + 0.14, high, 0.033),
-                &leaf,
-            );
-        }
-    }
-    let side = vec3(0.07, height, 0.05);
-    mesh.slabs(vec3(half + 0.03, 0.0, 0.02), side, &rail);
+    let mut mesh = Mesh::default();
+    let side = vec3(0.08, height, 0.14);
+    mesh.slabs(vec3(half + 0.03, 0.0, -0.05), side, &rail);
     mesh.board(
-        half + 0.065,
-        [height, height + 0.07],
-        [-0.005, 0.045],
+        half + 0.07,
+        [height - 0.02, height + 0.06],
+        [-0.12, 0.02],
         &rail,
     );
-    let knob = vec3(half - 0.08, 1.0, 0.06);
-    mesh.ball(knob, vec3(0.028, 0.028, 0.02), &Surface::steel());
-    mesh.rod(knob - vec3(0.0, 0.0, 0.05), knob, 0.01, &Surface::steel());
-    Piece::new(kind("door", "door"), mesh, "")
-}
-
-/// A fireplace with its mantelpiece.
-pub(in super::super) fn fireplace(dice: &mut Dice) -> Piece {
-    let stone = Surface::plain(dice.pick(&[[236, 232, 224], [172, 88, 66], [150, 146, 140]]));
-    let stone = stone.with(Pattern::Tiles(0.11, rgb([206, 200, 190])));
-    let soot = Surface::plain([20, 19, 18]);
-    let wood = Surface::wood(Paint::nameless([92, 62, 40]), 0);
-    let shelf = Surface::wood(Paint::of(&["brown", "white"], dice), 0);
-    let (width, height, depth) = (1.4, 1.1, 0.36);
-    let (open, tall) = (0.76, 0.66);
-    let mut mesh = Mesh::default();
-    for x in [-1.0, 1.0_f32] {
-        let (a, b) = (x * width / 2.0, x * open / 2.0);
-        mesh.block(
-            vec3(a.min(b), 0.0, 0.0),
-            vec3(a.max(b), height, depth),
-            &stone,
-        );
-    }
-    mesh.board(open / 2.0, [tall, height], [0.0, depth], &stone);
-    mesh.board(
-        width / 2.0 + 0.08,
-        [height, height + 0.06],
-        [0.0, depth + 0.07],
-        &shelf,
-    );
-    mesh.board(open / 2.0, [0.0, tall], [0.0, 0.03], &soot);
-    mesh.board(
-        open / 2.0,
-        [0.0, 0.02],
-        [0.0, depth + 0.2],
-        &Surface::plain([88, 84, 80]),
-    );
-    for i in 0..4 {
-        let (x, y) = ((i % 2) as f32 * 0.1 - 0.05, 0.07 + 0.08 * (i / 2) as f32);
-        mesh.rod(
-            vec3(-0.26 + x, y, 0.14 + 0.08 * (i % 2) as f32),
-            vec3(0.26 + x, y + 0.03, 0.18),
-            0.042,
-            &wood,
-        );
-    }
-    let flame = Surface {
-        color: rgb([255, 168, 60]),
-        pattern: Pattern::Plain,
-        finish: SurfaceFinish::Glow(0.9),
-    };
-    for (x, tall) in [
-        (-0.14, 0.2),
-        (0.0, 0.3),
-        (0.12, 0.22),
-        (0.2, 0.14),
-        (-0.22, 0.12),
-    ] {
-        mesh.vessel(
-            vec3(x, 0.14, 0.17),
-            &[
-                (0.03, 0.0),
-                (0.055, tall * 0.3),
-                (0.03, tall * 0.7),
-                (0.001, tall),
-            ],
-            0.7,
-            &flame,
-        );
-    }
-    let mut piece = Piece::new(kind("fireplace", "fireplace"), mesh, "");
-    piece.light = Some(LightSource::Bulb {
-        middle: vec3(0.0, 0.3, 0.3),
-        radius: 0.1,
-        radiance: vec3(1.0, 0.6, 0.3) * 5.0,
-    });
-    piece
+    let leaf = parts::piece("door", dice);
+    let hinge = vec3(0.01 - half, 0.0, if turned > 0.0 { -0.07 } else { 0.045 });
+    mesh.add(&leaf.mesh, hinge, turned);
+    Piece::new(leaf.kind, mesh, "")
 }

@@ -3,8 +3,10 @@
 use glam::vec3;
 
 use super::super::dice::Dice;
-use super::super::furniture::{FurnitureSet, bath, clutter, storage, textiles, walls};
-use super::super::plan::{FloorPlan, Flooring, WALLS, WindowDressing};
+use super::super::furniture::{FurnitureSet, bath, parts, storage, textiles, walls};
+use super::super::openings::WindowDressing;
+use super::super::plan::FloorPlan;
+use super::super::shell::{Flooring, WALLS};
 use super::shared::low_stool;
 
 pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
@@ -20,21 +22,24 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     }
     if !tub || plan.dice.chance(0.5) {
         plan.focus_on_next();
-        let set = FurnitureSet::of(bath::shower(&mut plan.dice));
+        let set = FurnitureSet::of(parts::piece(
+            ["shower", "shower:2"][plan.dice.below(2)],
+            &mut plan.dice,
+        ));
         plan.corner(&set, &WALLS);
     }
     if plan.dice.chance(0.92) {
         plan.focus_on_next();
-        let set = FurnitureSet::of(bath::toilet(&mut plan.dice));
+        let set = FurnitureSet::of(parts::piece("toilet", &mut plan.dice));
         if let Some(pose) = plan.stand(&set, &WALLS) {
-            plan.add_relative(&pose, bath::toilet_paper(), vec3(0.42, 0.72, -0.01), 0.0);
+            plan.add_part(&pose, "toilet paper", vec3(0.42, 0.72, -0.01));
         }
     }
     if plan.dice.chance(0.85) {
         let set = if plan.dice.chance(0.7) {
             bath::vanity(&mut plan.dice)
         } else {
-            FurnitureSet::of(bath::pedestal_sink(&mut plan.dice))
+            FurnitureSet::of(parts::piece("sink", &mut plan.dice))
         };
         plan.focus_on_next();
         if let Some(pose) = plan.stand(&set, &WALLS)
@@ -55,7 +60,7 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
         plan.maybe_hang(0.7, 1.35, textiles::towel);
     }
     plan.maybe_stand(0.4, low_stool);
-    plan.maybe_stand(0.35, |_| clutter::basket());
+    plan.maybe_stand(0.35, |dice| parts::piece("laundry basket", dice));
     if plan.dice.chance(0.3) {
         plan.plant(1.0);
     }

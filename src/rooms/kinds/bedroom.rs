@@ -3,10 +3,12 @@
 use glam::vec3;
 
 use super::super::dice::Dice;
-use super::super::furniture::{FurnitureSet, at, beds, lamps, seats, storage, walls};
-use super::super::plan::{FloorPlan, Flooring, WALLS, Wall, WindowDressing};
+use super::super::furniture::{FurnitureSet, at, beds, seats, storage, walls};
+use super::super::openings::WindowDressing;
+use super::super::plan::FloorPlan;
 use super::super::scene::kind;
-use super::shared::{SMALL, dresser, low_stool, nightstand, sides};
+use super::super::shell::{Flooring, WALLS, Wall};
+use super::shared::{dresser, low_stool, nightstand, sides};
 
 pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     let size = vec3(dice.between(3.6, 4.6), 2.6, dice.between(3.6, 4.6));
@@ -21,7 +23,7 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     } else {
         WindowDressing::Blinds
     };
-    plan.window(&sides(wall), width, 0.85, dressing);
+    plan.windows(&sides(wall), width, 0.85, dressing);
     if let Some(pose) = plan.maybe_stand(0.6, dresser) {
         plan.focus_things.push(plan.scene.things.len() - 1);
         if plan.dice.chance(0.5) {
@@ -34,8 +36,6 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
                 vec3(0.0, 0.9, 0.05),
                 0.0,
             );
-        } else {
-            plan.place_on_top(&pose, 0.92, &[-0.3, 0.1, 0.35], &SMALL);
         }
     }
     plan.maybe_stand(0.35, |dice| {
@@ -72,13 +72,10 @@ fn bed(plan: &mut FloorPlan, wall: Wall) {
             let set = FurnitureSet::of(stand);
             let top = set.size.y;
             let place = along + side * (size.x / 2.0 + set.size.x / 2.0 + 0.06);
-            if let Some(pose) = plan.stand_at(set, wall, place) {
-                if plan.dice.chance(0.75) {
-                    let lamp = lamps::table_lamp(&mut plan.dice);
-                    plan.add_relative(&pose, lamp, vec3(0.0, top, 0.05), 0.0);
-                } else {
-                    plan.place_on_top(&pose, top, &[0.0], &SMALL);
-                }
+            if let Some(pose) = plan.stand_at(set, wall, place)
+                && plan.dice.chance(0.75)
+            {
+                plan.add_part(&pose, "table lamp", vec3(0.0, top, 0.05));
             }
         }
     }

@@ -3,12 +3,14 @@
 use glam::{Vec3, vec3};
 
 use super::super::dice::Dice;
-use super::super::furniture::{FurnitureSet, at, clutter, lamps, seats, storage, tables, walls};
-use super::super::paint::{ALL, Paint};
-use super::super::plan::{FloorPlan, Flooring, WALLS, WindowDressing};
+use super::super::furniture::{FurnitureSet, at, parts, seats, storage, tables, walls};
+use super::super::openings::WindowDressing;
+use super::super::paint::{Paint, USUAL};
+use super::super::plan::FloorPlan;
 use super::super::scene::kind;
+use super::super::shell::{Flooring, WALLS};
 use super::super::surface::Surface;
-use super::shared::{SMALL, low_stool};
+use super::shared::low_stool;
 
 pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     let size = vec3(dice.between(4.0, 4.9), 2.65, dice.between(4.0, 4.9));
@@ -22,18 +24,20 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     } else {
         WindowDressing::Bare
     };
-    plan.window(&WALLS, width, 0.75, dressing);
+    plan.windows(&WALLS, width, 0.75, dressing);
     if plan.dice.chance(0.65) {
         let (width, name) = (plan.dice.between(1.2, 1.6), kind("cabinet", "cabinet"));
         let piece = storage::cabinet(name, vec3(width, 0.85, 0.45), 3, &mut plan.dice);
-        if let Some(pose) = plan.stand(&FurnitureSet::of(piece), &WALLS) {
+        if plan.stand(&FurnitureSet::of(piece), &WALLS).is_some() {
             plan.focus_things.push(plan.scene.things.len() - 1);
-            plan.place_on_top(&pose, 0.85, &[-0.35, 0.0, 0.35], &SMALL);
         }
     }
     plan.maybe_stand(0.3, super::shared::dresser);
     plan.maybe_stand(0.3, storage::bookshelf);
-    if plan.maybe_stand(0.45, walls::fireplace).is_some() {
+    if plan
+        .maybe_stand(0.45, |dice| parts::piece("fireplace", dice))
+        .is_some()
+    {
         plan.focus_things.push(plan.scene.things.len() - 1);
     }
     plan.maybe_stand(0.2, low_stool);
@@ -83,7 +87,7 @@ fn table(plan: &mut FloorPlan) {
         vec3(length + 0.9, 0.0, depth + 1.0),
         0.0,
     );
-    let mut paint = Paint::of(&ALL, &mut plan.dice);
+    let mut paint = Paint::of(&USUAL, &mut plan.dice);
     if plan.dice.chance(0.4) {
         paint = Paint::of(&["brown"], &mut plan.dice);
     }
@@ -109,17 +113,11 @@ fn table(plan: &mut FloorPlan) {
         seat(plan, vec3(-side, 0.0, 0.0), std::f32::consts::FRAC_PI_2);
         seat(plan, vec3(side, 0.0, 0.0), -std::f32::consts::FRAC_PI_2);
     }
-    let piece = if plan.dice.chance(0.5) {
-        clutter::fruit(&mut plan.dice)
-    } else {
-        clutter::vase(&mut plan.dice)
-    };
-    plan.add_relative(&pose, piece, vec3(0.0, 0.75, depth / 2.0 - 0.1), 0.0);
+    let centre = plan
+        .dice
+        .pick(&["bowl of fruit", "vase", "vase:2", "candle"]);
+    plan.add_part(&pose, centre, vec3(0.0, 0.75, depth / 2.0 - 0.1));
+    let lamp = plan.dice.pick(&["chandelier", "ceiling lamp:2"]);
     let ceiling = vec3(middle.x, plan.size.y, middle.z);
-    let lamp = if plan.dice.chance(0.5) {
-        lamps::chandelier(0.75)
-    } else {
-        lamps::pendant(0.95, &mut plan.dice)
-    };
-    plan.add(lamp, at(ceiling, 0.0));
+    plan.add_part(&at(ceiling, 0.0), lamp, Vec3::ZERO);
 }

@@ -1,16 +1,16 @@
 //! Furnishing of kitchens.
 
-use glam::vec3;
+use glam::{Vec3, vec3};
 
 use super::super::dice::Dice;
-use super::super::furniture::kitchen::{
-    COUNTER, Style, base_cabinets, hood, microwave, refrigerator, stove, wall_cabinets,
-};
-use super::super::furniture::{FurnitureSet, at, clutter, lamps, seats, tables};
-use super::super::paint::{ALL, Paint};
-use super::super::plan::{FloorPlan, Flooring, WALLS, Wall, WindowDressing};
+use super::super::furniture::kitchen::{COUNTER, Style, base_cabinets, wall_cabinets};
+use super::super::furniture::{FurnitureSet, at, parts, seats, tables};
+use super::super::openings::WindowDressing;
+use super::super::paint::{Paint, USUAL};
+use super::super::plan::FloorPlan;
 use super::super::scene::kind;
-use super::shared::sides;
+use super::super::shell::{Flooring, WALLS, Wall};
+use super::shared::{low_stool, sides};
 
 pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     let size = vec3(dice.between(3.6, 4.6), 2.6, dice.between(3.4, 4.4));
@@ -26,7 +26,7 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
         WindowDressing::Blinds,
         WindowDressing::Curtains,
     ]);
-    plan.window(&[left, right, wall.opposite()], 1.2, 1.05, dressing);
+    plan.windows(&[left, right, wall.opposite()], 1.2, 1.05, dressing);
     eating(&mut plan, wall);
     plan.plant(0.3);
     plan.pictures(2);
@@ -50,39 +50,27 @@ fn kitchen_row(plan: &mut FloorPlan, wall: Wall, style: &Style) {
     };
     if fridge {
         plan.focus_on_next();
-        let set = FurnitureSet::of(refrigerator(style, &mut plan.dice));
+        let set = FurnitureSet::of(style.appliance("refrigerator", &mut plan.dice));
         plan.stand_at(set, wall, next(0.74));
     }
-    if let Some(pose) = plan.stand_at(
-        base_cabinets(first - 0.05, false, style),
-        wall,
-        next(first - 0.05),
-    ) {
+    let cabinets = base_cabinets(first - 0.05, false, style, &mut plan.dice);
+    if let Some(pose) = plan.stand_at(cabinets, wall, next(first - 0.05)) {
         if plan.dice.chance(0.6) {
-            plan.add_relative(&pose, microwave(style), vec3(0.0, COUNTER, 0.1), 0.0);
-        } else {
-            plan.place_on_top(&pose, COUNTER, &[0.0], &[clutter::fruit, clutter::bottle]);
+            let piece = style.appliance("microwave", &mut plan.dice);
+            plan.add_relative(&pose, piece, vec3(0.0, COUNTER, 0.1), 0.0);
         }
         plan.hang_above(&pose, wall_cabinets(first - 0.05, style), 1.48);
     }
     plan.focus_on_next();
-    if let Some(pose) = plan.stand_at(FurnitureSet::of(stove(style)), wall, next(0.63)) {
-        plan.hang_above(&pose, hood(), 1.6);
+    let stove = style.appliance("stove", &mut plan.dice);
+    if let Some(pose) = plan.stand_at(FurnitureSet::of(stove), wall, next(0.63)) {
+        let hood = parts::piece("range hood", &mut plan.dice);
+        plan.hang_above(&pose, hood, 1.6);
     }
     plan.focus_on_next();
-    if let Some(pose) = plan.stand_at(
-        base_cabinets(second - 0.05, sinks, style),
-        wall,
-        next(second - 0.05),
-    ) {
+    let cabinets = base_cabinets(second - 0.05, sinks, style, &mut plan.dice);
+    if let Some(pose) = plan.stand_at(cabinets, wall, next(second - 0.05)) {
         plan.hang_above(&pose, wall_cabinets(second - 0.05, style), 1.48);
-        let x = second / 2.0 - 0.22;
-        plan.place_on_top(
-            &pose,
-            COUNTER,
-            &[x],
-            &[clutter::bottle, clutter::mug, clutter::vase],
-        );
     }
 }
 
@@ -100,14 +88,14 @@ fn eating(plan: &mut FloorPlan, wall: Wall) {
         return;
     };
     plan.focus_things.push(plan.scene.things.len() - 1);
-    let paint = Paint::of(&ALL, &mut plan.dice);
+    let paint = Paint::of(&USUAL, &mut plan.dice);
     let stools = plan.dice.chance(0.4);
     let start = plan.dice.between(0.0, 6.0);
     for i in 0..=plan.dice.below(3) {
         let angle = start + i as f32 * 2.2;
         let out = super::super::mesh::cos_sin(angle);
         let piece = if stools {
-            seats::stool(0.5, &mut plan.dice)
+            low_stool(&mut plan.dice)
         } else {
             seats::chair(kind("chair", "chair"), paint, &mut plan.dice)
         };
@@ -118,12 +106,10 @@ fn eating(plan: &mut FloorPlan, wall: Wall) {
     }
     if plan.dice.chance(0.5) {
         let top = vec3(0.0, 0.75, 0.3);
-        let piece = clutter::fruit(&mut plan.dice);
-        plan.add_relative(&pose, piece, top, 0.0);
+        plan.add_part(&pose, "bowl of fruit", top);
     }
     if plan.dice.chance(0.5) {
-        let lamp = lamps::pendant(0.95, &mut plan.dice);
-        let height = plan.size.y;
-        plan.add(lamp, at(vec3(place.x, height, place.z), 0.0));
+        let ceiling = vec3(place.x, plan.size.y, place.z);
+        plan.add_part(&at(ceiling, 0.0), "ceiling lamp:2", Vec3::ZERO);
     }
 }

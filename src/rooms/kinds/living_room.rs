@@ -3,10 +3,12 @@
 use glam::vec3;
 
 use super::super::dice::Dice;
-use super::super::furniture::{FurnitureSet, lamps, seats, storage, tables, walls};
-use super::super::plan::{FloorPlan, Flooring, WALLS, Wall, WindowDressing};
+use super::super::furniture::{FurnitureSet, parts, seats, storage, tables, walls};
+use super::super::openings::WindowDressing;
+use super::super::plan::FloorPlan;
 use super::super::scene::kind;
-use super::shared::{SMALL, low_stool, sides};
+use super::super::shell::{Flooring, WALLS, Wall};
+use super::shared::{low_stool, sides};
 
 pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     let size = vec3(dice.between(4.2, 5.4), 2.65, dice.between(4.2, 5.4));
@@ -23,9 +25,9 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     } else {
         WindowDressing::Bare
     };
-    plan.window(&sides(wall), width, 0.7, dressing);
+    plan.windows(&sides(wall), width, 0.7, dressing);
     plan.maybe_stand(0.45, storage::bookshelf);
-    plan.maybe_stand(0.6, lamps::floor_lamp);
+    plan.maybe_stand(0.6, |dice| parts::piece("floor lamp", dice));
     plan.maybe_stand(0.25, low_stool);
     plan.maybe_stand(0.25, super::shared::dresser);
     plan.plant(0.6);
@@ -60,9 +62,7 @@ fn sofa_group(plan: &mut FloorPlan, wall: Wall) {
         };
         let piece = FurnitureSet::of(piece);
         plan.focus_things.push(plan.scene.things.len());
-        if let Some(pose) = plan.stand_free(piece, before, pose.angle) {
-            plan.place_on_top(&pose, 0.42, &[-0.15, 0.2], &SMALL);
-        }
+        plan.stand_free(piece, before, pose.angle);
     }
     if plan.dice.chance(0.55) {
         let side = if plan.dice.chance(0.5) { -1.0 } else { 1.0 };
@@ -79,8 +79,7 @@ fn sofa_group(plan: &mut FloorPlan, wall: Wall) {
         ));
         let place = along + size.x / 2.0 + 0.32;
         if let Some(pose) = plan.stand_at(piece, wall, place) {
-            let lamp = lamps::table_lamp(&mut plan.dice);
-            plan.add_relative(&pose, lamp, vec3(0.0, 0.5, 0.1), 0.0);
+            plan.add_part(&pose, "table lamp", vec3(0.0, 0.5, 0.1));
         }
     }
 }
@@ -90,14 +89,12 @@ fn opposite_sofa(plan: &mut FloorPlan, wall: Wall) {
     let along = plan.width(wall) / 2.0 + plan.dice.between(-0.3, 0.3);
     plan.focus_on_next();
     if plan.dice.chance(0.5) {
-        let piece = FurnitureSet::of(walls::fireplace(&mut plan.dice));
-        if let Some(pose) = plan.stand_at(piece, wall, along) {
-            if plan.dice.chance(0.5) {
-                let piece = walls::mirror(0.8, 0.6, &mut plan.dice);
-                plan.hang_above(&pose, piece, 1.35);
-            } else {
-                plan.place_on_top(&pose, 1.16, &[-0.4, 0.35], &SMALL);
-            }
+        let piece = FurnitureSet::of(parts::piece("fireplace", &mut plan.dice));
+        if let Some(pose) = plan.stand_at(piece, wall, along)
+            && plan.dice.chance(0.5)
+        {
+            let piece = walls::mirror(0.8, 0.6, &mut plan.dice);
+            plan.hang_above(&pose, piece, 1.35);
         }
         return;
     }

@@ -47,13 +47,16 @@ impl RoomKind {
 
     /// A furnished room of this kind.
     pub(super) fn furnish(self, dice: Dice) -> FloorPlan {
-        match self {
-            Self::Bedroom => bedroom::furnish(dice),
-            Self::Bathroom => bathroom::furnish(dice),
-            Self::Kitchen => kitchen::furnish(dice),
-            Self::LivingRoom => living_room::furnish(dice),
-            Self::DiningRoom => dining_room::furnish(dice),
-            Self::Office => office::furnish(dice),
-        }
+        let (mut plan, floor) = match self {
+            Self::Bedroom => (bedroom::furnish(dice), "floor"),
+            Self::Bathroom => (bathroom::furnish(dice), "bathfloor"),
+            Self::Kitchen => (kitchen::furnish(dice), "kitchenfloor"),
+            Self::LivingRoom => (living_room::furnish(dice), "floor"),
+            Self::DiningRoom => (dining_room::furnish(dice), "floor"),
+            Self::Office => (office::furnish(dice), "floor"),
+        };
+        plan.clutter(floor);
+        plan.walls();
+        plan
     }
 }

@@ -3,10 +3,12 @@
 use glam::vec3;
 
 use super::super::dice::Dice;
-use super::super::furniture::{FurnitureSet, clutter, lamps, seats, storage, tables, walls};
-use super::super::plan::{FloorPlan, Flooring, WALLS, Wall, WindowDressing};
+use super::super::furniture::{FurnitureSet, parts, seats, storage, walls};
+use super::super::openings::WindowDressing;
+use super::super::plan::FloorPlan;
 use super::super::scene::kind;
-use super::shared::{SMALL, low_stool, sides};
+use super::super::shell::{Flooring, WALLS, Wall};
+use super::shared::{low_stool, sides};
 
 pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     let size = vec3(dice.between(3.4, 4.4), 2.6, dice.between(3.4, 4.4));
@@ -21,7 +23,7 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
         WindowDressing::Curtains,
         WindowDressing::Bare,
     ]);
-    plan.window(&sides(wall), width, 0.9, dressing);
+    plan.windows(&sides(wall), width, 0.9, dressing);
     if plan.maybe_stand(0.8, storage::bookshelf).is_some() {
         plan.focus_things.push(plan.scene.things.len() - 1);
     }
@@ -32,7 +34,7 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     });
     plan.maybe_stand(0.3, seats::armchair);
     plan.maybe_stand(0.2, low_stool);
-    plan.maybe_stand(0.3, lamps::floor_lamp);
+    plan.maybe_stand(0.3, |dice| parts::piece("floor lamp", dice));
     plan.plant(0.5);
     plan.pictures(2);
     plan.maybe_hang(0.3, 1.5, storage::wall_shelf);
@@ -42,7 +44,7 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
 
 /// Places a desk with its chair, monitor, keyboard and lamp.
 fn desk(plan: &mut FloorPlan, wall: Wall) {
-    let set = FurnitureSet::of(tables::desk(&mut plan.dice));
+    let set = FurnitureSet::of(parts::piece("desk", &mut plan.dice));
     let size = set.size;
     let along = plan.width(wall) / 2.0 + plan.dice.between(-0.5, 0.5);
     plan.focus_on_next();
@@ -55,18 +57,16 @@ fn desk(plan: &mut FloorPlan, wall: Wall) {
         let width = plan.dice.between(0.5, 0.65);
         let x = plan.dice.between(-0.2, 0.1);
         plan.add_relative(&pose, walls::monitor(width), vec3(x, top, 0.04), 0.0);
-        plan.add_relative(&pose, clutter::keyboard(), vec3(x, top, 0.38), 0.0);
+        plan.add_part(&pose, "keyboard", vec3(x, top, 0.38));
     }
     if plan.dice.chance(0.6) {
-        let lamp = lamps::desk_lamp(&mut plan.dice);
-        plan.add_relative(&pose, lamp, vec3(size.x / 2.0 - 0.2, top, 0.1), 0.0);
+        plan.add_part(&pose, "desk lamp", vec3(size.x / 2.0 - 0.2, top, 0.1));
     }
-    plan.place_on_top(&pose, top, &[-size.x / 2.0 + 0.2], &SMALL);
     // The chair stands in front of the desk and faces it, up to a small random angle.
     let turned = pose.angle + std::f32::consts::PI + plan.dice.between(-0.6, 0.6);
     let aside = plan.dice.between(-0.2, 0.1);
     let place = pose.to_room(vec3(aside, 0.0, size.z + 0.32));
-    let chair = FurnitureSet::of(seats::office_chair(&mut plan.dice));
+    let chair = FurnitureSet::of(parts::piece("office chair", &mut plan.dice));
     plan.focus_on_next();
     plan.stand_free(chair, place, turned);
 }

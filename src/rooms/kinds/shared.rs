@@ -3,9 +3,10 @@
 use glam::{Vec3, vec3};
 
 use super::super::dice::Dice;
-use super::super::furniture::{FurnitureSet, at, clutter, lamps, seats, storage, textiles, walls};
-use super::super::plan::{FloorPlan, WALLS, Wall};
+use super::super::furniture::{FurnitureSet, at, parts, plants, storage, textiles, walls};
+use super::super::plan::FloorPlan;
 use super::super::scene::{Piece, Pose};
+use super::super::shell::{WALLS, Wall};
 
 impl FloorPlan {
     /// Marks the next thing that is added as one that the camera should look at.
@@ -39,32 +40,22 @@ impl FloorPlan {
         }
     }
 
-    /// Adds random small pieces on top of another piece, at the x positions `places`, in metres from its middle.
-    pub(super) fn place_on_top(
-        &mut self,
-        base: &Pose,
-        height: f32,
-        places: &[f32],
-        makers: &[fn(&mut Dice) -> Piece],
-    ) {
-        for x in places {
-            let make = self.dice.pick(makers);
-            let piece = make(&mut self.dice);
-            let angle = self.dice.between(-0.3, 0.3);
-            self.add_relative(base, piece, vec3(*x, height, 0.08), angle);
-        }
+    /// Adds a piece of the table of parts on another piece, at a place in its coordinates.
+    pub(super) fn add_part(&mut self, base: &Pose, name: &str, place: Vec3) -> usize {
+        let piece = parts::piece(name, &mut self.dice);
+        self.add_relative(base, piece, place, 0.0)
     }
 
     /// Adds a lamp below the middle of the ceiling.
     pub(super) fn ceiling_lamp(&mut self) {
         let place = vec3(self.size.x / 2.0, self.size.y, self.size.z / 2.0);
-        self.add(lamps::ceiling_lamp(), at(place, 0.0));
+        self.add_part(&at(place, 0.0), "ceiling lamp", Vec3::ZERO);
     }
 
-    /// Hangs up to `count` pictures.
+    /// Hangs about `count` pictures or a few more.
     pub(super) fn pictures(&mut self, count: usize) {
-        for _ in 0..=self.dice.below(count) {
-            let up = self.dice.between(1.3, 1.5);
+        for _ in 0..=count + self.dice.below(3) {
+            let up = self.dice.between(1.15, 1.5);
             self.maybe_hang(0.8, up, walls::picture);
         }
     }
@@ -73,7 +64,7 @@ impl FloorPlan {
     pub(super) fn plant(&mut self, probability: f32) {
         self.maybe_stand(probability, |dice| {
             let height = dice.between(0.7, 1.3);
-            clutter::plant(height, dice)
+            plants::plant(height, dice)
         });
     }
 
@@ -86,9 +77,6 @@ impl FloorPlan {
     }
 }
 
-/// Small things for the tops of furniture.
-pub(super) const SMALL: [fn(&mut Dice) -> Piece; 3] = [clutter::books, clutter::vase, clutter::mug];
-
 pub(super) fn nightstand(dice: &mut Dice) -> Piece {
     let size = vec3(dice.between(0.42, 0.5), dice.between(0.45, 0.55), 0.4);
     storage::chest("nightstand", size, [2, 1], dice)
@@ -100,7 +88,7 @@ pub(super) fn dresser(dice: &mut Dice) -> Piece {
 }
 
 pub(super) fn low_stool(dice: &mut Dice) -> Piece {
-    seats::stool(0.45, dice)
+    parts::piece(["stool", "stool:2"][dice.below(2)], dice)
 }
 
 /// The two walls next to a wall.

@@ -1,0 +1,167 @@
+//! The small things that lie about: on furniture, on the floor and on walls.
+
+use glam::{Vec3, vec2, vec3};
+
+use super::furniture::{at, parts};
+use super::mesh::bounds;
+use super::plan::{FloorArea, FloorPlan};
+use super::scene::{Piece, Pose};
+use super::shell::WALLS;
+
+/// Furniture that things lie on: its word, the place of the table of parts whose things lie there, the height of the surface in
+/// metres (0 for its top), and the share of the depth from which on it is free.
+const TOPS: [(&str, &str, f32, f32); 15] = [
+    ("desk", "desk", 0.0, 0.0),
+    ("coffee table", "living", 0.0, 0.0),
+    ("side table", "living", 0.0, 0.0),
+    ("dining table", "dining", 0.0, 0.0),
+    ("table", "kitchen", 0.0, 0.0),
+    ("dresser", "living", 0.0, 0.0),
+    ("nightstand", "bed", 0.0, 0.0),
+    ("cabinet", "living", 0.0, 0.0),
+    ("kitchen counter", "kitchen", 0.9, 0.05),
+    ("shelf", "shelf", 0.0, 0.0),
+    ("bookshelf", "shelf", 0.0, 0.0),
+    ("fireplace", "living", 0.0, 0.0),
+    ("toilet", "bath", 0.0, 0.0),
+    ("bed", "bed", 0.56, 0.35),
+    ("sofa", "sofa", 0.46, 0.3),
+];
+
+/// The number of things per square metre of a surface (chosen), before the factor of a room.
+const DENSITY: f32 = 9.0;
+/// The gap in metres between things that lie next to each other.
+const GAP: f32 = 0.006;
+
+fn meet([low, high]: &[Vec3; 2], [other_low, other_high]: &[Vec3; 2]) -> bool {
+    low.cmplt(*other_high + GAP).all() && other_low.cmplt(*high + GAP).all()
+}
+
+impl FloorPlan {
+    /// Adds small things to a furnished room; `floor` is the place of the table of parts whose things stand on its floor.
+    pub(super) fn clutter(&mut self, floor: &str) {
+        let mess = self.dice.between(0.4, 1.6);
+        for thing in 0..self.scene.things.len() {
+            let word = self.scene.things[thing].kind.word;
+            let top = TOPS.iter().find(|(known, ..)| *known == word);
+            if let Some((_, place, height, from)) = top {
+                self.fill(thing, place, [*height, *from], mess);
+            }
+        }
+        for _ in 0..(3.5 * mess) as usize {
+            self.drop_on_floor(floor);
+        }
+        let on_walls = parts::found("wall");
+        for _ in 0..2 + self.dice.below(4) {
+            let name = self.dice.pick(&on_walls);
+            let piece = parts::piece(name, &mut self.dice);
+            self.hang(&piece, &WALLS, 0.0);
+        }
+    }
+
+    /// Adds things on top of a thing.
+    fn fill(&mut self, thing: usize, place: &str, [height, from]: [f32; 2], mess: f32) {
+        let pose = self.scene.things[thing].pose;
+        let faces = self.scene.mesh.faces.iter().zip(&self.scene.owners);
+        let corners = faces.filter(|(_, owner)| **owner == thing);
+        let corners = corners.flat_map(|(face, _)| face.corners.map(|corner| corner.at));
+        let (mut low, mut high) = (Vec3::splat(f32::MAX), Vec3::splat(f32::MIN));
+        for corner in corners.map(|at| pose.to_piece(at)) {
+            (low, high) = (low.min(corner), high.max(corner));
+        }
+        // Things on high furniture are not seen from below.
+        let top = if height > 0.0 { height } else { high.y };
+        if top > 1.7 {
+            return;
+        }
+        low.z += (high.z - low.z) * from;
+        let area = (high.x - low.x) * (high.z - low.z);
+        // Seats and beds are mostly empty.
+        let count = if from > 0.0 && height < 0.8 {
+            usize::from(self.dice.chance(0.3))
+        } else {
+            (area * DENSITY * mess).clamp(1.0, 7.0) as usize
+        };
+        let names = parts::found(place);
+        for _ in 0..count * 3 {
+            let name = self.dice.pick(&names);
+            let piece = parts::piece(name, &mut self.dice);
+            let [x, z] = [0, 2].map(|axis| self.dice.between(low[axis], high[axis]));
+            let angle = pose.angle + self.dice.between(-0.5, 0.5);
+            let foot = at(pose.to_room(vec3(x, top + 0.001, z)), angle);
+            let corners = base(&piece).map(|corner| foot.to_room(corner));
+            if corners.iter().all(|corner| self.is_above(thing, *corner)) {
+                self.add_if_free(piece, foot, Some(thing));
+            }
+        }
+    }
+
+    /// Whether a point is just above an upper side of a thing.
+    fn is_above(&self, thing: usize, place: Vec3) -> bool {
+        let flat = |v: Vec3| vec2(v.x, v.z);
+        let mut faces = self.scene.mesh.faces.iter().zip(&self.scene.owners);
+        faces.any(|(face, owner)| {
+            let corners = face.corners.map(|corner| corner.at);
+            let level = |corner: Vec3| (place.y - corner.y).abs() < 0.012;
+            if *owner != thing || !corners.into_iter().all(level) {
+                return false;
+            }
+            let [a, b, c] = corners.map(|corner| flat(corner) - flat(place));
+            let turns = [a.perp_dot(b), b.perp_dot(c), c.perp_dot(a)];
+            turns.iter().all(|turn| *turn >= 0.0) || turns.iter().all(|turn| *turn <= 0.0)
+        })
+    }
+
+    /// Adds a piece unless it would meet another thing than the one that it lies on.
+    fn add_if_free(&mut self, piece: Piece, pose: Pose, below: Option<usize>) -> bool {
+        let corners = piece.mesh.faces.iter().flat_map(|face| face.corners);
+        let corners = corners.map(|corner| pose.to_room(corner.at));
+        let space = corners.fold([Vec3::MAX, Vec3::MIN], |[low, high], at| {
+            [low.min(at), high.max(at)]
+        });
+        let mut others = self.boxes.iter().enumerate();
+        let blocked = others.any(|(thing, other)| {
+            let is_flat = other[1].y - other[0].y < 0.02;
+            Some(thing) != below && !is_flat && meet(&space, other)
+        });
+        let inside = space[0].x > 0.0 && space[0].z > 0.0;
+        if blocked || !inside || space[1].x > self.size.x || space[1].z > self.size.z {
+            return false;
+        }
+        self.add(piece, pose);
+        true
+    }
+
+    /// Adds a thing on the floor, mostly near a wall.
+    fn drop_on_floor(&mut self, place: &str) {
+        let names = parts::found(place);
+        let name = self.dice.pick(&names);
+        let piece = parts::piece(name, &mut self.dice);
+        for _ in 0..12 {
+            let wall = self.dice.pick(&WALLS);
+            let along = self.dice.between(0.3, self.width(wall) - 0.3);
+            let out = if self.dice.chance(0.6) { 0.1 } else { 1.4 };
+            let pose = self.wall_pose(wall, along, 0.0);
+            let foot = pose.to_room(vec3(0.0, 0.013, self.dice.between(0.03, out)));
+            let turned = pose.angle + self.dice.between(-0.6, 0.6);
+            let [low, high] = [foot - 0.16, foot + 0.16];
+            let area = FloorArea([low.x.max(0.01), low.z.max(0.01), high.x, high.z]);
+            if self.is_free(&area) && self.add_if_free(piece.clone(), at(foot, turned), None) {
+                self.keep_free(&at(foot, 0.0), vec3(0.36, 0.0, 0.36), -0.18);
+                return;
+            }
+        }
+    }
+}
+
+/// The corners of the lower side of the bounding box of a piece.
+fn base(piece: &Piece) -> [Vec3; 4] {
+    let [low, high] = bounds(&piece.mesh.faces);
+    [
+        (low.x, low.z),
+        (high.x, low.z),
+        (high.x, high.z),
+        (low.x, high.z),
+    ]
+    .map(|(x, z)| vec3(x, 0.0, z))
+}

@@ -1,0 +1,27 @@
+//! Pseudo-random numbers of places: [`hash`] and [`noise`].
+
+use glam::Vec3;
+
+/// A pseudo-random number from 0 to 1, decided by three whole numbers.
+pub(super) fn hash(x: i32, y: i32, z: i32) -> f32 {
+    let mut bits = (x as u32).wrapping_mul(0x8da6_b343)
+        ^ (y as u32).wrapping_mul(0xd816_3841)
+        ^ (z as u32).wrapping_mul(0xcb1a_b31f);
+    bits = (bits ^ (bits >> 15)).wrapping_mul(0x2c1b_3c6d);
+    bits = (bits ^ (bits >> 12)).wrapping_mul(0x297a_2d39);
+    bits ^= bits >> 15;
+    (bits >> 8) as f32 / (1_u32 << 24) as f32
+}
+
+/// Smooth noise from 0 to 1 (value noise on a lattice of whole numbers).
+pub(super) fn noise(place: Vec3) -> f32 {
+    let cell = place.floor();
+    let share = place - cell;
+    let share = share * share * (Vec3::splat(3.0) - 2.0 * share);
+    let [x, y, z] = [cell.x as i32, cell.y as i32, cell.z as i32];
+    let at = |i: i32, j: i32, k: i32| hash(x.wrapping_add(i), y.wrapping_add(j), z.wrapping_add(k));
+    let mix = |a: f32, b: f32, share: f32| a + (b - a) * share;
+    let row = |j: i32, k: i32| mix(at(0, j, k), at(1, j, k), share.x);
+    let sheet = |k: i32| mix(row(0, k), row(1, k), share.y);
+    mix(sheet(0), sheet(1), share.z)
+}
