@@ -47,14 +47,7 @@ const EDGE: f32 = 0.06;
 pub(super) fn render(scene: &Scene, camera: &Camera, shown: RoomLight) -> RenderedView {
     let tree = scene.tree();
     let [width, height] = camera.size;
-    let spots: Vec<Option<Spot>> = (0..width * height)
-        .into_par_iter()
-        .with_min_len(width)
-        .map(|i| {
-            let ray = camera.ray((i % width) as f32, (i / width) as f32);
-            Spot::through_mirror(scene, &tree, &ray)
-        })
-        .collect();
+    let spots = spots(scene, &tree, camera);
     let lighting = lighting(scene, &tree, &spots);
     let radiances = match shown {
         RoomLight::Display => Vec::new(),
@@ -105,21 +98,37 @@ pub(super) fn render(scene: &Scene, camera: &Camera, shown: RoomLight) -> Render
             Pixels::Light(Arc::new(light))
         }
     };
-    let axis = camera.axis();
-    let depth = spots.iter().enumerate().map(|(i, spot)| {
-        let ray = camera.ray((i % width) as f32, (i / width) as f32);
-        spot.map_or(0, |spot| {
-            (spot.distance * ray.direction.dot(axis) * 1000.0 + 0.5) as u32
-        })
-    });
     RenderedView {
-        depth: depth.collect(),
+        depth: depth(&spots, camera),
         things: spots
             .iter()
             .map(|spot| spot.map_or(0, |spot| spot.thing as u32 + 1))
             .collect(),
         pixels,
     }
+}
+
+/// What the ray through the middle of each pixel meets.
+fn spots(scene: &Scene, tree: &Bvh, camera: &Camera) -> Vec<Option<Spot>> {
+    let [width, height] = camera.size;
+    let places = (0..width * height).into_par_iter().with_min_len(width);
+    let spots = places.map(|i| {
+        let ray = camera.ray((i % width) as f32, (i / width) as f32);
+        Spot::through_mirror(scene, tree, &ray)
+    });
+    spots.collect()
+}
+
+/// The depth of each pixel in millimetres along the optical axis; 0 if there is none.
+fn depth(spots: &[Option<Spot>], camera: &Camera) -> Vec<u32> {
+    let (width, axis) = (camera.size[0], camera.axis());
+    let depths = spots.iter().enumerate().map(|(i, spot)| {
+        let ray = camera.ray((i % width) as f32, (i / width) as f32);
+        spot.map_or(0, |spot| {
+            (spot.distance * ray.direction.dot(axis) * 1000.0 + 0.5) as u32
+        })
+    });
+    depths.collect()
 }
 
 /// The number of the thing at each pixel of a small view, from 1; 0 if there is none.

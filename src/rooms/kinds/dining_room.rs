@@ -7,7 +7,7 @@ use super::super::furniture::{FurnitureSet, at, parts, seats, storage, tables, w
 use super::super::openings::WindowDressing;
 use super::super::paint::{Paint, USUAL};
 use super::super::plan::FloorPlan;
-use super::super::scene::kind;
+use super::super::scene::{Pose, kind};
 use super::super::shell::{Flooring, WALLS};
 use super::super::surface::Surface;
 use super::shared::low_stool;
@@ -87,6 +87,18 @@ fn table(plan: &mut FloorPlan) {
         vec3(length + 0.9, 0.0, depth + 1.0),
         0.0,
     );
+    chairs(plan, &around, [length, depth], round);
+    let centre = plan
+        .dice
+        .pick(&["bowl of fruit", "vase", "vase:2", "candle"]);
+    plan.add_part(&pose, centre, vec3(0.0, 0.75, depth / 2.0 - 0.1));
+    let lamp = plan.dice.pick(&["chandelier", "ceiling lamp:2"]);
+    let ceiling = vec3(middle.x, plan.size.y, middle.z);
+    plan.add_part(&at(ceiling, 0.0), lamp, Vec3::ZERO);
+}
+
+/// Two to six chairs of one kind around a table, whose sizes are its length and depth.
+fn chairs(plan: &mut FloorPlan, around: &Pose, [length, depth]: [f32; 2], round: bool) {
     let mut paint = Paint::of(&USUAL, &mut plan.dice);
     if plan.dice.chance(0.4) {
         paint = Paint::of(&["brown"], &mut plan.dice);
@@ -100,7 +112,7 @@ fn table(plan: &mut FloorPlan) {
     let seat = |plan: &mut FloorPlan, place: Vec3, turned: f32| {
         plan.focus_on_next();
         let piece = seats::chair_of(kind("dining chair", "chair"), paint, &surface, style);
-        plan.add_relative(&around, piece, place, turned);
+        plan.add_relative(around, piece, place, turned);
     };
     let out = depth / 2.0 + 0.3;
     let columns: &[f32] = if round { &[0.0] } else { &[-0.36, 0.36] };
@@ -113,11 +125,4 @@ fn table(plan: &mut FloorPlan) {
         seat(plan, vec3(-side, 0.0, 0.0), std::f32::consts::FRAC_PI_2);
         seat(plan, vec3(side, 0.0, 0.0), -std::f32::consts::FRAC_PI_2);
     }
-    let centre = plan
-        .dice
-        .pick(&["bowl of fruit", "vase", "vase:2", "candle"]);
-    plan.add_part(&pose, centre, vec3(0.0, 0.75, depth / 2.0 - 0.1));
-    let lamp = plan.dice.pick(&["chandelier", "ceiling lamp:2"]);
-    let ceiling = vec3(middle.x, plan.size.y, middle.z);
-    plan.add_part(&at(ceiling, 0.0), lamp, Vec3::ZERO);
 }
