@@ -14,6 +14,11 @@ use crate::types::{Flaw, Rgb};
 pub(crate) const DARK: f64 = 64.0;
 /// Longer side of the images that are judged, in pixels: that of the images from which the thresholds come.
 const JUDGED_SIDE: usize = 160;
+/// Share of the pixels that count as the darkest.
+const DARKEST_SHARE: f64 = 0.01;
+/// How much nearer to the mean the darkest pixels must be than in the dark frame, as a ratio, for a haze. Codes of light that is dimmed
+/// keep their ratios, as their curve is nearly a power. Chosen: noise moves the ratio less.
+const LIFTED: f64 = 1.5;
 /// Side of the blocks whose means are compared, in pixels; chosen, so that noise is averaged out.
 const BLOCK: usize = 4;
 
@@ -252,8 +257,11 @@ pub(super) fn judge(dark: &Codes, made: &Codes) -> Option<Verdict> {
     if (strength / was.len() as f64).sqrt() > 0.06 && cosine < -0.25 {
         return impossible(Flaw::Hue, cosine);
     }
-    let darkest = percentile(&after.samples, 0.01);
-    (darkest > 100.0).then(|| verdict(Flaw::Haze, Gravity::Doubtful, darkest))
+    let darkest = percentile(&after.samples, DARKEST_SHARE);
+    // A pale room has no dark pixel either: in its dark frame, too, the darkest pixels are near to the mean.
+    let [was, is] = [&before.samples, &after.samples]
+        .map(|plane| percentile(plane, DARKEST_SHARE) / mean(plane).max(f64::MIN_POSITIVE));
+    (darkest > 100.0 && is > LIFTED * was).then(|| verdict(Flaw::Haze, Gravity::Doubtful, darkest))
 }
 
 fn verdict(flaw: Flaw, gravity: Gravity, figure: f64) -> Verdict {

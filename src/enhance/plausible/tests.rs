@@ -95,6 +95,17 @@ fn each_wrong_reading_has_its_flaw() {
 }
 
 #[test]
+fn a_pale_room_is_no_haze() {
+    let pale = each(&dark(), |code| 6.0 + code / 4.0);
+    let made = each(&pale, |code| 16.0 * code);
+    assert_eq!(judge(&pale, &made), None);
+    let hazy = each(&good(), |code| f32::midpoint(code, 255.0));
+    assert_eq!(judge(&dark(), &hazy).unwrap().flaw, Flaw::Haze);
+    // The rule looks at the dark frame: a dark one that comes out pale is a haze.
+    assert_eq!(judge(&dark(), &made).unwrap().flaw, Flaw::Haze);
+}
+
+#[test]
 fn a_black_output_is_impossible_and_a_denoised_one_doubtful() {
     let gravity = |made: &Codes| judge(&dark(), made).unwrap().gravity;
     assert_eq!(

@@ -133,6 +133,15 @@ impl<'a> QuestionMaking<'a> {
             palette: palette.map_or_else(Palette::built_in, Ok)?,
         })
     }
+
+    /// The families that are asked for; all that are made by rule, if none is named.
+    fn families(&self) -> BTreeSet<Family> {
+        if self.args.families.is_empty() {
+            Family::PAPER.into_iter().collect()
+        } else {
+            self.args.families.iter().cloned().collect()
+        }
+    }
 }
 
 fn read<T>(path: Option<&Path>, parse: fn(&str) -> Result<T>) -> Result<Option<T>> {
@@ -166,11 +175,7 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
         labels,
         rules: &making.rules,
         palette: &making.palette,
-        families: if args.families.is_empty() {
-            Family::PAPER.into_iter().collect()
-        } else {
-            args.families.iter().cloned().collect::<BTreeSet<_>>()
-        },
+        families: making.families(),
         room_source: args.room,
         balance: args.balance,
         rejected: verdicts.rejected,
@@ -189,19 +194,7 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
         write(path, &lines(candidates)?)?;
     }
     let summary = QuestionSummary::new(&frames, &generated, &request, failed);
-    let compared = match &args.against {
-        Some(folder) => {
-            let other = Dataset::of_images(folder)?.with_rule(args.codes.rule(args.limit));
-            let sets = [&dataset, &other];
-            Some(against::compare(
-                sets,
-                &making.palette,
-                args.threads,
-                progress,
-            )?)
-        }
-        None => None,
-    };
+    let compared = against::compared(making, &dataset, progress)?;
     let json = report::questions::json(&summary, &verdicts.checks, compared.as_ref())?;
     if let Some(folder) = &args.stats {
         write_statistics(folder, &summary, &json)?;
