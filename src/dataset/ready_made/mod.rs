@@ -92,29 +92,8 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
     let mut further = args.root.data_root.clone();
     further.extend(allowed);
     let root = Root::of(&folder, &further)?;
-    let mut table = Table::default();
     let files: Vec<Arc<SetFile>> = files.into_iter().map(Arc::new).collect();
-    let mut header: Option<BTreeSet<String>> = None;
-    for file in &files {
-        file.read(args.rows.as_deref(), &mut table)?;
-        let columns = table.columns_of_last_file();
-        let first = header.get_or_insert_with(|| columns.clone());
-        if joined == Joined::OneTable
-            && let Some(name) = first.symmetric_difference(&columns).next()
-        {
-            let holder = if columns.contains(name) {
-                file
-            } else {
-                &files[0]
-            };
-            let problem = format!(
-                "not the columns of {}: {name:?} stands in {} alone; files that are joined have the same columns, in any order",
-                files[0].label.path.display(),
-                holder.label.path.display()
-            );
-            return Err(Error::data(file.label.path.display(), problem));
-        }
-    }
+    let mut table = rows(&files, joined, args)?;
     let (group, no_group) = preset.map_or((None, None), |preset| preset.group(&table));
     let map = Map::joined(group.iter().chain(&info.map).chain(&args.map));
     let wrong = |table: &Table, problem: String| {
@@ -155,6 +134,36 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
         sources: asked.sources,
         questions: asked.questions,
     })
+}
+
+/// The rows of all files.
+///
+/// # Errors
+/// If a file cannot be read, or files of one table differ in their columns.
+fn rows(files: &[Arc<SetFile>], joined: Joined, args: &SetArgs) -> Result<Table> {
+    let mut table = Table::default();
+    let mut header: Option<BTreeSet<String>> = None;
+    for file in files {
+        file.read(args.rows.as_deref(), &mut table)?;
+        let columns = table.columns_of_last_file();
+        let first = header.get_or_insert_with(|| columns.clone());
+        if joined == Joined::OneTable
+            && let Some(name) = first.symmetric_difference(&columns).next()
+        {
+            let holder = if columns.contains(name) {
+                file
+            } else {
+                &files[0]
+            };
+            let problem = format!(
+                "not the columns of {}: {name:?} stands in {} alone; files that are joined have the same columns, in any order",
+                files[0].label.path.display(),
+                holder.label.path.display()
+            );
+            return Err(Error::data(file.label.path.display(), problem));
+        }
+    }
+    Ok(table)
 }
 
 /// A set that was read.
@@ -251,7 +260,13 @@ fn finish(
         ids = frames.ids(&set.answered)?;
     }
     let family = FamilyOf::of(opened.table, &opened.roles.families, &set.answered);
-    let (questions, sources) = questions(opened, (&family, &set.groups), set.answered, &ids, &mut frames)?;
+    let (questions, sources) = questions(
+        opened,
+        (&family, &set.groups),
+        set.answered,
+        &ids,
+        &mut frames,
+    )?;
     notes.extend(ids.note());
     notes.extend(hint);
     let summary = Summary {
