@@ -2,7 +2,6 @@
 
 use rayon::prelude::*;
 
-use super::QuestionMaking;
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
 use crate::job::input_tally::InputTally;
@@ -13,31 +12,28 @@ use crate::questions::look::FrameLook;
 use crate::report::questions::against::LookComparison;
 use crate::types::FrameId;
 
-/// The frames beside those of the other set that the flags name; `None` if they name none.
+/// The frames of two sets beside each other.
 ///
 /// # Errors
 /// If a set has no images, or one of them cannot be read: left out, it would change what is compared.
-pub(super) fn compared(
-    making: &QuestionMaking<'_>,
-    dataset: &Dataset,
+pub(super) fn compare(
+    sets: [&Dataset; 2],
+    palette: &Palette,
+    threads: ThreadArgs,
     progress: &Progress,
-) -> Result<Option<LookComparison>> {
-    let args = making.args;
-    let Some(folder) = &args.against else {
-        return Ok(None);
-    };
-    let other = Dataset::of_images(folder, &args.root.data_root)?;
-    let other = other.with_rule(args.codes.rule(args.limit));
+) -> Result<LookComparison> {
     let looks = |set: &Dataset| {
-        let found = looks(set, &making.palette, args.threads, progress)?;
+        let found = looks(set, palette, threads, progress)?;
         if found.is_empty() {
             return Err(Error::data(set.name(), "no images to compare"));
         }
         Ok(found)
     };
-    let (own, others) = (looks(dataset)?, looks(&other)?);
-    let sets = [(dataset.name(), &*own), (other.name(), &*others)];
-    Ok(Some(LookComparison::new(sets)))
+    let [own, others] = [looks(sets[0])?, looks(sets[1])?];
+    Ok(LookComparison::new([
+        (sets[0].name(), &own),
+        (sets[1].name(), &others),
+    ]))
 }
 
 /// The look of each frame.

@@ -142,6 +142,17 @@ impl<'a> QuestionMaking<'a> {
             self.args.families.iter().cloned().collect()
         }
     }
+
+    /// The frames beside those of the other set that the flags name; `None` if they name none.
+    fn compared(&self, dataset: &Dataset, progress: &Progress) -> Result<Option<LookComparison>> {
+        let args = self.args;
+        let Some(folder) = &args.against else {
+            return Ok(None);
+        };
+        let other = Dataset::of_images(folder, &args.root.data_root)?;
+        let other = other.with_rule(args.codes.rule(args.limit));
+        against::compare([dataset, &other], &self.palette, args.threads, progress).map(Some)
+    }
 }
 
 fn read<T>(path: Option<&Path>, parse: fn(&str) -> Result<T>) -> Result<Option<T>> {
@@ -194,7 +205,7 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
         write(path, &lines(candidates)?)?;
     }
     let summary = QuestionSummary::new(&frames, &generated, &request, failed);
-    let compared = against::compared(making, &dataset, progress)?;
+    let compared = making.compared(&dataset, progress)?;
     let json = report::questions::json(&summary, &verdicts.checks, compared.as_ref())?;
     if let Some(folder) = &args.stats {
         write_statistics(folder, &summary, &json)?;
