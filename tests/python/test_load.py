@@ -119,7 +119,7 @@ class Choices(RunTest):
         again["failure"] = {"kind": "server", "status": 503, "message": "busy"}
         with (run / "records.jsonl").open("a") as file:
             file.write(json.dumps(again) + "\n" + json.dumps(records[1])[:-40])
-        with self.assertWarnsRegex(UserWarning, r"records.jsonl:302: the last line is incomplete"):
+        with self.assertWarnsRegex(UserWarning, rf"records.jsonl:{len(records) + 2}: the last line is incomplete"):
             table = load_run(run).set_index("key")
         self.assertEqual(len(table), len(records))
         row = table.loc[again["key"]]
