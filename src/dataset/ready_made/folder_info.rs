@@ -33,7 +33,14 @@ impl FolderInfo {
         }
         let path = archive.path().join(Self::FILE);
         let text = archive.text(Self::FILE)?;
-        let info = serde_json::from_str(&text).map_err(|e| Error::data(path.display(), e))?;
+        let info: serde_json::Value =
+            serde_json::from_str(&text).map_err(|e| Error::data(path.display(), e))?;
+        if info.get("light").is_some_and(|light| light != "lit") {
+            tracing::warn!(
+                "{}: `light` is not read from a ZIP file; --light dark says that the set was photographed in the dark",
+                path.display()
+            );
+        }
         Self::read(&path, &info)
     }
 

@@ -111,7 +111,10 @@ impl SheetItem {
         let shown = shown.filter(|record| !is_control(&record.model));
         let records: Vec<Record> = shown.cloned().collect();
         let Some(first) = records.first() else {
-            return Err(problem(format!("the run did not ask {name:?} with images")));
+            let example = run.records.first().map_or("", |record| &record.question.0);
+            return Err(problem(format!(
+                "the run did not ask {name:?} with images; an item is named by the id of its question, as {example}"
+            )));
         };
         let stored = run.questions.iter().find(|question| question.id.0 == name);
         let text = choice_text(first, stored);
