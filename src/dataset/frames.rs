@@ -27,6 +27,7 @@ use super::dark_photos::DarkField;
 use super::image_file::format::READ;
 use super::image_names::{ImageNames, is_image};
 use super::maps::{DepthFile, MapPaths};
+use super::root::LeadsTo;
 use super::view::FrameFacts;
 use super::{Dataset, ImageSource, Root, SetArgs, ready_made, stem};
 use crate::error::{Error, Result};
@@ -278,11 +279,10 @@ fn images(root: &Root) -> Result<BTreeMap<FrameId, ImageSource>> {
     let mut sources = BTreeMap::new();
     let (mut all, mut links_out) = (Vec::new(), Vec::new());
     for path in entries(folder)? {
-        match path.canonicalize() {
-            Ok(real) if root.holds(&real) => all.push(path),
-            Ok(_) => links_out.push(path),
-            // A link to nowhere is no image.
-            Err(_) => {}
+        match root.leads_to(&path) {
+            LeadsTo::Within => all.push(path),
+            LeadsTo::Outside => links_out.push(path),
+            LeadsTo::Nowhere => {}
         }
     }
     root.warn_of_links_out(&links_out);

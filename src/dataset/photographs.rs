@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::image_file::format::READ;
 use super::image_names::{ImageNames, is_image};
-use super::root::Root;
+use super::root::{LeadsTo, Root};
 use super::{DataPlace, Dataset, ImageSource, SetArgs, frames, stem};
 use crate::error::{Error, Result};
 use crate::files::reading::entries;
@@ -121,16 +121,11 @@ impl Scan {
             if name.starts_with('.') {
                 continue;
             }
-            // A link to nowhere is no image.
-            let Ok(target) = path.canonicalize() else {
-                continue;
-            };
-            if !root.holds(&target) {
-                self.links_out.push(path);
-            } else if path.is_dir() {
-                self.add(root, &path)?;
-            } else {
-                self.files.push(path);
+            match root.leads_to(&path) {
+                LeadsTo::Within if path.is_dir() => self.add(root, &path)?,
+                LeadsTo::Within => self.files.push(path),
+                LeadsTo::Outside => self.links_out.push(path),
+                LeadsTo::Nowhere => {}
             }
         }
         Ok(())

@@ -39,6 +39,17 @@ pub(crate) struct Root {
     written: Vec<PathBuf>,
 }
 
+/// Where a path leads, links followed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum LeadsTo {
+    /// Below one of the folders.
+    Within,
+    /// Out of the folders.
+    Outside,
+    /// To nothing that is there.
+    Nowhere,
+}
+
 impl Root {
     /// The folder of some data with further folders, all of which must exist.
     ///
@@ -120,8 +131,17 @@ impl Root {
         Ok(path)
     }
 
-    /// Whether a path, links followed, lies below one of the folders.
-    pub(crate) fn holds(&self, real: &Path) -> bool {
+    /// Where a path that was found in the folder leads, links followed.
+    pub(crate) fn leads_to(&self, path: &Path) -> LeadsTo {
+        match path.canonicalize() {
+            Ok(real) if self.holds(&real) => LeadsTo::Within,
+            Ok(_) => LeadsTo::Outside,
+            Err(_) => LeadsTo::Nowhere,
+        }
+    }
+
+    /// Whether a real path lies below one of the folders.
+    fn holds(&self, real: &Path) -> bool {
         self.real.iter().any(|root| real.starts_with(root))
     }
 

@@ -5,7 +5,7 @@ use super::measure::AGREEMENT;
 use crate::report::table::ColumnKind::{self, Count, Number, Percent, Ratio, Share, Text};
 use crate::report::table::{Table, TableBuilder, TableCell};
 use crate::report::tables::{
-    SUMMARY, comparisons_of, counted_answers, health, level_words, reading,
+    SUMMARY, commonest_answers, comparisons_of, counted_answers, health, level_words, reading,
 };
 use crate::report::words::{counted, light};
 use crate::score::choice::ReadingMode;
@@ -292,23 +292,8 @@ fn changed(rates: &[Hallucination]) -> Table {
 
 /// The answer given most often, beside how often it is that at L0.
 fn commonest(confusions: &[Confusion]) -> Table {
-    let answers = confusions.iter();
-    let answers = answers.filter_map(|confusion| Some((confusion, confusion.collapse.as_ref()?)));
-    let mut table = TableBuilder::new("commonest_answers", answers)
-        .page(
-            "answers",
-            "The answer given most often, and how often it is the answer at L0",
-        )
-        .subject(|(confusion, _)| &confusion.subject, ToString::to_string)
-        .family(|(confusion, _)| Some(&confusion.family))
-        .column(Text, "csv top_answer | page given most often", |(_, c)| {
-            c.top.clone()
-        })
-        .column(
-            Share,
-            "csv top_share top_low top_high | page given in % [95 %]",
-            |(_, c)| c.share,
-        )
+    let caption = "The answer given most often, and how often it is the answer at L0";
+    let mut table = commonest_answers("commonest_answers", caption, confusions)
         .column(Percent, "csv light_share | page at L0 in %", |(_, c)| {
             c.truth
         })

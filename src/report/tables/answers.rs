@@ -2,7 +2,7 @@
 
 use crate::report::table::ColumnKind::{Count, Number, Percent, Share, Text};
 use crate::report::table::{Table, TableBuilder};
-use crate::score::confusion::{Confusion, Hallucination};
+use crate::score::confusion::{Collapse, Confusion, Hallucination};
 use crate::score::findings::Findings;
 
 pub(super) fn answers(findings: &Findings<'_>) -> Vec<Table> {
@@ -31,15 +31,17 @@ fn hallucination(rates: &[Hallucination]) -> Table {
         .build()
 }
 
-fn collapse(confusions: &[Confusion]) -> Table {
+/// A row for each answer that is given most often, with its share: the first columns of a table.
+pub(in crate::report) fn commonest_answers<'a>(
+    name: &'static str,
+    caption: &str,
+    confusions: &'a [Confusion],
+) -> TableBuilder<(&'a Confusion, &'a Collapse)> {
     let collapses = confusions.iter();
     let collapses =
         collapses.filter_map(|confusion| Some((confusion, confusion.collapse.as_ref()?)));
-    TableBuilder::new("collapse", collapses)
-        .page(
-            "answers",
-            "The answer given most often, and how often it is true",
-        )
+    TableBuilder::new(name, collapses)
+        .page("answers", caption)
         .subject(|(confusion, _)| &confusion.subject, ToString::to_string)
         .family(|(confusion, _)| Some(&confusion.family))
         .column(Text, "csv top_answer | page given most often", |(_, c)| {
@@ -50,6 +52,11 @@ fn collapse(confusions: &[Confusion]) -> Table {
             "csv top_share top_low top_high | page given in % [95 %]",
             |(_, c)| c.share,
         )
+}
+
+fn collapse(confusions: &[Confusion]) -> Table {
+    let caption = "The answer given most often, and how often it is true";
+    commonest_answers("collapse", caption, confusions)
         .column(Percent, "csv true_share | page true in %", |(_, c)| c.truth)
         .column(Number, "csv guess_share", |(_, c)| c.guess)
         .column(

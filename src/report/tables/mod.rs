@@ -29,7 +29,7 @@ use crate::score::findings::Findings;
 use crate::score::subject::Subject;
 use crate::types::{EnhancerName, Family, KindReading, ModelListing};
 
-pub(super) use answers::counted_answers;
+pub(super) use answers::{commonest_answers, counted_answers};
 pub(super) use baseline::BASELINE;
 pub(crate) use baseline::baseline;
 pub(super) use comparisons::comparisons_of;
