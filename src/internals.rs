@@ -50,7 +50,7 @@ pub mod score {
     pub use crate::score::bootstrap::Resamples;
     pub use crate::score::calibration::{Calibration, calibrations};
     pub use crate::score::chance::OfferedChoices;
-    pub use crate::score::cluster::Clusters;
+    pub use crate::score::cluster::{Clusters, FrameTies};
     pub use crate::score::curve::curves;
     pub use crate::score::estimate::Estimate;
     pub use crate::score::fidelity::FidelityFindings;

@@ -59,6 +59,7 @@ mod wire_kind;
 
 pub use access::Access;
 pub(crate) use batch_interface::BatchInterface;
+pub(crate) use call::ImagePlaces;
 pub use call::{Call, Message, Query};
 pub use endpoint::Endpoint;
 pub use extra_fields::ExtraFields;

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::fmt;
 use std::num::NonZeroU32;
 use std::str::FromStr;
+use std::sync::Arc;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -165,6 +166,11 @@ impl Payload {
     #[must_use]
     pub fn facts(&self) -> &ImageFacts {
         &self.facts
+    }
+
+    /// The digest of images that are sent together, as in a record; `None` of none.
+    pub(crate) fn joint_digest(images: &[Arc<Self>]) -> Option<Digest> {
+        Digest::of_files(images.iter().map(|image| image.facts.digest))
     }
 
     /// Extension of a name for the file, without the dot.

@@ -47,7 +47,7 @@ pub(crate) use photographs::Photographs;
 pub(crate) use picture::Picture;
 pub(crate) use reading_rule::ReadingRule;
 pub use ready_made::SetArgs;
-use ready_made::{Form, ReadQuestions};
+use ready_made::{Form, ReadQuestions, Series};
 pub(crate) use root::Root;
 pub(crate) use root::RootArgs;
 pub(crate) use scene_args::SceneArgs;
@@ -92,6 +92,8 @@ pub struct Dataset {
     /// The `name` in `dataset.json`; empty if there is none.
     title: String,
     pub(crate) sources: BTreeMap<FrameId, ImageSource>,
+    /// The frames of each question that shows several, by the name that the question has for all of them.
+    series: Series,
     questions: Vec<Question>,
     labels: Option<Labels>,
     rule: ReadingRule,
@@ -110,6 +112,7 @@ impl Dataset {
             name,
             title: String::new(),
             sources,
+            series: Series::new(),
             questions,
             labels: None,
             rule: ReadingRule::default(),
@@ -154,6 +157,7 @@ impl Dataset {
             title: set.title,
             reading: set.reading,
             form: set.form,
+            series: set.series,
             ..Self::new(set.name, set.sources, set.questions)
         }
     }
@@ -239,6 +243,21 @@ impl Dataset {
     /// The ids of the frames, in alphabetical order.
     pub fn frames(&self) -> impl Iterator<Item = &FrameId> {
         self.sources.keys()
+    }
+
+    /// The frames that a question about `frame` shows, in order: this frame alone, or the several that it stands for.
+    #[must_use]
+    pub(crate) fn shown<'a>(&'a self, frame: &'a FrameId) -> &'a [FrameId] {
+        match self.series.get(frame) {
+            Some(frames) => frames,
+            None => std::slice::from_ref(frame),
+        }
+    }
+
+    /// The frames of a question that shows several, in order; none of a question that shows one.
+    #[must_use]
+    pub(crate) fn several(&self, frame: &FrameId) -> &[FrameId] {
+        self.series.get(frame).map_or(&[], Vec::as_slice)
     }
 
     /// The scene of a frame; empty if the data set does not name scenes.

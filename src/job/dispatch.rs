@@ -304,15 +304,17 @@ impl<I: Item> ReplySink<'_, I> {
             return;
         }
         let text = text_tokens(&ready.trial.prompt);
-        self.measured.add(model, charged, text);
-        if self.measured.images(model).is_none() {
+        let shown = ready.stimulus.images.len();
+        self.measured.add(model, charged, text, shown);
+        if self.measured.image(model).is_none() {
             return;
         }
         self.said_difference[model] = Said::Done;
         let images = ready.stimulus.images.iter().map(|image| image.facts());
         let of_model = (model, &self.dispatcher.models[model]);
         let expected = self.budget.expected_image_tokens(of_model, images);
-        let difference = expected.and_then(|images| self.measured.difference(model, text, images));
+        let difference =
+            expected.and_then(|tokens| self.measured.difference(model, text, (shown, tokens)));
         if let Some(difference) = difference {
             tracing::warn!(
                 "{}: a prompt is charged {:.0} tokens, where {:.0} were estimated (median of the first 10 with images); --dry-run \

@@ -93,7 +93,12 @@ impl<'a, E: Experiment> Job<'a, E> {
         for phase in 0..E::PHASES.len() {
             let mut plan = Plan::new(experiment.plan(phase, &stored)?);
             let models = experiment.models(phase).len();
-            measured.push(MeasuredTokens::of_stored(models, &plan, &stored));
+            measured.push(MeasuredTokens::of_stored(
+                models,
+                &plan,
+                experiment.sources(),
+                &stored,
+            ));
             plan.exclude(|key| answered.contains(key));
             plans.push(plan);
         }

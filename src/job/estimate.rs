@@ -158,13 +158,16 @@ fn lines<E: Experiment>(
                 tokens.add(text_tokens(&trial.prompt), trial.item.reply_tokens());
             }
             let source = &sources[place];
-            if let (Some(_), Some(frame)) = (&group.condition, source.frames.first()) {
-                let (width, height) = experiment.recipe().scaling.of(frame.size);
-                let images = source.order.len() as f64;
-                let by_rule = || Some(images * image_tokens(model, price, width, height)?);
-                let each = measured.images(index).or_else(by_rule);
+            if group.condition.is_some() {
+                let mut shown = source.order.iter().map(|place| source.frames[*place].size);
+                let charged = measured.image(index);
+                let of_request = shown.try_fold(0.0, |sum, size| {
+                    let (width, height) = experiment.recipe().scaling.of(size);
+                    let by_rule = || image_tokens(model, price, width, height);
+                    Some(sum + charged.or_else(by_rule)?)
+                });
                 let requests = (tokens.requests - before) as f64;
-                let known = tokens.image.zip(each);
+                let known = tokens.image.zip(of_request);
                 tokens.image = known.map(|(sum, each)| sum + each * requests);
             }
         }
@@ -173,7 +176,7 @@ fn lines<E: Experiment>(
             tokens.add(request.text_tokens, request.reply_tokens);
         }
         let line = CostLine {
-            charged_image_tokens: measured.images(index),
+            charged_image_tokens: measured.image(index),
             ..line(model, price, &by_reading, E::PHASES[phase])
         };
         (index, line)

@@ -17,14 +17,14 @@ use super::frame_work::{FrameWork, ImageSteps, StagedFrame};
 use super::image_notes::{ImageNotes, MissingNotes, WantedNotes, fidelity};
 use super::plan::{SourcePlan, TrialGroup};
 use super::source::Source;
-use super::thumbnail::thumbnail;
+use super::thumbnail::{thumbnail, thumbnail_of_all};
 use super::timings::TimedStep;
 use super::trial::{Item, PreparedGroup, Stimulus};
 use super::workers::Workers;
 use crate::ask::Payload;
 use crate::enhance::{Enhancer, Implausible};
 use crate::error::{Error, Result};
-use crate::types::{Condition, EnhancerName, FrameId, Rgb, Thumbnail};
+use crate::types::{Condition, EnhancerName, FrameId, Rgb};
 
 /// The steps from a frame to an image, with the enhancement models that they need.
 pub(crate) struct ImagePipeline<'a> {
@@ -40,7 +40,7 @@ pub(crate) struct ImagePipeline<'a> {
 enum SourceWork<'a> {
     /// One frame, whose images are made when they are needed.
     Frame(Box<FrameWork<'a>>),
-    /// A walk, whose images are all made, by condition.
+    /// A walk, or several frames of one question, whose images are all made, by condition.
     Walk(BTreeMap<Condition, Vec<Arc<Payload>>>),
     /// A source whose images cannot be made, and the reason.
     Failed(Error),
@@ -155,8 +155,8 @@ impl<'a> ImagePipeline<'a> {
         }
     }
 
-    /// The images of a group in the order shown, with the missing notes; none if nothing is shown. Of a walk, the middle image
-    /// has a thumbnail, and no fidelity is measured.
+    /// The images of a group in the order shown, with the missing notes; none if nothing is shown. Of several images, one
+    /// thumbnail stands for all, and no fidelity is measured.
     fn group(
         &mut self,
         work: &mut SourceWork<'_>,
@@ -176,11 +176,14 @@ impl<'a> ImagePipeline<'a> {
             }
             SourceWork::Walk(images) => {
                 let images = images.remove(condition).unwrap_or_default();
-                let middle = images.get(images.len() / 2).filter(|_| wanted.thumbnail);
+                let thumbnail = wanted
+                    .thumbnail
+                    .then(|| thumbnail_of_all(name, condition, &images))
+                    .and_then(|made| or_warning(name, condition, made).flatten());
+                let fidelity = None;
                 let notes = ImageNotes {
-                    thumbnail: middle
-                        .and_then(|middle| try_thumbnail(name, condition, middle, None)),
-                    fidelity: None,
+                    thumbnail,
+                    fidelity,
                 };
                 Ok((images, notes))
             }
@@ -206,8 +209,11 @@ impl<'a> ImagePipeline<'a> {
             pair,
         } = work.resolved(condition)?;
         let steps = work.steps;
-        let thumbnail = |image: &Payload, encoded: &Rgb| {
-            let make = || try_thumbnail(name, condition, image, Some(encoded));
+        let small_copy = |image: &Payload, encoded: &Rgb| {
+            let make = || {
+                let made = thumbnail(name, condition, image, Some(encoded));
+                or_warning(name, condition, made)
+            };
             steps.timings.time(TimedStep::Encode, make)
         };
         let mut notes = ImageNotes::default();
@@ -215,7 +221,7 @@ impl<'a> ImagePipeline<'a> {
             let image = paired(image, pair);
             // The file is decoded only for its thumbnail.
             if wanted.thumbnail {
-                notes.thumbnail = thumbnail(&image, work.clean()?);
+                notes.thumbnail = small_copy(&image, work.clean()?);
             }
             return Ok((image, notes));
         }
@@ -225,7 +231,7 @@ impl<'a> ImagePipeline<'a> {
         let (image, encoded) = steps.payload(&pixels, &read, exposure)?;
         let image = paired(image, pair);
         if wanted.thumbnail {
-            notes.thumbnail = thumbnail(&image, &encoded);
+            notes.thumbnail = small_copy(&image, &encoded);
         }
         if let Some(clean) = clean {
             let measure = || fidelity(name, condition, &image, [&*encoded, &*clean]);
@@ -351,19 +357,12 @@ fn one_frame_each<I>(sources: &[Source], plan: &[SourcePlan<I>], workers: usize)
     plan.len() >= 2 * workers && parts.all(|part| sources[part.source].frames.len() < 2)
 }
 
-/// The thumbnail of an image, or a warning and `None`: an answer must not fail because of a picture for the report.
-fn try_thumbnail(
-    name: &FrameId,
-    condition: &Condition,
-    image: &Payload,
-    encoded: Option<&Rgb>,
-) -> Option<Thumbnail> {
-    let thumbnail = thumbnail(name, condition, image, encoded);
-    thumbnail
-        .inspect_err(|problem| {
-            tracing::warn!("the report has no thumbnail of {name} at {condition}: {problem}");
-        })
-        .ok()
+/// What was made for the report, or a warning and `None`: an answer must not fail because of a picture for the report.
+fn or_warning<T>(name: &FrameId, condition: &Condition, made: Result<T>) -> Option<T> {
+    made.inspect_err(|problem| {
+        tracing::warn!("the report has no thumbnail of {name} at {condition}: {problem}");
+    })
+    .ok()
 }
 
 #[cfg(test)]

@@ -30,6 +30,7 @@ mod measured_tokens;
 pub(crate) mod merge;
 pub(crate) mod models;
 pub(crate) mod money;
+pub(crate) mod montage;
 pub(crate) mod observer;
 mod open_run;
 mod outcome;

@@ -12,7 +12,7 @@ use super::image_words::ImageFlags;
 use super::photographs;
 use super::questions::ASK;
 use super::recipe::Recipe;
-use super::source::{Frames, Source, SourceFrame};
+use super::source::{Frames, Source};
 use super::timings::Timings;
 use super::walk::{Walk, WalkFolder};
 use super::workers::ThreadArgs;
@@ -150,9 +150,7 @@ impl ImageRebuilder {
 
     fn source(&self, name: &FrameId) -> Result<Source> {
         match &self.folder {
-            FrameFolder::Frames(dataset) => {
-                SourceFrame::inspect(dataset, name).map(Source::of_frame)
-            }
+            FrameFolder::Frames(dataset) => Source::of_questions(dataset, name),
             FrameFolder::Walks(folder, walk) => folder.source(&name.0, walk),
         }
     }

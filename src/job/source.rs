@@ -146,28 +146,38 @@ fn inspect_photographs(frames: &dyn Frames, id: &FrameId) -> Result<Vec<SourcePh
     photos.collect()
 }
 
-/// The frames that are shown together: one frame, or those of a walk.
+/// The frames that are shown together: one frame, those of a question that shows several, or those of a walk.
 #[derive(Debug)]
 pub(crate) struct Source {
-    /// Name of the frame or of the walk.
+    /// Name of the frame, of several frames together, or of the walk.
     pub(crate) name: FrameId,
     /// Each of its frames once; none if only blind models are asked, or it cannot be shown.
     pub(crate) frames: Vec<SourceFrame>,
-    /// Indices into `frames`, in the order shown. A frame is repeated if a walk has fewer frames than are shown.
+    /// Indices into `frames`, in the order shown. A frame is repeated if a question shows it twice, or a walk has fewer frames than
+    /// are shown.
     pub(crate) order: Vec<usize>,
     /// Reason why it cannot be shown; `None` if it can.
     pub(crate) problem: Option<String>,
 }
 
 impl Source {
-    /// A source of a single frame.
-    pub(crate) fn of_frame(frame: SourceFrame) -> Self {
-        Self {
-            name: frame.id.clone(),
-            frames: vec![frame],
-            order: vec![0],
-            problem: None,
+    /// The source of questions about a frame of this name: this frame alone, or the several that it stands for. Each file is read once.
+    pub(crate) fn of_questions(dataset: &Dataset, name: &FrameId) -> Result<Self> {
+        let mut frames: Vec<SourceFrame> = Vec::new();
+        let mut order = Vec::new();
+        for id in dataset.shown(name) {
+            let known = frames.iter().position(|frame| frame.id == *id);
+            if known.is_none() {
+                frames.push(SourceFrame::inspect(dataset, id)?);
+            }
+            order.push(known.unwrap_or(frames.len() - 1));
         }
+        Ok(Self {
+            name: name.clone(),
+            frames,
+            order,
+            problem: None,
+        })
     }
 
     /// A source without frames, for blind models.
@@ -190,14 +200,9 @@ impl Source {
         self.frames.get(self.frames.len() / 2)
     }
 
-    /// The digest of all frames in the order shown; for a single frame, that of its file.
-    pub(crate) fn digest(&self) -> Digest {
-        let shown = self.order.iter().map(|index| &self.frames[*index].digest);
-        let digests: Vec<&Digest> = shown.collect();
-        match digests[..] {
-            [only] => *only,
-            _ => Digest::of_parts(digests.iter().map(|digest| &digest.as_bytes()[..])),
-        }
+    /// The digest of all frames in the order shown; for a single frame, that of its file; `None` without frames.
+    pub(crate) fn digest(&self) -> Option<Digest> {
+        Digest::of_files(self.order.iter().map(|index| self.frames[*index].digest))
     }
 }
 
@@ -244,10 +249,10 @@ pub(crate) fn inspect_all(
     let first = first_asked(questions);
     let bar = progress.bar("reading images", first.len());
     let sources = first.into_par_iter().map(|question| {
-        let frame = SourceFrame::inspect(dataset, &question.frame)
+        let source = Source::of_questions(dataset, &question.frame)
             .map_err(|e| Error::data(format_args!("question {:?}", question.id.0), e))?;
         bar.inc();
-        Ok(Source::of_frame(frame))
+        Ok(source)
     });
     sources.collect()
 }

@@ -1,9 +1,11 @@
-//! Small copies of the images that were sent, for the report: [`thumbnail`], and those not made yet: [`MissingThumbnails`].
+//! Small copies of the images that were sent, for the report: [`thumbnail`], [`thumbnail_of_all`], and those not made yet: [`MissingThumbnails`].
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::num::NonZeroU32;
+use std::sync::Arc;
 
+use super::montage::{columns, montage};
 use crate::ask::{Payload, PayloadFormat};
 use crate::error::{Error, Result};
 use crate::types::{Condition, Digest, FrameId, Rgb, Thumbnail};
@@ -12,6 +14,8 @@ use crate::types::{Condition, Digest, FrameId, Rgb, Thumbnail};
 const MAX_FRAMES: usize = 48;
 /// Longest side of a small copy, in pixels; chosen.
 const SIDE: u32 = 240;
+/// Maximum number of images beside each other in one small copy; chosen, so that each keeps a third of its side.
+const MOST_TILES: usize = 9;
 /// Side of the crop, in pixels; chosen.
 const CROP: usize = 96;
 /// Format of the small copy and of the crop.
@@ -54,6 +58,29 @@ impl MissingThumbnails {
     }
 }
 
+/// A small copy of an image as it was sent, and a crop of its middle; of several images small copies beside each other, and a crop of
+/// the one in the middle. Of more than [`MOST_TILES`] the one in the middle stands for all. `None` without images.
+pub(crate) fn thumbnail_of_all(
+    frame: &FrameId,
+    condition: &Condition,
+    sent: &[Arc<Payload>],
+) -> Result<Option<Thumbnail>> {
+    let Some(middle) = sent.get(sent.len() / 2) else {
+        return Ok(None);
+    };
+    let mut thumbnail = thumbnail(frame, condition, middle, None)?;
+    thumbnail.image = Payload::joint_digest(sent).unwrap_or(thumbnail.image);
+    if (2..=MOST_TILES).contains(&sent.len()) {
+        let side = SIDE / columns(sent.len()) as u32;
+        let tiles = sent.iter().map(|image| {
+            let image = image.decode()?;
+            small(&image, side).map(Cow::into_owned)
+        });
+        thumbnail.small = url(&montage(&tiles.collect::<Result<Vec<Rgb>>>()?)?)?;
+    }
+    Ok(Some(thumbnail))
+}
+
 /// A small copy of an image as it was sent, and a crop of its middle. The crop of a degraded image without an enhancer is amplified by
 /// the light that the level has taken; other crops are unchanged. With the `encoded` pixels, a PNG need not be decoded.
 pub(crate) fn thumbnail(
@@ -78,28 +105,30 @@ pub(crate) fn thumbnail(
         },
         Some(_) => 0.0,
     };
-    let jpeg: PayloadFormat = FORMAT
-        .parse()
-        .map_err(|e| Error::data("the format of thumbnails", e))?;
-    let url = |image: &Rgb| -> Result<String> {
-        let url = Payload::encode(image, jpeg, None)?.data_url();
-        Ok(String::from_utf8_lossy(&url).into_owned())
-    };
     Ok(Thumbnail {
         frame: frame.clone(),
         condition: condition.clone(),
         image: sent.facts().digest,
-        small: url(&*small(&image)?)?,
+        small: url(&*small(&image, SIDE)?)?,
         crop: url(&middle(&image, ev)?)?,
         stops: ev,
     })
 }
 
-/// The image with a longer side of at most [`SIDE`] pixels. Each pixel is the mean of those that it replaces. This is four times as
+/// The `data:` URL of a picture.
+fn url(image: &Rgb) -> Result<String> {
+    let jpeg: PayloadFormat = FORMAT
+        .parse()
+        .map_err(|e| Error::data("the format of thumbnails", e))?;
+    let url = Payload::encode(image, jpeg, None)?.data_url();
+    Ok(String::from_utf8_lossy(&url).into_owned())
+}
+
+/// The image with a longer side of at most `side` pixels. Each pixel is the mean of those that it replaces. This is four times as
 /// fast as `image::imageops::thumbnail`.
-fn small(image: &Rgb) -> Result<Cow<'_, Rgb>> {
+fn small(image: &Rgb, side: u32) -> Result<Cow<'_, Rgb>> {
     let (height, width) = (image.height(), image.width());
-    let fitted = Payload::fitted(width as u32, height as u32, NonZeroU32::new(SIDE));
+    let fitted = Payload::fitted(width as u32, height as u32, NonZeroU32::new(side));
     let (columns, rows) = (fitted.0 as usize, fitted.1 as usize);
     if (columns, rows) == (width, height) {
         return Ok(Cow::Borrowed(image));
@@ -157,12 +186,12 @@ mod tests {
             pixel.fill((10 * row + 3 * (column % 2) + column / 4) as u8);
         }
         // 240 × 2: the first row replaces one row of the image, the second two.
-        let copy = small(&image).unwrap();
+        let copy = small(&image, SIDE).unwrap();
         assert_eq!((copy.height(), copy.width()), (2, 240));
         let at = |row: usize, column: usize| copy.samples()[(row * 240 + column) * 3];
         assert_eq!([at(0, 0), at(0, 3), at(1, 0)], [2, 3, 17]);
         let fits = Rgb::black(2, 240);
-        assert!(matches!(small(&fits).unwrap(), Cow::Borrowed(_)));
+        assert!(matches!(small(&fits, SIDE).unwrap(), Cow::Borrowed(_)));
     }
 
     #[test]

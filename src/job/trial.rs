@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::image_notes::ImageNotes;
 use super::models::ModelUnderTest;
-use crate::ask::{Message, Payload, Query};
+use crate::ask::{ImagePlaces, Message, Payload, Query};
 use crate::error::{Error, Result};
 use crate::types::{Condition, Detail, Digest, QuestionId, Record, TrialKey};
 
@@ -51,6 +51,8 @@ pub(crate) struct KeyFacts<'a> {
     question: &'a QuestionId,
     before: &'a str,
     behind: Option<&'a str>,
+    /// Where the images stand; `None` if they stand together.
+    places: Option<ImagePlaces>,
     /// Choices in the order shown; `None` for an open question.
     choices: Option<&'a [String]>,
     /// Number of earlier trials with the same question; `None` for the first.
@@ -76,6 +78,7 @@ impl<'a> KeyFacts<'a> {
             question,
             before: &prompt.before,
             behind: prompt.behind.as_deref(),
+            places: Some(prompt.places).filter(|places| *places != ImagePlaces::Together),
             choices: None,
             repeat: None,
             condition,
@@ -105,6 +108,8 @@ pub(crate) struct Prompt {
     pub(crate) before: Arc<str>,
     /// Text after the images; `None` if there is none.
     pub(crate) behind: Option<Arc<str>>,
+    /// Where the images stand.
+    pub(crate) places: ImagePlaces,
 }
 
 impl Prompt {
@@ -113,6 +118,7 @@ impl Prompt {
         Self {
             before: text,
             behind: None,
+            places: ImagePlaces::Together,
         }
     }
 
@@ -121,7 +127,13 @@ impl Prompt {
         Self {
             before: Arc::from(""),
             behind: Some(text),
+            places: ImagePlaces::Together,
         }
+    }
+
+    /// The same prompt with images in these places.
+    pub(crate) fn with_places(self, places: ImagePlaces) -> Self {
+        Self { places, ..self }
     }
 
     /// The text before and after the images; the second is empty if there is none.
@@ -135,6 +147,7 @@ impl Prompt {
             before,
             images,
             behind,
+            places: self.places,
         }
     }
 }

@@ -30,7 +30,7 @@ pub(crate) struct CostLine {
     pub dollars: Option<f64>,
     /// Cost in dollars if each reply is as long as `--max-tokens` allows.
     pub most_dollars: Option<f64>,
-    /// Tokens of the images of one request, as the replies so far were charged; `None` if there are too few of them.
+    /// Tokens of one image, as the replies so far were charged; `None` if there are too few of them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub charged_image_tokens: Option<f64>,
     /// The same requests by the light reading of what is shown.
@@ -139,7 +139,7 @@ pub(crate) fn render(forecast: &Forecast) -> String {
         if let Some(tokens) = line.charged_image_tokens {
             let _ = writeln!(
                 text,
-                "{}: {} tokens for the images of a request, as its first replies were charged",
+                "{}: {} tokens an image, as its first replies were charged",
                 line.model,
                 count(tokens)
             );

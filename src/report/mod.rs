@@ -8,6 +8,7 @@ mod csv;
 pub(crate) mod doctor;
 pub(crate) mod figures;
 pub(crate) mod forecast;
+mod frame_count;
 pub(crate) mod histogram;
 pub(crate) mod json;
 mod ladder;

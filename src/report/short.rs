@@ -11,6 +11,7 @@ use self::wrapped::WIDTH;
 pub(super) use self::wrapped::wrapped;
 use super::alert::lines;
 use super::choice_report::ChoiceReport;
+use super::frame_count::frames;
 use super::ladder::{Ladder, SeriesByLevel};
 use super::light_readings::LightReadings;
 use super::sentences::{FIRST, HOW_TO_READ, Sentence};
@@ -114,11 +115,6 @@ fn head(report: &ChoiceReport<'_>) -> String {
         [one] => (*one).to_owned(),
         several => counted(several.len(), "model"),
     };
-    let frames: std::collections::BTreeSet<_> = grid
-        .items
-        .iter()
-        .map(|item| &item.record.detail.frame)
-        .collect();
     let questions: std::collections::BTreeSet<_> = grid
         .items
         .iter()
@@ -133,7 +129,7 @@ fn head(report: &ChoiceReport<'_>) -> String {
     format!(
         "{who} · {} · {} · {replies}, {failed} failed · intervals by {}",
         counted(questions.len(), "question"),
-        counted(frames.len(), "frame"),
+        frames(grid),
         findings.unit
     )
 }

@@ -26,12 +26,22 @@ impl fmt::Display for ClusterUnit {
     }
 }
 
+/// What ties frames to each other.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct FrameTies {
+    /// The scene of each frame for which it is known; empty if the data name none.
+    pub scenes: BTreeMap<FrameId, String>,
+    /// The images of each frame that stands for several.
+    pub images: BTreeMap<FrameId, Vec<FrameId>>,
+}
+
 /// The cluster of each frame.
 ///
 /// Questions of a frame and frames of a scene are not independent. Intervals that treat them as independent are too
 /// narrow (Miller 2024, "Adding Error Bars to Evals", arXiv:2411.00640, section 2.2). The unit is the scene if every frame
 /// has one, there are at least [`MIN_SCENES`], and some have more than one frame. Otherwise it is the frame, or the
-/// question if there is only one frame.
+/// question if there is only one frame. Questions that show several images are of one frame if they share an image with each other, or
+/// with a question about that image alone.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Clusters {
     unit: ClusterUnit,
@@ -46,17 +56,17 @@ pub struct Clusters {
 pub(crate) const MIN_SCENES: usize = 8;
 
 impl Clusters {
-    /// Clusters of questions and their frames. `scenes` holds the scene of each frame for which it is known.
+    /// Clusters of questions and their frames.
     pub fn new<'a>(
         pairs: impl IntoIterator<Item = (&'a QuestionId, &'a FrameId)>,
-        scenes: &BTreeMap<FrameId, String>,
+        ties: &FrameTies,
     ) -> Self {
         let pairs: BTreeSet<(&FrameId, &QuestionId)> = pairs
             .into_iter()
             .map(|(question, frame)| (frame, question))
             .collect();
         let frames: BTreeSet<&FrameId> = pairs.iter().map(|(frame, _)| *frame).collect();
-        let scene_of = |frame: &FrameId| scenes.get(frame).filter(|scene| !scene.is_empty());
+        let scene_of = |frame: &FrameId| ties.scenes.get(frame).filter(|scene| !scene.is_empty());
         let known: Option<Vec<&String>> = frames.iter().map(|frame| scene_of(frame)).collect();
         let names: BTreeSet<&String> = known.iter().flatten().copied().collect();
         if known.is_some() && names.len() >= MIN_SCENES && names.len() < frames.len() {
@@ -72,7 +82,8 @@ impl Clusters {
                 by_question: HashMap::new(),
             };
         }
-        if frames.len() == 1 {
+        let (by_frame, count) = numbered(&frames, &ties.images);
+        if count == 1 {
             return Self {
                 unit: ClusterUnit::Question,
                 count: pairs.len(),
@@ -85,13 +96,13 @@ impl Clusters {
             };
         }
         Self {
-            unit: if pairs.len() == frames.len() {
+            unit: if pairs.len() == count {
                 ClusterUnit::Question
             } else {
                 ClusterUnit::Frame
             },
-            count: frames.len(),
-            by_frame: frames.into_iter().cloned().zip(0..).collect(),
+            count,
+            by_frame,
             by_question: HashMap::new(),
         }
     }
@@ -118,6 +129,41 @@ impl Clusters {
     }
 }
 
+/// A number for each frame, and how many numbers there are. Frames that share an image, directly or through others, have one number.
+fn numbered(
+    frames: &BTreeSet<&FrameId>,
+    images: &BTreeMap<FrameId, Vec<FrameId>>,
+) -> (HashMap<FrameId, u32>, usize) {
+    /// The frame that stands for the frame at a place.
+    fn root(parents: &mut [usize], place: usize) -> usize {
+        let mut place = place;
+        while parents[place] != place {
+            parents[place] = parents[parents[place]];
+            place = parents[place];
+        }
+        place
+    }
+    let mut parents: Vec<usize> = (0..frames.len()).collect();
+    let mut holders = HashMap::<&FrameId, usize>::new();
+    for (place, frame) in frames.iter().enumerate() {
+        let shown = images.get(*frame);
+        let shown = shown.map_or(std::slice::from_ref(*frame), Vec::as_slice);
+        for image in shown {
+            let holder = *holders.entry(image).or_insert(place);
+            let [one, other] = [holder, place].map(|place| root(&mut parents, place));
+            parents[one.max(other)] = one.min(other);
+        }
+    }
+    let mut numbers = HashMap::<usize, u32>::new();
+    let mut by_frame = HashMap::with_capacity(frames.len());
+    for (place, frame) in frames.iter().enumerate() {
+        let next = numbers.len() as u32;
+        let number = *numbers.entry(root(&mut parents, place)).or_insert(next);
+        by_frame.insert((*frame).clone(), number);
+    }
+    (by_frame, numbers.len())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -130,7 +176,38 @@ mod tests {
         let known = frames.iter().enumerate().filter(|_| scenes > 0);
         let known = known.map(|(i, frame)| (frame.clone(), format!("s{}", i % scenes.max(1))));
         let pairs = ids.iter().zip(frames.iter().cycle());
-        Clusters::new(pairs, &known.collect())
+        let scenes = known.collect();
+        Clusters::new(
+            pairs,
+            &FrameTies {
+                scenes,
+                ..FrameTies::default()
+            },
+        )
+    }
+
+    #[test]
+    fn frames_that_share_an_image_are_one_cluster() {
+        let name = |name: &str| FrameId(name.to_owned());
+        let ids: Vec<QuestionId> = (0..6).map(|i| QuestionId(format!("q{i}"))).collect();
+        let frames = ["ab", "bc", "c", "d", "ef", "a c"].map(name);
+        let several = frames.iter().filter(|frame| frame.0.len() > 1);
+        let images = several.map(|frame| {
+            let letters = frame.0.chars().filter(|letter| *letter != ' ');
+            let images = letters.map(|letter| name(&letter.to_string()));
+            (frame.clone(), images.collect())
+        });
+        let ties = FrameTies {
+            images: images.collect(),
+            ..FrameTies::default()
+        };
+        let found = Clusters::new(ids.iter().zip(&frames), &ties);
+        let of = |frame: usize| found.of(&frames[frame], &ids[frame]);
+        assert_eq!((found.count(), found.unit()), (3, ClusterUnit::Frame));
+        assert!([1, 2, 5].iter().all(|frame| of(*frame) == of(0)));
+        assert!(of(3) != of(0) && of(4) != of(0) && of(3) != of(4));
+        let apart = Clusters::new(ids.iter().zip(&frames), &FrameTies::default());
+        assert_eq!((apart.count(), apart.unit()), (6, ClusterUnit::Question));
     }
 
     #[test]

@@ -1,7 +1,5 @@
 //! All results of a run: [`Findings`].
 
-use std::collections::BTreeMap;
-
 use super::accuracy::{AccuracySummary, summarize};
 use super::agreement::{Agreement, agreements, light_agreements};
 use super::best::{BestInTheDark, best_in_the_dark};
@@ -9,7 +7,7 @@ use super::bootstrap::Resamples;
 use super::by_reading::{FindingByReading, by_reading};
 use super::calibration::{Calibration, calibrations};
 use super::chance::OfferedChoices;
-use super::cluster::{ClusterUnit, Clusters};
+use super::cluster::{ClusterUnit, Clusters, FrameTies};
 use super::common::CommonItems;
 use super::comparison::{Comparison, ComparisonKind, comparisons, lights_between};
 use super::confusion::{Confusion, Hallucination, confusions, hallucinations};
@@ -25,7 +23,7 @@ use super::pooled::{LevelsLeftOut, PooledFinding, levels_left_out, pooled};
 use super::significance::Significance;
 use super::strict_score::StrictScore;
 use super::subject::{Subject, is_control, is_observer};
-use crate::types::{Family, FrameId, ImageFidelity, ModelListing, Record, RunQuestion};
+use crate::types::{Family, ImageFidelity, ModelListing, Record, RunQuestion};
 
 /// All results that are computed from the records of a run.
 #[derive(Debug)]
@@ -79,24 +77,24 @@ pub struct Findings<'a> {
 }
 
 impl<'a> Findings<'a> {
-    /// Results of the records. `scenes` holds the scene of each frame for which it is known; `questions` are all questions
+    /// Results of the records. `ties` says what ties frames to each other; `questions` are all questions
     /// of the run, for the chance line; `measured` holds the images that were compared with their clean frames.
     #[must_use]
     pub fn new(
         records: &'a [Record],
-        scenes: &BTreeMap<FrameId, String>,
+        ties: &FrameTies,
         questions: impl IntoIterator<Item = OfferedChoices>,
         measured: &[ImageFidelity],
     ) -> Self {
         let listing = ModelListing::default();
-        Self::listed(records, scenes, questions, measured, &listing)
+        Self::listed(records, ties, questions, measured, &listing)
     }
 
     /// The same results with the models as listed.
     #[must_use]
     pub fn listed(
         records: &'a [Record],
-        scenes: &BTreeMap<FrameId, String>,
+        ties: &FrameTies,
         questions: impl IntoIterator<Item = OfferedChoices>,
         measured: &[ImageFidelity],
         listing: &ModelListing,
@@ -104,7 +102,7 @@ impl<'a> Findings<'a> {
         let pairs = records
             .iter()
             .map(|record| (&record.question, &record.detail.frame));
-        let clusters = Clusters::new(pairs, scenes);
+        let clusters = Clusters::new(pairs, ties);
         let questions: Vec<OfferedChoices> = questions.into_iter().collect();
         let observer = ObserverSummary::of(records, &clusters);
         let is_model = |model: &str| !is_control(model);

@@ -54,7 +54,7 @@ impl Detail for ChoiceDetail {
     }
 
     fn shown(&self) -> Option<Digest> {
-        self.image.as_ref().map(|image| image.digest)
+        self.sent()
     }
 }
 

@@ -1,10 +1,8 @@
 //! Tests of what is found over all models: [`super::pooled`] and [`super::best`], from made records.
 
-use std::collections::BTreeMap;
-
 use super::best::best_in_the_dark;
 use super::choice::ReadingMode;
-use super::cluster::Clusters;
+use super::cluster::{Clusters, FrameTies};
 use super::confusion::{FalseAnswer, confusions};
 use super::findings::Findings;
 use super::grid::Grid;
@@ -47,6 +45,7 @@ pub(super) fn records(model: &str, condition: &str, answers: Answers) -> Vec<Rec
                 Some(false) => TrialOutcome::Wrong,
             },
             image: None,
+            more_images: Vec::new(),
             shown_frame: None,
             observed: None,
             options: None,
@@ -63,7 +62,7 @@ pub(super) fn with_grid<T>(records: &[Record], check: impl FnOnce(&Grid<'_>) -> 
     let asked = records
         .iter()
         .map(|record| (&record.question, &record.detail.frame));
-    let clusters = Clusters::new(asked, &BTreeMap::new());
+    let clusters = Clusters::new(asked, &FrameTies::default());
     check(&Grid::new(records, &clusters))
 }
 
@@ -244,7 +243,7 @@ fn below_blind_is_what_the_corrected_test_shows() {
         records("m", "L5-noise", |_| Some(false)),
     ]
     .concat();
-    let findings = Findings::new(&records, &BTreeMap::new(), [], &[]);
+    let findings = Findings::new(&records, &FrameTies::default(), [], &[]);
     let below = |condition: &str| {
         let condition: Condition = condition.parse().unwrap();
         findings.below_blind(&Subject::new("m", Some(&condition)), None)

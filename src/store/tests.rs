@@ -39,6 +39,7 @@ fn record(name: &str, outcome: TrialOutcome) -> Record {
         lenient: None,
         outcome,
         image: None,
+        more_images: Vec::new(),
         shown_frame: None,
         observed: None,
         options: None,

@@ -95,8 +95,11 @@ details! {
         lenient: Option<AnswerReading>,
         /// How the trial ended.
         outcome: TrialOutcome,
-        /// The image as it was sent.
+        /// The image as it was sent; of several the first.
         image: Option<ImageFacts>,
+        /// The other images of a question that shows several, in order; not in the file otherwise.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        more_images: Vec<ImageFacts>,
         /// The frame whose image was shown, if it is not the frame of the question: a control of the observer. Not in the file
         /// otherwise.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -111,6 +114,17 @@ details! {
 }
 
 impl ChoiceDetail {
+    /// All images as they were sent, in order.
+    pub fn images(&self) -> impl Iterator<Item = &ImageFacts> {
+        self.image.iter().chain(&self.more_images)
+    }
+
+    /// The digest of the file that was sent, or of all files in order; `None` without an image.
+    #[must_use]
+    pub fn sent(&self) -> Option<Digest> {
+        Digest::of_files(self.images().map(|image| image.digest))
+    }
+
     /// The frame whose image was shown.
     #[must_use]
     pub fn shown(&self) -> &FrameId {

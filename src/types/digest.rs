@@ -44,6 +44,16 @@ impl Digest {
         Self(*hasher.finalize().as_bytes())
     }
 
+    /// The digest of files that are shown together: of one file its own, of several that of all digests in order; `None` of none.
+    pub(crate) fn of_files(files: impl IntoIterator<Item = Self>) -> Option<Self> {
+        let files: Vec<Self> = files.into_iter().collect();
+        match &*files {
+            [] => None,
+            [only] => Some(*only),
+            several => Some(Self::of_parts(several.iter().map(|file| &file.0[..]))),
+        }
+    }
+
     /// The digest as 32 bytes.
     #[must_use]
     pub fn as_bytes(&self) -> &[u8; 32] {

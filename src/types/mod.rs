@@ -14,6 +14,7 @@ pub(crate) mod exposure_facts;
 pub(crate) mod flag;
 mod flaw;
 pub(crate) mod frame;
+pub(crate) mod image_mark;
 pub(crate) mod image_notes;
 mod input_note;
 pub(crate) mod key_values;

@@ -42,6 +42,9 @@ pub struct RunQuestion {
     /// The digest of the frame's file, or of the walk's files in the order shown. `None` if all models were blind.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub image: Option<Digest>,
+    /// The frames of a question that shows several, in order; not in the file otherwise.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub images: Vec<FrameId>,
     /// The questions that this one is scored with, as `group` and `group_size`; not in the file if the data set has no groups.
     #[serde(default, flatten, skip_serializing_if = "Option::is_none")]
     pub group: Option<StrictGroup>,
@@ -88,6 +91,7 @@ impl RunQuestion {
             extra_answers: None,
             evidence: question.evidence.clone(),
             image: None,
+            images: Vec::new(),
             group: question.group.clone(),
         }
     }

@@ -11,13 +11,12 @@
 )]
 mod made;
 
-use std::collections::BTreeMap;
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use darkqa_eval::Kind;
 use darkqa_eval::internals::report::{ChoiceReport, PageInputs, products};
-use darkqa_eval::internals::score::Findings;
+use darkqa_eval::internals::score::{Findings, FrameTies};
 use darkqa_eval::types::{Condition, Degradation, Digest, Family, Record, Severity};
 use made::record;
 
@@ -51,7 +50,7 @@ fn records() -> Vec<Record> {
 
 fn bench(c: &mut Criterion) {
     let records = records();
-    let find = || Findings::new(&records, &BTreeMap::new(), [], &[]);
+    let find = || Findings::new(&records, &FrameTies::default(), [], &[]);
     let mut group = c.benchmark_group("100,320 records");
     group.sample_size(10);
     group.bench_function("find what they say", |b| b.iter(|| black_box(find())));

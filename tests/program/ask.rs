@@ -62,9 +62,8 @@ async fn a_request_is_the_smallest_every_server_takes() {
     let hostile = "say \"url\":\"\" \u{1F512} \\\"}}]}]} \n{{ x }}\u{0}";
     let images = [Arc::new(image())];
     let message = Message {
-        before: hostile,
         images: &images,
-        behind: "",
+        ..Message::words(hostile)
     };
     let reply = model_at(&mock, quick()).ask(message, 2).await.unwrap();
     assert_eq!((reply.text.as_str(), reply.attempts), ("B", 1));
@@ -125,9 +124,9 @@ async fn what_is_set_is_sent_and_what_is_not_is_left_out() {
     let model = Remote::open(endpoint.clone(), parameters).unwrap();
     let images = [image(), image()].map(Arc::new);
     let message = Message {
-        before: "Look \\\"url\":\"\"",
         images: &images,
         behind: "\"url\":\"\" Red?",
+        ..Message::words("Look \\\"url\":\"\"")
     };
     model.ask(message, 2).await.unwrap();
     let bare = Parameters {

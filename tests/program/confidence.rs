@@ -7,11 +7,9 @@
     reason = "the measured rates, for whoever asks with --nocapture"
 )]
 
-use std::collections::BTreeMap;
-
 use crate::support::made::record;
 use darkqa_eval::internals::score::{
-    Calibration, Clusters, Estimate, Grid, Resamples, calibrations,
+    Calibration, Clusters, Estimate, FrameTies, Grid, Resamples, calibrations,
 };
 use darkqa_eval::types::{Condition, OptionProbabilities, Record};
 use rand::rngs::StdRng;
@@ -78,7 +76,7 @@ fn of(records: &[Record], draws: &Resamples) -> Calibration {
     let asked = records
         .iter()
         .map(|record| (&record.question, &record.detail.frame));
-    let clusters = Clusters::new(asked, &BTreeMap::new());
+    let clusters = Clusters::new(asked, &FrameTies::default());
     let mut found = calibrations(&Grid::new(records, &clusters), draws);
     assert_eq!(found.len(), 1);
     found.remove(0)

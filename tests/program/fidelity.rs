@@ -1,11 +1,10 @@
 //! Does a better picture mean better answers: the numbers of a simulation whose truth is known, and those of a run.
 
-use std::collections::BTreeMap;
 use std::fs;
 
 use crate::support::made::record;
 use crate::support::run::{Bench, records, words};
-use darkqa_eval::internals::score::{FidelityFindings, Findings};
+use darkqa_eval::internals::score::{FidelityFindings, Findings, FrameTies};
 use darkqa_eval::types::{Condition, Digest, ImageFacts, ImageFidelity, Record};
 use rand::rngs::StdRng;
 use rand::{RngExt as _, SeedableRng as _};
@@ -39,7 +38,7 @@ fn findings(
             ssim: None,
         });
     }
-    let found = Findings::new(&records, &BTreeMap::new(), [], &measured);
+    let found = Findings::new(&records, &FrameTies::default(), [], &measured);
     found.fidelity.unwrap()
 }
 
@@ -95,7 +94,7 @@ fn two_frames_with_the_same_dark_image_have_their_own_fidelity() {
     }
     for _ in 0..2 {
         measured.reverse();
-        let found = Findings::new(&records, &BTreeMap::new(), [], &measured);
+        let found = Findings::new(&records, &FrameTies::default(), [], &measured);
         let row = &found.fidelity.unwrap().conditions[0];
         assert_eq!((row.images, row.means[0]), (2, Some(20.0)));
     }

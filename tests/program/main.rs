@@ -49,6 +49,7 @@ mod rooms;
 mod same_bytes;
 mod sentences;
 mod serve;
+mod several_images;
 mod shards;
 mod statistics;
 mod synthesize;

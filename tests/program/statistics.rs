@@ -10,15 +10,15 @@
     reason = "the measured rates, for whoever asks with --nocapture"
 )]
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use crate::support::made::record;
 use crate::support::table::check_rows;
 use darkqa_eval::Kind;
 use darkqa_eval::internals::score::{
-    AnswerOutcome, Baseline, ClusterCount, Clusters, Estimate, Findings, Grid, Group, OpenSummary,
-    PairedComparison, QuestionGroups, Resamples, ScoredAnswer, Subject, curves, open_summary,
+    AnswerOutcome, Baseline, ClusterCount, Clusters, Estimate, Findings, FrameTies, Grid, Group,
+    OpenSummary, PairedComparison, QuestionGroups, Resamples, ScoredAnswer, Subject, curves,
+    open_summary,
 };
 use darkqa_eval::score::choice::ReadingMode;
 use darkqa_eval::types::{
@@ -58,7 +58,7 @@ fn clusters_of(records: &[Record]) -> Clusters {
     let asked = records
         .iter()
         .map(|record| (&record.question, &record.detail.frame));
-    Clusters::new(asked, &BTreeMap::new())
+    Clusters::new(asked, &FrameTies::default())
 }
 
 /// So many questions about each of so many frames.
@@ -407,7 +407,12 @@ fn a_made_set_gives_the_papers_arithmetic() {
             family: record.detail.family.clone(),
             choices: record.detail.choices.len(),
         });
-    let findings = Findings::new(&records, &BTreeMap::new(), offers.collect::<Vec<_>>(), &[]);
+    let findings = Findings::new(
+        &records,
+        &FrameTies::default(),
+        offers.collect::<Vec<_>>(),
+        &[],
+    );
     let rates = &findings.hallucinations[0];
     assert_eq!(rates.false_positive.unwrap().value, 0.25);
     assert_eq!(rates.false_negative.unwrap().value, 0.6);

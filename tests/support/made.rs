@@ -30,6 +30,7 @@ pub fn record(
             TrialOutcome::Wrong
         },
         image: None,
+        more_images: Vec::new(),
         shown_frame: None,
         observed: None,
         options: None,

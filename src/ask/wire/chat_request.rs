@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 
 use super::image_places::with_images;
 use crate::ask::body::Parts;
-use crate::ask::call::Message;
+use crate::ask::call::{Message, MessagePart, images};
 use crate::ask::constraint;
 use crate::ask::field::RequestFields;
 use crate::ask::parameters::{Constrain, ImageDetail, Parameters};
@@ -109,9 +109,10 @@ pub(super) fn body(
         role: "system",
         content: Content::Words(words),
     });
+    let parts = message.parts();
     let question = Turn {
         role: "user",
-        content: content(message, parameters.detail),
+        content: content(&parts, parameters.detail),
     };
     let messages: Vec<Turn<'_>> = system.into_iter().chain([question]).collect();
     let messages = serde_json::to_string(&messages)?;
@@ -120,29 +121,25 @@ pub(super) fn body(
         "messages",
         &messages,
         PLACE,
-        message.images,
+        images(&parts),
     ))
 }
 
 /// The content of a message, with a place for each image.
-fn content(message: Message<'_>, detail: Option<ImageDetail>) -> Content<'_> {
-    let Message {
-        before,
-        images,
-        behind,
-    } = message;
-    if images.is_empty() && behind.is_empty() {
-        return Content::Words(before);
+fn content<'a>(parts: &[MessagePart<'a>], detail: Option<ImageDetail>) -> Content<'a> {
+    match parts {
+        [] => Content::Words(""),
+        [MessagePart::Words(words)] => Content::Words(words),
+        parts => {
+            let parts = parts.iter().map(|part| match part {
+                MessagePart::Words(text) => Part::Text { text },
+                MessagePart::Image(_) => Part::ImageUrl {
+                    image_url: ImageUrl { detail, url: "" },
+                },
+            });
+            Content::Parts(parts.collect())
+        }
     }
-    let words = |text| Part::Text { text };
-    let image = || Part::ImageUrl {
-        image_url: ImageUrl { detail, url: "" },
-    };
-    let is_filled = |text: &&str| !text.is_empty();
-    let before = Some(before).filter(is_filled).map(words);
-    let behind = Some(behind).filter(is_filled).map(words);
-    let images = images.iter().map(|_| image());
-    Content::Parts(before.into_iter().chain(images).chain(behind).collect())
 }
 
 /// OpenAI's `json_schema` format for an object with one of the letters.

@@ -10,24 +10,24 @@ use crate::ask::payload::Payload;
 ///
 /// A place is a field with an empty value, as `"url":""`. No question can contain one, because in a JSON text every quotation mark
 /// has a backslash before it. The other fields may be the user's, so no place is looked for in them.
-pub(super) fn with_images(
+pub(super) fn with_images<'a>(
     fields: &str,
     name: &str,
     json: &str,
     place: &str,
-    images: &[Arc<Payload>],
+    mut images: impl Iterator<Item = &'a Arc<Payload>> + Clone,
 ) -> Parts {
     let fields = fields.strip_suffix('}').unwrap_or(fields);
     let head = format!("{fields},\"{name}\":");
     let json = format!("{json}}}");
-    if images.is_empty() {
+    let count = images.clone().count();
+    if count == 0 {
         return Parts::new([(head + &json).into()]);
     }
-    debug_assert_eq!(json.matches(place).count(), images.len());
+    debug_assert_eq!(json.matches(place).count(), count);
     let (open, close) = place.split_at(place.len() - 1);
-    let mut pieces = Vec::with_capacity(2 * images.len() + 1);
+    let mut pieces = Vec::with_capacity(2 * count + 1);
     let mut begin = &*head;
-    let mut images = images.iter();
     for words in json.split(place) {
         match images.next() {
             Some(image) => {

@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 use super::chat_fields::PROBABILITIES;
 use super::image_places::with_images;
 use crate::ask::body::Parts;
-use crate::ask::call::Message;
+use crate::ask::call::{Message, MessagePart, images};
 use crate::ask::constraint;
 use crate::ask::field::{AdaptableField, FieldState, RequestField, RequestFields, SentFields};
 use crate::ask::parameters::{Constrain, ImageDetail, Parameters, Temperature};
@@ -94,11 +94,12 @@ pub(super) fn body(
         switch: fields.switch(),
     })?;
     let head = parameters.extra.apply(head)?;
+    let parts = message.parts();
     let input = serde_json::to_string(&[Turn {
         role: "user",
-        content: content(message, parameters.detail),
+        content: content(&parts, parameters.detail),
     }])?;
-    Ok(with_images(&head, "input", &input, PLACE, message.images))
+    Ok(with_images(&head, "input", &input, PLACE, images(&parts)))
 }
 
 /// The token limit, which has one name here.
@@ -109,16 +110,18 @@ fn limit(parameters: &Parameters, fields: RequestFields) -> Option<u32> {
 }
 
 /// The content of a message, with a place for each image.
-fn content(message: Message<'_>, detail: Option<ImageDetail>) -> Vec<Part<'_>> {
-    let words = |text| Part::InputText { text };
-    let images = message.images.iter().map(|_| Part::InputImage {
-        detail,
-        image_url: "",
+fn content<'a>(parts: &[MessagePart<'a>], detail: Option<ImageDetail>) -> Vec<Part<'a>> {
+    if parts.is_empty() {
+        return vec![Part::InputText { text: "" }];
+    }
+    let parts = parts.iter().map(|part| match part {
+        MessagePart::Words(text) => Part::InputText { text },
+        MessagePart::Image(_) => Part::InputImage {
+            detail,
+            image_url: "",
+        },
     });
-    let before = Some(message.before).filter(|text| !text.is_empty() || message.images.is_empty());
-    let behind = Some(message.behind).filter(|text| !text.is_empty());
-    let parts = before.map(words).into_iter().chain(images);
-    parts.chain(behind.map(words)).collect()
+    parts.collect()
 }
 
 /// The format of an object with one of the letters, by a JSON schema.

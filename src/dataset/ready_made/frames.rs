@@ -1,4 +1,4 @@
-//! The frames and the ids of the questions of a set: [`Frames`], [`Ids`].
+//! The frames of the questions of a set: [`Frames`].
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -9,51 +9,16 @@ use super::container::{Archive, SetFile};
 use super::images::{EmbeddedImage, RowImage, images};
 use super::roles::{Column, Roles};
 use super::row::Table;
+use super::settings::SeveralImages;
 use super::step::Step;
 use super::truths::Answered;
 use crate::dataset::Root;
 use crate::dataset::image_source::ImageSource;
 use crate::error::{Error, Result};
-use crate::files::reading;
-use crate::types::{Digest, FrameId, QuestionId};
-
-/// The ids of questions.
-#[derive(Debug)]
-pub(super) struct Ids {
-    texts: Vec<String>,
-    /// The column, or that they follow from the content.
-    name: String,
-    note: Option<String>,
-    /// The places of two questions that differ in their answers alone.
-    contradictory: Vec<[usize; 2]>,
-}
-
-impl Ids {
-    /// The pairs of questions that differ in their answers alone, by their places.
-    pub(super) fn contradictory(&self) -> &[[usize; 2]] {
-        &self.contradictory
-    }
-
-    pub(super) fn id(&self, question: usize) -> QuestionId {
-        QuestionId(self.texts[question].clone())
-    }
-
-    /// The column, or `content`.
-    pub(super) fn name(&self) -> String {
-        self.name.clone()
-    }
-
-    /// What the user should know of them.
-    pub(super) fn note(&self) -> Option<String> {
-        self.note.clone()
-    }
-}
-
-/// Ids by content, the number of repeats, and the pairs that differ in their answers alone.
-type ContentIds = (Vec<String>, usize, Vec<[usize; 2]>);
+use crate::types::{Digest, FrameId};
 
 /// The image of a question, found.
-enum Found {
+pub(super) enum Found {
     /// In a cell of a row.
     Cell {
         row: usize,
@@ -71,18 +36,22 @@ enum Found {
 
 /// The frames of a set. Equal bytes in cells are one frame, with one noise.
 pub(super) struct Frames<'a> {
-    table: &'a Table,
+    pub(super) table: &'a Table,
     root: &'a Root,
     /// The ZIP file that holds the set.
-    archive: Option<&'a Arc<Archive>>,
+    pub(super) archive: Option<&'a Arc<Archive>>,
     files: &'a [Arc<SetFile>],
     /// The row of each file and id whose own cell holds an image.
     holders: HashMap<(usize, String), usize>,
-    roles: &'a Roles,
+    pub(super) roles: &'a Roles,
     /// The name of each image in a cell.
     names: HashMap<Digest, FrameId>,
     sources: BTreeMap<FrameId, ImageSource>,
+    series: Series,
 }
+
+/// The images of each row that shows several, by the name of all of them together.
+pub(in crate::dataset) type Series = BTreeMap<FrameId, Vec<FrameId>>;
 
 impl<'a> Frames<'a> {
     pub(super) fn new(
@@ -91,6 +60,7 @@ impl<'a> Frames<'a> {
         archive: Option<&'a Arc<Archive>>,
         files: &'a [Arc<SetFile>],
         roles: &'a Roles,
+        several: Option<SeveralImages>,
     ) -> Self {
         let mut frames = Self {
             table,
@@ -101,14 +71,15 @@ impl<'a> Frames<'a> {
             roles,
             names: HashMap::new(),
             sources: BTreeMap::new(),
+            series: Series::new(),
         };
-        frames.name_embedded();
+        frames.name_embedded(several);
         frames
     }
 
     /// Names the images in cells: by the least id of the rows that hold one, so that the order of rows does not matter; without ids
-    /// that differ, by their content.
-    fn name_embedded(&mut self) {
+    /// that differ, by their content. The images of a row that shows several are numbered behind its id: `7#1`, `7#2`.
+    fn name_embedded(&mut self, several: Option<SeveralImages>) {
         let ids = self.roles.ids.iter();
         let mut ids = ids.filter(|column| {
             let mut seen = HashSet::new();
@@ -129,30 +100,54 @@ impl<'a> Frames<'a> {
         let named = unique.or_else(|| self.roles.ids.iter().find(differs));
         for (at, row) in self.table.rows.iter().enumerate() {
             let found = images(self.table, row, self.roles);
-            let [RowImage::Embedded { facts, .. }] = &*found else {
+            if found.len() > 1 && several != Some(SeveralImages::Send) {
                 continue;
-            };
-            if let Some(id) = named.and_then(|column| column.text(row)) {
+            }
+            if let ([RowImage::Embedded { .. }], Some(id)) =
+                (&*found, named.and_then(|column| column.text(row)))
+            {
                 let key = (row.file, id.trim().to_owned());
                 self.holders.entry(key).or_insert(at);
             }
             let id = unique.and_then(|column| column.text(row));
-            let name = id.map_or_else(|| content_name(&facts.digest), |id| id.trim().to_owned());
-            let known = self
-                .names
-                .entry(facts.digest)
-                .or_insert_with(|| FrameId(name.clone()));
-            if order(&name) < order(&known.0) {
-                *known = FrameId(name);
+            for (number, image) in (1..).zip(&found) {
+                let RowImage::Embedded { facts, .. } = image else {
+                    continue;
+                };
+                let name = match &id {
+                    None => content_name(&facts.digest),
+                    Some(id) if found.len() == 1 => id.trim().to_owned(),
+                    Some(id) => format!("{}#{number}", id.trim()),
+                };
+                let known = self
+                    .names
+                    .entry(facts.digest)
+                    .or_insert_with(|| FrameId(name.clone()));
+                if order(&name) < order(&known.0) {
+                    *known = FrameId(name);
+                }
+            }
+        }
+        self.tell_apart();
+    }
+
+    /// Names images by their content where an id ends as the number of an image does, so that two images had one name.
+    fn tell_apart(&mut self) {
+        let mut holders = HashMap::<FrameId, usize>::new();
+        for name in self.names.values() {
+            *holders.entry(name.clone()).or_default() += 1;
+        }
+        for (digest, name) in &mut self.names {
+            if holders[name] > 1 {
+                *name = FrameId(content_name(digest));
             }
         }
     }
 
-    /// The image of a question.
-    fn find(&self, answered: &Answered) -> Result<Found> {
-        let row = answered.item.row;
+    /// An image of a row.
+    pub(super) fn find(&self, row: usize, image: &RowImage) -> Result<Found> {
         let at = |problem| Error::data(self.table.place(row), problem);
-        match &answered.item.image {
+        match image {
             RowImage::Embedded {
                 column,
                 steps,
@@ -221,10 +216,26 @@ impl<'a> Frames<'a> {
         found.map(|(name, path)| Found::File(name, path))
     }
 
-    /// The frame of a question. Its source is kept.
+    /// The frame of a question; of a question about several images the name of all of them together. The sources are kept.
     pub(super) fn frame(&mut self, answered: &Answered) -> Result<FrameId> {
-        match self.find(answered)? {
-            Found::Frame(name) => Ok(name),
+        let row = answered.item.row;
+        let mut shown = Vec::with_capacity(answered.item.images.len());
+        for image in &answered.item.images {
+            let found = self.find(row, image)?;
+            shown.push(self.keep(found));
+        }
+        if let [only] = &*shown {
+            return Ok(only.clone());
+        }
+        let name = series_name(&shown);
+        self.series.insert(name.clone(), shown);
+        Ok(name)
+    }
+
+    /// The name of an image. Its source is kept.
+    fn keep(&mut self, found: Found) -> FrameId {
+        match found {
+            Found::Frame(name) => name,
             Found::Member(name) => {
                 if let Some(archive) = self.archive {
                     let archive = Arc::clone(archive);
@@ -232,13 +243,13 @@ impl<'a> Frames<'a> {
                         .entry(name.clone())
                         .or_insert(ImageSource::Member(archive));
                 }
-                Ok(name)
+                name
             }
             Found::File(name, path) => {
                 self.sources
                     .entry(name.clone())
                     .or_insert_with(|| ImageSource::image(path));
-                Ok(name)
+                name
             }
             Found::Cell {
                 row,
@@ -258,96 +269,17 @@ impl<'a> Frames<'a> {
                         facts,
                     })
                 });
-                Ok(name)
+                name
             }
         }
     }
 
-    /// The sources of all frames that were asked for.
-    pub(super) fn take_sources(&mut self) -> BTreeMap<FrameId, ImageSource> {
-        std::mem::take(&mut self.sources)
-    }
-
-    /// The ids of the questions: those of the first column in which all differ, or by content.
-    pub(super) fn ids(&self, answered: &[Answered]) -> Result<Ids> {
-        let texts = |column: &Column| -> Option<Vec<String>> {
-            let rows = answered
-                .iter()
-                .map(|answered| &self.table.rows[answered.item.row]);
-            rows.map(|row| Some(column.text(row)?.trim().to_owned()))
-                .collect()
-        };
-        for column in &self.roles.ids {
-            let Some(texts) = texts(column) else {
-                continue;
-            };
-            let mut seen = HashSet::new();
-            if texts.iter().all(|text| seen.insert(text)) {
-                let name = column.name.clone();
-                return Ok(Ids {
-                    texts,
-                    name,
-                    note: None,
-                    contradictory: Vec::new(),
-                });
-            }
-        }
-        let (texts, repeats, contradictory) = self.ids_by_content(answered)?;
-        let name = match &*self.roles.ids {
-            [] => "content".to_owned(),
-            [column, ..] => format!("content ({} does not tell all rows apart)", column.name),
-        };
-        let note = (repeats > 0).then(|| {
-            format!("{repeats} questions repeat an earlier one, with its image and options; each is asked again")
-        });
-        Ok(Ids {
-            texts,
-            name,
-            note,
-            contradictory,
-        })
-    }
-
-    /// The first 12 hexadecimal digits of a digest over image, question and options. The k-th repeat gets `-k`. So an id depends
-    /// neither on the order of rows nor on the name of a file.
-    fn ids_by_content(&self, answered: &[Answered]) -> Result<ContentIds> {
-        let mut files: HashMap<FrameId, Digest> = HashMap::new();
-        let mut seen: HashMap<String, (usize, usize)> = HashMap::new();
-        let (mut repeats, mut contradictory) = (0, Vec::new());
-        let mut texts = Vec::with_capacity(answered.len());
-        for (at, question) in answered.iter().enumerate() {
-            let image = match self.find(question)? {
-                Found::Cell { facts, .. } => facts.digest,
-                Found::Frame(name) => Digest::of(name.0.as_bytes()),
-                Found::Member(name) => {
-                    if let (None, Some(archive)) = (files.get(&name), self.archive) {
-                        files.insert(name.clone(), Digest::of(&archive.image(&name.0)?));
-                    }
-                    files[&name]
-                }
-                Found::File(name, path) => {
-                    if !files.contains_key(&name) {
-                        files.insert(name.clone(), Digest::of(&reading::bytes(&path)?));
-                    }
-                    files[&name]
-                }
-            };
-            let options = question.choices.texts().iter().map(String::as_bytes);
-            let parts = [image.as_bytes(), question.item.text.as_bytes()];
-            let digest = Digest::of_parts(parts.into_iter().chain(options));
-            let id = digest.to_string()[..12].to_owned();
-            let (first, count) = seen.entry(id.clone()).or_insert((at, 0));
-            if answered[*first].choices.truth() != question.choices.truth() {
-                contradictory.push([*first, at]);
-            }
-            texts.push(match *count {
-                0 => id,
-                earlier => format!("{id}-{earlier}"),
-            });
-            repeats += usize::from(*count > 0);
-            *count += 1;
-        }
-        Ok((texts, repeats, contradictory))
+    /// The sources of all frames that were asked for, and the images of rows that show several.
+    pub(super) fn take_sources(&mut self) -> (BTreeMap<FrameId, ImageSource>, Series) {
+        (
+            std::mem::take(&mut self.sources),
+            std::mem::take(&mut self.series),
+        )
     }
 }
 
@@ -372,6 +304,14 @@ fn member(archive: &Archive, folder: &Path, path: &str) -> Result<FrameId, Strin
 /// The name of a frame by the content of its image.
 fn content_name(digest: &Digest) -> String {
     format!("image-{}", &digest.to_string()[..12])
+}
+
+/// The name of several images in this order: that of the first, how many follow, and a digest of all names.
+fn series_name(frames: &[FrameId]) -> FrameId {
+    let digest = Digest::of_parts(frames.iter().map(|frame| frame.0.as_bytes()));
+    let first = frames.first().map_or("", |frame| &frame.0);
+    let more = frames.len().saturating_sub(1);
+    FrameId(format!("{first} +{more} ({})", &digest.to_string()[..12]))
 }
 
 /// The order of ids: shorter ones first, so that numbers are in the order of their values.

@@ -1,5 +1,6 @@
 //! The rows of a set as questions without their truth: [`items`].
 
+use super::image_marks::ImageMarks;
 use super::images::{ImagesAre, RowImage, images, named_frames};
 use super::left_out::{LeftOut, Why};
 use super::lettered::{Lettered, in_question};
@@ -9,23 +10,18 @@ use super::offered::Offered;
 use super::options::Options;
 use super::roles::{InQuestion, Roles};
 use super::row::{Row, Table};
+use super::settings::{SetArgs, SeveralImages};
 use std::collections::BTreeMap;
-use std::sync::LazyLock;
-
-use regex::Regex;
 
 /// The maximum length of a question or an option, in bytes.
 const LONGEST_TEXT: usize = 16 << 10;
-
-/// The place of an image in a text.
-static IMAGE_MARK: LazyLock<Option<Regex>> =
-    LazyLock::new(|| Regex::new(r"<image(?: ?\d+)?>\s*").ok());
 
 /// A row as a question. Its truth is not known yet.
 #[derive(Debug)]
 pub(super) struct Item {
     pub(super) row: usize,
-    pub(super) image: RowImage,
+    /// The images that it shows, at least one; in their order.
+    pub(super) images: Vec<RowImage>,
     pub(super) text: String,
     /// The text with the options in it, if they were found there.
     pub(super) whole: Option<String>,
@@ -46,15 +42,25 @@ impl Item {
     }
 }
 
-/// What is done about instructions at the end of questions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Endings {
-    Cut,
-    Kept,
-}
-
 /// How often each instruction was cut from questions.
 pub(super) type Cut = BTreeMap<String, usize>;
+
+/// The instructions at the end of questions, with how often each was cut; `None` if they stay.
+struct Endings<'a>(Option<&'a mut Cut>);
+
+impl Endings<'_> {
+    /// The text without the instructions at its end.
+    fn cut(&mut self, text: &str) -> String {
+        let Some(cut) = &mut self.0 else {
+            return text.to_owned();
+        };
+        let (rest, endings) = without_endings(text);
+        for ending in endings {
+            *cut.entry(ending).or_default() += 1;
+        }
+        rest.to_owned()
+    }
+}
 
 /// The rows as questions. Rows that cannot be asked are counted.
 ///
@@ -64,44 +70,44 @@ pub(super) fn items(
     table: &Table,
     roles: &Roles,
     kind: ImagesAre,
-    ending: Endings,
+    args: &SetArgs,
     left: &mut LeftOut,
     cut: &mut Cut,
 ) -> Result<Vec<Item>, String> {
+    let mut endings = Endings((!args.keep_instructions).then_some(cut));
     let mut items = Vec::new();
     for (at, row) in table.rows.iter().enumerate() {
-        let mut found = match kind {
+        let images = match kind {
             ImagesAre::Files => images(table, row, roles),
             ImagesAre::Frames => named_frames(row, roles),
         };
-        let count = found.len();
-        let Some(image) = found.pop().filter(|_| count == 1) else {
-            let why = if count == 0 {
-                Why::NoImage
-            } else {
-                Why::SeveralImages
-            };
+        let count = images.len();
+        let why = match (count, args.multi_image) {
+            (0, _) => Some(Why::NoImage),
+            (1, _) | (_, Some(SeveralImages::Send)) => None,
+            (_, Some(SeveralImages::Skip) | None) => Some(Why::SeveralImages),
+        };
+        if let Some(why) = why {
             left.add(why, || format!("{count} images"));
             continue;
-        };
-        let item = match item(table, at, roles, ending, cut)? {
+        }
+        match parts(row, roles, ImageMarks::of(count), &mut endings) {
             Ok(Parts {
                 text,
                 whole,
                 options,
-            }) => Item {
+            }) => items.push(Item {
                 row: at,
-                image,
+                images,
                 text,
                 whole,
                 options,
-            },
-            Err(problem) => {
+            }),
+            Err(NoParts::BadRow(problem)) => {
                 left.add(Why::Bad, || format!("{}: {problem}", table.place(at)));
-                continue;
             }
-        };
-        items.push(item);
+            Err(NoParts::BadSet(problem)) => return Err(format!("{}: {problem}", table.place(at))),
+        }
     }
     Ok(items)
 }
@@ -113,85 +119,90 @@ struct Parts {
     options: Option<Offered>,
 }
 
-/// The parts of a row; the inner error is the fault of a bad row.
-fn item(
-    table: &Table,
-    at: usize,
+/// Why a row has no [`Parts`].
+enum NoParts {
+    /// The row is bad, in words.
+    BadRow(String),
+    /// The set cannot be read, in words.
+    BadSet(String),
+}
+
+/// A bad row.
+fn bad(problem: impl Into<String>) -> NoParts {
+    NoParts::BadRow(problem.into())
+}
+
+/// The parts of a row.
+fn parts(
+    row: &Row,
     roles: &Roles,
-    ending: Endings,
-    cut: &mut Cut,
-) -> Result<Result<Parts, String>, String> {
-    let row = &table.rows[at];
-    let Some(text) = roles.question.text(row) else {
-        let column = &roles.question.name;
-        return Ok(Err(format!("the question is empty (column {column:?})")));
-    };
-    if text.len() > LONGEST_TEXT {
-        let problem = format!("a question of more than {} KB", LONGEST_TEXT >> 10);
-        return Ok(Err(problem));
-    }
-    let text = match &*IMAGE_MARK {
-        Some(mark) => mark.replace_all(&text, "").trim().to_owned(),
-        None => text,
-    };
-    let mut without = |text: &str| {
-        if ending == Endings::Kept {
-            return text.to_owned();
-        }
-        let (rest, endings) = without_endings(text);
-        for ending in endings {
-            *cut.entry(ending).or_default() += 1;
-        }
-        rest.to_owned()
-    };
+    mut marks: ImageMarks,
+    endings: &mut Endings<'_>,
+) -> Result<Parts, NoParts> {
+    let [hint, text] = words(row, roles, &mut marks).map_err(NoParts::BadRow)?;
     let (text, whole, options) = match Options::of(row, roles) {
-        Options::Found(options) => (without(&text), None, Some(options)),
-        Options::None if roles.in_question == InQuestion::None => (without(&text), None, None),
+        Options::Found(mut options) => {
+            for option in &mut options.texts {
+                *option = marks.read_option(option).map_err(NoParts::BadRow)?;
+            }
+            (endings.cut(&text), None, Some(options))
+        }
+        Options::None if roles.in_question == InQuestion::None => (endings.cut(&text), None, None),
         Options::None => {
-            let text = without(&text);
+            let text = endings.cut(&text);
             match in_question(&text) {
                 Lettered::Found { question, options } => {
                     let options = Offered::lettered(options);
-                    (without(&question), Some(text), Some(options))
+                    (endings.cut(&question), Some(text), Some(options))
                 }
                 Lettered::None => (text, None, None),
-                Lettered::Unclear(problem) => return Ok(Err(problem)),
+                Lettered::Unclear(problem) => return Err(NoParts::BadRow(problem)),
             }
         }
         Options::Differ([one, other]) => {
-            return Err(format!(
-                "{}: the options of {one:?} and {other:?} differ; {} or {} says which are meant",
-                table.place(at),
+            return Err(NoParts::BadSet(format!(
+                "the options of {one:?} and {other:?} differ; {} or {} says which are meant",
                 flag(Role::Options, &one, None),
                 flag(Role::Options, &other, None)
-            ));
+            )));
         }
-        Options::Unread(problem) => return Ok(Err(problem)),
+        Options::Unread(problem) => return Err(NoParts::BadRow(problem)),
     };
     if text.is_empty() {
-        return Ok(Err("nothing but options in the question".to_owned()));
+        return Err(bad("nothing but options in the question"));
     }
-    let hint = roles.hint.as_ref().and_then(|hint| hint.text(row));
-    let below = |text: String| match &hint {
-        Some(hint) => format!("{}\n{text}", hint.trim()),
-        None => text,
+    let below = |text: String| match &*hint {
+        "" => text,
+        hint => format!("{hint}\n{text}"),
     };
     let (text, whole) = (below(text), whole.map(below));
-    let is_long = |text: &String| text.len() > LONGEST_TEXT;
-    if is_long(&text)
-        || options
-            .iter()
-            .flat_map(|options| &options.texts)
-            .any(is_long)
-    {
-        let problem = format!("a text of more than {} KB", LONGEST_TEXT >> 10);
-        return Ok(Err(problem));
+    let texts = options.iter().flat_map(|options| &options.texts);
+    if texts.chain([&text]).any(|text| text.len() > LONGEST_TEXT) {
+        return Err(bad(format!(
+            "a text of more than {} KB",
+            LONGEST_TEXT >> 10
+        )));
     }
-    Ok(Ok(Parts {
+    Ok(Parts {
         text,
         whole,
         options,
-    }))
+    })
+}
+
+/// The hint of a row, empty if it has none, and its question.
+fn words(row: &Row, roles: &Roles, marks: &mut ImageMarks) -> Result<[String; 2], String> {
+    let Some(text) = roles.question.text(row) else {
+        let column = &roles.question.name;
+        return Err(format!("the question is empty (column {column:?})"));
+    };
+    if text.len() > LONGEST_TEXT {
+        let longest = LONGEST_TEXT >> 10;
+        return Err(format!("a question of more than {longest} KB"));
+    }
+    let hint = roles.hint.as_ref().and_then(|hint| hint.text(row));
+    let hint = marks.read(hint.as_deref().unwrap_or_default().trim())?;
+    Ok([hint, marks.read(&text)?])
 }
 
 /// The answer in a column of a row, as text; a list of one is that one.

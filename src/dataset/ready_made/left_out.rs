@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::settings::{LeaveOut, SetArgs};
+use super::settings::{LeaveOut, SetArgs, SeveralImages};
 
 /// Why a row cannot be asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -42,7 +42,7 @@ impl Why {
 
     fn is_left_out(self, args: &SetArgs) -> bool {
         let flag = match self {
-            Self::SeveralImages => args.multi_image,
+            Self::SeveralImages => return args.multi_image == Some(SeveralImages::Skip),
             Self::NoImage => args.no_image,
             Self::Open => args.open,
             Self::SeveralTruths => args.several,
@@ -94,7 +94,11 @@ impl LeftOut {
                     1 => "leaves it out",
                     _ => "leaves them out",
                 };
-                problems.push(format!("{head}; {} {verb}", why.flag()));
+                let other = match why {
+                    Why::SeveralImages => ", --multi-image send shows all of them in one request",
+                    _ => "",
+                };
+                problems.push(format!("{head}; {} {verb}{other}", why.flag()));
             } else if why == Why::Bad && *count as f64 > MOST_BAD * rows as f64 {
                 problems.push(format!(
                     "{head}; --bad skip leaves out at most 5 %: mend the file"
@@ -120,10 +124,10 @@ mod tests {
         left.add(Why::SeveralImages, || "2 images".into());
         left.add(Why::SeveralImages, || "3 images".into());
         let problem = left.check(40, &SetArgs::default()).unwrap_err();
-        assert!(problem.contains("2 of 40 rows show 2 images; --multi-image skip leaves them out\n no image in 1 of 40 rows; --no-image skip leaves it out"), "{problem}");
+        assert!(problem.contains("2 of 40 rows show 2 images; --multi-image skip leaves them out, --multi-image send shows all of them in one request\n no image in 1 of 40 rows; --no-image skip leaves it out"), "{problem}");
         let args = SetArgs {
             no_image: Some(LeaveOut::Skip),
-            multi_image: Some(LeaveOut::Skip),
+            multi_image: Some(SeveralImages::Skip),
             ..SetArgs::default()
         };
         assert!(left.check(40, &args).is_ok());

@@ -19,6 +19,8 @@ mod family_column;
 mod folder_info;
 mod frames;
 mod groups;
+mod ids;
+mod image_marks;
 mod images;
 mod items;
 mod left_out;
@@ -48,6 +50,7 @@ use crate::error::{Error, Result};
 use crate::types::{Family, FrameId, Question};
 
 pub(super) use container::{Archive, holds_files};
+pub(super) use frames::Series;
 pub(super) use images::EmbeddedImage;
 pub(super) use preset::{is_known as is_known_set, names as known_sets};
 pub use settings::SetArgs;
@@ -58,8 +61,9 @@ use family_column::FamilyOf;
 use folder_info::FolderInfo;
 use frames::Frames;
 use groups::{GroupRule, Groups};
+use ids::Ids;
 use images::ImagesAre;
-use items::{Cut, Endings, items};
+use items::{Cut, items};
 use left_out::{LeftOut, Why};
 use map::{How, Map};
 use names::Role;
@@ -108,7 +112,14 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
         "" => stem.to_owned(),
         name => name.to_owned(),
     };
-    let frames = Frames::new(&table, &root, archive.as_ref(), &files, &roles);
+    let frames = Frames::new(
+        &table,
+        &root,
+        archive.as_ref(),
+        &files,
+        &roles,
+        args.multi_image,
+    );
     let mut notes = notes;
     notes.append(&mut table.notes.clone());
     notes.extend(preset.map(preset::Preset::source));
@@ -132,6 +143,7 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
         title: info.name,
         name,
         sources: asked.sources,
+        series: asked.series,
         questions: asked.questions,
     })
 }
@@ -173,6 +185,8 @@ pub(super) struct ReadySet {
     /// The name in `dataset.json`; empty if there is none.
     pub(super) title: String,
     pub(super) sources: BTreeMap<FrameId, ImageSource>,
+    /// The images of each question that shows several, by the name of its frame.
+    pub(super) series: Series,
     pub(super) questions: Vec<Question>,
     /// What was taken for what, one fact a line.
     pub(super) reading: Vec<String>,
@@ -205,7 +219,7 @@ pub(super) fn about_frames(file: &Path, args: &SetArgs) -> Result<ReadQuestions>
     let (roles, set) = read(&table, &map, args, None, ImagesAre::Frames)
         .map_err(|problem| Error::data(file.display(), problem))?;
     let root = Root::of(folder, &[])?;
-    let frames = Frames::new(&table, &root, None, &[], &roles);
+    let frames = Frames::new(&table, &root, None, &[], &roles, args.multi_image);
     let name = file.display().to_string();
     let opened = Opened {
         place: file,
@@ -226,6 +240,7 @@ pub(super) fn about_frames(file: &Path, args: &SetArgs) -> Result<ReadQuestions>
 struct Finished {
     questions: Vec<Question>,
     sources: BTreeMap<FrameId, ImageSource>,
+    series: Series,
     reading: Vec<String>,
 }
 
@@ -260,13 +275,9 @@ fn finish(
         ids = frames.ids(&set.answered)?;
     }
     let family = FamilyOf::of(opened.table, &opened.roles.families, &set.answered);
-    let (questions, sources) = questions(
-        opened,
-        (&family, &set.groups),
-        set.answered,
-        &ids,
-        &mut frames,
-    )?;
+    let groups = (&family, &set.groups);
+    let questions = questions(opened, groups, set.answered, &ids, &mut frames)?;
+    let (sources, series) = frames.take_sources();
     notes.extend(ids.note());
     notes.extend(hint);
     let summary = Summary {
@@ -280,6 +291,7 @@ fn finish(
         left: &set.left,
         groups: set.groups.said(&questions),
         sources: &sources,
+        series: &series,
         questions: &questions,
         notes,
     };
@@ -287,6 +299,7 @@ fn finish(
     Ok(Finished {
         questions,
         sources,
+        series,
         reading,
     })
 }
@@ -314,12 +327,7 @@ fn read(
     let roles = Roles::of(table, map)?;
     let rule = GroupRule::of(table, map)?;
     let (mut left, mut cut) = (LeftOut::default(), Cut::new());
-    let endings = if args.keep_instructions {
-        Endings::Kept
-    } else {
-        Endings::Cut
-    };
-    let all = items(table, &roles, kind, endings, &mut left, &mut cut)?;
+    let all = items(table, &roles, kind, args, &mut left, &mut cut)?;
     let (kept, rotated): (Vec<_>, Vec<_>) = all
         .into_iter()
         .partition(|item| !preset.is_some_and(|preset| preset.is_rotation(table, item.row)));
@@ -371,14 +379,14 @@ fn image_hint(table: &Table, roles: &Roles, problem: String) -> String {
     )
 }
 
-/// The questions and the sources of their frames.
+/// The questions. The sources of their frames are kept in `frames`.
 fn questions(
     opened: &Opened<'_>,
     (families, groups): (&FamilyOf, &Groups),
     answered: Vec<Answered>,
-    ids: &frames::Ids,
+    ids: &Ids,
     frames: &mut Frames<'_>,
-) -> Result<(Vec<Question>, BTreeMap<FrameId, ImageSource>)> {
+) -> Result<Vec<Question>> {
     let (table, evidence) = (opened.table, opened.roles.evidence.as_ref());
     let mut questions = Vec::with_capacity(answered.len());
     for (at, answered) in answered.into_iter().enumerate() {
@@ -398,7 +406,7 @@ fn questions(
             evidence: evidence.map_or(serde_json::Value::Null, |column| column.of(cells).into()),
         });
     }
-    Ok((questions, frames.take_sources()))
+    Ok(questions)
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use super::groups::columns;
 use super::map::Map;
 use super::names::plain;
 use super::row::Table;
-use super::settings::{LeaveOut, SetArgs};
+use super::settings::{LeaveOut, SetArgs, SeveralImages};
 
 /// The file of presets.
 const SETS: &str = include_str!("sets.toml");
@@ -99,7 +99,9 @@ impl Preset {
         let skip = |kind, flag: Option<LeaveOut>| {
             flag.or(self.skip.contains(&kind).then_some(LeaveOut::Skip))
         };
-        args.multi_image = skip(Skip::MultiImage, args.multi_image);
+        let skips_several = self.skip.contains(&Skip::MultiImage);
+        let several = skips_several.then_some(SeveralImages::Skip);
+        args.multi_image = args.multi_image.or(several);
         args.no_image = skip(Skip::NoImage, args.no_image);
         args.open = skip(Skip::Open, args.open);
         args.several = skip(Skip::Several, args.several);

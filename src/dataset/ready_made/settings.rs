@@ -29,9 +29,9 @@ pub struct SetArgs {
     /// Where the rows are in a JSON file, as items or images.*.qa; default: the whole file
     #[arg(long, value_name = "FIELD", add = Decides::Reply)]
     pub rows: Option<String>,
-    /// What is done about rows that show several images; default: stop
-    #[arg(long, value_name = "skip", add = Decides::Trials)]
-    pub multi_image: Option<LeaveOut>,
+    /// What is done about rows that show several images: leave them out, or send all images of a row in one request; default: stop
+    #[arg(long, value_name = "skip|send", add = Decides::Trials)]
+    pub multi_image: Option<SeveralImages>,
     /// What is done about rows without an image; default: stop
     #[arg(long, value_name = "skip", add = Decides::Trials)]
     pub no_image: Option<LeaveOut>,
@@ -50,6 +50,15 @@ pub struct SetArgs {
     /// Keep sentences at the end of questions that say in what form to answer; default: cut, because the prompt says it too
     #[arg(long, add = Decides::Reply)]
     pub keep_instructions: bool,
+}
+
+/// What is done about rows that show several images.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SeveralImages {
+    /// Leave them out, and say how many
+    Skip,
+    /// Send all images of a row in one request, in order, each in the same condition; <image 2> in a text is the place of the second
+    Send,
 }
 
 /// What is done about rows that cannot be asked.

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::family_column::FamilyOf;
+use super::frames::Series;
 use super::items::Cut;
 use super::left_out::LeftOut;
 use super::roles::{Images, Roles};
@@ -23,6 +24,8 @@ pub(super) struct Summary<'a> {
     /// What the groups of questions are like; `None` without groups.
     pub(super) groups: Option<String>,
     pub(super) sources: &'a BTreeMap<FrameId, ImageSource>,
+    /// The images of questions that show several.
+    pub(super) series: &'a Series,
     pub(super) questions: &'a [Question],
     /// Further facts, one a line.
     pub(super) notes: Vec<String>,
@@ -50,6 +53,7 @@ impl Summary<'_> {
             ),
             self.columns(),
         ];
+        lines.extend(self.several());
         lines.extend(self.groups.clone());
         for (why, number) in self.left.counts() {
             lines.push(format!(
@@ -70,6 +74,26 @@ impl Summary<'_> {
         }
         lines.extend(self.notes.iter().cloned());
         lines
+    }
+
+    /// How many questions show several images; `None` if all show one.
+    fn several(&self) -> Option<String> {
+        let shown = self.questions.iter();
+        let shown = shown.filter_map(|question| Some(self.series.get(&question.frame)?.len()));
+        let counts: Vec<usize> = shown.collect();
+        let (least, most) = (counts.iter().min()?, counts.iter().max()?);
+        let each = if least == most {
+            most.to_string()
+        } else {
+            format!("{least} to {most}")
+        };
+        let questions = match counts.len() {
+            1 => "1 question shows".to_owned(),
+            number => format!("{number} questions show"),
+        };
+        Some(format!(
+            "{questions} {each} images, all in one request: each at its mark (<image 2>) in the text, else in order beside it"
+        ))
     }
 
     /// Which column was taken for what.

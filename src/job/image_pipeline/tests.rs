@@ -7,7 +7,6 @@ use crate::ask::PayloadFormat;
 use crate::dataset::Dataset;
 use crate::job::recipe::Recipe;
 use crate::job::scaling::Scaling;
-use crate::job::source::SourceFrame;
 use crate::job::timings::Timings;
 use crate::job::walk::{CameraOf, DegradedAt};
 use crate::synthesis::KindSettings;
@@ -23,7 +22,7 @@ fn frame() -> (tempfile::TempDir, Dataset, Source) {
     std::fs::write(folder.path().join("a.png"), file.unwrap()).unwrap();
     let dataset = Dataset::of_images(folder.path(), &[]).unwrap();
     let name = dataset.frames().next().unwrap().clone();
-    let source = Source::of_frame(SourceFrame::inspect(&dataset, &name).unwrap());
+    let source = Source::of_questions(&dataset, &name).unwrap();
     (folder, dataset, source)
 }
 

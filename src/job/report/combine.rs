@@ -11,12 +11,12 @@ use crate::error::{Error, Result};
 use crate::job::stored::StoredRun;
 use crate::report::page::{self, PageInputs};
 use crate::score::chance::OfferedChoices;
-use crate::score::cluster::{ClusterUnit, Clusters};
+use crate::score::cluster::{ClusterUnit, Clusters, FrameTies};
 use crate::score::findings::Findings;
 use crate::score::grid::Grid;
 use crate::score::photographed_set::PhotographedSet;
 use crate::types::manifest::RunManifest;
-use crate::types::{ChoiceDetail, FrameId, QuestionId, Record, RunQuestion, SetLight, Truths};
+use crate::types::{ChoiceDetail, QuestionId, Record, RunQuestion, SetLight, Truths};
 
 /// Several runs of questions with choices, joined.
 pub(super) type Combined = Joined<ChoiceDetail>;
@@ -27,7 +27,7 @@ impl Combined {
         let offers = offers(&self.records, &self.questions);
         let findings = Findings::listed(
             &self.records,
-            &scenes(&self.questions),
+            &ties(&self.questions),
             offers,
             &self.fidelity,
             &self.listing,
@@ -85,17 +85,20 @@ impl Combined {
     }
 }
 
-/// The scene of each frame.
-pub(super) fn scenes<'a>(
-    questions: impl IntoIterator<Item = &'a RunQuestion>,
-) -> BTreeMap<FrameId, String> {
-    let questions = questions.into_iter();
-    questions
-        .map(|question| (question.frame.clone(), question.scene.clone()))
-        .collect()
+/// What these questions say of their frames.
+pub(super) fn ties<'a>(questions: impl IntoIterator<Item = &'a RunQuestion>) -> FrameTies {
+    let mut ties = FrameTies::default();
+    for question in questions {
+        let frame = &question.frame;
+        ties.scenes.insert(frame.clone(), question.scene.clone());
+        if !question.images.is_empty() {
+            ties.images.insert(frame.clone(), question.images.clone());
+        }
+    }
+    ties
 }
 
-/// The clusters of records, with the scenes that these questions name.
+/// The clusters of records, with what these questions say of their frames.
 pub(super) fn clusters<'a>(
     records: &[Record],
     questions: impl IntoIterator<Item = &'a RunQuestion>,
@@ -103,7 +106,7 @@ pub(super) fn clusters<'a>(
     let pairs = records
         .iter()
         .map(|record| (&record.question, &record.detail.frame));
-    Clusters::new(pairs, &scenes(questions))
+    Clusters::new(pairs, &ties(questions))
 }
 
 /// Joins runs that can be compared.

@@ -1,7 +1,7 @@
 //! The report of runs whose questions have no true answers: each model against its own answers in the light.
 
 use super::alerts::alerts_without_truths;
-use super::combine::{Combined, scenes};
+use super::combine::{Combined, ties};
 use super::enhancers;
 use crate::error::Result;
 use crate::job::StdoutFormat;
@@ -71,7 +71,7 @@ pub(super) fn compared(
 fn found(combined: &Combined) -> SelfAgreement<'_> {
     SelfAgreement::new(
         &combined.records,
-        &scenes(&combined.questions),
+        &ties(&combined.questions),
         &combined.questions,
         &combined.listing,
     )

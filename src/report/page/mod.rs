@@ -17,6 +17,7 @@ use serde_json::{Value, json};
 use super::alert::Alert;
 use super::chart::Figure;
 use super::choice_report::ChoiceReport;
+use super::frame_count::frames;
 use super::light_readings::LightReadings;
 use super::sentences::{HOW_TO_READ, Sentence};
 use super::table::Table;
@@ -152,17 +153,12 @@ fn title(inputs: &PageInputs<'_>) -> String {
 
 fn intro(findings: &Findings<'_>) -> Vec<String> {
     let (grid, unit) = (&findings.grid, findings.unit);
-    let frames: std::collections::BTreeSet<_> = grid
-        .items
-        .iter()
-        .map(|item| &item.record.detail.frame)
-        .collect();
     let facts = format!(
-        "{} items about {} frames, {} subjects (model × condition). Strict reading. Intervals are 95 %, by {unit} \
+        "{} items about {}, {} subjects (model × condition). Strict reading. Intervals are 95 %, by {unit} \
          ({} clusters); differences are paired by item, tested by swapping whole {unit}s, and corrected by Holm over the comparisons of one kind and model; \
          “not shown” does not say that there is no difference.",
         grid.items.len(),
-        frames.len(),
+        frames(grid),
         grid.subjects.len(),
         grid.clusters
     );
@@ -227,7 +223,7 @@ fn usage(records: &[&Record]) -> Vec<(String, String)> {
     };
     let bytes: u64 = records
         .iter()
-        .filter_map(|record| record.detail.image.as_ref())
+        .flat_map(|record| record.detail.images())
         .map(|image| image.bytes as u64)
         .sum();
     let mut waits: Vec<u64> = records

@@ -66,6 +66,7 @@ impl Experiment for ChoiceSetup<'_> {
         questions
             .map(|question| RunQuestion {
                 image: self.digests.get(&question.frame).copied(),
+                images: self.dataset.several(&question.frame).to_vec(),
                 ..RunQuestion::new(
                     question,
                     places[&question.id],

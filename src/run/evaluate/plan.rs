@@ -6,6 +6,7 @@ use super::choice_order::arrange;
 use super::controls::is_other_room;
 use super::settings::ImagePlace;
 use super::setup::ChoiceSetup;
+use crate::ask::ImagePlaces;
 use crate::error::Result;
 use crate::job::models::{ModelUnderTest, asked_in};
 use crate::job::plan::{SourcePlan, TrialGroup};
@@ -79,9 +80,14 @@ fn prompts(
     let prompts = arranged.map(|arranged| {
         let prompt = |view| {
             let words = setup.config.prompts.render(view, &arranged.question)?;
-            Ok(match (view, setup.config.image_place) {
+            let prompt = match (view, setup.config.image_place) {
                 (View::Image, ImagePlace::BeforeWords) => Prompt::behind(words.into()),
                 _ => Prompt::of(words.into()),
+            };
+            let several = setup.dataset.several(&question.frame);
+            Ok(match view {
+                View::Image if !several.is_empty() => prompt.with_places(ImagePlaces::Marked),
+                View::Image | View::Blind => prompt,
             })
         };
         Ok(QuestionPrompts {

@@ -1,7 +1,9 @@
 //! The trial of a question with choices, and its record before the reply.
 
+use std::sync::Arc;
+
 use super::plan::ChoiceItem;
-use crate::ask::Query;
+use crate::ask::{Payload, Query};
 use crate::job::trial::{Item, Stimulus, Trial};
 use crate::types::{ChoiceDetail, Record, TrialOutcome};
 
@@ -28,7 +30,8 @@ impl Item for ChoiceItem {
 
     fn blank(trial: &Trial<Self>, stimulus: &Stimulus, model: &str) -> Record {
         let question = &*trial.item.question;
-        let image = stimulus.images.first();
+        let facts = |image: &Arc<Payload>| image.facts().clone();
+        let mut images = stimulus.images.iter().map(facts);
         let detail = ChoiceDetail {
             frame: question.frame.clone(),
             family: question.family.clone(),
@@ -38,7 +41,8 @@ impl Item for ChoiceItem {
             strict: None,
             lenient: None,
             outcome: TrialOutcome::Failed,
-            image: image.map(|image| image.facts().clone()),
+            image: images.next(),
+            more_images: images.collect(),
             shown_frame: trial.item.shown_frame.clone(),
             observed: None,
             options: None,

@@ -19,7 +19,7 @@ use crate::job::progress::Progress;
 use crate::job::questions::{QuestionBank, open_data, select};
 use crate::job::recipe::Recipe;
 use crate::job::shard::part;
-use crate::job::source::{Source, SourceFrame, first_asked, inspect_all};
+use crate::job::source::{Source, first_asked, inspect_all};
 use crate::types::{Condition, Digest, FrameId, Question, QuestionId, SetLight, TreatmentSet};
 
 /// All data and models of an evaluation, opened and checked. Nothing is asked or written yet.
@@ -35,7 +35,7 @@ pub(super) struct ChoiceSetup<'a> {
     pub(super) places: HashMap<FrameId, usize>,
     /// The place of each question among all that are selected, for models that are asked the first ones alone.
     pub(super) question_places: HashMap<QuestionId, usize>,
-    /// The digest of the file of each frame that a question is about; empty if no image is read.
+    /// The digest of the file, or of all files, of each frame that a question is about; empty if no image is read.
     pub(super) digests: HashMap<FrameId, Digest>,
     pub(super) models: Vec<ModelUnderTest>,
     pub(super) conditions: Vec<Condition>,
@@ -155,8 +155,10 @@ impl<'a> ChoiceSetup<'a> {
         });
         for question in &all {
             if !self.digests.contains_key(&question.frame) {
-                let frame = SourceFrame::inspect(&*self.dataset, &question.frame)?;
-                self.digests.insert(frame.id, frame.digest);
+                let source = Source::of_questions(&self.dataset, &question.frame)?;
+                let digest = source.digest();
+                self.digests
+                    .extend(digest.map(|digest| (source.name, digest)));
             }
         }
         self.with_other_rooms = all;
@@ -164,13 +166,10 @@ impl<'a> ChoiceSetup<'a> {
     }
 }
 
-/// The digest of the file of each source.
+/// The digest of the file of each source, or of all its files.
 fn digests(sources: &[Source]) -> HashMap<FrameId, Digest> {
     let sources = sources.iter();
-    let digests = sources.filter_map(|source| {
-        let frame = source.frames.first()?;
-        Some((source.name.clone(), frame.digest))
-    });
+    let digests = sources.filter_map(|source| Some((source.name.clone(), source.digest()?)));
     digests.collect()
 }
 

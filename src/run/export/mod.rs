@@ -98,6 +98,7 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
         progress.note(line);
     }
     let questions = select(&dataset, &args.selection)?;
+    refuse_several_images(&dataset, &questions)?;
     let files = enhancers::read(&args.enhancers.llie)?;
     let recipe = Recipe::lossless(&light.kinds, &files);
     let workers = pool(args.loading.threads.threads)?;
@@ -167,6 +168,24 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
             paths.join("\n")
         ),
     })
+}
+
+/// Refuses questions that show several images: the forms of the sets have one image a question.
+fn refuse_several_images(dataset: &Dataset, questions: &[Question]) -> Result<()> {
+    let mut several = questions
+        .iter()
+        .filter(|question| !dataset.several(&question.frame).is_empty());
+    match several.next() {
+        None => Ok(()),
+        Some(first) => Err(Error::usage(
+            "--multi-image",
+            format_args!(
+                "the question {:?} shows {} images, and an exported set has one image a question; --multi-image skip leaves such rows out",
+                first.id.0,
+                dataset.several(&first.frame).len()
+            ),
+        )),
+    }
 }
 
 fn open_sets(

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::record::OpenItem;
 use super::setup::OpenSetup;
+use crate::ask::ImagePlaces;
 use crate::ask::openeqa::{blind, vision};
 use crate::dataset::openeqa::OpenQuestion;
 use crate::error::Result;
@@ -77,6 +78,7 @@ fn prompt(question: &OpenQuestion, view: View) -> Prompt {
             Prompt {
                 before: before.into(),
                 behind: Some(behind.into()),
+                places: ImagePlaces::Together,
             }
         }
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::ask::{Payload, Query};
 use crate::dataset::openeqa::OpenQuestion;
 use crate::job::trial::{Item, Stimulus, Trial};
-use crate::types::{Digest, ExposureFacts, OpenDetail, Record, Step, WalkFacts};
+use crate::types::{ExposureFacts, OpenDetail, Record, Step, WalkFacts};
 
 /// The subject of one trial.
 #[derive(Debug, Clone)]
@@ -91,12 +91,10 @@ pub(super) fn detail(question: &OpenQuestion, step: Step) -> OpenDetail {
 /// The facts of all images of a stimulus together; `None` without images.
 fn facts(images: &[Arc<Payload>]) -> Option<WalkFacts> {
     let first = images.first()?.facts();
-    let digests = images.iter().map(|image| image.facts().digest);
-    let digests: Vec<Digest> = digests.collect();
     Some(WalkFacts {
         images: images.len(),
         bytes: images.iter().map(|image| image.facts().bytes).sum(),
-        digest: Digest::of_parts(digests.iter().map(|digest| &digest.as_bytes()[..])),
+        digest: Payload::joint_digest(images)?,
         width: first.width,
         height: first.height,
         format: first.format.clone(),

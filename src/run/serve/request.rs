@@ -51,7 +51,7 @@ pub(super) struct ServedQuestion {
     pub(super) model: String,
     /// The texts of all messages, joined.
     pub(super) text: String,
-    /// The last image: its pixels, and the payload for the model.
+    /// The image of the last message that has one: its pixels, and the payload for the model.
     pub(super) image: Option<(Rgb, Arc<Payload>)>,
     pub(super) form: ReplyForm,
 }
@@ -62,7 +62,7 @@ impl ServedQuestion {
         let wrong = |message: String| RequestFault::new(StatusCode::BAD_REQUEST, message);
         let body: ChatBody = serde_json::from_slice(body)
             .map_err(|e| wrong(format!("the request is not a valid chat completion: {e}")))?;
-        let (mut text, mut image) = (String::new(), None);
+        let (mut text, mut image, mut most) = (String::new(), None, 0);
         let mut append = |words: &str| {
             text.push_str(words);
             text.push('\n');
@@ -72,6 +72,8 @@ impl ServedQuestion {
                 None => {}
                 Some(Content::Text(words)) => append(&words),
                 Some(Content::Parts(parts)) => {
+                    let is_image = |part: &&Part| matches!(part, Part::ImageUrl { .. });
+                    most = most.max(parts.iter().filter(is_image).count());
                     for part in parts {
                         match part {
                             Part::Text { text } => append(&text),
@@ -80,6 +82,10 @@ impl ServedQuestion {
                     }
                 }
             }
+        }
+        if most > 1 {
+            let message = format!("a message shows {most} images, and these models look at one");
+            return Err(wrong(message).at("image_url", "invalid_image_url"));
         }
         Ok(Self {
             model: body.model,

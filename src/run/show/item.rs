@@ -63,7 +63,13 @@ fn stored_question<'a>(questions: &'a [RunQuestion], name: &str) -> Option<&'a R
 }
 
 pub(super) fn choice_text(record: &Record, stored_question: Option<&RunQuestion>) -> String {
-    let mut text = format!("{}, about {}\n", record.question, record.detail.frame);
+    let images = stored_question.map_or(&[][..], |question| &question.images);
+    let images: Vec<&str> = images.iter().map(|frame| &*frame.0).collect();
+    let about = match &*images {
+        [] => record.detail.frame.to_string(),
+        several => format!("{} images: {}", several.len(), several.join(", ")),
+    };
+    let mut text = format!("{}, about {about}\n", record.question);
     if let Some(stored_question) = stored_question {
         let _ = writeln!(text, "{}", stored_question.text);
     }
@@ -91,7 +97,7 @@ fn choice_answer(record: &Record) -> ShownAnswer {
         },
         reply: reply(record.reply.as_deref(), record.failure.as_ref()),
         shown: record.detail.shown().clone(),
-        sent: record.detail.image.as_ref().map(|image| image.digest),
+        sent: record.detail.sent(),
     }
 }
 

@@ -64,7 +64,9 @@ pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
         let images = rebuilder.images(&source, &conditions)?;
         for (condition, images) in conditions.iter().zip(images) {
             text += &written(&out, &source, condition, &images)?;
-            let digest = joint_digest(&images);
+            let Some(digest) = Payload::joint_digest(&images) else {
+                continue;
+            };
             let sent = sent(&answers, condition);
             let comparison = if sent.is_empty() {
                 format!("the digest of what was sent is not stored; {digest} now")
@@ -152,18 +154,6 @@ fn conditions(answers: &[ShownAnswer], args: &ShowArgs) -> Result<Vec<Condition>
         return Err(Error::usage("--condition", problem));
     }
     Ok(wanted.clone())
-}
-
-/// The digest of images that are sent together, as in a record.
-fn joint_digest(images: &[Arc<Payload>]) -> Digest {
-    match images {
-        [only] => only.facts().digest,
-        multiple => Digest::of_parts(
-            multiple
-                .iter()
-                .map(|image| &image.facts().digest.as_bytes()[..]),
-        ),
-    }
 }
 
 /// The digests of the images that were sent in a condition.

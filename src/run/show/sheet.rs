@@ -10,6 +10,7 @@ use crate::ask::{Payload, PayloadFormat};
 use crate::error::{Error, Result};
 use crate::files::write;
 use crate::job::Outcome;
+use crate::job::montage::montage;
 use crate::job::rebuild::ImageRebuilder;
 use crate::job::report::story_curves;
 use crate::job::stored::StoredRun;
@@ -18,7 +19,7 @@ use crate::report::sheet::{Story, StoryCell, StoryMark, StoryRow, story};
 use crate::score::subject::is_control;
 use crate::types::degradation::Kind;
 use crate::types::manifest::{RunManifest, Status};
-use crate::types::{AxisLevel, Condition, KindReading, Record, TrialOutcome};
+use crate::types::{AxisLevel, Condition, KindReading, Record, Rgb, TrialOutcome};
 
 /// Draws the picture and writes it. The outcome says which conditions are left out, and which images are not those that were sent.
 ///
@@ -33,7 +34,7 @@ pub(super) fn sheet(args: &ShowArgs, path: &Path) -> Result<Outcome> {
     let cell = |condition: &Condition| -> Option<Result<StoryCell>> {
         let image = images.get(condition)?;
         let marks = item.marks(condition);
-        Some(image.decode().map(|image| StoryCell { image, marks }))
+        Some(picture(image).map(|image| StoryCell { image, marks }))
     };
     let drawn = rows.iter().map(|(name, conditions)| {
         let cells = conditions.iter();
@@ -72,6 +73,16 @@ pub(super) fn sheet(args: &ShowArgs, path: &Path) -> Result<Outcome> {
             .flatten()
             .collect(),
     })
+}
+
+/// The image of a cell; several stand beside each other.
+fn picture(images: &[Arc<Payload>]) -> Result<Rgb> {
+    let images = images.iter().map(|image| image.decode());
+    let mut images: Vec<Rgb> = images.collect::<Result<_>>()?;
+    match images.pop() {
+        Some(only) if images.is_empty() => Ok(only),
+        last => montage(&images.into_iter().chain(last).collect::<Vec<Rgb>>()),
+    }
 }
 
 /// Conditions as a list of names; `None` if there are none.
@@ -168,12 +179,12 @@ impl SheetItem {
         std::iter::once(raw).chain(enhanced).collect()
     }
 
-    /// The image of each condition of the rows, made again.
+    /// The images of each condition of the rows, made again.
     fn images(
         &self,
         args: &ShowArgs,
         rows: &SheetRows,
-    ) -> Result<BTreeMap<Condition, Arc<Payload>>> {
+    ) -> Result<BTreeMap<Condition, Vec<Arc<Payload>>>> {
         let conditions = rows
             .iter()
             .flat_map(|(_, conditions)| conditions.iter().flatten());
@@ -181,17 +192,17 @@ impl SheetItem {
         let rebuild = args.rebuild.clone();
         let mut rebuilder = ImageRebuilder::open(rebuild, &self.manifest, &args.run, &conditions)?;
         let images = rebuilder.images(&self.records[0].detail.frame, &conditions)?;
-        let images = images.into_iter().flatten();
         Ok(conditions.into_iter().zip(images).collect())
     }
 
-    /// Whether an image is another one than was sent.
-    fn is_changed(&self, condition: &Condition, image: &Payload) -> bool {
+    /// Whether the images are others than were sent.
+    fn is_changed(&self, condition: &Condition, images: &[Arc<Payload>]) -> bool {
+        let now = Payload::joint_digest(images);
         let records = self.records.iter();
         let mut records = records.filter(|record| record.condition.as_ref() == Some(condition));
         records.any(|record| {
-            let sent = record.detail.image.as_ref();
-            sent.is_some_and(|sent| sent.digest != image.facts().digest)
+            let sent = record.detail.sent();
+            sent.is_some() && sent != now
         })
     }
 

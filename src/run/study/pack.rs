@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use crate::ask::Payload;
 use crate::error::{Error, Result};
 use crate::files::write;
 use crate::job::Outcome;
@@ -72,9 +73,10 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
     for (number, (frame, questions)) in frames.into_iter().enumerate() {
         let mut shots = Vec::new();
         let rebuilt = rebuilder.images(&frame, &conditions)?;
-        for (condition, image) in conditions.iter().zip(rebuilt.iter().flatten()) {
+        for (condition, shown) in conditions.iter().zip(&rebuilt) {
+            let now = Payload::joint_digest(shown);
             if let Some(sent) = sent.get(&(frame.clone(), condition.clone()))
-                && *sent != image.facts().digest
+                && now.is_some_and(|now| now != *sent)
             {
                 let problem = format!(
                     "{frame} at {condition} is not the image that was sent: the data, an enhancement model or this program has changed"
@@ -83,13 +85,21 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
             }
             // The name does not reveal the level.
             let name = Digest::of_parts([frame.0.as_bytes(), condition.to_string().as_bytes()]);
-            let name = format!("images/{}.{}", &name.to_string()[..16], image.extension());
-            write(&args.out.join(&name), &image.file()?)?;
+            let stem = format!("images/{}", &name.to_string()[..16]);
+            let names = shown.iter().enumerate().map(|(place, image)| {
+                let place = match shown.len() {
+                    1 => String::new(),
+                    _ => format!("-{}", place + 1),
+                };
+                let name = format!("{stem}{place}.{}", image.extension());
+                write(&args.out.join(&name), &image.file()?)?;
+                Ok(name)
+            });
             shots.push(StudyImage {
                 condition: condition.to_string(),
-                images: vec![name],
+                images: names.collect::<Result<_>>()?,
             });
-            images += 1;
+            images += shown.len();
             bar.inc();
         }
         asked.extend(questions.into_iter().map(|question| StudyQuestion {
@@ -148,11 +158,11 @@ fn chosen(mut questions: Vec<RunQuestion>, count: usize) -> Vec<RunQuestion> {
     questions
 }
 
-/// The digest of each image that was sent, by frame and condition.
+/// The digest of what was sent, by frame and condition.
 fn sent(records: &[Record]) -> BTreeMap<(FrameId, Condition), Digest> {
     let sent = records.iter().filter_map(|record| {
         let place = (record.detail.shown().clone(), record.condition.clone()?);
-        Some((place, record.detail.image.as_ref()?.digest))
+        Some((place, record.detail.sent()?))
     });
     sent.collect()
 }

@@ -194,6 +194,7 @@ fn held(record: &Record, repeat: u32, reference: usize) -> Record {
         lenient: detail.lenient,
         outcome,
         image: None,
+        more_images: Vec::new(),
         shown_frame: None,
         observed: None,
         options: None,

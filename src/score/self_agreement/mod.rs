@@ -24,8 +24,6 @@ pub(crate) mod question_in_light;
 #[cfg(test)]
 mod tests;
 
-use std::collections::BTreeMap;
-
 use self::bank_index::BankIndex;
 use self::cell::{AgreementCell, cells};
 use self::evidence::{EvidenceCurve, curves};
@@ -34,12 +32,12 @@ use self::models_in_light::{ModelsInLight, models_in_light};
 use self::question_in_light::{QuestionInLight, questions_in_light};
 use super::bootstrap::Resamples;
 use super::choice::ReadingMode;
-use super::cluster::{ClusterUnit, Clusters};
+use super::cluster::{ClusterUnit, Clusters, FrameTies};
 use super::comparison::{Comparison, ComparisonKind, comparisons};
 use super::confusion::{Confusion, Hallucination, confusions, hallucinations};
 use super::grid::Grid;
 use super::health::{Health, healths};
-use crate::types::{FrameId, ModelListing, Record, RunQuestion};
+use crate::types::{ModelListing, Record, RunQuestion};
 
 /// All results of a run without true answers.
 #[derive(Debug)]
@@ -69,18 +67,18 @@ pub(crate) struct SelfAgreement<'a> {
 }
 
 impl<'a> SelfAgreement<'a> {
-    /// The results of records without true answers. `scenes` holds the scene of each frame for which it is known.
+    /// The results of records without true answers. `ties` says what ties frames to each other.
     #[must_use]
     pub(crate) fn new(
         records: &'a [Record],
-        scenes: &BTreeMap<FrameId, String>,
+        ties: &FrameTies,
         questions: &'a [RunQuestion],
         listing: &ModelListing,
     ) -> Self {
         let pairs = records
             .iter()
             .map(|record| (&record.question, &record.detail.frame));
-        let clusters = Clusters::new(pairs, scenes);
+        let clusters = Clusters::new(pairs, ties);
         let draws = Resamples::new(clusters.count());
         let bank = BankIndex::new(questions);
         let grid = Grid::without_truths(records, &clusters, listing);

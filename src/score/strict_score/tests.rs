@@ -24,6 +24,7 @@ fn questions(records: &[Record], group: impl Fn(usize) -> Option<String>) -> Vec
             extra_answers: None,
             evidence: serde_json::Value::Null,
             image: None,
+            images: Vec::new(),
             group: group(item).map(|name| StrictGroup { name, size: 0 }),
         });
     }

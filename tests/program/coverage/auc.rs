@@ -1,10 +1,8 @@
 //! The area under the ROC curve of fidelity, pooled over conditions that ask the same questions about the same scenes.
 
-use std::collections::BTreeMap;
-
 use super::*;
 use crate::support::made::record;
-use darkqa_eval::internals::score::{Clusters, FidelityFindings, Grid};
+use darkqa_eval::internals::score::{Clusters, FidelityFindings, FrameTies, Grid};
 use darkqa_eval::types::{
     AnswerReading, Condition, Digest, Family, ImageFacts, ImageFidelity, Record,
 };
@@ -151,11 +149,14 @@ impl MadeRun {
             let scene = index / FRAMES % design.scenes;
             (image.frame.clone(), format!("s{scene:03}"))
         });
-        let scenes: BTreeMap<_, _> = scenes.collect();
+        let ties = FrameTies {
+            scenes: scenes.collect(),
+            ..FrameTies::default()
+        };
         let asked = records
             .iter()
             .map(|record| (&record.question, &record.detail.frame));
-        let clusters = Clusters::new(asked, &scenes);
+        let clusters = Clusters::new(asked, &ties);
         assert_eq!(clusters.count(), design.scenes);
         Self {
             design,

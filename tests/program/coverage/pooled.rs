@@ -1,12 +1,10 @@
 //! The test of all models together, and its interval.
 
-use std::collections::BTreeMap;
-
 use super::*;
 use crate::support::made::record;
 use darkqa_eval::Kind;
 use darkqa_eval::internals::score::{
-    Clusters, Grid, PairedComparison, PooledKind, Significance, pooled,
+    Clusters, FrameTies, Grid, PairedComparison, PooledKind, Significance, pooled,
 };
 use darkqa_eval::score::choice::ReadingMode;
 use darkqa_eval::types::{AnswerReading, Condition, Degradation, Record, Severity};
@@ -74,7 +72,7 @@ fn pooled_rates(design: &PooledDesign, runs: usize) -> PooledRates {
     let asked = records
         .iter()
         .map(|record| (&record.question, &record.detail.frame));
-    let units = Clusters::new(asked, &BTreeMap::new());
+    let units = Clusters::new(asked, &FrameTies::default());
     let mut rates = PooledRates::default();
     for _ in 0..runs {
         answer(&mut random, &mut records, &clusters, design);

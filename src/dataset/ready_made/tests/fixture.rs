@@ -29,6 +29,11 @@ pub(super) fn base64(colour: u8) -> String {
     STANDARD.encode(png(colour))
 }
 
+/// A PNG as hubs hold it: its bytes and its path in one value.
+pub(super) fn bytes(colour: u8) -> Value {
+    json!({"bytes": base64(colour), "path": null})
+}
+
 /// A row from its fields.
 pub(super) fn row(fields: Value) -> Map<String, Value> {
     match fields {

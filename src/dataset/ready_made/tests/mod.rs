@@ -9,6 +9,7 @@ mod joined;
 mod limits;
 mod marks;
 mod refusals;
+mod several;
 mod shapes;
 
 use std::path::Path;

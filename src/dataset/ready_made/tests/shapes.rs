@@ -4,8 +4,8 @@ use std::fs;
 
 use serde_json::{Map, Value, json};
 
-use super::super::settings::LeaveOut;
-use super::fixture::{base64, png, row, set, write};
+use super::super::settings::{LeaveOut, SeveralImages};
+use super::fixture::{base64, bytes, png, row, set, write};
 use super::{Read, digests, expected, map, open, read};
 use crate::dataset::ready_made::SetArgs;
 
@@ -22,10 +22,6 @@ fn in_every_form(rows: &[Map<String, Value>], args: &SetArgs) -> Vec<Read> {
         assert_eq!(*first, found, "{form}");
     }
     first.unwrap().0
-}
-
-fn bytes(colour: u8) -> Value {
-    json!({"bytes": base64(colour), "path": null})
 }
 
 #[test]
@@ -238,7 +234,7 @@ fn several_images_none_and_open_questions_are_left_out_only_by_a_flag() {
     ];
     let skip = Some(LeaveOut::Skip);
     let args = SetArgs {
-        multi_image: skip,
+        multi_image: Some(SeveralImages::Skip),
         no_image: skip,
         ..SetArgs::default()
     };

@@ -1,9 +1,8 @@
 //! Sentences from made records, through all tests: what is named, counted, and left out.
 
-use std::collections::BTreeMap;
-
 use super::checked;
 use crate::report::sentences::{Sentence, sentences};
+use crate::score::cluster::FrameTies;
 use crate::score::findings::Findings;
 use crate::types::{
     AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, LightGroup, QuestionId,
@@ -38,6 +37,7 @@ fn asked(model: &str, frames: usize, conditions: &[(&str, f64)]) -> Vec<Record> 
                     TrialOutcome::Wrong
                 },
                 image: None,
+                more_images: Vec::new(),
                 shown_frame: None,
                 observed: None,
                 options: None,
@@ -58,7 +58,7 @@ fn asked(model: &str, frames: usize, conditions: &[(&str, f64)]) -> Vec<Record> 
 
 /// All sentences about records.
 fn said(records: &[Record]) -> Vec<Sentence> {
-    sentences(&Findings::new(records, &BTreeMap::new(), [], &[]))
+    sentences(&Findings::new(records, &FrameTies::default(), [], &[]))
 }
 
 /// The sentences of a kind, each with its detail.
@@ -262,7 +262,7 @@ fn the_best_model_has_its_light_and_each_level_once() {
             all.extend(records);
         }
     }
-    let findings = Findings::new(&all, &BTreeMap::new(), [], &[]);
+    let findings = Findings::new(&all, &FrameTies::default(), [], &[]);
     let best = findings.best.as_ref().unwrap();
     let names: Vec<String> = best.levels.iter().map(ToString::to_string).collect();
     assert_eq!(names, ["L0", "L3"]);

@@ -1,6 +1,6 @@
 //! The images of a check: [`images`].
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use rayon::prelude::*;
 
@@ -40,12 +40,15 @@ pub(super) fn images(
     progress: &Progress,
     findings: &mut Findings,
 ) {
-    let asked = first_asked(questions);
-    let bar = progress.bar("reading images", asked.len());
-    let looked: Vec<Looked> = asked
+    let mut seen = HashSet::new();
+    let shown = first_asked(questions).into_iter();
+    let shown = shown.flat_map(|question| dataset.shown(&question.frame));
+    let shown: Vec<&FrameId> = shown.filter(|frame| seen.insert(*frame)).collect();
+    let bar = progress.bar("reading images", shown.len());
+    let looked: Vec<Looked> = shown
         .par_iter()
-        .map(|question| {
-            let looked = look(dataset, &question.frame, depth);
+        .map(|frame| {
+            let looked = look(dataset, frame, depth);
             bar.inc();
             looked
         })
@@ -77,14 +80,14 @@ pub(super) fn images(
     }
     findings.ok(format!(
         "{} images, {}, {}",
-        asked.len(),
+        shown.len(),
         megabytes(bytes),
         listed(&sizes)
     ));
     for line in notes.lines() {
         findings.warn(line);
     }
-    light(dataset, &asked, findings);
+    light(dataset, &shown, findings);
 }
 
 fn look(dataset: &Dataset, id: &FrameId, depth: Depth) -> Looked {
@@ -105,11 +108,11 @@ fn look(dataset: &Dataset, id: &FrameId, depth: Depth) -> Looked {
 }
 
 /// Measures the brightness of a sample of the images.
-fn light(dataset: &Dataset, asked: &[&Question], findings: &mut Findings) {
-    let number = asked.len().min(SAMPLED);
+fn light(dataset: &Dataset, shown: &[&FrameId], findings: &mut Findings) {
+    let number = shown.len().min(SAMPLED);
     let sample = (0..number).into_par_iter().filter_map(|index| {
-        let question = asked[index * asked.len() / number];
-        let picture = dataset.picture(&question.frame).ok()?;
+        let frame = shown[index * shown.len() / number];
+        let picture = dataset.picture(frame).ok()?;
         Some(brightness(&picture.decode().ok()?))
     });
     let mut sample: Vec<f64> = sample.collect();

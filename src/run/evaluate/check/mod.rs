@@ -184,9 +184,15 @@ fn plan(args: EvaluateArgs, progress: &Progress, findings: &mut Findings) {
 fn save(path: &Path, dataset: &Dataset, questions: &[Question]) -> Result<()> {
     let mut text = String::new();
     for question in questions {
-        let digest = match dataset.picture(&question.frame) {
+        let digest = |frame| match dataset.picture(frame) {
             Ok(Picture::Encoded(file)) => Some(hex(&Sha256::digest(file.bytes()))),
             _ => None,
+        };
+        let digests: Vec<Option<String>> =
+            dataset.shown(&question.frame).iter().map(digest).collect();
+        let digest = match &*digests {
+            [only] => json!(only),
+            several => json!(several),
         };
         let line = json!({
             "id": question.id,

@@ -68,7 +68,7 @@ fn commonest(questions: &[Question], findings: &mut Findings) {
         let share = *count as f64 / questions.len() as f64;
         if share >= COMMON {
             findings.warn(format!(
-                "always the {what} {answer:?} scores {:.0} %; ask the blind model too (--blind), or show the choices in other orders (--shuffle-options)",
+                "always the {what} {answer:?} scores {:.0} %; ask the model without images too (--blind-model NAME), or show the choices in other orders (--shuffle-options)",
                 100.0 * share
             ));
         }

@@ -4,11 +4,10 @@ mod intervals;
 mod models;
 mod simulated;
 
-use std::collections::BTreeMap;
-
 use self::simulated::{Answer, IMAGES, QUESTIONS, Simulated, at, found, keep, record};
 use super::evidence::NoEvidence;
 use crate::score::choice::ReadingMode;
+use crate::score::cluster::FrameTies;
 use crate::score::comparison::ComparisonKind;
 use crate::score::significance::Significance;
 use crate::types::{AnswerReading, Record};
@@ -192,7 +191,7 @@ fn nothing_without_a_truth_is_scored_as_an_accuracy() {
         dark: keep,
     };
     let records = model.records(&[]);
-    let findings = Findings::new(&records, &BTreeMap::new(), [], &[]);
+    let findings = Findings::new(&records, &FrameTies::default(), [], &[]);
     assert!(findings.grid.items.is_empty());
     let mut cells = findings.summary.cells.iter();
     assert!(cells.all(|cell| cell.accuracy.is_none() && cell.right == 0));

@@ -1,9 +1,8 @@
 //! Simulated models, and what is found in their records.
 
-use std::collections::BTreeMap;
-
 use serde_json::json;
 
+use crate::score::cluster::FrameTies;
 use crate::score::self_agreement::SelfAgreement;
 use crate::score::self_agreement::cell::AgreementCell;
 use crate::score::split_mix::SplitMix;
@@ -68,6 +67,7 @@ pub(super) fn record(
         lenient: Some(reading),
         outcome: chosen.map_or(TrialOutcome::Unparsed, |_| TrialOutcome::Answered),
         image: None,
+        more_images: Vec::new(),
         shown_frame: None,
         observed: None,
         options: None,
@@ -93,6 +93,7 @@ pub(super) fn questions() -> Vec<RunQuestion> {
         group: None,
         evidence: json!({ BANK_ID: format!("q{question:02}") }),
         image: None,
+        images: Vec::new(),
     };
     ids.map(question).collect()
 }
@@ -130,7 +131,7 @@ pub(super) fn found<T>(records: &[Record], read: impl FnOnce(&SelfAgreement<'_>)
     let listing = ModelListing::default();
     read(&SelfAgreement::new(
         records,
-        &BTreeMap::new(),
+        &FrameTies::default(),
         &questions,
         &listing,
     ))

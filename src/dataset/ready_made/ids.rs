@@ -1,0 +1,142 @@
+//! The ids of the questions of a set: [`Ids`].
+
+use std::collections::{HashMap, HashSet};
+
+use super::frames::{Found, Frames};
+use super::roles::Column;
+use super::truths::Answered;
+use crate::error::Result;
+use crate::files::reading;
+use crate::types::{Digest, FrameId, QuestionId};
+
+/// The ids of questions.
+#[derive(Debug)]
+pub(super) struct Ids {
+    texts: Vec<String>,
+    /// The column, or that they follow from the content.
+    name: String,
+    note: Option<String>,
+    /// The places of two questions that differ in their answers alone.
+    contradictory: Vec<[usize; 2]>,
+}
+
+impl Ids {
+    /// The pairs of questions that differ in their answers alone, by their places.
+    pub(super) fn contradictory(&self) -> &[[usize; 2]] {
+        &self.contradictory
+    }
+
+    pub(super) fn id(&self, question: usize) -> QuestionId {
+        QuestionId(self.texts[question].clone())
+    }
+
+    /// The column, or `content`.
+    pub(super) fn name(&self) -> String {
+        self.name.clone()
+    }
+
+    /// What the user should know of them.
+    pub(super) fn note(&self) -> Option<String> {
+        self.note.clone()
+    }
+}
+
+/// Ids by content, the number of repeats, and the pairs that differ in their answers alone.
+type ContentIds = (Vec<String>, usize, Vec<[usize; 2]>);
+
+impl Frames<'_> {
+    /// The ids of the questions: those of the first column in which all differ, or by content.
+    pub(super) fn ids(&self, answered: &[Answered]) -> Result<Ids> {
+        let texts = |column: &Column| -> Option<Vec<String>> {
+            let rows = answered
+                .iter()
+                .map(|answered| &self.table.rows[answered.item.row]);
+            rows.map(|row| Some(column.text(row)?.trim().to_owned()))
+                .collect()
+        };
+        for column in &self.roles.ids {
+            let Some(texts) = texts(column) else {
+                continue;
+            };
+            let mut seen = HashSet::new();
+            if texts.iter().all(|text| seen.insert(text)) {
+                let name = column.name.clone();
+                return Ok(Ids {
+                    texts,
+                    name,
+                    note: None,
+                    contradictory: Vec::new(),
+                });
+            }
+        }
+        let (texts, repeats, contradictory) = self.ids_by_content(answered)?;
+        let name = match &*self.roles.ids {
+            [] => "content".to_owned(),
+            [column, ..] => format!("content ({} does not tell all rows apart)", column.name),
+        };
+        let note = (repeats > 0).then(|| {
+            format!("{repeats} questions repeat an earlier one, with its image and options; each is asked again")
+        });
+        Ok(Ids {
+            texts,
+            name,
+            note,
+            contradictory,
+        })
+    }
+
+    /// The first 12 hexadecimal digits of a digest over images, question and options. The k-th repeat gets `-k`. So an id depends
+    /// neither on the order of rows nor on the name of a file.
+    fn ids_by_content(&self, answered: &[Answered]) -> Result<ContentIds> {
+        let mut files: HashMap<FrameId, Digest> = HashMap::new();
+        let mut seen: HashMap<String, (usize, usize)> = HashMap::new();
+        let (mut repeats, mut contradictory) = (0, Vec::new());
+        let mut texts = Vec::with_capacity(answered.len());
+        for (at, question) in answered.iter().enumerate() {
+            let images = question.item.images.iter();
+            let images = images.map(|image| {
+                let found = self.find(question.item.row, image)?;
+                self.image_digest(found, &mut files)
+            });
+            let images: Vec<Digest> = images.collect::<Result<_>>()?;
+            let options = question.choices.texts().iter().map(String::as_bytes);
+            let images = images.iter().map(|image| &image.as_bytes()[..]);
+            let text = question.item.text.as_bytes();
+            let digest = Digest::of_parts(images.chain([text]).chain(options));
+            let id = digest.to_string()[..12].to_owned();
+            let (first, count) = seen.entry(id.clone()).or_insert((at, 0));
+            if answered[*first].choices.truth() != question.choices.truth() {
+                contradictory.push([*first, at]);
+            }
+            texts.push(match *count {
+                0 => id,
+                earlier => format!("{id}-{earlier}"),
+            });
+            repeats += usize::from(*count > 0);
+            *count += 1;
+        }
+        Ok((texts, repeats, contradictory))
+    }
+
+    /// The digest of an image. Files that were read are kept in `files`.
+    fn image_digest(&self, found: Found, files: &mut HashMap<FrameId, Digest>) -> Result<Digest> {
+        let (name, digest) = match found {
+            Found::Cell { facts, .. } => return Ok(facts.digest),
+            Found::Frame(name) => return Ok(Digest::of(name.0.as_bytes())),
+            Found::Member(name) | Found::File(name, _) if files.contains_key(&name) => {
+                return Ok(files[&name]);
+            }
+            Found::Member(name) => {
+                let image = self.archive.map(|archive| archive.image(&name.0));
+                let digest = Digest::of(&image.transpose()?.unwrap_or_default());
+                (name, digest)
+            }
+            Found::File(name, path) => {
+                let digest = Digest::of(&reading::bytes(&path)?);
+                (name, digest)
+            }
+        };
+        files.insert(name, digest);
+        Ok(digest)
+    }
+}
