@@ -1,6 +1,6 @@
 //! The report of a run without true answers: its files ([`products`]), its summary ([`summary`]) and its text ([`text()`]).
 //!
-//! The measure is agreement with the model's own answer in the light. It never stands without what keeps it honest, and the word
+//! The measure is agreement with the model's own answer at L0. It never stands without what keeps it honest, and the word
 //! accuracy never stands over it.
 
 mod agreement_report;
@@ -49,7 +49,7 @@ pub(crate) fn products<'a>(
         sections: &sections::SECTIONS,
         grid: &report.found.grid,
         confusions: &report.found.confusions,
-        answers_title: "Answers given against those in the light",
+        answers_title: "Answers given against those at L0",
     };
     let page = page_of(content, &figures, inputs)?;
     files(&report.tables, &report.sentences, figures, page, inputs)
