@@ -11,7 +11,7 @@ use super::csv::fields;
 use super::light_readings::LightReadings;
 use super::sentences::Sentence;
 use super::table::{Table, TableRow};
-use super::tables::{BASELINE, summary_rows};
+use super::tables::{BASELINE, strict_groups, summary_rows};
 use crate::error::{Error, Result};
 use crate::types::UnreadReason;
 use crate::types::manifest::RunManifest;
@@ -21,20 +21,25 @@ use crate::types::manifest::RunManifest;
 struct Document<'a, H> {
     #[serde(flatten)]
     head: H,
-    #[serde(serialize_with = "rows")]
-    rows: &'a Table,
+    rows: Rows<'a>,
 }
 
-fn rows<S: Serializer>(table: &Table, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_seq(table.rows.iter().map(|row| Named { table, row }))
-}
+/// The rows of tables with the same columns as objects.
+pub(super) struct Rows<'a>(&'a [Table]);
 
-/// The rows of a table as objects.
-pub(super) struct Rows<'a>(pub(super) &'a Table);
+impl<'a> Rows<'a> {
+    /// The rows of one table.
+    pub(super) fn of(table: &'a Table) -> Self {
+        Self(std::slice::from_ref(table))
+    }
+}
 
 impl Serialize for Rows<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        rows(self.0, serializer)
+        let rows = self.0.iter();
+        serializer.collect_seq(
+            rows.flat_map(|table| table.rows.iter().map(move |row| Named { table, row })),
+        )
     }
 }
 
@@ -58,6 +63,7 @@ impl Serialize for Named<'_> {
 /// # Errors
 /// If the document cannot be written.
 pub(super) fn document(head: impl Serialize, rows: &Table) -> Result<String> {
+    let rows = Rows::of(rows);
     serde_json::to_string_pretty(&Document { head, rows })
         .map(|text| text + "\n")
         .map_err(|e| Error::data("summary.json", e))
@@ -78,6 +84,9 @@ struct Head<'a> {
     unread: &'a BTreeMap<UnreadReason, usize>,
     alerts: &'a [Alert],
     findings: &'a [Sentence],
+    /// The rows of `groups.csv`, without the observer if it is not shown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    groups: Option<Rows<'a>>,
     /// The rows of `baseline.csv`.
     #[serde(skip_serializing_if = "Option::is_none")]
     baseline: Option<Rows<'a>>,
@@ -123,7 +132,8 @@ impl<'a> RunList<'a> {
 /// # Errors
 /// If the document cannot be written.
 pub(crate) fn summary(report: &ChoiceReport<'_>, runs: RunList<'_>) -> Result<String> {
-    let tables = &report.tables;
+    let mut tables = report.tables.iter();
+    let groups = strict_groups(report.findings);
     let (run, folder, runs) = runs.parts();
     let head = Head {
         schema: "darkqa.summary/1",
@@ -134,7 +144,8 @@ pub(crate) fn summary(report: &ChoiceReport<'_>, runs: RunList<'_>) -> Result<St
         unread: &report.findings.summary.unread,
         alerts: &report.alerts,
         findings: &report.sentences,
-        baseline: tables.iter().find(|table| table.name == BASELINE).map(Rows),
+        groups: (!groups.is_empty()).then_some(Rows(&groups)),
+        baseline: tables.find(|table| table.name == BASELINE).map(Rows::of),
     };
     document(
         head,

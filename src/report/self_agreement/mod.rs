@@ -107,7 +107,7 @@ pub(crate) fn summary(report: &AgreementReport<'_>, runs: RunList<'_>) -> Result
         readings: LightReadings::of(&report.found.grid.subjects),
         alerts: &report.alerts,
         findings: &report.sentences,
-        own_answers: own_answers.map(Rows),
+        own_answers: own_answers.map(Rows::of),
     };
     document(head, &tables::summary(report.found))
 }
