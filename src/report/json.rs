@@ -72,13 +72,8 @@ pub(super) fn document(head: impl Serialize, rows: &Table) -> Result<String> {
 /// The head of the summary of an evaluation.
 #[derive(Serialize)]
 struct Head<'a> {
-    schema: &'static str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    folder: Option<&'a Path>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    run: Option<&'a RunManifest>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    runs: Vec<ComparedRun<'a>>,
+    #[serde(flatten)]
+    runs: RunsHead<'a>,
     /// The light readings of the noisy images.
     readings: LightReadings,
     unread: &'a BTreeMap<UnreadReason, usize>,
@@ -92,9 +87,21 @@ struct Head<'a> {
     baseline: Option<Rows<'a>>,
 }
 
+/// The head of a summary of runs: one run with its folder, or several; the others are left out.
+#[derive(Serialize)]
+pub(super) struct RunsHead<'a> {
+    schema: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    folder: Option<&'a Path>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    run: Option<&'a RunManifest>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    runs: Vec<ComparedRun<'a>>,
+}
+
 /// One of several runs.
 #[derive(Serialize)]
-pub(super) struct ComparedRun<'a> {
+struct ComparedRun<'a> {
     folder: &'a Path,
     run: &'a RunManifest,
 }
@@ -109,21 +116,20 @@ pub(crate) enum RunList<'a> {
 }
 
 impl<'a> RunList<'a> {
-    /// The one run with its folder, and the several ones: one of both is empty.
-    pub(super) fn parts(
-        self,
-    ) -> (
-        Option<&'a RunManifest>,
-        Option<&'a Path>,
-        Vec<ComparedRun<'a>>,
-    ) {
+    /// The head of a summary in this schema.
+    pub(super) fn head(self, schema: &'static str) -> RunsHead<'a> {
         let (run, folder, runs) = match self {
             Self::One(run, folder) => (Some(run), folder, [].as_slice()),
             Self::Several(runs) => (None, None, runs),
         };
         let runs = runs.iter();
         let runs = runs.map(|&(run, folder)| ComparedRun { folder, run });
-        (run, folder, runs.collect())
+        RunsHead {
+            schema,
+            folder,
+            run,
+            runs: runs.collect(),
+        }
     }
 }
 
@@ -134,12 +140,8 @@ impl<'a> RunList<'a> {
 pub(crate) fn summary(report: &ChoiceReport<'_>, runs: RunList<'_>) -> Result<String> {
     let mut tables = report.tables.iter();
     let groups = strict_groups(report.findings);
-    let (run, folder, runs) = runs.parts();
     let head = Head {
-        schema: "darkqa.summary/1",
-        folder,
-        run,
-        runs,
+        runs: runs.head("darkqa.summary/1"),
         readings: LightReadings::of(&report.findings.grid.subjects),
         unread: &report.findings.summary.unread,
         alerts: &report.alerts,
