@@ -259,16 +259,13 @@ fn the_page_without_true_answers_works_in_a_browser() {
         .evaluate("[...document.querySelector('#f-state').options].map((o) => o.value).join(', ')");
     let states = states.as_str().unwrap().to_owned();
     assert!(
-        states.contains("as in the light, not as in the light") && !states.contains("right"),
+        states.contains("as at L0, not as at L0") && !states.contains("right"),
         "{states}"
     );
     browser.choose("#f-light", "exposure drop");
     browser.choose("#f-level", "L5");
     let mut counts = [0, 0];
-    for (count_of, state) in counts
-        .iter_mut()
-        .zip(["as in the light", "not as in the light"])
-    {
+    for (count_of, state) in counts.iter_mut().zip(["as at L0", "not as at L0"]) {
         browser.choose("#f-state", state);
         let text = count(&mut browser);
         *count_of = text
@@ -286,10 +283,10 @@ fn the_page_without_true_answers_works_in_a_browser() {
         "{counts:?}"
     );
     let title = browser.evaluate("document.querySelector('#i-choices .true').title");
-    assert_eq!(title, "its answer in the light");
+    assert_eq!(title, "its answer at L0");
     let reading = browser.evaluate("document.querySelector('#r-reading').textContent");
     assert!(
-        reading.as_str().unwrap().ends_with("not as in the light"),
+        reading.as_str().unwrap().ends_with("not as at L0"),
         "{reading}"
     );
     let head = browser.evaluate("document.querySelector('#c-table th').textContent");

@@ -15,7 +15,17 @@ use crate::types::{AxisLevel, Rgb, SetLight};
 const SAMPLED: usize = 24;
 
 /// Mean luma, of 255, below which a frame is dark. Chosen: a well-lit frame has about 100.
-pub(crate) const DARK: f64 = 40.0;
+const DARK: f64 = 40.0;
+
+/// What to do with images of which this is the median of the mean luma, of 255; `None` if they are not dark.
+pub(crate) fn advice(median: f64) -> Option<String> {
+    (median < DARK).then(|| {
+        format!(
+            "these images are dark already (median brightness {median:.0} of 255); --levels L0 --llie-on l0 asks about them as they are \
+             and enhanced, and --light dark does so by default"
+        )
+    })
+}
 
 /// Says what a set in the dark is asked by default, and why, or what is odd about the levels that are named.
 pub(crate) fn tell(job: &JobSettings, progress: &Progress) {
@@ -48,11 +58,8 @@ pub(super) fn warn<E: Experiment>(experiment: &E) {
         return;
     }
     let median = median_luma(experiment.frames(), experiment.sources());
-    if let Some(luma) = median.filter(|luma| *luma < DARK) {
-        tracing::warn!(
-            "these images are dark already (median brightness {luma:.0} of 255); --levels L0 --llie-on l0 asks about them as they are \
-             and enhanced, and --light dark does so by default"
-        );
+    if let Some(advice) = median.and_then(advice) {
+        tracing::warn!("{advice}");
     }
 }
 

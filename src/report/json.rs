@@ -11,7 +11,7 @@ use super::csv::fields;
 use super::light_readings::LightReadings;
 use super::sentences::Sentence;
 use super::table::{Table, TableRow};
-use super::tables::{BASELINE, summary_rows};
+use super::tables::{BASELINE, strict_groups, summary_rows};
 use crate::error::{Error, Result};
 use crate::types::UnreadReason;
 use crate::types::manifest::RunManifest;
@@ -21,20 +21,25 @@ use crate::types::manifest::RunManifest;
 struct Document<'a, H> {
     #[serde(flatten)]
     head: H,
-    #[serde(serialize_with = "rows")]
-    rows: &'a Table,
+    rows: Rows<'a>,
 }
 
-fn rows<S: Serializer>(table: &Table, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_seq(table.rows.iter().map(|row| Named { table, row }))
-}
+/// The rows of tables with the same columns as objects.
+pub(super) struct Rows<'a>(&'a [Table]);
 
-/// The rows of a table as objects.
-pub(super) struct Rows<'a>(pub(super) &'a Table);
+impl<'a> Rows<'a> {
+    /// The rows of one table.
+    pub(super) fn of(table: &'a Table) -> Self {
+        Self(std::slice::from_ref(table))
+    }
+}
 
 impl Serialize for Rows<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        rows(self.0, serializer)
+        let rows = self.0.iter();
+        serializer.collect_seq(
+            rows.flat_map(|table| table.rows.iter().map(move |row| Named { table, row })),
+        )
     }
 }
 
@@ -58,6 +63,7 @@ impl Serialize for Named<'_> {
 /// # Errors
 /// If the document cannot be written.
 pub(super) fn document(head: impl Serialize, rows: &Table) -> Result<String> {
+    let rows = Rows::of(rows);
     serde_json::to_string_pretty(&Document { head, rows })
         .map(|text| text + "\n")
         .map_err(|e| Error::data("summary.json", e))
@@ -66,6 +72,24 @@ pub(super) fn document(head: impl Serialize, rows: &Table) -> Result<String> {
 /// The head of the summary of an evaluation.
 #[derive(Serialize)]
 struct Head<'a> {
+    #[serde(flatten)]
+    runs: RunsHead<'a>,
+    /// The light readings of the noisy images.
+    readings: LightReadings,
+    unread: &'a BTreeMap<UnreadReason, usize>,
+    alerts: &'a [Alert],
+    findings: &'a [Sentence],
+    /// The rows of `groups.csv`, without the observer if it is not shown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    groups: Option<Rows<'a>>,
+    /// The rows of `baseline.csv`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    baseline: Option<Rows<'a>>,
+}
+
+/// The head of a summary of runs: one run with its folder, or several; the others are left out.
+#[derive(Serialize)]
+pub(super) struct RunsHead<'a> {
     schema: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
     folder: Option<&'a Path>,
@@ -73,19 +97,11 @@ struct Head<'a> {
     run: Option<&'a RunManifest>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     runs: Vec<ComparedRun<'a>>,
-    /// The light readings of the noisy images.
-    readings: LightReadings,
-    unread: &'a BTreeMap<UnreadReason, usize>,
-    alerts: &'a [Alert],
-    findings: &'a [Sentence],
-    /// The rows of `baseline.csv`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    baseline: Option<Rows<'a>>,
 }
 
 /// One of several runs.
 #[derive(Serialize)]
-pub(super) struct ComparedRun<'a> {
+struct ComparedRun<'a> {
     folder: &'a Path,
     run: &'a RunManifest,
 }
@@ -100,21 +116,20 @@ pub(crate) enum RunList<'a> {
 }
 
 impl<'a> RunList<'a> {
-    /// The one run with its folder, and the several ones: one of both is empty.
-    pub(super) fn parts(
-        self,
-    ) -> (
-        Option<&'a RunManifest>,
-        Option<&'a Path>,
-        Vec<ComparedRun<'a>>,
-    ) {
+    /// The head of a summary in this schema.
+    pub(super) fn head(self, schema: &'static str) -> RunsHead<'a> {
         let (run, folder, runs) = match self {
             Self::One(run, folder) => (Some(run), folder, [].as_slice()),
             Self::Several(runs) => (None, None, runs),
         };
         let runs = runs.iter();
         let runs = runs.map(|&(run, folder)| ComparedRun { folder, run });
-        (run, folder, runs.collect())
+        RunsHead {
+            schema,
+            folder,
+            run,
+            runs: runs.collect(),
+        }
     }
 }
 
@@ -123,18 +138,16 @@ impl<'a> RunList<'a> {
 /// # Errors
 /// If the document cannot be written.
 pub(crate) fn summary(report: &ChoiceReport<'_>, runs: RunList<'_>) -> Result<String> {
-    let tables = &report.tables;
-    let (run, folder, runs) = runs.parts();
+    let mut tables = report.tables.iter();
+    let groups = strict_groups(report.findings);
     let head = Head {
-        schema: "darkqa.summary/1",
-        folder,
-        run,
-        runs,
+        runs: runs.head("darkqa.summary/1"),
         readings: LightReadings::of(&report.findings.grid.subjects),
         unread: &report.findings.summary.unread,
         alerts: &report.alerts,
         findings: &report.sentences,
-        baseline: tables.iter().find(|table| table.name == BASELINE).map(Rows),
+        groups: (!groups.is_empty()).then_some(Rows(&groups)),
+        baseline: tables.find(|table| table.name == BASELINE).map(Rows::of),
     };
     document(
         head,

@@ -64,7 +64,7 @@ pub trait Detail: Clone + Serialize + Send {
     /// The schema of a run with these records.
     const SCHEMA: &'static str;
 
-    /// The version of the rules by which answers are read, as `lenient/2`; `None` if no choice is read.
+    /// The version of the rules by which answers are read, as `lenient/3`; `None` if no choice is read.
     const REPLY_READING: Option<&'static str>;
 
     /// Reads the answer from a reply into the detail; a stored reply can be read again.

@@ -208,7 +208,6 @@ fn kept_replies_are_read_again_without_a_call() {
 
 #[test]
 fn a_run_that_an_earlier_version_read_says_what_has_changed() {
-    const CHANGE: &str = "lenient/2 reads 6 of 6 replies differently than lenient/1: the lenient accuracy is 0.0 %, and was 100.0 %";
     let bench = Bench::with_questions(6);
     bench.file("script.jsonl", "{\"default\":\"I can rule out option C.\"}");
     run(&bench, "--model script:script.jsonl");
@@ -216,9 +215,9 @@ fn a_run_that_an_earlier_version_read_says_what_has_changed() {
         ["run/records.jsonl", "run/manifest.json"].map(|name| bench.path(name));
     let read_manifest =
         || -> Value { serde_json::from_slice(&fs::read(&manifest).unwrap()).unwrap() };
-    assert_eq!(read_manifest()["reply_reading"], "lenient/2");
-    assert!(!bench.complete(&["report", "run"]).contains("lenient/1"));
-    // As the first version read them.
+    assert_eq!(read_manifest()["reply_reading"], "lenient/3");
+    assert!(!bench.complete(&["report", "run"]).contains("differently"));
+    // As an earlier version read them.
     let old: String = fs::read_to_string(&records)
         .unwrap()
         .lines()
@@ -229,20 +228,31 @@ fn a_run_that_an_earlier_version_read_says_what_has_changed() {
             record.to_string() + "\n"
         })
         .collect();
-    fs::write(&records, old).unwrap();
-    let mut earlier = read_manifest();
-    earlier.as_object_mut().unwrap().remove("reply_reading");
-    fs::write(&manifest, earlier.to_string()).unwrap();
-    let report = bench.complete(&["report", "run"]);
-    let said = report.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(said.contains(CHANGE), "{report}");
-    let rescored = bench.complete(&["report", "run", "--rescore"]);
-    assert!(
-        rescored.starts_with(&format!("6 of 6 records now read differently\n{CHANGE}\n")),
-        "{rescored}"
-    );
-    assert_eq!(read_manifest()["reply_reading"], "lenient/2");
-    assert!(!bench.complete(&["report", "run"]).contains("lenient/1"));
+    // The first version has no name in a manifest.
+    for (stored, named) in [(None, "lenient/1"), (Some("lenient/2"), "lenient/2")] {
+        let change = format!(
+            "lenient/3 reads 6 of 6 replies differently than {named}: the lenient accuracy is 0.0 %, and was 100.0 %"
+        );
+        fs::write(&records, &old).unwrap();
+        let mut earlier = read_manifest();
+        match stored {
+            Some(version) => earlier["reply_reading"] = json!(version),
+            None => {
+                earlier.as_object_mut().unwrap().remove("reply_reading");
+            }
+        }
+        fs::write(&manifest, earlier.to_string()).unwrap();
+        let report = bench.complete(&["report", "run"]);
+        let said = report.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(said.contains(&change), "{report}");
+        let rescored = bench.complete(&["report", "run", "--rescore"]);
+        assert!(
+            rescored.starts_with(&format!("6 of 6 records now read differently\n{change}\n")),
+            "{rescored}"
+        );
+        assert_eq!(read_manifest()["reply_reading"], "lenient/3");
+        assert!(!bench.complete(&["report", "run"]).contains("differently"));
+    }
 }
 
 #[test]

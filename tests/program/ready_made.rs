@@ -305,6 +305,23 @@ fn a_set_with_groups_has_its_strict_score() {
     }
     assert_eq!(line_of(&table, "random,blind,")[at("n")], "4");
     assert_eq!(line_of(&table, "chance,")[at("value")], "0.25");
+    // The summary has the same rows.
+    let summary = |run: &str| -> Value {
+        serde_json::from_str(&read(&format!("{run}/summary.json"))).unwrap()
+    };
+    let groups = &summary("run")["groups"];
+    assert_eq!(groups.as_array().unwrap().len(), table.lines().count() - 1);
+    for (row, line) in groups.as_array().unwrap().iter().zip(table.lines().skip(1)) {
+        for (head, cell) in head.iter().zip(line.split(',')) {
+            let same = match &row[head] {
+                Value::Null => cell.is_empty(),
+                Value::String(text) => text == cell,
+                number => number.as_f64() == cell.parse().ok(),
+            };
+            assert!(same, "{head}: {cell} {row}");
+        }
+    }
+    assert!(summary("plain").get("groups").is_none());
     for name in ["run/report.html", "run/tables.tex"] {
         assert!(read(name).contains("group"), "{name}");
     }

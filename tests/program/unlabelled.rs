@@ -205,15 +205,13 @@ fn the_word_accuracy_stands_over_no_agreement() {
     }
     let figure = text(&bench, "run/figures/agreement.svg");
     assert!(
-        figure.contains("agreement with its own answer in the light"),
+        figure.contains("agreement with its own answer at L0"),
         "{figure}"
     );
     let page = text(&bench, "run/report.html");
     // The style and the script are those of every page.
     let page = page.split("<script id=\"data\"").next().unwrap();
-    assert!(
-        !page.contains("ccuracy") && page.contains("Agreement with its own answer in the light")
-    );
+    assert!(!page.contains("ccuracy") && page.contains("Agreement with its own answer at L0"));
     assert!(
         !bench.path("run/thresholds.csv").exists()
             && bench.path("run/evidence_thresholds.csv").exists()
@@ -229,10 +227,7 @@ fn a_bank_to_which_all_is_no_gives_no_verdict() {
         on_one_line(&shown).contains("This bank cannot tell what script:no.jsonl sees"),
         "{shown}"
     );
-    assert!(
-        !shown.contains("gives its answer in the light to"),
-        "{shown}"
-    );
+    assert!(!shown.contains("gives its answer at L0 to"), "{shown}");
     assert!(
         on_one_line(&shown)
             .contains("the ceiling is 0.0 points above the floor, and 10.0 are needed"),
@@ -278,7 +273,7 @@ fn a_way_out_is_a_measure_of_its_own() {
     let shown = on_one_line(&shown);
     assert!(
         shown.contains(
-            "script:eyes.jsonl says “cannot tell” to 0.0 % of the questions in the light, and to 100.0 % at L5"
+            "script:eyes.jsonl says “cannot tell” to 0.0 % of the questions at L0, and to 100.0 % at L5"
         ),
         "{shown}"
     );
@@ -405,4 +400,120 @@ fn images_of_rooms_and_of_sets_are_asked_too() {
     assert_eq!(records(&bench.path("one")).len(), 2 * 4);
     call("rooms:frames=6,size=64x48", "two");
     assert_eq!(records(&bench.path("two")).len(), 12 * 4);
+}
+
+/// The same questions about twelve photographs of a dark checkerboard each.
+fn photographs_in_the_dark() -> Bench {
+    let bench = photographs();
+    for index in 0..PHOTOGRAPHS {
+        let name = format!("photos/{}/{index:02}.png", ["hall", "kitchen"][index % 2]);
+        let picture = image::RgbImage::from_fn(48, 32, |x, y| {
+            let code = if (x / 8 + y / 8) % 2 == 0 { 0 } else { 12 };
+            image::Rgb([code + index as u8, code, code / 2])
+        });
+        picture.save(bench.path(&name)).unwrap();
+    }
+    bench
+}
+
+/// What a reader is told of photographs in the dark.
+const NOTICE: &str = "These photographs were taken in the dark: L0 is each as photographed, there is no image in the light to compare with";
+
+#[test]
+fn photographs_in_the_dark_are_asked_as_they_are() {
+    let bench = photographs_in_the_dark();
+    let line = "--data photos --ask bank.jsonl --model random --out run";
+    let called = bench.call(&words(&format!("{line} --light dark")));
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert!(!called.stderr.contains("dark already"), "{called:?}");
+    let all = records(&bench.path("run"));
+    // Twice at L0, and once without an image.
+    assert_eq!(all.len(), 36 * 3);
+    let levels: BTreeSet<String> = all.iter().map(|r| r["level"].to_string()).collect();
+    assert_eq!(
+        levels,
+        BTreeSet::from(["null".to_owned(), "\"L0\"".to_owned()])
+    );
+    // The ceiling is what the records say.
+    let chosen = |question: &Value, repeat: u64| {
+        let mut of = all.iter().filter(|record| {
+            record["question"] == *question
+                && record["level"] == "L0"
+                && record["repeat"].as_u64().unwrap_or_default() == repeat
+        });
+        of.next().unwrap()["strict"]["chosen"].clone()
+    };
+    let questions: BTreeSet<String> = all.iter().map(|r| r["question"].to_string()).collect();
+    let same = questions.iter().filter(|question| {
+        let question: Value = serde_json::from_str(question).unwrap();
+        chosen(&question, 0) == chosen(&question, 1)
+    });
+    let same = same.count() as f64 / 36.0;
+    let own = rows(&bench, "run/own_answers.csv");
+    let ceiling = row(
+        &own,
+        &[("level", "L0"), ("family", "all"), ("mode", "strict")],
+    );
+    assert_eq!(ceiling["role"], "ceiling");
+    assert!((number(ceiling, "agreement") - same).abs() < 1e-12 && same > 0.0 && same < 1.0);
+    // No word of an answer in the light, which nobody gave.
+    let shown = on_one_line(&called.stdout);
+    assert!(
+        shown.contains(NOTICE) && shown.contains("random, as photographed"),
+        "{shown}"
+    );
+    let page = text(&bench, "run/report.html");
+    let summary = text(&bench, "run/summary.json");
+    let tex = text(&bench, "run/tables.tex");
+    for (name, of) in [("text", &shown), ("page", &page), ("summary", &summary)] {
+        assert!(of.contains(NOTICE), "{name}");
+    }
+    let page = page.split("<script id=\"data\"").next().unwrap();
+    for (name, of) in [
+        ("text", &*shown),
+        ("page", page),
+        ("summary", &summary),
+        ("tex", &tex),
+    ] {
+        let of = of.replace(NOTICE, "");
+        assert!(!of.contains("in the light"), "{name}: {of}");
+        // The pictures at the end of the page are named by their files.
+        assert!(name == "page" || !of.contains("untouched"), "{name}: {of}");
+    }
+    // The same images without the flag are taken for images in the light.
+    let called = bench.call(&words(&line.replace("--out run", "--out lit --levels L0")));
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert!(called.stderr.contains("dark already"), "{called:?}");
+    let shown = on_one_line(&called.stdout);
+    assert!(
+        !shown.contains("taken in the dark") && shown.contains("random, untouched"),
+        "{shown}"
+    );
+}
+
+#[test]
+fn an_enhancer_of_photographs_in_the_dark_does_no_harm_in_the_light() {
+    let bench = photographs_in_the_dark();
+    let replies = text(&bench, "eyes.jsonl");
+    let enhanced = replies.lines().filter_map(|line| {
+        let mut line: Value = serde_json::from_str(line).unwrap();
+        (line["condition"] == "L0").then(|| {
+            // With the enhancer a model sees what it did not see.
+            line["condition"] = "L0+lift".into();
+            line["reply"] = "A".into();
+            format!("{line}\n")
+        })
+    });
+    let enhanced: String = enhanced.collect();
+    bench.file("eyes.jsonl", format!("{replies}\n{enhanced}"));
+    let line = "--data photos --ask bank.jsonl --model script:eyes.jsonl --llie lift";
+    let of = |flags: &str| on_one_line(&bench.complete(&words(&format!("{line} {flags}"))));
+    let dark = of("--light dark --out dark");
+    assert!(
+        dark.contains("Lift changes answers of script:eyes.jsonl to these photographs: whether for the better is not known."),
+        "{dark}"
+    );
+    assert!(!dark.contains("harm"), "{dark}");
+    let lit = of("--levels L0 --llie-on l0 --out lit");
+    assert!(lit.contains("harm where nothing was dark"), "{lit}");
 }

@@ -175,68 +175,13 @@ fn of_options(
     }
     let column = answer_column::of_options(table, roles, &items)?;
     let items = with_answers(table, column, items, left)?;
-    let none = Offered::default();
-    let rows: Vec<AnswerOf<'_>> = items
-        .iter()
-        .map(|(item, answer)| (answer.as_str(), item.options.as_ref().unwrap_or(&none)))
-        .collect();
-    let read_as = |reading: Reading, (answer, options): AnswerOf<'_>| match how {
-        How::Answer(_) => reading.truth(answer, options),
-        How::ByRule | How::Split(_) => reading.by_rule(answer, options),
-    };
-    let is_read = |reading: Reading, row: usize| read_as(reading, rows[row]).is_some();
-    let fits = |reading: Reading| (0..rows.len()).all(|row| is_read(reading, row));
-    let (reading, unfit) = match how {
-        How::Answer(reading) => {
-            let unfit = (0..rows.len()).filter(|&row| !is_read(*reading, row));
-            (*reading, unfit.collect())
-        }
-        How::ByRule | How::Split(_)
-            if is_own(table) && are_texts(table, column) && fits(Reading::Text) =>
-        {
-            (Reading::Text, Vec::new())
-        }
-        How::ByRule | How::Split(_) => match one_reading(&rows) {
-            OneReading::Fits(reading) => (reading, Vec::new()),
-            OneReading::None { best, unfit } => {
-                let read: Vec<usize> = (0..rows.len()).filter(|&row| is_read(best, row)).collect();
-                let kept: Vec<AnswerOf<'_>> = read.iter().map(|&row| rows[row]).collect();
-                if let OneReading::Ambiguous { readings, row } = one_reading(&kept) {
-                    let row = read[row];
-                    return Err(ambiguous(table, &items[row].0, rows[row], readings, column));
-                }
-                (best, unfit)
-            }
-            OneReading::Ambiguous { readings, row } => {
-                return Err(ambiguous(table, &items[row].0, rows[row], readings, column));
-            }
-        },
-    };
-    if unfit.len() == rows.len() && !rows.is_empty() {
-        let (item, answer) = &items[0];
-        return Err(format!(
-            "{}: the answer {answer:?} (column {:?}) is none of the options {:?}, neither by letter nor by text nor by number",
-            table.place(item.row),
-            column.name,
-            rows[0].1.texts
-        ));
-    }
-    let fit = rows.len() - unfit.len();
-    truths
-        .said
-        .push(format!("{} ({})", column.name, reading.name()));
+    let read = ColumnReading::of(table, column, how, &items)?;
+    let name = read.reading.name();
+    truths.said.push(format!("{} ({name})", column.name));
     truths.answered.reserve(items.len());
     for (mut item, answer) in items {
         let options = item.options.take().unwrap_or_default();
-        let choices = match read_as(reading, (&answer, &options)) {
-            Some(truth) => Choices::new(options.texts, truth).map_err(|e| e.to_string()),
-            None => Err(format!(
-                "the answer {answer:?} is none of the options {:?} (read as {}, which fits {fit} rows)",
-                options.texts,
-                reading.name()
-            )),
-        };
-        match choices {
+        match read.choices(&answer, options) {
             Ok(choices) => {
                 item.whole = None;
                 truths.answered.push(Answered { item, choices });
@@ -245,6 +190,109 @@ fn of_options(
         }
     }
     Ok(())
+}
+
+/// How the answers of a column are read: in one way, in all rows.
+struct ColumnReading<'h> {
+    how: &'h How,
+    reading: Reading,
+    /// The number of rows that it fits.
+    fit: usize,
+}
+
+impl<'h> ColumnReading<'h> {
+    /// The reading that the user names, else the one that fits all rows, else the one that fits most of them.
+    ///
+    /// # Errors
+    /// If it fits no row, or two readings fit and differ.
+    fn of(
+        table: &Table,
+        column: &Column,
+        how: &'h How,
+        items: &[(Item, String)],
+    ) -> Result<Self, String> {
+        let none = Offered::default();
+        let rows: Vec<AnswerOf<'_>> = items
+            .iter()
+            .map(|(item, answer)| (answer.as_str(), item.options.as_ref().unwrap_or(&none)))
+            .collect();
+        let by = |reading: Reading| {
+            let mut read = Self {
+                how,
+                reading,
+                fit: 0,
+            };
+            let fit = rows.iter().filter(|row| read.truth(**row).is_some());
+            read.fit = fit.count();
+            read
+        };
+        let read = match how {
+            How::Answer(reading) => by(*reading),
+            How::ByRule | How::Split(_) => {
+                let texts = is_own(table) && are_texts(table, column);
+                let texts = texts.then(|| by(Reading::Text));
+                match texts.filter(|read| read.fit == rows.len()) {
+                    Some(texts) => texts,
+                    None => by(by_rule(&rows).map_err(|(readings, row)| {
+                        ambiguous(table, &items[row].0, rows[row], readings, column)
+                    })?),
+                }
+            }
+        };
+        match items.first() {
+            Some((item, answer)) if read.fit == 0 => Err(format!(
+                "{}: the answer {answer:?} (column {:?}) is none of the options {:?}, neither by letter nor by text nor by number",
+                table.place(item.row),
+                column.name,
+                rows[0].1.texts
+            )),
+            _ => Ok(read),
+        }
+    }
+
+    /// The index of the option that an answer means.
+    fn truth(&self, (answer, options): AnswerOf<'_>) -> Option<usize> {
+        match self.how {
+            How::Answer(_) => self.reading.truth(answer, options),
+            How::ByRule | How::Split(_) => self.reading.by_rule(answer, options),
+        }
+    }
+
+    /// The options as choices, with the one that an answer means as the true one.
+    ///
+    /// # Errors
+    /// If the answer means none of them, or they are no choices.
+    fn choices(&self, answer: &str, options: Offered) -> Result<Choices, String> {
+        match self.truth((answer, &options)) {
+            Some(truth) => Choices::new(options.texts, truth).map_err(|e| e.to_string()),
+            None => Err(format!(
+                "the answer {answer:?} is none of the options {:?} (read as {}, which fits {} rows)",
+                options.texts,
+                self.reading.name(),
+                self.fit
+            )),
+        }
+    }
+}
+
+/// The reading that fits all rows; if there is none, the one that fits most of them.
+///
+/// # Errors
+/// If two readings fit and differ: both, and the row.
+fn by_rule(rows: &[AnswerOf<'_>]) -> Result<Reading, ([Reading; 2], usize)> {
+    match one_reading(rows) {
+        OneReading::Fits(reading) => Ok(reading),
+        OneReading::Ambiguous { readings, row } => Err((readings, row)),
+        OneReading::None { best, unfit } => {
+            let read = (0..rows.len()).filter(|row| unfit.binary_search(row).is_err());
+            let read: Vec<usize> = read.collect();
+            let kept: Vec<AnswerOf<'_>> = read.iter().map(|&row| rows[row]).collect();
+            match one_reading(&kept) {
+                OneReading::Ambiguous { readings, row } => Err((readings, read[row])),
+                OneReading::Fits(_) | OneReading::None { .. } => Ok(best),
+            }
+        }
+    }
 }
 
 /// The error for an answer that two readings understand in two ways.

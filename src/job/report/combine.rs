@@ -32,13 +32,33 @@ impl Combined {
             &self.fidelity,
             &self.listing,
         );
-        let findings = findings.of_set(set(&self.runs)).of_groups(&self.questions);
+        let findings = findings.of_set(self.set()).of_groups(&self.questions);
         // Replies differ from time to time: that is no other model.
         let apart = self.models.apart.iter();
         let by_replies = apart.filter(|apart| apart.differs_by_replies_alone());
         by_replies.fold(findings, |findings, apart| {
             findings.with_lights_between(&apart.names)
         })
+    }
+
+    /// The light of the set of these runs: dark if all say so, with the brightness that the first of them measured.
+    pub(super) fn set(&self) -> PhotographedSet {
+        let is_dark =
+            |run: &JoinedRun| run.manifest.settings.get("--light") == Some(&json!(SetLight::Dark));
+        if self.runs.is_empty() || !self.runs.iter().all(is_dark) {
+            return PhotographedSet::default();
+        }
+        let brightness = self.runs.iter().find_map(|run| {
+            let measured = run.manifest.settings.get("brightness")?;
+            Some((
+                measured.get("mean")?.as_f64()?,
+                measured.get("frames")?.as_u64()? as usize,
+            ))
+        });
+        PhotographedSet {
+            light: SetLight::Dark,
+            brightness,
+        }
     }
 
     /// Whether the true answers are known; [`combine`] has checked that they are known of all questions or of none.
@@ -223,24 +243,4 @@ pub(super) fn check_comparable(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// The light of the set of these runs: dark if all say so, with the brightness that the first of them measured.
-fn set(runs: &[JoinedRun]) -> PhotographedSet {
-    let is_dark =
-        |run: &JoinedRun| run.manifest.settings.get("--light") == Some(&json!(SetLight::Dark));
-    if runs.is_empty() || !runs.iter().all(is_dark) {
-        return PhotographedSet::default();
-    }
-    let brightness = runs.iter().find_map(|run| {
-        let measured = run.manifest.settings.get("brightness")?;
-        Some((
-            measured.get("mean")?.as_f64()?,
-            measured.get("frames")?.as_u64()? as usize,
-        ))
-    });
-    PhotographedSet {
-        light: SetLight::Dark,
-        brightness,
-    }
 }

@@ -1,4 +1,4 @@
-//! The report of runs whose questions have no true answers: each model against its own answers in the light.
+//! The report of runs whose questions have no true answers: each model against its own answers at L0.
 
 use super::alerts::alerts_without_truths;
 use super::combine::{Combined, ties};
@@ -75,6 +75,7 @@ fn found(combined: &Combined) -> SelfAgreement<'_> {
         &combined.questions,
         &combined.listing,
     )
+    .of_set(combined.set())
 }
 
 fn report<'a>(

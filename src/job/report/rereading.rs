@@ -69,7 +69,7 @@ impl LenientChange {
         self.changed > 0
     }
 
-    /// The change in words: `lenient/2 reads 3 of 60 replies differently than lenient/1: the lenient accuracy is 45.0 %, and was 50.0 %`.
+    /// The change in words: `lenient/3 reads 3 of 60 replies differently than lenient/2: the lenient accuracy is 45.0 %, and was 50.0 %`.
     pub(super) fn words(&self) -> String {
         let change = format!(
             "{LENIENT_VERSION} reads {} of {} replies differently than {}",

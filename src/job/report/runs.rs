@@ -195,7 +195,7 @@ fn refuse_without_truths(args: &ReportArgs) -> Result<()> {
         (
             "--common",
             args.common,
-            "each model is held against its own answers, on the questions that it answered in the light",
+            "each model is held against its own answers, on the questions that it answered at L0",
         ),
         (
             "--baseline",

@@ -48,7 +48,7 @@ const unpack = async () => {
 
 // What a subject made of an item.
 const chosen = (subject, item) => data.strict[subject][item];
-// Where nobody knows the true choice, a model is held against its own answer in the light: that of the first item of the question.
+// Where nobody knows the true choice, a model is held against its own answer at L0: that of the first item of the question.
 const hasTruth = () => !data.lights;
 const findReferences = () => {
   if (data.items.every((item) => item.truth !== null)) return;
@@ -73,7 +73,7 @@ const mark = (subject, item) => {
   if (code === ABSENT) return ["", "m-none", "not asked"];
   if (code === FAILED) return ["!", "m-odd", "no reply"];
   if (code === UNREAD) return ["?", "m-odd", "not readable"];
-  if (reference(subject, item) === null) return [letter(code), "m-none", "no answer in the light"];
+  if (reference(subject, item) === null) return [letter(code), "m-none", "no answer at L0"];
   const [same, other] = hasTruth() ? ["right", "wrong"] : [SAME, OTHER];
   return isRight(subject, item) ? ["✓ " + letter(code), "m-right", same] : ["✗ " + letter(code), "m-wrong", other];
 };
@@ -115,7 +115,7 @@ const STATES = {
 };
 
 // The same without true choices: nothing is right or wrong.
-const SAME = "as in the light", OTHER = "not as in the light";
+const SAME = "as at L0", OTHER = "not as at L0";
 const withoutTruth = () => {
   const kept = [["all", "all"], ["right", SAME], ["wrong", OTHER], ["not readable", "not readable"], ["no reply", "no reply"],
     ["rescued by the enhancer", "brought back by the enhancer"], ["harmed by the enhancer", "changed by the enhancer"],
@@ -320,7 +320,7 @@ const draw = () => {
   const list = data.choices[item.choices].map((choice, index) => {
     const row = make("li");
     reveal(row, letter(index) + ". " + choice);
-    if (index === reference(subject, i)) { row.classList.add("true"); row.title = hasTruth() ? "true" : "its answer in the light"; row.append(" ✓"); }
+    if (index === reference(subject, i)) { row.classList.add("true"); row.title = hasTruth() ? "true" : "its answer at L0"; row.append(" ✓"); }
     if (subject >= 0 && chosen(subject, i) === index) { row.classList.add("chosen"); row.title = "chosen"; }
     return row;
   });

@@ -38,9 +38,9 @@ pub(super) fn figures(found: &SelfAgreement<'_>) -> Result<Vec<Figure>> {
     let charts = [
         (
             "agreement",
-            "Agreement of each model with its own answer in the light, not with the truth. L0: the same images asked again, the ceiling. \
+            "Agreement of each model with its own answer at L0, not with the truth. L0: the same images asked again, the ceiling. \
              Broken lines: without images, the floor.",
-            "agreement with its own answer in the light, %",
+            "agreement with its own answer at L0, %",
             agreement,
         ),
         (

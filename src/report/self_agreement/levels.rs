@@ -51,7 +51,7 @@ impl Measure {
         }
     }
 
-    /// The cell of the measure; at L0 what concerns the light itself is that of the first replies there.
+    /// The cell of the measure; at L0 what concerns L0 itself is that of the first replies there.
     fn cell(self, found: &SelfAgreement<'_>, cell: &AgreementCell) -> TableCell {
         let is_light = cell.role() == CellRole::Ceiling;
         let light = found.light_of(&cell.subject.model).filter(|_| is_light);
@@ -136,7 +136,8 @@ struct MeasureRow {
 
 /// The tables of each axis: agreement with what stands beside it, a block of rows for each model in each light.
 pub(super) fn levels(found: &SelfAgreement<'_>) -> Vec<Table> {
-    let ladder = Ladder::new(found.whole().map(|cell| (&cell.subject, cell))).with_clean();
+    let mut ladder = Ladder::new(found.whole().map(|cell| (&cell.subject, cell))).with_clean();
+    ladder.set = found.set.light;
     let ladders = ladder.by_axis();
     let last = ladders.len().saturating_sub(1);
     let tables = ladders
@@ -167,7 +168,7 @@ fn of_axis(found: &SelfAgreement<'_>, axis: Axis, ladder: &Ladder<'_, AgreementC
                 None => TableCell::Blank,
             };
             rows.push(MeasureRow {
-                series: format!("{model}, {}", series.light(&[])),
+                series: format!("{model}, {}", ladder.light(series)),
                 measure,
                 cells: levels.iter().map(cell).collect(),
             });
@@ -178,8 +179,7 @@ fn of_axis(found: &SelfAgreement<'_>, axis: Axis, ladder: &Ladder<'_, AgreementC
     } else {
         format!("{} of {}", axis.title, axis.cause)
     };
-    let caption =
-        format!("Agreement with its own answer in the light by {by}, and what keeps it honest");
+    let caption = format!("Agreement with its own answer at L0 by {by}, and what keeps it honest");
     let mut table = TableBuilder::new(AGREEMENT, rows)
         .page("agreement", &caption)
         .group(|row| Some(row.series.clone()))
@@ -197,17 +197,17 @@ fn of_axis(found: &SelfAgreement<'_>, axis: Axis, ladder: &Ladder<'_, AgreementC
     }
     let mut table = table.build();
     table.heading = Some(format!(
-        "Agreement with its own answer in the light by {by}, in % (κ and entropy from 0 to 1); L0 again: the same images asked again, the \
+        "Agreement with its own answer at L0 by {by}, in % (κ and entropy from 0 to 1); L0 again: the same images asked again, the \
          ceiling; 95 %: how far the widest interval of the row reaches down and up"
     ));
     table.latex = Some(format!(
-        "Agreement of each model with its own answer in the light by {by} (strict reading), not with the truth; intervals by {}.",
+        "Agreement of each model with its own answer at L0 by {by} (strict reading), not with the truth; intervals by {}.",
         found.unit
     ));
     table
 }
 
-/// Lines about each model: its answers in the light, the floor, and why no evidence is given.
+/// Lines about each model: its answers at L0, the floor, and why no evidence is given.
 pub(super) fn notes(found: &SelfAgreement<'_>) -> Vec<String> {
     let mut notes = Vec::new();
     for model in found.models() {
@@ -217,7 +217,7 @@ pub(super) fn notes(found: &SelfAgreement<'_>) -> Vec<String> {
             });
             let (informative, all) = found.informative(model);
             notes.push(format!(
-                "{model} in the light: an answer to {read} of {} questions; {informative} of {all} questions of the bank can tell something",
+                "{model} at L0: an answer to {read} of {} questions; {informative} of {all} questions of the bank can tell something",
                 light.asked
             ));
         }

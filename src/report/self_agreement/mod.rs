@@ -1,6 +1,6 @@
 //! The report of a run without true answers: its files ([`products`]), its summary ([`summary`]) and its text ([`text()`]).
 //!
-//! The measure is agreement with the model's own answer in the light. It never stands without what keeps it honest, and the word
+//! The measure is agreement with the model's own answer at L0. It never stands without what keeps it honest, and the word
 //! accuracy never stands over it.
 
 mod agreement_report;
@@ -11,12 +11,10 @@ mod sections;
 mod tables;
 mod text;
 
-use std::path::Path;
-
 use serde::Serialize;
 
 use super::alert::Alert;
-use super::json::{ComparedRun, Rows, RunList, document};
+use super::json::{Rows, RunList, RunsHead, document};
 use super::light_readings::LightReadings;
 use super::page::{PageContent, PageInputs, page_of};
 use super::products::files;
@@ -24,7 +22,6 @@ use super::sentences::Sentence;
 use super::words::counted;
 use crate::error::Result;
 use crate::score::self_agreement::SelfAgreement;
-use crate::types::manifest::RunManifest;
 
 pub(crate) use agreement_report::AgreementReport;
 pub(crate) use text::{TextLength, text};
@@ -49,7 +46,7 @@ pub(crate) fn products<'a>(
         sections: &sections::SECTIONS,
         grid: &report.found.grid,
         confusions: &report.found.confusions,
-        answers_title: "Answers given against those in the light",
+        answers_title: "Answers given against those at L0",
     };
     let page = page_of(content, &figures, inputs)?;
     files(&report.tables, &report.sentences, figures, page, inputs)
@@ -75,13 +72,8 @@ fn intro(found: &SelfAgreement<'_>) -> Vec<String> {
 /// The head of the summary.
 #[derive(Serialize)]
 struct Head<'a> {
-    schema: &'static str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    folder: Option<&'a Path>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    run: Option<&'a RunManifest>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    runs: Vec<ComparedRun<'a>>,
+    #[serde(flatten)]
+    runs: RunsHead<'a>,
     measure: &'static str,
     readings: LightReadings,
     alerts: &'a [Alert],
@@ -95,19 +87,15 @@ struct Head<'a> {
 /// # Errors
 /// If the document cannot be written.
 pub(crate) fn summary(report: &AgreementReport<'_>, runs: RunList<'_>) -> Result<String> {
-    let (run, folder, runs) = runs.parts();
     let mut tables = report.tables.iter();
     let own_answers = tables.find(|table| table.name == tables::OWN_ANSWERS);
     let head = Head {
-        schema: "darkqa.self-agreement/1",
-        folder,
-        run,
-        runs,
+        runs: runs.head("darkqa.self-agreement/1"),
         measure: AGREEMENT,
         readings: LightReadings::of(&report.found.grid.subjects),
         alerts: &report.alerts,
         findings: &report.sentences,
-        own_answers: own_answers.map(Rows),
+        own_answers: own_answers.map(Rows::of),
     };
     document(head, &tables::summary(report.found))
 }

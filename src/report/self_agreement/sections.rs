@@ -6,7 +6,7 @@ use crate::report::tables::{ENHANCERS, Section};
 pub(super) const SECTIONS: [Section; 8] = [
     (
         "agreement",
-        "Agreement with its own answer in the light",
+        "Agreement with its own answer at L0",
         "The share of questions that a model answers as it does at L0, of those to which its answer at L0 could be read. Under L0 stands \
          the ceiling: the same image asked again. The floor is the same model without an image. Evidence kept is the share of the way \
          from the floor to the ceiling. κ takes off what equal habits give, question by question. Entropy is 0 if a question gets one \
@@ -23,13 +23,13 @@ pub(super) const SECTIONS: [Section; 8] = [
     (
         "questions",
         "The questions",
-        "What each model answers in the light. A question with one answer about 95 % of the images or more tells nothing: agreement is given \
+        "What each model answers at L0. A question with one answer about 95 % of the images or more tells nothing: agreement is given \
          with and without such questions.",
         &[],
     ),
     (
         "models",
-        "The models in the light",
+        "The models at L0",
         "How far two models agree with each other at L0. Each is held against itself, so that their agreements compare only as far as that.",
         &[],
     ),
@@ -37,7 +37,7 @@ pub(super) const SECTIONS: [Section; 8] = [
         ENHANCERS,
         "Images and enhancement",
         "Enhanced less raw, in percentage points of agreement. At L0 an enhancer is held against the same image asked again: less \
-         agreement there is harm done in the light.",
+         agreement there is harm, unless the photographs were taken in the dark.",
         &[],
     ),
     (

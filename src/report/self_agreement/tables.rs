@@ -146,7 +146,7 @@ fn models_in_light(pairs: &[ModelsInLight]) -> Table {
         .column(Count, "page n", |pair| pair.same.n)
         .build();
     if !pairs.is_empty() {
-        table.heading = Some("Two models in the light: each has its own answers as reference, so that their agreements compare only as far as these".to_owned());
+        table.heading = Some("Two models at L0: each has its own answers as reference, so that their agreements compare only as far as these".to_owned());
     }
     table
 }
@@ -199,7 +199,7 @@ fn thresholds(found: &SelfAgreement<'_>) -> Table {
 
 fn questions(found: &SelfAgreement<'_>) -> Table {
     let mut table = TableBuilder::new("own_questions", &found.questions)
-        .page("questions", "Answers in the light, by question of the bank")
+        .page("questions", "Answers at L0, by question of the bank")
         .column(
             Text,
             "csv model | terminal model | page model",
@@ -248,7 +248,7 @@ fn questions(found: &SelfAgreement<'_>) -> Table {
             .filter(|question| without(question))
             .count();
         table.heading = Some(format!(
-            "{} in the light of which nothing can be told, because one answer is that about 95 % of the images or more",
+            "{} of which nothing can be told, because one answer is that about 95 % of the images or more",
             counted(count, "question")
         ));
         for (row, question) in table.rows.iter_mut().zip(&found.questions) {

@@ -1,4 +1,4 @@
-//! Sentences about agreement with a model's own answers in the light: [`self_agreement`].
+//! Sentences about agreement with a model's own answers at L0: [`self_agreement`].
 
 use std::collections::BTreeSet;
 
@@ -10,9 +10,9 @@ use crate::score::self_agreement::cell::{AgreementCell, CellRole};
 use crate::score::self_agreement::light::LightReplies;
 use crate::score::significance::Significance;
 use crate::score::subject::judged;
-use crate::types::{AxisLevel, EnhancerName, KindReading};
+use crate::types::{AxisLevel, EnhancerName, KindReading, SetLight};
 
-/// All sentences of a run without true answers: models against each other in the light first, then each model.
+/// All sentences of a run without true answers: models against each other at L0 first, then each model.
 #[must_use]
 pub(in crate::report) fn self_agreement(found: &SelfAgreement<'_>) -> Vec<Sentence> {
     let mut sentences = between(found);
@@ -40,7 +40,7 @@ pub(in crate::report) fn self_agreement(found: &SelfAgreement<'_>) -> Vec<Senten
     sentences
 }
 
-/// The sentence in place of a verdict: no reply in the light could be read.
+/// The sentence in place of a verdict: no reply at L0 could be read.
 fn unread(found: &SelfAgreement<'_>, model: &str) -> Sentence {
     let text = format!(
         "Nothing can be told about {model}: no answer could be read in any of its replies at L0, so that there is nothing to hold it against."
@@ -81,7 +81,7 @@ fn cannot_tell(found: &SelfAgreement<'_>, model: &str) -> Sentence {
     numbers.sentence("bank_cannot_tell", Tone::Note, text, detail)
 }
 
-/// Each pair of models in the light.
+/// Each pair of models at L0.
 fn between(found: &SelfAgreement<'_>) -> Vec<Sentence> {
     let models = judged(found.models());
     let pairs = found.between.iter();
@@ -151,7 +151,7 @@ fn darkness(found: &SelfAgreement<'_>, model: &str, variant: &KindReading) -> Op
     let floor = cells.find(|cell| cell.role() == CellRole::Floor);
     let mut beside = Vec::new();
     for (name, words, cell) in [
-        ("ceiling", "asked again in the light", ceiling),
+        ("ceiling", "asked again at L0", ceiling),
         ("floor", "without an image", floor),
     ] {
         if let Some(share) = cell.and_then(|cell| cell.agreement) {
@@ -167,7 +167,7 @@ fn darkness(found: &SelfAgreement<'_>, model: &str, variant: &KindReading) -> Op
         format!("; {}", beside.join(", "))
     };
     let text = format!(
-        "At {level} ({}) {model} gives its answer in the light to {share} % of the questions{beside}.",
+        "At {level} ({}) {model} gives its answer at L0 to {share} % of the questions{beside}.",
         light(variant, None)
     );
     let test = compared(found, ComparisonKind::Level, model)
@@ -204,7 +204,7 @@ fn darkness_detail(
         let clean = numbers.number("entropy_light", clean, 2);
         let here = numbers.number("entropy", here, 2);
         parts.push(format!(
-            "entropy of its answers {clean} in the light, {here} at {level}"
+            "entropy of its answers {clean} at L0, {here} at {level}"
         ));
     }
     if let Some(test) = test {
@@ -224,7 +224,7 @@ fn darkness_detail(
     }
     if let Some(read) = found.light_of(model).and_then(|light| light.read) {
         let read = numbers.percent("read_in_light", read.value);
-        parts.push(format!("{read} % had an answer in the light"));
+        parts.push(format!("{read} % had an answer at L0"));
     }
     let (informative, all) = found.informative(model);
     if informative < all {
@@ -262,10 +262,35 @@ fn enhanced(
         let size = |c: &Comparison| c.paired.difference.value.abs();
         size(one).total_cmp(&size(other))
     })?;
-    let (better, worse) = (at(Significance::Better), at(Significance::Worse));
+    let levels = (at(Significance::Better), at(Significance::Worse));
+    let (tone, text) = if found.set.light == SetLight::Dark && *variant == KindReading::NONE {
+        of_photographs(enhancer, model, strongest.significance)
+    } else {
+        of_levels(enhancer, model, &light(variant, None), levels)
+    };
     let mut numbers = Numbers::of(found.unit);
-    let of = light(variant, None);
-    let (tone, text) = match (&better, &worse) {
+    let level = strongest.first.level?;
+    let difference = numbers.difference("", strongest.paired.difference);
+    let p = numbers.p("p", strongest.holm);
+    let against = if level == AxisLevel::L0 {
+        "L0 asked again"
+    } else {
+        "raw"
+    };
+    let detail =
+        format!("largest at {level}: {difference} points of agreement against {against}, {p}");
+    Some(numbers.sentence("agreement_enhanced", tone, capitalised(&text), detail))
+}
+
+/// What an enhancer of images in the light of `of` does to the answers of a model, with the levels at which it makes them more and less
+/// like those at L0.
+fn of_levels(
+    enhancer: &EnhancerName,
+    model: &str,
+    of: &str,
+    levels: (Option<String>, Option<String>),
+) -> (Tone, String) {
+    match levels {
         (Some(levels), None) => (
             Tone::Better,
             format!("{enhancer} brings answers of {model} back at {levels} ({of})."),
@@ -278,9 +303,7 @@ fn enhanced(
         ),
         (None, Some(levels)) => (
             Tone::Worse,
-            format!(
-                "{enhancer} takes {model} further from its answers in the light at {levels} ({of})."
-            ),
+            format!("{enhancer} takes {model} further from its answers at L0 at {levels} ({of})."),
         ),
         (Some(better), Some(worse)) => (
             Tone::Note,
@@ -292,18 +315,32 @@ fn enhanced(
             Tone::NotShown,
             format!("That {enhancer} brings answers of {model} back is not shown ({of})."),
         ),
-    };
-    let level = strongest.first.level?;
-    let difference = numbers.difference("", strongest.paired.difference);
-    let p = numbers.p("p", strongest.holm);
-    let against = if level == AxisLevel::L0 {
-        "L0 asked again"
-    } else {
-        "raw"
-    };
-    let detail =
-        format!("largest at {level}: {difference} points of agreement against {against}, {p}");
-    Some(numbers.sentence("agreement_enhanced", tone, capitalised(&text), detail))
+    }
+}
+
+/// What an enhancer of photographs in the dark does to the answers of a model. The answers at L0 were given in the dark themselves, so
+/// that a change is neither help nor harm.
+fn of_photographs(enhancer: &EnhancerName, model: &str, change: Significance) -> (Tone, String) {
+    match change {
+        Significance::Worse => (
+            Tone::Note,
+            format!(
+                "{enhancer} changes answers of {model} to these photographs: whether for the better is not known."
+            ),
+        ),
+        Significance::Better => (
+            Tone::Note,
+            format!(
+                "{model} answers with {enhancer} as at L0, more often than the same photographs asked about again."
+            ),
+        ),
+        _ => (
+            Tone::NotShown,
+            format!(
+                "That {enhancer} changes answers of {model} to these photographs is not shown."
+            ),
+        ),
+    }
 }
 
 /// How often a model says that it cannot tell, where it may.
@@ -321,7 +358,7 @@ fn way_out(found: &SelfAgreement<'_>, model: &str) -> Option<Sentence> {
     let in_light = numbers.percent("light", in_light);
     let here = numbers.percent("share", share.value);
     let text = format!(
-        "{model} says “cannot tell” to {in_light} % of the questions in the light, and to {here} % at {level}."
+        "{model} says “cannot tell” to {in_light} % of the questions at L0, and to {here} % at {level}."
     );
     let [low, high] = [("low", share.low), ("high", share.high)]
         .map(|(name, value)| numbers.percent(name, value));

@@ -39,6 +39,7 @@ pub(super) use health::health;
 pub(super) use levels::unread;
 pub(super) use observer::{notes as observer_notes, what_it_is};
 pub(super) use sections::{ENHANCERS, SECTIONS, Section};
+pub(super) use strict_groups::strict_groups;
 pub(super) use summary::{SUMMARY, reading, summary as summary_rows};
 pub(super) use thresholds::why as level_words;
 
@@ -64,7 +65,7 @@ fn all(findings: &Findings<'_>) -> Vec<Table> {
         by_reading::by_reading(findings),
         vec![best::best(findings)],
         vec![families::families(findings)],
-        strict_groups::strict_groups(findings),
+        strict_groups(findings),
         pooled::pooled(findings),
         comparisons::comparisons(findings),
         answers::answers(findings),

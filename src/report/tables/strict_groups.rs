@@ -19,7 +19,7 @@ enum Line<'a> {
 }
 
 /// All groups, then those of one family; empty if questions have no groups.
-pub(super) fn strict_groups(findings: &Findings<'_>) -> Vec<Table> {
+pub(in crate::report) fn strict_groups(findings: &Findings<'_>) -> Vec<Table> {
     let Some(score) = &findings.strict else {
         return Vec::new();
     };

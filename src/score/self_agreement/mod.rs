@@ -37,6 +37,7 @@ use super::comparison::{Comparison, ComparisonKind, comparisons};
 use super::confusion::{Confusion, Hallucination, confusions, hallucinations};
 use super::grid::Grid;
 use super::health::{Health, healths};
+use super::photographed_set::PhotographedSet;
 use crate::types::{ModelListing, Record, RunQuestion};
 
 /// All results of a run without true answers.
@@ -64,6 +65,8 @@ pub(crate) struct SelfAgreement<'a> {
     pub(crate) health: Vec<Health>,
     /// How far two models agree with each other in the light.
     pub(crate) between: Vec<ModelsInLight>,
+    /// The light in which the photographs were taken.
+    pub(crate) set: PhotographedSet,
 }
 
 impl<'a> SelfAgreement<'a> {
@@ -96,6 +99,7 @@ impl<'a> SelfAgreement<'a> {
             hallucinations: Vec::new(),
             health: healths(&grid),
             between: models_in_light(records, &clusters, &models, &bank),
+            set: PhotographedSet::default(),
             grid,
         };
         for model in &models {
@@ -123,6 +127,12 @@ impl<'a> SelfAgreement<'a> {
         all.comparisons
             .sort_by_key(|found| (found.kind, found.family.is_some()));
         all
+    }
+
+    /// The same results of a set whose photographs were taken in this light.
+    #[must_use]
+    pub(crate) fn of_set(self, set: PhotographedSet) -> Self {
+        Self { set, ..self }
     }
 
     /// The models, in their order.

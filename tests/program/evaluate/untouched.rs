@@ -240,7 +240,7 @@ fn the_estimate_counts_the_untouched_images_enhanced() {
 #[test]
 fn dark_images_are_noticed_once() {
     let hint = "these images are dark already (median brightness ";
-    let advice = "of 255); --levels L0 --llie-on l0 asks about them as they are and enhanced";
+    let advice = "of 255); --levels L0 --llie-on l0 asks about them as they are and enhanced, and --light dark does so by default";
     let rows = [
         (40, "--levels L0,L3 --llie lift", 1),
         (40, "--levels L0,L3 --llie lift --llie-on all", 1),
@@ -259,6 +259,14 @@ fn dark_images_are_noticed_once() {
         assert_eq!(called.stderr.matches(hint).count(), times, "{called:?}");
         assert_eq!(called.stderr.matches(advice).count(), times, "{called:?}");
     });
+    // The check says it in the same words.
+    let bench = photos(40);
+    for (flags, times) in [("", 1), ("--light dark", 0)] {
+        let checked = bench.complete(&words(&format!("check photos {flags}")));
+        assert_eq!(checked.matches(hint).count(), times, "{checked}");
+        assert_eq!(checked.matches(advice).count(), times, "{checked}");
+        assert!(checked.contains("median brightness 19 of 255"), "{checked}");
+    }
     // Built-in rooms are lit, and a model that sees no image needs no advice.
     let bench = photos(40);
     for flags in [

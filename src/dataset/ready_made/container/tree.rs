@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use super::SetFile;
 use super::archive::Archive;
+use crate::dataset::root::{LeadsTo, Root};
 use crate::error::{Error, Result};
 use crate::files::reading;
 
@@ -65,11 +66,9 @@ impl Tree {
         match self {
             Self::Archive(archive) => Ok((archive.files(), Vec::new())),
             Self::Folder { folder, blobs } => {
-                let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
-                let mut roots = vec![real(folder)];
-                roots.extend(blobs.as_deref().map(real));
+                let blobs = blobs.iter().filter(|blobs| blobs.is_dir()).cloned();
                 let mut scan = Scan {
-                    roots,
+                    root: Root::of(folder, &blobs.collect::<Vec<_>>())?,
                     files: Vec::new(),
                     outside: Vec::new(),
                 };
@@ -115,8 +114,8 @@ impl Tree {
 
 /// A walk over a folder.
 struct Scan {
-    /// The real paths of the folders that links may lead into.
-    roots: Vec<PathBuf>,
+    /// The folders that links may lead into.
+    root: Root,
     files: Vec<PathBuf>,
     outside: Vec<PathBuf>,
 }
@@ -129,7 +128,7 @@ impl Scan {
                 continue;
             }
             let is_link = fs::symlink_metadata(&path).is_ok_and(|facts| facts.is_symlink());
-            if is_link && !self.stays_inside(&path) {
+            if is_link && self.root.leads_to(&path) != LeadsTo::Within {
                 self.outside.push(path);
             } else if path.is_dir() && !is_link {
                 if depth < DEEPEST {
@@ -140,13 +139,6 @@ impl Scan {
             }
         }
         Ok(())
-    }
-
-    fn stays_inside(&self, link: &Path) -> bool {
-        let Ok(real) = link.canonicalize() else {
-            return false;
-        };
-        self.roots.iter().any(|root| real.starts_with(root))
     }
 }
 
@@ -165,8 +157,27 @@ mod tests {
         }
         std::os::unix::fs::symlink(at("secret.csv"), at("set/b.csv")).unwrap();
         std::os::unix::fs::symlink(at("set/a.csv"), at("set/inner/c.csv")).unwrap();
+        std::os::unix::fs::symlink(at("nothing.csv"), at("set/d.csv")).unwrap();
         let (files, outside) = Tree::of_folder(&at("set")).unwrap().files().unwrap();
         assert_eq!(files, [Path::new("a.csv"), Path::new("inner/c.csv")]);
-        assert_eq!(outside, [at("set/b.csv")]);
+        assert_eq!(outside, [at("set/b.csv"), at("set/d.csv")]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_into_the_cache_of_a_hub_are_followed() {
+        let outer = tempfile::tempdir().unwrap();
+        let at = |name: &str| outer.path().join("datasets--a--b").join(name);
+        fs::create_dir_all(at("snapshots/1")).unwrap();
+        std::os::unix::fs::symlink("../../blobs/f00", at("snapshots/1/a.csv")).unwrap();
+        let found = || {
+            let tree = Tree::of_folder(&at("snapshots/1")).unwrap();
+            tree.files().unwrap()
+        };
+        // What was not downloaded leads nowhere.
+        assert_eq!(found(), (Vec::new(), vec![at("snapshots/1/a.csv")]));
+        fs::create_dir(at("blobs")).unwrap();
+        fs::write(at("blobs/f00"), "a").unwrap();
+        assert_eq!(found(), (vec!["a.csv".into()], Vec::new()));
     }
 }

@@ -23,6 +23,7 @@ use crate::report::alert::{Alert, AlertKind};
 use crate::score::cluster::{ClusterUnit, MIN_SCENES};
 use crate::score::findings::Findings;
 use crate::score::pair_darkness::PairDarkness;
+use crate::score::photographed_set::PhotographedSet;
 use crate::score::self_agreement::SelfAgreement;
 use crate::types::manifest::Status;
 use crate::types::{Detail, InputSummary};
@@ -42,8 +43,7 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
     alerts.extend(questions::of_repeats(combined));
     alerts.extend(questions::of_items(findings));
     alerts.extend(of_clusters(findings.grid.clusters, findings.unit));
-    let notice = findings.set.notice().into_iter();
-    alerts.extend(notice.map(|text| Alert::new(AlertKind::Pairs, text)));
+    alerts.extend(of_set(findings.set));
     let oddities = findings.pairs.iter().flat_map(PairDarkness::oddities);
     alerts.extend(oddities.map(|text| Alert::new(AlertKind::Pairs, text)));
     alerts.sort_by_key(|alert| alert.kind);
@@ -61,8 +61,15 @@ pub(super) fn alerts_without_truths(combined: &Combined, found: &SelfAgreement<'
         &combined.records,
     ));
     alerts.extend(of_clusters(found.grid.clusters, found.unit));
+    alerts.extend(of_set(found.set));
     alerts.sort_by_key(|alert| alert.kind);
     alerts
+}
+
+/// That the photographs were taken in the dark.
+fn of_set(set: PhotographedSet) -> Option<Alert> {
+    let notice = set.notice();
+    notice.map(|text| Alert::new(AlertKind::Pairs, text))
 }
 
 /// That there are too few clusters for good intervals.

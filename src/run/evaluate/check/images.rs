@@ -8,10 +8,10 @@ use super::findings::{Findings, Mark};
 use crate::dataset::{Dataset, Picture};
 use crate::enhance::brightness;
 use crate::error::Result;
-use crate::job::dark_already::DARK;
+use crate::job::dark_already::advice;
 use crate::job::progress::Progress;
 use crate::job::source::first_asked;
-use crate::types::{Digest, FrameId, InputSummary, Question};
+use crate::types::{Digest, FrameId, InputSummary, Question, SetLight};
 
 /// Whether the pixels of images are looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,9 +32,10 @@ struct Looked {
     bytes: u64,
 }
 
-/// Looks at the images that the questions are about.
+/// Looks at the images that the questions are about, of a set that was photographed in this light.
 pub(super) fn images(
     dataset: &Dataset,
+    set: SetLight,
     questions: &[Question],
     depth: Depth,
     progress: &Progress,
@@ -87,7 +88,7 @@ pub(super) fn images(
     for line in notes.lines() {
         findings.warn(line);
     }
-    light(dataset, &shown, findings);
+    light(dataset, &shown, set, findings);
 }
 
 fn look(dataset: &Dataset, id: &FrameId, depth: Depth) -> Looked {
@@ -107,8 +108,8 @@ fn look(dataset: &Dataset, id: &FrameId, depth: Depth) -> Looked {
     Looked { id, facts, bytes }
 }
 
-/// Measures the brightness of a sample of the images.
-fn light(dataset: &Dataset, shown: &[&FrameId], findings: &mut Findings) {
+/// Measures the brightness of a sample of the images; those of a set in the dark may be dark.
+fn light(dataset: &Dataset, shown: &[&FrameId], set: SetLight, findings: &mut Findings) {
     let number = shown.len().min(SAMPLED);
     let sample = (0..number).into_par_iter().filter_map(|index| {
         let frame = shown[index * shown.len() / number];
@@ -120,14 +121,11 @@ fn light(dataset: &Dataset, shown: &[&FrameId], findings: &mut Findings) {
     let Some(median) = sample.get(sample.len() / 2) else {
         return;
     };
-    if *median < DARK {
-        findings.warn(format!(
-            "the images are dark already: median brightness {median:.0} of 255; --levels L0 --llie-on l0 asks about them as they are and enhanced"
-        ));
-    } else {
-        findings.ok(format!(
+    match advice(*median).filter(|_| set == SetLight::Lit) {
+        Some(advice) => findings.warn(advice),
+        None => findings.ok(format!(
             "median brightness {median:.0} of 255 ({number} images)"
-        ));
+        )),
     }
 }
 

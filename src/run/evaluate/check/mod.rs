@@ -128,8 +128,9 @@ fn data(
             progress,
         )
     });
-    let dataset = match opened {
-        Ok(dataset) => dataset,
+    let opened = opened.and_then(|dataset| Ok((dataset, args.scene.set_light(&place)?)));
+    let (dataset, light) = match opened {
+        Ok(opened) => opened,
         Err(e) => {
             findings.problem(e.to_string());
             return Ok(0);
@@ -151,7 +152,7 @@ fn data(
     } else {
         Depth::Heads
     };
-    images::images(&dataset, &asked, depth, progress, findings);
+    images::images(&dataset, light, &asked, depth, progress, findings);
     if let Some(path) = &check.save_questions {
         save(path, &dataset, &asked)?;
         findings.ok(format!(

@@ -16,7 +16,7 @@ struct Case {
     lenient: Option<usize>,
 }
 
-const SETS: [(&str, &[&str]); 12] = [
+const SETS: [(&str, &[&str]); 13] = [
     ("home", &["bedroom", "kitchen", "bathroom", "living room"]),
     ("yes_no", &["yes", "no"]),
     ("colors", &["black", "white", "gray", "brown"]),
@@ -28,6 +28,7 @@ const SETS: [(&str, &[&str]); 12] = [
     ("numbers", &["1", "2", "3", "4"]),
     ("brightness", &["dark", "bright", "dim", "normal"]),
     ("two_rooms", &["kitchen", "bathroom"]),
+    ("desks", &["desk", "TV", "microwave", "bed"]),
     ("lamps", &["lamp", "table", "cushion", "shelf"]),
 ];
 
