@@ -58,6 +58,9 @@ fn the_page_works_in_a_browser() {
     browser.wait("document.documentElement?.dataset.ready === 'true'");
     // Without a link the page opens at its top.
     assert_eq!(browser.evaluate("window.scrollY"), 0);
+    // Nothing is written to the address before a person acts.
+    assert_eq!(browser.evaluate("location.hash"), "");
+    charts(&mut browser, &bench);
     browser.shot("light.png", true);
     filters(&mut browser);
     slider(&mut browser);
@@ -116,16 +119,70 @@ fn filters(browser: &mut Browser) {
     assert_eq!(count(browser), "40 of 40 items");
 }
 
+/// Charts are drawn at the width there is, and the values at their cursor are those of the tables.
+fn charts(browser: &mut Browser, bench: &Bench) {
+    let first = "document.querySelector('figure.chart.drawn')";
+    let drawn = "document.querySelectorAll('figure.chart.drawn .panel svg').length";
+    assert!(browser.evaluate(drawn).as_u64().unwrap() >= 2);
+    // The built-in model is off at first, as there is another.
+    let pressed = "[...document.querySelectorAll('#models button')].map(b => [b.title, b.getAttribute('aria-pressed')])";
+    assert_eq!(
+        browser.evaluate(pressed),
+        json!([["random", "false"], [SAID, "true"]])
+    );
+    let rows =
+        format!("[...{first}.querySelectorAll('.values tbody tr')].map(r => r.firstChild.title)");
+    assert_eq!(browser.evaluate(&rows), json!([SAID, "chance"]));
+    browser.evaluate("document.querySelector('#models button[title=random]').click()");
+    assert_eq!(
+        browser.evaluate(&rows),
+        json!(["random", SAID, "random without images", "chance"])
+    );
+    let csv = std::fs::read_to_string(bench.path("run/summary.csv")).unwrap();
+    let csv: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
+    let column = |name: &str| csv[0].iter().position(|head| *head == name).unwrap();
+    for (place, level) in ["L0", "L1", "L2", "L3", "L4", "L5"].into_iter().enumerate() {
+        browser.evaluate(&format!(
+            "(() => {{ const s = {first}.querySelector('.cursor input'); s.value = {place}; s.dispatchEvent(new Event('input')); }})()"
+        ));
+        let cell = format!(
+            "{first}.querySelector('.values tbody tr[data-line=random] td:last-child').textContent"
+        );
+        let shown = browser.evaluate(&cell);
+        let kind = if level == "L0" { "none" } else { "noise" };
+        let row = csv.iter().find(|row| {
+            row[column("model")] == "random"
+                && row[column("level")] == level
+                && row[column("variant")] == kind
+                && row[column("family")] == "all"
+                && row[column("enhancer")].is_empty()
+        });
+        let row = row.unwrap_or_else(|| panic!("{level}: {csv:?}"));
+        let percent =
+            |name: &str| format!("{:.1}", 100.0 * row[column(name)].parse::<f64>().unwrap());
+        let expected = format!(
+            "{} [{}, {}]",
+            percent("value"),
+            percent("low"),
+            percent("high")
+        );
+        assert_eq!(shown, expected, "{level}");
+    }
+    browser.evaluate("document.querySelector('#models button[title=random]').click()");
+    browser.shot("charts.png", true);
+}
+
 fn slider(browser: &mut Browser) {
     let shown = "[...document.querySelectorAll('#i-images figcaption')].map(c => c.textContent.split(';')[0])";
     browser.press("[");
     let images = browser.evaluate(shown);
-    assert_eq!(images, json!(["L4-ev", "L4-noise"]));
+    assert_eq!(images, json!(["L0", "L4-ev", "L4-noise"]));
     assert_eq!(
         browser.evaluate("document.querySelector('#f-level').value"),
         "L4"
     );
-    let crop = browser.evaluate("document.querySelector('#i-images figcaption').textContent");
+    let crop = browser
+        .evaluate("document.querySelector('#i-images figure:nth-child(2) figcaption').textContent");
     assert_eq!(crop, "L4-ev; below, its middle, light × 181 (7.5 EV)");
     let loaded = "[...document.querySelectorAll('#i-images img')].every(i => i.complete && i.naturalWidth > 0)";
     browser.wait(loaded);
@@ -133,11 +190,19 @@ fn slider(browser: &mut Browser) {
         "(() => { const s = document.querySelector('#i-level'); s.value = 0; s.dispatchEvent(new Event('input')); })()",
     );
     assert_eq!(browser.evaluate(shown), json!(["L0"]));
+    // All images zoom together, by button and by key; never farther than the whole.
+    let zoom = "document.querySelector('#i-zoom').textContent";
+    assert_eq!(browser.evaluate(zoom), "1 ×");
+    browser.click("#i-in");
+    assert_eq!(browser.evaluate(zoom), "1.6 ×");
+    browser.click("#i-out");
+    browser.click("#i-out");
+    assert_eq!(browser.evaluate(zoom), "1 ×");
 }
 
 fn keyboard(browser: &mut Browser) {
     let item = "document.querySelector('#i-id').textContent.split(' ')[0]";
-    browser.evaluate("document.querySelector('#list li').click()");
+    browser.evaluate("document.querySelector('#list button').click()");
     let first = browser.evaluate(item);
     browser.press("j");
     let second = browser.evaluate(item);
@@ -178,7 +243,7 @@ fn hostile_replies(browser: &mut Browser) {
     assert!(long.len() < 21_000);
     assert_ne!(browser.evaluate("document.title"), "owned");
     assert_eq!(
-        browser.evaluate("document.querySelectorAll('script').length"),
+        browser.evaluate("document.querySelectorAll('script:not([type])').length"),
         2
     );
 }

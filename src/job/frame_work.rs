@@ -152,6 +152,11 @@ impl<'a> FrameWork<'a> {
         }
     }
 
+    /// Width and height of the file, in pixels; `None` before it is read, if it was not planned.
+    pub(crate) fn size(&self) -> Option<[u32; 2]> {
+        self.size.map(|(width, height)| [width, height])
+    }
+
     /// The name of the frame.
     pub(crate) fn frame(&self) -> &FrameId {
         &self.frame

@@ -7,6 +7,7 @@ use crate::ask::Payload;
 use crate::error::Result;
 use crate::score::realism::{psnr, ssim::ssim};
 use crate::store::Store;
+use crate::types::outlines::PixelBox;
 use crate::types::{Condition, Detail, FrameId, ImageFidelity, Rgb, Thumbnail};
 
 /// The notes about one image; `None` for what is not wanted or exists already.
@@ -53,6 +54,11 @@ impl MissingNotes {
                 .map(|image| (image.frame, image.condition))
                 .collect(),
         }
+    }
+
+    /// The things of a frame that have crops.
+    pub(crate) fn objects(&self, frame: &FrameId) -> &[PixelBox] {
+        self.thumbnails.objects(frame)
     }
 
     /// The notes that are wanted about a frame in a condition. The clean frame is not compared with itself.

@@ -17,7 +17,7 @@ use super::frame_work::{FrameWork, ImageSteps, StagedFrame};
 use super::image_notes::{ImageNotes, MissingNotes, WantedNotes, fidelity};
 use super::plan::{SourcePlan, TrialGroup};
 use super::source::Source;
-use super::thumbnail::{thumbnail, thumbnail_of_all};
+use super::thumbnail::{ShownObjects, thumbnail, thumbnail_of_all};
 use super::timings::TimedStep;
 use super::trial::{Item, PreparedGroup, Stimulus};
 use super::workers::Workers;
@@ -171,7 +171,12 @@ impl<'a> ImagePipeline<'a> {
         let wanted = missing.of(name, condition);
         match work {
             SourceWork::Frame(work) => {
-                let (image, notes) = self.image_and_notes(work, condition, name, wanted)?;
+                let shown = work.size().map(|size| ShownObjects {
+                    size,
+                    objects: missing.objects(name),
+                });
+                let (image, notes) =
+                    self.image_and_notes(work, condition, (name, shown), wanted)?;
                 Ok((vec![image], notes))
             }
             SourceWork::Walk(images) => {
@@ -200,7 +205,7 @@ impl<'a> ImagePipeline<'a> {
         &mut self,
         work: &mut FrameWork<'_>,
         condition: &Condition,
-        name: &FrameId,
+        (name, shown): (&FrameId, Option<ShownObjects<'_>>),
         wanted: WantedNotes,
     ) -> Result<(Arc<Payload>, ImageNotes)> {
         let Resolved {
@@ -211,7 +216,7 @@ impl<'a> ImagePipeline<'a> {
         let steps = work.steps;
         let small_copy = |image: &Payload, encoded: &Rgb| {
             let make = || {
-                let made = thumbnail(name, condition, image, Some(encoded));
+                let made = thumbnail(name, condition, image, Some(encoded), shown);
                 or_warning(name, condition, made)
             };
             steps.timings.time(TimedStep::Encode, make)

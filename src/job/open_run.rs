@@ -309,6 +309,7 @@ pub(crate) fn limit(settings: &JobSettings) -> Option<ImageLimit> {
 pub(super) fn missing_notes<E: Experiment>(experiment: &E, folder: &Path) -> Result<MissingNotes> {
     let names = experiment.sources().iter().map(|source| &source.name);
     let thumbnails = MissingThumbnails::new(names, store::read_thumbnails(folder)?);
+    let thumbnails = thumbnails.with_objects(&experiment.questions());
     Ok(MissingNotes::new(thumbnails, store::read_fidelity(folder)?))
 }
 

@@ -1,14 +1,15 @@
 //! Small copies of the images that were sent, for the report: [`thumbnail`], [`thumbnail_of_all`], and those not made yet: [`MissingThumbnails`].
 
 use std::borrow::Cow;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroU32;
 use std::sync::Arc;
 
 use super::montage::{columns, montage};
 use crate::ask::{Payload, PayloadFormat};
 use crate::error::{Error, Result};
-use crate::types::{Condition, Digest, FrameId, Rgb, Thumbnail};
+use crate::types::outlines::PixelBox;
+use crate::types::{Condition, Digest, FrameId, ObjectCrop, Rgb, RunQuestion, Thumbnail};
 
 /// Maximum number of frames with thumbnails, so that the report of a large run stays small; chosen.
 const MAX_FRAMES: usize = 48;
@@ -21,10 +22,18 @@ const CROP: usize = 96;
 /// Format of the small copy and of the crop.
 const FORMAT: &str = "jpeg:72";
 
+/// Least and largest side of the crop of a thing, in pixels; chosen.
+const OBJECT: [usize; 2] = [64, 160];
+/// Room around a thing in its crop, as a share of its sides; chosen.
+const AROUND: f64 = 0.2;
+/// Maximum number of things of a frame with crops; chosen, so that the page has room for many frames.
+const MAX_OBJECTS: usize = 3;
+
 /// The thumbnails that a run folder does not have yet.
 #[derive(Debug, Default)]
 pub(crate) struct MissingThumbnails {
     frames: BTreeSet<FrameId>,
+    objects: BTreeMap<FrameId, Vec<PixelBox>>,
     present: BTreeSet<(FrameId, Condition)>,
 }
 
@@ -43,8 +52,31 @@ impl MissingThumbnails {
             .map(|thumbnail| (thumbnail.frame, thumbnail.condition));
         Self {
             frames: ranked.into_iter().take(MAX_FRAMES).cloned().collect(),
+            objects: BTreeMap::new(),
             present: present.collect(),
         }
+    }
+
+    /// The same thumbnails with crops of the things that these questions are about; of the first few of a frame.
+    pub(crate) fn with_objects<'a>(
+        mut self,
+        questions: impl IntoIterator<Item = &'a RunQuestion>,
+    ) -> Self {
+        for question in questions {
+            let Some(object) = question.object().filter(|_| self.wants(&question.frame)) else {
+                continue;
+            };
+            let objects = self.objects.entry(question.frame.clone()).or_default();
+            if objects.len() < MAX_OBJECTS && !objects.contains(&object) {
+                objects.push(object);
+            }
+        }
+        self
+    }
+
+    /// The things of a frame that have crops.
+    pub(crate) fn objects(&self, frame: &FrameId) -> &[PixelBox] {
+        self.objects.get(frame).map_or(&[], Vec::as_slice)
     }
 
     /// Whether a frame has thumbnails in the report.
@@ -68,7 +100,7 @@ pub(crate) fn thumbnail_of_all(
     let Some(middle) = sent.get(sent.len() / 2) else {
         return Ok(None);
     };
-    let mut thumbnail = thumbnail(frame, condition, middle, None)?;
+    let mut thumbnail = thumbnail(frame, condition, middle, None, None)?;
     thumbnail.image = Payload::joint_digest(sent).unwrap_or(thumbnail.image);
     if (2..=MOST_TILES).contains(&sent.len()) {
         let side = SIDE / columns(sent.len()) as u32;
@@ -88,6 +120,7 @@ pub(crate) fn thumbnail(
     condition: &Condition,
     sent: &Payload,
     encoded: Option<&Rgb>,
+    shown: Option<ShownObjects<'_>>,
 ) -> Result<Thumbnail> {
     let image = sent.received(encoded)?;
     let ev = match condition.enhancer {
@@ -112,7 +145,54 @@ pub(crate) fn thumbnail(
         small: url(&*small(&image, SIDE)?)?,
         crop: url(&middle(&image, ev)?)?,
         stops: ev,
+        size: shown.map(|shown| shown.size),
+        objects: match shown {
+            None => Vec::new(),
+            Some(shown) => shown
+                .objects
+                .iter()
+                .map(|object| {
+                    let crop = url(&amplified(
+                        &image,
+                        object_place(&image, *object, shown.size),
+                        ev,
+                    )?)?;
+                    let object = *object;
+                    Ok(ObjectCrop { object, crop })
+                })
+                .collect::<Result<_>>()?,
+        },
     })
+}
+
+/// The things of a frame that have crops, and its width and height in pixels, in which their boxes are.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ShownObjects<'a> {
+    pub(crate) size: [u32; 2],
+    pub(crate) objects: &'a [PixelBox],
+}
+
+/// A part of an image: top, left, height and width, in pixels.
+type Place = [usize; 4];
+
+/// A square around the middle of a thing, with some room around it; within the image.
+fn object_place(image: &Rgb, object: PixelBox, size: [u32; 2]) -> Place {
+    let sides = [image.width(), image.height()];
+    let scale = [0, 1].map(|axis| sides[axis] as f64 / f64::from(size[axis].max(1)));
+    let ends =
+        [0, 1].map(|axis| [object[axis], object[axis + 2]].map(|end| f64::from(end) * scale[axis]));
+    let longer = (ends[0][1] - ends[0][0]).max(ends[1][1] - ends[1][0]);
+    let side = (longer * (1.0 + 2.0 * AROUND)).round() as usize;
+    let side = side.clamp(OBJECT[0], OBJECT[1]);
+    let [[left, width], [top, height]] = [0, 1].map(|axis| {
+        let length = side.min(sides[axis]);
+        let start = f64::midpoint(ends[axis][0], ends[axis][1]) - length as f64 / 2.0;
+        [
+            (start.max(0.0).round() as usize).min(sides[axis] - length),
+            length,
+        ]
+    });
+    [top, left, height, width]
 }
 
 /// The `data:` URL of a picture.
@@ -160,6 +240,11 @@ fn small(image: &Rgb, side: u32) -> Result<Cow<'_, Rgb>> {
 fn middle(image: &Rgb, ev: f32) -> Result<Rgb> {
     let (height, width) = (image.height().min(CROP), image.width().min(CROP));
     let (top, left) = ((image.height() - height) / 2, (image.width() - width) / 2);
+    amplified(image, [top, left, height, width], ev)
+}
+
+/// A part of an image, with its linear light (gamma 2.2) amplified by `ev`.
+fn amplified(image: &Rgb, [top, left, height, width]: Place, ev: f32) -> Result<Rgb> {
     let scale = libm::exp2(f64::from(ev) / 2.2);
     let amplified: [u8; 256] =
         std::array::from_fn(|code| (code as f64 * scale).round().min(255.0) as u8);
@@ -207,9 +292,25 @@ mod tests {
         ] {
             let scaled = Payload::scaled(&image, NonZeroU32::new(side)).unwrap();
             let sent = Payload::encode(&scaled, format.parse().unwrap(), None).unwrap();
-            let copy = |encoded| thumbnail(&frame, &condition, &sent, encoded).unwrap();
+            let copy = |encoded| thumbnail(&frame, &condition, &sent, encoded, None).unwrap();
             assert_eq!(copy(Some(&*scaled)), copy(None), "{format} {side}");
         }
+    }
+
+    #[test]
+    fn the_place_of_a_thing_is_around_it_and_within_the_image() {
+        let image = Rgb::black(300, 400);
+        let place = |object| object_place(&image, object, [800, 600]);
+        // Half the size of the frame: a box of 40 × 20 pixels has its least crop, one of 100 × 60 has room around it.
+        assert_eq!(place([200, 200, 280, 240]), [78, 88, 64, 64]);
+        assert_eq!(place([200, 200, 400, 320]), [60, 80, 140, 140]);
+        // At the edge, and larger than a crop.
+        assert_eq!(place([760, 560, 800, 600]), [236, 336, 64, 64]);
+        assert_eq!(place([0, 0, 800, 600]), [70, 120, 160, 160]);
+        assert_eq!(
+            object_place(&Rgb::black(40, 50), [0, 0, 5, 5], [50, 40]),
+            [0, 0, 40, 50]
+        );
     }
 
     #[test]

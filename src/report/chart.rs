@@ -5,6 +5,7 @@
 //! theme.
 
 pub(crate) mod bars;
+pub(crate) mod data;
 mod marks;
 
 use plotters::coord::Shift;
@@ -57,6 +58,8 @@ pub(crate) struct Figure {
     pub caption: String,
     /// The figure as SVG.
     pub svg: String,
+    /// What it shows, for the script of the page; `None` of a figure that the page shows as it is.
+    pub data: Option<String>,
 }
 
 /// Figures as files: name and contents.
@@ -122,6 +125,8 @@ pub(crate) struct PlotLine {
     pub name: String,
     pub style: LineStyle,
     pub content: PanelContent,
+    /// The model that it is about; `None` of a line about several, or about none.
+    pub model: Option<String>,
 }
 
 /// One panel of a chart.
@@ -130,6 +135,8 @@ pub(crate) struct Panel {
     /// Title, with the number of questions.
     pub title: String,
     pub lines: Vec<PlotLine>,
+    /// The model that all its lines are about; `None` if there are several.
+    pub model: Option<String>,
 }
 
 /// A figure of panels with one legend.

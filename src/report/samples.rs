@@ -198,6 +198,8 @@ mod tests {
             small: format!("data:{condition}"),
             crop: String::new(),
             stops: 0.0,
+            size: None,
+            objects: Vec::new(),
         };
         let all = ["L0", "L3-auto", "T8.33-motion", "T33.33-motion"].map(thumbnail);
         let pages = samples(&all);
@@ -221,6 +223,8 @@ mod tests {
             small: format!("data:{condition}"),
             crop: String::new(),
             stops: 0.0,
+            size: None,
+            objects: Vec::new(),
         };
         let thumbnails = ["L0", "L3-ev", "L3-noise", "L3-noise+lift"].map(thumbnail);
         let samples = only(&thumbnails);

@@ -16,7 +16,7 @@ use super::ladder::{Ladder, SeriesByLevel};
 use super::light_readings::LightReadings;
 use super::sentences::{FIRST, HOW_TO_READ, Sentence};
 use super::terminal::render;
-use super::words::{counted, percent, reach_of};
+use super::words::{counted, percent, reach_of, shortened};
 use crate::score::accuracy::AccuracyCell;
 use crate::score::choice::ReadingMode;
 use crate::score::health::Health;
@@ -259,21 +259,6 @@ fn line(name: &str, width: usize, values: impl Iterator<Item = String>, reach: &
     let values = values.collect::<Vec<_>>().concat();
     let line = format!(" {name:<width$}{values}  {reach}");
     line.trim_end().to_owned() + "\n"
-}
-
-/// A name with its middle left out, if it is longer than `width`.
-fn shortened(name: &str, width: usize) -> String {
-    let letters: Vec<char> = name.chars().collect();
-    if letters.len() <= width {
-        return name.to_owned();
-    }
-    let (head, tail) = (width.div_ceil(2) - 1, width / 2);
-    let middle = letters.len() - tail;
-    letters[..head]
-        .iter()
-        .chain(&['…'])
-        .chain(&letters[middle..])
-        .collect()
 }
 
 /// An accuracy in percent, with a mark if it is below that without images.

@@ -7,9 +7,11 @@ use serde::Serialize;
 use crate::error::{Error, Result};
 
 /// Parts that several pages share, each with its placeholder in the templates.
-const PARTS: [(&str, &str); 2] = [
+const PARTS: [(&str, &str); 3] = [
     ("<!-- figures -->", include_str!("page/figures.html")),
     ("<!-- tables -->", include_str!("page/tables.html")),
+    // The rows of a table, which stand in that part.
+    ("<!-- rows -->", include_str!("page/rows.html")),
 ];
 
 /// The HTML of a template with its values, which are escaped.

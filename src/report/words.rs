@@ -38,6 +38,21 @@ pub(super) fn counted(number: usize, noun: &str) -> String {
     format!("{number} {noun}{ending}")
 }
 
+/// A name with its middle left out, if it is longer than `width`.
+pub(super) fn shortened(name: &str, width: usize) -> String {
+    let letters: Vec<char> = name.chars().collect();
+    if letters.len() <= width {
+        return name.to_owned();
+    }
+    let (head, tail) = (width.div_ceil(2) - 1, width / 2);
+    let middle = letters.len() - tail;
+    letters[..head]
+        .iter()
+        .chain(&['…'])
+        .chain(&letters[middle..])
+        .collect()
+}
+
 /// A share in percent, with one decimal.
 pub(super) fn percent(share: f64) -> String {
     format!("{:.1}", 100.0 * share).replace('-', "−")

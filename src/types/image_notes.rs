@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::condition::Condition;
 use super::digest::Digest;
 use super::frame::FrameId;
+use super::outlines::PixelBox;
 
 /// One line of a run's `thumbnails.jsonl`: a small copy of an image as it was sent.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -22,6 +23,21 @@ pub struct Thumbnail {
     pub crop: String,
     /// The gain that brightens the crop, in EV.
     pub stops: f32,
+    /// The width and height of the frame, in whose pixels boxes of evidence are; not in the file for several frames.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub size: Option<[u32; 2]>,
+    /// The things that questions are about, each at full resolution and brightened as `crop` is; not in the file without any.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub objects: Vec<ObjectCrop>,
+}
+
+/// A thing that a question is about, cut out of an image as it was sent.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ObjectCrop {
+    /// The box of the thing, in pixels of the frame.
+    pub object: PixelBox,
+    /// The thing and some of what is around it, as a `data:` URL.
+    pub crop: String,
 }
 
 /// One line of a run's `fidelity.jsonl`: how similar an image is to its clean frame, both in the size sent, before any JPEG.

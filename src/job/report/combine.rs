@@ -16,7 +16,7 @@ use crate::score::findings::Findings;
 use crate::score::grid::Grid;
 use crate::score::photographed_set::PhotographedSet;
 use crate::types::manifest::RunManifest;
-use crate::types::{ChoiceDetail, QuestionId, Record, RunQuestion, SetLight, Truths};
+use crate::types::{ChoiceDetail, QuestionId, Record, RunQuestion, SetLight, Truths, shell_word};
 
 /// Several runs of questions with choices, joined.
 pub(super) type Combined = Joined<ChoiceDetail>;
@@ -82,6 +82,7 @@ impl Combined {
     /// Further inputs of the HTML page.
     pub(super) fn shown(&self) -> PageInputs<'_> {
         let runs = self.runs.iter().map(|run| page::PageRun {
+            folder: typed(&run.folder),
             name: run.name.clone(),
             manifest: &run.manifest,
             records: run
@@ -103,6 +104,13 @@ impl Combined {
         let runs = self.runs.iter();
         runs.map(|run| (&run.manifest, &*run.folder)).collect()
     }
+}
+
+/// A folder as a command on it names it. An absolute path says where somebody's files lie: of it the page has the name alone.
+fn typed(folder: &Path) -> String {
+    let name = folder.file_name().filter(|_| folder.is_absolute());
+    let shown = name.map_or_else(|| folder.to_owned(), |name| Path::new("DIR").join(name));
+    shell_word(&shown.display().to_string()).into_owned()
 }
 
 /// What these questions say of their frames.

@@ -23,7 +23,11 @@ impl Overview<'_> {
                 PanelContent::Flat(_) | PanelContent::Marks(_) => None,
             });
             let title = format!("{title}, n {}", n.unwrap_or(0));
-            Panel { title, lines }
+            Panel {
+                title,
+                lines,
+                model: None,
+            }
         };
         let panels = vec![
             panel("“yes” where nothing is", |rates| rates.false_positive),
@@ -55,9 +59,14 @@ impl Overview<'_> {
                 name: "commonest true answer".to_owned(),
                 style: REFERENCE,
                 content: PanelContent::Flat(share),
+                model: None,
             });
             let title = format!("{}, n {n}", family_name(Some(&family)));
-            Some(Panel { title, lines })
+            Some(Panel {
+                title,
+                lines,
+                model: None,
+            })
         };
         let panels = [Family::RoomType, Family::Color].into_iter();
         let panels: Vec<Panel> = panels.filter_map(panel).collect();

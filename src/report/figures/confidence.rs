@@ -30,12 +30,17 @@ impl Overview<'_> {
                         name: name.to_owned(),
                         style: LineStyle(style),
                         content: PanelContent::Curve(points),
+                        model: Some((*model).to_owned()),
                     })
                 };
                 let lines: Vec<PlotLine> = LINES.into_iter().enumerate().filter_map(line).collect();
                 if !lines.is_empty() {
                     let title = format!("{model}, {}", light(&variant, None));
-                    panels.push(Panel { title, lines });
+                    panels.push(Panel {
+                        title,
+                        lines,
+                        model: Some((*model).to_owned()),
+                    });
                 }
             }
         }

@@ -8,6 +8,7 @@ mod thresholds;
 
 use std::collections::BTreeSet;
 
+use super::chart::data::ChartData;
 use super::chart::{Chart, DarkMark, Figure, LineStyle, Panel, PanelContent, PlotLine};
 use super::words::{family as family_name, light};
 use crate::error::Result;
@@ -40,8 +41,12 @@ pub(crate) fn figures(findings: &Findings<'_>) -> Result<Vec<Figure>> {
         let Some((caption, chart)) = chart else {
             continue;
         };
-        let svg = chart.svg()?;
-        figures.push(Figure { name, caption, svg });
+        figures.push(Figure {
+            name,
+            caption,
+            svg: chart.svg()?,
+            data: Some(ChartData::json(&chart)?),
+        });
     }
     figures.extend(overview.photographed()?);
     figures.extend(thresholds::figures(findings)?);
@@ -127,16 +132,18 @@ impl<'a> Overview<'a> {
         let flat = cells.filter(|cell| cell.subject.view != Some(View::Image));
         let lines = flat.filter_map(|cell| {
             let model = &*cell.subject.model;
-            let (name, style) = if cell.subject.view.is_none() {
-                (CHANCE.to_owned(), REFERENCE)
+            let (name, style, of) = if cell.subject.view.is_none() {
+                (CHANCE.to_owned(), REFERENCE, None)
             } else {
-                (format!("{model} without images"), self.style(model))
+                let name = format!("{model} without images");
+                (name, self.style(model), Some(model.to_owned()))
             };
             let content = PanelContent::Flat(cell.accuracy?.value);
             Some(PlotLine {
                 name,
                 style,
                 content,
+                model: of,
             })
         });
         lines.collect()
@@ -176,6 +183,7 @@ impl<'a> Overview<'a> {
             name: (*model).to_owned(),
             style: self.style(model),
             content: PanelContent::Curve(self.points(model, variant, None, &mut number)),
+            model: Some((*model).to_owned()),
         });
         lines.collect()
     }
@@ -205,6 +213,7 @@ impl<'a> Overview<'a> {
                         name: format!("{model}, {} (real)", pair.name),
                         style: self.style(model),
                         content: PanelContent::Marks(marks),
+                        model: Some((*model).to_owned()),
                     });
                 }
             }
@@ -237,6 +246,7 @@ impl<'a> Overview<'a> {
             Panel {
                 title: format!("{}, n {}", light(variant, None), self.n(None)),
                 lines,
+                model: None,
             }
         });
         let mut panels: Vec<Panel> = panels.collect();
@@ -245,7 +255,11 @@ impl<'a> Overview<'a> {
             let mut lines = self.accuracies(&KindReading::NONE, None);
             lines.append(&mut marks);
             let title = format!("photographed in the dark, n {}", self.n(None));
-            panels.push(Panel { title, lines });
+            panels.push(Panel {
+                title,
+                lines,
+                model: None,
+            });
         }
         let caption = if self.findings.pairs.is_empty() {
             "Accuracy of each model by level, without enhancement. Broken lines: without images, and chance."
@@ -271,6 +285,7 @@ impl<'a> Overview<'a> {
                 panels.push(Panel {
                     title: title.clone(),
                     lines: self.lines_of_variants(&variants, &models),
+                    model: None,
                 });
             }
         }
@@ -305,6 +320,7 @@ impl<'a> Overview<'a> {
                 name: light(variant, None),
                 style: LineStyle(index),
                 content: PanelContent::Curve(mean(&curves)),
+                model: None,
             }
         };
         let mut lines: Vec<PlotLine> = variants.iter().enumerate().map(line).collect();
@@ -327,13 +343,18 @@ impl<'a> Overview<'a> {
                         name: enhancer.map_or("raw".to_owned(), ToString::to_string),
                         style: LineStyle(index),
                         content: PanelContent::Curve(points),
+                        model: Some((*model).to_owned()),
                     })
                 };
                 let all = std::iter::once(None).chain(self.enhancers.iter().copied().map(Some));
                 let lines: Vec<PlotLine> = all.enumerate().filter_map(line).collect();
                 if lines.len() > 1 {
                     let title = format!("{model}, {}, n {}", light(&variant, None), self.n(None));
-                    panels.push(Panel { title, lines });
+                    panels.push(Panel {
+                        title,
+                        lines,
+                        model: Some((*model).to_owned()),
+                    });
                 }
             }
         }
@@ -353,6 +374,7 @@ impl<'a> Overview<'a> {
             Panel {
                 title: format!("{}, n {n}", family_name(Some(family))),
                 lines: self.accuracies(variant, Some(family)),
+                model: None,
             }
         });
         let panels: Vec<Panel> = panels.collect();

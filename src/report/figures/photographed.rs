@@ -62,6 +62,7 @@ impl Overview<'_> {
             caption: "Accuracy on photographs in the dark, raw (as photographed) and with each enhancer. Broken line: chance."
                 .to_owned(),
             svg: chart.svg()?,
+            data: None,
         }))
     }
 }

@@ -40,6 +40,7 @@ pub(crate) fn story_curves(findings: &Findings<'_>) -> Option<StoryCurves> {
                     name,
                     style: LineStyle(lines.len()),
                     content: PanelContent::Curve(points),
+                    model: Some((*model).to_owned()),
                 });
             }
         }

@@ -5,7 +5,7 @@ use plotters::prelude::*;
 use super::super::chart::{
     BACKGROUND, BELOW, Figure, FigureArea, GRID, LEFT, LineStyle, RIGHT, draw_path, draw_text,
 };
-use super::super::words::{light, stops};
+use super::super::words::{light, shortened, stops};
 use crate::error::{Error, Result};
 use crate::score::curve::Curve;
 use crate::score::findings::Findings;
@@ -14,6 +14,8 @@ use crate::types::degradation::Axis;
 
 /// Widths of the names, of the axis and of the numbers, in pixels.
 const NAMES: i32 = 330;
+/// Most letters of a name.
+const NAME_LETTERS: usize = 46;
 const AXIS: i32 = 400;
 const NUMBERS: i32 = 150;
 const ROW: i32 = 24;
@@ -91,7 +93,12 @@ fn figure(findings: &Findings<'_>, axis: Axis) -> Result<Option<Figure>> {
         )
     };
     let caption = caption.to_owned();
-    Ok(Some(Figure { name, caption, svg }))
+    Ok(Some(Figure {
+        name,
+        caption,
+        svg,
+        data: None,
+    }))
 }
 
 fn draw(
@@ -113,7 +120,7 @@ fn draw(
     for (row, (curve, threshold)) in (0..).zip(rows) {
         let y = 12 + row * ROW + ROW / 2;
         let light = light(&curve.variant, curve.enhancer.as_ref());
-        let name = format!("{}, {light}", curve.model);
+        let name = shortened(&format!("{}, {light}", curve.model), NAME_LETTERS);
         draw_text(root, &name, (NAMES - 14, y), 13, RIGHT)?;
         let ends = [(x(threshold.low), y), (x(threshold.high), y)];
         draw_path(root, &ends, colour.stroke_width(2))?;

@@ -3,6 +3,7 @@
 use super::open_report::OpenReport;
 use super::tables::ladder;
 use crate::error::Result;
+use crate::report::chart::data::ChartData;
 use crate::report::chart::{Chart, Figure, LineStyle, Panel, PanelContent, PlotLine};
 use crate::report::ladder::Ladder;
 use crate::score::open::{Group, OpenCell};
@@ -47,6 +48,7 @@ pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
             name,
             caption: caption.to_owned(),
             svg: chart.svg()?,
+            data: Some(ChartData::json(&chart)?),
         });
     }
     Ok(figures)
@@ -81,6 +83,7 @@ fn panel(
             name: format!("{}, {}", series.model, series.light(&[])),
             style: LineStyle(index.unwrap_or(seeing)),
             content: PanelContent::Curve(points.collect()),
+            model: Some(series.model.to_owned()),
         }
     });
     let blind = ladder.without_level.iter().enumerate();
@@ -89,6 +92,7 @@ fn panel(
             name: format!("{} without images", subject.model),
             style: LineStyle(seeing + index),
             content: PanelContent::Flat(cell.score?.value),
+            model: Some(subject.model.clone()),
         })
     });
     let n = report.questions.len();
@@ -105,5 +109,6 @@ fn panel(
     Panel {
         title,
         lines: lines.chain(blind).collect(),
+        model: None,
     }
 }

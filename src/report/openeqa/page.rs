@@ -9,7 +9,7 @@ use super::open_report::{OpenReport, ReportedAnswer};
 use super::tables::SECTION;
 use crate::error::Result;
 use crate::report::chart::Figure;
-use crate::report::page::{STYLE, manifest_facts, tables};
+use crate::report::page::{CHART_SCRIPT, STYLE, manifest_facts, tables};
 use crate::report::readable::readable;
 use crate::report::table::Table;
 use crate::report::template::filled;
@@ -45,6 +45,7 @@ pub(super) fn page(
             "walks": walks(report),
             "facts": manifest_facts(report.manifest),
             "css": STYLE,
+            "script": CHART_SCRIPT,
         }),
     )
 }

@@ -8,6 +8,8 @@ use crate::types::{Record, RunQuestion, Thumbnail};
 pub struct PageRun<'a> {
     /// Name of the run: its folder.
     pub name: String,
+    /// The folder of the run as a command on it names it; of an absolute path the name alone, behind `DIR/`.
+    pub folder: String,
     pub manifest: &'a RunManifest,
     /// Records of the run, for totals of requests, tokens and latency.
     pub records: Vec<&'a Record>,

@@ -15,8 +15,9 @@ use crate::error::{Error, Result};
 use crate::score::choice::ReadingMode;
 use crate::score::confusion;
 use crate::score::grid::{Grid, TrialResult};
+use crate::types::outlines::PixelBox;
 use crate::types::{
-    Axis, AxisLevel, FrameId, QuestionId, RunQuestion, Thumbnail, UnreadReason, View,
+    Axis, AxisLevel, FrameId, ObjectCrop, QuestionId, RunQuestion, Thumbnail, UnreadReason, View,
 };
 
 /// Codes of results that are not the index of a choice.
@@ -56,9 +57,13 @@ struct SizeLimit {
 #[derive(Serialize)]
 struct PageData<'a> {
     runs: Vec<String>,
+    /// The folder of each run.
+    folders: Vec<String>,
     levels: Vec<[String; 2]>,
     families: Vec<&'a str>,
     frames: Vec<&'a str>,
+    /// Width and height of each frame of which there are small copies, in pixels.
+    sizes: Vec<Option<[u32; 2]>>,
     subjects: Vec<Subject<'a>>,
     questions: Vec<Question<'a>>,
     choices: Vec<&'a [String]>,
@@ -94,6 +99,9 @@ struct Question<'a> {
     family: usize,
     text: &'a str,
     evidence: Option<&'a Value>,
+    /// The boxes of the things that it is about, and the box of all of them, in pixels of its frame.
+    outlines: Vec<PixelBox>,
+    object: Option<PixelBox>,
 }
 
 #[derive(Serialize)]
@@ -119,6 +127,7 @@ struct Picture<'a> {
     small: &'a str,
     crop: &'a str,
     stops: f32,
+    objects: &'a [ObjectCrop],
 }
 
 /// A list without repetition, and the index of each entry.
@@ -197,6 +206,8 @@ fn data<'a>(
                 frame: frames.index_of(&*record.detail.frame.0),
                 family: families.index_of(record.detail.family.name()),
                 text: run_question.map_or("", |run_question| &run_question.text),
+                outlines: run_question.map_or_else(Vec::new, |question| question.outlines()),
+                object: run_question.and_then(|question| question.object()),
                 evidence: run_question
                     .map(|run_question| &run_question.evidence)
                     .filter(|e| !e.is_null()),
@@ -225,6 +236,8 @@ fn data<'a>(
     let (reasons, why) = reasons(grid);
     PageData {
         runs: inputs.runs.iter().map(|run| run.name.clone()).collect(),
+        folders: inputs.runs.iter().map(|run| run.folder.clone()).collect(),
+        sizes: sizes(inputs.thumbnails, &frames.list),
         levels: levels(grid),
         thumbnails: thumbnails(inputs.thumbnails, &frames.indices, limit.pictures),
         families: families.list,
@@ -241,6 +254,17 @@ fn data<'a>(
         replies,
         confusions: confusions_of(grid, confusions),
     }
+}
+
+/// The size of each frame that small copies state.
+fn sizes(thumbnails: &[Thumbnail], frames: &[&str]) -> Vec<Option<[u32; 2]>> {
+    let stated = thumbnails.iter();
+    let stated = stated.filter_map(|thumbnail| Some((&*thumbnail.frame.0, thumbnail.size?)));
+    let stated: HashMap<&str, [u32; 2]> = stated.collect();
+    frames
+        .iter()
+        .map(|frame| stated.get(frame).copied())
+        .collect()
 }
 
 /// The name of each level of the grid, in the order of tables, and its severity in words: `6 EV`.
@@ -364,7 +388,7 @@ fn confusions_of<'a>(
     named.collect()
 }
 
-/// Thumbnails of as many frames as the size limit allows, by the index of the frame.
+/// Thumbnails of as many frames as the size limit allows, by the index of the frame; crops of things as there is room behind them.
 fn thumbnails<'a>(
     all: &'a [Thumbnail],
     numbers: &HashMap<&str, usize>,
@@ -377,28 +401,36 @@ fn thumbnails<'a>(
             .or_default()
             .push(thumbnail);
     }
-    let mut by_number = BTreeMap::new();
+    // Small copies of all frames go before the things of the first ones.
+    let mut kept = Vec::new();
     for (frame, thumbnails) in by_frame {
-        let size: usize = thumbnails
-            .iter()
-            .map(|t| t.small.len() + t.crop.len())
-            .sum();
         let Some(number) = numbers.get(&*frame.0) else {
             continue;
         };
+        let sizes = thumbnails.iter().map(|t| t.small.len() + t.crop.len());
+        let size: usize = sizes.sum();
         if size > bytes_left {
             break;
         }
         bytes_left -= size;
+        kept.push((*number, thumbnails));
+    }
+    let mut by_number = BTreeMap::new();
+    for (number, thumbnails) in kept {
+        let crops = thumbnails.iter().flat_map(|thumbnail| &thumbnail.objects);
+        let size: usize = crops.map(|object| object.crop.len()).sum();
+        let has_room = size <= bytes_left;
+        bytes_left -= if has_room { size } else { 0 };
         let pictures = thumbnails.into_iter().map(|t| {
             let picture = Picture {
                 small: &t.small,
                 crop: &t.crop,
                 stops: t.stops,
+                objects: if has_room { &t.objects } else { &[] },
             };
             (t.condition.to_string(), picture)
         });
-        by_number.insert(*number, pictures.collect());
+        by_number.insert(number, pictures.collect());
     }
     by_number
 }

@@ -33,7 +33,12 @@ use crate::types::manifest::RunManifest;
 /// The template of the page, its style and its script.
 const PAGE: &str = include_str!("page.html");
 pub(super) const STYLE: &str = include_str!("page.css");
-const SCRIPT: &str = include_str!("page.js");
+/// What all pages share: names, the theme, and charts that are drawn at the width there is.
+pub(super) const CHART_SCRIPT: &str = concat!(
+    include_str!("script/base.js"),
+    include_str!("script/charts.js")
+);
+const SCRIPT: &str = include_str!("script/items.js");
 
 /// The values of the template. They are not converted to JSON first, because a large run has 100,000 cells.
 #[derive(Serialize)]
@@ -52,7 +57,7 @@ struct Page<'a> {
     /// The items, as compressed JSON in base64.
     data: String,
     css: &'static str,
-    script: &'static str,
+    script: String,
 }
 
 /// A finding in words, as the template reads it.
@@ -139,7 +144,7 @@ pub(crate) fn page_of<'a>(
             runs: inputs.runs.iter().map(facts).collect(),
             data: items::packed(content.grid, content.confusions, inputs)?,
             css: STYLE,
-            script: SCRIPT,
+            script: [CHART_SCRIPT, SCRIPT].concat(),
         },
     )
 }

@@ -2,12 +2,15 @@
 
 use serde::Serialize;
 
-use crate::report::table::{ColumnKind, Table, TableCell, TableFormat};
+use crate::report::table::{ColumnKind, Table, TableCell, TableFormat, TableRow};
 use crate::report::words::{ends, interval, words};
 use crate::score::significance::Significance;
 
 /// Maximum number of rows of a table that is not folded.
 const MAX_OPEN_ROWS: usize = 60;
+
+/// Least number of rows in which nothing is shown that are folded: fewer are read faster than opened.
+const LEAST_UNSHOWN: usize = 3;
 
 /// A table as the template reads it.
 #[derive(Serialize)]
@@ -18,6 +21,16 @@ pub(in crate::report) struct PageTable<'a> {
     /// The line below it; `None` without one.
     foot: Option<&'a str>,
     head: Vec<&'a str>,
+    rows: Vec<PageRow<'a>>,
+    /// Rows of tests in which nothing is shown, which are closed until the reader opens them; `None` without any.
+    unshown: Option<UnshownRows<'a>>,
+}
+
+/// Rows of tests in which nothing is shown.
+#[derive(Serialize)]
+struct UnshownRows<'a> {
+    /// Their number and the largest effect among them.
+    summary: String,
     rows: Vec<PageRow<'a>>,
 }
 
@@ -41,20 +54,21 @@ pub(in crate::report) fn page_tables<'a>(tables: &'a [Table], section: &str) -> 
     let in_section = tables.iter().filter(|table| table.section == section);
     let tables = in_section.map(|table| {
         let head = table.columns.iter();
-        let rows = table.headed_rows_in(TableFormat::Page);
-        let rows = rows.map(|(heading, row)| {
-            let cells = table.cells(row);
-            let cells = cells.filter(|(column, _)| column.heads.page.is_some());
-            let cells = cells.map(|(column, cell)| text(column.kind, cell));
-            PageRow {
-                heading,
-                cells: cells.collect(),
-            }
-        });
-        let rows: Vec<PageRow<'_>> = rows.collect();
+        let all = table.rows_in(TableFormat::Page);
+        let (unshown, shown): (Vec<&TableRow>, Vec<&TableRow>) =
+            all.partition(|row| is_unshown(row));
+        let (unshown, shown) = match unshown.len() {
+            0..LEAST_UNSHOWN => (Vec::new(), table.rows_in(TableFormat::Page).collect()),
+            _ => (unshown, shown),
+        };
+        let rows = page_rows(table, &shown);
         PageTable {
             caption: &table.caption,
             folded: table.is_folded || rows.len() > MAX_OPEN_ROWS,
+            unshown: (!unshown.is_empty()).then(|| UnshownRows {
+                summary: summary(table, &unshown),
+                rows: page_rows(table, &unshown),
+            }),
             foot: table.foot.as_deref(),
             head: head
                 .filter_map(|column| column.heads.page.as_deref())
@@ -62,7 +76,69 @@ pub(in crate::report) fn page_tables<'a>(tables: &'a [Table], section: &str) -> 
             rows,
         }
     });
-    tables.filter(|table| !table.rows.is_empty()).collect()
+    tables
+        .filter(|table| !table.rows.is_empty() || table.unshown.is_some())
+        .collect()
+}
+
+/// Whether a row is of a test in which nothing is shown.
+fn is_unshown(row: &TableRow) -> bool {
+    row.cells.iter().any(|cell| match cell {
+        TableCell::Significance(significance) => !significance.is_shown(),
+        _ => false,
+    })
+}
+
+/// Rows as the template reads them, with a heading where a group begins or ends.
+fn page_rows<'a>(table: &'a Table, rows: &[&'a TableRow]) -> Vec<PageRow<'a>> {
+    let mut above: Option<&str> = None;
+    let rows = rows.iter().map(|row| {
+        let group = row.group.as_deref();
+        let heading = (group != above).then(|| group.unwrap_or_default());
+        above = group;
+        let cells = table.cells(row);
+        let cells = cells.filter(|(column, _)| column.heads.page.is_some());
+        let cells = cells.map(|(column, cell)| text(column.kind, cell));
+        PageRow {
+            heading,
+            cells: cells.collect(),
+        }
+    });
+    rows.collect()
+}
+
+/// The number of rows in which nothing is shown, and the largest difference among them with the texts that stand before it.
+fn summary(table: &Table, rows: &[&TableRow]) -> String {
+    let count = match rows.len() {
+        1 => "1 row in which nothing is shown".to_owned(),
+        count => format!("{count} rows in which nothing is shown"),
+    };
+    let difference = |row: &&TableRow| {
+        let mut cells = table.cells(row);
+        cells.find_map(|(column, cell)| match (column.kind, cell) {
+            (ColumnKind::Points, TableCell::Estimate(found)) => {
+                Some((*found, words(column.kind, cell)))
+            }
+            _ => None,
+        })
+    };
+    let differences = rows.iter().filter_map(|row| Some((row, difference(row)?)));
+    let largest =
+        differences.max_by(|(_, (a, _)), (_, (b, _))| a.value.abs().total_cmp(&b.value.abs()));
+    let Some((row, (_, text))) = largest else {
+        return count;
+    };
+    let cells = table.cells(row);
+    let cells = cells.filter(|(column, _)| column.heads.page.is_some());
+    let names = cells.map_while(|(column, cell)| match (column.kind, cell) {
+        (ColumnKind::Text, cell) => Some(words(column.kind, cell)),
+        _ => None,
+    });
+    let names: Vec<String> = names.filter(|name| !name.is_empty()).collect();
+    format!(
+        "{count}; the largest difference is {text} ({})",
+        names.join(", ")
+    )
 }
 
 fn text(kind: ColumnKind, cell: &TableCell) -> PageCell {

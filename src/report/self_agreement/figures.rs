@@ -1,6 +1,7 @@
 //! Figures of a run without true answers: [`figures`].
 
 use crate::error::Result;
+use crate::report::chart::data::ChartData;
 use crate::report::chart::{Chart, Figure, LineStyle, Panel, PanelContent, PlotLine};
 use crate::report::ladder::{Ladder, Series, SeriesByLevel};
 use crate::score::estimate::Estimate;
@@ -72,6 +73,7 @@ pub(super) fn figures(found: &SelfAgreement<'_>) -> Result<Vec<Figure>> {
             name,
             caption: caption.to_owned(),
             svg: chart.svg()?,
+            data: Some(ChartData::json(&chart)?),
         });
     }
     Ok(figures)
@@ -100,6 +102,7 @@ fn panels(
         Panel {
             title: format!("{title}, n {}", found.items()),
             lines,
+            model: None,
         }
     });
     panels.collect()
@@ -119,6 +122,7 @@ fn line(
         name: series.model.to_owned(),
         style: style(found, series.model),
         content: PanelContent::Curve(points),
+        model: Some(series.model.to_owned()),
     }
 }
 
@@ -138,6 +142,7 @@ fn floors(found: &SelfAgreement<'_>) -> Vec<PlotLine> {
             name: format!("{model} without images"),
             style: style(found, model),
             content: PanelContent::Flat(cell.agreement?.value),
+            model: Some(model.to_owned()),
         })
     });
     lines.collect()

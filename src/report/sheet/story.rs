@@ -284,11 +284,13 @@ mod tests {
                     name: "observer".to_owned(),
                     style: LineStyle(0),
                     content: PanelContent::Curve(curve.collect()),
+                    model: None,
                 },
                 PlotLine {
                     name: "chance".to_owned(),
                     style: LineStyle(1),
                     content: PanelContent::Flat(0.3),
+                    model: None,
                 },
             ],
             note: "n = 9".to_owned(),

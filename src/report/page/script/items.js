@@ -1,22 +1,4 @@
-"use strict";
-document.documentElement.classList.add("scripted");
-
-const $ = (id) => document.getElementById(id);
-const make = (tag, text, className) => {
-  const element = document.createElement(tag);
-  if (text !== undefined) element.textContent = text;
-  if (className) element.className = className;
-  return element;
-};
-
-// Theme: the system's until a person chooses.
-const theme = () => {
-  const root = document.documentElement;
-  const system = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";
-  const now = root.dataset.theme || system;
-  root.dataset.theme = now === "dark" ? "light" : "dark";
-};
-$("theme").addEventListener("click", theme);
+// The items of the runs, with their images and the replies to them.
 
 // What a reply hides: controls that turn the direction of text or show nothing are written out.
 const HIDDEN = /[\u0000-\u0008\u000b-\u001f\u007f-\u009f\u00ad\u061c\u115f\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb]/g;
@@ -94,6 +76,15 @@ const raw = (subject) => {
 const there = () => data.subjects.findIndex((s) => s.name === state.against);
 const both = (s, i) => there() >= 0 && chosen(s, i) < FAILED && chosen(there(), i) < FAILED;
 
+// Right at L0 and at every level before this one, and wrong here.
+const isFirstLost = (s, i) => {
+  const here = data.subjects[s];
+  if (here.level === null || here.level === "L0" || chosen(s, i) >= FAILED || isRight(s, i)) return false;
+  const before = levels(here.model, here.light);
+  const earlier = before.slice(0, before.indexOf(here.level)).map((level) => at(here.model, here.light, level));
+  return earlier.length > 0 && earlier.every((subject) => subject >= 0 && isRight(subject, i));
+};
+
 const STATES = {
   "all": () => true,
   "right": (s, i) => isRight(s, i),
@@ -102,6 +93,7 @@ const STATES = {
   "no reply": (s, i) => chosen(s, i) === FAILED,
   "lost since L0": (s, i) => { const l = data.subjects[s].clean ?? -1; return l >= 0 && isRight(l, i) && chosen(s, i) < FAILED && !isRight(s, i); },
   "found since L0": (s, i) => { const l = data.subjects[s].clean ?? -1; return l >= 0 && chosen(l, i) < FAILED && !isRight(l, i) && isRight(s, i); },
+  "first lost at this level": (s, i) => isFirstLost(s, i),
   "rescued by the enhancer": (s, i) => { const r = raw(s); return r >= 0 && r !== s && chosen(r, i) < FAILED && !isRight(r, i) && isRight(s, i); },
   "harmed by the enhancer": (s, i) => { const r = raw(s); return r >= 0 && r !== s && isRight(r, i) && chosen(s, i) < FAILED && !isRight(s, i); },
   "right here, wrong there": (s, i) => isRight(s, i) && both(s, i) && !isRight(there(), i),
@@ -130,7 +122,6 @@ const fill = (select, values, value) => {
   select.value = values.includes(value) ? value : values[0];
   return select.value;
 };
-const unique = (values) => [...new Set(values)];
 
 const everyLevel = () => data.levels.map(([name]) => name);
 const severity = (level) => data.levels.find(([name]) => name === level)[1];
@@ -176,26 +167,30 @@ const drawList = (upTo) => {
   list.querySelector(".more")?.remove();
   for (; drawn < Math.min(upTo, shown.length); drawn++) {
     const i = shown[drawn], item = data.items[i], question = data.questions[item.question];
-    const row = make("li"), [sign, name, word] = mark(subject, i);
-    row.dataset.item = i;
+    const row = make("li"), button = make("button"), [sign, name, word] = mark(subject, i);
+    button.type = "button";
+    button.dataset.item = i;
     const badge = make("span", sign + " ", name);
     badge.title = word;
-    row.append(badge, plain(question.text || question.id), make("span", data.frames[question.frame], "where"));
-    row.addEventListener("click", () => go(i));
+    button.append(badge, plain(question.text || question.id), make("span", data.frames[question.frame], "where"));
+    button.addEventListener("click", () => { acted(); go(i); });
+    row.append(button);
     list.append(row);
   }
   if (drawn < shown.length) {
-    const more = make("li", (shown.length - drawn) + " more", "more");
+    const row = make("li", undefined, "more"), more = make("button", (shown.length - drawn) + " more");
+    more.type = "button";
     more.addEventListener("click", () => drawList(drawn + ROWS));
-    list.append(more);
+    row.append(more);
+    list.append(row);
   }
   current();
 };
 const current = () => {
-  for (const row of $("list").children) {
-    const here = Number(row.dataset.item) === state.item && row.dataset.item !== undefined;
+  for (const row of $("list").querySelectorAll("button[data-item]")) {
+    const here = Number(row.dataset.item) === state.item;
     row.setAttribute("aria-current", here);
-    if (here && row.scrollIntoView) {
+    if (here) {
       const list = $("list"), top = row.offsetTop - list.offsetTop;
       if (top < list.scrollTop || top + row.offsetHeight > list.scrollTop + list.clientHeight) list.scrollTop = top - list.clientHeight / 2;
     }
@@ -207,6 +202,10 @@ const link = () => {
   const parts = Object.entries(said).filter(([k, v]) => v && !(k === "family" && v === "all") && !(k === "show" && v === "all") && !(k === "against" && v === "–"));
   return "#" + parts.map(([k, v]) => k + "=" + encodeURIComponent(v)).join("&");
 };
+
+// The address names what is shown from the first act of a person on.
+let hasActed = false;
+const acted = () => { hasActed = true; };
 
 const refresh = () => {
   choices();
@@ -226,9 +225,58 @@ const go = (item) => {
   draw();
 };
 const step = (by) => {
+  acted();
   const place = shown.indexOf(state.item);
   const next = shown[Math.min(Math.max(place + by, 0), shown.length - 1)];
   if (next !== undefined) go(next);
+};
+
+// The images of the item at a level, side by side in one view: all zoom and move together.
+const view = { zoom: 1, x: 0, y: 0 };
+const MOST_ZOOM = 16;
+const show = () => {
+  view.zoom = Math.min(Math.max(view.zoom, 1), MOST_ZOOM);
+  const most = 1 - 1 / view.zoom;
+  view.x = Math.min(Math.max(view.x, 0), most);
+  view.y = Math.min(Math.max(view.y, 0), most);
+  for (const frame of $("i-images").querySelectorAll(".frame")) {
+    const { clientWidth: width, clientHeight: height } = frame;
+    frame.querySelector(".whole").style.transform = `scale(${view.zoom}) translate(${-view.x * width}px, ${-view.y * height}px)`;
+    for (const box of frame.querySelectorAll(".box")) {
+      const [left, top, right, bottom] = box.dataset.at.split(" ").map(Number);
+      Object.assign(box.style, {
+        left: (left - view.x) * view.zoom * width + "px", top: (top - view.y) * view.zoom * height + "px",
+        width: (right - left) * view.zoom * width + "px", height: (bottom - top) * view.zoom * height + "px",
+      });
+    }
+  }
+  $("i-zoom").textContent = view.zoom.toFixed(1).replace(".0", "") + " ×";
+};
+const zoom = (factor, x = 0.5, y = 0.5) => {
+  const before = view.zoom;
+  view.zoom = Math.min(Math.max(view.zoom * factor, 1), MOST_ZOOM);
+  view.x += x / before - x / view.zoom;
+  view.y += y / before - y / view.zoom;
+  show();
+};
+const pan = (x, y) => { view.x += x / view.zoom; view.y += y / view.zoom; show(); };
+
+// The boxes of the things that a question is about, as shares of the sides of its frame; none for a question about the whole room.
+const boxes = (question) => {
+  const size = data.sizes[question.frame];
+  if (!size) return [];
+  return question.outlines.map(([left, top, right, bottom]) => [left / size[0], top / size[1], right / size[0], bottom / size[1]]);
+};
+const toTheObject = () => {
+  const all = boxes(data.questions[data.items[state.item].question]);
+  if (!all.length) return;
+  const least = (at) => Math.min(...all.map((box) => box[at])), most = (at) => Math.max(...all.map((box) => box[at]));
+  const [left, top, right, bottom] = [least(0), least(1), most(2), most(3)];
+  view.zoom = 0.8 / Math.max(right - left, bottom - top, 0.05);
+  view.zoom = Math.min(Math.max(view.zoom, 1), MOST_ZOOM);
+  view.x = (left + right) / 2 - 0.5 / view.zoom;
+  view.y = (top + bottom) / 2 - 0.5 / view.zoom;
+  show();
 };
 
 const pictures = (question) => {
@@ -241,22 +289,35 @@ const pictures = (question) => {
   slider.value = Math.max(there.indexOf(level), 0);
   $("i-level-name").textContent = level ? level + " (" + severity(level) + ")" : "";
   $("i-pictures").hidden = !kept;
-  const remake = "darkqa-eval show " + data.runs[0] + " " + question.id;
+  const remake = "darkqa-eval show " + data.folders[0] + " " + question.id;
   $("i-remake").textContent = (kept ? "Small copies. " : "No small copy of this frame is kept. ") + "The images as they were sent, proved by digest: " + remake;
   if (!kept) return;
+  const outlines = boxes(question);
+  $("i-object").hidden = !outlines.length;
   const conditions = unique(data.subjects.filter((s) => s.level === level).map((s) => s.condition));
-  for (const condition of conditions) {
+  for (const condition of level === "L0" ? conditions : ["L0", ...conditions]) {
     const image = kept[condition];
     if (!image) continue;
-    const figure = make("figure"), whole = make("img", undefined, "whole"), crop = make("img", undefined, "crop");
+    const figure = make("figure"), frame = make("div", undefined, "frame"), whole = make("img", undefined, "whole"), crop = make("img", undefined, "crop");
     whole.src = image.small;
+    whole.draggable = false;
     whole.alt = condition + " of " + data.frames[question.frame];
-    crop.src = image.crop;
-    crop.alt = "middle of " + whole.alt;
+    frame.append(whole);
+    for (const at of $("i-boxes").checked ? outlines : []) {
+      const outline = make("span", undefined, "box");
+      outline.dataset.at = at.join(" ");
+      frame.append(outline);
+    }
+    whole.addEventListener("load", show);
+    const object = question.object && image.objects.find((one) => one.object.join() === question.object.join());
+    crop.src = object ? object.crop : image.crop;
+    const part = object ? "the thing asked about" : "its middle";
+    crop.alt = part + ", " + whole.alt;
     const gain = image.stops > 0 ? "light × " + Math.round(2 ** image.stops) + " (" + image.stops + " EV)" : "as it is";
-    figure.append(whole, crop, make("figcaption", condition + "; below, its middle, " + gain));
+    figure.append(frame, crop, make("figcaption", condition + "; below, " + part + ", " + gain));
     box.append(figure);
   }
+  show();
 };
 
 const marks = (i) => {
@@ -264,13 +325,15 @@ const marks = (i) => {
   table.replaceChildren();
   const there = everyLevel();
   const head = make("tr");
-  head.append(make("th", "model"), make("th", "light"), ...there.map((l) => make("th", l)));
+  head.append(...["model", "light", ...there].map((name) => { const th = make("th", name); th.scope = "col"; return th; }));
   table.append(head);
-  const now = subjectNow();
+  const now = subjectNow(), names = shortened(unique(data.subjects.map((s) => s.model)));
   for (const model of unique(data.subjects.map((s) => s.model))) {
     for (const light of lights(model)) {
       const row = make("tr");
-      const first = make("td", model), second = make("td", light, "text");
+      const first = make("th", names.get(model)), second = make("td", light, "text");
+      first.scope = "row";
+      first.title = model;
       row.append(first, second);
       for (const level of light === "blind" ? [null] : there) {
         const subject = light === "untouched" && level !== "L0" ? -1 : at(model, light, level);
@@ -279,9 +342,14 @@ const marks = (i) => {
         const cell = make("td", own || light === "blind" ? sign : "", name);
         cell.title = word;
         if (own) {
+          const button = make("button", sign);
+          button.type = "button";
+          button.title = word;
+          button.setAttribute("aria-label", `${sign}, ${word}: ${model}, ${light}, ${level ?? "without images"}`);
+          button.setAttribute("aria-current", subject === now);
           cell.dataset.subject = subject;
-          cell.setAttribute("aria-selected", subject === now);
-          cell.addEventListener("click", () => { Object.assign(state, { model, light, level, pictured: level }); refresh(); });
+          button.addEventListener("click", () => { acted(); Object.assign(state, { model, light, level, pictured: level }); refresh(); });
+          cell.replaceChildren(button);
         }
         row.append(cell);
       }
@@ -316,7 +384,7 @@ const draw = () => {
   reveal($("i-question"), question.text || question.id);
   $("i-id").textContent = item.name + " · " + data.frames[question.frame] + " · " + data.families[question.family];
   $("i-link").href = link();
-  history.replaceState(null, "", link());
+  if (hasActed) history.replaceState(null, "", link());
   const list = data.choices[item.choices].map((choice, index) => {
     const row = make("li");
     reveal(row, letter(index) + ". " + choice);
@@ -343,10 +411,13 @@ const confusion = () => {
   const family = fill($("c-family"), families, $("c-family").value);
   const one = all.find((c) => of(c).model === model && of(c).condition === condition && c.family === family);
   const table = $("c-table"), head = make("tr");
-  head.append(make("th", hasTruth() ? "true ↓ given →" : "at L0 ↓ given →"), ...one.labels.map((l) => make("th", l)), make("th", "not readable"));
+  const columns = [hasTruth() ? "true ↓ given →" : "at L0 ↓ given →", ...one.labels, "not readable"];
+  head.append(...columns.map((name) => { const th = make("th", name); th.scope = "col"; return th; }));
   const rows = one.counts.map((row, truth) => {
     const line = make("tr");
-    line.append(make("td", one.labels[truth]), ...row.map((n, given) => make("td", n || "·", n && given === truth ? "diagonal" : "")));
+    const name = make("th", one.labels[truth]);
+    name.scope = "row";
+    line.append(name, ...row.map((n, given) => make("td", n || "·", n && given === truth ? "diagonal" : "")));
     return line;
   });
   table.replaceChildren(head, ...rows);
@@ -379,22 +450,45 @@ const start = async () => {
   state = { family: "all", model: first?.model, light: undefined, level: undefined, against: "–", show: "all", words: "", item: data.items.length ? 0 : null, pictured: null };
   $("loading").hidden = true;
   $("explorer").hidden = false;
-  const set = (key, id) => $(id).addEventListener("change", (event) => { state[key] = event.target.value; state.pictured = null; refresh(); });
+  const set = (key, id) => $(id).addEventListener("change", (event) => { acted(); state[key] = event.target.value; state.pictured = null; refresh(); });
   set("family", "f-family"); set("model", "f-model"); set("light", "f-light"); set("level", "f-level"); set("against", "f-against"); set("show", "f-state");
-  $("f-words").addEventListener("input", (event) => { state.words = event.target.value; refresh(); });
+  $("f-words").addEventListener("input", (event) => { acted(); state.words = event.target.value; refresh(); });
   $("next").addEventListener("click", () => step(1));
   $("previous").addEventListener("click", () => step(-1));
   $("i-level").addEventListener("input", (event) => {
     const there = everyLevel();
+    acted();
     state.pictured = there[Number(event.target.value)];
     if (levels(state.model, state.light).includes(state.pictured)) { state.level = state.pictured; refresh(); } else { draw(); }
   });
+  const images = $("i-images");
+  images.addEventListener("wheel", (event) => {
+    const frame = event.target.closest(".frame");
+    if (!frame || !(event.ctrlKey || view.zoom > 1 || event.deltaY < 0)) return;
+    event.preventDefault();
+    const rect = frame.getBoundingClientRect();
+    zoom(event.deltaY < 0 ? 1.25 : 0.8, (event.clientX - rect.left) / rect.width, (event.clientY - rect.top) / rect.height);
+  }, { passive: false });
+  images.addEventListener("pointerdown", (event) => { if (event.target.closest(".frame")) images.setPointerCapture(event.pointerId); });
+  images.addEventListener("pointermove", (event) => {
+    const frame = images.querySelector(".frame");
+    if (frame && images.hasPointerCapture(event.pointerId)) pan(-event.movementX / frame.clientWidth, -event.movementY / frame.clientHeight);
+  });
+  images.addEventListener("keydown", (event) => {
+    const keys = { "+": () => zoom(1.25), "=": () => zoom(1.25), "-": () => zoom(0.8), ArrowLeft: () => pan(-0.1, 0), ArrowRight: () => pan(0.1, 0), ArrowUp: () => pan(0, -0.1), ArrowDown: () => pan(0, 0.1), "0": () => zoom(1 / MOST_ZOOM) };
+    if (keys[event.key]) { keys[event.key](); event.preventDefault(); }
+  });
+  $("i-in").addEventListener("click", () => zoom(1.6));
+  $("i-out").addEventListener("click", () => zoom(1 / 1.6));
+  $("i-object").addEventListener("click", toTheObject);
+  $("i-boxes").addEventListener("change", () => { if (state.item !== null) draw(); });
+  new ResizeObserver(show).observe(images);
   for (const id of ["c-model", "c-condition", "c-family"]) $(id)?.addEventListener("change", confusion);
   if ($("confusion")) confusion();
   // The page opens at its top, unless the address names an item; showing the first item writes its name there.
   const linked = data.subjects.length && follow();
   if (data.subjects.length && !linked) refresh();
-  if (linked) $("items").scrollIntoView();
+  if (linked) { acted(); $("items").scrollIntoView(); }
   addEventListener("hashchange", () => { if (said().item && location.hash !== link()) { follow(); $("items").scrollIntoView(); } });
   document.documentElement.dataset.ready = "true";
 };
