@@ -244,7 +244,7 @@ fn hostile_replies(browser: &mut Browser) {
     assert_ne!(browser.evaluate("document.title"), "owned");
     assert_eq!(
         browser.evaluate("document.querySelectorAll('script:not([type])').length"),
-        2
+        1
     );
 }
 
