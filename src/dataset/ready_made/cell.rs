@@ -5,6 +5,7 @@ use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
 
 use super::text_list::list;
+use crate::dataset::image_file::format::FileFormat;
 use crate::types::Digest;
 
 /// The maximum length of a text that may be a path or the id of a row. A longer one of the base64 alphabet is a file (the rule of
@@ -35,15 +36,15 @@ pub(super) enum Cell {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct FileFacts {
     pub(super) digest: Digest,
-    /// The first bytes, by which the format is known, and zeros behind the end of a shorter file.
-    pub(super) head: [u8; 16],
+    /// The format by the first bytes; `None` if it is none that is read.
+    pub(super) format: Option<FileFormat>,
 }
 
 impl FileFacts {
     pub(super) fn of(bytes: &[u8]) -> Self {
         Self {
             digest: Digest::of(bytes),
-            head: std::array::from_fn(|at| bytes.get(at).copied().unwrap_or(0)),
+            format: FileFormat::of(bytes).ok(),
         }
     }
 }

@@ -42,9 +42,9 @@ pub(super) fn leave_out(
 /// Two questions that differ in their answers alone, in words.
 fn contradiction(table: &Table, answered: &[Answered], pair: [usize; 2]) -> String {
     let [one, other] = pair.map(|at| {
-        let (item, choices) = (&answered[at].item, &answered[at].choices);
+        let Answered { row, choices, .. } = &answered[at];
         let truth = choices.truth().map_or("", |truth| &choices.texts()[truth]);
-        format!("{} ({truth:?})", table.place(item.row))
+        format!("{} ({truth:?})", table.place(*row))
     });
     format!("{one} and {other} ask the same of the same image, and their answers differ")
 }

@@ -50,7 +50,7 @@ impl Frames<'_> {
         let texts = |column: &Column| -> Option<Vec<String>> {
             let rows = answered
                 .iter()
-                .map(|answered| &self.table.rows[answered.item.row]);
+                .map(|answered| &self.table.rows[answered.row]);
             rows.map(|row| Some(column.text(row)?.trim().to_owned()))
                 .collect()
         };
@@ -93,15 +93,12 @@ impl Frames<'_> {
         let (mut repeats, mut contradictory) = (0, Vec::new());
         let mut texts = Vec::with_capacity(answered.len());
         for (at, question) in answered.iter().enumerate() {
-            let images = question.item.images.iter();
-            let images = images.map(|image| {
-                let found = self.find(question.item.row, image)?;
-                self.image_digest(found, &mut files)
-            });
+            let images = self.of_row(question.row);
+            let images = images.map(|found| self.image_digest(found?, &mut files));
             let images: Vec<Digest> = images.collect::<Result<_>>()?;
             let options = question.choices.texts().iter().map(String::as_bytes);
             let images = images.iter().map(|image| &image.as_bytes()[..]);
-            let text = question.item.text.as_bytes();
+            let text = question.text.as_bytes();
             let digest = Digest::of_parts(images.chain([text]).chain(options));
             let id = digest.to_string()[..12].to_owned();
             let (first, count) = seen.entry(id.clone()).or_insert((at, 0));

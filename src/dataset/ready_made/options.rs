@@ -29,7 +29,7 @@ impl Options {
         let cells = cells.filter_map(|(place, cell)| Some((option(cell.of(row))?, place)));
         let (texts, places): (Vec<String>, Vec<usize>) = cells.unzip();
         if !texts.is_empty() {
-            let texts = without_letters(texts);
+            let texts = without_letters(texts).into();
             let origin = Origin::Columns;
             let offered = Offered {
                 texts,
@@ -122,19 +122,22 @@ fn of_fields(fields: &[(String, Cell)]) -> Result<Offered, String> {
             return Err(format!("have {name} where {expected} is expected"));
         }
     }
-    let mut offered = Offered::default();
+    let (mut texts, mut places) = (Vec::new(), Vec::new());
     for (place, (name, cell)) in sorted.into_iter().enumerate() {
         match option(cell) {
             Some(text) => {
-                offered.texts.push(text);
-                offered.places.push(place);
+                texts.push(text);
+                places.push(place);
             }
             None if cell.is_absent() => {}
             None => return Err(format!("hold no text at {name}")),
         }
     }
-    offered.texts = without_letters(offered.texts);
-    Ok(offered)
+    Ok(Offered {
+        texts: without_letters(texts).into(),
+        places,
+        origin: Origin::Columns,
+    })
 }
 
 /// The names of the columns of options as `--map` takes them.
