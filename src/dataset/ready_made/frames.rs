@@ -104,16 +104,13 @@ impl<'a> Frames<'a> {
             })
         };
         let named = unique.or_else(|| self.roles.ids.iter().find(differs));
-        for (at, row) in self.table.rows.iter().enumerate() {
+        let mut name_rows = false;
+        for row in &self.table.rows {
             let found = images(self.table, row, self.roles);
+            let is_name = |image: &RowImage| matches!(image, RowImage::RowOrFile(_));
+            name_rows |= found.iter().any(is_name);
             if found.len() > 1 && several != Some(SeveralImages::Send) {
                 continue;
-            }
-            if let ([RowImage::Embedded { .. }], Some(id)) =
-                (&*found, named.and_then(|column| column.text(row)))
-            {
-                let key = (row.file, id.trim().to_owned());
-                self.holders.entry(key).or_insert(at);
             }
             let id = unique.and_then(|column| column.text(row));
             for (number, image) in (1..).zip(&found) {
@@ -135,6 +132,20 @@ impl<'a> Frames<'a> {
             }
         }
         self.tell_apart();
+        if name_rows && let Some(column) = named {
+            self.find_holders(column);
+        }
+    }
+
+    /// Finds the rows that others may name by their ids, in this column.
+    fn find_holders(&mut self, column: &Column) {
+        for (at, row) in self.table.rows.iter().enumerate() {
+            let found = images(self.table, row, self.roles);
+            if let ([RowImage::Embedded { .. }], Some(id)) = (&*found, column.text(row)) {
+                let key = (row.file, id.trim().to_owned());
+                self.holders.entry(key).or_insert(at);
+            }
+        }
     }
 
     /// Names images by their content where an id ends as the number of an image does, so that two images had one name.

@@ -126,7 +126,7 @@ fn collect(cell: &Cell, column: usize, steps: &[Step], found: &mut Vec<RowImage>
             }
         }
         Cell::Text(text) => text_image(text, column, steps, found),
-        Cell::Number(text) => found.push(RowImage::RowOrFile(text.clone())),
+        Cell::Number(text) => found.push(RowImage::RowOrFile(text.to_string())),
         Cell::Absent | Cell::Bool(_) | Cell::Bytes(_) => {}
     }
 }

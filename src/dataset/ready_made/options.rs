@@ -1,5 +1,7 @@
 //! The options of a row: [`Options`].
 
+use std::sync::Arc;
+
 use super::cell::Cell;
 use super::lettered::{in_cell, without_letters};
 use super::offered::{Offered, Origin};
@@ -84,14 +86,14 @@ fn no_list(column: &Column, cell: &Cell) -> String {
 }
 
 /// The fields of a cell that is an object, or the text of one in JSON or in Python's notation.
-fn by_letter(cell: &Cell) -> Option<Vec<(String, Cell)>> {
+fn by_letter(cell: &Cell) -> Option<Box<[(Arc<str>, Cell)]>> {
     match cell {
         Cell::Fields(fields) => Some(fields.clone()),
         Cell::Text(text) => {
             let pairs = dict(text)?.into_iter();
             Some(
                 pairs
-                    .map(|(name, text)| (name, text.map_or(Cell::Absent, Cell::Text)))
+                    .map(|(name, text)| (name.into(), text.map_or(Cell::Absent, Cell::Text)))
                     .collect(),
             )
         }
@@ -100,7 +102,7 @@ fn by_letter(cell: &Cell) -> Option<Vec<(String, Cell)>> {
 }
 
 /// The options of an object whose fields are the letters from A on, of either case.
-fn of_fields(fields: &[(String, Cell)]) -> Result<Offered, String> {
+fn of_fields(fields: &[(Arc<str>, Cell)]) -> Result<Offered, String> {
     let mut sorted: Vec<(char, &Cell)> = Vec::with_capacity(fields.len());
     for (name, cell) in fields {
         let mut chars = name.trim().chars();

@@ -134,12 +134,12 @@ fn check_codecs(path: &Path, footer: &ParquetMetaData) -> Result<()> {
 
 /// A value of a record.
 fn cell_of(field: Field) -> Cell {
-    let number = Cell::Number;
+    let number = |text: String| Cell::Number(text.into());
     match field {
         Field::Null => Cell::Absent,
         Field::Bool(is_true) => Cell::Bool(is_true),
         Field::Str(text) => Cell::Text(text),
-        Field::Bytes(bytes) => Cell::Bytes(bytes.data().to_vec()),
+        Field::Bytes(bytes) => Cell::Bytes(bytes.data().into()),
         Field::Float(value) if value.is_nan() => Cell::Absent,
         Field::Double(value) if value.is_nan() => Cell::Absent,
         Field::Float(value) => number(value.to_string()),
@@ -154,7 +154,11 @@ fn cell_of(field: Field) -> Cell {
         Field::ULong(value) => number(value.to_string()),
         Field::Group(record) => {
             let fields = record.into_columns().into_iter();
-            Cell::Fields(fields.map(|(name, field)| (name, cell_of(field))).collect())
+            Cell::Fields(
+                fields
+                    .map(|(name, field)| (name.into(), cell_of(field)))
+                    .collect(),
+            )
         }
         Field::ListInternal(list) => {
             Cell::List(list.elements().iter().cloned().map(cell_of).collect())
