@@ -168,6 +168,12 @@ impl Dataset {
         Self { questions, ..self }
     }
 
+    /// Its questions, which it has no longer, so that those of large sets are held once.
+    #[must_use]
+    pub(crate) fn take_questions(&mut self) -> Vec<Question> {
+        std::mem::take(&mut self.questions)
+    }
+
     /// The same data set with the questions of a file. Each must be about one of its frames.
     fn with_questions_of(self, file: &Path, read: ReadQuestions) -> Result<Self> {
         let (questions, reading) = read;

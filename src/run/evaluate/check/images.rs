@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::job::dark_already::advice;
 use crate::job::progress::Progress;
 use crate::job::source::first_asked;
-use crate::types::{Digest, FrameId, InputSummary, Question, SetLight};
+use crate::types::{Digest, FrameId, InputNote, InputSummary, Question, SetLight};
 
 /// Whether the pixels of images are looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,9 +26,10 @@ pub(super) enum Depth {
 const SAMPLED: usize = 32;
 
 /// What is known of one image.
-struct Looked {
-    id: FrameId,
-    facts: Result<((u32, u32), Digest, crate::types::InputNote)>,
+struct Looked<'a> {
+    id: &'a FrameId,
+    /// Its size, its digest, and what was done when it was read, if anything.
+    facts: Result<((u32, u32), Digest, Option<Box<InputNote>>)>,
     bytes: u64,
 }
 
@@ -41,12 +42,9 @@ pub(super) fn images(
     progress: &Progress,
     findings: &mut Findings,
 ) {
-    let mut seen = HashSet::new();
-    let shown = first_asked(questions).into_iter();
-    let shown = shown.flat_map(|question| dataset.shown(&question.frame));
-    let shown: Vec<&FrameId> = shown.filter(|frame| seen.insert(*frame)).collect();
+    let shown = first_shown(dataset, questions);
     let bar = progress.bar("reading images", shown.len());
-    let looked: Vec<Looked> = shown
+    let looked: Vec<Looked<'_>> = shown
         .par_iter()
         .map(|frame| {
             let looked = look(dataset, frame, depth);
@@ -68,8 +66,8 @@ pub(super) fn images(
             Ok((size, digest, note)) => {
                 bytes += of;
                 *sizes.entry(size).or_insert(0_usize) += 1;
-                notes.add(&id, &note);
-                if let Some(first) = by_digest.insert(digest, id.clone()) {
+                note.iter().for_each(|note| notes.add(id, note));
+                if let Some(first) = by_digest.insert(digest, id) {
                     let text = format!(
                         "{:?} and {:?} are the same image under two names: each gets noise of its own",
                         first.0, id.0
@@ -91,7 +89,15 @@ pub(super) fn images(
     light(dataset, &shown, set, findings);
 }
 
-fn look(dataset: &Dataset, id: &FrameId, depth: Depth) -> Looked {
+/// The frames that the questions show, each once, in the order of the questions.
+fn first_shown<'a>(dataset: &'a Dataset, questions: &'a [Question]) -> Vec<&'a FrameId> {
+    let mut seen = HashSet::new();
+    let shown = first_asked(questions).into_iter();
+    let shown = shown.flat_map(|question| dataset.shown(&question.frame));
+    shown.filter(|frame| seen.insert(*frame)).collect()
+}
+
+fn look<'a>(dataset: &Dataset, id: &'a FrameId, depth: Depth) -> Looked<'a> {
     let picture = dataset.picture(id);
     let bytes = match &picture {
         Ok(Picture::Encoded(file)) => file.bytes().len() as u64,
@@ -102,9 +108,9 @@ fn look(dataset: &Dataset, id: &FrameId, depth: Depth) -> Looked {
         if depth == Depth::Pixels {
             picture.decode()?;
         }
-        Ok((size, picture.digest(), picture.note()))
+        let note = Some(picture.note()).filter(|note| *note != InputNote::default());
+        Ok((size, picture.digest(), note.map(Box::new)))
     });
-    let id = id.clone();
     Looked { id, facts, bytes }
 }
 

@@ -129,7 +129,7 @@ fn data(
         )
     });
     let opened = opened.and_then(|dataset| Ok((dataset, args.scene.set_light(&place)?)));
-    let (dataset, light) = match opened {
+    let (mut dataset, light) = match opened {
         Ok(opened) => opened,
         Err(e) => {
             findings.problem(e.to_string());
@@ -139,7 +139,7 @@ fn data(
     for line in dataset.reading() {
         findings.ok(line);
     }
-    let asked = match select(&dataset, selection) {
+    let asked = match select(dataset.take_questions(), selection) {
         Ok(asked) => asked,
         Err(e) => {
             findings.problem(e.to_string());
