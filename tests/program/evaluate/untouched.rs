@@ -261,7 +261,14 @@ fn dark_images_are_noticed_once() {
     });
     // The check says it in the same words.
     let bench = photos(40);
-    for (flags, times) in [("", 1), ("--light dark", 0)] {
+    let rows = [
+        ("", 1),
+        ("--light dark", 0),
+        ("--levels L0 --llie lift --llie-on l0", 0),
+        ("--levels L0,L3 --llie lift --llie-on all", 1),
+        ("--levels L0", 1),
+    ];
+    for (flags, times) in rows {
         let checked = bench.complete(&words(&format!("check photos {flags}")));
         assert_eq!(checked.matches(hint).count(), times, "{checked}");
         assert_eq!(checked.matches(advice).count(), times, "{checked}");

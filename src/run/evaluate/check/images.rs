@@ -8,10 +8,10 @@ use super::findings::{Findings, Mark};
 use crate::dataset::{Dataset, Picture};
 use crate::enhance::brightness;
 use crate::error::Result;
-use crate::job::dark_already::advice;
+use crate::job::dark_already::{DarkImages, advice};
 use crate::job::progress::Progress;
 use crate::job::source::first_asked;
-use crate::types::{Digest, FrameId, InputNote, InputSummary, Question, SetLight};
+use crate::types::{Digest, FrameId, InputNote, InputSummary, Question};
 
 /// Whether the pixels of images are looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,10 +33,10 @@ struct Looked<'a> {
     bytes: u64,
 }
 
-/// Looks at the images that the questions are about, of a set that was photographed in this light.
+/// Looks at the images that the questions are about.
 pub(super) fn images(
     dataset: &Dataset,
-    set: SetLight,
+    dark: DarkImages,
     questions: &[Question],
     depth: Depth,
     progress: &Progress,
@@ -86,7 +86,7 @@ pub(super) fn images(
     for line in notes.lines() {
         findings.warn(line);
     }
-    light(dataset, &shown, set, findings);
+    light(dataset, &shown, dark, findings);
 }
 
 /// The frames that the questions show, each once, in the order of the questions.
@@ -114,8 +114,8 @@ fn look<'a>(dataset: &Dataset, id: &'a FrameId, depth: Depth) -> Looked<'a> {
     Looked { id, facts, bytes }
 }
 
-/// Measures the brightness of a sample of the images; those of a set in the dark may be dark.
-fn light(dataset: &Dataset, shown: &[&FrameId], set: SetLight, findings: &mut Findings) {
+/// Measures the brightness of a sample of the images.
+fn light(dataset: &Dataset, shown: &[&FrameId], dark: DarkImages, findings: &mut Findings) {
     let number = shown.len().min(SAMPLED);
     let sample = (0..number).into_par_iter().filter_map(|index| {
         let frame = shown[index * shown.len() / number];
@@ -127,7 +127,7 @@ fn light(dataset: &Dataset, shown: &[&FrameId], set: SetLight, findings: &mut Fi
     let Some(median) = sample.get(sample.len() / 2) else {
         return;
     };
-    match advice(*median).filter(|_| set == SetLight::Lit) {
+    match advice(*median).filter(|_| dark == DarkImages::Odd) {
         Some(advice) => findings.warn(advice),
         None => findings.ok(format!(
             "median brightness {median:.0} of 255 ({number} images)"
