@@ -94,6 +94,11 @@ fn dark_photographs_are_asked_as_they_are_and_enhanced() {
         (&Value::Null, &json!("lift"))
     );
 
+    // The first image was made for the probe too, and counts once.
+    let manifest = fs::read_to_string(bench.path("run/manifest.json")).unwrap();
+    let manifest: Value = serde_json::from_str(&manifest).unwrap();
+    assert_eq!(manifest["enhancers"]["lift"]["judged"]["images"], 3);
+
     // The image is made again from what the run holds, and is another one than the file.
     let shown = bench.call(&words("show run q1 --condition L0+lift"));
     assert_eq!(shown.code, Some(0), "{shown:?}");
