@@ -32,8 +32,11 @@ pub(super) enum Cell {
     /// Bytes that were looked at and not kept, of a row that is read for its question.
     File(Box<FileFacts>),
     List(Box<[Cell]>),
-    Fields(Box<[(Arc<str>, Cell)]>),
+    Fields(Fields),
 }
+
+/// The fields of a struct, with their names.
+pub(super) type Fields = Box<[(Arc<str>, Cell)]>;
 
 /// The names of fields in the cells of a table. Equal ones are held once.
 #[derive(Debug, Default)]

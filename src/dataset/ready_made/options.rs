@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::cell::Cell;
+use super::cell::{Cell, Fields};
 use super::lettered::{in_cell, without_letters};
 use super::offered::{Offered, Origin};
 use super::roles::{Column, Roles};
@@ -86,7 +86,7 @@ fn no_list(column: &Column, cell: &Cell) -> String {
 }
 
 /// The fields of a cell that is an object, or the text of one in JSON or in Python's notation.
-fn by_letter(cell: &Cell) -> Option<Box<[(Arc<str>, Cell)]>> {
+fn by_letter(cell: &Cell) -> Option<Fields> {
     match cell {
         Cell::Fields(fields) => Some(fields.clone()),
         Cell::Text(text) => {

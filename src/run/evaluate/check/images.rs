@@ -28,9 +28,16 @@ const SAMPLED: usize = 32;
 /// What is known of one image.
 struct Looked<'a> {
     id: &'a FrameId,
-    /// Its size, its digest, and what was done when it was read, if anything.
-    facts: Result<((u32, u32), Digest, Option<Box<InputNote>>)>,
+    facts: Result<Facts>,
     bytes: u64,
+}
+
+/// What an image is like.
+struct Facts {
+    size: (u32, u32),
+    digest: Digest,
+    /// What was done when it was read, if anything.
+    note: Option<Box<InputNote>>,
 }
 
 /// Looks at the images that the questions are about.
@@ -63,10 +70,12 @@ pub(super) fn images(
     {
         match facts {
             Err(e) => findings.one_of("images that cannot be used", Mark::Problem, e.to_string()),
-            Ok((size, digest, note)) => {
+            Ok(Facts { size, digest, note }) => {
                 bytes += of;
                 *sizes.entry(size).or_insert(0_usize) += 1;
-                note.iter().for_each(|note| notes.add(id, note));
+                if let Some(note) = note {
+                    notes.add(id, &note);
+                }
                 if let Some(first) = by_digest.insert(digest, id) {
                     let text = format!(
                         "{:?} and {:?} are the same image under two names: each gets noise of its own",
@@ -109,7 +118,11 @@ fn look<'a>(dataset: &Dataset, id: &'a FrameId, depth: Depth) -> Looked<'a> {
             picture.decode()?;
         }
         let note = Some(picture.note()).filter(|note| *note != InputNote::default());
-        Ok((size, picture.digest(), note.map(Box::new)))
+        Ok(Facts {
+            size,
+            digest: picture.digest(),
+            note: note.map(Box::new),
+        })
     });
     Looked { id, facts, bytes }
 }
