@@ -26,6 +26,7 @@ use serde::Deserialize;
 use super::dark_photos::DarkField;
 use super::image_file::format::READ;
 use super::image_names::{ImageNames, is_image};
+use super::image_source::FrameFile;
 use super::maps::{DepthFile, MapPaths};
 use super::root::LeadsTo;
 use super::view::FrameFacts;
@@ -127,12 +128,12 @@ impl FrameLine {
             room: self.room_gt,
             scene: self.scene,
         };
-        Ok(ImageSource::File {
+        Ok(ImageSource::File(Box::new(FrameFile {
             rgb,
             maps,
             view,
             dark,
-        })
+        })))
     }
 }
 

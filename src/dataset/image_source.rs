@@ -12,13 +12,7 @@ use crate::rooms;
 /// The place of one image and of its maps.
 #[derive(Debug, Clone)]
 pub(crate) enum ImageSource {
-    /// An image file, its map files, the other facts about the frame, and photographs of its scene in the dark.
-    File {
-        rgb: PathBuf,
-        maps: MapPaths,
-        view: FrameFacts,
-        dark: Vec<DarkPhoto>,
-    },
+    File(Box<FrameFile>),
     /// An image of this name in a ZIP file.
     Member(Arc<Archive>),
     /// An image inside a file of rows.
@@ -27,14 +21,23 @@ pub(crate) enum ImageSource {
     Room(rooms::Room),
 }
 
+/// An image file, its map files, the other facts about the frame, and photographs of its scene in the dark.
+#[derive(Debug, Clone)]
+pub(crate) struct FrameFile {
+    pub(crate) rgb: PathBuf,
+    pub(crate) maps: MapPaths,
+    pub(crate) view: FrameFacts,
+    pub(crate) dark: Vec<DarkPhoto>,
+}
+
 impl ImageSource {
     /// An image file without maps.
     pub(super) fn image(rgb: PathBuf) -> Self {
-        Self::File {
+        Self::File(Box::new(FrameFile {
             rgb,
             maps: MapPaths::default(),
             view: FrameFacts::default(),
             dark: Vec::new(),
-        }
+        }))
     }
 }

@@ -168,6 +168,12 @@ impl Dataset {
         Self { questions, ..self }
     }
 
+    /// Its questions, which it has no longer, so that those of large sets are held once.
+    #[must_use]
+    pub(crate) fn take_questions(&mut self) -> Vec<Question> {
+        std::mem::take(&mut self.questions)
+    }
+
     /// The same data set with the questions of a file. Each must be about one of its frames.
     fn with_questions_of(self, file: &Path, read: ReadQuestions) -> Result<Self> {
         let (questions, reading) = read;
@@ -264,7 +270,7 @@ impl Dataset {
     #[must_use]
     pub fn scene(&self, id: &FrameId) -> String {
         match self.sources.get(id) {
-            Some(ImageSource::File { view, .. }) => view.scene.clone(),
+            Some(ImageSource::File(file)) => file.view.scene.clone(),
             Some(ImageSource::Room(room)) => room.scene(),
             Some(ImageSource::Embedded(_) | ImageSource::Member(_)) | None => String::new(),
         }
@@ -368,9 +374,9 @@ impl Dataset {
     /// If there is no such frame, its file cannot be read, or the image is to be turned and its maps do not fit.
     pub fn picture(&self, frame: &FrameId) -> Result<Picture> {
         match self.sources.get(frame) {
-            Some(ImageSource::File { rgb, maps, .. }) => {
-                let file = ImageFile::open(rgb, self.rule)?;
-                file.beside(maps).map(Picture::Encoded)
+            Some(ImageSource::File(file)) => {
+                let image = ImageFile::open(&file.rgb, self.rule)?;
+                image.beside(&file.maps).map(Picture::Encoded)
             }
             Some(ImageSource::Embedded(image)) => image.image(self.rule).map(Picture::Encoded),
             Some(ImageSource::Member(archive)) => {
@@ -390,7 +396,7 @@ impl Dataset {
     #[must_use]
     pub(crate) fn photographs(&self, frame: &FrameId) -> &[DarkPhoto] {
         match self.sources.get(frame) {
-            Some(ImageSource::File { dark, .. }) => dark,
+            Some(ImageSource::File(file)) => &file.dark,
             _ => &[],
         }
     }
@@ -412,7 +418,7 @@ impl Dataset {
     #[must_use]
     pub fn focal(&self, frame: &FrameId) -> Option<f64> {
         match self.sources.get(frame)? {
-            ImageSource::File { view, .. } => view.intrinsics.map(|camera| camera.fx),
+            ImageSource::File(file) => file.view.intrinsics.map(|camera| camera.fx),
             ImageSource::Room(room) => Some(room.focal()),
             ImageSource::Embedded(_) | ImageSource::Member(_) => None,
         }
@@ -422,7 +428,7 @@ impl Dataset {
     #[must_use]
     pub fn image_file(&self, frame: &FrameId) -> Option<&Path> {
         match self.sources.get(frame)? {
-            ImageSource::File { rgb, .. } => Some(rgb),
+            ImageSource::File(file) => Some(&file.rgb),
             ImageSource::Embedded(_) | ImageSource::Member(_) | ImageSource::Room(_) => None,
         }
     }
@@ -435,7 +441,7 @@ impl Dataset {
         const NONE: &MapPaths = &MapPaths::NONE;
         static UNKNOWN: LazyLock<FrameFacts> = LazyLock::new(FrameFacts::default);
         let (maps, view) = match self.sources.get(frame) {
-            Some(ImageSource::File { maps, view, .. }) => (maps, view),
+            Some(ImageSource::File(file)) => (&file.maps, &file.view),
             _ => (NONE, &*UNKNOWN),
         };
         Ok(FrameFiles {

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::dark_photos::DarkPhoto;
+use super::image_source::FrameFile;
 use super::maps::MapPaths;
 use super::pairs::Pairs;
 use super::view::FrameFacts;
@@ -33,12 +34,12 @@ pub(super) fn dataset(folder: &Path, pairs: Pairs) -> Result<Dataset> {
             path: pair.low,
             ev: None,
         };
-        let source = ImageSource::File {
+        let source = ImageSource::File(Box::new(FrameFile {
             rgb: pair.normal.clone(),
             maps: MapPaths::default(),
             view: FrameFacts::default(),
             dark: vec![dark],
-        };
+        }));
         if sources.insert(id, source).is_some() {
             return Err(Error::data(
                 pair.normal.display(),

@@ -1,12 +1,12 @@
 //! What an enhancer did in a run, shared by all threads that use it: [`Usage`]; and what follows if that is odd: [`Implausible`].
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::plausible::{Codes, DARK, Gravity, brightness, judge};
 use super::sizes::SizeLog;
-use crate::types::Rgb;
 use crate::types::enhancer_note::{EnhancerNote, FlawedImage};
+use crate::types::{Digest, Rgb};
 
 /// Number of dark images from which on a verdict on the enhancer is possible; chosen as the number of frames of the probe.
 const ENOUGH: usize = super::probe::FRAMES;
@@ -32,6 +32,8 @@ struct State {
     note: EnhancerNote,
     /// Number of images that cannot be enhanced images.
     impossible: usize,
+    /// The digests of the frames and conditions whose images were looked at.
+    judged: HashSet<Digest>,
     /// What each twin did because of sizes.
     sizes: BTreeMap<usize, SizeLog>,
 }
@@ -58,8 +60,8 @@ impl Usage {
         self.with(|state| change(&mut state.note));
     }
 
-    /// Looks at what an enhancer made of a frame in a condition. Images that are not dark are not judged, because good models fail
-    /// the rules on them.
+    /// Looks at what an enhancer made of a frame in a condition; an image that is made again counts once. Images that are not dark are
+    /// not judged, because good models fail the rules on them.
     ///
     /// # Errors
     /// What was seen, if more than half of at least six images cannot be enhanced images, unless such images are used.
@@ -72,10 +74,16 @@ impl Usage {
         if implausible == Implausible::NotLookedFor || brightness(dark) > DARK {
             return Ok(());
         }
+        let place = [frame, condition].map(ToString::to_string);
+        let key = Digest::of_parts(place.iter().map(String::as_bytes));
+        if !self.with(|state| state.judged.insert(key)) {
+            return Ok(());
+        }
+        let [frame, condition] = place;
         let verdict = judge(&Codes::small(dark), &Codes::small(made));
         let flawed = verdict.map(|verdict| FlawedImage {
-            frame: frame.to_string(),
-            condition: condition.to_string(),
+            frame,
+            condition,
             flaw: verdict.flaw,
         });
         self.with(|state| {
@@ -115,24 +123,40 @@ mod tests {
         Rgb::new(96, 96, samples.collect()).unwrap()
     }
 
-    fn judged(usage: &Usage, made: &Rgb, how: Implausible) -> Result<(), String> {
-        usage.judge([&squares(1.0), made], [&"frame", &"L3+ev+m"], how)
+    fn judged(usage: &Usage, frame: usize, made: &Rgb, how: Implausible) -> Result<(), String> {
+        usage.judge([&squares(1.0), made], [&frame, &"L3+ev+m"], how)
     }
 
     #[test]
     fn an_enhancer_ends_when_most_of_its_images_are_impossible() {
         let usage = Usage::default();
         let (good, flat) = (squares(3.0), Rgb::black(96, 96));
-        for _ in 0..3 {
-            judged(&usage, &good, Implausible::Refused).unwrap();
+        for frame in 0..3 {
+            judged(&usage, frame, &good, Implausible::Refused).unwrap();
         }
-        for _ in 0..3 {
-            judged(&usage, &flat, Implausible::Refused).unwrap();
+        for frame in 3..6 {
+            judged(&usage, frame, &flat, Implausible::Refused).unwrap();
         }
-        let problem = judged(&usage, &flat, Implausible::Refused).unwrap_err();
+        let problem = judged(&usage, 6, &flat, Implausible::Refused).unwrap_err();
         assert!(problem.starts_with("4 of its 7 images"), "{problem}");
-        judged(&usage, &flat, Implausible::Used).unwrap();
+        judged(&usage, 7, &flat, Implausible::Used).unwrap();
         assert_eq!(usage.note().judged.flaws(), 5);
+    }
+
+    #[test]
+    fn an_image_that_is_made_again_counts_once() {
+        let usage = Usage::default();
+        let flat = Rgb::black(96, 96);
+        for frame in [0, 1, 0, 1, 1] {
+            judged(&usage, frame, &flat, Implausible::Used).unwrap();
+        }
+        let again = [&squares(1.0), &flat];
+        usage
+            .judge(again, [&0, &"L4+ev+m"], Implausible::Used)
+            .unwrap();
+        let judged = usage.note().judged;
+        assert_eq!((judged.images, judged.flaws()), (3, 3));
+        assert_eq!(judged.examples.len(), 3);
     }
 
     #[test]

@@ -45,9 +45,10 @@ impl Interface {
         };
         for (index, (_, line)) in lines.into_iter().enumerate() {
             let id = FrameId(format!("{}/{}", line.scene, line.frame));
-            let Some(ImageSource::File { rgb, view, .. }) = dataset.sources.get(&id) else {
+            let Some(ImageSource::File(file)) = dataset.sources.get(&id) else {
                 continue;
             };
+            let view = &file.view;
             if view.segmentation == Segmentation::Parts {
                 listing.segmentation = Segmentation::Parts;
             }
@@ -56,7 +57,7 @@ impl Interface {
                 .entry(line.scene.clone())
                 .or_insert_with(|| view.names.as_ref().clone());
             listing.frames.push(ListedFrame {
-                rgb: rgb.clone(),
+                rgb: file.rgb.clone(),
                 scene: line.scene,
                 frame: line.frame,
                 time: line.t,

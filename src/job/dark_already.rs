@@ -7,8 +7,8 @@ use super::progress::Progress;
 use super::settings::JobSettings;
 use super::source::{Frames, Source, SourceFrame};
 use crate::dataset::Picture;
-use crate::enhance::brightness as brightness_in_codes;
-use crate::synthesis::mean_luminance;
+use crate::enhance::{EnhancerArgs, brightness as brightness_in_codes};
+use crate::synthesis::{LightSettings, mean_luminance};
 use crate::types::{AxisLevel, Rgb, SetLight};
 
 /// Maximum number of frames that are measured; chosen.
@@ -51,24 +51,40 @@ pub(crate) fn brightness(frames: &dyn Frames, sources: &[Source]) -> Option<(f64
     (!sample.is_empty()).then_some((mean, sample.len()))
 }
 
+/// What it means that the images of a set are dark.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum DarkImages {
+    /// They are said to be, or they are asked about as they are, raw and enhanced, and no others are.
+    Expected,
+    /// They may not be what the user takes them for.
+    Odd,
+}
+
+impl DarkImages {
+    /// For a set in this light, asked with these levels and enhancers.
+    pub(crate) fn of(set: SetLight, light: &LightSettings, enhancers: &EnhancerArgs) -> Self {
+        let as_they_are = light.levels == [AxisLevel::L0]
+            && !enhancers.llie.is_empty()
+            && enhancers.on().includes(None);
+        if set == SetLight::Dark || as_they_are {
+            Self::Expected
+        } else {
+            Self::Odd
+        }
+    }
+}
+
 /// Warns if the frames of an experiment are dark already, and it does more than to ask about them as they are and enhanced.
 pub(super) fn warn<E: Experiment>(experiment: &E) {
     let settings = experiment.settings();
-    if settings.set_light == SetLight::Dark || asks_as_they_are(settings) {
+    let dark = DarkImages::of(settings.set_light, &settings.light, &settings.enhancers);
+    if dark == DarkImages::Expected {
         return;
     }
     let median = median_luma(experiment.frames(), experiment.sources());
     if let Some(advice) = median.and_then(advice) {
         tracing::warn!("{advice}");
     }
-}
-
-/// Whether the untouched images are asked about raw and enhanced, and no others.
-fn asks_as_they_are(settings: &JobSettings) -> bool {
-    let enhancers = &settings.enhancers;
-    settings.light.levels == [AxisLevel::L0]
-        && !enhancers.llie.is_empty()
-        && enhancers.on().includes(None)
 }
 
 /// The median of the mean luma of up to [`SAMPLED`] frames, evenly spread; the upper of two. `None` without frames in files. Built-in

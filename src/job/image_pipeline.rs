@@ -266,10 +266,11 @@ impl<'a> ImagePipeline<'a> {
                 let staged = conditions.iter().map(|condition| work.stage(condition));
                 staged.collect::<Result<Vec<StagedFrame>>>()
             });
-            for staged in staged.collect::<Result<Vec<_>>>()? {
+            let staged = staged.collect::<Result<Vec<_>>>()?;
+            for (frame, staged) in frames.iter().zip(staged) {
                 let conditions = conditions.iter().zip(&mut images);
                 for (staged, (condition, images)) in staged.into_iter().zip(conditions) {
-                    images.push(self.finish(staged, [&source.name, condition])?);
+                    images.push(self.finish(staged, [&frame.id, condition])?);
                 }
             }
         }

@@ -124,10 +124,13 @@ impl QuestionBank {
 }
 
 /// The questions that are asked: the first `--limit` ones of the chosen families.
-pub(crate) fn select(dataset: &Dataset, selection: &SelectionArgs) -> Result<Vec<Question>> {
+pub(crate) fn select(
+    mut questions: Vec<Question>,
+    selection: &SelectionArgs,
+) -> Result<Vec<Question>> {
     let wanted = &selection.families;
-    let all = dataset.questions().iter();
-    let present: BTreeSet<&Family> = all.clone().map(|question| &question.family).collect();
+    let present = questions.iter().map(|question| &question.family);
+    let present: BTreeSet<&Family> = present.collect();
     if let Some(missing) = wanted.iter().find(|family| !present.contains(family)) {
         let present: Vec<&str> = present.into_iter().map(Family::name).collect();
         let problem = format!(
@@ -136,7 +139,7 @@ pub(crate) fn select(dataset: &Dataset, selection: &SelectionArgs) -> Result<Vec
         );
         return Err(Error::usage("--families", problem));
     }
-    let chosen = all.filter(|question| wanted.is_empty() || wanted.contains(&question.family));
-    let limit = selection.limit.map_or(usize::MAX, usize::from);
-    Ok(chosen.take(limit).cloned().collect())
+    questions.retain(|question| wanted.is_empty() || wanted.contains(&question.family));
+    questions.truncate(selection.limit.map_or(usize::MAX, usize::from));
+    Ok(questions)
 }

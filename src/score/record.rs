@@ -18,7 +18,7 @@ impl Detail for ChoiceDetail {
 
     /// Stores both readings of a reply, and the outcome, which follows from the strict reading.
     fn read(&mut self, reply: &Reply) -> Result<()> {
-        let choices = Choices::known_by(self.choices.clone(), self.truth)?;
+        let choices = Choices::known_by(self.choices.clone().into(), self.truth)?;
         let (strict, lenient) = readings(reply, &choices);
         self.outcome = match strict {
             Answer::Unparsed(_) => TrialOutcome::Unparsed,

@@ -79,7 +79,7 @@ pub struct JudgedImages {
 /// One image with a flaw.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct FlawedImage {
-    /// The frame or walk.
+    /// The frame.
     pub frame: String,
     /// The condition.
     pub condition: String,

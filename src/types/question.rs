@@ -1,6 +1,7 @@
 //! A [`Question`] with its [`Choices`], and the [`Answer`] that is read from a reply.
 
 use std::fmt;
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
@@ -92,7 +93,7 @@ impl<'de> Deserialize<'de> for Family {
 /// The answers that a question offers, in the order shown, and the index of the true one, if anybody knows it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Choices {
-    texts: Vec<String>,
+    texts: Arc<[String]>,
     truth: Option<usize>,
 }
 
@@ -106,7 +107,7 @@ impl Choices {
     /// # Errors
     /// [`Error::Data`] at the place `choices`.
     pub fn new(texts: Vec<String>, truth: usize) -> Result<Self, Error> {
-        Self::known_by(texts, Some(truth))
+        Self::known_by(texts.into(), Some(truth))
     }
 
     /// Checks a list of choices of which nobody knows the true one, as [`new`](Self::new) does.
@@ -114,14 +115,14 @@ impl Choices {
     /// # Errors
     /// [`Error::Data`] at the place `choices`.
     pub fn without_truth(texts: Vec<String>) -> Result<Self, Error> {
-        Self::known_by(texts, None)
+        Self::known_by(texts.into(), None)
     }
 
     /// Checks a list of choices with the index of the true one, or `None` if nobody knows it.
     ///
     /// # Errors
     /// [`Error::Data`] at the place `choices`.
-    pub(crate) fn known_by(texts: Vec<String>, truth: Option<usize>) -> Result<Self, Error> {
+    pub(crate) fn known_by(texts: Arc<[String]>, truth: Option<usize>) -> Result<Self, Error> {
         let wrong = |problem: String| Err(Error::data("choices", problem));
         if !(2..=Self::MOST).contains(&texts.len()) {
             return wrong(format!(

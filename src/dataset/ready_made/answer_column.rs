@@ -48,7 +48,7 @@ pub(super) fn of_options<'a>(
         let said = |reading: Reading| -> Said {
             let rows = items.iter().zip(&answers);
             rows.map(|(item, answer)| {
-                let options = item.options.as_ref().unwrap_or(&none);
+                let options = item.options.as_deref().unwrap_or(&none);
                 reading.by_rule(answer.as_ref()?, options)
             })
             .collect()

@@ -171,7 +171,7 @@ mod tests {
     #[test]
     fn letters_and_numbers_name_columns_also_behind_an_empty_one() {
         let offered = Offered {
-            texts: vec!["red".to_owned(), "blue".to_owned()],
+            texts: ["red", "blue"].map(str::to_owned).into(),
             places: vec![0, 2],
             origin: Origin::Columns,
         };

@@ -1,10 +1,14 @@
 //! A value in a row of a ready-made set: [`Cell`].
 
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
 
 use super::text_list::list;
+use crate::dataset::image_file::format::FileFormat;
 use crate::types::Digest;
 
 /// The maximum length of a text that may be a path or the id of a row. A longer one of the base64 alphabet is a file (the rule of
@@ -14,59 +18,83 @@ pub(super) const LONGEST_NAME: usize = 64;
 /// The length from which on a text of the base64 alphabet is not kept: its file is read again when it is shown.
 const LONGEST_KEPT: usize = 1024;
 
-/// A value in a row. The bytes of files are not kept.
+/// A value in a row. The bytes of files are not kept. Sets have millions of cells, so that a cell is no larger than a text.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Cell {
     /// Null, or no such column in this row.
     Absent,
     Bool(bool),
     /// A number as its file writes it.
-    Number(String),
+    Number(Box<str>),
     Text(String),
     /// Bytes, of a row that is read to show its image.
-    Bytes(Vec<u8>),
+    Bytes(Box<[u8]>),
     /// Bytes that were looked at and not kept, of a row that is read for its question.
     File(Box<FileFacts>),
-    List(Vec<Cell>),
-    Fields(Vec<(String, Cell)>),
+    List(Box<[Cell]>),
+    Fields(Fields),
+}
+
+/// The fields of a struct, with their names.
+pub(super) type Fields = Box<[(Arc<str>, Cell)]>;
+
+/// The names of fields in the cells of a table. Equal ones are held once.
+#[derive(Debug, Default)]
+pub(super) struct FieldNames(BTreeSet<Arc<str>>);
+
+impl FieldNames {
+    fn once(&mut self, name: Arc<str>) -> Arc<str> {
+        if let Some(known) = self.0.get(&name) {
+            return Arc::clone(known);
+        }
+        self.0.insert(Arc::clone(&name));
+        name
+    }
 }
 
 /// What is known of bytes that are not kept.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct FileFacts {
     pub(super) digest: Digest,
-    /// The first bytes, by which the format is known, and zeros behind the end of a shorter file.
-    pub(super) head: [u8; 16],
+    /// The format by the first bytes; `None` if it is none that is read.
+    pub(super) format: Option<FileFormat>,
 }
 
 impl FileFacts {
     pub(super) fn of(bytes: &[u8]) -> Self {
         Self {
             digest: Digest::of(bytes),
-            head: std::array::from_fn(|at| bytes.get(at).copied().unwrap_or(0)),
+            format: FileFormat::of(bytes).ok(),
         }
     }
 }
 
 impl Cell {
     /// The cell without the bytes of files.
-    pub(super) fn without_files(self) -> Self {
+    pub(super) fn without_files(self, names: &mut FieldNames) -> Self {
         match self {
             Self::Bytes(bytes) => Self::File(Box::new(FileFacts::of(&bytes))),
             Self::Text(text) if text.len() > LONGEST_KEPT => match (decoded(&text), list(&text)) {
                 (Some(bytes), _) => Self::File(Box::new(FileFacts::of(&bytes))),
                 (None, Some(items)) => {
                     let items = items.into_iter();
-                    Self::List(items.map(|item| Self::Text(item).without_files()).collect())
+                    Self::List(
+                        items
+                            .map(|item| Self::Text(item).without_files(names))
+                            .collect(),
+                    )
                 }
                 (None, None) => Self::Text(text),
             },
-            Self::List(cells) => Self::List(cells.into_iter().map(Self::without_files).collect()),
+            Self::List(cells) => {
+                let cells = cells.into_iter();
+                Self::List(cells.map(|cell| cell.without_files(names)).collect())
+            }
             Self::Fields(fields) => {
                 let fields = fields.into_iter();
                 Self::Fields(
                     fields
-                        .map(|(name, cell)| (name, cell.without_files()))
+                        .map(|(name, cell)| (names.once(name), cell.without_files(names)))
                         .collect(),
                 )
             }
@@ -105,7 +133,7 @@ impl Cell {
         };
         let mut fields = fields.iter();
         fields
-            .find(|(field, _)| field == name)
+            .find(|(field, _)| **field == *name)
             .map(|(_, cell)| cell)
     }
 
@@ -154,14 +182,14 @@ impl From<&Cell> for Value {
             Cell::Bool(is_true) => Self::Bool(*is_true),
             Cell::Number(text) => text
                 .parse()
-                .map_or_else(|_| text.as_str().into(), Self::Number),
+                .map_or_else(|_| text.as_ref().into(), Self::Number),
             Cell::Text(text) => text.as_str().into(),
             Cell::List(cells) => cells.iter().map(Self::from).collect(),
             Cell::Fields(fields) => {
                 let fields = fields.iter();
                 Self::Object(
                     fields
-                        .map(|(name, cell)| (name.clone(), Self::from(cell)))
+                        .map(|(name, cell)| (name.to_string(), Self::from(cell)))
                         .collect(),
                 )
             }
@@ -174,14 +202,14 @@ impl From<Value> for Cell {
         match value {
             Value::Null => Self::Absent,
             Value::Bool(is_true) => Self::Bool(is_true),
-            Value::Number(number) => Self::Number(number.to_string()),
+            Value::Number(number) => Self::Number(number.to_string().into()),
             Value::String(text) => Self::Text(text),
             Value::Array(values) => Self::List(values.into_iter().map(Self::from).collect()),
             Value::Object(fields) => {
                 let fields = fields.into_iter();
                 Self::Fields(
                     fields
-                        .map(|(name, value)| (name, Self::from(value)))
+                        .map(|(name, value)| (name.into(), Self::from(value)))
                         .collect(),
                 )
             }
@@ -257,10 +285,18 @@ mod tests {
     }
 
     #[test]
+    fn a_cell_is_no_larger_than_a_text() {
+        assert_eq!(size_of::<Cell>(), size_of::<String>());
+    }
+
+    #[test]
     fn files_are_known_by_their_digest_and_not_kept() {
         let file = vec![9; 4000];
-        let text = Cell::Text(STANDARD.encode(&file)).without_files();
-        assert_eq!(text, Cell::Bytes(file.clone()).without_files());
+        let text = Cell::Text(STANDARD.encode(&file)).without_files(&mut FieldNames::default());
+        assert_eq!(
+            text,
+            Cell::Bytes(file.clone().into()).without_files(&mut FieldNames::default())
+        );
         assert_eq!(text, Cell::File(Box::new(FileFacts::of(&file))));
         assert_ne!(text, Cell::File(Box::new(FileFacts::of(&file[1..]))));
     }

@@ -1,11 +1,36 @@
-//! Questions that differ in their answers alone: [`leave_out`].
+//! Questions that differ in their answers alone: [`contradictory`], [`leave_out`].
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 
 use super::left_out::{LeftOut, Why};
 use super::row::Table;
 use super::settings::SetArgs;
 use super::truths::Answered;
+use crate::types::Digest;
+
+/// The pairs of questions whose digests are equal and whose answers differ, by their places. Each question that another contradicts is
+/// in a pair.
+pub(super) fn contradictory(answered: &[Answered], digests: &[Digest]) -> Vec<[usize; 2]> {
+    let truth = |at: usize| answered[at].choices.truth();
+    let mut first: HashMap<&Digest, usize> = HashMap::new();
+    let mut opposed: HashMap<&Digest, usize> = HashMap::new();
+    let mut pairs = Vec::new();
+    for (at, digest) in digests.iter().enumerate() {
+        let first = *first.entry(digest).or_insert(at);
+        if truth(first) != truth(at) {
+            opposed.entry(digest).or_insert(at);
+            pairs.push([first, at]);
+        }
+    }
+    if !opposed.is_empty() {
+        for (at, digest) in digests.iter().enumerate() {
+            let other = opposed.get(digest).copied();
+            let other = other.filter(|_| first[digest] != at && truth(first[digest]) == truth(at));
+            pairs.extend(other.map(|other| [at, other]));
+        }
+    }
+    pairs
+}
 
 /// Leaves out both questions of each pair that differs in its answers alone, if the user allows it.
 ///
@@ -42,9 +67,9 @@ pub(super) fn leave_out(
 /// Two questions that differ in their answers alone, in words.
 fn contradiction(table: &Table, answered: &[Answered], pair: [usize; 2]) -> String {
     let [one, other] = pair.map(|at| {
-        let (item, choices) = (&answered[at].item, &answered[at].choices);
+        let Answered { row, choices, .. } = &answered[at];
         let truth = choices.truth().map_or("", |truth| &choices.texts()[truth]);
-        format!("{} ({truth:?})", table.place(item.row))
+        format!("{} ({truth:?})", table.place(*row))
     });
     format!("{one} and {other} ask the same of the same image, and their answers differ")
 }

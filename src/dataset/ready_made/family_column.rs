@@ -23,11 +23,7 @@ impl FamilyOf {
             Families::Known(columns) => columns,
             Families::Said(column) => return column.clone().map_or(Self::None, Self::Column),
         };
-        let rows = || {
-            answered
-                .iter()
-                .map(|answered| &table.rows[answered.item.row])
-        };
+        let rows = || answered.iter().map(|answered| &table.rows[answered.row]);
         let varies = |column: &&Column| has_two(rows().map(|row| column.text(row)));
         if let Some(column) = columns.iter().find(varies) {
             return Self::Column(column.clone());

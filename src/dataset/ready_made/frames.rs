@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::cell::FileFacts;
 use super::container::{Archive, SetFile};
-use super::images::{EmbeddedImage, RowImage, images};
+use super::images::{CellPart, EmbeddedImage, ImagesAre, RowImage, images};
 use super::roles::{Column, Roles};
 use super::row::Table;
 use super::settings::SeveralImages;
@@ -44,6 +44,9 @@ pub(super) struct Frames<'a> {
     /// The row of each file and id whose own cell holds an image.
     holders: HashMap<(usize, String), usize>,
     pub(super) roles: &'a Roles,
+    kind: ImagesAre,
+    /// The part of the row that holds the image, by the column and the steps in its cell.
+    parts: HashMap<(usize, Vec<Step>), Arc<CellPart>>,
     /// The name of each image in a cell.
     names: HashMap<Digest, FrameId>,
     sources: BTreeMap<FrameId, ImageSource>,
@@ -60,6 +63,7 @@ impl<'a> Frames<'a> {
         archive: Option<&'a Arc<Archive>>,
         files: &'a [Arc<SetFile>],
         roles: &'a Roles,
+        kind: ImagesAre,
         several: Option<SeveralImages>,
     ) -> Self {
         let mut frames = Self {
@@ -69,6 +73,8 @@ impl<'a> Frames<'a> {
             files,
             holders: HashMap::new(),
             roles,
+            kind,
+            parts: HashMap::new(),
             names: HashMap::new(),
             sources: BTreeMap::new(),
             series: Series::new(),
@@ -98,16 +104,13 @@ impl<'a> Frames<'a> {
             })
         };
         let named = unique.or_else(|| self.roles.ids.iter().find(differs));
-        for (at, row) in self.table.rows.iter().enumerate() {
+        let mut name_rows = false;
+        for row in &self.table.rows {
             let found = images(self.table, row, self.roles);
+            let is_name = |image: &RowImage| matches!(image, RowImage::RowOrFile(_));
+            name_rows |= found.iter().any(is_name);
             if found.len() > 1 && several != Some(SeveralImages::Send) {
                 continue;
-            }
-            if let ([RowImage::Embedded { .. }], Some(id)) =
-                (&*found, named.and_then(|column| column.text(row)))
-            {
-                let key = (row.file, id.trim().to_owned());
-                self.holders.entry(key).or_insert(at);
             }
             let id = unique.and_then(|column| column.text(row));
             for (number, image) in (1..).zip(&found) {
@@ -129,6 +132,20 @@ impl<'a> Frames<'a> {
             }
         }
         self.tell_apart();
+        if name_rows && let Some(column) = named {
+            self.find_holders(column);
+        }
+    }
+
+    /// Finds the rows that others may name by their ids, in this column.
+    fn find_holders(&mut self, column: &Column) {
+        for (at, row) in self.table.rows.iter().enumerate() {
+            let found = images(self.table, row, self.roles);
+            if let ([RowImage::Embedded { .. }], Some(id)) = (&*found, column.text(row)) {
+                let key = (row.file, id.trim().to_owned());
+                self.holders.entry(key).or_insert(at);
+            }
+        }
     }
 
     /// Names images by their content where an id ends as the number of an image does, so that two images had one name.
@@ -144,8 +161,14 @@ impl<'a> Frames<'a> {
         }
     }
 
+    /// The images of a row, in order.
+    pub(super) fn of_row(&self, row: usize) -> impl Iterator<Item = Result<Found>> {
+        let images = self.kind.of(self.table, &self.table.rows[row], self.roles);
+        images.into_iter().map(move |image| self.find(row, image))
+    }
+
     /// An image of a row.
-    pub(super) fn find(&self, row: usize, image: &RowImage) -> Result<Found> {
+    fn find(&self, row: usize, image: RowImage) -> Result<Found> {
         let at = |problem| Error::data(self.table.place(row), problem);
         match image {
             RowImage::Embedded {
@@ -154,15 +177,15 @@ impl<'a> Frames<'a> {
                 facts,
             } => Ok(Found::Cell {
                 row,
-                column: *column,
-                steps: steps.clone(),
-                facts: facts.clone(),
+                column,
+                steps,
+                facts,
             }),
-            RowImage::File(path) => self.file(row, path).map_err(at),
-            RowImage::Frame(name) => Ok(Found::Frame(FrameId(name.clone()))),
-            RowImage::RowOrFile(text) => match self.holder(row, text) {
+            RowImage::File(path) => self.file(row, &path).map_err(at),
+            RowImage::Frame(name) => Ok(Found::Frame(FrameId(name))),
+            RowImage::RowOrFile(text) => match self.holder(row, &text) {
                 Some(found) => Ok(found),
-                None => self.file(row, text).map_err(|problem| {
+                None => self.file(row, &text).map_err(|problem| {
                     let is_number = text.bytes().all(|byte| byte.is_ascii_digit());
                     at(if is_number {
                         format!("{problem}; and no row with an image has the id {text}")
@@ -218,12 +241,8 @@ impl<'a> Frames<'a> {
 
     /// The frame of a question; of a question about several images the name of all of them together. The sources are kept.
     pub(super) fn frame(&mut self, answered: &Answered) -> Result<FrameId> {
-        let row = answered.item.row;
-        let mut shown = Vec::with_capacity(answered.item.images.len());
-        for image in &answered.item.images {
-            let found = self.find(row, image)?;
-            shown.push(self.keep(found));
-        }
+        let found: Vec<Found> = self.of_row(answered.row).collect::<Result<_>>()?;
+        let shown: Vec<FrameId> = found.into_iter().map(|found| self.keep(found)).collect();
         if let [only] = &*shown {
             return Ok(only.clone());
         }
@@ -260,12 +279,19 @@ impl<'a> Frames<'a> {
                 let name = self.names.get(&facts.digest).cloned();
                 let name = name.unwrap_or_else(|| FrameId(content_name(&facts.digest)));
                 let row = &self.table.rows[row];
+                let columns = &self.table.columns;
+                let part = self.parts.entry((column, steps));
+                let part = part.or_insert_with_key(|(column, steps)| {
+                    Arc::new(CellPart {
+                        column: columns[*column].clone(),
+                        steps: steps.clone(),
+                    })
+                });
                 self.sources.entry(name.clone()).or_insert_with(|| {
                     ImageSource::Embedded(EmbeddedImage {
                         file: Arc::clone(&self.files[row.file]),
                         row: row.place.clone(),
-                        column: self.table.columns[column].clone(),
-                        steps,
+                        part: Arc::clone(part),
                         facts,
                     })
                 });

@@ -2,6 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
+use super::contradiction::contradictory;
 use super::frames::{Found, Frames};
 use super::roles::Column;
 use super::truths::Answered;
@@ -41,8 +42,17 @@ impl Ids {
     }
 }
 
-/// Ids by content, the number of repeats, and the pairs that differ in their answers alone.
-type ContentIds = (Vec<String>, usize, Vec<[usize; 2]>);
+/// Ids by content, and the number of repeats.
+type ContentIds = (Vec<String>, usize);
+
+/// By what images are told apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum ImagesBy {
+    /// The bytes of each; every file is read.
+    Content,
+    /// The bytes of those in cells, of which the digests are known, and the names of files. Nothing is read.
+    Name,
+}
 
 impl Frames<'_> {
     /// The ids of the questions: those of the first column in which all differ, or by content.
@@ -50,7 +60,7 @@ impl Frames<'_> {
         let texts = |column: &Column| -> Option<Vec<String>> {
             let rows = answered
                 .iter()
-                .map(|answered| &self.table.rows[answered.item.row]);
+                .map(|answered| &self.table.rows[answered.row]);
             rows.map(|row| Some(column.text(row)?.trim().to_owned()))
                 .collect()
         };
@@ -60,16 +70,18 @@ impl Frames<'_> {
             };
             let mut seen = HashSet::new();
             if texts.iter().all(|text| seen.insert(text)) {
-                let name = column.name.clone();
+                drop(seen);
+                let digests = self.digests(answered, ImagesBy::Name)?;
                 return Ok(Ids {
                     texts,
-                    name,
+                    name: column.name.clone(),
                     note: None,
-                    contradictory: Vec::new(),
+                    contradictory: contradictory(answered, &digests),
                 });
             }
         }
-        let (texts, repeats, contradictory) = self.ids_by_content(answered)?;
+        let digests = self.digests(answered, ImagesBy::Content)?;
+        let (texts, repeats) = ids_by_content(&digests);
         let name = match &*self.roles.ids {
             [] => "content".to_owned(),
             [column, ..] => format!("content ({} does not tell all rows apart)", column.name),
@@ -81,41 +93,27 @@ impl Frames<'_> {
             texts,
             name,
             note,
-            contradictory,
+            contradictory: contradictory(answered, &digests),
         })
     }
 
-    /// The first 12 hexadecimal digits of a digest over images, question and options. The k-th repeat gets `-k`. So an id depends
-    /// neither on the order of rows nor on the name of a file.
-    fn ids_by_content(&self, answered: &[Answered]) -> Result<ContentIds> {
+    /// The digest of each question over its images, its text and its options.
+    fn digests(&self, answered: &[Answered], by: ImagesBy) -> Result<Vec<Digest>> {
         let mut files: HashMap<FrameId, Digest> = HashMap::new();
-        let mut seen: HashMap<String, (usize, usize)> = HashMap::new();
-        let (mut repeats, mut contradictory) = (0, Vec::new());
-        let mut texts = Vec::with_capacity(answered.len());
-        for (at, question) in answered.iter().enumerate() {
-            let images = question.item.images.iter();
-            let images = images.map(|image| {
-                let found = self.find(question.item.row, image)?;
-                self.image_digest(found, &mut files)
+        let digests = answered.iter().map(|question| {
+            let images = self.of_row(question.row).map(|found| match (found?, by) {
+                (Found::Member(name) | Found::File(name, _), ImagesBy::Name) => {
+                    Ok(Digest::of(name.0.as_bytes()))
+                }
+                (found, _) => self.image_digest(found, &mut files),
             });
             let images: Vec<Digest> = images.collect::<Result<_>>()?;
             let options = question.choices.texts().iter().map(String::as_bytes);
             let images = images.iter().map(|image| &image.as_bytes()[..]);
-            let text = question.item.text.as_bytes();
-            let digest = Digest::of_parts(images.chain([text]).chain(options));
-            let id = digest.to_string()[..12].to_owned();
-            let (first, count) = seen.entry(id.clone()).or_insert((at, 0));
-            if answered[*first].choices.truth() != question.choices.truth() {
-                contradictory.push([*first, at]);
-            }
-            texts.push(match *count {
-                0 => id,
-                earlier => format!("{id}-{earlier}"),
-            });
-            repeats += usize::from(*count > 0);
-            *count += 1;
-        }
-        Ok((texts, repeats, contradictory))
+            let text = question.text.as_bytes();
+            Ok(Digest::of_parts(images.chain([text]).chain(options)))
+        });
+        digests.collect()
     }
 
     /// The digest of an image. Files that were read are kept in `files`.
@@ -139,4 +137,22 @@ impl Frames<'_> {
         files.insert(name, digest);
         Ok(digest)
     }
+}
+
+/// The first 12 hexadecimal digits of the digest of each question over images, text and options. The k-th repeat gets `-k`. So an id
+/// depends neither on the order of rows nor on the name of a file.
+fn ids_by_content(digests: &[Digest]) -> ContentIds {
+    let mut seen: HashMap<String, usize> = HashMap::new();
+    let mut repeats = 0;
+    let texts = digests.iter().map(|digest| {
+        let id = digest.to_string()[..12].to_owned();
+        let count = seen.entry(id.clone()).or_insert(0);
+        *count += 1;
+        repeats += usize::from(*count > 1);
+        match *count - 1 {
+            0 => id,
+            earlier => format!("{id}-{earlier}"),
+        }
+    });
+    (texts.collect(), repeats)
 }

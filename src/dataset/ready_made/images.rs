@@ -39,12 +39,22 @@ pub(super) enum ImagesAre {
 }
 
 /// The frames that a row names.
-pub(super) fn named_frames(row: &Row, roles: &Roles) -> Vec<RowImage> {
+fn named_frames(row: &Row, roles: &Roles) -> Vec<RowImage> {
     let (Images::First(columns) | Images::All(columns)) = &roles.images else {
         return Vec::new();
     };
     let names = columns.iter().filter_map(|column| column.text(row));
     names.take(1).map(RowImage::Frame).collect()
+}
+
+impl ImagesAre {
+    /// The images of a row, in order.
+    pub(super) fn of(self, table: &Table, row: &Row, roles: &Roles) -> Vec<RowImage> {
+        match self {
+            Self::Files => images(table, row, roles),
+            Self::Frames => named_frames(row, roles),
+        }
+    }
 }
 
 /// The images of a row, in order.
@@ -116,7 +126,7 @@ fn collect(cell: &Cell, column: usize, steps: &[Step], found: &mut Vec<RowImage>
             }
         }
         Cell::Text(text) => text_image(text, column, steps, found),
-        Cell::Number(text) => found.push(RowImage::RowOrFile(text.clone())),
+        Cell::Number(text) => found.push(RowImage::RowOrFile(text.to_string())),
         Cell::Absent | Cell::Bool(_) | Cell::Bytes(_) => {}
     }
 }
@@ -156,15 +166,22 @@ fn text_image(text: &str, column: usize, steps: &[Step], found: &mut Vec<RowImag
 pub(crate) struct EmbeddedImage {
     pub(super) file: Arc<SetFile>,
     pub(super) row: RowPlace,
-    pub(super) column: String,
-    pub(super) steps: Vec<Step>,
+    pub(super) part: Arc<CellPart>,
     pub(super) facts: FileFacts,
+}
+
+/// The part of a row that holds an image; all images of a set are mostly in the same.
+#[derive(Debug)]
+pub(super) struct CellPart {
+    pub(super) column: String,
+    /// From the cell to the image.
+    pub(super) steps: Vec<Step>,
 }
 
 impl EmbeddedImage {
     /// The name of the format, by its first bytes.
     pub(super) fn format(&self) -> &'static str {
-        FileFormat::of(&self.facts.head).map_or("other", FileFormat::name)
+        self.facts.format.map_or("other", FileFormat::name)
     }
 
     /// The image file in the cell.
@@ -173,7 +190,9 @@ impl EmbeddedImage {
     /// If the file of rows cannot be read, or has changed since it was opened.
     pub(in crate::dataset) fn image(&self, rule: ReadingRule) -> Result<ImageFile> {
         let place = format!("{}, {}", self.file.label.path.display(), self.row);
-        let value = self.file.value(&self.row, &self.column, &self.steps)?;
+        let value = self
+            .file
+            .value(&self.row, &self.part.column, &self.part.steps)?;
         let value = match std::str::from_utf8(&value).ok().and_then(decoded) {
             Some(bytes) => bytes,
             None => value,

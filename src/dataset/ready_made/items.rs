@@ -1,17 +1,18 @@
 //! The rows of a set as questions without their truth: [`items`].
 
 use super::image_marks::ImageMarks;
-use super::images::{ImagesAre, RowImage, images, named_frames};
+use super::images::ImagesAre;
 use super::left_out::{LeftOut, Why};
 use super::lettered::{Lettered, in_question};
 use super::map::flag;
 use super::names::{Role, without_endings};
-use super::offered::Offered;
+use super::offered::{AllOffered, Offered};
 use super::options::Options;
 use super::roles::{InQuestion, Roles};
 use super::row::{Row, Table};
 use super::settings::{SetArgs, SeveralImages};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// The maximum length of a question or an option, in bytes.
 const LONGEST_TEXT: usize = 16 << 10;
@@ -20,13 +21,11 @@ const LONGEST_TEXT: usize = 16 << 10;
 #[derive(Debug)]
 pub(super) struct Item {
     pub(super) row: usize,
-    /// The images that it shows, at least one; in their order.
-    pub(super) images: Vec<RowImage>,
     pub(super) text: String,
     /// The text with the options in it, if they were found there.
     pub(super) whole: Option<String>,
     /// The options; `None` if neither columns nor the question hold any.
-    pub(super) options: Option<Offered>,
+    pub(super) options: Option<Arc<Offered>>,
 }
 
 impl Item {
@@ -75,13 +74,9 @@ pub(super) fn items(
     cut: &mut Cut,
 ) -> Result<Vec<Item>, String> {
     let mut endings = Endings((!args.keep_instructions).then_some(cut));
-    let mut items = Vec::new();
+    let (mut items, mut offered) = (Vec::new(), AllOffered::default());
     for (at, row) in table.rows.iter().enumerate() {
-        let images = match kind {
-            ImagesAre::Files => images(table, row, roles),
-            ImagesAre::Frames => named_frames(row, roles),
-        };
-        let count = images.len();
+        let count = kind.of(table, row, roles).len();
         let why = match (count, args.multi_image) {
             (0, _) => Some(Why::NoImage),
             (1, _) | (_, Some(SeveralImages::Send)) => None,
@@ -98,10 +93,9 @@ pub(super) fn items(
                 options,
             }) => items.push(Item {
                 row: at,
-                images,
                 text,
                 whole,
-                options,
+                options: options.map(|options| offered.once(options)),
             }),
             Err(NoParts::BadRow(problem)) => {
                 left.add(Why::Bad, || format!("{}: {problem}", table.place(at)));
@@ -142,9 +136,9 @@ fn parts(
     let [hint, text] = words(row, roles, &mut marks).map_err(NoParts::BadRow)?;
     let (text, whole, options) = match Options::of(row, roles) {
         Options::Found(mut options) => {
-            for option in &mut options.texts {
-                *option = marks.read_option(option).map_err(NoParts::BadRow)?;
-            }
+            let texts = options.texts.iter();
+            let texts = texts.map(|option| marks.read_option(option));
+            options.texts = texts.collect::<Result<_, _>>().map_err(NoParts::BadRow)?;
             (endings.cut(&text), None, Some(options))
         }
         Options::None if roles.in_question == InQuestion::None => (endings.cut(&text), None, None),
@@ -176,7 +170,7 @@ fn parts(
         hint => format!("{hint}\n{text}"),
     };
     let (text, whole) = (below(text), whole.map(below));
-    let texts = options.iter().flat_map(|options| &options.texts);
+    let texts = options.iter().flat_map(|options| &*options.texts);
     if texts.chain([&text]).any(|text| text.len() > LONGEST_TEXT) {
         return Err(bad(format!(
             "a text of more than {} KB",

@@ -118,6 +118,7 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
         archive.as_ref(),
         &files,
         &roles,
+        ImagesAre::Files,
         args.multi_image,
     );
     let mut notes = notes;
@@ -219,7 +220,15 @@ pub(super) fn about_frames(file: &Path, args: &SetArgs) -> Result<ReadQuestions>
     let (roles, set) = read(&table, &map, args, None, ImagesAre::Frames)
         .map_err(|problem| Error::data(file.display(), problem))?;
     let root = Root::of(folder, &[])?;
-    let frames = Frames::new(&table, &root, None, &[], &roles, args.multi_image);
+    let frames = Frames::new(
+        &table,
+        &root,
+        None,
+        &[],
+        &roles,
+        ImagesAre::Frames,
+        args.multi_image,
+    );
     let name = file.display().to_string();
     let opened = Opened {
         place: file,
@@ -327,11 +336,9 @@ fn read(
     let roles = Roles::of(table, map)?;
     let rule = GroupRule::of(table, map)?;
     let (mut left, mut cut) = (LeftOut::default(), Cut::new());
-    let all = items(table, &roles, kind, args, &mut left, &mut cut)?;
-    let (kept, rotated): (Vec<_>, Vec<_>) = all
-        .into_iter()
-        .partition(|item| !preset.is_some_and(|preset| preset.is_rotation(table, item.row)));
-    for item in rotated {
+    let mut kept = items(table, &roles, kind, args, &mut left, &mut cut)?;
+    let is_copy = |row| preset.is_some_and(|preset| preset.is_rotation(table, row));
+    for item in kept.extract_if(.., |item| is_copy(item.row)) {
         left.add(Why::Rotation, || table.place(item.row));
     }
     if kept.is_empty() {
@@ -348,7 +355,6 @@ fn read(
     if truths.answered.is_empty() {
         return Err("no row is left to ask".to_owned());
     }
-    let is_copy = |row| preset.is_some_and(|preset| preset.is_rotation(table, row));
     let set = ReadSet {
         groups: rule.map_or_else(Groups::default, |rule| Groups::of(table, &rule, is_copy)),
         answered: truths.answered,
@@ -390,7 +396,7 @@ fn questions(
     let (table, evidence) = (opened.table, opened.roles.evidence.as_ref());
     let mut questions = Vec::with_capacity(answered.len());
     for (at, answered) in answered.into_iter().enumerate() {
-        let row = answered.item.row;
+        let row = answered.row;
         let frame = frames.frame(&answered)?;
         let cells = &table.rows[row];
         let family = families.text(table, cells);
@@ -400,7 +406,7 @@ fn questions(
             id: ids.id(at),
             frame,
             family,
-            text: answered.item.text,
+            text: answered.text,
             choices: answered.choices,
             group: groups.group(row),
             evidence: evidence.map_or(serde_json::Value::Null, |column| column.of(cells).into()),

@@ -1,16 +1,19 @@
 //! The options of a row: [`Offered`].
 
+use std::collections::HashSet;
+use std::sync::Arc;
+
 /// The options of a row.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 pub(super) struct Offered {
-    pub(super) texts: Vec<String>,
+    pub(super) texts: Arc<[String]>,
     /// The place of each among its columns, by which letters and numbers name it: where B is empty, C is still C.
     pub(super) places: Vec<usize>,
     pub(super) origin: Origin,
 }
 
 /// Where options stand.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub(super) enum Origin {
     #[default]
     Columns,
@@ -33,9 +36,24 @@ impl Offered {
         let places = (0..texts.len()).collect();
         let origin = Origin::Columns;
         Self {
-            texts,
+            texts: texts.into(),
             places,
             origin,
         }
+    }
+}
+
+/// The options of all rows. Equal ones are held once.
+#[derive(Debug, Default)]
+pub(super) struct AllOffered(HashSet<Arc<Offered>>);
+
+impl AllOffered {
+    pub(super) fn once(&mut self, offered: Offered) -> Arc<Offered> {
+        if let Some(known) = self.0.get(&offered) {
+            return Arc::clone(known);
+        }
+        let offered = Arc::new(offered);
+        self.0.insert(Arc::clone(&offered));
+        offered
     }
 }

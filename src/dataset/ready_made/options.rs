@@ -1,6 +1,8 @@
 //! The options of a row: [`Options`].
 
-use super::cell::Cell;
+use std::sync::Arc;
+
+use super::cell::{Cell, Fields};
 use super::lettered::{in_cell, without_letters};
 use super::offered::{Offered, Origin};
 use super::roles::{Column, Roles};
@@ -29,7 +31,7 @@ impl Options {
         let cells = cells.filter_map(|(place, cell)| Some((option(cell.of(row))?, place)));
         let (texts, places): (Vec<String>, Vec<usize>) = cells.unzip();
         if !texts.is_empty() {
-            let texts = without_letters(texts);
+            let texts = without_letters(texts).into();
             let origin = Origin::Columns;
             let offered = Offered {
                 texts,
@@ -84,14 +86,14 @@ fn no_list(column: &Column, cell: &Cell) -> String {
 }
 
 /// The fields of a cell that is an object, or the text of one in JSON or in Python's notation.
-fn by_letter(cell: &Cell) -> Option<Vec<(String, Cell)>> {
+fn by_letter(cell: &Cell) -> Option<Fields> {
     match cell {
         Cell::Fields(fields) => Some(fields.clone()),
         Cell::Text(text) => {
             let pairs = dict(text)?.into_iter();
             Some(
                 pairs
-                    .map(|(name, text)| (name, text.map_or(Cell::Absent, Cell::Text)))
+                    .map(|(name, text)| (name.into(), text.map_or(Cell::Absent, Cell::Text)))
                     .collect(),
             )
         }
@@ -100,7 +102,7 @@ fn by_letter(cell: &Cell) -> Option<Vec<(String, Cell)>> {
 }
 
 /// The options of an object whose fields are the letters from A on, of either case.
-fn of_fields(fields: &[(String, Cell)]) -> Result<Offered, String> {
+fn of_fields(fields: &[(Arc<str>, Cell)]) -> Result<Offered, String> {
     let mut sorted: Vec<(char, &Cell)> = Vec::with_capacity(fields.len());
     for (name, cell) in fields {
         let mut chars = name.trim().chars();
@@ -122,19 +124,22 @@ fn of_fields(fields: &[(String, Cell)]) -> Result<Offered, String> {
             return Err(format!("have {name} where {expected} is expected"));
         }
     }
-    let mut offered = Offered::default();
+    let (mut texts, mut places) = (Vec::new(), Vec::new());
     for (place, (name, cell)) in sorted.into_iter().enumerate() {
         match option(cell) {
             Some(text) => {
-                offered.texts.push(text);
-                offered.places.push(place);
+                texts.push(text);
+                places.push(place);
             }
             None if cell.is_absent() => {}
             None => return Err(format!("hold no text at {name}")),
         }
     }
-    offered.texts = without_letters(offered.texts);
-    Ok(offered)
+    Ok(Offered {
+        texts: without_letters(texts).into(),
+        places,
+        origin: Origin::Columns,
+    })
 }
 
 /// The names of the columns of options as `--map` takes them.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use csv::Position;
 
-use super::cell::Cell;
+use super::cell::{Cell, FieldNames};
 use super::names::{Role, known, plain};
 
 /// The maximum number of columns of a set.
@@ -19,6 +19,7 @@ pub(super) struct Table {
     pub(super) files: Vec<FileLabel>,
     pub(super) columns: Vec<String>,
     places: HashMap<String, usize>,
+    names: FieldNames,
     /// Whether the last file has a column.
     in_last_file: Vec<bool>,
     pub(super) rows: Vec<Row>,
@@ -43,10 +44,10 @@ pub(super) struct Row {
     /// The index of its file.
     pub(super) file: usize,
     pub(super) place: RowPlace,
-    cells: Vec<Cell>,
+    cells: Box<[Cell]>,
 }
 
-/// Where a row stands in its file.
+/// Where a row stands in its file. Sets have millions of rows, so that what few of them need is in a box.
 #[derive(Debug, Clone)]
 pub(super) enum RowPlace {
     /// A record of a table of text.
@@ -56,9 +57,9 @@ pub(super) enum RowPlace {
         offset: u64,
         length: usize,
         number: u64,
-        unit: &'static str,
+        unit: JsonUnit,
         /// The place of the row in a list inside the value, and the field that holds the list, if rows are nested.
-        inner: Option<(usize, Arc<str>)>,
+        inner: Option<Box<(usize, Arc<str>)>>,
     },
     /// A row of a row group, and its number in the file, counted from 1.
     Parquet {
@@ -66,6 +67,22 @@ pub(super) enum RowPlace {
         row: usize,
         number: u64,
     },
+}
+
+/// What a JSON file holds a row in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum JsonUnit {
+    Line,
+    Object,
+}
+
+impl fmt::Display for JsonUnit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Line => "line",
+            Self::Object => "object",
+        })
+    }
 }
 
 impl fmt::Display for RowPlace {
@@ -80,7 +97,7 @@ impl fmt::Display for RowPlace {
             } => {
                 write!(f, "{unit} {number}")?;
                 let inner = inner.as_ref();
-                inner.map_or(Ok(()), |(inner, _)| write!(f, ".{}", inner + 1))
+                inner.map_or(Ok(()), |inner| write!(f, ".{}", inner.0 + 1))
             }
             Self::Parquet { number, .. } => write!(f, "row {number}"),
         }
@@ -137,12 +154,12 @@ impl Table {
         let width = cells.iter().map(|(at, _)| at + 1).max().unwrap_or(0);
         let mut row = vec![Cell::Absent; width];
         for (at, cell) in cells {
-            row[at] = cell.without_files();
+            row[at] = cell.without_files(&mut self.names);
         }
         self.rows.push(Row {
             file: self.files.len().saturating_sub(1),
             place,
-            cells: row,
+            cells: row.into(),
         });
     }
 
@@ -172,8 +189,10 @@ impl Table {
         }
         let at = self.column("id")?;
         for (row, id) in self.rows[from..].iter_mut().zip(ids) {
-            row.cells.resize(row.cells.len().max(at + 1), Cell::Absent);
-            row.cells[at] = Cell::Text(id);
+            let mut cells = std::mem::take(&mut row.cells).into_vec();
+            cells.resize(cells.len().max(at + 1), Cell::Absent);
+            cells[at] = Cell::Text(id);
+            row.cells = cells.into();
         }
         let note = "the names under which the rows stand in the file are the column id";
         self.notes.push(note.to_owned());

@@ -4,7 +4,7 @@ use super::cell::Cell;
 use super::text_list::list;
 
 /// A step from a cell to a value inside it.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) enum Step {
     /// An item of a list, or of the text of a list.
     Item(usize),

@@ -1,5 +1,7 @@
 //! The true option of each question of a set: [`Truths`].
 
+use std::sync::Arc;
+
 use super::answer_column;
 use super::answers::{
     AnswerOf, OneReading, Reading, asks_yes_or_no, digit, one_reading, yes_or_no,
@@ -17,7 +19,8 @@ use crate::types::Choices;
 /// A question with its choices.
 #[derive(Debug)]
 pub(super) struct Answered {
-    pub(super) item: Item,
+    pub(super) row: usize,
+    pub(super) text: String,
     pub(super) choices: Choices,
 }
 
@@ -67,20 +70,22 @@ pub(super) fn truths(
             item
         }
     });
-    let (listed, bare): (Vec<Item>, Vec<Item>) = items.partition(|item| item.options.is_some());
+    let mut listed: Vec<Item> = items.collect();
+    let bare = listed.extract_if(.., |item| item.options.is_none());
+    let bare: Vec<Item> = bare.collect();
     let mut truths = Truths {
         answered: Vec::new(),
         said: Vec::new(),
     };
     of_options(table, roles, how, listed, left, &mut truths)?;
     of_yes_or_no(table, roles, bare, left, &mut truths)?;
-    truths.answered.sort_by_key(|answered| answered.item.row);
+    truths.answered.sort_by_key(|answered| answered.row);
     Ok(truths)
 }
 
 /// Whether the letters in a question name things in the image and no options, because its answer is yes or no and none of them.
 fn names_no_options(table: &Table, roles: &Roles, item: &Item) -> bool {
-    let Some(options) = item.options.as_ref().filter(|_| item.whole.is_some()) else {
+    let Some(options) = item.options.as_deref().filter(|_| item.whole.is_some()) else {
         return false;
     };
     let answers: Vec<String> = roles
@@ -139,7 +144,7 @@ fn with_answers(
 ) -> Result<Vec<(Item, String)>, String> {
     let count = items.len();
     let mut absent = Vec::new();
-    let mut found = Vec::new();
+    let mut found = Vec::with_capacity(count);
     for item in items {
         match AnswerCell::of(&table.rows[item.row], column) {
             AnswerCell::One(answer) => found.push((item, answer)),
@@ -179,14 +184,16 @@ fn of_options(
     let name = read.reading.name();
     truths.said.push(format!("{} ({name})", column.name));
     truths.answered.reserve(items.len());
-    for (mut item, answer) in items {
-        let options = item.options.take().unwrap_or_default();
-        match read.choices(&answer, options) {
-            Ok(choices) => {
-                item.whole = None;
-                truths.answered.push(Answered { item, choices });
-            }
-            Err(problem) => left.add(Why::Bad, || format!("{}: {problem}", table.place(item.row))),
+    for (
+        Item {
+            row, text, options, ..
+        },
+        answer,
+    ) in items
+    {
+        match read.choices(&answer, &options.unwrap_or_default()) {
+            Ok(choices) => truths.answered.push(Answered { row, text, choices }),
+            Err(problem) => left.add(Why::Bad, || format!("{}: {problem}", table.place(row))),
         }
     }
     Ok(())
@@ -214,7 +221,7 @@ impl<'h> ColumnReading<'h> {
         let none = Offered::default();
         let rows: Vec<AnswerOf<'_>> = items
             .iter()
-            .map(|(item, answer)| (answer.as_str(), item.options.as_ref().unwrap_or(&none)))
+            .map(|(item, answer)| (answer.as_str(), item.options.as_deref().unwrap_or(&none)))
             .collect();
         let by = |reading: Reading| {
             let mut read = Self {
@@ -262,9 +269,10 @@ impl<'h> ColumnReading<'h> {
     ///
     /// # Errors
     /// If the answer means none of them, or they are no choices.
-    fn choices(&self, answer: &str, options: Offered) -> Result<Choices, String> {
-        match self.truth((answer, &options)) {
-            Some(truth) => Choices::new(options.texts, truth).map_err(|e| e.to_string()),
+    fn choices(&self, answer: &str, options: &Offered) -> Result<Choices, String> {
+        match self.truth((answer, options)) {
+            Some(truth) => Choices::known_by(Arc::clone(&options.texts), Some(truth))
+                .map_err(|e| e.to_string()),
             None => Err(format!(
                 "the answer {answer:?} is none of the options {:?} (read as {}, which fits {} rows)",
                 options.texts,
@@ -331,18 +339,17 @@ fn of_yes_or_no(
         .count();
     let are_digits = verbs as f64 >= SHARE_OF_VERBS * items.len() as f64
         && items.iter().all(|(_, answer)| digit(answer).is_some());
+    let both: Arc<[String]> = ["yes", "no"].map(str::to_owned).into();
     let mut count = 0;
-    for (item, answer) in items {
+    for (Item { row, text, .. }, answer) in items {
         let read = if are_digits { digit(&answer) } else { None };
         let truth = read.or_else(|| yes_or_no(&answer));
-        let choices =
-            truth.map(|truth| Choices::new(vec!["yes".to_owned(), "no".to_owned()], truth));
-        match choices {
-            Some(Ok(choices)) => {
+        match Choices::known_by(Arc::clone(&both), truth) {
+            Ok(choices) if choices.truth().is_some() => {
                 count += 1;
-                truths.answered.push(Answered { item, choices });
+                truths.answered.push(Answered { row, text, choices });
             }
-            _ => left.add(Why::Open, || format!("{:?}", shortened(&answer, 60))),
+            Ok(_) | Err(_) => left.add(Why::Open, || format!("{:?}", shortened(&answer, 60))),
         }
     }
     if count > 0 {

@@ -75,7 +75,7 @@ impl<'a> ChoiceSetup<'a> {
             )?
         };
         let dataset = Arc::new(dataset);
-        let all = select(&dataset, &config.selection)?;
+        let all = select(dataset.questions().to_vec(), &config.selection)?;
         let other_rooms = OtherRooms::of(&all, |frame| dataset.scene(frame));
         let controls = AddedControls::of(config, other_rooms.is_some())?;
         let questions = part(all.clone(), job.shard, |question| question.frame.0.clone())?;

@@ -97,7 +97,7 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
     for line in dataset.reading_to_say() {
         progress.note(line);
     }
-    let questions = select(&dataset, &args.selection)?;
+    let questions = select(dataset.questions().to_vec(), &args.selection)?;
     refuse_several_images(&dataset, &questions)?;
     let files = enhancers::read(&args.enhancers.llie)?;
     let recipe = Recipe::lossless(&light.kinds, &files);

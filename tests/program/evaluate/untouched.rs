@@ -94,6 +94,11 @@ fn dark_photographs_are_asked_as_they_are_and_enhanced() {
         (&Value::Null, &json!("lift"))
     );
 
+    // The first image was made for the probe too, and counts once.
+    let manifest = fs::read_to_string(bench.path("run/manifest.json")).unwrap();
+    let manifest: Value = serde_json::from_str(&manifest).unwrap();
+    assert_eq!(manifest["enhancers"]["lift"]["judged"]["images"], 3);
+
     // The image is made again from what the run holds, and is another one than the file.
     let shown = bench.call(&words("show run q1 --condition L0+lift"));
     assert_eq!(shown.code, Some(0), "{shown:?}");
@@ -261,7 +266,14 @@ fn dark_images_are_noticed_once() {
     });
     // The check says it in the same words.
     let bench = photos(40);
-    for (flags, times) in [("", 1), ("--light dark", 0)] {
+    let rows = [
+        ("", 1),
+        ("--light dark", 0),
+        ("--levels L0 --llie lift --llie-on l0", 0),
+        ("--levels L0,L3 --llie lift --llie-on all", 1),
+        ("--levels L0", 1),
+    ];
+    for (flags, times) in rows {
         let checked = bench.complete(&words(&format!("check photos {flags}")));
         assert_eq!(checked.matches(hint).count(), times, "{checked}");
         assert_eq!(checked.matches(advice).count(), times, "{checked}");

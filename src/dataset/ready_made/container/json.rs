@@ -8,7 +8,7 @@ use std::sync::Arc;
 use serde_json::{Map, Value};
 
 use super::super::cell::Cell;
-use super::super::row::{RowPlace, Table};
+use super::super::row::{JsonUnit, RowPlace, Table};
 use super::json_scan::{Found, JsonScan, Kind, LONGEST_ROW};
 use crate::error::{Error, Result};
 use crate::types::shell_word;
@@ -84,7 +84,7 @@ pub(super) fn read_lines(path: &Path, table: &mut Table) -> Result<()> {
                 offset: offset + (taken - bytes.len()) as u64,
                 length: bytes.len(),
                 number: number as u64,
-                unit: "line",
+                unit: JsonUnit::Line,
                 inner: None,
             };
             let pushed = push(table, place, fields, None);
@@ -146,7 +146,7 @@ fn add(found: &Found, number: u64, inner: Option<&str>, table: &mut Table) -> Re
         offset: found.offset,
         length: found.bytes.len(),
         number,
-        unit: "object",
+        unit: JsonUnit::Object,
         inner,
     };
     let Some(list) = inner else {
@@ -163,7 +163,7 @@ fn add(found: &Found, number: u64, inner: Option<&str>, table: &mut Table) -> Re
         };
         push(
             table,
-            place(Some((at, Arc::clone(&name)))),
+            place(Some(Box::new((at, Arc::clone(&name))))),
             row,
             Some(&outer),
         )?;

@@ -155,13 +155,13 @@ impl SetFile {
                 },
                 _,
             ) => {
-                let inner = inner.as_ref().map(|(at, list)| (*at, &**list));
+                let inner = inner.as_ref().map(|inner| (inner.0, &*inner.1));
                 json::cell(self.read_path(), (*offset, *length), inner, column)?
             }
             (RowPlace::Record(_), _) => Cell::Absent,
         };
         match cell.at(steps) {
-            Some(Cell::Bytes(bytes)) => Ok(bytes),
+            Some(Cell::Bytes(bytes)) => Ok(bytes.into_vec()),
             Some(Cell::Text(text)) => Ok(text.into_bytes()),
             _ => {
                 let place = format!("{}, {row}", self.label.path.display());

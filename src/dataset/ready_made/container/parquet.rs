@@ -21,6 +21,7 @@ use super::super::cell::Cell;
 use super::super::row::{RowPlace, Table};
 use super::super::step::Step;
 use super::super::text_list::list;
+use super::json_scan::LONGEST_ROW;
 use crate::dataset::guarded::guarded;
 use crate::error::{Error, Result};
 
@@ -72,7 +73,14 @@ pub(super) fn read(path: &Path, footer: &Footer, table: &mut Table) -> Result<()
     check_codecs(path, &*footer.of(path)?)?;
     let file = open(path)?;
     let mut columns: Vec<(String, usize)> = Vec::new();
+    let mut too_long = None;
     let mut add = |place: RowPlace, record: Record| -> Result<(), String> {
+        let fields = record.get_column_iter();
+        if fields.map(|(_, field)| length(field)).sum::<usize>() > LONGEST_ROW {
+            let problem = format!("more than {} MB in a row", LONGEST_ROW >> 20);
+            too_long = Some((place, problem.clone()));
+            return Err(problem);
+        }
         let mut cells = Vec::new();
         for (at, (name, field)) in record.into_columns().into_iter().enumerate() {
             if columns.get(at).is_none_or(|(known, _)| *known != name) {
@@ -102,7 +110,29 @@ pub(super) fn read(path: &Path, footer: &Footer, table: &mut Table) -> Result<()
         }
         Ok(())
     };
-    guarded(walk).map_err(|problem| wrong(path, &problem))
+    guarded(walk).map_err(|problem| match too_long {
+        Some((row, problem)) => Error::data(format_args!("{}, {row}", path.display()), problem),
+        None => wrong(path, &problem),
+    })
+}
+
+/// The length of a value in bytes; numbers count as 8.
+fn length(field: &Field) -> usize {
+    match field {
+        Field::Null => 0,
+        Field::Str(text) => text.len(),
+        Field::Bytes(bytes) => bytes.len(),
+        Field::Group(record) => record
+            .get_column_iter()
+            .map(|(_, field)| length(field))
+            .sum(),
+        Field::ListInternal(list) => list.elements().iter().map(length).sum(),
+        Field::MapInternal(map) => {
+            let pairs = map.entries().iter();
+            pairs.map(|(key, value)| length(key) + length(value)).sum()
+        }
+        _ => size_of::<u64>(),
+    }
 }
 
 /// Refuses a column whose compression is not read.
@@ -134,12 +164,12 @@ fn check_codecs(path: &Path, footer: &ParquetMetaData) -> Result<()> {
 
 /// A value of a record.
 fn cell_of(field: Field) -> Cell {
-    let number = Cell::Number;
+    let number = |text: String| Cell::Number(text.into());
     match field {
         Field::Null => Cell::Absent,
         Field::Bool(is_true) => Cell::Bool(is_true),
         Field::Str(text) => Cell::Text(text),
-        Field::Bytes(bytes) => Cell::Bytes(bytes.data().to_vec()),
+        Field::Bytes(bytes) => Cell::Bytes(bytes.data().into()),
         Field::Float(value) if value.is_nan() => Cell::Absent,
         Field::Double(value) if value.is_nan() => Cell::Absent,
         Field::Float(value) => number(value.to_string()),
@@ -154,7 +184,11 @@ fn cell_of(field: Field) -> Cell {
         Field::ULong(value) => number(value.to_string()),
         Field::Group(record) => {
             let fields = record.into_columns().into_iter();
-            Cell::Fields(fields.map(|(name, field)| (name, cell_of(field))).collect())
+            Cell::Fields(
+                fields
+                    .map(|(name, field)| (name.into(), cell_of(field)))
+                    .collect(),
+            )
         }
         Field::ListInternal(list) => {
             Cell::List(list.elements().iter().cloned().map(cell_of).collect())

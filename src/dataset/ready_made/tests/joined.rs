@@ -218,6 +218,57 @@ fn two_rows_that_differ_in_their_answers_alone_contradict_each_other() {
 }
 
 #[test]
+fn rows_with_ids_contradict_each_other_too() {
+    let skip = SetArgs {
+        bad: Some(LeaveOut::Skip),
+        ..SetArgs::default()
+    };
+    let strict = SetArgs::default();
+    // The images of the rows 39 to 41, in cells and in files.
+    for [same, other] in [
+        [json!(base64(1)), json!(base64(2))],
+        [json!("a.png"), json!("b.png")],
+    ] {
+        let rows = |last: [(&Value, &str); 3]| -> Vec<_> {
+            let all = (0..60).map(|at: usize| {
+                let last = at.checked_sub(38).and_then(|at| last.get(at));
+                let (image, answer) = last.copied().unwrap_or((&same, "x"));
+                let text = last.map_or_else(|| format!("{at}?"), |_| "Which?".to_owned());
+                let fields = json!({"id": at, "question": text, "answer": answer, "image": image});
+                row(question(fields))
+            });
+            all.collect()
+        };
+        let opened = |last, args| {
+            let (folder, path) = set("set.jsonl", &rows(last));
+            for (name, colour) in [("a.png", 1), ("b.png", 2)] {
+                fs::write(folder.path().join(name), png(colour)).unwrap();
+            }
+            open(&path, args)
+        };
+        let differ = [(&same, "x"), (&same, "x"), (&same, "y")];
+        let problem = opened(differ, &strict).unwrap_err().to_string();
+        assert!(
+            problem.contains("3 of 60 rows are broken")
+                && problem.contains("line 39 (\"x\")")
+                && problem.contains("line 41 (\"y\") ask the same of the same image"),
+            "{problem}"
+        );
+        let kept = opened(differ, &skip).unwrap();
+        let ids: Vec<&str> = kept.questions().iter().map(|kept| &*kept.id.0).collect();
+        assert_eq!(ids.len(), 57);
+        assert!(!ids.iter().any(|id| ["38", "39", "40"].contains(id)));
+        // Another image, or the same answer.
+        for fine in [
+            [(&same, "x"), (&same, "x"), (&other, "y")],
+            [(&same, "y"), (&same, "y"), (&same, "y")],
+        ] {
+            assert_eq!(opened(fine, &strict).unwrap().questions().len(), 60);
+        }
+    }
+}
+
+#[test]
 fn a_folder_says_which_column_is_which_of_its_questions() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);

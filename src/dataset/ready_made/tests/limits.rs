@@ -66,6 +66,27 @@ fn a_record_without_an_end_is_named() {
 }
 
 #[test]
+fn a_row_of_parquet_that_would_fill_the_memory_is_named() {
+    let with = |length: usize| {
+        let mut long = question();
+        long.insert("evidence".to_owned(), json!("x".repeat(length)));
+        set("set.parquet", &[question(), question(), long])
+    };
+    let (_folder, path) = with((64 << 20) + 1);
+    let problem = refusal(&path, &SetArgs::default());
+    assert!(
+        problem.contains("set.parquet, row 3: more than 64 MB in a row")
+            && !problem.contains("not a whole"),
+        "{problem}"
+    );
+    let (_folder, path) = with(1 << 20);
+    assert_eq!(
+        open(&path, &SetArgs::default()).unwrap().questions().len(),
+        3
+    );
+}
+
+#[test]
 fn a_row_of_a_million_values_is_refused() {
     let values = "0,".repeat(1_100_000);
     for (name, text) in [

@@ -8,10 +8,10 @@ use super::findings::{Findings, Mark};
 use crate::dataset::{Dataset, Picture};
 use crate::enhance::brightness;
 use crate::error::Result;
-use crate::job::dark_already::advice;
+use crate::job::dark_already::{DarkImages, advice};
 use crate::job::progress::Progress;
 use crate::job::source::first_asked;
-use crate::types::{Digest, FrameId, InputSummary, Question, SetLight};
+use crate::types::{Digest, FrameId, InputNote, InputSummary, Question};
 
 /// Whether the pixels of images are looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,27 +26,32 @@ pub(super) enum Depth {
 const SAMPLED: usize = 32;
 
 /// What is known of one image.
-struct Looked {
-    id: FrameId,
-    facts: Result<((u32, u32), Digest, crate::types::InputNote)>,
+struct Looked<'a> {
+    id: &'a FrameId,
+    facts: Result<Facts>,
     bytes: u64,
 }
 
-/// Looks at the images that the questions are about, of a set that was photographed in this light.
+/// What an image is like.
+struct Facts {
+    size: (u32, u32),
+    digest: Digest,
+    /// What was done when it was read, if anything.
+    note: Option<Box<InputNote>>,
+}
+
+/// Looks at the images that the questions are about.
 pub(super) fn images(
     dataset: &Dataset,
-    set: SetLight,
+    dark: DarkImages,
     questions: &[Question],
     depth: Depth,
     progress: &Progress,
     findings: &mut Findings,
 ) {
-    let mut seen = HashSet::new();
-    let shown = first_asked(questions).into_iter();
-    let shown = shown.flat_map(|question| dataset.shown(&question.frame));
-    let shown: Vec<&FrameId> = shown.filter(|frame| seen.insert(*frame)).collect();
+    let shown = first_shown(dataset, questions);
     let bar = progress.bar("reading images", shown.len());
-    let looked: Vec<Looked> = shown
+    let looked: Vec<Looked<'_>> = shown
         .par_iter()
         .map(|frame| {
             let looked = look(dataset, frame, depth);
@@ -65,11 +70,13 @@ pub(super) fn images(
     {
         match facts {
             Err(e) => findings.one_of("images that cannot be used", Mark::Problem, e.to_string()),
-            Ok((size, digest, note)) => {
+            Ok(Facts { size, digest, note }) => {
                 bytes += of;
                 *sizes.entry(size).or_insert(0_usize) += 1;
-                notes.add(&id, &note);
-                if let Some(first) = by_digest.insert(digest, id.clone()) {
+                if let Some(note) = note {
+                    notes.add(id, &note);
+                }
+                if let Some(first) = by_digest.insert(digest, id) {
                     let text = format!(
                         "{:?} and {:?} are the same image under two names: each gets noise of its own",
                         first.0, id.0
@@ -88,10 +95,18 @@ pub(super) fn images(
     for line in notes.lines() {
         findings.warn(line);
     }
-    light(dataset, &shown, set, findings);
+    light(dataset, &shown, dark, findings);
 }
 
-fn look(dataset: &Dataset, id: &FrameId, depth: Depth) -> Looked {
+/// The frames that the questions show, each once, in the order of the questions.
+fn first_shown<'a>(dataset: &'a Dataset, questions: &'a [Question]) -> Vec<&'a FrameId> {
+    let mut seen = HashSet::new();
+    let shown = first_asked(questions).into_iter();
+    let shown = shown.flat_map(|question| dataset.shown(&question.frame));
+    shown.filter(|frame| seen.insert(*frame)).collect()
+}
+
+fn look<'a>(dataset: &Dataset, id: &'a FrameId, depth: Depth) -> Looked<'a> {
     let picture = dataset.picture(id);
     let bytes = match &picture {
         Ok(Picture::Encoded(file)) => file.bytes().len() as u64,
@@ -102,14 +117,18 @@ fn look(dataset: &Dataset, id: &FrameId, depth: Depth) -> Looked {
         if depth == Depth::Pixels {
             picture.decode()?;
         }
-        Ok((size, picture.digest(), picture.note()))
+        let note = Some(picture.note()).filter(|note| *note != InputNote::default());
+        Ok(Facts {
+            size,
+            digest: picture.digest(),
+            note: note.map(Box::new),
+        })
     });
-    let id = id.clone();
     Looked { id, facts, bytes }
 }
 
-/// Measures the brightness of a sample of the images; those of a set in the dark may be dark.
-fn light(dataset: &Dataset, shown: &[&FrameId], set: SetLight, findings: &mut Findings) {
+/// Measures the brightness of a sample of the images.
+fn light(dataset: &Dataset, shown: &[&FrameId], dark: DarkImages, findings: &mut Findings) {
     let number = shown.len().min(SAMPLED);
     let sample = (0..number).into_par_iter().filter_map(|index| {
         let frame = shown[index * shown.len() / number];
@@ -121,7 +140,7 @@ fn light(dataset: &Dataset, shown: &[&FrameId], set: SetLight, findings: &mut Fi
     let Some(median) = sample.get(sample.len() / 2) else {
         return;
     };
-    match advice(*median).filter(|_| set == SetLight::Lit) {
+    match advice(*median).filter(|_| dark == DarkImages::Odd) {
         Some(advice) => findings.warn(advice),
         None => findings.ok(format!(
             "median brightness {median:.0} of 255 ({number} images)"

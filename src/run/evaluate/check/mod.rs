@@ -20,8 +20,10 @@ use crate::dataset::{DataPlace, Dataset, Picture};
 use crate::error::{Error, Result};
 use crate::files::write;
 use crate::job::Outcome;
+use crate::job::dark_already::DarkImages;
 use crate::job::progress::Progress;
 use crate::job::questions::{QuestionBank, open_data, rules, select};
+use crate::synthesis::LightSettings;
 use crate::types::Decides;
 use crate::types::Question;
 use crate::types::manifest::Status;
@@ -129,7 +131,7 @@ fn data(
         )
     });
     let opened = opened.and_then(|dataset| Ok((dataset, args.scene.set_light(&place)?)));
-    let (dataset, light) = match opened {
+    let (mut dataset, light) = match opened {
         Ok(opened) => opened,
         Err(e) => {
             findings.problem(e.to_string());
@@ -139,7 +141,7 @@ fn data(
     for line in dataset.reading() {
         findings.ok(line);
     }
-    let asked = match select(&dataset, selection) {
+    let asked = match select(dataset.take_questions(), selection) {
         Ok(asked) => asked,
         Err(e) => {
             findings.problem(e.to_string());
@@ -152,7 +154,12 @@ fn data(
     } else {
         Depth::Heads
     };
-    images::images(&dataset, light, &asked, depth, progress, findings);
+    let enhancers = args.job.enhancers.clone().for_set(light);
+    // Flags that cannot be followed are a finding already.
+    let dark = LightSettings::resolve(&args.job.light, light).map_or(DarkImages::Odd, |levels| {
+        DarkImages::of(light, &levels, &enhancers)
+    });
+    images::images(&dataset, dark, &asked, depth, progress, findings);
     if let Some(path) = &check.save_questions {
         save(path, &dataset, &asked)?;
         findings.ok(format!(
