@@ -62,7 +62,7 @@ fn pipeline_output(
         fidelity: condition != Condition::L0,
     };
     let (image, notes) = pipeline
-        .image_and_notes(&mut work, &condition, &source.name, wanted)
+        .image_and_notes(&mut work, &condition, (&source.name, None), wanted)
         .unwrap();
     (image, notes, work.is_decoded())
 }
@@ -86,7 +86,8 @@ fn thumbnails_show_what_was_sent() {
             let (image, notes, _) = pipeline_output(condition, how, true);
             let thumbnail = notes.thumbnail.unwrap();
             let of_file =
-                super::thumbnail(&thumbnail.frame, &thumbnail.condition, &image, None).unwrap();
+                super::thumbnail(&thumbnail.frame, &thumbnail.condition, &image, None, None)
+                    .unwrap();
             assert_eq!(thumbnail, of_file, "{condition} {how:?}");
         }
     }

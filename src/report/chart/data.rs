@@ -142,7 +142,7 @@ fn line(line: &PlotLine) -> LineData {
 
 /// A share as in tables; one that is known exactly has no interval.
 fn text(share: Estimate) -> String {
-    if share.low == share.high {
+    if share.high <= share.low {
         return percent(share.value);
     }
     with_interval(share)
