@@ -1,5 +1,6 @@
 //! What a reader must know before any number of a report: [`Alert`].
 
+use super::terminal::line;
 use serde::Serialize;
 
 /// Share of unreadable replies of a model above which an alert names it; chosen.
@@ -77,8 +78,6 @@ pub enum AlertKind {
 /// The alerts as lines of the terminal, each marked with `!`; empty without an alert.
 #[must_use]
 pub(in crate::report) fn lines(alerts: &[Alert]) -> String {
-    let lines = alerts
-        .iter()
-        .map(|alert| ["! ", &*alert.text, "\n"].concat());
+    let lines = alerts.iter().map(|alert| line(["! ", &alert.text, "  "]));
     lines.collect()
 }

@@ -1,7 +1,7 @@
 //! The text of a report of questions with choices: [`short`] for 80 columns, [`findings`] alone, and [`full`] with all tables.
 
 mod foot;
-mod wrapped;
+pub(super) mod wrapped;
 
 use std::fmt::Write;
 use std::path::Path;
@@ -15,7 +15,7 @@ use super::frame_count::frames;
 use super::ladder::{Ladder, SeriesByLevel};
 use super::light_readings::LightReadings;
 use super::sentences::{FIRST, HOW_TO_READ, Sentence};
-use super::terminal::render;
+use super::terminal::{line as line_of, render};
 use super::words::{counted, percent, reach_of, shortened};
 use crate::score::accuracy::AccuracyCell;
 use crate::score::choice::ReadingMode;
@@ -57,7 +57,8 @@ pub(crate) fn full(report: &ChoiceReport<'_>, runs: &[(&RunManifest, &Path)]) ->
         text += &sentence_lines(sentence);
     }
     if !report.sentences.is_empty() {
-        let _ = writeln!(text, " {HOW_TO_READ}\n");
+        text += &line_of([" ", HOW_TO_READ, " "]);
+        text.push('\n');
     }
     text += &render(&report.tables);
     text += &open_question(report);

@@ -1,10 +1,10 @@
 //! Tables as text for the terminal: [`render`].
 
-use std::fmt::Write;
+mod fitted;
+mod width;
 
-use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
-use comfy_table::{CellAlignment, LineStyle};
-
+use self::fitted::{TextColumn, TextRow, TextTable};
+use super::short::wrapped::wrapped_to;
 use super::table::{Column, ColumnKind, Table, TableCell, TableFormat};
 use super::words::{interval, percent, points, reach, reach_of, stops, with_interval, words};
 use crate::types::manifest::{Counts, RunManifest, Status};
@@ -38,6 +38,11 @@ pub(super) fn texts(kind: ColumnKind, cell: &TableCell) -> Vec<String> {
     }
 }
 
+/// Text in lines as wide as the terminal: the beginning of the first line, the text, and the beginning of the others.
+pub(super) fn line(parts: [&str; 3]) -> String {
+    wrapped_to(width::columns(), parts)
+}
+
 /// All tables that have a heading, each with its heading and notes.
 #[must_use]
 pub(super) fn render(tables: &[Table]) -> String {
@@ -48,13 +53,13 @@ pub(super) fn render(tables: &[Table]) -> String {
             continue;
         };
         if !heading.is_empty() {
-            let _ = writeln!(text, "{heading}");
+            text += &line(["", heading, " "]);
         }
         text += &table(parts);
         let notes = parts.iter().flat_map(|table| &table.notes);
         let foot = parts.iter().filter_map(|table| table.foot.as_ref()).take(1);
         for note in notes.chain(foot) {
-            let _ = writeln!(text, "{note}");
+            text += &line(["", note, " "]);
         }
     }
     text
@@ -67,44 +72,39 @@ const REACH: &str = "95 %";
 /// intervals.
 #[must_use]
 pub(super) fn table(parts: &[Table]) -> String {
-    let mut grid = comfy_table::Table::new();
-    grid.load_style(UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()));
     let columns = parts.iter().take(1).flat_map(|table| &table.columns);
     let has_reach = columns
         .clone()
         .any(|column| column.kind == ColumnKind::Accuracy);
-    let names = columns.clone().flat_map(|column| &column.heads.terminal);
-    let reach = has_reach.then(|| REACH.to_owned());
-    grid.set_header(names.cloned().chain(reach));
+    let heads = columns.flat_map(|Column { kind, heads }| {
+        let heads = heads.terminal.iter();
+        heads.map(|head| TextColumn {
+            head: head.clone(),
+            kind: *kind,
+        })
+    });
+    let reach = has_reach.then(|| TextColumn {
+        head: REACH.to_owned(),
+        kind: ColumnKind::Text,
+    });
+    let mut rows = Vec::new();
     for table in parts {
         for (heading, row) in table.headed_rows_in(TableFormat::Terminal) {
             if let Some(heading) = heading.filter(|heading| !heading.is_empty()) {
-                grid.add_row([format!("— {heading}")]);
+                rows.push(TextRow::Heading(heading.to_owned()));
             }
             let cells = table.cells(row);
             let cells = cells.filter(|(column, _)| !column.heads.terminal.is_empty());
             let reach = has_reach.then(|| widest_reach(cells.clone()));
             let texts = cells.flat_map(|(column, cell)| texts(column.kind, cell));
-            grid.add_row(texts.chain(reach));
+            rows.push(TextRow::Cells(texts.chain(reach).collect()));
         }
     }
-    if grid.row_count() == 0 {
-        return String::new();
-    }
-    let kinds = columns.flat_map(|Column { kind, heads }| vec![kind; heads.terminal.len()]);
-    for (column, kind) in grid.column_iter_mut().zip(kinds) {
-        if matches!(
-            kind,
-            ColumnKind::Count
-                | ColumnKind::Accuracy
-                | ColumnKind::Points
-                | ColumnKind::P
-                | ColumnKind::Percent
-        ) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
-    format!("{grid}\n")
+    let table = TextTable {
+        columns: heads.chain(reach).collect(),
+        rows,
+    };
+    table.fitted(width::columns())
 }
 
 /// How far the widest interval of these cells reaches down and up, as `−7.7 +7.1`; empty if no cell has one.

@@ -18,12 +18,14 @@ use files::Files;
 use map::Map;
 
 /// The libraries that stand in some places (folders or files in `src/`) alone. Test code may use them anywhere.
-const LIBRARIES: [(&str, &[&str]); 15] = [
+const LIBRARIES: [(&str, &[&str]); 17] = [
     ("axum", &["run/serve"]),
     ("glam", &["rooms"]),
     ("plotters", &["report"]),
     ("noto_sans_mono_bitmap", &["report/sheet"]),
     ("comfy_table", &["report"]),
+    ("terminal_size", &["report"]),
+    ("unicode_width", &["report"]),
     ("tokio", &["ask", "job", "run/serve"]),
     ("reqwest", &["ask"]),
     ("ort", &["enhance"]),

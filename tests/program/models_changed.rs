@@ -323,7 +323,7 @@ fn columns_about_models_are_shown_on_demand() {
     assert!(row.contains("org/first") && row.contains("fp8"), "{full}");
     let page = fs::read_to_string(bench.path("run/report.html")).unwrap();
     assert!(
-        page.contains("<th>served as</th>"),
+        page.contains("<th scope=\"col\">served as</th>"),
         "the column is on the page"
     );
     let summary = fs::read_to_string(bench.path("run/summary.csv")).unwrap();

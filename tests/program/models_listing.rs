@@ -130,7 +130,7 @@ fn tables_are_divided_by_groups() {
     let page = read(&bench, "run/report.html");
     let shown = between(&page, "Accuracy in % by level, with", "</table>");
     assert!(
-        shown.contains("<tr class=\"group\"><th colspan="),
+        shown.contains("<tr class=\"group\"><th scope=\"rowgroup\" colspan="),
         "{shown}"
     );
     // The model without images stands below the same model with them, and chance at the end.

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::run::{Bench, records, words};
+use crate::support::run::{Bench, called, records, words};
 use crate::support::table::check_rows;
 use serde_json::{Value, json};
 
@@ -418,4 +418,29 @@ fn people_enter_as_a_model() {
             .contains("answers.jsonl, line 1: missing field `condition`"),
         "{broken:?}"
     );
+}
+
+#[test]
+fn no_line_of_all_tables_is_wider_than_the_terminal() {
+    let bench = Bench::with_questions(12);
+    let models = ["72b-a", "72b-b"]
+        .map(|end| format!("a-model-with-a-name-of-many-letters-instruct-{end}.jsonl"));
+    for model in &models {
+        bench.file(model, "{\"default\": \"C\"}\n");
+    }
+    let [one, other] = &models;
+    bench.complete(&words(&format!(
+        "--data set.jsonl --model script:{one} --model script:{other} --blind-model random --model random --out run"
+    )));
+    for columns in [60, 80, 100, 140] {
+        let mut command = bench.command(&["report", "run", "--full"]);
+        let called = called(command.env("COLUMNS", columns.to_string()));
+        assert_eq!(called.code, Some(0), "{called:?}");
+        for line in called.stdout.lines() {
+            assert!(line.chars().count() <= columns, "{columns}: {line}");
+        }
+        // Both models can be told apart in every table.
+        assert!(called.stdout.contains("-a.jsonl") && called.stdout.contains("-b.jsonl"));
+        assert!(called.stdout.contains("100.0"), "{}", called.stdout);
+    }
 }

@@ -70,6 +70,8 @@ impl Bench {
         }
         // Where no data are named: few rooms, and small ones.
         command.env("DARKQA_DATA", "rooms:frames=6,size=200x150");
+        // A wide terminal, so that a line of a table is one line.
+        command.env("COLUMNS", "400");
         command.current_dir(self.folder.path()).args(words);
         command
     }

@@ -10,7 +10,7 @@ use crate::report::alert::lines;
 use crate::report::light_readings::LightReadings;
 use crate::report::sentences::Sentence;
 use crate::report::short::wrapped;
-use crate::report::terminal::{render, table};
+use crate::report::terminal::{line, render, table};
 use crate::report::words::counted;
 use crate::score::health::Health;
 use crate::types::manifest::RunManifest;
@@ -39,7 +39,8 @@ pub(crate) fn text(
         for sentence in &report.sentences {
             text += &sentence_lines(sentence);
         }
-        let _ = writeln!(text, " {HOW_TO_READ}\n");
+        text += &line([" ", HOW_TO_READ, " "]);
+        text.push('\n');
         text += &render(&report.tables);
     } else {
         text += &findings(report);

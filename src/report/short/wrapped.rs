@@ -5,11 +5,16 @@ pub(super) const WIDTH: usize = 80;
 
 /// Text in lines of [`WIDTH`] characters; the first begins with `first`, the others with `rest`.
 pub(in crate::report) fn wrapped(first: &str, text: &str, rest: &str) -> String {
+    wrapped_to(WIDTH, [first, text, rest])
+}
+
+/// Text in lines of `width` characters, as by [`wrapped`].
+pub(in crate::report) fn wrapped_to(width: usize, [first, text, rest]: [&str; 3]) -> String {
     let mut lines = String::new();
     let mut line = first.to_owned();
     let mut is_empty = true;
     for word in text.split(' ') {
-        if !is_empty && line.chars().count() + 1 + word.chars().count() > WIDTH {
+        if !is_empty && line.chars().count() + 1 + word.chars().count() > width {
             lines += line.trim_end();
             lines.push('\n');
             rest.clone_into(&mut line);
