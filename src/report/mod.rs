@@ -31,4 +31,5 @@ pub(crate) mod table;
 pub(crate) mod tables;
 mod template;
 pub(crate) mod terminal;
+mod width;
 mod words;

@@ -1,11 +1,11 @@
 //! Tables as text for the terminal: [`render`].
 
 mod fitted;
-mod width;
 
 use self::fitted::{TextColumn, TextRow, TextTable};
 use super::short::wrapped::wrapped_to;
 use super::table::{Column, ColumnKind, Table, TableCell, TableFormat};
+use super::width;
 use super::words::{interval, percent, points, reach, reach_of, stops, with_interval, words};
 use crate::types::manifest::{Counts, RunManifest, Status};
 

@@ -1,11 +1,13 @@
 //! Text in lines of one width: [`wrapped`].
 
-/// Width of the text in characters.
+use crate::report::width::columns;
+
+/// Width of the text in characters, where the terminal has room for it.
 pub(super) const WIDTH: usize = 80;
 
-/// Text in lines of [`WIDTH`] characters; the first begins with `first`, the others with `rest`.
+/// Text in lines of [`WIDTH`] characters, or as many as the terminal has; the first begins with `first`, the others with `rest`.
 pub(in crate::report) fn wrapped(first: &str, text: &str, rest: &str) -> String {
-    wrapped_to(WIDTH, [first, text, rest])
+    wrapped_to(WIDTH.min(columns()), [first, text, rest])
 }
 
 /// Text in lines of `width` characters, as by [`wrapped`].
