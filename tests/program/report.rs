@@ -423,8 +423,8 @@ fn people_enter_as_a_model() {
 #[test]
 fn no_line_of_all_tables_is_wider_than_the_terminal() {
     let bench = Bench::with_questions(12);
-    let models = ["72b-a", "72b-b"]
-        .map(|end| format!("a-model-with-a-name-of-many-letters-instruct-{end}.jsonl"));
+    // Names of thirty letters.
+    let models = ["a", "b"].map(|end| format!("a-model-of-thirty-letters-72-{end}.jsonl"));
     for model in &models {
         bench.file(model, "{\"default\": \"C\"}\n");
     }

@@ -139,18 +139,26 @@ impl TextTable {
         }
     }
 
-    /// The columns of each part. The texts at the left, which name the rows, stand in every part.
+    /// The columns of each part. The texts at the left, which name the rows, stand in every part; on a narrow terminal as many of them as
+    /// leave room for another column.
     fn parts(&self, most: usize) -> Vec<Vec<usize>> {
-        let is_text = |column: &TextColumn| column.kind == ColumnKind::Text;
-        let names = self
-            .columns
-            .iter()
-            .take_while(|column| is_text(column))
-            .count();
-        let names = names.min(self.columns.len().saturating_sub(1));
         // The last cell has no gap behind it.
         let most = most + 1;
-        let named: usize = (0..names).map(|column| self.width_of(column)).sum();
+        let width_to = |end: usize| (0..end).map(|column| self.width_of(column)).sum::<usize>();
+        let has_room = |names: usize| {
+            let widest = (names..self.columns.len()).map(|column| self.width_of(column));
+            width_to(names) + widest.max().unwrap_or(0) <= most
+        };
+        let texts = self
+            .columns
+            .iter()
+            .take_while(|column| column.kind == ColumnKind::Text);
+        let texts = texts.count().min(self.columns.len().saturating_sub(1));
+        let names = (1..=texts)
+            .rev()
+            .find(|names| has_room(*names))
+            .unwrap_or(texts.min(1));
+        let named = width_to(names);
         let mut parts: Vec<Vec<usize>> = Vec::new();
         let mut width = 0;
         for column in names..self.columns.len() {
