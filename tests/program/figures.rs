@@ -157,7 +157,7 @@ fn what_is_not_known_is_refused_with_what_is() {
         ("--label nobody=A", "script:m.jsonl"),
         ("--order nobody", "script:m.jsonl"),
         ("--reference one", "script:m.jsonl"),
-        ("--only acuracy", "accuracy"),
+        ("--only accuracies", "accuracy"),
         ("--label one", "OLD=NEW"),
         ("--label one=A --label one=B", "two names"),
         (
