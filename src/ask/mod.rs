@@ -73,7 +73,7 @@ pub use model::Model;
 pub(crate) use pace::Bounds;
 pub use pace::Quota;
 pub use parameters::{Constrain, ImageDetail, Parameters, Temperature};
-pub(crate) use payload::{ImageArgs, png};
+pub(crate) use payload::{ImageArgs, pixels_of_url, png};
 pub use payload::{Payload, PayloadFormat};
 pub(crate) use prices::{Price, Prices};
 pub use prompt::Prompts;

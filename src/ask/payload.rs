@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::fmt;
+use std::io::Cursor;
 use std::num::NonZeroU32;
 use std::str::FromStr;
 use std::sync::Arc;
@@ -11,7 +12,9 @@ use base64::engine::general_purpose::STANDARD;
 use bytes::Bytes;
 use clap::Args;
 use image::codecs::png::{CompressionType, FilterType as RowFilter, PngEncoder};
-use image::{ExtendedColorType, ImageBuffer, ImageEncoder as _, imageops};
+use image::{
+    ExtendedColorType, ImageBuffer, ImageEncoder as _, ImageFormat, ImageReader, Limits, imageops,
+};
 
 use super::plain_png;
 use crate::error::{Error, Result};
@@ -275,6 +278,23 @@ pub(crate) fn png(image: &Rgb) -> Result<Vec<u8>> {
         .write_image(image.samples(), width, height, ExtendedColorType::Rgb8)
         .map_err(image_error)?;
     Ok(file)
+}
+
+/// The pixels of a JPEG in a `data:` URL, as a run stores small copies.
+///
+/// # Errors
+/// If the text is no such URL, the file is no whole JPEG, or a side has more than `most` pixels.
+pub(crate) fn pixels_of_url(url: &str, most: u32) -> Result<Rgb> {
+    let base64 = url.strip_prefix("data:image/jpeg;base64,");
+    let base64 = base64.ok_or_else(|| image_error("no JPEG as a run stores it"))?;
+    let file = STANDARD.decode(base64).map_err(image_error)?;
+    let mut reader = ImageReader::with_format(Cursor::new(file), ImageFormat::Jpeg);
+    let mut limits = Limits::default();
+    (limits.max_image_width, limits.max_image_height) = (Some(most), Some(most));
+    reader.limits(limits);
+    let image = reader.decode().map_err(image_error)?.into_rgb8();
+    let (height, width) = (image.height() as usize, image.width() as usize);
+    Rgb::new(height, width, image.into_raw())
 }
 
 fn jpeg(samples: &[u8], width: u32, height: u32, quality: Quality) -> Result<Vec<u8>> {

@@ -13,6 +13,7 @@ use crate::run::calibrate::CalibrateArgs;
 use crate::run::enhance::EnhanceArgs;
 use crate::run::evaluate::{CheckArgs, EvaluateArgs};
 use crate::run::export::ExportArgs;
+use crate::run::figures::FiguresArgs;
 use crate::run::import::ImportArgs;
 use crate::run::init::InitArgs;
 use crate::run::models::ModelsArgs;
@@ -112,6 +113,8 @@ pub(crate) enum Command {
     Serve(ServeArgs),
     /// Show the results of runs, from their records alone: tables, figures and one HTML file; several runs are compared
     Report(ReportArgs),
+    /// Draw the figures of runs for a paper, at the width of its columns: PDF, SVG, pgfplots, and their captions
+    Figures(FiguresArgs),
     /// Merge the shards of an evaluation into one run
     Merge(MergeArgs),
     /// Make the images of one question again, bit for bit, and check their digests

@@ -7,6 +7,7 @@
 pub(crate) mod bars;
 pub(crate) mod data;
 mod marks;
+pub(crate) mod thresholds;
 
 use plotters::coord::Shift;
 use plotters::element::DashedPathElement;
@@ -75,6 +76,11 @@ pub(super) fn files(figures: Vec<Figure>) -> impl Iterator<Item = (String, Vec<u
 pub(crate) struct LineStyle(pub usize);
 
 impl LineStyle {
+    /// Style of lines that belong to no model: chance, and the most frequent true answer.
+    pub(crate) const REFERENCE: Self = Self(27);
+    /// Style of the model that a reader asked to be drawn black.
+    pub(crate) const BLACK: Self = Self(1000);
+
     pub(super) fn colour(self) -> RGBColor {
         COLOURS[self.0 % COLOURS.len()]
     }
@@ -137,6 +143,49 @@ pub(crate) struct Panel {
     pub lines: Vec<PlotLine>,
     /// The model that all its lines are about; `None` if there are several.
     pub model: Option<String>,
+}
+
+impl PlotLine {
+    /// Whether nothing of the line is drawn.
+    pub(super) fn is_empty(&self) -> bool {
+        match &self.content {
+            PanelContent::Curve(points) => points.is_empty(),
+            PanelContent::Marks(marks) => marks.is_empty(),
+            PanelContent::Flat(_) => false,
+        }
+    }
+}
+
+impl Panel {
+    /// The levels of its curves, from L0.
+    pub(super) fn levels(&self) -> Vec<AxisLevel> {
+        let levels = self.lines.iter().flat_map(|line| match &line.content {
+            PanelContent::Curve(points) => points.iter().map(|(level, _)| *level).collect(),
+            PanelContent::Flat(_) | PanelContent::Marks(_) => Vec::new(),
+        });
+        let mut levels: Vec<AxisLevel> = levels.collect();
+        levels.sort_unstable();
+        levels.dedup();
+        levels
+    }
+
+    /// The right end of the axis, in the unit of the levels.
+    pub(super) fn farthest(&self) -> f64 {
+        let marks = self.lines.iter().flat_map(|line| match &line.content {
+            PanelContent::Marks(marks) => &marks[..],
+            PanelContent::Flat(_) | PanelContent::Curve(_) => &[],
+        });
+        let marks = marks.map(|mark| mark.ev[2]);
+        let levels = self.levels().into_iter().map(AxisLevel::value);
+        levels.chain(marks).fold(0.0, f64::max)
+    }
+
+    /// Title of the horizontal axis.
+    pub(super) fn axis_title(&self) -> String {
+        let axis = self.levels().into_iter().find_map(AxisLevel::axis);
+        let Axis { title, unit, .. } = axis.unwrap_or(Axis::LIGHT);
+        format!("level; {title} in {unit}")
+    }
 }
 
 /// A figure of panels with one legend.
@@ -258,29 +307,13 @@ struct AxisFrame {
 
 impl AxisFrame {
     fn new((x, y): (i32, i32), panel: &Panel) -> Self {
-        let mut levels: Vec<AxisLevel> = panel
-            .lines
-            .iter()
-            .flat_map(|line| match &line.content {
-                PanelContent::Curve(points) => points.iter().map(|(level, _)| *level).collect(),
-                PanelContent::Flat(_) | PanelContent::Marks(_) => Vec::new(),
-            })
-            .collect();
-        levels.sort_unstable();
-        levels.dedup();
-        let marks = panel.lines.iter().flat_map(|line| match &line.content {
-            PanelContent::Marks(marks) => &marks[..],
-            PanelContent::Flat(_) | PanelContent::Curve(_) => &[],
-        });
-        let marks = marks.map(|mark| mark.ev[2]);
-        let farthest = levels.iter().map(|level| level.value()).chain(marks);
         Self {
             left: x + MARGIN[0],
             top: y + MARGIN[1],
             width: PANEL.0 - MARGIN[0] - MARGIN[2],
             height: PANEL.1 - MARGIN[1] - MARGIN[3],
-            farthest: farthest.fold(0.0, f64::max),
-            levels,
+            farthest: panel.farthest(),
+            levels: panel.levels(),
         }
     }
 
@@ -307,13 +340,6 @@ impl AxisFrame {
             }
         }
         labelled
-    }
-
-    /// Title of the horizontal axis.
-    fn axis_title(&self) -> String {
-        let axis = self.levels.iter().find_map(|level| level.axis());
-        let Axis { title, unit, .. } = axis.unwrap_or(Axis::LIGHT);
-        format!("level; {title} in {unit}")
     }
 
     fn y(&self, share: f64) -> i32 {
@@ -347,7 +373,7 @@ impl AxisFrame {
             draw_text(root, &drop.to_string(), (x, bottom + 22), 11, BELOW)?;
         }
         let middle = self.left + self.width / 2;
-        draw_text(root, &self.axis_title(), (middle, bottom + 38), 12, BELOW)?;
+        draw_text(root, &panel.axis_title(), (middle, bottom + 38), 12, BELOW)?;
         draw_text(
             root,
             &panel.title,

@@ -11,9 +11,12 @@ use crate::score::significance::Significance;
 /// The findings as a list, then all tables that have a LaTeX caption; `head` names them in the first comment line.
 #[must_use]
 pub(super) fn tables(head: &str, sentences: &[Sentence], tables: &[Table]) -> String {
-    let mut text = format!("% {head} of darkqa-eval; \\usepackage{{booktabs}} in the preamble.\n");
+    let mut text = format!(
+        "% {head} of darkqa-eval; \\usepackage{{booktabs,graphicx}} in the preamble. Tables that are wider than the text are made smaller;\n\
+         % `darkqa-eval figures RUN --format tex` sets the main ones at the width of a column.\n"
+    );
     if !sentences.is_empty() {
-        text += "\n\\begin{itemize}\n";
+        text += "\n\\begin{itemize}\\sloppy\n";
         for Sentence {
             text: line, detail, ..
         } in sentences
@@ -47,6 +50,7 @@ pub(super) fn escaped(text: &str) -> String {
             '\\' => escaped.push_str("\\textbackslash{}"),
             '~' => escaped.push_str("\\textasciitilde{}"),
             '^' => escaped.push_str("\\textasciicircum{}"),
+            '…' => escaped.push_str("\\ldots{}"),
             '−' => escaped.push_str("$-$"),
             'κ' => escaped.push_str("$\\kappa$"),
             '†' => escaped.push_str("$\\dagger$"),
@@ -59,6 +63,13 @@ pub(super) fn escaped(text: &str) -> String {
     escaped
 }
 
+/// Makes what follows smaller where it is wider than the text.
+const FIT: &str = "\\resizebox{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}{!}";
+
+/// Most rows of a table on a page.
+const MOST_ROWS: usize = 40;
+
+/// A table as floats of at most [`MOST_ROWS`] rows each, no wider than the text.
 fn table(caption: &str, table: &Table) -> String {
     let named = |column: &&Column| column.heads.latex.is_some();
     let columns = table.columns.iter().filter(named);
@@ -68,14 +79,41 @@ fn table(caption: &str, table: &Table) -> String {
     });
     let heads = columns.filter_map(|column| column.heads.latex.clone());
     let line = |cells: Vec<String>| format!("    {} \\\\\n", cells.join(" & "));
-    let mut text = String::from("\n\\begin{table}\n  \\centering\n");
-    let _ = writeln!(text, "  \\caption{{{caption}}}");
     let alignments: String = alignments.collect();
-    let _ = writeln!(text, "  \\begin{{tabular}}{{{alignments}}}\n    \\toprule");
-    text += &line(heads.collect());
-    text += "    \\midrule\n";
-    let width = alignments.len();
-    for (index, (heading, row)) in table.headed_rows_in(TableFormat::Latex).enumerate() {
+    let heads = line(heads.collect());
+    let rows: Vec<(Option<&str>, String)> = table
+        .headed_rows_in(TableFormat::Latex)
+        .map(|(heading, row)| {
+            let cells = table.cells(row).filter(|(column, _)| named(column));
+            let cells = cells.map(|(column, cell)| cell_text(column.kind, cell));
+            (heading, line(cells.collect()))
+        })
+        .collect();
+    let foot = table.foot.as_deref();
+    let foot = foot.map(|foot| format!("\n  {{\\footnotesize {}}}\n", escaped(foot)));
+    let mut text = String::new();
+    let parts = rows.chunks(MOST_ROWS).count().max(1);
+    for part in 0..parts {
+        let rows = rows.chunks(MOST_ROWS).nth(part).unwrap_or_default();
+        let place = match parts {
+            1 => String::new(),
+            _ => format!(" (part {} of {parts})", part + 1),
+        };
+        let body = body(rows, alignments.len());
+        let _ = write!(
+            text,
+            "\n\\begin{{table}}\n  \\centering\n  \\caption{{{caption}{place}}}\n  {FIT}{{\\footnotesize\n  \
+             \\begin{{tabular}}{{{alignments}}}\n    \\toprule\n{heads}    \\midrule\n{body}    \\bottomrule\n  \\end{{tabular}}}}\n{}\\end{{table}}\n",
+            foot.as_deref().unwrap_or_default()
+        );
+    }
+    text
+}
+
+/// Rows with their headings and the rules between.
+fn body(rows: &[(Option<&str>, String)], width: usize) -> String {
+    let mut text = String::new();
+    for (index, (heading, row)) in rows.iter().enumerate() {
         if let Some(heading) = heading {
             if index > 0 {
                 text += "    \\midrule\n";
@@ -88,18 +126,9 @@ fn table(caption: &str, table: &Table) -> String {
                 );
             }
         }
-        let cells = table.cells(row).filter(|(column, _)| named(column));
-        text += &line(
-            cells
-                .map(|(column, cell)| cell_text(column.kind, cell))
-                .collect(),
-        );
+        text += row;
     }
-    text += "    \\bottomrule\n  \\end{tabular}\n";
-    if let Some(foot) = &table.foot {
-        let _ = writeln!(text, "\n  {{\\footnotesize {}}}", escaped(foot));
-    }
-    text + "\\end{table}\n"
+    text
 }
 
 /// A number above its interval.

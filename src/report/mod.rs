@@ -16,6 +16,7 @@ mod latex;
 mod light_readings;
 pub(crate) mod openeqa;
 pub(crate) mod page;
+pub(crate) mod paper;
 pub(crate) mod products;
 pub(crate) mod questions;
 mod readable;

@@ -7,6 +7,11 @@ use crate::types::{EnhancerName, Family, KindReading};
 
 /// A variant in words, with its enhancer.
 pub(super) fn light(variant: &KindReading, enhancer: Option<&EnhancerName>) -> String {
+    light_with(variant, enhancer.map(EnhancerName::as_str))
+}
+
+/// A variant in words, with a name for its enhancer.
+pub(super) fn light_with(variant: &KindReading, enhancer: Option<&str>) -> String {
     let (title, group) = (variant.title(), variant.group_suffix());
     match enhancer {
         None => title + &group,

@@ -5,6 +5,7 @@ pub(crate) mod calibrate;
 pub(crate) mod enhance;
 pub(crate) mod evaluate;
 pub(crate) mod export;
+pub(crate) mod figures;
 pub(crate) mod import;
 pub(crate) mod init;
 pub(crate) mod models;

@@ -23,6 +23,7 @@ mod export;
 mod fair;
 mod faults;
 mod fidelity;
+mod figures;
 mod golden;
 mod hm3d;
 mod identity;

@@ -68,6 +68,10 @@ fn sample(arg: &Arg) -> String {
         "url" => "/v1/responses",
         "families" => "color",
         "crop" => "0,0,256,256",
+        "width" => "neurips",
+        "columns" => "2",
+        "label" => "abc=name",
+        "font_size" => "9",
         "top_p" => "0.9",
         "data" | "model" | "judge" => "abc",
         _ => match arg.get_value_names() {

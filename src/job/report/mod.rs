@@ -7,6 +7,7 @@ mod combine;
 mod common;
 mod cost;
 mod enhancers;
+mod figure_runs;
 mod join;
 mod lights;
 mod listing;
@@ -19,5 +20,6 @@ mod settings;
 mod story;
 
 pub(super) use cost::price;
+pub(crate) use figure_runs::FigureRuns;
 pub(crate) use runs::{ReportArgs, report};
 pub(crate) use story::story_curves;

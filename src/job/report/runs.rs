@@ -110,7 +110,7 @@ pub(crate) fn report(args: &ReportArgs) -> Result<Outcome> {
 }
 
 /// The folders without those that are named before, and the alerts about these.
-fn distinct(folders: &[PathBuf]) -> (Vec<&PathBuf>, Vec<Alert>) {
+pub(super) fn distinct(folders: &[PathBuf]) -> (Vec<&PathBuf>, Vec<Alert>) {
     let mut times = Vec::<(PathBuf, &PathBuf, usize)>::new();
     for folder in folders {
         // A folder that cannot be read is named when it is opened.
@@ -329,7 +329,7 @@ fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<String> {
     Ok(lines)
 }
 
-fn no_records(path: PathBuf) -> Error {
+pub(super) fn no_records(path: PathBuf) -> Error {
     let problem = "the run has no records yet: nothing to report".to_owned();
     Error::Run { path, problem }
 }

@@ -85,7 +85,7 @@ impl ChartData {
             PanelData {
                 title: panel.title.clone(),
                 model: panel.model.clone(),
-                axis: frame.axis_title(),
+                axis: panel.axis_title(),
                 unit: axis.unwrap_or(Axis::LIGHT).unit,
                 levels: levels
                     .map(|level| LevelData {

@@ -1,8 +1,8 @@
 //! Figures of the answers of models that no longer see: hallucination and collapse.
 
-use super::super::chart::{Chart, Panel, PanelContent, PlotLine};
-use super::super::words::{family as family_name, light};
-use super::{Overview, REFERENCE};
+use super::super::chart::{Chart, LineStyle, Panel, PanelContent, PlotLine};
+use super::super::words::family as family_name;
+use super::Overview;
 use crate::score::confusion::{Confusion, Hallucination};
 use crate::score::estimate::Estimate;
 use crate::types::Family;
@@ -35,7 +35,7 @@ impl Overview<'_> {
         ];
         let caption = format!(
             "Object recognition: false positives (left) and false negatives (right) by level, {}.",
-            light(&variant, None)
+            self.light(&variant, None)
         );
         self.chart("share of replies in %", panels, 2, &caption)
     }
@@ -57,11 +57,11 @@ impl Overview<'_> {
             let (share, n) = truth?;
             lines.push(PlotLine {
                 name: "commonest true answer".to_owned(),
-                style: REFERENCE,
+                style: LineStyle::REFERENCE,
                 content: PanelContent::Flat(share),
                 model: None,
             });
-            let title = format!("{}, n {n}", family_name(Some(&family)));
+            let title = format!("{}, n {n}", self.names.of(family_name(Some(&family))));
             Some(Panel {
                 title,
                 lines,
@@ -72,7 +72,7 @@ impl Overview<'_> {
         let panels: Vec<Panel> = panels.filter_map(panel).collect();
         let caption = format!(
             "Answer collapse, {}: how often the answer given most often is given, by level.",
-            light(&variant, None)
+            self.light(&variant, None)
         );
         let (caption, mut chart) = self.chart("share of replies in %", panels, 2, &caption)?;
         "shares of all replies, strict reading; what the answers are is in collapse.csv"

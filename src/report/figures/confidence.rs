@@ -1,7 +1,6 @@
 //! The figure of confidence against accuracy over the levels.
 
 use super::super::chart::{Chart, LineStyle, Panel, PanelContent, PlotLine};
-use super::super::words::light;
 use super::Overview;
 use crate::score::calibration::Calibration;
 use crate::score::estimate::Estimate;
@@ -35,7 +34,8 @@ impl Overview<'_> {
                 };
                 let lines: Vec<PlotLine> = LINES.into_iter().enumerate().filter_map(line).collect();
                 if !lines.is_empty() {
-                    let title = format!("{model}, {}", light(&variant, None));
+                    let name = self.names.of(model);
+                    let title = format!("{name}, {}", self.light(&variant, None));
                     panels.push(Panel {
                         title,
                         lines,

@@ -2,15 +2,20 @@
 
 mod answers;
 mod confidence;
+mod names;
+mod overview;
 mod photographed;
 mod story;
+mod tables;
 mod thresholds;
 
 use std::collections::BTreeSet;
 
+use super::chart::bars::BarChart;
 use super::chart::data::ChartData;
+use super::chart::thresholds::ThresholdChart;
 use super::chart::{Chart, DarkMark, Figure, LineStyle, Panel, PanelContent, PlotLine};
-use super::words::{family as family_name, light};
+use super::words::{family as family_name, light_with};
 use crate::error::Result;
 use crate::score::choice::ReadingMode;
 use crate::score::estimate::Estimate;
@@ -19,14 +24,91 @@ use crate::score::subject::{CHANCE, Subject, judged};
 use crate::types::degradation::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
 
+pub(crate) use names::{KnownNames, Names};
+pub(crate) use overview::{OverviewPanels, overview};
 pub(crate) use story::{StoryCurves, story_curves};
+pub(crate) use tables::{PaperCell, PaperMark, PaperRow, PaperTable, paper_tables};
 
 /// All figures for which there are records.
 ///
 /// # Errors
 /// If a figure cannot be drawn.
 pub(crate) fn figures(findings: &Findings<'_>) -> Result<Vec<Figure>> {
-    let overview = Overview::new(findings);
+    let drawings = drawings(findings, &Names::default()).into_iter();
+    let figures = drawings.map(|drawing| {
+        Ok(Figure {
+            svg: drawing.chart.svg()?,
+            data: drawing.chart.data()?,
+            name: drawing.name,
+            caption: drawing.caption,
+        })
+    });
+    figures.collect()
+}
+
+/// One figure of a report, before it is drawn.
+#[derive(Debug, Clone)]
+pub(crate) struct Drawing {
+    /// Name of the figure in files.
+    pub name: &'static str,
+    /// Its caption, without the note of the chart.
+    pub caption: String,
+    pub chart: Drawn,
+}
+
+/// What a figure shows.
+#[derive(Debug, Clone)]
+pub(crate) enum Drawn {
+    Lines(Chart),
+    Bars(BarChart),
+    Thresholds(ThresholdChart),
+}
+
+impl Drawn {
+    /// What the caption says besides: numbers of items, and what bands and bars are.
+    pub(crate) fn note(&self) -> String {
+        match self {
+            Self::Lines(chart) => chart.note.clone(),
+            Self::Bars(chart) => chart.note.clone(),
+            Self::Thresholds(chart) => format!("lines are 95 % intervals by {}", chart.unit),
+        }
+    }
+
+    /// What the figure shows, for the script of the page.
+    fn data(&self) -> Result<Option<String>> {
+        match self {
+            Self::Lines(chart) => ChartData::json(chart).map(Some),
+            Self::Bars(_) | Self::Thresholds(_) => Ok(None),
+        }
+    }
+
+    /// The figure of a report as SVG.
+    fn svg(&self) -> Result<String> {
+        match self {
+            Self::Lines(chart) => chart.svg(),
+            Self::Bars(chart) => chart.svg(),
+            Self::Thresholds(chart) => chart.svg(),
+        }
+    }
+}
+
+/// The names that figures of questions with choices can have, in their order.
+pub(crate) const FIGURES: [&str; 10] = [
+    "accuracy",
+    "variants",
+    "enhancers",
+    "families",
+    "hallucination",
+    "collapse",
+    "confidence",
+    "photographed",
+    "thresholds",
+    "blur_thresholds",
+];
+
+/// All figures for which there are records, with the names and in the order of the reader.
+pub(crate) fn drawings(findings: &Findings<'_>, names: &Names) -> Vec<Drawing> {
+    let overview = Overview::new(findings, names);
     let charts = [
         ("accuracy", overview.accuracy()),
         ("variants", overview.variants()),
@@ -36,25 +118,20 @@ pub(crate) fn figures(findings: &Findings<'_>) -> Result<Vec<Figure>> {
         ("collapse", overview.collapse()),
         ("confidence", overview.confidence()),
     ];
-    let mut figures = Vec::new();
-    for (name, chart) in charts {
-        let Some((caption, chart)) = chart else {
-            continue;
-        };
-        figures.push(Figure {
+    let figures = charts.into_iter().filter_map(|(name, chart)| {
+        let (caption, chart) = chart?;
+        let chart = Drawn::Lines(chart);
+        Some(Drawing {
             name,
             caption,
-            svg: chart.svg()?,
-            data: Some(ChartData::json(&chart)?),
-        });
-    }
-    figures.extend(overview.photographed()?);
-    figures.extend(thresholds::figures(findings)?);
-    Ok(figures)
+            chart,
+        })
+    });
+    let mut figures: Vec<Drawing> = figures.collect();
+    figures.extend(overview.photographed());
+    figures.extend(overview.thresholds());
+    figures
 }
-
-/// Style of lines that belong to no model: chance, and the most frequent true answer.
-const REFERENCE: LineStyle = LineStyle(27);
 
 const ACCURACY: &str = "accuracy in %";
 
@@ -65,23 +142,28 @@ struct Overview<'a> {
     models: Vec<&'a str>,
     enhancers: Vec<&'a EnhancerName>,
     levels: BTreeSet<AxisLevel>,
+    names: Names,
 }
 
 impl<'a> Overview<'a> {
-    fn new(findings: &'a Findings<'a>) -> Self {
+    fn new(findings: &'a Findings<'a>, names: &Names) -> Self {
         let subjects = &findings.grid.subjects;
         let seeing = subjects.iter().filter(|s| s.view == Some(View::Image));
         // Subjects of one model stand together, and models in their order.
         let mut models: Vec<&str> = seeing.map(|subject| &*subject.model).collect();
         models.dedup();
+        names.order(&mut models, |model| model);
         let enhancers: BTreeSet<&EnhancerName> = subjects
             .iter()
             .filter_map(|s| s.enhancer.as_ref())
             .collect();
+        let mut enhancers: Vec<&EnhancerName> = enhancers.into_iter().collect();
+        names.order(&mut enhancers, |name| name.as_str());
         Self {
             findings,
             models,
-            enhancers: enhancers.into_iter().collect(),
+            enhancers,
+            names: names.clone(),
             levels: subjects.iter().filter_map(|s| s.level).collect(),
         }
     }
@@ -133,9 +215,9 @@ impl<'a> Overview<'a> {
         let lines = flat.filter_map(|cell| {
             let model = &*cell.subject.model;
             let (name, style, of) = if cell.subject.view.is_none() {
-                (CHANCE.to_owned(), REFERENCE, None)
+                (CHANCE.to_owned(), LineStyle::REFERENCE, None)
             } else {
-                let name = format!("{model} without images");
+                let name = format!("{} without images", self.names.of(model));
                 (name, self.style(model), Some(model.to_owned()))
             };
             let content = PanelContent::Flat(cell.accuracy?.value);
@@ -157,8 +239,17 @@ impl<'a> Overview<'a> {
     }
 
     fn style(&self, model: &str) -> LineStyle {
+        if self.names.black.as_deref() == Some(model) {
+            return LineStyle::BLACK;
+        }
         let index = self.models.iter().position(|known| *known == model);
         LineStyle(index.unwrap_or(self.models.len()))
+    }
+
+    /// A variant in words, with its enhancer.
+    fn light(&self, variant: &KindReading, enhancer: Option<&EnhancerName>) -> String {
+        let enhancer = enhancer.map(|name| self.names.of(name.as_str()));
+        light_with(variant, enhancer.as_deref())
     }
 
     /// The variant for figures that show only one: noise, if it was asked.
@@ -180,7 +271,7 @@ impl<'a> Overview<'a> {
     ) -> Vec<PlotLine> {
         let models = self.models.iter();
         let lines = models.map(|model| PlotLine {
-            name: (*model).to_owned(),
+            name: self.names.of(model),
             style: self.style(model),
             content: PanelContent::Curve(self.points(model, variant, None, &mut number)),
             model: Some((*model).to_owned()),
@@ -210,7 +301,7 @@ impl<'a> Overview<'a> {
                 let marks: Vec<DarkMark> = marks.collect();
                 if !marks.is_empty() {
                     lines.push(PlotLine {
-                        name: format!("{model}, {} (real)", pair.name),
+                        name: format!("{}, {} (real)", self.names.of(model), pair.name),
                         style: self.style(model),
                         content: PanelContent::Marks(marks),
                         model: Some((*model).to_owned()),
@@ -244,7 +335,7 @@ impl<'a> Overview<'a> {
                 lines.extend(self.photographs());
             }
             Panel {
-                title: format!("{}, n {}", light(variant, None), self.n(None)),
+                title: format!("{}, n {}", self.light(variant, None), self.n(None)),
                 lines,
                 model: None,
             }
@@ -273,7 +364,7 @@ impl<'a> Overview<'a> {
     fn variants(&self) -> Option<(String, Chart)> {
         let models = self.averaged_models();
         let title = match &*models {
-            [single] => format!("{single}, n {}", self.n(None)),
+            [single] => format!("{}, n {}", self.names.of(single), self.n(None)),
             several => format!("mean of {} models, n {} each", several.len(), self.n(None)),
         };
         let all = self.tested_variants();
@@ -317,7 +408,7 @@ impl<'a> Overview<'a> {
                 })
                 .collect();
             PlotLine {
-                name: light(variant, None),
+                name: self.light(variant, None),
                 style: LineStyle(index),
                 content: PanelContent::Curve(mean(&curves)),
                 model: None,
@@ -340,7 +431,8 @@ impl<'a> Overview<'a> {
                     // One level is not a line; L0 enhanced is a point of its own.
                     let is_clean = points.first().is_some_and(|(at, _)| *at == AxisLevel::L0);
                     (points.len() > 1 || is_clean).then(|| PlotLine {
-                        name: enhancer.map_or("raw".to_owned(), ToString::to_string),
+                        name: enhancer
+                            .map_or("raw".to_owned(), |name| self.names.of(name.as_str())),
                         style: LineStyle(index),
                         content: PanelContent::Curve(points),
                         model: Some((*model).to_owned()),
@@ -349,7 +441,8 @@ impl<'a> Overview<'a> {
                 let all = std::iter::once(None).chain(self.enhancers.iter().copied().map(Some));
                 let lines: Vec<PlotLine> = all.enumerate().filter_map(line).collect();
                 if lines.len() > 1 {
-                    let title = format!("{model}, {}, n {}", light(&variant, None), self.n(None));
+                    let (name, light) = (self.names.of(model), self.light(&variant, None));
+                    let title = format!("{name}, {light}, n {}", self.n(None));
                     panels.push(Panel {
                         title,
                         lines,
@@ -372,7 +465,7 @@ impl<'a> Overview<'a> {
         let panels = families.into_iter().map(|family| {
             let n = self.n(Some(family));
             Panel {
-                title: format!("{}, n {n}", family_name(Some(family))),
+                title: format!("{}, n {n}", self.names.of(family_name(Some(family)))),
                 lines: self.accuracies(variant, Some(family)),
                 model: None,
             }
@@ -380,7 +473,7 @@ impl<'a> Overview<'a> {
         let panels: Vec<Panel> = panels.collect();
         let caption = format!(
             "Accuracy by family, {}. Broken lines: without images, and chance.",
-            light(variant, None)
+            self.light(variant, None)
         );
         self.chart(ACCURACY, panels, 3, &caption)
     }

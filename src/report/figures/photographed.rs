@@ -1,21 +1,17 @@
 //! The figure of a set that was photographed in the dark: bars, raw and with each enhancer.
 
-use super::Overview;
-use crate::error::Result;
+use super::{Drawing, Drawn, Overview};
+use crate::report::chart::LineStyle;
 use crate::report::chart::bars::{Bar, BarChart, BarPanel};
-use crate::report::chart::{Figure, LineStyle};
 use crate::score::choice::ReadingMode;
 use crate::types::{SetLight, View};
 
 impl Overview<'_> {
     /// The accuracy of each model as photographed, raw and with each enhancer; `None` for sets in the light, which have curves.
-    ///
-    /// # Errors
-    /// If the figure cannot be drawn.
-    pub(super) fn photographed(&self) -> Result<Option<Figure>> {
+    pub(super) fn photographed(&self) -> Option<Drawing> {
         let findings = self.findings;
         if findings.set.light == SetLight::Lit || self.models.is_empty() {
-            return Ok(None);
+            return None;
         }
         let chance = findings.summary.of(None, ReadingMode::Strict);
         let mut chance = chance.filter(|cell| cell.subject.view.is_none());
@@ -29,7 +25,10 @@ impl Overview<'_> {
             let bars = subjects.filter_map(|subject| {
                 let name = match &subject.enhancer {
                     None => "raw".to_owned(),
-                    Some(name) => format!("{name}{}", subject.variant.group_suffix()),
+                    Some(name) => {
+                        let name = self.names.of(name.as_str());
+                        format!("{name}{}", subject.variant.group_suffix())
+                    }
                 };
                 let place = self
                     .enhancers
@@ -42,7 +41,11 @@ impl Overview<'_> {
                 })
             });
             BarPanel {
-                title: format!("{model}: accuracy in %, n {}", self.n(None)),
+                title: format!(
+                    "{}: accuracy in %, n {}",
+                    self.names.of(model),
+                    self.n(None)
+                ),
                 bars: bars.collect(),
                 line,
             }
@@ -55,14 +58,13 @@ impl Overview<'_> {
             ),
         };
         if chart.panels.is_empty() {
-            return Ok(None);
+            return None;
         }
-        Ok(Some(Figure {
+        Some(Drawing {
             name: "photographed",
             caption: "Accuracy on photographs in the dark, raw (as photographed) and with each enhancer. Broken line: chance."
                 .to_owned(),
-            svg: chart.svg()?,
-            data: None,
-        }))
+            chart: Drawn::Bars(chart),
+        })
     }
 }

@@ -1,7 +1,8 @@
 //! The curves of the picture that tells a run's story: [`story_curves`].
 
-use super::{Overview, light};
+use super::{Names, Overview};
 use crate::report::chart::{LineStyle, PanelContent, PlotLine};
+use crate::report::words::light;
 use crate::score::findings::Findings;
 use crate::score::subject::CHANCE;
 use crate::types::{EnhancerName, KindReading};
@@ -23,7 +24,7 @@ pub(crate) struct StoryCurves {
 
 /// The curves of a run; `None` if no model was shown a dark image.
 pub(crate) fn story_curves(findings: &Findings<'_>) -> Option<StoryCurves> {
-    let overview = Overview::new(findings);
+    let overview = Overview::new(findings, &Names::default());
     let variant = overview.main_variant()?;
     let enhancer = overview.enhancers.first().copied();
     let mut lines = Vec::new();

@@ -1,0 +1,130 @@
+//! The font of figures for papers: [`Font`].
+//!
+//! Arimo 1.33 (Steve Matteson, SIL Open Font License 1.1), reduced to Latin, Greek, punctuation and a few signs. Its letters are as wide
+//! as those of Arial, Helvetica and Liberation Sans, so that an SVG has the same measures where one of them is installed.
+
+use skrifa::instance::{LocationRef, Size};
+use skrifa::{FontRef, GlyphId, MetadataProvider};
+
+/// The file of the font.
+pub(super) const FILE: &[u8] = include_bytes!("font/Arimo-figures.ttf");
+
+/// The families that a viewer of an SVG may take: all of them have the same measures.
+pub(super) const FAMILIES: &str = "Arimo, 'Liberation Sans', Arial, Helvetica, sans-serif";
+
+/// The bundled font.
+pub(super) struct Font(FontRef<'static>);
+
+/// One letter of a text.
+pub(super) struct Letter {
+    pub glyph: GlyphId,
+    /// Width for letters of height 1.
+    pub advance: f32,
+    /// The bytes of the text that it stands for.
+    pub bytes: std::ops::Range<usize>,
+}
+
+impl Font {
+    /// The bundled font.
+    pub(super) fn bundled() -> Self {
+        Self(FontRef::new(FILE).expect("the bundled font is a font: a test reads it"))
+    }
+
+    /// Whether the font has a letter.
+    pub(super) fn has(&self, letter: char) -> bool {
+        self.0.charmap().map(letter).is_some()
+    }
+
+    /// The letters of a text; of one that the font lacks, the sign for a missing letter.
+    pub(super) fn letters(&self, text: &str) -> Vec<Letter> {
+        let (map, metrics) = (
+            self.0.charmap(),
+            self.0
+                .glyph_metrics(Size::unscaled(), LocationRef::default()),
+        );
+        let units = f32::from(metrics_units(&self.0));
+        let letters = text.char_indices().map(|(at, letter)| {
+            let glyph = map.map(letter).unwrap_or(GlyphId::NOTDEF);
+            Letter {
+                glyph,
+                advance: metrics.advance_width(glyph).unwrap_or(0.0) / units,
+                bytes: at..at + letter.len_utf8(),
+            }
+        });
+        letters.collect()
+    }
+
+    /// Width in points of a text in letters of `size` points.
+    pub(super) fn width(&self, text: &str, size: f64) -> f64 {
+        let letters = self.letters(text).into_iter();
+        letters.map(|letter| f64::from(letter.advance)).sum::<f64>() * size
+    }
+
+    /// The text, or its start and end with "…" between, so that it is no wider than `room` points.
+    pub(super) fn shortened(&self, text: &str, size: f64, room: f64) -> String {
+        if self.width(text, size) <= room {
+            return text.to_owned();
+        }
+        let letters: Vec<char> = text.chars().collect();
+        for kept in (2..letters.len()).rev() {
+            let (head, tail) = (kept.div_ceil(2), kept / 2);
+            let start: String = letters[..head].iter().collect();
+            let end: String = letters[letters.len() - tail..].iter().collect();
+            let short = format!("{}…{}", start.trim_end(), end.trim_start());
+            if self.width(&short, size) <= room {
+                return short;
+            }
+        }
+        "…".to_owned()
+    }
+
+    /// The text in lines of at most `room` points, broken at spaces; a word that is wider is shortened.
+    pub(super) fn wrapped(&self, text: &str, size: f64, room: f64) -> Vec<String> {
+        let mut lines: Vec<String> = Vec::new();
+        for word in text.split_whitespace() {
+            let word = self.shortened(word, size, room);
+            match lines.last_mut() {
+                Some(line) if self.width(&format!("{line} {word}"), size) <= room => {
+                    line.push(' ');
+                    *line += &word;
+                }
+                _ => lines.push(word),
+            }
+        }
+        lines
+    }
+}
+
+fn metrics_units(font: &FontRef<'_>) -> u16 {
+    font.metrics(Size::unscaled(), LocationRef::default())
+        .units_per_em
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_font_has_latin_greek_and_the_minus_sign_and_is_small() {
+        let font = Font::bundled();
+        let letters = "AZaz09ÄéßŁñΑΩαωμ−–—…“”‘’±×≤≥°%";
+        assert!(letters.chars().all(|letter| font.has(letter)));
+        assert!(!font.has('模'));
+        assert!(FILE.len() < 100_000);
+        // The widths that Arial and Helvetica have, in thousandths: W 944, i 222, minus 584.
+        let width = |text| font.width(text, 1000.0).round() as u32;
+        assert_eq!([width("W"), width("i"), width("−")], [944, 222, 584]);
+    }
+
+    #[test]
+    fn texts_fit_their_room() {
+        let font = Font::bundled();
+        let long = "a-model-with-a-name-of-30-letters";
+        let short = font.shortened(long, 8.0, 60.0);
+        assert!(font.width(&short, 8.0) <= 60.0 && short.contains('…') && short.starts_with("a-m"));
+        assert_eq!(font.shortened("short", 8.0, 60.0), "short");
+        let lines = font.wrapped("exposure drop with sensor noise, n 237", 8.0, 70.0);
+        assert!(lines.len() > 1 && lines.iter().all(|line| font.width(line, 8.0) <= 70.0));
+        assert_eq!(lines.join(" "), "exposure drop with sensor noise, n 237");
+    }
+}

@@ -1,0 +1,300 @@
+//! `figures`: the figures of runs for a paper, at the width of its columns.
+
+mod width;
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+
+use crate::ask::{pixels_of_url, png};
+use crate::error::{Error, Result};
+use crate::files;
+use crate::job::Outcome;
+use crate::job::report::FigureRuns;
+use crate::report::figures::{
+    Drawing, Drawn, FIGURES, KnownNames, Names, PaperTable, drawings, overview, paper_tables,
+};
+use crate::report::paper::{
+    Look, OverviewSheet, Palette, Sheet, overview_sheet, pdf, sheet, svg, tables, tex,
+};
+use crate::types::Decides;
+use crate::types::manifest::Status;
+
+use width::{TEX, Width};
+
+/// Name of the sheet that tells a run in four panels.
+const PAPER: &str = "paper";
+/// Name of the tables.
+const TABLES: &str = "tables";
+/// File name of the captions.
+const CAPTIONS: &str = "captions.txt";
+/// Longest side in pixels of a small copy that is read; chosen, and more than a run stores.
+const MAX_SIDE: u32 = 2048;
+/// Heights of letters in points that `--font-size` takes; chosen.
+const LETTERS: std::ops::RangeInclusive<f64> = 4.0..=24.0;
+
+/// The flags of `figures`.
+#[derive(Debug, Args)]
+pub(crate) struct FiguresArgs {
+    /// The folders of the runs; several runs are drawn together
+    #[arg(value_name = "RUN", required = true, add = Decides::Nothing)]
+    pub runs: Vec<PathBuf>,
+    /// Where the figures and their captions go
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
+    pub out: PathBuf,
+    /// The forms of the figures
+    #[arg(long, value_name = "FORMATS", value_enum, value_delimiter = ',', default_value = "pdf,svg", add = Decides::Nothing)]
+    pub format: Vec<FigureFormat>,
+    /// The columns of the paper: ieee, cvpr, acl, neurips, or the width of a figure in millimetres
+    #[arg(long, value_name = "VENUE|MM", default_value = "ieee", add = Decides::Nothing)]
+    pub width: Width,
+    /// How many columns a figure is wide, 1 or 2; default: 1, and for the sheet `paper` the whole text
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=2), add = Decides::Nothing)]
+    pub columns: Option<u8>,
+    /// Another name for a model, an enhancer or a family of questions; can be given several times;
+    /// default: none
+    #[arg(long, value_name = "OLD=NEW", value_parser = label, add = Decides::Nothing)]
+    pub label: Vec<(String, String)>,
+    /// The models and enhancers that come first, separated by commas, by their names in the runs, and the others follow;
+    /// default: none
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', add = Decides::Nothing)]
+    pub order: Vec<String>,
+    /// The colours of lines; grey is for papers that are printed without colour
+    #[arg(long, value_enum, default_value = "colour", add = Decides::Nothing)]
+    pub palette: Palette,
+    /// Height of the letters in points, from 4 to 24; default: that of the captions of the venue
+    #[arg(long, value_name = "PT", value_parser = letters, add = Decides::Nothing)]
+    pub font_size: Option<f64>,
+    /// The figures to draw, separated by commas; default: all for which there are records
+    #[arg(long, value_name = "FIGURES", value_delimiter = ',', add = Decides::Nothing)]
+    pub only: Vec<String>,
+    /// The model that is drawn black, as an upper reference; default: none
+    #[arg(long, value_name = "MODEL", add = Decides::Nothing)]
+    pub reference: Option<String>,
+}
+
+/// A form of figures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FigureFormat {
+    /// Vectors with their font
+    Pdf,
+    /// Vectors for drawing programs and pages
+    Svg,
+    /// Source of charts of lines for pgfplots, with their data
+    Tex,
+}
+
+fn label(text: &str) -> std::result::Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((old, new)) if !old.is_empty() && !new.trim().is_empty() => {
+            Ok((old.to_owned(), new.trim().to_owned()))
+        }
+        _ => Err("is OLD=NEW: a name in the runs, and the one to show".to_owned()),
+    }
+}
+
+fn letters(text: &str) -> std::result::Result<f64, String> {
+    let size = text.parse().ok().filter(|size| LETTERS.contains(size));
+    size.ok_or_else(|| format!("is from {} to {} points", LETTERS.start(), LETTERS.end()))
+}
+
+/// Draws the figures of the runs, from the numbers of their report.
+///
+/// # Errors
+/// If a run cannot be read or asked open questions, a name is not known, or a file cannot be written.
+pub(crate) fn figures(args: &FiguresArgs) -> Result<Outcome> {
+    let look = Look {
+        width: args.width.points(args.columns)?,
+        letters: args.font_size.unwrap_or_else(|| args.width.letters()),
+        palette: args.palette,
+    };
+    check_only(&args.only)?;
+    let runs = FigureRuns::open(&args.runs)?;
+    let all = runs.findings();
+    let findings = all.shown();
+    let names = Names::new(
+        &args.label,
+        &args.order,
+        args.reference.as_ref(),
+        &KnownNames::of(findings),
+    )?;
+    let mut output = String::new();
+    for alert in runs.alerts(&all) {
+        let _ = writeln!(output, "note: {}", alert.text);
+    }
+    let drawings = drawings(findings, &names);
+    let mut files = Files::default();
+    for name in wanted(&args.only) {
+        if name == PAPER {
+            let width = args.width.text();
+            let look = Look { width, ..look };
+            let made = overview_sheet(
+                &overview(findings, &names),
+                runs.thumbnails(),
+                &look,
+                &|url| pixels_of_url(url, MAX_SIDE),
+            )?;
+            files.add_overview(&made, &args.format, &look)?;
+            continue;
+        }
+        if name == TABLES {
+            files.add_tables(&paper_tables(findings, &names), args, &look);
+            continue;
+        }
+        match drawings.iter().find(|drawing| drawing.name == name) {
+            Some(drawing) => files.add_drawing(drawing, &args.format, &look)?,
+            None => files.leave_out(name, "the runs have no records for it"),
+        }
+    }
+    let said = names.said();
+    if !said.is_empty() {
+        let _ = writeln!(files.captions, "{said}\n");
+        let _ = writeln!(output, "note: {said}");
+    }
+    output += &files.write(&args.out)?;
+    Ok(Outcome {
+        status: Status::Complete,
+        output,
+    })
+}
+
+/// The names of all figures, in their order.
+fn known() -> impl Iterator<Item = &'static str> {
+    std::iter::once(PAPER).chain(FIGURES).chain([TABLES])
+}
+
+fn check_only(only: &[String]) -> Result<()> {
+    match only.iter().find(|name| known().all(|known| known != *name)) {
+        Some(name) => {
+            let all: Vec<&str> = known().collect();
+            let problem = format!("there is no figure {name:?}; there are {}", all.join(", "));
+            Err(Error::usage("--only", problem))
+        }
+        None => Ok(()),
+    }
+}
+
+/// The names of the figures to draw, in their order.
+fn wanted(only: &[String]) -> impl Iterator<Item = &'static str> {
+    let is_wanted = |name: &&str| only.is_empty() || only.iter().any(|wanted| wanted == name);
+    known().filter(is_wanted)
+}
+
+/// The same look with its width in points of TeX.
+fn in_tex(look: &Look) -> Look {
+    let width = look.width * TEX;
+    Look { width, ..*look }
+}
+
+/// The files of the figures, made before any is written.
+#[derive(Default)]
+struct Files {
+    made: Vec<(String, Vec<u8>)>,
+    captions: String,
+    left_out: String,
+}
+
+impl Files {
+    fn add_drawing(
+        &mut self,
+        drawing: &Drawing,
+        formats: &[FigureFormat],
+        look: &Look,
+    ) -> Result<()> {
+        let name = drawing.name;
+        self.add(name, &sheet(&drawing.chart, look), formats)?;
+        if formats.contains(&FigureFormat::Tex) {
+            match &drawing.chart {
+                Drawn::Lines(chart) => self.made.extend(tex(name, chart, &in_tex(look))),
+                Drawn::Bars(_) | Drawn::Thresholds(_) => {
+                    self.leave_out(&format!("{name}.tex"), "it is no chart of lines");
+                }
+            }
+        }
+        let note = drawing.chart.note();
+        let _ = writeln!(self.captions, "{name}\n{} ({note}.)\n", drawing.caption);
+        Ok(())
+    }
+
+    fn add_overview(
+        &mut self,
+        overview: &OverviewSheet,
+        formats: &[FigureFormat],
+        look: &Look,
+    ) -> Result<()> {
+        for (panel, why) in &overview.left_out {
+            self.leave_out(&format!("{PAPER}, the panel {panel}"), why);
+        }
+        if overview.sheet.marks.is_empty() {
+            self.leave_out(PAPER, "it has no panel");
+            return Ok(());
+        }
+        self.add(PAPER, &overview.sheet, formats)?;
+        if formats.contains(&FigureFormat::Tex) {
+            let width = in_tex(look).width / 2.0;
+            for (letter, chart) in ('a'..).zip(&overview.charts) {
+                let half = Look { width, ..*look };
+                self.made
+                    .extend(tex(&format!("{PAPER}-{letter}"), chart, &half));
+            }
+        }
+        let _ = writeln!(self.captions, "{PAPER}\n{}\n", overview.caption);
+        Ok(())
+    }
+
+    fn add_tables(&mut self, all: &[PaperTable], args: &FiguresArgs, look: &Look) {
+        if !args.format.contains(&FigureFormat::Tex) {
+            // Nobody who draws figures alone waits for tables.
+            if !args.only.is_empty() {
+                self.leave_out(TABLES, "they are made with --format tex");
+            }
+            return;
+        }
+        if all.is_empty() {
+            self.leave_out(TABLES, "no image was asked about");
+            return;
+        }
+        let (files, long) = tables(all, &in_tex(look), args.columns == Some(2));
+        self.made.extend(files);
+        if long > 0 {
+            let why = format!(
+                "{long} of more than 40 rows are in tables-full.tex, for text in one column"
+            );
+            self.leave_out("tables.tex", &why);
+        }
+    }
+
+    /// Adds a sheet in the forms that draw it.
+    fn add(&mut self, name: &str, sheet: &Sheet, formats: &[FigureFormat]) -> Result<()> {
+        sheet.check_letters()?;
+        if formats.contains(&FigureFormat::Pdf) {
+            self.made.push((format!("{name}.pdf"), pdf(sheet, name)?));
+        }
+        if formats.contains(&FigureFormat::Svg) {
+            let file = (format!("{name}.svg"), svg(sheet, &png)?.into_bytes());
+            self.made.push(file);
+        }
+        Ok(())
+    }
+
+    fn leave_out(&mut self, name: &str, why: &str) {
+        let _ = writeln!(self.left_out, "{name}: left out, {why}");
+    }
+
+    /// Writes the files; returns lines that name them.
+    fn write(self, out: &Path) -> Result<String> {
+        let mut lines = String::new();
+        for (name, content) in &self.made {
+            files::write(&out.join(name), content)?;
+            let _ = writeln!(lines, "{}", out.join(name).display());
+        }
+        let captions = out.join(CAPTIONS);
+        files::write(
+            &captions,
+            format!("{}{}", self.captions, self.left_out).as_bytes(),
+        )?;
+        let _ = writeln!(lines, "{}", captions.display());
+        Ok(lines + &self.left_out)
+    }
+}

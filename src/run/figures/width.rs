@@ -1,0 +1,134 @@
+//! Widths of the columns of papers: [`Width`].
+
+use std::str::FromStr;
+
+use crate::error::{Error, Result};
+
+/// Points of PDF in a millimetre: 72 to an inch.
+const POINTS: f64 = 72.0 / 25.4;
+/// Points of TeX in one of PDF: 72.27 to an inch.
+pub(super) const TEX: f64 = 72.27 / 72.0;
+/// Bounds of a width in millimetres; chosen.
+const MILLIMETRES: std::ops::RangeInclusive<f64> = 40.0..=600.0;
+
+/// The measures of a paper.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Width {
+    Venue(&'static Venue),
+    /// A width in points of PDF that was given in millimetres.
+    Own(f64),
+}
+
+/// The columns of a venue.
+#[derive(Debug, PartialEq)]
+pub(crate) struct Venue {
+    name: &'static str,
+    /// Width of a column, in points of TeX.
+    column: f64,
+    /// Width of the text of two columns, in points of TeX; `None` if there is one.
+    text: Option<f64>,
+    /// Height of the letters of captions, in points.
+    letters: f64,
+}
+
+/// \columnwidth and \textwidth of the classes and style files of these venues.
+const VENUES: [Venue; 4] = [
+    Venue {
+        name: "ieee",
+        column: 252.0,
+        text: Some(516.0),
+        letters: 8.0,
+    },
+    Venue {
+        name: "cvpr",
+        column: 237.1,
+        text: Some(496.9),
+        letters: 8.0,
+    },
+    Venue {
+        name: "acl",
+        column: 219.1,
+        text: Some(455.2),
+        letters: 8.0,
+    },
+    Venue {
+        name: "neurips",
+        column: 397.5,
+        text: None,
+        letters: 9.0,
+    },
+];
+
+impl FromStr for Width {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        if let Some(venue) = VENUES.iter().find(|venue| venue.name == text) {
+            return Ok(Self::Venue(venue));
+        }
+        match text.parse::<f64>() {
+            Ok(millimetres) if MILLIMETRES.contains(&millimetres) => {
+                Ok(Self::Own(millimetres * POINTS))
+            }
+            _ => Err(format!(
+                "is ieee, cvpr, acl, neurips, or a width from {} to {} in millimetres",
+                MILLIMETRES.start(),
+                MILLIMETRES.end()
+            )),
+        }
+    }
+}
+
+impl Width {
+    /// Width of a figure over `columns` columns, in points of PDF; by default over one.
+    ///
+    /// # Errors
+    /// If the paper has no two columns.
+    pub(super) fn points(self, columns: Option<u8>) -> Result<f64> {
+        let problem = match (self, columns) {
+            (Self::Own(_), Some(_)) => "a width in millimetres is that of the figure: leave it out",
+            (Self::Own(width), None) => return Ok(width),
+            (Self::Venue(Venue { text: None, .. }), Some(2)) => {
+                "this paper has one column: leave it out"
+            }
+            (Self::Venue(_), Some(2)) => return Ok(self.text()),
+            (Self::Venue(venue), _) => return Ok(venue.column / TEX),
+        };
+        Err(Error::usage("--columns", problem))
+    }
+
+    /// Width of the text, in points of PDF.
+    pub(super) fn text(self) -> f64 {
+        match self {
+            Self::Venue(venue) => venue.text.unwrap_or(venue.column) / TEX,
+            Self::Own(width) => width,
+        }
+    }
+
+    /// Height of the letters, in points.
+    pub(super) fn letters(self) -> f64 {
+        match self {
+            Self::Venue(venue) => venue.letters,
+            Self::Own(_) => 8.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn widths_are_those_of_columns_or_millimetres() {
+        let points = |text: &str, columns| text.parse::<Width>().unwrap().points(columns);
+        let tex = |text: &str, columns| points(text, columns).unwrap() * 72.27 / 72.0;
+        assert!((tex("ieee", None) - 252.0).abs() < 1e-9);
+        assert!((tex("ieee", Some(2)) - 516.0).abs() < 1e-9);
+        assert!((tex("neurips", Some(1)) - 397.5).abs() < 1e-9);
+        assert!(points("neurips", Some(2)).is_err() && points("85", Some(1)).is_err());
+        assert!((points("254", None).unwrap() - 720.0).abs() < 1e-9);
+        for wrong in ["", "nature", "-3", "39", "601", "nan", "inf"] {
+            assert!(wrong.parse::<Width>().is_err(), "{wrong}");
+        }
+    }
+}
