@@ -2,9 +2,10 @@
 
 use super::chart::Figure;
 use super::choice_report::ChoiceReport;
-use super::figures::figures;
+use super::figures::{Names, drawings};
 use super::page::{PageInputs, page};
-use super::samples::{figure, samples};
+use super::paper::figure;
+use super::samples::{self, samples};
 use super::sentences::Sentence;
 use super::table::Table;
 use super::{chart, csv, latex};
@@ -18,7 +19,9 @@ pub fn products<'a>(
     report: &'a ChoiceReport<'a>,
     inputs: &PageInputs<'a>,
 ) -> Result<Vec<(String, Vec<u8>)>> {
-    let figures = figures(report.findings)?;
+    let figures = drawings(report.findings, &Names::default()).into_iter();
+    let figures = figures.map(|drawing| figure(drawing.name, &drawing.caption, &drawing.chart));
+    let figures: Vec<Figure> = figures.collect::<Result<_>>()?;
     let page = page(report, &figures, inputs)?;
     files(&report.tables, &report.sentences, figures, page, inputs)
 }
@@ -35,7 +38,7 @@ pub(super) fn files(
     files.extend(chart::files(figures));
     for samples in samples(inputs.thumbnails) {
         let name = format!("figures/{}.svg", samples.name);
-        files.push((name, figure(&samples).into_bytes()));
+        files.push((name, samples::figure(&samples).into_bytes()));
     }
     files.push((PAGE.to_owned(), page.into_bytes()));
     Ok(files)

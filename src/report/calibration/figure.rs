@@ -87,7 +87,8 @@ fn series<'a, 'b: 'a>(
     points: &[[f64; 2]],
     line: &[[f64; 2]],
 ) -> Result<(), String> {
-    let colour = LineStyle(style).colour();
+    let [red, green, blue] = LineStyle(style).rgb();
+    let colour = RGBColor(red, green, blue);
     let pair = |point: &[f64; 2]| (point[0], point[1]);
     let drawn = chart
         .draw_series(LineSeries::new(

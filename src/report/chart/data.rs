@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{AxisFrame, Chart, PanelContent, PlotLine};
+use super::{Chart, PanelContent, PlotLine};
 use crate::error::Result;
 use crate::report::script::embedded;
 use crate::report::words::{percent, with_interval};
@@ -13,7 +13,6 @@ use crate::types::degradation::Axis;
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct ChartData {
     measure: &'static str,
-    note: String,
     panels: Vec<PanelData>,
 }
 
@@ -79,27 +78,26 @@ impl ChartData {
 
     fn of(chart: &Chart) -> Self {
         let panels = chart.panels.iter().map(|panel| {
-            let frame = AxisFrame::new((0, 0), panel);
-            let levels = frame.levels.iter();
-            let axis = frame.levels.iter().find_map(|level| level.axis());
+            let levels = panel.levels();
+            let axis = levels.iter().find_map(|level| level.axis());
             PanelData {
                 title: panel.title.clone(),
                 model: panel.model.clone(),
                 axis: panel.axis_title(),
                 unit: axis.unwrap_or(Axis::LIGHT).unit,
                 levels: levels
+                    .iter()
                     .map(|level| LevelData {
                         name: level.to_string(),
                         value: level.value(),
                     })
                     .collect(),
-                end: frame.farthest,
+                end: panel.farthest(),
                 lines: panel.lines.iter().map(line).collect(),
             }
         });
         Self {
             measure: chart.measure,
-            note: chart.note.clone(),
             panels: panels.collect(),
         }
     }

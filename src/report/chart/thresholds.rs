@@ -1,20 +1,7 @@
 //! A figure of thresholds, a row for each curve: [`ThresholdChart`].
 
-use plotters::prelude::*;
-
-use super::{BACKGROUND, BELOW, FigureArea, GRID, LEFT, LineStyle, RIGHT, draw_path, draw_text};
-use crate::error::{Error, Result};
-use crate::report::words::shortened;
 use crate::score::threshold::Threshold;
 use crate::types::degradation::Axis;
-
-/// Widths of the names, of the axis and of the numbers, in pixels.
-const NAMES: i32 = 330;
-/// Most letters of a name.
-const NAME_LETTERS: usize = 46;
-const AXIS: i32 = 400;
-const NUMBERS: i32 = 150;
-const ROW: i32 = 24;
 
 /// The scale of an axis: the exposure drops to L5, the darkest named level, or the exposure times of the ladder.
 #[derive(Debug, Clone)]
@@ -41,10 +28,6 @@ impl Scale {
             unit: axis.unit,
         }
     }
-
-    fn x(&self, value: f64) -> i32 {
-        NAMES + (value.clamp(0.0, self.end) / self.end * f64::from(AXIS)).round() as i32
-    }
 }
 
 /// The threshold of one curve.
@@ -64,67 +47,4 @@ pub(crate) struct ThresholdChart {
     pub scale: Scale,
     /// The unit of the intervals: scenes or frames.
     pub unit: String,
-}
-
-impl ThresholdChart {
-    /// The chart as SVG.
-    ///
-    /// # Errors
-    /// If it cannot be drawn.
-    pub(crate) fn svg(&self) -> Result<String> {
-        let size = (
-            (NAMES + AXIS + NUMBERS) as u32,
-            (self.rows.len() as i32 * ROW + 76) as u32,
-        );
-        let mut svg = String::new();
-        let drawn = {
-            let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-            self.draw(&root)
-        };
-        drawn.map_err(|e| Error::data("figure", e))?;
-        Ok(svg)
-    }
-
-    fn draw(&self, root: &FigureArea<'_>) -> Result<(), String> {
-        let failed = |e: DrawingAreaErrorKind<_>| e.to_string();
-        let scale = &self.scale;
-        let x = |value: f64| scale.x(value);
-        let colour = LineStyle(0).colour();
-        root.fill(&BACKGROUND).map_err(failed)?;
-        let bottom = 12 + self.rows.len() as i32 * ROW;
-        for tick in (0..=scale.end as i32).step_by(scale.step as usize) {
-            let at = x(f64::from(tick));
-            draw_path(root, &[(at, 8), (at, bottom)], GRID.stroke_width(1))?;
-            draw_text(root, &tick.to_string(), (at, bottom + 6), 13, BELOW)?;
-        }
-        for (index, row) in (0..).zip(&self.rows) {
-            let threshold = row.threshold;
-            let y = 12 + index * ROW + ROW / 2;
-            let name = shortened(&row.name, NAME_LETTERS);
-            draw_text(root, &name, (NAMES - 14, y), 13, RIGHT)?;
-            let ends = [(x(threshold.low), y), (x(threshold.high), y)];
-            draw_path(root, &ends, colour.stroke_width(2))?;
-            if threshold.high.is_infinite() {
-                let end = x(scale.end);
-                let tip = vec![(end + 8, y), (end, y - 5), (end, y + 5)];
-                root.draw(&Polygon::new(tip, colour)).map_err(failed)?;
-            }
-            if threshold.value.is_finite() {
-                let place = (x(threshold.value), y);
-                let point = Circle::new(place, 5, colour.filled());
-                root.draw(&point).map_err(failed)?;
-            }
-            let place = (NAMES + AXIS + 16, y);
-            draw_text(root, &row.words, place, 13, LEFT)?;
-        }
-        let place = (NAMES + AXIS / 2, bottom + 30);
-        draw_text(root, &self.axis_title(), place, 13, BELOW)?;
-        root.present().map_err(failed)
-    }
-
-    /// Title of the axis.
-    pub(crate) fn axis_title(&self) -> String {
-        let Scale { title, unit, .. } = self.scale;
-        format!("{title} in {unit}, with 95 % interval by {}", self.unit)
-    }
 }

@@ -48,7 +48,7 @@ impl Overview<'_> {
                        accuracy of the same replies, by level.";
         let (caption, mut chart) = self.chart("%", panels, 2, caption)?;
         chart.note = format!(
-            "bands are 95 % intervals by {}; strict reading",
+            "bands and bars are 95 % intervals by {}; strict reading",
             self.findings.unit
         );
         Some((caption, chart))

@@ -11,12 +11,9 @@ mod thresholds;
 
 use std::collections::BTreeSet;
 
-use super::chart::bars::BarChart;
-use super::chart::data::ChartData;
-use super::chart::thresholds::ThresholdChart;
-use super::chart::{Chart, DarkMark, Figure, LineStyle, Panel, PanelContent, PlotLine};
+use super::chart::drawn::Drawn;
+use super::chart::{Chart, DarkMark, LineStyle, Panel, PanelContent, PlotLine};
 use super::words::{family as family_name, light_with};
-use crate::error::Result;
 use crate::score::choice::ReadingMode;
 use crate::score::estimate::Estimate;
 use crate::score::findings::Findings;
@@ -29,23 +26,6 @@ pub(crate) use overview::{OverviewPanels, overview};
 pub(crate) use story::{StoryCurves, story_curves};
 pub(crate) use tables::{PaperCell, PaperMark, PaperRow, PaperTable, paper_tables};
 
-/// All figures for which there are records.
-///
-/// # Errors
-/// If a figure cannot be drawn.
-pub(crate) fn figures(findings: &Findings<'_>) -> Result<Vec<Figure>> {
-    let drawings = drawings(findings, &Names::default()).into_iter();
-    let figures = drawings.map(|drawing| {
-        Ok(Figure {
-            svg: drawing.chart.svg()?,
-            data: drawing.chart.data()?,
-            name: drawing.name,
-            caption: drawing.caption,
-        })
-    });
-    figures.collect()
-}
-
 /// One figure of a report, before it is drawn.
 #[derive(Debug, Clone)]
 pub(crate) struct Drawing {
@@ -54,42 +34,6 @@ pub(crate) struct Drawing {
     /// Its caption, without the note of the chart.
     pub caption: String,
     pub chart: Drawn,
-}
-
-/// What a figure shows.
-#[derive(Debug, Clone)]
-pub(crate) enum Drawn {
-    Lines(Chart),
-    Bars(BarChart),
-    Thresholds(ThresholdChart),
-}
-
-impl Drawn {
-    /// What the caption says besides: numbers of items, and what bands and bars are.
-    pub(crate) fn note(&self) -> String {
-        match self {
-            Self::Lines(chart) => chart.note.clone(),
-            Self::Bars(chart) => chart.note.clone(),
-            Self::Thresholds(chart) => format!("lines are 95 % intervals by {}", chart.unit),
-        }
-    }
-
-    /// What the figure shows, for the script of the page.
-    fn data(&self) -> Result<Option<String>> {
-        match self {
-            Self::Lines(chart) => ChartData::json(chart).map(Some),
-            Self::Bars(_) | Self::Thresholds(_) => Ok(None),
-        }
-    }
-
-    /// The figure of a report as SVG.
-    fn svg(&self) -> Result<String> {
-        match self {
-            Self::Lines(chart) => chart.svg(),
-            Self::Bars(chart) => chart.svg(),
-            Self::Thresholds(chart) => chart.svg(),
-        }
-    }
 }
 
 /// The names that figures of questions with choices can have, in their order.
@@ -316,7 +260,7 @@ impl<'a> Overview<'a> {
     fn note(&self) -> String {
         let (grid, unit) = (&self.findings.grid, self.findings.unit);
         format!(
-            "n = {} items in {} {unit}s; bands are 95 % intervals by {unit}; strict reading",
+            "n = {} items in {} {unit}s; bands and bars are 95 % intervals by {unit}; strict reading",
             grid.items.len(),
             grid.clusters
         )

@@ -1,8 +1,9 @@
 //! The figure of a set that was photographed in the dark: bars, raw and with each enhancer.
 
-use super::{Drawing, Drawn, Overview};
+use super::{Drawing, Overview};
 use crate::report::chart::LineStyle;
 use crate::report::chart::bars::{Bar, BarChart, BarPanel};
+use crate::report::chart::drawn::Drawn;
 use crate::score::choice::ReadingMode;
 use crate::types::{SetLight, View};
 

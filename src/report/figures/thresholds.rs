@@ -1,7 +1,8 @@
 //! The figures of the thresholds, one for each axis.
 
 use super::super::words::stops;
-use super::{Drawing, Drawn, Overview};
+use super::{Drawing, Overview};
+use crate::report::chart::drawn::Drawn;
 use crate::report::chart::thresholds::{Scale, ThresholdChart, ThresholdRow};
 use crate::types::degradation::Axis;
 

@@ -3,9 +3,10 @@
 use super::open_report::OpenReport;
 use super::tables::ladder;
 use crate::error::Result;
-use crate::report::chart::data::ChartData;
+use crate::report::chart::drawn::Drawn;
 use crate::report::chart::{Chart, Figure, LineStyle, Panel, PanelContent, PlotLine};
 use crate::report::ladder::Ladder;
+use crate::report::paper::figure;
 use crate::score::open::{Group, OpenCell};
 use crate::types::AxisLevel;
 
@@ -21,7 +22,7 @@ pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
         .flat_map(|group| panels(report, group, &whole))
         .collect();
     let note = format!(
-        "bands are 95 % intervals by {} ({} clusters)",
+        "bands and bars are 95 % intervals by {} ({} clusters)",
         report.summary.unit, report.summary.clusters
     );
     let charts = [
@@ -44,12 +45,7 @@ pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
             columns,
             note: note.clone(),
         };
-        figures.push(Figure {
-            name,
-            caption: caption.to_owned(),
-            svg: chart.svg()?,
-            data: Some(ChartData::json(&chart)?),
-        });
+        figures.push(figure(name, caption, &Drawn::Lines(chart))?);
     }
     Ok(figures)
 }

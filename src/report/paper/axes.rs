@@ -2,8 +2,8 @@
 
 use super::font::Font;
 use super::look::Look;
-use super::sheet::{Anchor, GRID, INK, Place, Sheet, Turn};
-use crate::report::chart::Panel;
+use super::sheet::{Anchor, GRID, Place, Sheet, Turn};
+use crate::report::chart::{INK, Panel};
 use crate::types::AxisLevel;
 
 /// A rectangle between axes, in points, with the scale of its levels.
@@ -118,5 +118,47 @@ impl Axes {
             }
         }
         labelled
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::paper::Palette;
+    use crate::types::Severity;
+    use crate::types::degradation::Kind;
+
+    /// Names of the labelled levels of an axis with L0 and these drops in hundredths of an EV.
+    fn labelled(drops: impl IntoIterator<Item = u16>) -> Vec<String> {
+        let of = |drop| AxisLevel::new(Kind::Sensor, Severity::hundredths(drop));
+        let drops = drops.into_iter().map(of);
+        let levels: Vec<AxisLevel> = std::iter::once(AxisLevel::L0).chain(drops).collect();
+        let axes = Axes {
+            left: 0.0,
+            top: 0.0,
+            width: 200.0,
+            height: 1.0,
+            farthest: levels.last().map_or(0.0, |level| level.value()),
+            levels,
+            title: String::new(),
+        };
+        let look = Look {
+            width: 252.0,
+            letters: 8.0,
+            palette: Palette::Colour,
+        };
+        axes.labelled(&look)
+            .iter()
+            .map(ToString::to_string)
+            .collect()
+    }
+
+    #[test]
+    fn labels_of_levels_do_not_overlap() {
+        let paper = [200, 400, 600, 750, 900];
+        assert_eq!(labelled(paper), ["L0", "L1", "L2", "L3", "L4", "L5"]);
+        let halves = labelled((1..=20).map(|step| 50 * step));
+        assert!(halves.len() > 5 && halves.len() < 15, "{halves:?}");
+        assert_eq!(labelled([1, 900]), ["L0", "L5"]);
     }
 }

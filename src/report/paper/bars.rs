@@ -2,7 +2,8 @@
 
 use super::font::Font;
 use super::look::Look;
-use super::sheet::{Anchor, GRID, INK, Place, Sheet};
+use super::sheet::{Anchor, GRID, Place, Sheet};
+use crate::report::chart::INK;
 use crate::report::chart::bars::{Bar, BarChart, BarPanel};
 
 /// Height of the panels between their axes, in heights of letters.

@@ -1,7 +1,7 @@
 //! How a figure for a paper looks: its width, letters and palette ([`Look`]), and the pens of its lines ([`Pen`]).
 
-use super::sheet::{Colour, INK, Sheet, Stroke};
-use crate::report::chart::LineStyle;
+use super::sheet::{Colour, Sheet, Stroke};
+use crate::report::chart::{COLOURS, INK, LineStyle};
 
 /// The colours of figures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -12,17 +12,6 @@ pub(crate) enum Palette {
     /// Five greys, told apart by dash and mark
     Grey,
 }
-
-/// Six colours, found by search: contrast with white of 3.1 at least, and a distance by CIEDE2000 of any two of 21 at least in normal,
-/// protanopic, deuteranopic and tritanopic sight (Machado, Oliveira and Fernandes 2009, severity 1).
-const COLOURS: [Colour; 6] = [
-    [0x01, 0x97, 0xea],
-    [0x72, 0x11, 0x57],
-    [0x7a, 0x82, 0x02],
-    [0xb3, 0x62, 0x81],
-    [0x24, 0x05, 0xf4],
-    [0x2d, 0x45, 0x19],
-];
 
 /// Five greys; the lightest has a contrast with white of 3.0.
 const GREYS: [u8; 5] = [0, 120, 60, 148, 90];
@@ -86,9 +75,8 @@ impl Look {
     pub(super) fn colour(&self, style: LineStyle) -> Colour {
         let LineStyle(number) = style;
         match self.palette {
-            _ if style == LineStyle::BLACK => [0; 3],
-            _ if style == LineStyle::REFERENCE => INK,
-            Palette::Colour => COLOURS[number % COLOURS.len()],
+            Palette::Colour => style.rgb(),
+            _ if [LineStyle::BLACK, LineStyle::REFERENCE].contains(&style) => style.rgb(),
             Palette::Grey => [GREYS[number % GREYS.len()]; 3],
         }
     }

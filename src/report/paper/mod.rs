@@ -1,10 +1,11 @@
-//! The figures of a report for papers: the same charts at the width of a column, with one bundled font, as PDF, SVG and pgfplots.
+//! The figures of reports, and of papers at the width of a column, with one bundled font: as PDF, SVG and pgfplots.
 //!
 //! A chart becomes a [`Sheet`] of marks in points; PDF and SVG write the same marks. What a figure says in words stands in its caption,
 //! which is a text of its own.
 
 mod axes;
 mod bars;
+mod figure;
 mod font;
 mod legend;
 mod lines;
@@ -18,6 +19,7 @@ mod tables;
 mod tex;
 mod thresholds;
 
+pub(crate) use figure::figure;
 pub(crate) use look::{Look, Palette};
 pub(crate) use overview::{OverviewSheet, overview_sheet};
 pub(crate) use pdf::pdf;
@@ -26,9 +28,9 @@ pub(crate) use svg::svg;
 pub(crate) use tables::tables;
 pub(crate) use tex::tex;
 
-use super::figures::Drawn;
+use super::chart::drawn::Drawn;
 
-/// A figure of a report as a sheet.
+/// What a figure shows as a sheet.
 pub(crate) fn sheet(figure: &Drawn, look: &Look) -> Sheet {
     match figure {
         Drawn::Lines(chart) => lines::lines(chart, look),

@@ -14,8 +14,9 @@ use krilla::text::{Font as PdfFont, GlyphId, KrillaGlyph};
 use krilla::{Document, SerializeSettings};
 
 use super::font::{FILE, Font};
-use super::sheet::{Colour, INK, Mark, Place, Sheet, Stroke, Turn, Words};
+use super::sheet::{Colour, Mark, Place, Sheet, Stroke, Turn, Words};
 use crate::error::{Error, Result};
+use crate::report::chart::INK;
 
 /// Four arcs of a circle by cubic curves have their handles at this share of the radius: 4 (√2 − 1) / 3.
 const HANDLE: f64 = 0.552_284_749_8;

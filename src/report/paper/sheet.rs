@@ -13,8 +13,6 @@ pub(crate) type Place = [f64; 2];
 /// Red, green and blue.
 pub(crate) type Colour = [u8; 3];
 
-/// Colour of axes and text.
-pub(super) const INK: Colour = [34, 34, 34];
 /// Colour of grid lines.
 pub(super) const GRID: Colour = [221, 221, 221];
 /// Colour of the paper, in hollow marks.
@@ -155,6 +153,19 @@ impl Sheet {
             size,
             turn,
         }));
+    }
+
+    /// The same marks on a white ground, for viewers with a dark one.
+    pub(super) fn on_paper(mut self) -> Self {
+        let [width, height] = self.size;
+        let corners = vec![[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]];
+        let ground = Mark::Area {
+            corners,
+            fill: PAPER,
+            opacity: 1.0,
+        };
+        self.marks.insert(0, ground);
+        self
     }
 
     /// Draws another sheet with its left upper corner at a place.

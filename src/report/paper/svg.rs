@@ -6,8 +6,9 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
 use super::font::{FAMILIES, Font};
-use super::sheet::{Colour, INK, Mark, Place, Sheet, Stroke, Turn, Words};
+use super::sheet::{Colour, Mark, Place, Sheet, Stroke, Turn, Words};
 use crate::error::Result;
+use crate::report::chart::INK;
 use crate::types::Rgb;
 
 /// How a picture is written as PNG.
@@ -118,11 +119,18 @@ fn text(words: &Words) -> String {
         Turn::Right => String::new(),
         Turn::Up => format!(" transform=\"rotate(-90 {x} {y})\""),
     };
+    let font = Font::bundled();
+    // Only the width of words whose letters the font has is known.
+    let length = if words.text.chars().all(|letter| font.has(letter)) {
+        let width = number(font.width(&words.text, words.size));
+        format!(" textLength=\"{width}\" lengthAdjust=\"spacingAndGlyphs\"")
+    } else {
+        String::new()
+    };
     format!(
-        "<text x=\"{x}\" y=\"{y}\" font-size=\"{}\" fill=\"{}\" textLength=\"{}\" lengthAdjust=\"spacingAndGlyphs\"{turn}>{}</text>",
+        "<text x=\"{x}\" y=\"{y}\" font-size=\"{}\" fill=\"{}\"{length}{turn}>{}</text>",
         number(words.size),
         hex(INK),
-        number(Font::bundled().width(&words.text, words.size)),
         escaped(&words.text)
     )
 }

@@ -1,9 +1,10 @@
 //! Figures of a run without true answers: [`figures`].
 
 use crate::error::Result;
-use crate::report::chart::data::ChartData;
+use crate::report::chart::drawn::Drawn;
 use crate::report::chart::{Chart, Figure, LineStyle, Panel, PanelContent, PlotLine};
 use crate::report::ladder::{Ladder, Series, SeriesByLevel};
+use crate::report::paper::figure;
 use crate::score::estimate::Estimate;
 use crate::score::self_agreement::SelfAgreement;
 use crate::score::self_agreement::cell::{AgreementCell, CellRole};
@@ -19,7 +20,7 @@ pub(super) fn figures(found: &SelfAgreement<'_>) -> Result<Vec<Figure>> {
         return Ok(Vec::new());
     }
     let note = format!(
-        "n = {} items in {} {unit}s; bands are 95 % intervals by {unit}; strict reading",
+        "n = {} items in {} {unit}s; bands and bars are 95 % intervals by {unit}; strict reading",
         found.items(),
         found.grid.clusters,
         unit = found.unit
@@ -69,12 +70,7 @@ pub(super) fn figures(found: &SelfAgreement<'_>) -> Result<Vec<Figure>> {
             columns: 2,
             note: note.clone(),
         };
-        figures.push(Figure {
-            name,
-            caption: caption.to_owned(),
-            svg: chart.svg()?,
-            data: Some(ChartData::json(&chart)?),
-        });
+        figures.push(figure(name, caption, &Drawn::Lines(chart))?);
     }
     Ok(figures)
 }

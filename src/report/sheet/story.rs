@@ -2,7 +2,7 @@
 
 use super::levels::label;
 use super::{CELL, GAP, LINE, SheetCanvas, letter_width, mean};
-use crate::report::chart::{PanelContent, PlotLine};
+use crate::report::chart::{COLOURS, LineStyle, PanelContent, PlotLine};
 use crate::types::{AxisLevel, Rgb};
 
 /// Width of a sheet of six levels, in pixels; fewer levels need less.
@@ -213,7 +213,7 @@ fn draw_curves(sheet: &mut SheetCanvas, layout: &Layout, top: usize, story: &Sto
                 let band = points.clone().map(|(x, at)| [x, y(at.high), y(at.low)]);
                 sheet.band(&band.collect::<Vec<_>>(), colour, 0.14);
                 let path: Vec<[f64; 2]> = points.map(|(x, at)| [x, y(at.value)]).collect();
-                sheet.path(&path, line.style.dashes(), 3.0, colour);
+                sheet.path(&path, dashes(line.style), 3.0, colour);
                 for place in &path {
                     sheet.line([*place, *place], 9.0, colour);
                 }
@@ -223,6 +223,13 @@ fn draw_curves(sheet: &mut SheetCanvas, layout: &Layout, top: usize, story: &Sto
         labels.push((last, &line.name, colour));
     }
     write_labels(sheet, layout, labels);
+}
+
+/// Lengths of dash and gap in pixels; the first style is a solid line.
+const DASHES: [Option<[f64; 2]>; 4] = [None, Some([9.0, 5.0]), Some([2.0, 4.0]), Some([14.0, 4.0])];
+
+fn dashes(LineStyle(number): LineStyle) -> Option<[f64; 2]> {
+    DASHES[(number + number / COLOURS.len()) % DASHES.len()]
 }
 
 /// Writes the name of each line at its right end, from top to bottom, without overlap.
@@ -244,7 +251,6 @@ fn write_labels(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::chart::LineStyle;
     use crate::score::estimate::Estimate;
     use crate::types::Severity;
     use crate::types::degradation::Kind;

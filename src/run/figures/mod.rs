@@ -12,8 +12,9 @@ use crate::error::{Error, Result};
 use crate::files;
 use crate::job::Outcome;
 use crate::job::report::FigureRuns;
+use crate::report::chart::drawn::Drawn;
 use crate::report::figures::{
-    Drawing, Drawn, FIGURES, KnownNames, Names, PaperTable, drawings, overview, paper_tables,
+    Drawing, FIGURES, KnownNames, Names, PaperTable, drawings, overview, paper_tables,
 };
 use crate::report::paper::{
     Look, OverviewSheet, Palette, Sheet, overview_sheet, pdf, sheet, svg, tables, tex,

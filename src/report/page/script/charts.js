@@ -115,7 +115,6 @@ class Chart {
     const body = make("div", undefined, this.data.panels.length > 1 ? "body" : "body single");
     body.append(this.grid, fold);
     plot.append(this.legend, body);
-    if (this.data.note) plot.append(make("p", this.data.note, "small"));
     this.figure.querySelector(".drawing").after(plot);
     this.figure.classList.add("drawn");
     new ResizeObserver(() => {

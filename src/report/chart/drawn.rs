@@ -1,0 +1,37 @@
+//! What a figure of a report shows: [`Drawn`].
+
+use super::Chart;
+use super::bars::BarChart;
+use super::data::ChartData;
+use super::thresholds::ThresholdChart;
+use crate::error::Result;
+
+/// What a figure shows.
+#[derive(Debug, Clone)]
+pub(crate) enum Drawn {
+    Lines(Chart),
+    Bars(BarChart),
+    Thresholds(ThresholdChart),
+}
+
+impl Drawn {
+    /// What the caption says besides: numbers of items, and what bands and bars are.
+    pub(crate) fn note(&self) -> String {
+        match self {
+            Self::Lines(chart) => chart.note.clone(),
+            Self::Bars(chart) => chart.note.clone(),
+            Self::Thresholds(chart) => format!("lines are 95 % intervals by {}", chart.unit),
+        }
+    }
+
+    /// What the figure shows, for the script of the page; `None` of a figure that the page shows as it is.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub(crate) fn data(&self) -> Result<Option<String>> {
+        match self {
+            Self::Lines(chart) => ChartData::json(chart).map(Some),
+            Self::Bars(_) | Self::Thresholds(_) => Ok(None),
+        }
+    }
+}
