@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, CommandFactory as _, Parser, Subcommand};
+use clap::{Args, CommandFactory as _, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 
 use crate::job::batch::{BatchFileArgs, BatchRunArgs};
@@ -62,6 +62,14 @@ pub(crate) struct Cli {
     pub common: CommonArgs,
 }
 
+/// When results have colours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Colours {
+    Auto,
+    Always,
+    Never,
+}
+
 /// Flags that every command has.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Output")]
@@ -69,6 +77,9 @@ pub(crate) struct CommonArgs {
     /// Show no progress bars
     #[arg(long, global = true, add = Decides::Nothing)]
     pub quiet: bool,
+    /// Colours of results; auto: on a terminal, without NO_COLOR, CLICOLOR=0 and TERM=dumb
+    #[arg(long, global = true, value_name = "WHEN", value_enum, default_value = "auto", add = Decides::Nothing)]
+    pub color: Colours,
     /// A TOML file of flags by their long names; those of one command alone stand in a table of its name; default:
     /// DARKQA_CONFIG, else none
     #[arg(long, global = true, value_name = "FILE", add = Decides::Nothing)]

@@ -13,6 +13,7 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
+use anstream::{AutoStream, ColorChoice};
 use clap::FromArgMatches as _;
 use clap_complete::Shell;
 use tracing_subscriber::EnvFilter;
@@ -27,7 +28,7 @@ use crate::run::openeqa::openeqa;
 use crate::run::{self, study};
 use crate::types::manifest::Status;
 
-use command::{BatchCommand, Command, NAME, StudyCommand};
+use command::{BatchCommand, Colours, Command, NAME, StudyCommand};
 use layers::one_line;
 
 use command::Cli;
@@ -85,8 +86,13 @@ pub fn main(words: impl Iterator<Item = OsString>) -> ExitCode {
     for line in no_effect::without_effect(&cli, &parsed.matches) {
         tracing::warn!("{line}");
     }
+    let colours = match cli.common.color {
+        Colours::Auto => AutoStream::choice(&std::io::stdout()),
+        Colours::Always => ColorChoice::Always,
+        Colours::Never => ColorChoice::Never,
+    };
     match carry_out(cli, &progress) {
-        Ok(outcome) => finish(outcome),
+        Ok(outcome) => finish(&outcome, colours),
         // The text of an error of this crate includes its cause.
         Err(e) => fail(&format!("{e}{first_steps}")),
     }
@@ -177,8 +183,9 @@ fn manual(folder: &Path) -> Result<Outcome> {
     })
 }
 
-fn finish(Outcome { status, output }: Outcome) -> ExitCode {
-    let written = std::io::stdout().lock().write_all(output.as_bytes());
+fn finish(Outcome { status, output }: &Outcome, colours: ColorChoice) -> ExitCode {
+    let mut stdout = AutoStream::new(std::io::stdout().lock(), colours);
+    let written = stdout.write_all(output.as_bytes());
     match (status, written) {
         (Status::Cancelled, _) => ExitCode::from(INTERRUPTED),
         (Status::OverBudget, _) => ExitCode::from(OVER_BUDGET),

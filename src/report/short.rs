@@ -1,6 +1,7 @@
 //! The text of a report of questions with choices: [`short`] for 80 columns, [`findings`] alone, and [`full`] with all tables.
 
 mod foot;
+pub(super) mod marked;
 pub(super) mod wrapped;
 
 use std::fmt::Write;
@@ -41,7 +42,7 @@ const MAX_LEVELS: usize = 7;
 pub(crate) fn short(report: &ChoiceReport<'_>, runs: &[(&RunManifest, &Path)]) -> String {
     let mut text = findings(report);
     text.push('\n');
-    text += &table(report);
+    text += &marked::table(&table(report));
     text += &open_question(report);
     for (_, folder) in runs {
         let _ = writeln!(text, "run: {}", folder.display());
@@ -54,7 +55,7 @@ pub(crate) fn short(report: &ChoiceReport<'_>, runs: &[(&RunManifest, &Path)]) -
 pub(crate) fn full(report: &ChoiceReport<'_>, runs: &[(&RunManifest, &Path)]) -> String {
     let mut text = lines(&report.alerts);
     for sentence in &report.sentences {
-        text += &sentence_lines(sentence);
+        text += &marked::sentence(sentence);
     }
     if !report.sentences.is_empty() {
         text += &line_of([" ", HOW_TO_READ, " "]);
@@ -73,10 +74,10 @@ pub(crate) fn full(report: &ChoiceReport<'_>, runs: &[(&RunManifest, &Path)]) ->
 pub(crate) fn findings(report: &ChoiceReport<'_>) -> String {
     let mut text = head(report) + "\n";
     for alert in &report.alerts {
-        text += &wrapped("! ", &alert.text, "  ");
+        text += &marked::alert(alert);
     }
     for sentence in report.sentences.iter().take(FIRST) {
-        text += &sentence_lines(sentence);
+        text += &marked::sentence(sentence);
     }
     if report.sentences.len() > FIRST {
         let more = counted(report.sentences.len() - FIRST, "more finding");
@@ -94,12 +95,6 @@ fn open_question(report: &ChoiceReport<'_>) -> String {
     let readings = LightReadings::of(&report.findings.grid.subjects);
     let open = readings.open_question();
     open.map_or_else(String::new, |open| wrapped(" ", &open, " "))
-}
-
-/// A sentence with its sign, and its detail beneath.
-fn sentence_lines(sentence: &Sentence) -> String {
-    let sign = format!(" {}  ", sentence.tone.sign());
-    wrapped(&sign, &sentence.text, "    ") + &wrapped("    ", &sentence.detail, "    ")
 }
 
 /// Numbers of models, questions, frames, clusters and replies.

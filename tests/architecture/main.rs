@@ -18,7 +18,9 @@ use files::Files;
 use map::Map;
 
 /// The libraries that stand in some places (folders or files in `src/`) alone. Test code may use them anywhere.
-const LIBRARIES: [(&str, &[&str]); 17] = [
+const LIBRARIES: [(&str, &[&str]); 19] = [
+    ("anstream", &["cli"]),
+    ("anstyle", &["report"]),
     ("axum", &["run/serve"]),
     ("glam", &["rooms"]),
     ("plotters", &["report"]),

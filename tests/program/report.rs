@@ -444,3 +444,35 @@ fn no_line_of_all_tables_is_wider_than_the_terminal() {
         assert!(called.stdout.contains("100.0"), "{}", called.stdout);
     }
 }
+
+#[test]
+fn signs_have_colours_where_they_are_wanted() {
+    let bench = Bench::with_questions(12);
+    run(&bench, "one", "");
+    run(&bench, "two", "--seed 1");
+    let said = |more: &[&str], variables: &[(&str, &str)]| {
+        let mut command = bench.command(&[&["report", "one", "two"], more].concat());
+        command.envs(variables.iter().copied());
+        let output = command.output().unwrap();
+        assert_eq!(output.status.code(), Some(0));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let plain = said(&[], &[]);
+    assert!(plain.contains("! ") && !plain.contains('\x1b'), "{plain}");
+    let wanted = [("CLICOLOR_FORCE", "1")];
+    let coloured = said(&[], &wanted);
+    assert!(
+        coloured.contains("\x1b[1m\x1b[33m!\x1b[0m "),
+        "{coloured:?}"
+    );
+    assert_eq!(said(&["--color", "always"], &[]), coloured);
+    let codes = regex::Regex::new("\x1b\\[[0-9;]*m").unwrap();
+    assert_eq!(codes.replace_all(&coloured, ""), plain);
+    assert_eq!(said(&["--color", "never"], &wanted), plain);
+    let refused = [wanted[0], ("NO_COLOR", "1")];
+    assert_eq!(said(&[], &refused), plain);
+    assert_eq!(said(&["--color", "always"], &refused), coloured);
+    // What other programs read has none.
+    let summary = said(&["--json", "--color", "always"], &[]);
+    assert!(!summary.contains('\x1b') && !summary.contains("\\u001b"));
+}

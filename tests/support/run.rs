@@ -61,7 +61,7 @@ impl Bench {
     pub fn command(&self, words: &[&str]) -> Command {
         let mut command = Command::cargo_bin("darkqa-eval").unwrap();
         for (name, _) in std::env::vars() {
-            if ["OPENAI_", "DARKQA_", "RUST_LOG"]
+            if ["OPENAI_", "DARKQA_", "RUST_LOG", "CLICOLOR", "NO_COLOR"]
                 .iter()
                 .any(|begin| name.starts_with(begin))
             {

@@ -8,8 +8,7 @@ use super::levels::{levels, notes};
 use super::measure::HOW_TO_READ;
 use crate::report::alert::lines;
 use crate::report::light_readings::LightReadings;
-use crate::report::sentences::Sentence;
-use crate::report::short::wrapped;
+use crate::report::short::{marked, wrapped};
 use crate::report::terminal::{line, render, table};
 use crate::report::words::counted;
 use crate::score::health::Health;
@@ -37,7 +36,7 @@ pub(crate) fn text(
     if length == TextLength::Full {
         text += &lines(&report.alerts);
         for sentence in &report.sentences {
-            text += &sentence_lines(sentence);
+            text += &marked::sentence(sentence);
         }
         text += &line([" ", HOW_TO_READ, " "]);
         text.push('\n');
@@ -63,10 +62,10 @@ pub(crate) fn text(
 fn findings(report: &AgreementReport<'_>) -> String {
     let mut text = head(report) + "\n";
     for alert in &report.alerts {
-        text += &wrapped("! ", &alert.text, "  ");
+        text += &marked::alert(alert);
     }
     for sentence in &report.sentences {
-        text += &sentence_lines(sentence);
+        text += &marked::sentence(sentence);
     }
     text + &wrapped(" ", HOW_TO_READ, " ")
 }
@@ -82,11 +81,6 @@ fn short_tables(report: &AgreementReport<'_>) -> String {
         text += &wrapped(" ", &note, "   ");
     }
     text
-}
-
-fn sentence_lines(sentence: &Sentence) -> String {
-    let sign = format!(" {}  ", sentence.tone.sign());
-    wrapped(&sign, &sentence.text, "    ") + &wrapped("    ", &sentence.detail, "    ")
 }
 
 /// Numbers of models, questions, images and replies.

@@ -26,7 +26,7 @@ pub(crate) use baseline::{against_baseline, no_verdict};
 pub(in crate::report) use models::over_levels;
 pub(in crate::report) use sample::left_out;
 pub(in crate::report) use self_agreement::self_agreement;
-pub(crate) use sentence::Sentence;
+pub(crate) use sentence::{Sentence, Tone};
 
 use std::collections::BTreeSet;
 
