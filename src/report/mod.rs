@@ -14,6 +14,7 @@ pub(crate) mod json;
 mod ladder;
 mod latex;
 mod light_readings;
+pub(crate) mod markdown;
 pub(crate) mod openeqa;
 pub(crate) mod page;
 pub(crate) mod paper;

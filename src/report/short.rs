@@ -103,7 +103,7 @@ fn sentence_lines(sentence: &Sentence) -> String {
 }
 
 /// Numbers of models, questions, frames, clusters and replies.
-fn head(report: &ChoiceReport<'_>) -> String {
+pub(super) fn head(report: &ChoiceReport<'_>) -> String {
     let findings = report.findings;
     let grid = &findings.grid;
     let mut models: Vec<&str> = grid

@@ -15,6 +15,7 @@ use crate::job::outcome::StdoutFormat;
 use crate::job::predictions::{AnswerState, Prediction, predictions};
 use crate::job::stored::{ShownModels, StoredRun, in_order};
 use crate::report::alert::{Alert, AlertKind};
+use crate::report::markdown::MarkdownReport;
 use crate::report::openeqa::{OpenReport, ReportedAnswer, products, render, summary_json, tables};
 use crate::report::table::Table;
 use crate::report::tables::EnhancerRow;
@@ -128,6 +129,7 @@ impl Scores {
         let folder = &self.run.folder;
         match show {
             StdoutFormat::Json => summary_json(report, tables, Some(folder)),
+            StdoutFormat::Markdown => Ok(MarkdownReport::of_open(report, tables).text()),
             _ => Ok(render(report, tables, folder)),
         }
     }

@@ -1,12 +1,16 @@
 //! The report of runs whose questions have no true answers: each model against its own answers at L0.
 
+use std::path::Path;
+
 use super::alerts::alerts_without_truths;
 use super::combine::{Combined, ties};
 use super::enhancers;
 use crate::error::Result;
 use crate::job::StdoutFormat;
+use crate::job::stored::name;
 use crate::report::alert::Alert;
 use crate::report::json::RunList;
+use crate::report::markdown::MarkdownReport;
 use crate::report::products::PAGE;
 use crate::report::self_agreement::{AgreementReport, TextLength, products, summary, text};
 use crate::score::self_agreement::SelfAgreement;
@@ -36,11 +40,13 @@ pub(super) fn in_its_folder(
     store.write("summary.json", json(None)?.as_bytes())?;
     store.write_manifest(manifest)?;
     let folder = store.folder();
+    let runs = [(manifest, folder)];
     Ok(match length(show) {
+        None if show == StdoutFormat::Markdown => markdown(&report, &runs),
         None => json(Some(folder))?,
         Some(length) => {
             let page = folder.join(PAGE);
-            text(&report, &[(manifest, folder)], length) + &format!("report: {}\n", page.display())
+            text(&report, &runs, length) + &format!("report: {}\n", page.display())
         }
     })
 }
@@ -62,6 +68,7 @@ pub(super) fn compared(
         files.push(("summary.json".to_owned(), json()?.into_bytes()));
     }
     let text = match length(show) {
+        None if show == StdoutFormat::Markdown => markdown(&report, &runs),
         None => json()?,
         Some(length) => text(&report, &runs, length),
     };
@@ -88,12 +95,17 @@ fn report<'a>(
     AgreementReport::new(found, above, &enhancers::rows(&combined.runs))
 }
 
-/// How much is printed; `None` for JSON.
+fn markdown(report: &AgreementReport<'_>, runs: &[(&RunManifest, &Path)]) -> String {
+    let names = runs.iter().map(|(_, folder)| name(folder)).collect();
+    MarkdownReport::of_own_answers(report, names).text()
+}
+
+/// How much is printed; `None` for a document.
 fn length(show: StdoutFormat) -> Option<TextLength> {
     match show {
         StdoutFormat::Findings => Some(TextLength::Findings),
         StdoutFormat::Short => Some(TextLength::Short),
         StdoutFormat::Full => Some(TextLength::Full),
-        StdoutFormat::Json => None,
+        StdoutFormat::Markdown | StdoutFormat::Json => None,
     }
 }

@@ -90,7 +90,7 @@ fn sentence_lines(sentence: &Sentence) -> String {
 }
 
 /// Numbers of models, questions, images and replies.
-fn head(report: &AgreementReport<'_>) -> String {
+pub(super) fn head(report: &AgreementReport<'_>) -> String {
     let found = report.found;
     let items = &found.grid.items;
     let models = found.models();
