@@ -9,6 +9,7 @@ use crate::job::batch::{BatchFileArgs, BatchRunArgs};
 use crate::job::merge::MergeArgs;
 use crate::job::report::ReportArgs;
 use crate::run::batch::{BatchFolderArgs, BatchImportArgs, BatchStatusArgs};
+use crate::run::bundle::BundleArgs;
 use crate::run::calibrate::CalibrateArgs;
 use crate::run::enhance::EnhanceArgs;
 use crate::run::evaluate::{CheckArgs, EvaluateArgs};
@@ -115,6 +116,8 @@ pub(crate) enum Command {
     Report(ReportArgs),
     /// Draw the figures of runs for a paper, at the width of its columns: PDF, SVG, pgfplots, and their captions
     Figures(FiguresArgs),
+    /// Pack a run as one ZIP file to pass on: records, tables, page and findings, without keys and places on this machine
+    Bundle(BundleArgs),
     /// Merge the shards of an evaluation into one run
     Merge(MergeArgs),
     /// Make the images of one question again, bit for bit, and check their digests

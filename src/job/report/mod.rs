@@ -18,8 +18,10 @@ mod rereading;
 mod runs;
 mod settings;
 mod story;
+mod whole;
 
 pub(super) use cost::price;
 pub(crate) use figure_runs::FigureRuns;
 pub(crate) use runs::{ReportArgs, report};
 pub(crate) use story::story_curves;
+pub(crate) use whole::WholeReport;

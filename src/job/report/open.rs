@@ -9,6 +9,7 @@ use super::alerts::{of_joining, of_runs};
 use super::enhancers;
 use super::join::join;
 use super::listing::listing;
+use super::whole::{SUMMARY_JSON, WholeReport};
 use crate::error::{Error, Result};
 use crate::job::outcome::Outcome;
 use crate::job::outcome::StdoutFormat;
@@ -112,6 +113,19 @@ impl Scores {
     pub(crate) fn products(&self) -> Result<Vec<(String, Vec<u8>)>> {
         let report = self.report();
         products(&report, &tables(&report))
+    }
+
+    /// The whole report of the run.
+    pub(super) fn whole(&self) -> Result<WholeReport> {
+        let report = self.report();
+        let tables = tables(&report);
+        let mut files = products(&report, &tables)?;
+        let json = summary_json(&report, &tables, None)?;
+        files.push((SUMMARY_JSON.to_owned(), json.into_bytes()));
+        Ok(WholeReport {
+            files,
+            markdown: self.show(&report, &tables, StdoutFormat::Markdown)?,
+        })
     }
 
     /// The text for standard output.

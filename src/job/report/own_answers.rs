@@ -5,6 +5,7 @@ use std::path::Path;
 use super::alerts::alerts_without_truths;
 use super::combine::{Combined, ties};
 use super::enhancers;
+use super::whole::{SUMMARY_JSON, WholeReport};
 use crate::error::Result;
 use crate::job::StdoutFormat;
 use crate::job::stored::name;
@@ -73,6 +74,20 @@ pub(super) fn compared(
         Some(length) => text(&report, &runs, length),
     };
     Ok(ReportOutput { files, text })
+}
+
+/// The whole report of one run.
+pub(super) fn whole(combined: &Combined) -> Result<WholeReport> {
+    let found = found(combined);
+    let report = report(combined, &found, &[]);
+    let runs = combined.manifests();
+    let mut files = products(&report, &combined.shown())?;
+    let json = summary(&report, RunList::One(runs[0].0, None))?;
+    files.push((SUMMARY_JSON.to_owned(), json.into_bytes()));
+    Ok(WholeReport {
+        files,
+        markdown: markdown(&report, &runs),
+    })
 }
 
 fn found(combined: &Combined) -> SelfAgreement<'_> {
