@@ -28,6 +28,7 @@ pub(crate) mod self_agreement;
 pub(crate) mod sentences;
 pub(crate) mod sheet;
 pub(crate) mod short;
+pub(crate) mod site;
 pub(crate) mod study;
 pub(crate) mod table;
 pub(crate) mod tables;

@@ -16,5 +16,6 @@ pub(crate) mod realism;
 pub(crate) mod rooms;
 pub(crate) mod serve;
 pub(crate) mod show;
+pub(crate) mod site;
 pub(crate) mod study;
 pub(crate) mod synthesize;

@@ -17,11 +17,13 @@ mod own_answers;
 mod rereading;
 mod runs;
 mod settings;
+mod site;
 mod story;
 mod whole;
 
 pub(super) use cost::price;
 pub(crate) use figure_runs::FigureRuns;
 pub(crate) use runs::{ReportArgs, report};
+pub(crate) use site::site;
 pub(crate) use story::story_curves;
 pub(crate) use whole::WholeReport;

@@ -94,6 +94,11 @@ impl Scores {
         answers.any(|answer| answer.outcome == AnswerOutcome::Unmarked)
     }
 
+    /// The scores.
+    pub(super) fn summary(&self) -> &OpenSummary {
+        &self.summary
+    }
+
     fn report(&self) -> OpenReport<'_> {
         OpenReport {
             summary: &self.summary,

@@ -59,7 +59,7 @@ fn of_open(run: StoredRun<OpenDetail>) -> Result<WholeReport> {
 }
 
 /// A run without the models that a report leaves out.
-fn shown<D: Detail>(mut run: StoredRun<D>) -> Result<StoredRun<D>> {
+pub(super) fn shown<D: Detail>(mut run: StoredRun<D>) -> Result<StoredRun<D>> {
     if run.records.is_empty() {
         return Err(no_records(run.folder));
     }
