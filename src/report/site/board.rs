@@ -25,8 +25,8 @@ pub(super) struct BoardRow {
 #[derive(Serialize)]
 pub(super) struct BoardCell {
     text: String,
-    /// What stands beneath it in small letters; empty without.
-    small: String,
+    /// Lines beneath it in small letters.
+    small: Vec<String>,
     class: &'static str,
     /// By what the column is sorted: a number, or a text; empty if there is nothing.
     key: String,
@@ -42,7 +42,7 @@ impl BoardCell {
         Self {
             key: text.clone(),
             text,
-            small: String::new(),
+            small: Vec::new(),
             class: "text",
             link: String::new(),
             is_header: false,
@@ -56,7 +56,7 @@ impl BoardCell {
             _ => None,
         });
         let (shown, small) = match share {
-            Some(share) => (words(ColumnKind::Accuracy, cell), ends(share)),
+            Some(share) => (words(ColumnKind::Accuracy, cell), Some(ends(share))),
             None => split(&words(kind, cell)),
         };
         let number = match cell {
@@ -69,7 +69,7 @@ impl BoardCell {
         // Infinity is beyond every number of its column.
         let key = number.map(|number| number.clamp(-1e300, 1e300).to_string());
         Self {
-            small,
+            small: small.into_iter().collect(),
             class: "",
             key: key.unwrap_or_default(),
             ..Self::text(&shown)
@@ -83,11 +83,10 @@ impl BoardCell {
         }
     }
 
-    pub(super) fn small(self, small: &str) -> Self {
-        Self {
-            small: readable(small),
-            ..self
-        }
+    /// The same with a line beneath it.
+    pub(super) fn small(mut self, line: &str) -> Self {
+        self.small.push(readable(line));
+        self
     }
 
     pub(super) fn class(self, class: &'static str) -> Self {
@@ -105,9 +104,9 @@ impl BoardCell {
 }
 
 /// A number and the interval behind it, if the text has both.
-fn split(text: &str) -> (String, String) {
+fn split(text: &str) -> (String, Option<String>) {
     match text.split_once(" [") {
-        Some((number, interval)) => (number.to_owned(), format!("[{interval}")),
-        None => (text.to_owned(), String::new()),
+        Some((number, interval)) => (number.to_owned(), Some(format!("[{interval}"))),
+        None => (text.to_owned(), None),
     }
 }

@@ -217,13 +217,13 @@ const HEAD: [&str; 12] = [
     "rank",
     "model",
     "n",
-    "L0",
-    "area",
-    "drop",
+    "L0 in %",
+    "area in %",
+    "drop in points",
     "threshold in EV",
-    "best enhancer",
+    "best enhancer, gain in points",
     "below blind at",
-    "unread",
+    "unread in %",
     "date",
     "version",
 ];
@@ -293,16 +293,15 @@ fn board_row(row: &ChoiceRow) -> BoardRow {
     }
 }
 
-/// A difference in points, with its interval and where it was found. The word stands where nothing is shown.
+/// A difference in points, with its interval and where it was found. A word stands where nothing is shown.
 fn difference(difference: Estimate, verdict: Significance, place: &str) -> BoardCell {
     let ends = format!("[{}, {}]", points(difference.low), points(difference.high));
-    let (class, unshown) = match verdict {
-        Significance::Better => ("better", ""),
-        Significance::Worse => ("worse", ""),
-        _ => ("unshown", ", not shown"),
-    };
-    BoardCell::text(&points(difference.value))
+    let cell = BoardCell::text(&points(difference.value))
         .keyed(difference.value)
-        .small(&format!("{place} {ends}{unshown}"))
-        .class(class)
+        .small(&ends);
+    match verdict {
+        Significance::Better => cell.small(place).class("better"),
+        Significance::Worse => cell.small(place).class("worse"),
+        _ => cell.small(&format!("{place}, not shown")).class("unshown"),
+    }
 }

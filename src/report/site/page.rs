@@ -86,8 +86,8 @@ pub(super) fn index(site: &Site, downloads: &[String]) -> Result<String> {
 
 fn page_group(group: &SiteGroup, id: usize) -> PageGroup<'_> {
     let (kind, table, ranking) = match &group.rows {
-        GroupRows::Choices(rows, ranking) => ("choices", choices::board(rows), &*ranking.words),
-        GroupRows::Open(rows) => ("openeqa", open::board(rows), NOT_RANKED),
+        GroupRows::Choices(rows, ranking) => ("ranked", choices::board(rows), &*ranking.words),
+        GroupRows::Open(rows) => ("unranked", open::board(rows), NOT_RANKED),
     };
     let shared = group.shared.iter();
     PageGroup {

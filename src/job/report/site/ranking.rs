@@ -81,13 +81,19 @@ fn words(best: Option<&BestInTheDark>, models: usize, unit: &str) -> String {
     };
     let levels = best.levels.iter().map(ToString::to_string);
     let mut words = format!(
-        "Ranks are by mean accuracy over {}, on the {} items that all {} models answered at all of these levels ({} {unit}s): \
-         swaps of whole {unit}s, corrected by Holm over all {} pairs.",
+        "Ranks are by mean accuracy over {}, on the {} items that {} models answered at all of these levels ({} {unit}s): \
+         swaps of whole {unit}s, corrected by Holm over {}.",
         levels.collect::<Vec<_>>().join(", "),
         best.items,
-        best.models.len(),
+        match best.models.len() {
+            2 => "both".to_owned(),
+            models => format!("all {models}"),
+        },
         best.clusters,
-        best.pairs.len(),
+        match best.pairs.len() {
+            1 => "1 pair".to_owned(),
+            pairs => format!("all {pairs} pairs"),
+        },
     );
     if best.dropped > 0 {
         words += &format!(
