@@ -12,7 +12,7 @@ use super::short::head;
 use super::table::{Column, ColumnKind, Table, TableFormat};
 use super::words::{ends, interval, words};
 
-/// Name of the table of accuracy by level, in every report.
+/// Name of the table by level of accuracies and scores.
 const LEVELS: &str = "levels";
 
 /// What a report says in Markdown.
@@ -33,7 +33,7 @@ impl<'a> MarkdownReport<'a> {
     pub(crate) fn of_choices(report: &'a ChoiceReport<'a>, names: Vec<String>) -> Self {
         let is_tested = |sentence: &Sentence| sentence.values.contains_key("p");
         let has_tests = report.sentences.iter().any(is_tested);
-        let mut tables = levels(&report.tables);
+        let mut tables = named(&report.tables, LEVELS);
         if report.findings.common.is_some() && tables.len() > 1 {
             // Models that were asked different questions are compared on those that they share.
             tables.retain(|table| table.caption.contains("all models"));
@@ -57,7 +57,7 @@ impl<'a> MarkdownReport<'a> {
             alerts: parts.alerts,
             sentences: parts.sentences,
             how_to_read: Some(parts.how_to_read),
-            tables: levels(parts.tables),
+            tables: named(parts.tables, parts.levels),
         }
     }
 
@@ -75,7 +75,7 @@ impl<'a> MarkdownReport<'a> {
             alerts: report.alerts,
             sentences: &[],
             how_to_read: None,
-            tables: levels(tables),
+            tables: named(tables, LEVELS),
         }
     }
 
@@ -110,9 +110,9 @@ impl<'a> MarkdownReport<'a> {
     }
 }
 
-/// The tables by level.
-fn levels(tables: &[Table]) -> Vec<&Table> {
-    let tables = tables.iter().filter(|table| table.name == LEVELS);
+/// The tables of a name that have a row.
+fn named<'a>(tables: &'a [Table], name: &str) -> Vec<&'a Table> {
+    let tables = tables.iter().filter(|table| table.name == name);
     tables.filter(|table| !table.rows.is_empty()).collect()
 }
 

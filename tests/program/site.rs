@@ -32,12 +32,17 @@ fn find<'r>(
         .unwrap_or_else(|| panic!("{cells:?}: {rows:?}"))
 }
 
-/// Two scripts: one is right as long as it is not too dark, one never.
+/// Two scripts for these questions: one is right as long as it is not too dark, one never.
 fn scripts(bench: &Bench) {
-    bench.file(
-        "good.jsonl",
-        "{\"condition\": \"L5-noise\", \"reply\": \"A\"}\n{\"default\": \"C\"}\n",
-    );
+    let set = fs::read_to_string(bench.path("set.jsonl")).unwrap();
+    let lines = set.lines().map(|line| {
+        let question: Value = serde_json::from_str(line).unwrap();
+        let dark =
+            serde_json::json!({"question": question["id"], "condition": "L5-noise", "reply": "A"});
+        format!("{dark}\n")
+    });
+    let good = lines.collect::<String>() + "{\"default\": \"C\"}\n";
+    bench.file("good.jsonl", good);
     bench.file("bad.jsonl", "{\"default\": \"A\"}\n");
 }
 
@@ -225,7 +230,6 @@ fn only_what_was_asked_in_the_same_way_shares_a_table() {
     run("one", "");
     run("same", "--model script:bad.jsonl");
     run("seed", "--seed 1");
-    bench.file("prompts/choice.txt", "Look: {question}\n{choices}\n");
     let set = fs::read_to_string(bench.path("set.jsonl")).unwrap();
     bench.file(
         "set.jsonl",
@@ -430,6 +434,7 @@ fn open_questions_have_a_table_of_their_own_and_photographs_without_labels_none(
     }
     assert!(compared > 1);
     let index = fs::read_to_string(bench.path("site/index.html")).unwrap();
+    let index = index.replace("&#x2f;", "/");
     assert!(index.contains("These rows are not ranked"));
     assert!(index.contains("runs/own.html"));
 }

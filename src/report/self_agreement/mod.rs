@@ -78,6 +78,8 @@ pub(super) struct MarkdownParts<'a> {
     pub(super) sentences: &'a [Sentence],
     pub(super) how_to_read: &'static str,
     pub(super) tables: &'a [Table],
+    /// Name of the tables by level.
+    pub(super) levels: &'static str,
 }
 
 /// What Markdown shows of a report.
@@ -88,6 +90,7 @@ pub(super) fn markdown_parts<'a>(report: &'a AgreementReport<'_>) -> MarkdownPar
         sentences: &report.sentences,
         how_to_read: HOW_TO_READ,
         tables: &report.tables,
+        levels: AGREEMENT,
     }
 }
 
