@@ -2,11 +2,12 @@
 
 use std::fs;
 
+use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::run::{Bench, files, words};
 
 /// A family and a model that a spreadsheet would run.
 const FAMILY: &str = "=HYPERLINK(\"http://x\",\"y\")";
-const SCRIPT: &str = "+1-cmd.jsonl";
+const MODEL: &str = "+1-cmd|x";
 
 /// The cells of all CSV files below a folder, each with its file.
 fn cells(bench: &Bench, folder: &str) -> Vec<(String, String)> {
@@ -32,21 +33,17 @@ fn a_family_or_model_that_looks_like_a_formula_is_only_text() {
     let set = fs::read_to_string(bench.path("set.jsonl")).unwrap();
     let family = serde_json::to_string(FAMILY).unwrap();
     bench.file("set.jsonl", set.replace("\"color\"", &family));
-    bench.file(SCRIPT, "{\"default\": \"C\"}\n");
-    bench.file("said.jsonl", "{\"default\": \"A\"}\n");
-    // The name of a model in a file of models is anybody's.
-    bench.file(
-        "models.toml",
-        "[[model]]\nname = \"@SUM(A1)\"\nmodel = \"script:said.jsonl\"\n[[model]]\nname = \"-2+3\"\nmodel = \"script:+1-cmd.jsonl\"\n",
-    );
-    let run = "--models models.toml --data set.jsonl --levels L0,L5 --out run";
-    let called = bench.call(&words(run));
-    let named = called.code == Some(0);
-    if !named {
-        // A file of models that takes no scripts: the scripts are named by flags.
-        let run = "--model script:said.jsonl --model script:+1-cmd.jsonl --data set.jsonl --levels L0,L5 --out run";
-        bench.complete(&words(run));
-    }
+    let endpoint = MockEndpoint::answering(|_| Answer::text("A"));
+    let line = "--data set.jsonl --levels L0,L5 --out run";
+    let models = [
+        "--model",
+        MODEL,
+        "--model",
+        "@SUM(A1)",
+        "--base-url",
+        &endpoint.base_url(),
+    ];
+    bench.complete(&[&models[..], &words(line)].concat());
     bench.complete(&words("site run --out site"));
     for folder in ["run", "site"] {
         let cells = cells(&bench, folder);
@@ -62,8 +59,10 @@ fn a_family_or_model_that_looks_like_a_formula_is_only_text() {
     let cells = cells(&bench, "run");
     // The text is there behind its apostrophe, and negative numbers are numbers.
     let has = |text: &str| cells.iter().any(|(_, cell)| cell == text);
-    assert!(has(&format!("'{FAMILY}")));
-    assert!(!has(FAMILY));
+    for text in [FAMILY, MODEL] {
+        assert!(has(&format!("'{text}")), "{text}");
+        assert!(!has(text), "{text}");
+    }
     let is_negative = |cell: &str| cell.parse::<f64>().is_ok_and(|number| number < 0.0);
     assert!(cells.iter().any(|(_, cell)| is_negative(cell)));
     // JSON is no spreadsheet: the name is as it was given.
