@@ -9,7 +9,7 @@ use super::alerts::{of_joining, of_runs};
 use super::enhancers;
 use super::join::join;
 use super::listing::listing;
-use super::whole::{SUMMARY_JSON, WholeReport};
+use super::whole_report::{SUMMARY_JSON, WholeReport};
 use crate::error::{Error, Result};
 use crate::job::outcome::Outcome;
 use crate::job::outcome::StdoutFormat;

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::alerts::alerts_without_truths;
 use super::combine::{Combined, ties};
 use super::enhancers;
-use super::whole::{SUMMARY_JSON, WholeReport};
+use super::whole_report::{SUMMARY_JSON, WholeReport};
 use crate::error::Result;
 use crate::job::StdoutFormat;
 use crate::job::stored::name;

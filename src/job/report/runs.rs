@@ -12,6 +12,7 @@ use super::combine::{Combined, combine};
 use super::common::restrict;
 use super::enhancers;
 use super::rereading::LenientChange;
+use super::whole_report::no_records;
 use super::{open, own_answers};
 use crate::error::{Error, Result};
 use crate::files;
@@ -339,9 +340,4 @@ fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<String> {
         store.write_manifest(&run.manifest)?;
     }
     Ok(lines)
-}
-
-pub(super) fn no_records(path: PathBuf) -> Error {
-    let problem = "the run has no records yet: nothing to report".to_owned();
-    Error::Run { path, problem }
 }

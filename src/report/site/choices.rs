@@ -1,7 +1,7 @@
 //! Rows of models that answered questions with choices: [`ChoiceRow`].
 
-use super::RunLink;
 use super::board::{BoardCell, BoardRow, BoardTable};
+use super::run_link::RunLink;
 use crate::report::table::ColumnKind::{Count, Points, Share, Text, Threshold};
 use crate::report::table::{ColumnKind, Table, TableBuilder, TableCell};
 use crate::report::tables::level_words as why;

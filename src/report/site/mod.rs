@@ -2,8 +2,10 @@
 
 mod board;
 mod choices;
+mod content;
 mod open;
 mod page;
+mod run_link;
 
 use serde::Serialize;
 
@@ -13,79 +15,12 @@ use super::table::Table;
 use crate::error::{Error, Result};
 
 pub(crate) use choices::{ChoiceRow, choice_rows};
+pub(crate) use content::{DATA, GroupDifference, GroupRows, Ranking, Site, SiteGroup};
 pub(crate) use open::{OpenRow, open_rows};
+pub(crate) use run_link::{PAGES, RunLink};
 
 /// The schema of `data.json`.
 pub(crate) const SCHEMA: &str = "darkqa.site/1";
-
-/// Name of the file with all rows of the site.
-pub(crate) const DATA: &str = "data.json";
-
-/// Folder of the pages of runs.
-pub(crate) const PAGES: &str = "runs";
-
-/// A leaderboard and the pages behind it.
-pub(crate) struct Site {
-    pub(crate) groups: Vec<SiteGroup>,
-    /// Runs that stand in no table, each with the reason.
-    pub(crate) others: Vec<(RunLink, String)>,
-    /// The page of each run, with its link.
-    pub(crate) pages: Vec<(RunLink, Vec<u8>)>,
-}
-
-/// A run as rows name it.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub(crate) struct RunLink {
-    /// Name of the run: its folder.
-    pub(crate) name: String,
-    /// Name of the file of its page.
-    pub(crate) page: String,
-    /// The day when the run was last written.
-    pub(crate) date: String,
-    /// The version that made it.
-    pub(crate) version: String,
-}
-
-impl RunLink {
-    /// Path of the page from the leaderboard.
-    pub(crate) fn path(&self) -> String {
-        format!("{PAGES}/{}", self.page)
-    }
-}
-
-/// Rows that can be compared: of one set of questions, one light and one prompt.
-pub(crate) struct SiteGroup {
-    /// What its rows share, in words.
-    pub(crate) title: String,
-    /// Digests and settings that its rows share, by name.
-    pub(crate) shared: Vec<(String, String)>,
-    /// What differs from the first table of its kind; `None` for the first.
-    pub(crate) differs: Option<GroupDifference>,
-    pub(crate) rows: GroupRows,
-}
-
-/// What differs between two groups.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub(crate) struct GroupDifference {
-    /// The number of the other group.
-    pub(crate) from: usize,
-    /// A line for each setting.
-    pub(crate) lines: Vec<String>,
-}
-
-/// The rows of a group.
-pub(crate) enum GroupRows {
-    /// Questions with choices, and on what their ranks are based.
-    Choices(Vec<ChoiceRow>, Ranking),
-    /// Open questions.
-    Open(Vec<OpenRow>),
-}
-
-/// On what the ranks of a group are based, in words.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Ranking {
-    pub(crate) words: String,
-}
 
 /// A group in `data.json`.
 #[derive(Serialize)]

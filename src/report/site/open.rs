@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::RunLink;
 use super::board::{BoardCell, BoardRow, BoardTable};
+use super::run_link::RunLink;
 use crate::report::table::ColumnKind::{Count, Share, Text};
 use crate::report::table::{Table, TableBuilder, TableCell};
 use crate::report::words::light;

@@ -3,7 +3,8 @@
 use serde::Serialize;
 
 use super::board::BoardTable;
-use super::{GroupRows, Site, SiteGroup, choices, open};
+use super::content::{DATA, GroupRows, Site, SiteGroup};
+use super::{choices, open};
 use crate::error::Result;
 use crate::report::page::STYLE;
 use crate::report::readable::readable;
@@ -76,7 +77,7 @@ pub(super) fn index(site: &Site, downloads: &[String]) -> Result<String> {
             groups: groups.map(|(group, id)| page_group(group, id)).collect(),
             others: others.collect(),
             downloads,
-            data: super::DATA,
+            data: DATA,
             version: env!("CARGO_PKG_VERSION"),
             css: [STYLE, OWN_STYLE].concat(),
             script: SCRIPT,

@@ -14,7 +14,7 @@ use clap::Args;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::job::Outcome;
-use crate::job::report::WholeReport;
+use crate::job::report::whole;
 use crate::job::stored::name;
 use crate::types::Decides;
 use crate::types::manifest::Status;
@@ -59,7 +59,7 @@ pub(crate) fn bundle(args: &BundleArgs) -> Result<Outcome> {
         thumbnails,
     } = parts;
     let command_run = run.clone();
-    let report = WholeReport::of(run)?;
+    let report = whole(run)?;
     files.extend(report.files);
     let mut changes: Vec<String> = redactor
         .changes

@@ -141,15 +141,15 @@ impl GroupKey {
         let mut shared = vec![
             (
                 "questions, digest".to_owned(),
-                first_letters(&self.settings[QUESTIONS]),
+                short(&self.settings[QUESTIONS]),
             ),
-            ("light, digest".to_owned(), first_letters(&light)),
+            ("light, digest".to_owned(), short(&light)),
         ];
         shared.extend(
             self.settings
                 .iter()
                 .filter(|(name, value)| *name != QUESTIONS && !value.is_empty())
-                .map(|(name, value)| (name.clone(), first_letters(value))),
+                .map(|(name, value)| (name.clone(), short(value))),
         );
         self.shared = shared;
         Ok(self)
@@ -258,11 +258,6 @@ fn sent(record: &Record<OpenDetail>) -> Option<Digest> {
     Digest::of_files(images.map(|image| image.digest))
 }
 
-/// A digest by its first letters; another value as it is.
-fn first_letters(value: &str) -> String {
-    short(value)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -300,7 +295,10 @@ mod tests {
             ["1 questions have other choices or another truth"]
         );
         assert!(lines(4).is_empty());
-        let groups = grouped((0..5).collect(), |number: &usize| &keys[*number]);
+        let numbered = keys.into_iter().enumerate().collect();
+        let groups = grouped(numbered, |(_, key)| key).into_iter();
+        let groups = groups.map(|group| group.into_iter().map(|(number, _)| number).collect());
+        let groups: Vec<Vec<usize>> = groups.collect();
         assert_eq!(groups, [vec![0, 4], vec![1], vec![2], vec![3]]);
     }
 }

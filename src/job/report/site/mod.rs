@@ -1,6 +1,7 @@
 //! The site of many runs: [`site`]. Each run has the page of its report, and rows in the table of those that can be compared with it.
 
 mod group;
+mod member;
 mod ranking;
 
 use std::collections::BTreeSet;
@@ -10,28 +11,18 @@ use super::combine::{Combined, combine};
 use super::enhancers;
 use super::open;
 use super::own_answers;
-use super::whole::shown;
+use super::whole_report::shown;
 use crate::error::{Error, Result};
 use crate::job::stored::{AnyRun, StoredRun};
 use crate::report::choice_report::ChoiceReport;
 use crate::report::products::{PAGE, products};
-use crate::report::site::{
-    ChoiceRow, GroupRows, OpenRow, RunLink, Site, SiteGroup, choice_rows, open_rows,
-};
+use crate::report::site::{GroupRows, OpenRow, RunLink, Site, SiteGroup, choice_rows, open_rows};
 use crate::types::manifest::RunManifest;
-use crate::types::{ChoiceDetail, KindReading, OpenDetail, Record, RunQuestion, Truths};
+use crate::types::{ChoiceDetail, KindReading, OpenDetail, Record, Truths};
 
 use group::{GroupKey, grouped};
+use member::ChoiceMember;
 use ranking::ranked;
-
-/// A run of questions with choices: its rows, and the records that models are compared by.
-struct ChoiceMember {
-    key: GroupKey,
-    run: RunLink,
-    rows: Vec<ChoiceRow>,
-    records: Vec<Record>,
-    questions: Vec<RunQuestion>,
-}
 
 /// A run of open questions.
 struct OpenMember {

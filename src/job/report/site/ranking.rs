@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::ChoiceMember;
+use super::member::ChoiceMember;
 use crate::job::report::combine::clusters;
 use crate::report::site::{ChoiceRow, GroupRows, Ranking};
 use crate::score::best::{BestInTheDark, best_in_the_dark};
