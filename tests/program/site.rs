@@ -1,6 +1,7 @@
 //! `site`: a leaderboard and the pages of many runs.
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::fs;
 
 use crate::support::house::House;
@@ -58,150 +59,126 @@ fn many(bench: &Bench) {
                 "question": format!("What color is it, {number}?"),
                 "choices": ["red", "blue", "brown"], "answer": "brown",
             });
-            lines += &format!("{question}\n");
+            let _ = writeln!(lines, "{question}");
         }
     }
     bench.file("set.jsonl", lines);
 }
 
-#[test]
-fn every_number_is_that_of_the_runs_own_files() {
+/// Two runs of the same questions, a good model and a bad one, and their site.
+fn two_runs() -> Bench {
     let bench = Bench::new();
     many(&bench);
     scripts(&bench);
     let asked = "--data set.jsonl --levels L0,L3,L5 --llie lift";
-    bench.complete(&words(&format!(
-        "--model script:good.jsonl --blind-model script:good.jsonl {asked} --out one"
-    )));
-    bench.complete(&words(&format!(
-        "--model script:bad.jsonl --model random {asked} --out two"
-    )));
+    let good = "--model script:good.jsonl --blind-model script:good.jsonl";
+    bench.complete(&words(&format!("{good} {asked} --out one")));
+    let bad = "--model script:bad.jsonl --model random";
+    bench.complete(&words(&format!("{bad} {asked} --out two")));
     bench.complete(&words("site one two --out site"));
+    bench
+}
+
+/// Checks numbers of a row against those of a line of a run's file: pairs of names of columns.
+fn assert_equal(
+    row: &BTreeMap<String, String>,
+    own: &BTreeMap<String, String>,
+    pairs: &[(&str, &str)],
+) {
+    for (name, other) in pairs {
+        let numbers = [&row[*name], &own[*other]].map(|text| text.parse::<f64>().unwrap());
+        assert!(
+            (numbers[0] - numbers[1]).abs() < 1e-12,
+            "{name}: {row:?} {own:?}"
+        );
+    }
+}
+
+#[test]
+fn every_number_is_that_of_the_runs_own_files() {
+    let bench = two_runs();
     let board = rows(&bench, "site/leaderboard.csv");
     assert_eq!(board.len(), 3);
-    let equal =
-        |row: &BTreeMap<String, String>, own: &BTreeMap<String, String>, pairs: &[(&str, &str)]| {
-            for (name, other) in pairs {
-                let numbers = [&row[*name], &own[*other]].map(|text| text.parse::<f64>().unwrap());
-                assert!(
-                    (numbers[0] - numbers[1]).abs() < 1e-12,
-                    "{name}: {row:?} {own:?}"
-                );
-            }
-        };
     for row in &board {
-        let (model, run) = (&*row["model"], &*row["run"]);
-        let summary = rows(&bench, &format!("{run}/summary.csv"));
-        let l0 = find(
-            &summary,
-            &[
-                ("model", model),
-                ("level", "L0"),
-                ("enhancer", ""),
-                ("family", "all"),
-                ("mode", "strict"),
-                ("view", "image"),
-            ],
-        );
-        equal(
-            row,
-            l0,
-            &[
-                ("l0", "value"),
-                ("l0_low", "low"),
-                ("l0_high", "high"),
-                ("n", "n"),
-            ],
-        );
-        let curves = rows(&bench, &format!("{run}/thresholds.csv"));
-        let curve = find(
-            &curves,
-            &[
-                ("model", model),
-                ("variant", "noise"),
-                ("enhancer", ""),
-                ("family", "all"),
-            ],
-        );
-        equal(
-            row,
-            curve,
-            &[
-                ("area", "area"),
-                ("area_low", "area_low"),
-                ("area_high", "area_high"),
-            ],
-        );
+        let model = &*row["model"];
+        let file = |name: &str| rows(&bench, &format!("{}/{name}.csv", row["run"]));
+        let all = [("model", model), ("family", "all")];
+        let of = |more: &[(&'static str, &'static str)]| [&all[..], more].concat();
+        let summary = file("summary");
+        let strict = [
+            ("enhancer", ""),
+            ("mode", "strict"),
+            ("view", "image"),
+            ("level", "L0"),
+        ];
+        let pairs = [
+            ("l0", "value"),
+            ("l0_low", "low"),
+            ("l0_high", "high"),
+            ("n", "n"),
+        ];
+        assert_equal(row, find(&summary, &of(&strict)), &pairs);
+        let curves = file("thresholds");
+        let curve = find(&curves, &of(&[("variant", "noise"), ("enhancer", "")]));
+        let pairs = [
+            ("area", "area"),
+            ("area_low", "area_low"),
+            ("area_high", "area_high"),
+        ];
+        assert_equal(row, curve, &pairs);
         assert_eq!(row["threshold_ev"], curve["threshold_ev"]);
-        let comparisons = rows(&bench, &format!("{run}/comparisons.csv"));
+        let comparisons = file("comparisons");
         let drop = find(
             &comparisons,
-            &[
-                ("kind", "level"),
-                ("model", model),
-                ("condition", "L5-noise"),
-                ("family", "all"),
-            ],
+            &of(&[("kind", "level"), ("condition", "L5-noise")]),
         );
-        equal(
-            row,
-            drop,
-            &[
-                ("drop", "difference"),
-                ("drop_low", "low"),
-                ("drop_high", "high"),
-            ],
-        );
+        let pairs = [
+            ("drop", "difference"),
+            ("drop_low", "low"),
+            ("drop_high", "high"),
+        ];
+        assert_equal(row, drop, &pairs);
         assert_eq!(row["drop_shown"], drop["shown"]);
         let condition = format!("{}-noise+{}", row["best_level"], row["best_enhancer"]);
-        let gain = find(
-            &comparisons,
-            &[
-                ("kind", "enhancer"),
-                ("model", model),
-                ("condition", &condition),
-                ("family", "all"),
-            ],
-        );
-        equal(
-            row,
-            gain,
-            &[
-                ("gain", "difference"),
-                ("gain_low", "low"),
-                ("gain_high", "high"),
-            ],
-        );
-        let health = rows(&bench, &format!("{run}/health.csv"));
-        let own = health.iter().filter(|line| line["model"] == model);
-        let sum = |name: &str| {
-            own.clone()
-                .map(|line| line[name].parse::<usize>().unwrap())
-                .sum::<usize>()
-        };
+        let gain = [
+            &all[..],
+            &[("kind", "enhancer"), ("condition", &*condition)],
+        ]
+        .concat();
+        let pairs = [
+            ("gain", "difference"),
+            ("gain_low", "low"),
+            ("gain_high", "high"),
+        ];
+        assert_equal(row, find(&comparisons, &gain), &pairs);
+        let health = file("health");
+        let own = || health.iter().filter(|line| line["model"] == model);
+        let sum =
+            |name: &str| -> usize { own().map(|line| line[name].parse::<usize>().unwrap()).sum() };
         assert_eq!(row["replies"], sum("replies").to_string());
         assert_eq!(row["unread"], (sum("replies") - sum("read")).to_string());
     }
+}
+
+#[test]
+fn models_are_ranked_and_the_pages_are_those_of_the_runs() {
+    let bench = two_runs();
+    let board = rows(&bench, "site/leaderboard.csv");
     // The better one is first, the reference has no rank.
     let rank = |model: &str| {
         let row = find(&board, &[("model", model)]);
-        (row["rank_first"].clone(), row["rank_last"].clone())
+        [row["rank_first"].clone(), row["rank_last"].clone()]
     };
-    assert_eq!(rank("script:good.jsonl"), ("1".to_owned(), "1".to_owned()));
-    assert_eq!(rank("script:bad.jsonl"), ("2".to_owned(), "2".to_owned()));
-    assert_eq!(rank("random"), (String::new(), String::new()));
+    assert_eq!(rank("script:good.jsonl"), ["1", "1"]);
+    assert_eq!(rank("script:bad.jsonl"), ["2", "2"]);
+    assert_eq!(rank("random"), ["", ""]);
     // What is below the words alone is there: the model in the dark against itself without images.
-    assert_eq!(
-        find(&board, &[("model", "script:good.jsonl")])["below_blind"],
-        "L5"
-    );
-    // The pages are those of the runs, and data.json has the rows.
+    let good = find(&board, &[("model", "script:good.jsonl")]);
+    assert_eq!(good["below_blind"], "L5");
     for run in ["one", "two"] {
         let page = fs::read(bench.path(&format!("site/runs/{run}.html"))).unwrap();
-        assert!(
-            page == fs::read(bench.path(&format!("{run}/report.html"))).unwrap(),
-            "{run}"
-        );
+        let own = fs::read(bench.path(&format!("{run}/report.html"))).unwrap();
+        assert!(page == own, "{run}");
     }
     let data = fs::read(bench.path("site/data.json")).unwrap();
     let data: Value = serde_json::from_slice(&data).unwrap();
@@ -231,12 +208,14 @@ fn only_what_was_asked_in_the_same_way_shares_a_table() {
     run("same", "--model script:bad.jsonl");
     run("seed", "--seed 1");
     let set = fs::read_to_string(bench.path("set.jsonl")).unwrap();
+    let fewer: Vec<&str> = set.lines().take(4).collect();
     bench.file(
         "set.jsonl",
-        set.lines()
-            .take(4)
-            .map(|line| format!("{line}\n"))
-            .collect::<String>(),
+        fewer.join(
+            "
+",
+        ) + "
+",
     );
     run("fewer", "");
     let said = bench.complete(&words("site one same seed fewer --out site"));

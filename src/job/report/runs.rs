@@ -49,15 +49,23 @@ pub(crate) struct ReportArgs {
     /// Further columns about models in tables, separated by commas; default: none
     #[arg(long, value_name = "COLUMNS", value_enum, value_delimiter = ',', add = Decides::Nothing)]
     pub columns: Vec<ModelColumn>,
-    /// Print the findings and the table by level as Markdown, for an issue or a README
-    #[arg(long, conflicts_with_all = ["full", "findings", "json"], help_heading = "Output", add = Decides::Nothing)]
-    pub markdown: bool,
     /// An old run to compare with.
     #[command(flatten)]
     pub baseline: BaselineArgs,
     /// How the report is printed.
     #[command(flatten)]
+    pub show: ReportShowArgs,
+}
+
+/// The flags that say how a report of stored runs is printed.
+#[derive(Debug, Args)]
+pub(crate) struct ReportShowArgs {
+    /// The formats that every report has.
+    #[command(flatten)]
     pub show: ShowArgs,
+    /// Print the findings and the table by level as Markdown, for an issue or a README
+    #[arg(long, conflicts_with_all = ["full", "findings", "json"], help_heading = "Output", add = Decides::Nothing)]
+    pub markdown: bool,
 }
 
 /// The flags of a comparison with an old run.
@@ -84,10 +92,10 @@ impl ReportArgs {
 
     /// How the report is printed.
     fn format(&self) -> StdoutFormat {
-        if self.markdown {
+        if self.show.markdown {
             StdoutFormat::Markdown
         } else {
-            self.show.format()
+            self.show.show.format()
         }
     }
 }

@@ -76,11 +76,9 @@ impl BoardCell {
         }
     }
 
-    pub(super) fn keyed(self, key: impl ToString) -> Self {
-        Self {
-            key: key.to_string(),
-            ..self
-        }
+    /// The same, sorted by this.
+    pub(super) fn keyed(self, key: String) -> Self {
+        Self { key, ..self }
     }
 
     /// The same with a line beneath it.

@@ -179,7 +179,7 @@ pub(super) fn table(number: usize, rows: &[ChoiceRow]) -> Table {
         .column(
             Threshold,
             "csv threshold_ev threshold_low threshold_high",
-            threshold,
+            |row| threshold(row),
         )
         .column(Text, "csv best_enhancer", |row| {
             row.gain.as_ref().map(|(enhancer, ..)| enhancer.clone())
@@ -203,8 +203,8 @@ pub(super) fn table(number: usize, rows: &[ChoiceRow]) -> Table {
         .build()
 }
 
-fn threshold(row: &&ChoiceRow) -> TableCell {
-    let darkest = row.darkest.map_or(0.0, |level| level.value());
+fn threshold(row: &ChoiceRow) -> TableCell {
+    let darkest = row.darkest.map_or(0.0, AxisLevel::value);
     match &row.threshold {
         Some(Ok(threshold)) => TableCell::Threshold(*threshold, darkest),
         Some(Err(reason)) => TableCell::Unknown(why(reason)),
@@ -241,9 +241,10 @@ fn board_row(row: &ChoiceRow) -> BoardRow {
     let rank = row.rank.map(|rank| rank.first * 1000 + rank.last);
     let rank = BoardCell::text(&row.rank_text())
         .keyed(rank.map_or_else(String::new, |rank| rank.to_string()));
-    let run = match row.is_reference() {
-        true => format!("{}, for comparison", row.run.name),
-        false => row.run.name.clone(),
+    let run = if row.is_reference() {
+        format!("{}, for comparison", row.run.name)
+    } else {
+        row.run.name.clone()
     };
     let n = row.clean.map(|clean| clean.n);
     let drop = match (&row.drop, row.darkest) {
@@ -260,9 +261,10 @@ fn board_row(row: &ChoiceRow) -> BoardRow {
         Some(Err(reason)) => why(reason),
         _ => String::new(),
     };
-    let threshold = match why.is_empty() {
-        true => BoardCell::of(Threshold, &threshold(&row)),
-        false => BoardCell::of(Threshold, &TableCell::Missing).small(&why),
+    let threshold = if why.is_empty() {
+        BoardCell::of(Threshold, &threshold(row))
+    } else {
+        BoardCell::of(Threshold, &TableCell::Missing).small(&why)
     };
     let [unread, replies] = row.unread;
     let part = unread as f64 / replies.max(1) as f64;
@@ -297,7 +299,7 @@ fn board_row(row: &ChoiceRow) -> BoardRow {
 fn difference(difference: Estimate, verdict: Significance, place: &str) -> BoardCell {
     let ends = format!("[{}, {}]", points(difference.low), points(difference.high));
     let cell = BoardCell::text(&points(difference.value))
-        .keyed(difference.value)
+        .keyed(difference.value.to_string())
         .small(&ends);
     match verdict {
         Significance::Better => cell.small(place).class("better"),

@@ -113,7 +113,7 @@ pub(super) fn board(rows: &[OpenRow]) -> BoardTable {
                 .header(row.run.path()),
             BoardCell::text(&row.light),
             BoardCell::text(&format!("{scored} of {due}"))
-                .keyed(scored)
+                .keyed(scored.to_string())
                 .class(""),
         ];
         cells.extend(levels.iter().map(|level| match row.levels.get(level) {

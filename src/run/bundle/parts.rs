@@ -25,11 +25,14 @@ pub(crate) enum ThumbnailChoice {
     All,
 }
 
+/// The name and the content of a file.
+type NamedFile = (String, Vec<u8>);
+
 /// A run without what is private.
 pub(super) struct RunParts {
     pub(super) manifest: RunManifest,
     /// The files from which the run can be read again, by name.
-    pub(super) files: Vec<(String, Vec<u8>)>,
+    pub(super) files: Vec<NamedFile>,
     /// The run as read from these files, in a folder of its name.
     pub(super) run: AnyRun,
     /// Number of small images, and of those that are left out.
@@ -73,7 +76,7 @@ impl RunParts {
 
     fn new(
         manifest: RunManifest,
-        mut files: Vec<(String, Vec<u8>)>,
+        mut files: Vec<NamedFile>,
         run: AnyRun,
         thumbnails: [usize; 2],
     ) -> Result<Self> {
@@ -93,7 +96,7 @@ impl RunParts {
 /// The lines of a run's files without what is private, and the files.
 struct Parts<D> {
     lines: RunLines<D>,
-    files: Vec<(String, Vec<u8>)>,
+    files: Vec<NamedFile>,
     thumbnails: [usize; 2],
 }
 
@@ -136,7 +139,7 @@ fn redacted<T: Serialize + DeserializeOwned>(
     name: &str,
     lines: impl Iterator<Item = T>,
     redactor: &mut Redactor,
-) -> Result<(Vec<T>, (String, Vec<u8>))> {
+) -> Result<(Vec<T>, NamedFile)> {
     let (mut kept, mut file) = (Vec::new(), Vec::new());
     for line in lines {
         let value = serde_json::to_value(&line).map_err(|e| broken(name, &e))?;

@@ -74,12 +74,12 @@ impl GroupKey {
             images,
             truths,
         };
-        Ok(key.named(
+        key.named(
             manifest,
             combined.questions.len(),
             &[(VARIANT, &light)],
             &format!("{light}, {}", listed(&levels)),
-        )?)
+        )
     }
 
     /// Of a run of open questions.

@@ -1,6 +1,7 @@
 //! The ranks of the models of one table: [`ranked`].
 
 use std::collections::BTreeMap;
+use std::fmt::Write;
 
 use super::member::ChoiceMember;
 use crate::job::report::combine::clusters;
@@ -96,7 +97,8 @@ fn words(best: Option<&BestInTheDark>, models: usize, unit: &str) -> String {
         },
     );
     if best.dropped > 0 {
-        words += &format!(
+        let _ = write!(
+            words,
             " {} more items are left out, because a model has no reply to them.",
             best.dropped
         );
@@ -107,13 +109,17 @@ fn words(best: Option<&BestInTheDark>, models: usize, unit: &str) -> String {
         } else {
             "s are"
         };
-        words += &format!(
+        let _ = write!(
+            words,
             " {} model{ends} not ranked: not asked at L0 and at a darker level.",
             best.without.len()
         );
     }
     if !best.is_possible() {
-        words += &format!(" With so few {unit}s no model can be shown to be better than another.");
+        let _ = write!(
+            words,
+            " With so few {unit}s no model can be shown to be better than another."
+        );
     }
     words
 }
