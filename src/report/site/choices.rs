@@ -1,7 +1,7 @@
 //! Rows of models that answered questions with choices: [`ChoiceRow`].
 
 use super::board::{BoardCell, BoardRow, BoardTable};
-use super::run_link::RunLink;
+use super::run_link::{GroupDigests, RunLink};
 use crate::report::table::ColumnKind::{Count, Points, Share, Text, Threshold};
 use crate::report::table::{ColumnKind, Table, TableBuilder, TableCell};
 use crate::report::tables::level_words as why;
@@ -157,7 +157,7 @@ fn row(findings: &Findings<'_>, variant: &KindReading, model: &str, run: &RunLin
 }
 
 /// The rows as a table for files. Numbers are as in the files of the runs.
-pub(super) fn table(number: usize, rows: &[ChoiceRow]) -> Table {
+pub(super) fn table(number: usize, digests: &GroupDigests, rows: &[ChoiceRow]) -> Table {
     let end = |row: &&ChoiceRow, of: fn(RankRange) -> usize| row.rank.map(of);
     TableBuilder::new("leaderboard", rows)
         .column(Count, "csv group", |_| number)
@@ -200,6 +200,9 @@ pub(super) fn table(number: usize, rows: &[ChoiceRow]) -> Table {
         .column(Text, "csv date", |row| row.run.date.clone())
         .column(Text, "csv version", |row| row.run.version.clone())
         .column(Text, "csv page", |row| row.run.path())
+        .column(Text, "csv questions", |_| digests.questions.clone())
+        .column(Text, "csv light_digest", |_| digests.light.clone())
+        .column(Text, "csv prompts", |_| digests.prompts.clone())
         .build()
 }
 

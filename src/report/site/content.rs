@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::choices::ChoiceRow;
 use super::open::OpenRow;
-use super::run_link::RunLink;
+use super::run_link::{GroupDigests, RunLink};
 
 /// Name of the file with all rows of the site.
 pub(crate) const DATA: &str = "data.json";
@@ -22,7 +22,9 @@ pub(crate) struct Site {
 pub(crate) struct SiteGroup {
     /// What its rows share, in words.
     pub(crate) title: String,
-    /// Digests and settings that its rows share, by name.
+    /// The digests of its questions, light and prompts.
+    pub(crate) digests: GroupDigests,
+    /// Settings that its rows share, by name.
     pub(crate) shared: Vec<(String, String)>,
     /// What differs from the first table of its kind; `None` for the first.
     pub(crate) differs: Option<GroupDifference>,

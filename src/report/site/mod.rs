@@ -17,7 +17,7 @@ use crate::error::{Error, Result};
 pub(crate) use choices::{ChoiceRow, choice_rows};
 pub(crate) use content::{DATA, GroupDifference, GroupRows, Ranking, Site, SiteGroup};
 pub(crate) use open::{OpenRow, open_rows};
-pub(crate) use run_link::{PAGES, RunLink};
+pub(crate) use run_link::{GroupDigests, PAGES, RunLink};
 
 /// The schema of `data.json`.
 pub(crate) const SCHEMA: &str = "darkqa.site/1";
@@ -27,6 +27,7 @@ pub(crate) const SCHEMA: &str = "darkqa.site/1";
 struct GroupData<'a> {
     kind: &'static str,
     title: &'a str,
+    digests: &'a GroupDigests,
     shared: Vec<[&'a str; 2]>,
     #[serde(skip_serializing_if = "Option::is_none")]
     differs: Option<&'a GroupDifference>,
@@ -66,8 +67,8 @@ pub(crate) fn products(site: Site) -> Result<Vec<(String, Vec<u8>)>> {
 /// The table of a group with its number.
 fn table((index, group): (usize, &SiteGroup)) -> Table {
     match &group.rows {
-        GroupRows::Choices(rows, _) => choices::table(index + 1, rows),
-        GroupRows::Open(rows) => open::table(index + 1, rows),
+        GroupRows::Choices(rows, _) => choices::table(index + 1, &group.digests, rows),
+        GroupRows::Open(rows) => open::table(index + 1, &group.digests, rows),
     }
 }
 
@@ -81,6 +82,7 @@ fn data(site: &Site, tables: &[Table]) -> Result<Vec<u8>> {
         GroupData {
             kind,
             title: &group.title,
+            digests: &group.digests,
             shared: shared.map(|(name, value)| [&**name, &**value]).collect(),
             differs: group.differs.as_ref(),
             ranking,

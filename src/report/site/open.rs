@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::board::{BoardCell, BoardRow, BoardTable};
-use super::run_link::RunLink;
+use super::run_link::{GroupDigests, RunLink};
 use crate::report::table::ColumnKind::{Count, Share, Text};
 use crate::report::table::{Table, TableBuilder, TableCell};
 use crate::report::words::light;
@@ -67,7 +67,7 @@ pub(crate) fn open_rows(summary: &OpenSummary, run: &RunLink) -> Vec<OpenRow> {
 }
 
 /// The rows as a table for files, with a line for each level.
-pub(super) fn table(number: usize, rows: &[OpenRow]) -> Table {
+pub(super) fn table(number: usize, digests: &GroupDigests, rows: &[OpenRow]) -> Table {
     let lines = rows.iter().flat_map(|row| {
         let levels = row.levels.iter();
         levels.map(move |(level, cell)| (row, level.to_string(), *cell))
@@ -88,6 +88,9 @@ pub(super) fn table(number: usize, rows: &[OpenRow]) -> Table {
         .column(Text, "csv date", |(row, ..)| row.run.date.clone())
         .column(Text, "csv version", |(row, ..)| row.run.version.clone())
         .column(Text, "csv page", |(row, ..)| row.run.path())
+        .column(Text, "csv questions", |_| digests.questions.clone())
+        .column(Text, "csv light_digest", |_| digests.light.clone())
+        .column(Text, "csv prompts", |_| digests.prompts.clone())
         .build()
 }
 

@@ -19,7 +19,7 @@ const SCRIPT: &str = concat!(
 );
 
 /// What the ranks of open questions would need.
-const NOT_RANKED: &str = "These rows are not ranked: scores of open answers have no test of one model against another here.";
+const NOT_RANKED: &str = "Scores are in %, over the answers that were marked. These rows are not ranked: scores of open answers have no test of one model against another here.";
 
 #[derive(Serialize)]
 struct Page<'a> {
@@ -40,6 +40,8 @@ struct PageGroup<'a> {
     kind: &'static str,
     title: String,
     ranking: &'a str,
+    /// The first letters of the digests of questions, light and prompts.
+    digests: String,
     /// The number of the other table and what differs; `None` for the first of its kind.
     differs: Option<(usize, Vec<String>)>,
     shared: Vec<[String; 2]>,
@@ -96,6 +98,7 @@ fn page_group(group: &SiteGroup, id: usize) -> PageGroup<'_> {
         kind,
         title: readable(&group.title),
         ranking,
+        digests: digests(group),
         differs: group.differs.as_ref().map(|differs| {
             let lines = differs.lines.iter().map(|line| readable(line));
             (differs.from, lines.collect())
@@ -105,4 +108,20 @@ fn page_group(group: &SiteGroup, id: usize) -> PageGroup<'_> {
             .collect(),
         table,
     }
+}
+
+/// The digests of a group in a line.
+fn digests(group: &SiteGroup) -> String {
+    let digests = &group.digests;
+    let named = [
+        ("questions", &digests.questions),
+        ("light", &digests.light),
+        ("prompts", &digests.prompts),
+    ];
+    let named = named.iter().filter(|(_, digest)| !digest.is_empty());
+    let named = named.map(|(name, digest)| {
+        let first: String = digest.chars().take(8).collect();
+        format!("{name} {}", readable(&first))
+    });
+    named.collect::<Vec<_>>().join(" · ")
 }

@@ -1,4 +1,4 @@
-//! A run as rows name it: [`RunLink`].
+//! A run as rows name it, [`RunLink`], and by what rows can be compared, [`GroupDigests`].
 
 use serde::Serialize;
 
@@ -23,4 +23,15 @@ impl RunLink {
     pub(crate) fn path(&self) -> String {
         format!("{PAGES}/{}", self.page)
     }
+}
+
+/// By what the rows of a group can be compared.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub(crate) struct GroupDigests {
+    /// The questions, with their words and choices.
+    pub(crate) questions: String,
+    /// All that decides raw images.
+    pub(crate) light: String,
+    /// The words around the questions; empty if the runs do not say.
+    pub(crate) prompts: String,
 }

@@ -126,7 +126,9 @@ fn command(manifest: &RunManifest, run: &AnyRun) -> String {
         words.extend(flag_words(&format!("--{flag}"), value));
     }
     let levels: Vec<String> = asked.levels.iter().map(ToString::to_string).collect();
-    words.extend(["--levels".to_owned(), word(&levels.join(","))]);
+    if !levels.is_empty() {
+        words.extend(["--levels".to_owned(), word(&levels.join(","))]);
+    }
     let has = |flag: &str| words.iter().any(|known| known == flag);
     let identity = manifest.identity.iter();
     let identity = identity.filter(|(flag, value)| {

@@ -10,7 +10,7 @@ use crate::job::report::open::{JUDGE, PROTOCOL};
 use crate::job::report::settings::{ENCODING, readings_and_variants};
 use crate::job::report::settings::{Settings, differing, identity, pixels, short, some};
 use crate::job::stored::StoredRun;
-use crate::report::site::GroupDifference;
+use crate::report::site::{GroupDifference, GroupDigests};
 use crate::types::manifest::RunManifest;
 use crate::types::{AxisLevel, Digest, KindReading, OpenDetail, Record, RunQuestion};
 
@@ -27,7 +27,9 @@ const VARIANT: &str = "variant";
 pub(super) struct GroupKey {
     /// What it is in words.
     pub(super) title: String,
-    /// Digests and settings in words, by name.
+    /// The digests of its questions, light and prompts.
+    pub(super) digests: GroupDigests,
+    /// Settings in words, by name.
     pub(super) shared: Vec<(String, String)>,
     /// What has to be equal.
     settings: Settings,
@@ -69,6 +71,7 @@ impl GroupKey {
         let light = variant.title();
         let key = Self {
             title: String::new(),
+            digests: GroupDigests::default(),
             shared: Vec::new(),
             settings: settings(manifest, &combined.questions, &levels)?,
             images,
@@ -106,6 +109,7 @@ impl GroupKey {
         let (judge, protocol) = (setting(JUDGE), setting(PROTOCOL));
         let key = Self {
             title: String::new(),
+            digests: GroupDigests::default(),
             shared: Vec::new(),
             // Rows of other levels stand in the same table, in other columns.
             settings: settings(&run.manifest, &run.questions, &BTreeSet::new())?,
@@ -138,20 +142,18 @@ impl GroupKey {
             "{questions} questions{}, {what}",
             data.map_or_else(String::new, |data| format!(" of {}", short(&data)))
         );
-        let mut shared = vec![
-            (
-                "questions, digest".to_owned(),
-                short(&self.settings[QUESTIONS]),
-            ),
-            ("light, digest".to_owned(), short(&light)),
-        ];
-        shared.extend(
-            self.settings
-                .iter()
-                .filter(|(name, value)| *name != QUESTIONS && !value.is_empty())
-                .map(|(name, value)| (name.clone(), short(value))),
-        );
-        self.shared = shared;
+        self.digests = GroupDigests {
+            questions: self.settings[QUESTIONS].clone(),
+            light,
+            prompts: self.settings.get(PROMPTS).cloned().unwrap_or_default(),
+        };
+        let named = self
+            .settings
+            .iter()
+            .filter(|(name, value)| ![QUESTIONS, PROMPTS].contains(&&***name) && !value.is_empty());
+        self.shared = named
+            .map(|(name, value)| (name.clone(), short(value)))
+            .collect();
         Ok(self)
     }
 
@@ -268,6 +270,7 @@ mod tests {
         let choices = BTreeSet::from(["red".to_owned(), "blue".to_owned()]);
         GroupKey {
             title: String::new(),
+            digests: GroupDigests::default(),
             shared: Vec::new(),
             settings: settings.collect(),
             images: HashMap::from([(

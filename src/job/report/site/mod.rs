@@ -83,12 +83,20 @@ fn add_groups<M>(
         .filter_map(|members| {
             let own = key(members.first()?);
             let differs = first.map(|first| own.difference(key(first), first_number));
-            Some((own.title.clone(), own.shared.clone(), differs))
+            Some((
+                own.title.clone(),
+                own.digests.clone(),
+                own.shared.clone(),
+                differs,
+            ))
         })
         .collect();
-    for (index, (members, (title, shared, differs))) in groups.into_iter().zip(heads).enumerate() {
+    for (index, (members, (title, digests, shared, differs))) in
+        groups.into_iter().zip(heads).enumerate()
+    {
         site.groups.push(SiteGroup {
             title,
+            digests,
             shared,
             differs: differs.filter(|_| index > 0),
             rows: rows(members),
