@@ -1,12 +1,13 @@
 //! `bundle`: a run as one ZIP file, without what is private.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::io::{Cursor, Read};
 use std::path::Path;
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::house::House;
-use crate::support::run::{Bench, called, files, words};
+use crate::support::run::{Bench, called, files, records, words};
 use base64::Engine as _;
 use zip::ZipArchive;
 
@@ -87,6 +88,17 @@ fn a_bundle_is_the_run_again_and_the_same_bytes_each_time() {
     ] {
         assert!(readme.contains(part), "{part}: {readme}");
     }
+    // The command asks the very same trials again.
+    let command = readme
+        .lines()
+        .find(|line| line.starts_with("darkqa-eval --"));
+    let command = command.unwrap().trim_start_matches("darkqa-eval ");
+    bench.complete(&words(&format!("{command} --out again")));
+    let keys = |run: &str| -> BTreeSet<String> {
+        let records = records(&bench.path(run)).into_iter();
+        records.map(|record| record["key"].to_string()).collect()
+    };
+    assert_eq!(keys("again"), keys("run"));
     let summary = fs::read_to_string(bench.path("run/summary.json")).unwrap();
     let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
     let plain = readme.replace('\\', "");
@@ -227,7 +239,7 @@ fn runs_of_open_questions_are_bundled_too() {
     let readme = fs::read_to_string(house.0.path("unpacked/run/README.md")).unwrap();
     assert!(readme.contains("OpenEQA by LLM-Match"), "{readme}");
     assert!(
-        readme.contains("darkqa-eval openeqa --model script:a.jsonl --judge script:j.jsonl"),
+        readme.contains("darkqa-eval openeqa --questions DIR/questions.json --model script:a.jsonl --judge script:j.jsonl"),
         "{readme}"
     );
 }

@@ -99,7 +99,9 @@ fn command(manifest: &RunManifest, run: &AnyRun) -> String {
             }
         }
         AnyRun::Open(run) => {
-            words.push("openeqa".to_owned());
+            // The manifest has the digest of the questions, not their place.
+            let questions = ["openeqa", "--questions", "DIR/questions.json"];
+            words.extend(questions.map(str::to_owned));
             for record in &run.records {
                 asked.add(&record.model, record.condition.as_ref());
             }
