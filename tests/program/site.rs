@@ -377,12 +377,22 @@ fn open_questions_have_a_table_of_their_own_and_photographs_without_labels_none(
     bench.complete(&words(
         "--model random --data rooms:frames=2,size=96x64 --ask home --levels L0,L3 --out own",
     ));
-    let said = bench.complete(&words("site one two closed own --out site"));
+    bench.complete(&words(
+        "--blind-model random --data rooms:frames=2,size=96x64 --levels L0,L3 --out blind",
+    ));
+    bench.complete(&words(
+        "--model random --data rooms:frames=2,size=96x64 --light dark --out dark",
+    ));
+    let said = bench.complete(&words("site one two closed own blind dark --out site"));
+    assert!(
+        said.contains("blind: in no table: no model was shown an image"),
+        "{said}"
+    );
     assert!(
         said.contains("own: in no table: nobody knows the true answers"),
         "{said}"
     );
-    assert!(said.contains("runs: 4, tables: 2"), "{said}");
+    assert!(said.contains("runs: 6, tables: 3"), "{said}");
     let board = rows(bench, "site/openeqa.csv");
     let cells: Vec<_> = rows(bench, "one/summary.csv");
     let mut compared = 0;

@@ -74,14 +74,13 @@ pub(crate) fn bundle(args: &BundleArgs) -> Result<Outcome> {
         ));
     }
     let others = others(&args.run, &files)?;
-    if !others.is_empty() {
-        changes.push(format!(
-            "{} of the run's folder left out that no report needs",
-            match others.len() {
-                1 => "1 file or folder is".to_owned(),
-                n => format!("{n} files or folders are"),
-            }
-        ));
+    match others.len() {
+        0 => {}
+        1 => changes
+            .push("1 other file or folder of the run is left out: no report needs it".to_owned()),
+        n => changes.push(format!(
+            "{n} other files or folders of the run are left out: no report needs them"
+        )),
     }
     files.sort();
     let sizes: Vec<(String, usize)> = files

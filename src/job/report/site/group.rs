@@ -18,6 +18,8 @@ use crate::types::{AxisLevel, Digest, KindReading, OpenDetail, Record, RunQuesti
 const PROMPTS: &str = "--prompts";
 /// The version of enhancement says nothing of raw images, by which models are compared.
 const ENHANCEMENT: &str = "enhancement";
+/// The setting with the light of the set.
+const SET_LIGHT: &str = "--light";
 /// Names of what has no flag.
 const QUESTIONS: &str = "questions";
 const LEVELS: &str = "levels";
@@ -246,6 +248,10 @@ fn light(manifest: &RunManifest) -> Settings {
     ];
     let mut light: Settings = parts.into_iter().flatten().collect();
     light.remove(ENHANCEMENT);
+    // The light in which the photographs of the set were taken: a statement about the data.
+    if let Some(taken) = manifest.settings.get(SET_LIGHT).and_then(Value::as_str) {
+        light.insert(SET_LIGHT.to_owned(), taken.to_owned());
+    }
     light
 }
 

@@ -125,6 +125,12 @@ fn add_choices(
     let variant = findings.shown().grid.main_variant();
     let variant = variant.unwrap_or(KindReading::NONE);
     let rows = choice_rows(findings.shown(), &variant, &link);
+    if rows.is_empty() {
+        let why = "no model was shown an image";
+        site.others.push((link.clone(), why.to_owned()));
+        site.pages.push((link, page));
+        return Ok(None);
+    }
     let key = GroupKey::of_choices(&combined, &variant)?;
     drop(report);
     drop(findings);
