@@ -88,7 +88,7 @@
 //! - [`ask`]: a prompt and images → a reply; the only asynchronous stage. `ask/wire`: one file an API.
 //! - [`score`]: a reply → a choice or a mark; records → numbers with their intervals.
 //! - [`store`]: `results/<run>/`, append-only and resumable.
-//! - [`report`]: tables, figures and one HTML file, from the records alone; figures of pictures that are handed in.
+//! - [`report`]: tables, figures and one HTML file, from the records alone, and a leaderboard of many; figures of pictures that are handed in.
 //! - [`job`]: the engine. A `Job` carries out an `Experiment`: it plans, has the one image pipeline make images, asks, keeps, and
 //!   has the experiment score. Questions with choices and open ones differ in their `Experiment` alone.
 //! - [`run`]: the commands; `run/evaluate` and `run/openeqa` are the two experiments.

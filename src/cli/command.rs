@@ -9,6 +9,7 @@ use crate::job::batch::{BatchFileArgs, BatchRunArgs};
 use crate::job::merge::MergeArgs;
 use crate::job::report::ReportArgs;
 use crate::run::batch::{BatchFolderArgs, BatchImportArgs, BatchStatusArgs};
+use crate::run::bundle::BundleArgs;
 use crate::run::calibrate::CalibrateArgs;
 use crate::run::enhance::EnhanceArgs;
 use crate::run::evaluate::{CheckArgs, EvaluateArgs};
@@ -23,6 +24,7 @@ use crate::run::realism::RealismArgs;
 use crate::run::rooms::RoomsArgs;
 use crate::run::serve::ServeArgs;
 use crate::run::show::ShowArgs;
+use crate::run::site::SiteArgs;
 use crate::run::study;
 use crate::run::synthesize::SynthesizeArgs;
 use crate::types::Decides;
@@ -126,6 +128,10 @@ pub(crate) enum Command {
     Report(ReportArgs),
     /// Draw the figures of runs for a paper, at the width of its columns: PDF, SVG, pgfplots, and their captions
     Figures(FiguresArgs),
+    /// Pack a run as one ZIP file to pass on: records, tables, page and findings, without keys and places on this machine
+    Bundle(BundleArgs),
+    /// Write a site of many runs: a leaderboard and the page of each run, to open from a folder or put on any web server
+    Site(SiteArgs),
     /// Merge the shards of an evaluation into one run
     Merge(MergeArgs),
     /// Make the images of one question again, bit for bit, and check their digests

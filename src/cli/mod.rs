@@ -149,6 +149,8 @@ fn carry_out(cli: Cli, progress: &Progress) -> Result<Outcome> {
         Command::Serve(args) => run::serve::serve(&args, progress),
         Command::Report(args) => report(&args),
         Command::Figures(args) => run::figures::figures(&args),
+        Command::Bundle(args) => run::bundle::bundle(&args),
+        Command::Site(args) => run::site::site(&args),
         Command::Merge(args) => merge(&args),
         Command::Show(args) => run::show::show(args),
         Command::Study(StudyCommand::Pack(args)) => study::pack(args, progress),

@@ -51,5 +51,15 @@ pub(crate) enum StdoutFormat {
     Findings,
     /// The findings and every table.
     Full,
+    /// The findings and the table by level, as Markdown.
+    Markdown,
     Json,
+}
+
+impl StdoutFormat {
+    /// Whether the text is a document of its own, to which no line may be added.
+    #[must_use]
+    pub(crate) fn is_document(self) -> bool {
+        matches!(self, Self::Markdown | Self::Json)
+    }
 }

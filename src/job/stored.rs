@@ -46,18 +46,27 @@ impl<D: Detail> StoredRun<D> {
 
     /// Reads everything in a run folder except `manifest`.
     pub(crate) fn of(folder: &Path, manifest: RunManifest) -> Result<Self> {
-        let questions = store::read_questions(folder)?;
-        let mut records = store::read_records(folder)?;
+        Ok(Self::of_lines(folder, manifest, RunLines::read(folder)?))
+    }
+
+    /// The run of a folder from its manifest and the lines of its files.
+    pub(crate) fn of_lines(folder: &Path, manifest: RunManifest, lines: RunLines<D>) -> Self {
+        let RunLines {
+            mut records,
+            questions,
+            thumbnails,
+            fidelity,
+        } = lines;
         renamed::rename(&mut records, &manifest);
-        Ok(Self {
+        Self {
             records: in_order(records, &questions, &manifest.models),
             left_out: Vec::new(),
             questions,
-            thumbnails: store::read_thumbnails(folder)?,
-            fidelity: store::read_fidelity(folder)?,
+            thumbnails,
+            fidelity,
             folder: folder.to_owned(),
             manifest,
-        })
+        }
     }
 
     /// Takes the records apart that a report does not show.
@@ -70,6 +79,29 @@ impl<D: Detail> StoredRun<D> {
     /// Name of the run: that of its folder.
     pub(crate) fn name(&self) -> String {
         name(&self.folder)
+    }
+}
+
+/// The lines of the files in a run folder, as they are stored.
+pub(crate) struct RunLines<D> {
+    pub(crate) records: Vec<Record<D>>,
+    pub(crate) questions: Vec<RunQuestion>,
+    pub(crate) thumbnails: Vec<Thumbnail>,
+    pub(crate) fidelity: Vec<ImageFidelity>,
+}
+
+impl<D: Detail> RunLines<D> {
+    /// Reads the files of a run folder: of each trial the last record.
+    ///
+    /// # Errors
+    /// If a line of a file is broken.
+    pub(crate) fn read(folder: &Path) -> Result<Self> {
+        Ok(Self {
+            records: store::read_records(folder)?,
+            questions: store::read_questions(folder)?,
+            thumbnails: store::read_thumbnails(folder)?,
+            fidelity: store::read_fidelity(folder)?,
+        })
     }
 }
 
@@ -107,6 +139,7 @@ pub(crate) fn name(folder: &Path) -> String {
 }
 
 /// A run of either experiment. Only this module tells experiments apart by the schema of their folders.
+#[derive(Clone)]
 pub(crate) enum AnyRun {
     Choice(StoredRun<ChoiceDetail>),
     Open(StoredRun<OpenDetail>),

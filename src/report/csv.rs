@@ -1,4 +1,7 @@
-//! Tables as CSV: [`files`]. Numbers are written with all their digits.
+//! Tables as CSV: [`files`], and [`safe`] texts in them. Numbers are written with all their digits.
+
+use std::borrow::Cow;
+use std::fmt::Write as _;
 
 use serde::{Serialize, Serializer};
 
@@ -62,6 +65,48 @@ pub(super) fn fields(cell: &TableCell, names: usize) -> impl Iterator<Item = Csv
     fields.into_iter().take(names)
 }
 
+/// A text as it stands in a cell of a CSV file, so that no spreadsheet runs it as a formula.
+///
+/// A spreadsheet takes what begins with `=`, `+`, `-`, `@`, a tab or a carriage return for a formula, also after spaces, and also where the
+/// cell is quoted (OWASP, “CSV Injection”). Such a text gets an apostrophe in front, and so does one that begins with apostrophes and such a
+/// letter, so that taking one apostrophe away gives the text back. A number is no formula and stays. Control characters are written as
+/// `⟨U+001B⟩`; line breaks stay.
+pub(super) fn safe(text: &str) -> Cow<'_, str> {
+    let is_formula = begins_formula(text);
+    let hidden = |c: char| c != '\n' && c.is_control();
+    if !is_formula && !text.contains(hidden) {
+        return Cow::Borrowed(text);
+    }
+    let mut safe = String::with_capacity(text.len() + 1);
+    if is_formula {
+        safe.push('\'');
+    }
+    for c in text.chars() {
+        if hidden(c) {
+            let _ = write!(safe, "⟨U+{:04X}⟩", u32::from(c));
+        } else {
+            safe.push(c);
+        }
+    }
+    Cow::Owned(safe)
+}
+
+/// Whether a spreadsheet may run a text as a formula, with or without apostrophes before it.
+fn begins_formula(text: &str) -> bool {
+    let begins = text.trim_start_matches([' ', '\u{a0}', '\u{3000}', '\n', '\'']);
+    let is_sign = |c: char| {
+        let full_width = ['＝', '＋', '－', '＠'];
+        ['=', '+', '-', '@', '\t', '\r'].contains(&c) || full_width.contains(&c)
+    };
+    begins.starts_with(is_sign) && !is_number(text)
+}
+
+/// Whether a text is a number in digits: neither a name for one, such as `-inf`, nor a sum.
+fn is_number(text: &str) -> bool {
+    let is_digit = |c: char| c.is_ascii_digit() || ".eE+-".contains(c);
+    text.chars().all(is_digit) && text.parse::<f64>().is_ok()
+}
+
 /// CSV files by name, of all tables that have CSV columns and at least one row. Tables of one name share one file.
 ///
 /// # Errors
@@ -92,12 +137,17 @@ pub(super) fn csv(parts: &[Table]) -> Result<Vec<u8>> {
                 break;
             }
             if !has_header {
-                file.write_record(names.clone()).map_err(failed)?;
+                let names = names.clone().map(|name| safe(name).into_owned());
+                file.write_record(names).map_err(failed)?;
                 has_header = true;
             }
             let cells = table.cells(row);
-            let fields = cells.flat_map(|(column, cell)| fields(cell, column.heads.csv.len()));
-            let fields = fields.map(|field| match field {
+            let cells: Vec<CsvField<'_>> = cells
+                .flat_map(|(column, cell)| fields(cell, column.heads.csv.len()))
+                .collect();
+            let texts: Vec<Cow<'_, str>> = cells.iter().map(safe_text).collect();
+            let fields = cells.iter().zip(&texts).map(|(field, text)| match *field {
+                CsvField::Text(_) => CsvField::Text(text),
                 // `summary.csv` and `summary.json` write numbers in the same way.
                 CsvField::Number(number) if table.name != SUMMARY => CsvField::Plain(number),
                 field => field,
@@ -107,4 +157,63 @@ pub(super) fn csv(parts: &[Table]) -> Result<Vec<u8>> {
         }
     }
     file.into_inner().map_err(|e| Error::data("CSV", e))
+}
+
+/// The text of a field as [`safe`] writes it; empty for a number.
+fn safe_text<'a>(field: &CsvField<'a>) -> Cow<'a, str> {
+    match *field {
+        CsvField::Text(text) => safe(text),
+        _ => Cow::Borrowed(""),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::table::ColumnKind::{Number, Text};
+    use crate::report::table::TableBuilder;
+
+    #[test]
+    fn a_text_that_a_spreadsheet_would_run_gets_an_apostrophe() {
+        for formula in [
+            "=HYPERLINK(\"http://x\",\"y\")",
+            "=1+1",
+            "+1+1",
+            "-1+1",
+            "@SUM(A1)",
+            "  =1",
+            "\n=1",
+            "＝1",
+            "-inf",
+            "-",
+            "'=1",
+            "''@x",
+        ] {
+            let safe = safe(formula);
+            assert_eq!(safe.strip_prefix('\''), Some(formula), "{safe}");
+        }
+        assert_eq!(safe("\t=1"), "'⟨U+0009⟩=1");
+        assert_eq!(safe("\r=1"), "'⟨U+000D⟩=1");
+        assert_eq!(safe("a\u{1b}[1m\r"), "a⟨U+001B⟩[1m⟨U+000D⟩");
+    }
+
+    #[test]
+    fn other_texts_and_numbers_stay() {
+        for plain in [
+            "", "a=1", "-4.8", "+3", "-1e-7", "'quoted'", "it's", "−4.8", "L3-noise", "a\nb",
+        ] {
+            assert_eq!(safe(plain), plain);
+        }
+    }
+
+    #[test]
+    fn cells_and_heads_of_a_file_are_safe_and_numbers_stay_numbers() -> Result<()> {
+        let table = TableBuilder::new("t", [("=cmd|' /C calc'!A0", -0.048), ("fine", 1.0)])
+            .column(Text, "csv =name", |row| row.0)
+            .column(Number, "csv n", |row| row.1)
+            .build();
+        let file = String::from_utf8_lossy(&csv(&[table])?).into_owned();
+        assert_eq!(file, "'=name,n\n'=cmd|' /C calc'!A0,-0.048\nfine,1\n");
+        Ok(())
+    }
 }

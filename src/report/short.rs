@@ -98,7 +98,7 @@ fn open_question(report: &ChoiceReport<'_>) -> String {
 }
 
 /// Numbers of models, questions, frames, clusters and replies.
-fn head(report: &ChoiceReport<'_>) -> String {
+pub(super) fn head(report: &ChoiceReport<'_>) -> String {
     let findings = report.findings;
     let grid = &findings.grid;
     let mut models: Vec<&str> = grid

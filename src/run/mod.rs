@@ -1,6 +1,7 @@
 //! One folder or file per command. Shared parts are in [`job`](crate::job) or below; no command uses the folder of another.
 
 pub(crate) mod batch;
+pub(crate) mod bundle;
 pub(crate) mod calibrate;
 pub(crate) mod enhance;
 pub(crate) mod evaluate;
@@ -15,5 +16,6 @@ pub(crate) mod realism;
 pub(crate) mod rooms;
 pub(crate) mod serve;
 pub(crate) mod show;
+pub(crate) mod site;
 pub(crate) mod study;
 pub(crate) mod synthesize;

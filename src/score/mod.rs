@@ -46,6 +46,7 @@ pub(crate) mod photographed_set;
 pub(crate) mod pooled;
 pub(crate) mod pooled_kind;
 mod quantiles;
+pub(crate) mod ranks;
 pub(crate) mod realism;
 mod record;
 mod residuals;

@@ -8,9 +8,10 @@ use super::{enhancers, own_answers};
 use crate::error::Result;
 use crate::job::outcome::Outcome;
 use crate::job::outcome::StdoutFormat;
-use crate::job::stored::{ShownModels, StoredRun};
+use crate::job::stored::{ShownModels, StoredRun, name};
 use crate::report::choice_report::ChoiceReport;
 use crate::report::json::{RunList, summary};
+use crate::report::markdown::MarkdownReport;
 use crate::report::products::{PAGE, products};
 use crate::report::short::{findings, full, short};
 use crate::store::Store;
@@ -54,6 +55,9 @@ pub(super) fn in_its_folder(
     if show == StdoutFormat::Json {
         return json(Some(folder));
     }
+    if show.is_document() {
+        return Ok(text(&report, &[(manifest, folder)], show));
+    }
     let page = folder.join(PAGE);
     Ok(text(&report, &[(manifest, folder)], show) + &format!("report: {}\n", page.display()))
 }
@@ -67,6 +71,10 @@ pub(super) fn text(
     match show {
         StdoutFormat::Findings => findings(report),
         StdoutFormat::Full => full(report, runs),
+        StdoutFormat::Markdown => {
+            let names = runs.iter().map(|(_, folder)| name(folder)).collect();
+            MarkdownReport::of_choices(report, names).text()
+        }
         StdoutFormat::Short | StdoutFormat::Json => short(report, runs),
     }
 }

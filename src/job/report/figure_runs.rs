@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use super::alerts::alerts;
 use super::combine::{Combined, combine};
-use super::runs::{distinct, no_records};
+use super::runs::distinct;
+use super::whole_report::no_records;
 use crate::error::{Error, Result};
 use crate::job::stored::{ShownModels, StoredRun};
 use crate::report::alert::Alert;

@@ -17,9 +17,14 @@ mod own_answers;
 mod rereading;
 mod runs;
 mod settings;
+mod site;
 mod story;
+mod whole;
+mod whole_report;
 
 pub(super) use cost::price;
 pub(crate) use figure_runs::FigureRuns;
 pub(crate) use runs::{ReportArgs, report};
+pub(crate) use site::site;
 pub(crate) use story::story_curves;
+pub(crate) use whole::whole;

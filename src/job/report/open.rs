@@ -9,12 +9,14 @@ use super::alerts::{of_joining, of_runs};
 use super::enhancers;
 use super::join::join;
 use super::listing::listing;
+use super::whole_report::{SUMMARY_JSON, WholeReport};
 use crate::error::{Error, Result};
 use crate::job::outcome::Outcome;
 use crate::job::outcome::StdoutFormat;
 use crate::job::predictions::{AnswerState, Prediction, predictions};
 use crate::job::stored::{ShownModels, StoredRun, in_order};
 use crate::report::alert::{Alert, AlertKind};
+use crate::report::markdown::MarkdownReport;
 use crate::report::openeqa::{OpenReport, ReportedAnswer, products, render, summary_json, tables};
 use crate::report::table::Table;
 use crate::report::tables::EnhancerRow;
@@ -92,6 +94,11 @@ impl Scores {
         answers.any(|answer| answer.outcome == AnswerOutcome::Unmarked)
     }
 
+    /// The scores.
+    pub(super) fn summary(&self) -> &OpenSummary {
+        &self.summary
+    }
+
     fn report(&self) -> OpenReport<'_> {
         OpenReport {
             summary: &self.summary,
@@ -113,6 +120,19 @@ impl Scores {
         products(&report, &tables(&report))
     }
 
+    /// The whole report of the run.
+    pub(super) fn whole(&self) -> Result<WholeReport> {
+        let report = self.report();
+        let tables = tables(&report);
+        let mut files = products(&report, &tables)?;
+        let json = summary_json(&report, &tables, None)?;
+        files.push((SUMMARY_JSON.to_owned(), json.into_bytes()));
+        Ok(WholeReport {
+            files,
+            markdown: self.show(&report, &tables, StdoutFormat::Markdown)?,
+        })
+    }
+
     /// The text for standard output.
     pub(crate) fn shown(&self, show: StdoutFormat) -> Result<String> {
         let report = self.report();
@@ -128,6 +148,7 @@ impl Scores {
         let folder = &self.run.folder;
         match show {
             StdoutFormat::Json => summary_json(report, tables, Some(folder)),
+            StdoutFormat::Markdown => Ok(MarkdownReport::of_open(report, tables).text()),
             _ => Ok(render(report, tables, folder)),
         }
     }

@@ -1,12 +1,17 @@
 //! The report of runs whose questions have no true answers: each model against its own answers at L0.
 
+use std::path::Path;
+
 use super::alerts::alerts_without_truths;
 use super::combine::{Combined, ties};
 use super::enhancers;
+use super::whole_report::{SUMMARY_JSON, WholeReport};
 use crate::error::Result;
 use crate::job::StdoutFormat;
+use crate::job::stored::name;
 use crate::report::alert::Alert;
 use crate::report::json::RunList;
+use crate::report::markdown::MarkdownReport;
 use crate::report::products::PAGE;
 use crate::report::self_agreement::{AgreementReport, TextLength, products, summary, text};
 use crate::score::self_agreement::SelfAgreement;
@@ -36,11 +41,13 @@ pub(super) fn in_its_folder(
     store.write("summary.json", json(None)?.as_bytes())?;
     store.write_manifest(manifest)?;
     let folder = store.folder();
+    let runs = [(manifest, folder)];
     Ok(match length(show) {
+        None if show == StdoutFormat::Markdown => markdown(&report, &runs),
         None => json(Some(folder))?,
         Some(length) => {
             let page = folder.join(PAGE);
-            text(&report, &[(manifest, folder)], length) + &format!("report: {}\n", page.display())
+            text(&report, &runs, length) + &format!("report: {}\n", page.display())
         }
     })
 }
@@ -62,10 +69,25 @@ pub(super) fn compared(
         files.push(("summary.json".to_owned(), json()?.into_bytes()));
     }
     let text = match length(show) {
+        None if show == StdoutFormat::Markdown => markdown(&report, &runs),
         None => json()?,
         Some(length) => text(&report, &runs, length),
     };
     Ok(ReportOutput { files, text })
+}
+
+/// The whole report of one run.
+pub(super) fn whole(combined: &Combined) -> Result<WholeReport> {
+    let found = found(combined);
+    let report = report(combined, &found, &[]);
+    let runs = combined.manifests();
+    let mut files = products(&report, &combined.shown())?;
+    let json = summary(&report, RunList::One(runs[0].0, None))?;
+    files.push((SUMMARY_JSON.to_owned(), json.into_bytes()));
+    Ok(WholeReport {
+        files,
+        markdown: markdown(&report, &runs),
+    })
 }
 
 fn found(combined: &Combined) -> SelfAgreement<'_> {
@@ -88,12 +110,17 @@ fn report<'a>(
     AgreementReport::new(found, above, &enhancers::rows(&combined.runs))
 }
 
-/// How much is printed; `None` for JSON.
+fn markdown(report: &AgreementReport<'_>, runs: &[(&RunManifest, &Path)]) -> String {
+    let names = runs.iter().map(|(_, folder)| name(folder)).collect();
+    MarkdownReport::of_own_answers(report, names).text()
+}
+
+/// How much is printed; `None` for a document.
 fn length(show: StdoutFormat) -> Option<TextLength> {
     match show {
         StdoutFormat::Findings => Some(TextLength::Findings),
         StdoutFormat::Short => Some(TextLength::Short),
         StdoutFormat::Full => Some(TextLength::Full),
-        StdoutFormat::Json => None,
+        StdoutFormat::Markdown | StdoutFormat::Json => None,
     }
 }

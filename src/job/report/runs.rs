@@ -12,6 +12,7 @@ use super::combine::{Combined, combine};
 use super::common::restrict;
 use super::enhancers;
 use super::rereading::LenientChange;
+use super::whole_report::no_records;
 use super::{open, own_answers};
 use crate::error::{Error, Result};
 use crate::files;
@@ -53,7 +54,18 @@ pub(crate) struct ReportArgs {
     pub baseline: BaselineArgs,
     /// How the report is printed.
     #[command(flatten)]
+    pub show: ReportShowArgs,
+}
+
+/// The flags that say how a report of stored runs is printed.
+#[derive(Debug, Args)]
+pub(crate) struct ReportShowArgs {
+    /// The formats that every report has.
+    #[command(flatten)]
     pub show: ShowArgs,
+    /// Print the findings and the table by level as Markdown, for an issue or a README
+    #[arg(long, conflicts_with_all = ["full", "findings", "json"], help_heading = "Output", add = Decides::Nothing)]
+    pub markdown: bool,
 }
 
 /// The flags of a comparison with an old run.
@@ -75,6 +87,15 @@ impl ReportArgs {
             ShownModels::All
         } else {
             ShownModels::Current
+        }
+    }
+
+    /// How the report is printed.
+    fn format(&self) -> StdoutFormat {
+        if self.show.markdown {
+            StdoutFormat::Markdown
+        } else {
+            self.show.show.format()
         }
     }
 }
@@ -144,7 +165,7 @@ fn of_choices(
         }
         run.leave_out(args.shown());
     }
-    if args.show.format() == StdoutFormat::Json {
+    if args.format().is_document() {
         output.clear();
     }
     let old = args.baseline.baseline.as_ref().map(|folder| {
@@ -171,7 +192,7 @@ fn of_choices(
     output += &match &*combined.runs {
         [run] if in_folder => match Store::open(&run.folder, &run.manifest, AddressChange::Allowed)
         {
-            Ok(store) => in_its_folder(&store, &run.manifest, &combined, args.show.format())?,
+            Ok(store) => in_its_folder(&store, &run.manifest, &combined, args.format())?,
             // A run that another process writes, or in a read-only folder, is shown anyway.
             Err(error) => {
                 tracing::warn!("the report is not written: {error}");
@@ -217,7 +238,7 @@ fn compare(
     again: &[Alert],
 ) -> Result<String> {
     if combined.truths() == Truths::Unknown {
-        let show = args.show.format();
+        let show = args.format();
         let output = own_answers::compared(combined, again, show, args.out.is_some())?;
         return write_files(args, output.text, output.files);
     }
@@ -231,7 +252,7 @@ fn compare(
         baseline.add_to(&mut report);
     }
     let json = || summary(&report, RunList::Several(&runs));
-    let shown = match args.show.format() {
+    let shown = match args.format() {
         StdoutFormat::Json => json()?,
         show => text(&report, &runs, show),
     };
@@ -250,7 +271,7 @@ fn write_files(
     contents: Vec<(String, Vec<u8>)>,
 ) -> Result<String> {
     let Some(out) = &args.out else {
-        if args.show.format() != StdoutFormat::Json {
+        if !args.format().is_document() {
             text += "report: not written; --out DIR writes one\n";
         }
         return Ok(text);
@@ -258,7 +279,7 @@ fn write_files(
     for (name, content) in contents {
         files::write(&out.join(name), &content)?;
     }
-    if args.show.format() != StdoutFormat::Json {
+    if !args.format().is_document() {
         let _ = writeln!(text, "report: {}", out.join(PAGE).display());
     }
     Ok(text)
@@ -291,7 +312,7 @@ fn of_open(
     let run = &scores.run;
     if is_single && args.out.is_none() {
         match Store::open(&run.folder, &run.manifest, AddressChange::Allowed) {
-            Ok(store) => return scores.write(&store, args.show.format()),
+            Ok(store) => return scores.write(&store, args.format()),
             Err(error) => tracing::warn!("the report is not written: {error}"),
         }
     }
@@ -299,7 +320,7 @@ fn of_open(
         Some(_) => scores.products()?,
         None => Vec::new(),
     };
-    write_files(args, scores.shown(args.show.format())?, files)
+    write_files(args, scores.shown(args.format())?, files)
 }
 
 /// Reads all stored replies again, and stores the readings that changed, with the version of the reading; returns lines about the
@@ -327,9 +348,4 @@ fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<String> {
         store.write_manifest(&run.manifest)?;
     }
     Ok(lines)
-}
-
-pub(super) fn no_records(path: PathBuf) -> Error {
-    let problem = "the run has no records yet: nothing to report".to_owned();
-    Error::Run { path, problem }
 }

@@ -167,6 +167,13 @@ pub(super) fn noise(run: &RunManifest, runs: &[&RunManifest]) -> Settings {
     settings
 }
 
+/// The content of the light readings, and of the kinds that the paper does not have.
+pub(super) fn readings_and_variants(run: &RunManifest) -> Settings {
+    let mut settings = of_column(run, "reading");
+    settings.extend(of_column(run, VARIANT));
+    settings
+}
+
 /// The content of the enhancers.
 pub(super) fn enhancers(run: &RunManifest) -> Settings {
     of_column(run, "enhancer")

@@ -5,7 +5,7 @@ use crate::score::open::{Group, OpenCell};
 
 /// Lines with the number of scored answers, and of answers by every other outcome that occurs.
 #[must_use]
-pub(super) fn coverage(report: &OpenReport<'_>) -> Vec<String> {
+pub(in crate::report) fn coverage(report: &OpenReport<'_>) -> Vec<String> {
     let cells = report.summary.cells.iter();
     let all = cells.filter(|cell| cell.group == Group::All);
     let sum = |count: fn(&OpenCell) -> usize| -> usize { all.clone().map(count).sum() };

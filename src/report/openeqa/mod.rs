@@ -15,7 +15,7 @@ use serde::Serialize;
 pub(crate) use open_report::{OpenReport, ReportedAnswer};
 pub(crate) use tables::tables;
 
-use self::coverage::coverage;
+pub(super) use self::coverage::coverage;
 use crate::error::Result;
 use crate::report::alert::{Alert, lines};
 use crate::report::light_readings::LightReadings;

@@ -388,6 +388,28 @@ fn confusions_of<'a>(
     named.collect()
 }
 
+/// The thumbnails that a page shows of these frames, of which it may have no room for all.
+pub(crate) fn shown_thumbnails<'a>(
+    all: &[Thumbnail],
+    frames: impl IntoIterator<Item = &'a FrameId>,
+) -> Vec<Thumbnail> {
+    let frames = frames.into_iter().enumerate();
+    let numbers: HashMap<&str, usize> = frames.map(|(n, frame)| (&*frame.0, n)).collect();
+    let shown = thumbnails(all, &numbers, SIZE_LIMITS[0].pictures);
+    let picture = |thumbnail: &Thumbnail| {
+        let number = numbers.get(&*thumbnail.frame.0)?;
+        shown.get(number)?.get(&thumbnail.condition.to_string())
+    };
+    let kept = all.iter().filter_map(|thumbnail| {
+        let objects = picture(thumbnail)?.objects.to_vec();
+        Some(Thumbnail {
+            objects,
+            ..thumbnail.clone()
+        })
+    });
+    kept.collect()
+}
+
 /// Thumbnails of as many frames as the size limit allows, by the index of the frame; crops of things as there is room behind them.
 fn thumbnails<'a>(
     all: &'a [Thumbnail],

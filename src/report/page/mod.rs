@@ -10,6 +10,7 @@ pub(super) mod tables;
 
 pub use inputs::PageInputs;
 pub(crate) use inputs::PageRun;
+pub(crate) use items::shown_thumbnails;
 
 use serde::Serialize;
 use serde_json::{Value, json};

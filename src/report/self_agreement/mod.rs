@@ -19,6 +19,7 @@ use super::light_readings::LightReadings;
 use super::page::{PageContent, PageInputs, page_of};
 use super::products::files;
 use super::sentences::Sentence;
+use super::table::Table;
 use super::words::counted;
 use crate::error::Result;
 use crate::score::self_agreement::SelfAgreement;
@@ -67,6 +68,30 @@ fn intro(found: &SelfAgreement<'_>) -> Vec<String> {
     std::iter::once(facts)
         .chain(readings.open_question())
         .collect()
+}
+
+/// What Markdown shows of a report.
+pub(super) struct MarkdownParts<'a> {
+    /// Numbers of models, questions and replies.
+    pub(super) head: String,
+    pub(super) alerts: &'a [Alert],
+    pub(super) sentences: &'a [Sentence],
+    pub(super) how_to_read: &'static str,
+    pub(super) tables: &'a [Table],
+    /// Name of the tables by level.
+    pub(super) levels: &'static str,
+}
+
+/// What Markdown shows of a report.
+pub(super) fn markdown_parts<'a>(report: &'a AgreementReport<'_>) -> MarkdownParts<'a> {
+    MarkdownParts {
+        head: text::head(report),
+        alerts: &report.alerts,
+        sentences: &report.sentences,
+        how_to_read: HOW_TO_READ,
+        tables: &report.tables,
+        levels: AGREEMENT,
+    }
 }
 
 /// The head of the summary.

@@ -84,7 +84,7 @@ fn short_tables(report: &AgreementReport<'_>) -> String {
 }
 
 /// Numbers of models, questions, images and replies.
-fn head(report: &AgreementReport<'_>) -> String {
+pub(super) fn head(report: &AgreementReport<'_>) -> String {
     let found = report.found;
     let items = &found.grid.items;
     let models = found.models();

@@ -1,0 +1,250 @@
+//! A report as Markdown, for an issue or a README: [`MarkdownReport`], with the findings and the table by level.
+
+use std::fmt::Write;
+
+use super::alert::Alert;
+use super::choice_report::ChoiceReport;
+use super::openeqa::{OpenReport, coverage};
+use super::readable::readable;
+use super::self_agreement::{self, AgreementReport};
+use super::sentences::{HOW_TO_READ, Sentence};
+use super::short::head;
+use super::table::{Column, ColumnKind, Table, TableFormat};
+use super::words::{ends, interval, words};
+
+/// Name of the table by level of accuracies and scores.
+const LEVELS: &str = "levels";
+
+/// What a report says in Markdown.
+pub(crate) struct MarkdownReport<'a> {
+    /// Names of the runs.
+    names: Vec<String>,
+    /// Numbers of models, questions and replies.
+    head: Vec<String>,
+    alerts: &'a [Alert],
+    sentences: &'a [Sentence],
+    /// The line below the findings; `None` without one.
+    how_to_read: Option<&'static str>,
+    tables: Vec<&'a Table>,
+}
+
+impl<'a> MarkdownReport<'a> {
+    /// The report of questions with choices.
+    pub(crate) fn of_choices(report: &'a ChoiceReport<'a>, names: Vec<String>) -> Self {
+        let is_tested = |sentence: &Sentence| sentence.values.contains_key("p");
+        let has_tests = report.sentences.iter().any(is_tested);
+        let mut tables = named(&report.tables, LEVELS);
+        if report.findings.common.is_some() && tables.len() > 1 {
+            // Models that were asked different questions are compared on those that they share.
+            tables.retain(|table| table.caption.contains("all models"));
+        }
+        Self {
+            names,
+            head: vec![head(report)],
+            alerts: &report.alerts,
+            sentences: &report.sentences,
+            how_to_read: has_tests.then_some(HOW_TO_READ),
+            tables,
+        }
+    }
+
+    /// The report of questions without true answers.
+    pub(crate) fn of_own_answers(report: &'a AgreementReport<'a>, names: Vec<String>) -> Self {
+        let parts = self_agreement::markdown_parts(report);
+        Self {
+            names,
+            head: vec![parts.head],
+            alerts: parts.alerts,
+            sentences: parts.sentences,
+            how_to_read: Some(parts.how_to_read),
+            tables: named(parts.tables, parts.levels),
+        }
+    }
+
+    /// The report of open questions, with its tables.
+    pub(crate) fn of_open(report: &'a OpenReport<'_>, tables: &'a [Table]) -> Self {
+        let judge = report.judge.unwrap_or("nobody");
+        let mut head = vec![format!(
+            "OpenEQA by LLM-Match, marked by {judge}, protocol {}",
+            report.protocol
+        )];
+        head.extend(coverage(report));
+        Self {
+            names: vec![report.name.clone()],
+            head,
+            alerts: report.alerts,
+            sentences: &[],
+            how_to_read: None,
+            tables: named(tables, LEVELS),
+        }
+    }
+
+    /// The text.
+    pub(crate) fn text(&self) -> String {
+        let names = self.names.iter().map(|name| inline(name));
+        let names: Vec<String> = names.collect();
+        let mut text = format!("### Seeing in the dark: {}\n\n", names.join(", "));
+        let _ = writeln!(text, "{}\n", block(&self.head.join(" · ")));
+        for alert in self.alerts {
+            let _ = writeln!(text, "> **Note:** {}\n", inline(&alert.text));
+        }
+        for sentence in self.sentences {
+            let (sign, detail) = (sentence.tone.sign(), inline(&sentence.detail));
+            let line = inline(&sentence.text);
+            let _ = writeln!(
+                text,
+                "- {} **{line}**\\\n  {detail}",
+                block(&sign.to_string())
+            );
+        }
+        if !self.sentences.is_empty() {
+            text.push('\n');
+        }
+        if let Some(line) = self.how_to_read {
+            let _ = writeln!(text, "{}\n", block(line));
+        }
+        for table in &self.tables {
+            text += &of_table(table);
+        }
+        text + &format!("Made by darkqa-eval {}.\n", env!("CARGO_PKG_VERSION"))
+    }
+}
+
+/// The tables of a name that have a row.
+fn named<'a>(tables: &'a [Table], name: &str) -> Vec<&'a Table> {
+    let tables = tables.iter().filter(|table| table.name == name);
+    tables.filter(|table| !table.rows.is_empty()).collect()
+}
+
+/// A table with the columns and rows of the page. An interval stands behind its number.
+fn of_table(table: &Table) -> String {
+    let columns: Vec<&Column> = table
+        .columns
+        .iter()
+        .filter(|column| is_shown(column))
+        .collect();
+    let heads = columns
+        .iter()
+        .filter_map(|column| column.heads.page.as_deref());
+    let mut text = format!("{}\n\n", block(&table.caption));
+    text += &row(heads.map(inline));
+    text += &row(columns.iter().map(|column| {
+        let is_text = matches!(column.kind, ColumnKind::Text | ColumnKind::Significance);
+        if is_text { "---" } else { "---:" }.to_owned()
+    }));
+    for (heading, cells) in table.headed_rows_in(TableFormat::Page) {
+        if let Some(heading) = heading.filter(|heading| !heading.is_empty()) {
+            let empty = columns.iter().skip(1).map(|_| String::new());
+            text += &row(std::iter::once(format!("**{}**", inline(heading))).chain(empty));
+        }
+        let cells = table.cells(cells).filter(|(column, _)| is_shown(column));
+        text += &row(cells.map(|(column, cell)| {
+            let ends = interval(column.kind, cell).map(|share| format!(" ({})", ends(share)));
+            inline(&words(column.kind, cell)) + &ends.unwrap_or_default()
+        }));
+    }
+    text.push('\n');
+    if let Some(foot) = &table.foot {
+        let _ = writeln!(text, "{}\n", block(foot));
+    }
+    text
+}
+
+fn is_shown(column: &Column) -> bool {
+    column.heads.page.is_some()
+}
+
+fn row(cells: impl Iterator<Item = String>) -> String {
+    let cells: Vec<String> = cells.collect();
+    format!("| {} |\n", cells.join(" | "))
+}
+
+/// A text within a line or a cell of a table: nothing in it is markup, HTML, a link, a mention of a user or a line break.
+pub(crate) fn inline(text: &str) -> String {
+    let line = text.split(['\n', '\r', '\t']).collect::<Vec<_>>().join(" ");
+    let line = readable(&line);
+    let mut escaped = String::with_capacity(line.len());
+    let mut before = None;
+    for c in line.chars() {
+        let is_address = c == '/' && before.is_some_and(|before| before == ':' || before == '/');
+        let ends_www = c == '.' && escaped.to_ascii_lowercase().ends_with("www");
+        if is_address || ends_www || "\\`*_{}[]<>#|~!&$\"".contains(c) {
+            escaped.push('\\');
+        }
+        escaped.push(c);
+        if matches!(c, '@' | '#') {
+            // Nothing joins it with what follows: GitHub tells no user, and links no issue.
+            escaped.push_str("&#8203;");
+        }
+        before = Some(c);
+    }
+    escaped
+}
+
+/// A text that begins a line: nothing at its start makes a list, a heading or a rule of it.
+fn block(text: &str) -> String {
+    let text = inline(text);
+    let digits = text.chars().take_while(char::is_ascii_digit).count();
+    if digits > 0 && text[digits..].starts_with(['.', ')']) {
+        return format!("{}\\{}", &text[..digits], &text[digits..]);
+    }
+    if text.starts_with(['-', '+', '=']) {
+        return format!("\\{text}");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::table::ColumnKind::{Accuracy, Text};
+    use crate::report::table::TableBuilder;
+    use crate::score::estimate::Estimate;
+
+    #[test]
+    fn nothing_in_a_name_is_markup() {
+        let names = [
+            ("a|b", "a\\|b"),
+            ("`x`", "\\`x\\`"),
+            ("<img src=x>", "\\<img src=x\\>"),
+            ("two\nlines", "two lines"),
+            ("@team", "@&#8203;team"),
+            ("[a](b)", "\\[a\\](b)"),
+            ("http://x/y", "http:\\/\\/x/y"),
+            ("WWW.x", "WWW\\.x"),
+            ("\u{202e}x", "⟨U+202E⟩x"),
+            ("&lt;", "\\&lt;"),
+        ];
+        for (name, expected) in names {
+            assert_eq!(inline(name), expected);
+        }
+        // What is no markup stays as it is.
+        assert_eq!(
+            inline("gpt-4o (max-side 512), 5 %"),
+            "gpt-4o (max-side 512), 5 %"
+        );
+        assert_eq!(block("1. a"), "1\\. a");
+        assert_eq!(block("+ a"), "\\+ a");
+        assert_eq!(block("10 models"), "10 models");
+    }
+
+    #[test]
+    fn every_row_of_a_table_has_the_same_number_of_cells() {
+        let share = Estimate {
+            value: 0.5,
+            low: 0.25,
+            high: 0.75,
+            n: 10,
+        };
+        let table = TableBuilder::new(LEVELS, [("a|b\n`c`", Some(share)), ("plain", None)])
+            .page("accuracy", "Accuracy")
+            .column(Text, "page model", |row| row.0)
+            .column(Accuracy, "page L0", |row| row.1)
+            .column(Text, "csv hidden", |_| "no")
+            .build();
+        assert_eq!(
+            of_table(&table),
+            "Accuracy\n\n| model | L0 |\n| --- | ---: |\n| a\\|b \\`c\\` | 50.0 (25.0–75.0) |\n| plain | – |\n\n"
+        );
+    }
+}

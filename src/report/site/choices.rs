@@ -1,0 +1,312 @@
+//! Rows of models that answered questions with choices: [`ChoiceRow`].
+
+use super::board::{BoardCell, BoardRow, BoardTable};
+use super::run_link::{GroupDigests, RunLink};
+use crate::report::table::ColumnKind::{Count, Points, Share, Text, Threshold};
+use crate::report::table::{ColumnKind, Table, TableBuilder, TableCell};
+use crate::report::tables::level_words as why;
+use crate::report::words::points;
+use crate::score::choice::ReadingMode;
+use crate::score::comparison::{Comparison, ComparisonKind};
+use crate::score::curve::Curve;
+use crate::score::estimate::Estimate;
+use crate::score::findings::Findings;
+use crate::score::ranks::RankRange;
+use crate::score::significance::Significance;
+use crate::score::subject::{Subject, is_reference};
+use crate::score::threshold::{NoThreshold, Threshold as EvThreshold};
+use crate::types::{AxisLevel, KindReading, View};
+
+/// A model of a run.
+#[derive(Debug, Clone)]
+pub(crate) struct ChoiceRow {
+    pub(crate) model: String,
+    pub(crate) run: RunLink,
+    /// Its place among the models of its table; `None` if it is not ranked.
+    pub(crate) rank: Option<RankRange>,
+    /// Accuracy at L0; `None` if there is no reply.
+    clean: Option<Estimate>,
+    /// Mean accuracy from L0 to the darkest level.
+    area: Option<Estimate>,
+    /// The darkest level; `None` if no degraded level was asked.
+    darkest: Option<AxisLevel>,
+    /// Accuracy at the darkest level less that at L0, and whether a loss is shown.
+    drop: Option<(Estimate, Significance)>,
+    threshold: Option<Result<EvThreshold, NoThreshold>>,
+    /// The enhancer, the level and the difference from raw images of the largest gain.
+    gain: Option<(String, AxisLevel, Estimate, Significance)>,
+    /// The levels at which the model is shown to be below a model without images.
+    below: Vec<AxisLevel>,
+    /// Replies that cannot be read, and all replies.
+    unread: [usize; 2],
+}
+
+impl ChoiceRow {
+    /// Whether the model stands for comparison only, and has no rank.
+    pub(crate) fn is_reference(&self) -> bool {
+        is_reference(&self.model)
+    }
+
+    /// The place of the row before a person sorts: by rank, then by area; what has no rank is last.
+    pub(crate) fn order(&self) -> (usize, usize, bool, i64) {
+        let rank = self.rank.unwrap_or(RankRange {
+            first: usize::MAX,
+            last: usize::MAX,
+        });
+        let area = self.area.map_or(0.0, |area| area.value);
+        (
+            rank.first,
+            rank.last,
+            self.is_reference(),
+            -(area * 1e9) as i64,
+        )
+    }
+
+    fn rank_text(&self) -> String {
+        match self.rank {
+            None => "–".to_owned(),
+            Some(RankRange { first, last }) if first == last => first.to_string(),
+            Some(RankRange { first, last }) => format!("{first}–{last}"),
+        }
+    }
+
+    fn below_text(&self, by: &str) -> String {
+        let levels = self.below.iter().map(ToString::to_string);
+        levels.collect::<Vec<_>>().join(by)
+    }
+}
+
+/// A row for each model with images of a run, in the kind of degradation that its report leads with. All numbers are those of its report.
+pub(crate) fn choice_rows(
+    findings: &Findings<'_>,
+    variant: &KindReading,
+    run: &RunLink,
+) -> Vec<ChoiceRow> {
+    let subjects = findings.grid.subjects.iter();
+    let seeing = subjects.filter(|subject| subject.view == Some(View::Image));
+    let mut models: Vec<&str> = Vec::new();
+    for subject in seeing {
+        if !models.contains(&&*subject.model) {
+            models.push(&subject.model);
+        }
+    }
+    let rows = models.into_iter();
+    rows.map(|model| row(findings, variant, model, run))
+        .collect()
+}
+
+fn row(findings: &Findings<'_>, variant: &KindReading, model: &str, run: &RunLink) -> ChoiceRow {
+    let grid = &findings.grid;
+    let clean = grid.stand_in(&Subject::seeing(model, AxisLevel::L0, variant, None));
+    let clean = clean.and_then(|index| {
+        let summary = &findings.summary;
+        let cell = summary.cell(&grid.subjects[index], None, ReadingMode::Strict)?;
+        cell.accuracy
+    });
+    let mut curves = findings.curves.iter();
+    let curve: Option<&Curve> = curves.find(|curve| {
+        curve.model == model
+            && curve.variant == *variant
+            && curve.enhancer.is_none()
+            && curve.family.is_none()
+    });
+    let darkest = curve.map(|curve| curve.summary.darkest);
+    let of = |kind| {
+        let comparisons = findings.comparisons.iter();
+        comparisons.filter(move |comparison: &&Comparison| {
+            let first = &comparison.first;
+            comparison.kind == kind
+                && comparison.family.is_none()
+                && first.model == model
+                && first.variant == *variant
+        })
+    };
+    let drop = of(ComparisonKind::Level).find(|found| found.first.level == darkest);
+    let gains = of(ComparisonKind::Enhancer);
+    let gain = gains.max_by(|a, b| {
+        let value = |found: &Comparison| found.paired.difference.value;
+        value(a).total_cmp(&value(b))
+    });
+    let below = grid.subjects.iter().filter(|subject| {
+        subject.model == model
+            && subject.variant == *variant
+            && subject.enhancer.is_none()
+            && !findings.below_blind(subject, None).is_empty()
+    });
+    let health = findings.health.iter();
+    let health = health.filter(|health| health.subject.model == model);
+    ChoiceRow {
+        model: model.to_owned(),
+        run: run.clone(),
+        rank: None,
+        clean,
+        area: curve.and_then(|curve| curve.summary.area),
+        darkest,
+        drop: drop.map(|drop| (drop.paired.difference, drop.significance)),
+        threshold: curve.map(|curve| curve.summary.threshold),
+        gain: gain.and_then(|gain| {
+            let enhancer = gain.first.enhancer.as_ref()?.to_string();
+            let difference = gain.paired.difference;
+            Some((enhancer, gain.first.level?, difference, gain.significance))
+        }),
+        below: below.filter_map(|subject| subject.level).collect(),
+        unread: health.fold([0, 0], |[unread, all], health| {
+            [unread + health.replies - health.read, all + health.replies]
+        }),
+    }
+}
+
+/// The rows as a table for files. Numbers are as in the files of the runs.
+pub(super) fn table(number: usize, digests: &GroupDigests, rows: &[ChoiceRow]) -> Table {
+    let end = |row: &&ChoiceRow, of: fn(RankRange) -> usize| row.rank.map(of);
+    TableBuilder::new("leaderboard", rows)
+        .column(Count, "csv group", |_| number)
+        .column(Count, "csv rank_first", |row| end(row, |rank| rank.first))
+        .column(Count, "csv rank_last", |row| end(row, |rank| rank.last))
+        .column(Text, "csv model", |row| row.model.clone())
+        .column(Text, "csv run", |row| row.run.name.clone())
+        .column(Share, "csv l0 l0_low l0_high n", |row| row.clean)
+        .column(Share, "csv area area_low area_high area_n", |row| row.area)
+        .column(Text, "csv darkest", |row| {
+            row.darkest.map(|level| level.to_string())
+        })
+        .column(Points, "csv drop drop_low drop_high drop_n", |row| {
+            row.drop.map(|(drop, _)| drop)
+        })
+        .column(Text, "csv drop_shown", |row| {
+            row.drop.map(|(_, verdict)| verdict.is_shown().to_string())
+        })
+        .column(
+            Threshold,
+            "csv threshold_ev threshold_low threshold_high",
+            |row| threshold(row),
+        )
+        .column(Text, "csv best_enhancer", |row| {
+            row.gain.as_ref().map(|(enhancer, ..)| enhancer.clone())
+        })
+        .column(Text, "csv best_level", |row| {
+            row.gain.as_ref().map(|(_, level, ..)| level.to_string())
+        })
+        .column(Points, "csv gain gain_low gain_high gain_n", |row| {
+            row.gain.as_ref().map(|(.., gain, _)| *gain)
+        })
+        .column(Text, "csv gain_shown", |row| {
+            let gain = row.gain.as_ref();
+            gain.map(|(.., verdict)| verdict.is_shown().to_string())
+        })
+        .column(Text, "csv below_blind", |row| row.below_text(";"))
+        .column(Count, "csv unread", |row| row.unread[0])
+        .column(Count, "csv replies", |row| row.unread[1])
+        .column(Text, "csv date", |row| row.run.date.clone())
+        .column(Text, "csv version", |row| row.run.version.clone())
+        .column(Text, "csv page", |row| row.run.path())
+        .column(Text, "csv questions", |_| digests.questions.clone())
+        .column(Text, "csv light_digest", |_| digests.light.clone())
+        .column(Text, "csv prompts", |_| digests.prompts.clone())
+        .build()
+}
+
+fn threshold(row: &ChoiceRow) -> TableCell {
+    let darkest = row.darkest.map_or(0.0, AxisLevel::value);
+    match &row.threshold {
+        Some(Ok(threshold)) => TableCell::Threshold(*threshold, darkest),
+        Some(Err(reason)) => TableCell::Unknown(why(reason)),
+        None => TableCell::Missing,
+    }
+}
+
+/// The heads of the columns on the page.
+const HEAD: [&str; 12] = [
+    "rank",
+    "model",
+    "n",
+    "L0 in %",
+    "area in %",
+    "drop in points",
+    "threshold in EV",
+    "best enhancer, gain in points",
+    "below blind at",
+    "unread in %",
+    "date",
+    "version",
+];
+
+/// The rows as the page shows them.
+pub(super) fn board(rows: &[ChoiceRow]) -> BoardTable {
+    BoardTable {
+        head: HEAD.map(str::to_owned).to_vec(),
+        rows: rows.iter().map(board_row).collect(),
+    }
+}
+
+fn board_row(row: &ChoiceRow) -> BoardRow {
+    let share = |share: Option<Estimate>| BoardCell::of(Share, &TableCell::from(share));
+    let rank = row.rank.map(|rank| rank.first * 1000 + rank.last);
+    let rank = BoardCell::text(&row.rank_text())
+        .keyed(rank.map_or_else(String::new, |rank| rank.to_string()));
+    let run = if row.is_reference() {
+        format!("{}, for comparison", row.run.name)
+    } else {
+        row.run.name.clone()
+    };
+    let n = row.clean.map(|clean| clean.n);
+    let drop = match (&row.drop, row.darkest) {
+        (Some((drop, verdict)), Some(darkest)) => difference(*drop, *verdict, &darkest.to_string()),
+        _ => BoardCell::of(Points, &TableCell::Missing),
+    };
+    let gain = match &row.gain {
+        Some((enhancer, level, gain, verdict)) => {
+            difference(*gain, *verdict, &format!("{enhancer}, {level}"))
+        }
+        None => BoardCell::of(Points, &TableCell::Missing),
+    };
+    let why = match &row.threshold {
+        Some(Err(reason)) => why(reason),
+        _ => String::new(),
+    };
+    let threshold = if why.is_empty() {
+        BoardCell::of(Threshold, &threshold(row))
+    } else {
+        BoardCell::of(Threshold, &TableCell::Missing).small(&why)
+    };
+    let [unread, replies] = row.unread;
+    let part = unread as f64 / replies.max(1) as f64;
+    let below = BoardCell::text(&row.below_text(", ")).keyed(
+        row.below
+            .first()
+            .map_or_else(String::new, |level| level.value().to_string()),
+    );
+    BoardRow {
+        words: format!("{} {}", row.model, row.run.name).to_lowercase(),
+        cells: vec![
+            rank.class("rank"),
+            BoardCell::text(&row.model)
+                .small(&run)
+                .header(row.run.path()),
+            BoardCell::of(Count, &TableCell::from(n)),
+            share(row.clean),
+            share(row.area),
+            drop,
+            threshold,
+            gain,
+            below.class(if row.below.is_empty() { "" } else { "below" }),
+            BoardCell::of(ColumnKind::Percent, &TableCell::Number(part))
+                .small(&format!("{unread} of {replies}")),
+            BoardCell::text(&row.run.date),
+            BoardCell::text(&row.run.version),
+        ],
+    }
+}
+
+/// A difference in points, with its interval and where it was found. A word stands where nothing is shown.
+fn difference(difference: Estimate, verdict: Significance, place: &str) -> BoardCell {
+    let ends = format!("[{}, {}]", points(difference.low), points(difference.high));
+    let cell = BoardCell::text(&points(difference.value))
+        .keyed(difference.value.to_string())
+        .small(&ends);
+    match verdict {
+        Significance::Better => cell.small(place).class("better"),
+        Significance::Worse => cell.small(place).class("worse"),
+        _ => cell.small(&format!("{place}, not shown")).class("unshown"),
+    }
+}

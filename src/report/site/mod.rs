@@ -1,0 +1,101 @@
+//! A site of many runs: a leaderboard and a page a run ([`products`]). It needs no server and no network.
+
+mod board;
+mod choices;
+mod content;
+mod open;
+mod page;
+mod run_link;
+
+use serde::Serialize;
+
+use super::csv;
+use super::json::Rows;
+use super::table::Table;
+use crate::error::{Error, Result};
+
+pub(crate) use choices::{ChoiceRow, choice_rows};
+pub(crate) use content::{DATA, GroupDifference, GroupRows, Ranking, Site, SiteGroup};
+pub(crate) use open::{OpenRow, open_rows};
+pub(crate) use run_link::{GroupDigests, PAGES, RunLink};
+
+/// The schema of `data.json`.
+pub(crate) const SCHEMA: &str = "darkqa.site/1";
+
+/// A group in `data.json`.
+#[derive(Serialize)]
+struct GroupData<'a> {
+    kind: &'static str,
+    title: &'a str,
+    digests: &'a GroupDigests,
+    shared: Vec<[&'a str; 2]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    differs: Option<&'a GroupDifference>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ranking: Option<&'a str>,
+    rows: Rows<'a>,
+}
+
+/// The content of `data.json`.
+#[derive(Serialize)]
+struct SiteData<'a> {
+    schema: &'static str,
+    version: &'static str,
+    runs: Vec<&'a RunLink>,
+    groups: Vec<GroupData<'a>>,
+}
+
+/// The files of a site by name: the leaderboard, the pages, `data.json`, and the tables as CSV.
+///
+/// # Errors
+/// If a file cannot be made.
+pub(crate) fn products(site: Site) -> Result<Vec<(String, Vec<u8>)>> {
+    let tables: Vec<Table> = site.groups.iter().enumerate().map(table).collect();
+    let mut named: Vec<&Table> = tables.iter().collect();
+    named.sort_by_key(|table| table.name);
+    let named: Vec<Table> = named.into_iter().cloned().collect();
+    let mut files = csv::files(&named)?;
+    let downloads: Vec<String> = files.iter().map(|(name, _)| name.clone()).collect();
+    files.push((DATA.to_owned(), data(&site, &tables)?));
+    let index = page::index(&site, &downloads)?;
+    files.push(("index.html".to_owned(), index.into_bytes()));
+    let pages = site.pages.into_iter();
+    files.extend(pages.map(|(link, page)| (link.path(), page)));
+    Ok(files)
+}
+
+/// The table of a group with its number.
+fn table((index, group): (usize, &SiteGroup)) -> Table {
+    match &group.rows {
+        GroupRows::Choices(rows, _) => choices::table(index + 1, &group.digests, rows),
+        GroupRows::Open(rows) => open::table(index + 1, &group.digests, rows),
+    }
+}
+
+fn data(site: &Site, tables: &[Table]) -> Result<Vec<u8>> {
+    let groups = site.groups.iter().zip(tables).map(|(group, table)| {
+        let shared = group.shared.iter();
+        let (kind, ranking) = match &group.rows {
+            GroupRows::Choices(_, ranking) => ("choices", Some(&*ranking.words)),
+            GroupRows::Open(_) => ("openeqa", None),
+        };
+        GroupData {
+            kind,
+            title: &group.title,
+            digests: &group.digests,
+            shared: shared.map(|(name, value)| [&**name, &**value]).collect(),
+            differs: group.differs.as_ref(),
+            ranking,
+            rows: Rows::of(table),
+        }
+    });
+    let data = SiteData {
+        schema: SCHEMA,
+        version: env!("CARGO_PKG_VERSION"),
+        runs: site.pages.iter().map(|(link, _)| link).collect(),
+        groups: groups.collect(),
+    };
+    let mut text = serde_json::to_vec_pretty(&data).map_err(|e| Error::data(DATA, e))?;
+    text.push(b'\n');
+    Ok(text)
+}

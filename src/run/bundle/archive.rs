@@ -1,0 +1,103 @@
+//! The ZIP file of a bundle: [`zipped`], and [`is_bundle`].
+
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::{Cursor, Write as _};
+use std::path::Path;
+
+use sha2::{Digest as _, Sha256};
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
+
+use crate::error::{Error, Result};
+
+/// The comment of the archive, by which a bundle is known again.
+const MARK: &[u8] = b"darkqa.bundle/1";
+
+/// Name of the file with the digests of the others.
+const SUMS: &str = "SHA256SUMS";
+
+/// Level of compression (the usual one of deflate).
+const LEVEL: i64 = 6;
+
+/// Whether a file is a bundle.
+pub(super) fn is_bundle(path: &Path) -> bool {
+    let archive = File::open(path).ok().map(ZipArchive::new);
+    archive.is_some_and(|archive| archive.is_ok_and(|archive| archive.comment() == MARK))
+}
+
+/// The files by name as one archive, in a folder of this name, with their digests as `sha256sum` reads them. The same files are the same
+/// bytes: names are sorted, and times are all 1980-01-01.
+///
+/// # Errors
+/// If the archive cannot be made.
+pub(super) fn zipped(folder: &str, mut files: Vec<(String, Vec<u8>)>) -> Result<Vec<u8>> {
+    files.sort();
+    files.push((SUMS.to_owned(), sums(&files).into_bytes()));
+    files.sort();
+    let failed = |e: &dyn std::fmt::Display| Error::data("the bundle", e);
+    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+    archive.set_raw_comment(MARK.into());
+    for (name, content) in files {
+        let options = SimpleFileOptions::default()
+            .compression_method(CompressionMethod::Deflated)
+            .compression_level(Some(LEVEL))
+            .last_modified_time(DateTime::default())
+            .unix_permissions(0o644)
+            .large_file(u32::try_from(content.len()).is_err());
+        archive
+            .start_file(format!("{folder}/{name}"), options)
+            .map_err(|e| failed(&e))?;
+        archive.write_all(&content).map_err(|e| failed(&e))?;
+    }
+    let archive = archive.finish().map_err(|e| failed(&e))?;
+    Ok(archive.into_inner())
+}
+
+/// A line for each file: its SHA-256 in hexadecimal, two spaces, and its name.
+fn sums(files: &[(String, Vec<u8>)]) -> String {
+    let mut sums = String::new();
+    for (name, content) in files {
+        for byte in Sha256::digest(content) {
+            let _ = write!(sums, "{byte:02x}");
+        }
+        let _ = writeln!(sums, "  {name}");
+    }
+    sums
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_same_files_in_any_order_are_the_same_bytes() {
+        let files = [("b.txt", "two"), ("a/c.txt", "one")];
+        let named = |files: Vec<(&str, &str)>| {
+            let files = files.into_iter();
+            let files = files.map(|(name, text)| (name.to_owned(), text.as_bytes().to_vec()));
+            zipped("run", files.collect()).unwrap()
+        };
+        let bytes = named(files.to_vec());
+        assert_eq!(bytes, named(files.into_iter().rev().collect()));
+        assert_ne!(bytes, named(vec![("b.txt", "two")]));
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.zip");
+        std::fs::write(&path, &bytes).unwrap();
+        assert!(is_bundle(&path));
+        std::fs::write(&path, b"PK, but no archive").unwrap();
+        assert!(!is_bundle(&path));
+        let mut archive = ZipArchive::new(Cursor::new(bytes)).unwrap();
+        let names: Vec<&str> = archive.file_names().collect();
+        assert_eq!(names.len(), 3, "{names:?}");
+        let mut sums = archive.by_name("run/SHA256SUMS").unwrap();
+        let text = std::io::read_to_string(&mut sums).unwrap();
+        // echo -n two | sha256sum
+        assert!(
+            text.contains(
+                "3fc4ccfe745870e2c0d99f71f30ff0656c8dedd41cc1d7d3d376b0dbe685e2f3  b.txt\n"
+            ),
+            "{text}"
+        );
+    }
+}

@@ -1,0 +1,164 @@
+//! `bundle`: a run as one ZIP file to pass on.
+
+mod archive;
+mod parts;
+mod readme;
+mod redact;
+
+use std::collections::BTreeSet;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use crate::error::{Error, Result};
+use crate::files;
+use crate::job::Outcome;
+use crate::job::report::whole;
+use crate::job::stored::name;
+use crate::types::Decides;
+use crate::types::manifest::Status;
+
+use archive::{is_bundle, zipped};
+use parts::RunParts;
+pub(crate) use parts::ThumbnailChoice;
+use readme::{ReadmeInputs, readme};
+use redact::Redactor;
+
+/// The flags of `bundle`.
+#[derive(Debug, Args)]
+pub(crate) struct BundleArgs {
+    /// The folder of a run
+    #[arg(value_name = "RUN", add = Decides::Nothing)]
+    pub run: PathBuf,
+    /// Where the ZIP file goes; a bundle that is there is replaced, any other file is not
+    #[arg(long, value_name = "FILE.zip", add = Decides::Nothing)]
+    pub out: PathBuf,
+    /// The small images in it
+    #[arg(long, value_name = "WHICH", value_enum, default_value = "shown", add = Decides::Nothing)]
+    pub thumbnails: ThumbnailChoice,
+}
+
+/// Packs a run. What says where it was made, and what is secret, is taken out of all files; the report is made again from what is left.
+///
+/// # Errors
+/// If the folder holds no run, something else than a bundle is at `--out`, or something private would be left in a file.
+pub(crate) fn bundle(args: &BundleArgs) -> Result<Outcome> {
+    let replaces = args.out.symlink_metadata().is_ok();
+    if replaces && !is_bundle(&args.out) {
+        let problem = "there already, and no bundle: name another file";
+        return Err(Error::data(args.out.display(), problem));
+    }
+    let folder_name = file_name(&name(&args.run));
+    let mut redactor = Redactor::new(&args.run);
+    let parts = RunParts::read(&args.run, &folder_name, args.thumbnails, &mut redactor)?;
+    let RunParts {
+        manifest,
+        mut files,
+        run,
+        thumbnails,
+    } = parts;
+    let command_run = run.clone();
+    let report = whole(run)?;
+    files.extend(report.files);
+    let mut changes: Vec<String> = redactor
+        .changes
+        .iter()
+        .map(|(change, times)| change.words(*times))
+        .collect();
+    if thumbnails[1] > 0 {
+        let of = thumbnails[0] + thumbnails[1];
+        changes.push(format!(
+            "{} of {of} small images are left out",
+            thumbnails[1]
+        ));
+    }
+    let others = others(&args.run, &files)?;
+    match others.len() {
+        0 => {}
+        1 => changes
+            .push("1 other file or folder of the run is left out: no report needs it".to_owned()),
+        n => changes.push(format!(
+            "{n} other files or folders of the run are left out: no report needs them"
+        )),
+    }
+    files.sort();
+    let sizes: Vec<(String, usize)> = files
+        .iter()
+        .map(|(name, content)| (name.clone(), content.len()))
+        .collect();
+    let text = readme(&ReadmeInputs {
+        name: &folder_name,
+        manifest: &manifest,
+        run: &command_run,
+        findings: &report.markdown,
+        changes: &changes,
+        files: &sizes,
+    });
+    files.push(("README.md".to_owned(), text.into_bytes()));
+    check(&files, &redactor)?;
+    let count = files.len() + 1;
+    let archive = zipped(&folder_name, files)?;
+    files::write(&args.out, &archive)?;
+    let verb = if replaces { "replaced" } else { "written" };
+    let mut output = format!(
+        "{}: {verb}, {count} files, {} bytes\n",
+        args.out.display(),
+        archive.len()
+    );
+    for change in changes {
+        let _ = writeln!(output, "{change}");
+    }
+    if !others.is_empty() {
+        let _ = writeln!(output, "left out: {}", others.join(", "));
+    }
+    Ok(Outcome {
+        status: Status::Complete,
+        output,
+    })
+}
+
+/// Checks that nothing private is left in any file.
+fn check(files: &[(String, Vec<u8>)], redactor: &Redactor) -> Result<()> {
+    for (name, content) in files {
+        if let Some(what) = redactor.leak(&String::from_utf8_lossy(content)) {
+            let problem = format_args!(
+                "{what} would be in it; nothing is written. Please report this with the line of the run that holds it"
+            );
+            return Err(Error::data(name, problem));
+        }
+    }
+    Ok(())
+}
+
+/// Files and folders beside those of the bundle, sorted.
+fn others(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<String>> {
+    let known: BTreeSet<&str> = files
+        .iter()
+        .map(|(name, _)| name.split('/').next().unwrap_or(name))
+        .collect();
+    let unreadable = |e: std::io::Error| Error::file(folder, "read", e);
+    let mut others = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(unreadable)? {
+        let name = entry.map_err(unreadable)?.file_name();
+        let name = name.to_string_lossy().into_owned();
+        if !known.contains(&*name) {
+            others.push(name);
+        }
+    }
+    others.sort();
+    Ok(others)
+}
+
+/// A name of a folder for any system, from that of the run.
+fn file_name(name: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_.+@".contains(c);
+    let name: String = name
+        .chars()
+        .map(|c| if plain(c) { c } else { '_' })
+        .collect();
+    match name.trim_start_matches('.') {
+        "" => "run".to_owned(),
+        name => name.to_owned(),
+    }
+}

@@ -1,0 +1,214 @@
+//! The README of a bundle: [`readme`].
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write;
+
+use serde_json::Value;
+
+use crate::job::stored::AnyRun;
+use crate::types::manifest::RunManifest;
+use crate::types::{AxisLevel, Condition, shell_word};
+
+/// What a README is written from.
+pub(super) struct ReadmeInputs<'a> {
+    /// Name of the run, and of the folder in the archive.
+    pub(super) name: &'a str,
+    pub(super) manifest: &'a RunManifest,
+    pub(super) run: &'a AnyRun,
+    /// The findings and the table by level, as Markdown.
+    pub(super) findings: &'a str,
+    /// What was left out or changed, a line each.
+    pub(super) changes: &'a [String],
+    /// Names and sizes of the files.
+    pub(super) files: &'a [(String, usize)],
+}
+
+/// The text of the README, in Markdown.
+pub(super) fn readme(inputs: &ReadmeInputs<'_>) -> String {
+    let mut text = inputs.findings.to_owned();
+    let name = shell_word(inputs.name);
+    text += "\n## Read it again\n\nBeside the unpacked folder:\n\n";
+    text += &fenced(&format!("darkqa-eval report {name}"));
+    text += "\nIn the folder, to check that nothing changed on the way:\n\n";
+    text += &fenced("sha256sum --check SHA256SUMS");
+    text += "\n## Ask again\n\n";
+    text += "The command that asks the same, as far as the manifest tells; `DIR/` stands for a folder of your own:\n\n";
+    text += &fenced(&command(inputs.manifest, inputs.run));
+    text += "\n## Changed, or left out\n\n";
+    if inputs.changes.is_empty() {
+        text += "Nothing.\n";
+    }
+    for change in inputs.changes {
+        let _ = writeln!(text, "- {change}");
+    }
+    text += "\n## Files\n\n| file | bytes |\n| --- | ---: |\n";
+    for (name, size) in inputs.files {
+        let _ = writeln!(text, "| `{name}` | {size} |");
+    }
+    text
+}
+
+/// Lines of a shell in a block of code that no text in them ends.
+fn fenced(lines: &str) -> String {
+    let shown: String = lines
+        .chars()
+        .map(|c| {
+            if c.is_control() && c != '\n' {
+                '\u{fffd}'
+            } else {
+                c
+            }
+        })
+        .collect();
+    let mut fence = "```".to_owned();
+    while shown.contains(&fence) {
+        fence.push('`');
+    }
+    format!("{fence}sh\n{shown}\n{fence}\n")
+}
+
+/// What a run asked, as its records tell.
+#[derive(Default)]
+struct Asked {
+    levels: BTreeSet<AxisLevel>,
+    /// Models with images, and without.
+    seeing: BTreeSet<String>,
+    blind: BTreeSet<String>,
+}
+
+impl Asked {
+    fn add(&mut self, model: &str, condition: Option<&Condition>) {
+        match condition {
+            None => self.blind.insert(model.to_owned()),
+            Some(condition) => {
+                self.levels.insert(condition.level());
+                self.seeing.insert(model.to_owned())
+            }
+        };
+    }
+}
+
+/// The command that asks what the run asked.
+fn command(manifest: &RunManifest, run: &AnyRun) -> String {
+    let mut asked = Asked::default();
+    let mut words = vec!["darkqa-eval".to_owned()];
+    match run {
+        AnyRun::Choice(run) => {
+            for record in &run.records {
+                asked.add(&record.model, record.condition.as_ref());
+            }
+        }
+        AnyRun::Open(run) => {
+            // The manifest has the digest of the questions, not their place.
+            let questions = ["openeqa", "--questions", "DIR/questions.json"];
+            words.extend(questions.map(str::to_owned));
+            for record in &run.records {
+                asked.add(&record.model, record.condition.as_ref());
+            }
+        }
+    }
+    let setting = |name: &str| manifest.settings.get(name).and_then(Value::as_str);
+    let judge = setting("--judge");
+    for model in asked.seeing.iter().filter(|model| !is_control(model)) {
+        words.extend(["--model".to_owned(), word(model)]);
+    }
+    for model in &asked.blind {
+        // The judge sees no image, either.
+        if Some(&**model) != judge {
+            words.extend(["--blind-model".to_owned(), word(model)]);
+        }
+    }
+    for flag in ["--judge", "--protocol"] {
+        if let Some(value) = setting(flag) {
+            words.extend([flag.to_owned(), word(value)]);
+        }
+    }
+    words.extend(of_models(manifest));
+    for (flag, value) in &manifest.images {
+        words.extend(flag_words(&format!("--{flag}"), value));
+    }
+    let levels: Vec<String> = asked.levels.iter().map(ToString::to_string).collect();
+    if !levels.is_empty() {
+        words.extend(["--levels".to_owned(), word(&levels.join(","))]);
+    }
+    let has = |flag: &str| words.iter().any(|known| known == flag);
+    let identity = manifest.identity.iter();
+    let identity = identity.filter(|(flag, value)| {
+        // Digests stand for files, which the flags of images name.
+        let is_plain = value.as_str().is_none_or(|text| text.len() < 64);
+        flag.starts_with("--") && !has(flag) && is_plain && *flag != "--data"
+    });
+    let more: Vec<String> = identity
+        .flat_map(|(flag, value)| flag_words(flag, value))
+        .collect();
+    words.extend(more);
+    words.join(" ")
+}
+
+/// Whether a model is a control of the observer, which is asked with it.
+fn is_control(model: &str) -> bool {
+    model.starts_with("observer:")
+}
+
+/// The flags of models that all of them have with the same value.
+fn of_models(manifest: &RunManifest) -> Vec<String> {
+    let models = manifest.columns.get("model");
+    let remote = models.into_iter().flatten();
+    let remote: Vec<&Value> = remote
+        .map(|(_, content)| content)
+        .filter(|content| content.get("--base-url").is_some())
+        .collect();
+    let Some(first) = remote.first().and_then(|first| first.as_object()) else {
+        return Vec::new();
+    };
+    let shared: BTreeMap<&String, &Value> = first
+        .iter()
+        .filter(|(flag, value)| {
+            let same = |other: &&Value| other.get(flag.as_str()) == Some(value);
+            flag.starts_with("--") && *flag != "--model" && remote.iter().all(same)
+        })
+        .collect();
+    shared
+        .into_iter()
+        .flat_map(|(flag, value)| flag_words(flag, value))
+        .collect()
+}
+
+/// A flag with its value as words of a shell; several for a list, none for a value that is not set.
+fn flag_words(flag: &str, value: &Value) -> Vec<String> {
+    match value {
+        Value::Null | Value::Bool(false) | Value::Object(_) => Vec::new(),
+        Value::Bool(true) => vec![flag.to_owned()],
+        Value::Array(values) => {
+            let values = values.iter();
+            values.flat_map(|value| flag_words(flag, value)).collect()
+        }
+        Value::String(text) => vec![flag.to_owned(), word(text)],
+        Value::Number(number) => vec![flag.to_owned(), number.to_string()],
+    }
+}
+
+fn word(text: &str) -> String {
+    shell_word(text).into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_text_ends_a_block_of_code() {
+        assert_eq!(fenced("a"), "```sh\na\n```\n");
+        assert_eq!(fenced("a ``` b"), "````sh\na ``` b\n````\n");
+        assert_eq!(fenced("a\u{1b}[1m"), "```sh\na\u{fffd}[1m\n```\n");
+    }
+
+    #[test]
+    fn flags_are_words_of_a_shell() {
+        let words = |value| flag_words("--x", &value);
+        assert_eq!(words(serde_json::json!("a b")), ["--x", "'a b'"]);
+        assert_eq!(words(serde_json::json!(["a", 2])), ["--x", "a", "--x", "2"]);
+        assert_eq!(words(serde_json::json!(true)), ["--x"]);
+        assert!(words(Value::Null).is_empty());
+    }
+}

@@ -1,0 +1,127 @@
+//! `site`: a leaderboard and the pages of many runs, as files.
+
+use std::collections::BTreeSet;
+use std::fmt::Write;
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::Value;
+
+use crate::error::{Error, Result};
+use crate::files;
+use crate::job::Outcome;
+use crate::job::report::site as collected;
+use crate::job::stored::AnyRun;
+use crate::report::site::{DATA, PAGES, SCHEMA, products};
+use crate::types::Decides;
+use crate::types::manifest::Status;
+
+/// The flags of `site`.
+#[derive(Debug, Args)]
+pub(crate) struct SiteArgs {
+    /// The folders of the runs, of either kind
+    #[arg(value_name = "RUN", required = true, add = Decides::Nothing)]
+    pub runs: Vec<PathBuf>,
+    /// Where the site goes: a new or empty folder, or one with a site, whose files are replaced
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
+    pub out: PathBuf,
+}
+
+/// Writes a site.
+///
+/// # Errors
+/// If a folder holds no run of this version or a run is named twice, if a record is broken, or if `--out` holds something else.
+pub(crate) fn site(args: &SiteArgs) -> Result<Outcome> {
+    check_distinct(&args.runs)?;
+    check_target(&args.out)?;
+    let runs = args.runs.iter().map(|folder| AnyRun::open(folder));
+    let site = collected(runs.collect::<Result<_>>()?)?;
+    let mut output = String::new();
+    for (run, why) in &site.others {
+        let _ = writeln!(output, "{}: in no table: {why}", run.name);
+    }
+    let (runs, tables) = (site.pages.len(), site.groups.len());
+    let contents = products(site)?;
+    let names: BTreeSet<String> = contents.iter().map(|(name, _)| name.clone()).collect();
+    for (name, content) in contents {
+        files::write(&args.out.join(name), &content)?;
+    }
+    for page in stale(&args.out, &names)? {
+        let _ = writeln!(
+            output,
+            "{page}: a page of no run of this site; delete it, or keep it"
+        );
+    }
+    let _ = writeln!(
+        output,
+        "site: {} (runs: {runs}, tables: {tables})",
+        args.out.join("index.html").display()
+    );
+    Ok(Outcome {
+        status: Status::Complete,
+        output,
+    })
+}
+
+/// Refuses a run that is named twice: its models would be compared with themselves.
+fn check_distinct(folders: &[PathBuf]) -> Result<()> {
+    let mut known = BTreeSet::new();
+    for folder in folders {
+        let place = folder.canonicalize().unwrap_or_else(|_| folder.clone());
+        if !known.insert(place) {
+            let problem = format_args!("{} is named twice; name each run once", folder.display());
+            return Err(Error::usage("RUN", problem));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a folder with anything else than a site in it, and links that lead out of it.
+fn check_target(out: &Path) -> Result<()> {
+    let unreadable = |e: std::io::Error| Error::file(out, "read", e);
+    let mut entries = match fs::read_dir(out) {
+        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(()),
+        entries => entries.map_err(unreadable)?,
+    };
+    let is_empty =
+        entries.all(|entry| entry.is_ok_and(|entry| files::is_unfinished(&entry.file_name())));
+    if is_empty {
+        return Ok(());
+    }
+    let data = fs::read(out.join(DATA)).ok();
+    let data = data.and_then(|text| serde_json::from_slice::<Value>(&text).ok());
+    let is_site =
+        data.is_some_and(|data| data.get("schema").and_then(Value::as_str) == Some(SCHEMA));
+    if !is_site {
+        let problem = "the folder is not empty and holds no site; name another --out";
+        return Err(Error::data(out.display(), problem));
+    }
+    let pages = out.join(PAGES);
+    if pages
+        .symlink_metadata()
+        .is_ok_and(|pages| pages.is_symlink())
+    {
+        let problem =
+            "a link; its folder would be written to. Delete the link, or name another --out";
+        return Err(Error::data(pages.display(), problem));
+    }
+    Ok(())
+}
+
+/// Pages in the folder of a site that it does not write.
+fn stale(out: &Path, names: &BTreeSet<String>) -> Result<Vec<String>> {
+    let pages = out.join(PAGES);
+    let unreadable = |e: std::io::Error| Error::file(&pages, "read", e);
+    let mut stale = Vec::new();
+    for entry in fs::read_dir(&pages).map_err(unreadable)? {
+        let name = entry.map_err(unreadable)?.file_name();
+        let name = format!("{PAGES}/{}", name.to_string_lossy());
+        if !names.contains(&name) {
+            stale.push(name);
+        }
+    }
+    stale.sort();
+    Ok(stale)
+}

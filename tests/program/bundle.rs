@@ -1,0 +1,245 @@
+//! `bundle`: a run as one ZIP file, without what is private.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io::{Cursor, Read};
+use std::path::Path;
+
+use crate::support::endpoint::{Answer, MockEndpoint};
+use crate::support::house::House;
+use crate::support::run::{Bench, called, files, records, words};
+use base64::Engine as _;
+use zip::ZipArchive;
+
+const KEY: &str = "a-very-secret-word-of-mine";
+
+/// Unpacks a bundle; returns the names in it.
+fn unpack(zip: &Path, into: &Path) -> Vec<String> {
+    let mut archive = ZipArchive::new(Cursor::new(fs::read(zip).unwrap())).unwrap();
+    archive.extract(into).unwrap();
+    let names = archive.file_names().map(str::to_owned);
+    names.collect()
+}
+
+/// Every text in a folder, with the data that the page has packed.
+fn texts(folder: &Path) -> Vec<(String, String)> {
+    let mut texts = Vec::new();
+    for path in files(folder) {
+        let name = path.display().to_string();
+        let text = fs::read_to_string(&path).unwrap();
+        let packed = text
+            .split(['"', '>', '<', '`'])
+            .filter(|part| part.starts_with("H4sI"));
+        for part in packed {
+            let bytes = base64::engine::general_purpose::STANDARD
+                .decode(part)
+                .unwrap();
+            let mut inside = String::new();
+            flate2::read::GzDecoder::new(&*bytes)
+                .read_to_string(&mut inside)
+                .unwrap();
+            texts.push((format!("{name}, packed"), inside));
+        }
+        texts.push((name, text));
+    }
+    texts
+}
+
+#[test]
+fn a_bundle_is_the_run_again_and_the_same_bytes_each_time() {
+    let bench = Bench::new();
+    bench.complete(&words(
+        "--model observer --model random --blind-model random --data rooms:frames=4,size=160x120 --levels L0,L5 --out run",
+    ));
+    bench.file("run/notes.txt", "mine");
+    let said = bench.complete(&words("bundle run --out one.zip"));
+    assert!(said.contains("left out: notes.txt"), "{said}");
+    bench.complete(&words("bundle run --out two.zip"));
+    let one = fs::read(bench.path("one.zip")).unwrap();
+    assert_eq!(one, fs::read(bench.path("two.zip")).unwrap());
+    let names = unpack(&bench.path("one.zip"), &bench.path("unpacked"));
+    let mut sorted = names.clone();
+    sorted.sort();
+    assert_eq!(names, sorted);
+    assert!(!names.contains(&"run/notes.txt".to_owned()), "{names:?}");
+    // The report of the unpacked run is that of the run, byte for byte.
+    let mut report = bench.command(&["report", "run"]);
+    let report = called(report.current_dir(bench.path("unpacked")));
+    assert_eq!(report.code, Some(0), "{report:?}");
+    let mut same = 0;
+    for path in files(&bench.path("run")) {
+        let name = path.strip_prefix(bench.path("run")).unwrap();
+        if name != Path::new("notes.txt") {
+            let unpacked = fs::read(bench.path("unpacked/run").join(name)).unwrap();
+            assert!(fs::read(&path).unwrap() == unpacked, "{}", name.display());
+            same += 1;
+        }
+    }
+    assert!(same > 10, "{same}");
+    // The digests are those of the files.
+    let sums = fs::read_to_string(bench.path("unpacked/run/SHA256SUMS")).unwrap();
+    assert_eq!(sums.lines().count(), names.len() - 1);
+    let readme = fs::read_to_string(bench.path("unpacked/run/README.md")).unwrap();
+    for part in [
+        "darkqa-eval report run",
+        "--data rooms:frames=4,size=160x120",
+        "--blind-model random",
+        "--levels L0,L5",
+    ] {
+        assert!(readme.contains(part), "{part}: {readme}");
+    }
+    // The command asks the very same trials again.
+    let command = readme
+        .lines()
+        .find(|line| line.starts_with("darkqa-eval --"));
+    let command = command.unwrap().trim_start_matches("darkqa-eval ");
+    bench.complete(&words(&format!("{command} --out again")));
+    let keys = |run: &str| -> BTreeSet<String> {
+        let records = records(&bench.path(run)).into_iter();
+        records.map(|record| record["key"].to_string()).collect()
+    };
+    assert_eq!(keys("again"), keys("run"));
+    let summary = fs::read_to_string(bench.path("run/summary.json")).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+    let plain = readme.replace('\\', "");
+    for finding in summary["findings"].as_array().unwrap() {
+        assert!(
+            plain.contains(finding["text"].as_str().unwrap()),
+            "{readme}"
+        );
+    }
+    // Without images it is smaller, and the page has none; with all it has the file of the run.
+    bench.complete(&words("bundle run --out none.zip --thumbnails none"));
+    let names = unpack(&bench.path("none.zip"), &bench.path("none"));
+    assert!(
+        !names.iter().any(|name| name.ends_with("thumbnails.jsonl")),
+        "{names:?}"
+    );
+    for (name, text) in texts(&bench.path("none")) {
+        assert!(!text.contains("data:image/"), "{name}");
+    }
+    assert!(fs::metadata(bench.path("none.zip")).unwrap().len() < one.len() as u64);
+    bench.complete(&words("bundle run --out all.zip --thumbnails all"));
+    unpack(&bench.path("all.zip"), &bench.path("all"));
+    let file = "run/thumbnails.jsonl";
+    let all = fs::read(bench.path("all").join(file)).unwrap();
+    assert!(all == fs::read(bench.path(file)).unwrap());
+}
+
+#[test]
+fn only_a_bundle_is_replaced() {
+    let bench = Bench::new();
+    bench.complete(&words("--model random --levels L0 --out run"));
+    let said = bench.complete(&words("bundle run --out run.zip"));
+    assert!(said.contains("run.zip: written"), "{said}");
+    let said = bench.complete(&words("bundle run --out run.zip"));
+    assert!(said.contains("run.zip: replaced"), "{said}");
+    for mine in ["PK, of mine", ""] {
+        bench.file("mine.zip", mine);
+        let refused = bench.call(&words("bundle run --out mine.zip"));
+        assert_eq!(refused.code, Some(2), "{refused:?}");
+        assert!(
+            refused.stderr.contains("mine.zip") && refused.stderr.contains("no bundle"),
+            "{refused:?}"
+        );
+        assert_eq!(fs::read_to_string(bench.path("mine.zip")).unwrap(), mine);
+    }
+    let refused = bench.call(&words("bundle nowhere --out none.zip"));
+    assert!(
+        refused.stderr.contains("nowhere: no run in this folder"),
+        "{refused:?}"
+    );
+    assert!(!bench.path("none.zip").exists());
+    // A damaged line is named, and nothing is written.
+    bench.file("run/records.jsonl", "{\"no\": \"record\"}\n");
+    let refused = bench.call(&words("bundle run --out none.zip"));
+    assert!(
+        refused.stderr.contains("records.jsonl, line 1"),
+        "{refused:?}"
+    );
+    assert!(!bench.path("none.zip").exists());
+}
+
+#[test]
+fn nothing_private_is_in_a_bundle() {
+    let bench = Bench::with_questions(4);
+    let home = bench.path("home/ann");
+    fs::create_dir_all(home.join("data set")).unwrap();
+    for name in ["set.jsonl", "a.png"] {
+        fs::copy(bench.path(name), home.join("data set").join(name)).unwrap();
+    }
+    let place = home.display().to_string();
+    let said = format!("I see {place}/photo.png with {KEY}");
+    let endpoint = MockEndpoint::answering(move |_| Answer::text(&said));
+    let address = endpoint
+        .base_url()
+        .replace("http://", "http://ann:password@");
+    let data = home.join("data set/set.jsonl").display().to_string();
+    let mut run = bench.command(&[
+        "--model",
+        "m",
+        "--base-url",
+        &address,
+        "--data",
+        &data,
+        "--levels",
+        "L0,L3",
+        "--out",
+        "run",
+    ]);
+    let ran = called(run.env("HOME", &home));
+    assert_ne!(ran.code, Some(2), "{ran:?}");
+    let stored: String = texts(&bench.path("run"))
+        .into_iter()
+        .map(|(_, text)| text)
+        .collect();
+    // Without the bundle they are there.
+    assert!(stored.contains(&place) && stored.contains(KEY));
+    let mut bundle = bench.command(&["bundle", "run", "--out", "run.zip"]);
+    let bundled = called(bundle.env("HOME", &home).env("MY_API_KEY", KEY));
+    assert_eq!(bundled.code, Some(0), "{bundled:?}");
+    assert!(
+        bundled.stdout.contains("[secret]") && bundled.stdout.contains("DIR/"),
+        "{bundled:?}"
+    );
+    unpack(&bench.path("run.zip"), &bench.path("unpacked"));
+    let texts = texts(&bench.path("unpacked"));
+    assert!(texts.iter().any(|(name, _)| name.ends_with("packed")));
+    let folder = bench.path("").display().to_string();
+    for (name, text) in &texts {
+        for private in [&*place, KEY, "ann:password", folder.trim_end_matches('/')] {
+            assert!(!text.contains(private), "{private} in {name}");
+        }
+    }
+    let all: String = texts.iter().map(|(_, text)| &**text).collect();
+    assert!(all.contains("DIR/ann/photo.png with [secret]"));
+    // What was changed is said, and the run is read again.
+    assert!(all.contains("## Changed, or left out"));
+    bench.complete(&words("report unpacked/run"));
+}
+
+#[test]
+fn runs_of_open_questions_are_bundled_too() {
+    let house = House::new();
+    house.0.file("a.jsonl", "{\"default\": \"an answer\"}\n");
+    house.0.file("j.jsonl", "{\"default\": \"4\"}\n");
+    let line = "--model script:a.jsonl --judge script:j.jsonl --levels L0,L3 --out run";
+    assert_eq!(house.call(&words(line)).code, Some(0));
+    house.0.complete(&words("bundle run --out run.zip"));
+    unpack(&house.0.path("run.zip"), &house.0.path("unpacked"));
+    house.0.complete(&words("report unpacked/run"));
+    for name in ["records.jsonl", "summary.csv", "report.html", "upstream"] {
+        let unpacked = house.0.path("unpacked/run").join(name);
+        assert!(unpacked.exists(), "{name}");
+        if unpacked.is_file() {
+            let own = fs::read(house.0.path("run").join(name)).unwrap();
+            assert!(fs::read(&unpacked).unwrap() == own, "{name}");
+        }
+    }
+    let readme = fs::read_to_string(house.0.path("unpacked/run/README.md")).unwrap();
+    assert!(readme.contains("OpenEQA by LLM-Match"), "{readme}");
+    assert!(
+        readme.contains("darkqa-eval openeqa --questions DIR/questions.json --model script:a.jsonl --judge script:j.jsonl"),
+        "{readme}"
+    );
+}

@@ -1,0 +1,79 @@
+//! `report --markdown`: the findings and the table by level, for an issue or a README.
+
+use std::fs;
+
+use crate::support::house::House;
+use crate::support::run::{Bench, words};
+use serde_json::Value;
+
+/// The lines of the only table in a text of Markdown.
+fn table(text: &str) -> Vec<&str> {
+    let rows = text.lines().filter(|line| line.starts_with('|'));
+    rows.collect()
+}
+
+#[test]
+fn findings_are_the_words_of_the_summary_and_cells_cannot_break_the_table() {
+    let bench = Bench::new();
+    bench.file("a|`b`<b>.jsonl", "{\"default\": \"A\"}\n");
+    bench.complete(&words(
+        "--model random --model observer --model script:a|`b`<b>.jsonl --data rooms:frames=8,size=160x120 --levels L0,L5 --out run",
+    ));
+    let text = bench.complete(&words("report run --markdown"));
+    let summary = fs::read(bench.path("run/summary.json")).unwrap();
+    let summary: Value = serde_json::from_slice(&summary).unwrap();
+    let findings = summary["findings"].as_array().unwrap();
+    assert!(!findings.is_empty());
+    // Without the signs that keep markup away, each finding is there in the words of the summary.
+    let plain = text.replace('\\', "").replace("&#8203;", "");
+    for finding in findings {
+        for part in ["text", "detail"] {
+            let words = finding[part].as_str().unwrap();
+            assert!(plain.contains(words), "{words}: {plain}");
+        }
+    }
+    let rows = table(&text);
+    assert!(rows.len() > 4, "{text}");
+    let bars = |row: &str| row.replace("\\|", "").matches('|').count();
+    for row in &rows {
+        assert_eq!(bars(row), bars(rows[0]), "{row}");
+    }
+    assert!(
+        rows.iter().any(|row| row.contains("a\\|\\`b\\`\\<b\\>")),
+        "{text}"
+    );
+    assert!(!text.contains("<b>"), "{text}");
+    // Nothing but Markdown is printed, and the folder has its report as ever.
+    assert!(text.starts_with("### Seeing in the dark: run\n"), "{text}");
+    assert!(!text.contains("report.html"), "{text}");
+    let again = bench.complete(&words("report run"));
+    assert!(again.contains("report.html"));
+    let refused = bench.call(&words("report run --markdown --json"));
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+}
+
+#[test]
+fn runs_without_true_answers_and_open_questions_have_it_too() {
+    let bench = Bench::new();
+    bench.complete(&words(
+        "--model random --data rooms:frames=2,size=96x64 --ask home --levels L0,L3 --out own",
+    ));
+    let text = bench.complete(&words("report own --markdown"));
+    assert!(text.contains("without answers"), "{text}");
+    assert!(table(&text).len() > 2, "{text}");
+    let house = House::new();
+    house.0.file("a.jsonl", "{\"default\": \"an answer\"}\n");
+    house.0.file("j.jsonl", "{\"default\": \"4\"}\n");
+    let line = "--model script:a.jsonl --judge script:j.jsonl --levels L0,L3 --out run";
+    assert_eq!(house.call(&words(line)).code, Some(0));
+    let text = house.0.complete(&words("report run --markdown"));
+    assert!(
+        text.contains("OpenEQA by LLM-Match, marked by script:j.jsonl"),
+        "{text}"
+    );
+    // A mark of 4 is 75 %.
+    assert!(
+        table(&text).iter().any(|row| row.contains("| 75.0 (")),
+        "{text}"
+    );
+}
