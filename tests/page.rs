@@ -83,7 +83,7 @@ fn filters(browser: &mut Browser) {
     browser.choose("#f-model", SAID);
     assert_eq!(count(browser), "40 of 40 items");
     // The markup, the turned letters and the long reply cannot be read; everything else is right.
-    browser.choose("#f-state", "not readable");
+    browser.choose("#f-state", "not read");
     assert_eq!(count(browser), "3 of 40 items");
     browser.choose("#f-state", "wrong");
     assert_eq!(count(browser), "0 of 40 items");
@@ -259,7 +259,9 @@ fn deep_link(browser: &mut Browser, url: &str) {
     let title = browser.evaluate("document.querySelector('#r-title').textContent");
     assert_eq!(title, format!("Reply of {SAID} at L5-noise"));
     let reading = browser.evaluate("document.querySelector('#r-reading').textContent");
-    assert_eq!(reading, "strict reading: A · lenient: A · wrong");
+    assert_eq!(reading, "strict reading: A · lenient: A");
+    let mark = browser.evaluate("document.querySelector('#r-mark').textContent");
+    assert_eq!(mark, "✗ A, wrong");
     // A link to nowhere shows the page all the same.
     browser.go("about:blank");
     browser.go(&format!("{url}#item=%zz&model=nobody"));
@@ -349,7 +351,7 @@ fn the_page_without_true_answers_works_in_a_browser() {
     );
     let title = browser.evaluate("document.querySelector('#i-choices .true').title");
     assert_eq!(title, "its answer at L0");
-    let reading = browser.evaluate("document.querySelector('#r-reading').textContent");
+    let reading = browser.evaluate("document.querySelector('#r-mark').textContent");
     assert!(
         reading.as_str().unwrap().ends_with("not as at L0"),
         "{reading}"

@@ -15,6 +15,7 @@ mod ladder;
 mod latex;
 mod light_readings;
 pub(crate) mod openeqa;
+pub(crate) mod outcome_words;
 pub(crate) mod page;
 pub(crate) mod paper;
 pub(crate) mod products;

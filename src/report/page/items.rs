@@ -12,12 +12,14 @@ use serde_json::Value;
 
 use super::inputs::PageInputs;
 use crate::error::{Error, Result};
+use crate::report::outcome_words;
 use crate::score::choice::ReadingMode;
 use crate::score::confusion;
 use crate::score::grid::{Grid, TrialResult};
 use crate::types::outlines::PixelBox;
 use crate::types::{
-    Axis, AxisLevel, FrameId, ObjectCrop, QuestionId, RunQuestion, Thumbnail, UnreadReason, View,
+    Axis, AxisLevel, FailureKind, FrameId, ObjectCrop, QuestionId, Record, RunQuestion, Thumbnail,
+    UnreadReason, View,
 };
 
 /// Codes of results that are not the index of a choice.
@@ -70,7 +72,7 @@ struct PageData<'a> {
     items: Vec<Item>,
     strict: Vec<Vec<u8>>,
     lenient: Vec<Vec<u8>>,
-    reasons: Vec<Value>,
+    reasons: Vec<String>,
     why: Vec<Vec<usize>>,
     texts: Vec<String>,
     replies: Vec<Vec<usize>>,
@@ -317,20 +319,46 @@ fn clean(grid: &Grid<'_>, of: &crate::score::subject::Subject) -> Option<usize> 
     grid.stand_in(&clean)
 }
 
-/// The different reasons for unreadable replies, with `None` first, and for each subject and item the index of its reason.
-fn reasons(grid: &Grid<'_>) -> (Vec<Value>, Vec<Vec<usize>>) {
-    let mut reasons: Distinct<Option<UnreadReason>> = Distinct::new();
-    reasons.index_of(None);
+/// Why a reply was not read, or why none came.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Why {
+    Nothing,
+    Unread(UnreadReason),
+    Failed(FailureKind, Option<u16>),
+}
+
+impl Why {
+    fn of(record: Option<&Record>) -> Self {
+        let unread = record.and_then(|record| record.detail.strict?.why);
+        let failed = record.and_then(|record| record.failure.as_ref());
+        match (unread, failed) {
+            (Some(why), _) => Self::Unread(why),
+            (None, Some(failure)) => Self::Failed(failure.kind, failure.status),
+            (None, None) => Self::Nothing,
+        }
+    }
+
+    fn words(self) -> String {
+        match self {
+            Self::Nothing => String::new(),
+            Self::Unread(why) => outcome_words::unread(why).to_owned(),
+            Self::Failed(kind, status) => outcome_words::failed(kind, status),
+        }
+    }
+}
+
+/// The different reasons in words why replies were not read or did not come, with none first, and for each subject and item the
+/// index of its reason.
+fn reasons(grid: &Grid<'_>) -> (Vec<String>, Vec<Vec<usize>>) {
+    let mut reasons = Distinct::new();
+    reasons.index_of(Why::Nothing);
     let mut indices = Vec::new();
     for subject in 0..grid.subjects.len() {
-        let why = (0..grid.items.len()).map(|item| {
-            let record = grid.record(subject, item);
-            reasons.index_of(record.and_then(|record| record.detail.strict?.why))
-        });
+        let why =
+            (0..grid.items.len()).map(|item| reasons.index_of(Why::of(grid.record(subject, item))));
         indices.push(why.collect());
     }
-    let named = reasons.list.iter().map(|why| serde_json::json!(why));
-    (named.collect(), indices)
+    (reasons.list.into_iter().map(Why::words).collect(), indices)
 }
 
 /// The different replies, cut if they are too long, and for each subject and item the index of its reply.
@@ -345,10 +373,7 @@ fn replies(grid: &Grid<'_>, limit: usize) -> (Vec<String>, Vec<Vec<usize>>) {
             let Some(record) = grid.record(subject, item) else {
                 return 0;
             };
-            let failure = || record.failure.as_ref().map(|failure| &*failure.message);
-            let text = record.reply.as_deref().filter(|text| !text.is_empty());
-            let text = text.or(record.refusal.as_deref()).or_else(failure);
-            texts.index_of(text.unwrap_or_default())
+            texts.index_of(record.text_or_error().unwrap_or_default())
         });
         indices.push(of_subject.collect());
     }

@@ -50,11 +50,16 @@ const reference = (subject, item) => {
   return code < UNREAD ? code : null;
 };
 const isRight = (subject, item) => chosen(subject, item) === reference(subject, item);
+// Why a reply was not read, or why none came.
+const because = (subject, item) => {
+  const why = data.reasons[data.why[subject][item]];
+  return why ? ` (${why})` : "";
+};
 const mark = (subject, item) => {
   const code = chosen(subject, item);
   if (code === ABSENT) return ["", "m-none", "not asked"];
-  if (code === FAILED) return ["!", "m-odd", "no reply"];
-  if (code === UNREAD) return ["?", "m-odd", "not readable"];
+  if (code === FAILED) return ["!", "m-odd", "failed" + because(subject, item)];
+  if (code === UNREAD) return ["?", "m-odd", "not read" + because(subject, item)];
   if (reference(subject, item) === null) return [letter(code), "m-none", "no answer at L0"];
   const [same, other] = hasTruth() ? ["right", "wrong"] : [SAME, OTHER];
   return isRight(subject, item) ? ["✓ " + letter(code), "m-right", same] : ["✗ " + letter(code), "m-wrong", other];
@@ -89,8 +94,8 @@ const STATES = {
   "all": () => true,
   "right": (s, i) => isRight(s, i),
   "wrong": (s, i) => chosen(s, i) < UNREAD && !isRight(s, i),
-  "not readable": (s, i) => chosen(s, i) === UNREAD,
-  "no reply": (s, i) => chosen(s, i) === FAILED,
+  "not read": (s, i) => chosen(s, i) === UNREAD,
+  "failed": (s, i) => chosen(s, i) === FAILED,
   "lost since L0": (s, i) => { const l = data.subjects[s].clean ?? -1; return l >= 0 && isRight(l, i) && chosen(s, i) < FAILED && !isRight(s, i); },
   "found since L0": (s, i) => { const l = data.subjects[s].clean ?? -1; return l >= 0 && chosen(l, i) < FAILED && !isRight(l, i) && isRight(s, i); },
   "first lost at this level": (s, i) => isFirstLost(s, i),
@@ -109,7 +114,7 @@ const STATES = {
 // The same without true choices: nothing is right or wrong.
 const SAME = "as at L0", OTHER = "not as at L0";
 const withoutTruth = () => {
-  const kept = [["all", "all"], ["right", SAME], ["wrong", OTHER], ["not readable", "not readable"], ["no reply", "no reply"],
+  const kept = [["all", "all"], ["right", SAME], ["wrong", OTHER], ["not read", "not read"], ["failed", "failed"],
     ["rescued by the enhancer", "brought back by the enhancer"], ["harmed by the enhancer", "changed by the enhancer"],
     ["another answer there", "another answer there"], ["models differ", "models differ"]];
   const states = kept.map(([name, own]) => [own, STATES[name]]);
@@ -326,7 +331,9 @@ const marks = (i) => {
   const there = everyLevel();
   const head = make("tr");
   head.append(...["model", "light", ...there].map((name) => { const th = make("th", name); th.scope = "col"; return th; }));
-  table.append(head);
+  const thead = make("thead");
+  thead.append(head);
+  table.append(thead);
   const now = subjectNow(), names = shortened(unique(data.subjects.map((s) => s.model)));
   for (const model of unique(data.subjects.map((s) => s.model))) {
     for (const light of lights(model)) {
@@ -358,19 +365,40 @@ const marks = (i) => {
   }
 };
 
+// The answers that were not read or did not come, each with why, and with what was said.
+const LONGEST_QUOTE = 120;
+const unread = (i) => {
+  const names = shortened(unique(data.subjects.map((s) => s.model))), rows = [];
+  data.subjects.forEach((s, subject) => {
+    const code = chosen(subject, i);
+    if (code !== UNREAD && code !== FAILED) return;
+    const [sign, name, word] = mark(subject, i), row = make("li"), quote = make("q");
+    const text = data.texts[data.replies[subject][i]] || "", letters = [...text];
+    reveal(quote, letters.length > LONGEST_QUOTE ? letters.slice(0, LONGEST_QUOTE).join("") + " …" : text);
+    row.append(make("span", sign + " ", name), `${names.get(s.model)}, ${s.condition}: ${word}`);
+    if (text) row.append(code === FAILED ? "; the error: " : "; the reply: ", quote);
+    rows.push(row);
+  });
+  $("i-unread").replaceChildren(...rows);
+};
+
 const reply = (subject, i) => {
   if (subject < 0 || chosen(subject, i) === ABSENT) {
     $("r-title").textContent = "";
     $("r-text").textContent = "";
-    $("r-reading").textContent = "not asked";
+    $("r-mark").textContent = "not asked";
+    $("r-mark").className = "m-none";
+    $("r-reading").textContent = "";
     return;
   }
   const s = data.subjects[subject];
   $("r-title").textContent = "Reply of " + s.model + " at " + s.condition;
   reveal($("r-text"), data.texts[data.replies[subject][i]] || "");
-  const said = (code) => code < UNREAD ? letter(code) : code === UNREAD ? "nothing" : "no reply";
-  const why = data.reasons[data.why[subject][i]];
-  $("r-reading").textContent = "strict reading: " + said(chosen(subject, i)) + (why ? " (" + why.replace(/_/g, " ") + ")" : "") + " · lenient: " + said(data.lenient[subject][i]) + " · " + mark(subject, i)[2];
+  const [sign, name, word] = mark(subject, i), lenient = data.lenient[subject][i];
+  $("r-mark").textContent = (sign ? sign + ", " : "") + word;
+  $("r-mark").className = name;
+  const said = (code) => code < UNREAD ? letter(code) : "nothing";
+  $("r-reading").textContent = lenient < FAILED ? `strict reading: ${said(chosen(subject, i))} · lenient: ${said(lenient)}` : "";
 };
 
 const draw = () => {
@@ -395,6 +423,7 @@ const draw = () => {
   $("i-choices").replaceChildren(...list);
   pictures(question);
   marks(i);
+  unread(i);
   reply(subject, i);
   $("i-evidence").textContent = question.evidence ? JSON.stringify(question.evidence, null, 1) : "none";
 };
