@@ -61,9 +61,7 @@ mod tests {
         let reasons: std::collections::BTreeSet<&str> =
             UnreadReason::ALL.into_iter().map(unread).collect();
         assert_eq!(reasons.len(), UnreadReason::ALL.len());
-        let kinds = FailureKind::ALL
-            .into_iter()
-            .map(|kind| failed(kind, None));
+        let kinds = FailureKind::ALL.into_iter().map(|kind| failed(kind, None));
         let kinds: std::collections::BTreeSet<String> = kinds.collect();
         assert_eq!(kinds.len(), FailureKind::ALL.len());
         let status = failed(FailureKind::RateLimit, Some(429));

@@ -111,7 +111,10 @@ fn open_answer(record: &Record<OpenDetail>) -> ShownAnswer {
         model: record.model.clone(),
         condition: record.condition.clone(),
         outcome: match (&record.failure, &record.detail.judged) {
-            (Some(failure), _) => format!("failed ({})", outcome_words::failed(failure.kind, failure.status)),
+            (Some(failure), _) => format!(
+                "failed ({})",
+                outcome_words::failed(failure.kind, failure.status)
+            ),
             (None, Some(_)) => "marked".to_owned(),
             (None, None) => "answered".to_owned(),
         },

@@ -5,7 +5,10 @@
 
 #![allow(clippy::unwrap_used)]
 
+#[path = "../support/mod.rs"]
 mod support;
+
+mod access;
 
 use serde_json::{Value, json};
 use support::browser::{Browser, chromium};
