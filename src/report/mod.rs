@@ -33,5 +33,6 @@ pub(crate) mod table;
 pub(crate) mod tables;
 mod template;
 pub(crate) mod terminal;
+mod views;
 mod width;
 mod words;
