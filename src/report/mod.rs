@@ -20,7 +20,6 @@ pub(crate) mod page;
 pub(crate) mod paper;
 pub(crate) mod products;
 pub(crate) mod questions;
-mod readable;
 pub(crate) mod realism;
 mod samples;
 mod script;

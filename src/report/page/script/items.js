@@ -28,12 +28,16 @@ const unpack = async () => {
   return JSON.parse(await new Response(stream).text());
 };
 
+// Open questions have marks of a judge where others have choices: 1 to 5, and 0 of an answer that says nothing.
+const BEST_MARK = 5;
+const isOpen = () => data.kind === "open";
+
 // What a subject made of an item.
 const chosen = (subject, item) => data.strict[subject][item];
 // Where nobody knows the true choice, a model is held against its own answer at L0: that of the first item of the question.
 const hasTruth = () => !data.lights;
 const findReferences = () => {
-  if (data.items.every((item) => item.truth !== null)) return;
+  if (isOpen() || data.items.every((item) => item.truth !== null)) return;
   data.lights = data.subjects.map((s) => data.subjects.findIndex((o) => o.model === s.model && o.level === "L0" && o.enhancer === null));
   const seen = new Map();
   data.firsts = data.items.map((item, i) => {
@@ -49,17 +53,23 @@ const reference = (subject, item) => {
   const code = there < 0 ? ABSENT : chosen(there, data.firsts[item]);
   return code < UNREAD ? code : null;
 };
-const isRight = (subject, item) => chosen(subject, item) === reference(subject, item);
+const isRight = (subject, item) => chosen(subject, item) === (isOpen() ? BEST_MARK : reference(subject, item));
 // Why a reply was not read, or why none came.
 const because = (subject, item) => {
   const why = data.reasons[data.why[subject][item]];
   return why ? ` (${why})` : "";
 };
+const openMark = (code) => {
+  if (code === BEST_MARK) return ["✓ 5/5", "m-right", "mark 5 of 5"];
+  if (code === 0) return ["✗ 0", "m-wrong", "no answer in the reply, which scores 0"];
+  return code === 1 ? ["✗ 1/5", "m-wrong", "mark 1 of 5, which scores 0"] : [code + "/5", "m-none", `mark ${code} of 5`];
+};
 const mark = (subject, item) => {
   const code = chosen(subject, item);
   if (code === ABSENT) return ["", "m-none", "not asked"];
-  if (code === FAILED) return ["!", "m-odd", "failed" + because(subject, item)];
-  if (code === UNREAD) return ["?", "m-odd", "not read" + because(subject, item)];
+  if (isOpen() && code < UNREAD) return openMark(code);
+  if (code === FAILED) return ["!", "m-odd", (isOpen() ? "not answered" : "failed") + because(subject, item)];
+  if (code === UNREAD) return ["?", "m-odd", (isOpen() ? "not marked" : "not read") + because(subject, item)];
   if (reference(subject, item) === null) return [letter(code), "m-none", "no answer at L0"];
   const [same, other] = hasTruth() ? ["right", "wrong"] : [SAME, OTHER];
   return isRight(subject, item) ? ["✓ " + letter(code), "m-right", same] : ["✗ " + letter(code), "m-wrong", other];
@@ -122,6 +132,32 @@ const withoutTruth = () => {
   Object.assign(STATES, Object.fromEntries(states));
 };
 
+// Those of open questions: marks are higher or lower.
+const openStates = () => {
+  // 0 and 1 both score nothing.
+  const points = (s, i) => s >= 0 && chosen(s, i) < UNREAD ? Math.max(chosen(s, i), 1) : null;
+  const less = (a, b) => a !== null && b !== null && a < b;
+  const cleanOf = (s) => data.subjects[s].clean ?? -1;
+  const rawOf = (s) => raw(s) === s ? -1 : raw(s);
+  const states = {
+    "all": () => true,
+    "mark 5": (s, i) => chosen(s, i) === BEST_MARK,
+    "mark below 5": (s, i) => chosen(s, i) < BEST_MARK,
+    "not marked": (s, i) => chosen(s, i) === UNREAD,
+    "not answered": (s, i) => chosen(s, i) === FAILED,
+    "lower than at L0": (s, i) => less(points(s, i), points(cleanOf(s), i)),
+    "higher than at L0": (s, i) => less(points(cleanOf(s), i), points(s, i)),
+    "lower than at L0 for any model": (_, i) => data.subjects.some((_o, s) => less(points(s, i), points(cleanOf(s), i))),
+    "higher with the enhancer": (s, i) => less(points(rawOf(s), i), points(s, i)),
+    "lower with the enhancer": (s, i) => less(points(s, i), points(rawOf(s), i)),
+    "higher here than there": (s, i) => less(points(there(), i), points(s, i)),
+    "lower here than there": (s, i) => less(points(s, i), points(there(), i)),
+    "models differ": STATES["models differ"],
+  };
+  for (const name of Object.keys(STATES)) delete STATES[name];
+  Object.assign(STATES, states);
+};
+
 const fill = (select, values, value) => {
   select.replaceChildren(...values.map((v) => { const o = make("option", v); o.value = v; return o; }));
   select.value = values.includes(value) ? value : values[0];
@@ -158,8 +194,9 @@ const select = () => {
     if (state.family !== "all" && data.families[question.family] !== state.family) continue;
     if (subject < 0 || chosen(subject, i) === ABSENT || !test(subject, i)) continue;
     if (words) {
-      const text = data.texts[data.replies[subject][i]] || "";
-      if (![question.text, question.id, data.frames[question.frame], text].some((t) => t.toLowerCase().includes(words))) continue;
+      const replies = isOpen() ? data.replies.map((row) => row[i]) : [data.replies[subject][i]];
+      const texts = [question.text, question.id, data.frames[question.frame], question.answer || "", ...replies.map((reply) => data.texts[reply] || "")];
+      if (!texts.some((t) => t.toLowerCase().includes(words))) continue;
     }
     shown.push(i);
   }
@@ -299,6 +336,7 @@ const pictures = (question) => {
   if (!kept) return;
   const outlines = boxes(question);
   $("i-object").hidden = !outlines.length;
+  $("i-boxes").parentElement.hidden = !outlines.length;
   const conditions = unique(data.subjects.filter((s) => s.level === level).map((s) => s.condition));
   for (const condition of level === "L0" ? conditions : ["L0", ...conditions]) {
     const image = kept[condition];
@@ -306,7 +344,9 @@ const pictures = (question) => {
     const figure = make("figure"), frame = make("div", undefined, "frame"), whole = make("img", undefined, "whole"), crop = make("img", undefined, "crop");
     whole.src = image.small;
     whole.draggable = false;
-    whole.alt = condition + " of " + data.frames[question.frame];
+    // Of a walk, small copies of all frames, or of many the one in the middle.
+    const walk = isOpen() ? ", frames of the walk (of many, that in the middle)" : "";
+    whole.alt = condition + " of " + data.frames[question.frame] + walk;
     frame.append(whole);
     for (const at of $("i-boxes").checked ? outlines : []) {
       const outline = make("span", undefined, "box");
@@ -316,10 +356,10 @@ const pictures = (question) => {
     whole.addEventListener("load", show);
     const object = question.object && image.objects.find((one) => one.object.join() === question.object.join());
     crop.src = object ? object.crop : image.crop;
-    const part = object ? "the thing asked about" : "its middle";
+    const part = object ? "the thing asked about" : isOpen() ? "the middle of the middle one" : "its middle";
     crop.alt = part + ", " + whole.alt;
     const gain = image.stops > 0 ? "light × " + Math.round(2 ** image.stops) + " (" + image.stops + " EV)" : "as it is";
-    figure.append(frame, crop, make("figcaption", condition + "; below, " + part + ", " + gain));
+    figure.append(frame, crop, make("figcaption", condition + walk + "; below, " + part + ", " + gain));
     box.append(figure);
   }
   show();
@@ -330,10 +370,11 @@ const marks = (i) => {
   table.replaceChildren();
   const there = everyLevel();
   const head = make("tr");
-  head.append(...["model", "light", ...there].map((name) => { const th = make("th", name); th.scope = "col"; return th; }));
+  head.append(...["model", "light", ...there].map((name) => { const th = make("th", name, name === "light" ? "text" : ""); th.scope = "col"; return th; }));
   const thead = make("thead");
   thead.append(head);
-  table.append(thead);
+  const body = make("tbody");
+  table.append(thead, body);
   const now = subjectNow(), names = shortened(unique(data.subjects.map((s) => s.model)));
   for (const model of unique(data.subjects.map((s) => s.model))) {
     for (const light of lights(model)) {
@@ -360,7 +401,7 @@ const marks = (i) => {
         }
         row.append(cell);
       }
-      table.append(row);
+      body.append(row);
     }
   }
 };
@@ -369,6 +410,8 @@ const marks = (i) => {
 const LONGEST_QUOTE = 120;
 const unread = (i) => {
   const names = shortened(unique(data.subjects.map((s) => s.model))), rows = [];
+  // The table of all answers has the same of open questions.
+  if (isOpen()) return;
   data.subjects.forEach((s, subject) => {
     const code = chosen(subject, i);
     if (code !== UNREAD && code !== FAILED) return;
@@ -382,6 +425,30 @@ const unread = (i) => {
   $("i-unread").replaceChildren(...rows);
 };
 
+// All answers to an open question, with their marks and what the judge said.
+const answers = (i) => {
+  const box = $("i-answers");
+  box.hidden = !isOpen();
+  if (!isOpen()) return;
+  const table = make("table"), head = make("tr"), thead = make("thead"), body = make("tbody");
+  const names = shortened(unique(data.subjects.map((s) => s.model)));
+  head.append(...["model", "shown", "mark", "answer"].map((name) => { const th = make("th", name, name === "mark" ? "" : "text"); th.scope = "col"; return th; }));
+  thead.append(head);
+  data.subjects.forEach((s, subject) => {
+    if (chosen(subject, i) === ABSENT) return;
+    const [sign, name, word] = mark(subject, i), row = make("tr"), first = make("th", names.get(s.model)), said = make("td", undefined, "said");
+    first.scope = "row";
+    first.title = s.model;
+    reveal(said, data.texts[data.replies[subject][i]] || word);
+    const marked = make("td", sign, name);
+    marked.title = word;
+    row.append(first, make("td", s.condition, "text"), marked, said);
+    body.append(row);
+  });
+  table.append(make("caption", "All answers"), thead, body);
+  box.replaceChildren(table);
+};
+
 const reply = (subject, i) => {
   if (subject < 0 || chosen(subject, i) === ABSENT) {
     $("r-title").textContent = "";
@@ -389,12 +456,16 @@ const reply = (subject, i) => {
     $("r-mark").textContent = "not asked";
     $("r-mark").className = "m-none";
     $("r-reading").textContent = "";
+    $("r-judged").hidden = true;
     return;
   }
   const s = data.subjects[subject];
-  $("r-title").textContent = "Reply of " + s.model + " at " + s.condition;
+  const judged = isOpen() ? data.texts[data.judged[subject][i]] : "";
+  $("r-judged").hidden = !judged;
+  reveal($("r-judge"), judged || "");
+  $("r-title").textContent = (isOpen() ? "Answer of " : "Reply of ") + s.model + " at " + s.condition;
   reveal($("r-text"), data.texts[data.replies[subject][i]] || "");
-  const [sign, name, word] = mark(subject, i), lenient = data.lenient[subject][i];
+  const [sign, name, word] = mark(subject, i), lenient = isOpen() ? ABSENT : data.lenient[subject][i];
   $("r-mark").textContent = (sign ? sign + ", " : "") + word;
   $("r-mark").className = name;
   const said = (code) => code < UNREAD ? letter(code) : "nothing";
@@ -420,10 +491,19 @@ const draw = () => {
     if (subject >= 0 && chosen(subject, i) === index) { row.classList.add("chosen"); row.title = "chosen"; }
     return row;
   });
+  if (isOpen()) {
+    const right = [question.answer, ...(question.also_right || [])].filter((answer) => answer !== undefined);
+    list.push(...right.map((answer, place) => {
+      const row = make("li", undefined, "true");
+      reveal(row, (place ? "also right: " : "right: ") + answer + " ✓");
+      return row;
+    }));
+  }
   $("i-choices").replaceChildren(...list);
   pictures(question);
   marks(i);
   unread(i);
+  answers(i);
   reply(subject, i);
   $("i-evidence").textContent = question.evidence ? JSON.stringify(question.evidence, null, 1) : "none";
 };
@@ -474,7 +554,11 @@ const follow = () => {
 const start = async () => {
   data = await unpack();
   findReferences();
-  if (!hasTruth()) withoutTruth();
+  if (isOpen()) openStates(); else if (!hasTruth()) withoutTruth();
+  $("i-evidenced").hidden = isOpen();
+  $("i-key").textContent = isOpen()
+    ? "Marks of the judge from 1 to 5 (0: no answer) · ? not marked · ! not answered; a click shows the answer and what the judge said"
+    : `✓ ${hasTruth() ? "right" : SAME} · ✗ ${hasTruth() ? "wrong" : OTHER} · ? not read · ! failed; the letter is the choice that was read; a click shows the reply`;
   const first = data.subjects.find((s) => s.light !== "blind") || data.subjects[0];
   state = { family: "all", model: first?.model, light: undefined, level: undefined, against: "–", show: "all", words: "", item: data.items.length ? 0 : null, pictured: null };
   $("loading").hidden = true;
