@@ -72,6 +72,7 @@ fn the_page_works_in_a_browser() {
     deep_link(&mut browser, &url);
     themes(&mut browser);
     narrow(&mut browser, &url);
+    paper(&mut browser);
     assert!(browser.print("page.pdf") > 10_000);
     assert_eq!(browser.complaints(&url), Vec::<String>::new());
 }
@@ -310,6 +311,36 @@ fn narrow(browser: &mut Browser, url: &str) {
     assert!(wide.as_u64().unwrap() <= 390, "nothing sticks out: {wide}");
     browser.shot("narrow.png", true);
     browser.window(1400, 900, "light");
+}
+
+/// On paper charts have its width, and what is not drawn is said; afterwards they have that of the window again.
+fn paper(browser: &mut Browser) {
+    let widest =
+        "Math.max(...[...document.querySelectorAll('.panel svg')].map((s) => s.clientWidth))";
+    let noted = "document.querySelector('figure.chart .paper-only').textContent";
+    let before = browser.evaluate(widest).as_f64().unwrap();
+    browser.evaluate("dispatchEvent(new Event('beforeprint'))");
+    let printed = browser.evaluate(widest).as_f64().unwrap();
+    // A4 has 718 pixels between margins of 10 mm.
+    assert!(printed <= 718.0 && printed < before, "{printed} {before}");
+    let note = browser.evaluate(noted);
+    assert_eq!(note, "Not drawn, as they are switched off: random. ");
+    browser.evaluate("dispatchEvent(new Event('afterprint'))");
+    assert_eq!(browser.evaluate(widest).as_f64().unwrap(), before);
+    browser.call("Emulation.setEmulatedMedia", &json!({"media": "print"}));
+    let is_shown = |browser: &mut Browser, of: &str| {
+        browser.evaluate(&format!("document.querySelector('{of}').checkVisibility()"))
+    };
+    for (of, expected) in [
+        ("header .paper-only", true),
+        (".plot", true),
+        ("nav", false),
+        ("#items", false),
+    ] {
+        assert_eq!(is_shown(browser, of), expected, "{of}");
+    }
+    browser.call("Emulation.setEmulatedMedia", &json!({"media": ""}));
+    assert_eq!(is_shown(browser, "header .paper-only"), false);
 }
 
 #[test]

@@ -41,6 +41,7 @@ const charts = [];
 const NAMED_FROM = 480;
 const LETTER = 7.2;
 const BAND_LINES = 2;
+const BAR_STEP = 3;
 const MOST_FLAT = 3;
 const MOST_NAMED = 14;
 // Widths of a panel on paper (A4 with margins of 10 mm has 718 pixels), by how many panels a figure has.
@@ -219,7 +220,9 @@ class Chart {
             group.append(draw_("path", { d: `M${[...upper, ...lower].join("L")}Z`, class: "band" }));
           } else if (here) {
             const point = line.points.find((p) => p.x[1] === cursor.value);
-            if (point) group.append(draw_("path", { d: `M${x(point.x[1])} ${y(point.y[1])}V${y(point.y[2])}`, class: "bar" }));
+            // Side by side, so that each can be told from the others.
+            const beside = x(point?.x[1]) + (curves.indexOf(line) - (curves.length - 1) / 2) * BAR_STEP;
+            if (point) group.append(draw_("path", { d: `M${beside} ${y(point.y[1])}V${y(point.y[2])}`, class: "bar" }));
           }
           group.append(draw_("path", { d: "M" + points.map((p) => p.join(" ")).join("L"), class: "line", "stroke-dasharray": dash }));
         } else {

@@ -379,7 +379,7 @@ const marks = (i) => {
   for (const model of unique(data.subjects.map((s) => s.model))) {
     for (const light of lights(model)) {
       const row = make("tr");
-      const first = make("th", names.get(model)), second = make("td", light, "text");
+      const first = make("th", names.get(model)), second = make("td", light === "blind" ? "without images" : light, "text");
       first.scope = "row";
       first.title = model;
       row.append(first, second);
@@ -389,6 +389,8 @@ const marks = (i) => {
         const [sign, name, word] = subject >= 0 ? mark(subject, i) : ["", "", ""];
         const cell = make("td", own || light === "blind" ? sign : "", name);
         cell.title = word;
+        // What was seen without an image lies at no level.
+        if (light === "blind") cell.colSpan = there.length;
         if (own) {
           const button = make("button", sign);
           button.type = "button";
