@@ -125,8 +125,15 @@ fn faint(browser: &mut Browser) -> Vec<String> {
         const named = names.map((name) => { probe.style.color = `var(${name})`; return [name, getComputedStyle(probe).color]; });
         probe.remove();
         const of = (selector, property) => [...document.querySelectorAll('.plot ' + selector)].map((e) => [selector, getComputedStyle(e)[property]]);
+        const all = [...named, ...of('.line', 'stroke'), ...of('.stroked', 'stroke'), ...of('.filled', 'fill')];
+        // Figures that are shown as they are, but for their ground, grid, text and bands.
+        const still = [...document.querySelectorAll('figure:not(.drawn) .drawing svg *')].filter((e) => Number(getComputedStyle(e).opacity) > 0.5);
+        const plain = ['#FFFFFF', '#222222', '#DDDDDD', 'none', null];
+        for (const property of ['fill', 'stroke']) {
+          all.push(...still.filter((e) => !plain.includes(e.getAttribute(property))).map((e) => [e.tagName, getComputedStyle(e)[property]]));
+        }
         return { ground: getComputedStyle(document.body).backgroundColor,
-                 all: [...named, ...of('.line', 'stroke'), ...of('.stroked', 'stroke'), ...of('.filled', 'fill')] };
+                 all };
     })()";
     let found = browser.evaluate(script);
     let ground = found["ground"].as_str().unwrap();

@@ -21,17 +21,12 @@ type Quantity = fn(&ConditionFidelity) -> Option<Estimate>;
 const CHANCE: LineStyle = LineStyle(27);
 
 /// The panels: title, number, and the share that chance has.
-const PANELS: [(&str, Quantity, Option<f64>); 4] = [
-    ("SSIM of the images", |row| known(row.means[1]?), None),
-    ("right answers", |row| known(row.accuracy), None),
+const PANELS: [(&str, Quantity, Option<f64>); 3] = [
+    ("SSIM of the images × 100", |row| known(row.means[1]?), None),
+    ("right answers in %", |row| known(row.accuracy), None),
     (
-        "AUC of PSNR within a condition",
+        "AUC of PSNR × 100",
         |row| Some(row.predicts[0]?.auc.estimate),
-        Some(0.5),
-    ),
-    (
-        "AUC of SSIM within a condition",
-        |row| Some(row.predicts[1]?.auc.estimate),
         Some(0.5),
     ),
 ];
@@ -59,9 +54,9 @@ pub(super) fn drawing(findings: &Findings<'_>) -> Option<Drawing> {
         several => format!("answers of {several} models together"),
     };
     let chart = Chart {
-        measure: "in %; SSIM and AUC × 100",
+        measure: "in %",
         panels,
-        columns: 2,
+        columns: 3,
         note: format!(
             "{models}; the band of an AUC is its 95 % interval by {}; strict reading",
             findings.unit
@@ -70,7 +65,7 @@ pub(super) fn drawing(findings: &Findings<'_>) -> Option<Drawing> {
     Some(Drawing {
         name: "fidelity",
         caption: "Does a better picture mean better answers? Between conditions: how similar the images are to their clean frames \
-                  and how many answers are right. Within a condition: AUC, 50 is chance. PSNR is in the table."
+                  and how many answers are right. Within a condition: AUC of PSNR, 50 is chance. PSNR and the AUC of SSIM are in the table."
             .to_owned(),
         chart: Drawn::Lines(chart),
     })

@@ -178,7 +178,7 @@ class Chart {
     const names = lines.map((line) => this.names.get(line.name));
     const isNamed = width >= NAMED_FROM && lines.length > 0 && lines.length <= MOST_NAMED;
     const right = isNamed ? Math.min(Math.max(...names.map((name) => name.length)) * LETTER + 26, width * 0.36) : 14;
-    const height = Math.round(Math.min(Math.max(width * 0.5, this.paper ? 156 : 230), this.paper ? 176 : 340));
+    const height = Math.round(Math.min(Math.max(width * 0.5, this.paper ? 142 : 230), this.paper ? 166 : 340));
     const area = { left: 46, top: 10, right: width - right, bottom: height - 52 };
     const x = (value) => area.left + 10 + (area.right - area.left - 20) * (panel.end > 0 ? value / panel.end : 0.5);
     const y = (share) => area.bottom - (area.bottom - area.top) * Math.min(Math.max(share, 0), 1);
