@@ -18,7 +18,7 @@ type Light<'f> = (&'f KindReading, Option<&'f EnhancerName>);
 type Quantity = fn(&ConditionFidelity) -> Option<Estimate>;
 
 /// Style of the line of chance.
-const CHANCE: LineStyle = LineStyle(27);
+const CHANCE: LineStyle = LineStyle::REFERENCE;
 
 /// The panels: title, number, and the share that chance has.
 const PANELS: [(&str, Quantity, Option<f64>); 3] = [
