@@ -39,7 +39,12 @@ const CHART_SCRIPT: &str = concat!(
     include_str!("script/base.js"),
     include_str!("script/charts.js")
 );
-const SCRIPT: &str = include_str!("script/items.js");
+/// The items and their images; the parts of one script.
+const SCRIPT: &str = concat!(
+    include_str!("script/images.js"),
+    include_str!("script/open.js"),
+    include_str!("script/items.js")
+);
 
 /// The values of the template. They are not converted to JSON first, because a large run has 100,000 cells.
 #[derive(Serialize)]
