@@ -128,7 +128,7 @@ fn faint(browser: &mut Browser) -> Vec<String> {
         const all = [...named, ...of('.line', 'stroke'), ...of('.stroked', 'stroke'), ...of('.filled', 'fill')];
         // Figures that are shown as they are, but for their ground, grid, text and bands.
         const still = [...document.querySelectorAll('figure:not(.drawn) .drawing svg *')].filter((e) => Number(getComputedStyle(e).opacity) > 0.5);
-        const plain = ['#FFFFFF', '#222222', '#DDDDDD', 'none', null];
+        const plain = ['#ffffff', '#222222', '#dddddd', 'none', null];
         for (const property of ['fill', 'stroke']) {
           all.push(...still.filter((e) => !plain.includes(e.getAttribute(property))).map((e) => [e.tagName, getComputedStyle(e)[property]]));
         }
