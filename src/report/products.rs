@@ -8,7 +8,7 @@ use super::paper::figure;
 use super::samples::{self, samples};
 use super::sentences::Sentence;
 use super::table::Table;
-use super::{chart, csv, latex};
+use super::{chart, csv, latex, views};
 use crate::error::Result;
 
 /// Files of a report by name: numbers as CSV, the main tables as LaTeX, figures as SVG, and the HTML page.
@@ -20,6 +20,7 @@ pub fn products<'a>(
     inputs: &PageInputs<'a>,
 ) -> Result<Vec<(String, Vec<u8>)>> {
     let figures = drawings(report.findings, &Names::default()).into_iter();
+    let figures = figures.chain(views::drawings(report.findings));
     let figures = figures.map(|drawing| figure(drawing.name, &drawing.caption, &drawing.chart));
     let figures: Vec<Figure> = figures.collect::<Result<_>>()?;
     let page = page(report, &figures, inputs)?;

@@ -129,6 +129,14 @@ impl<D> Record<D> {
         self.failure.is_some()
     }
 
+    /// The text of the reply; else that of a refusal, else what the error says.
+    #[must_use]
+    pub fn text_or_error(&self) -> Option<&str> {
+        let reply = self.reply.as_deref().filter(|text| !text.is_empty());
+        let error = || self.failure.as_ref().map(|failure| &*failure.message);
+        reply.or(self.refusal.as_deref()).or_else(error)
+    }
+
     /// The record with a failure after this number of requests.
     #[must_use]
     pub fn failed_by(self, failure: Failure, attempts: u32) -> Self {

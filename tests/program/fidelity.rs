@@ -139,9 +139,41 @@ fn a_run_keeps_the_fidelity_of_its_images_and_reports_it() {
         table.starts_with("condition,level,variant,enhancer,images,psnr,ssim,n,accuracy,psnr_auc")
     );
     assert_eq!(table.lines().count(), 3, "{table}");
+    the_page_draws_the_numbers_of_the_file(&bench, &table);
     // Images that were measured are not measured again; a new condition is added.
     run("both");
     let after = lines("fidelity.jsonl");
     assert_eq!(after.len(), 2 * stored.len());
     assert_eq!(after[..stored.len()], stored);
+}
+
+/// The figure of the page has a point for each row of the file, with its numbers; a run without dark images has no such section.
+fn the_page_draws_the_numbers_of_the_file(bench: &Bench, table: &str) {
+    let page = |run: &str| fs::read_to_string(bench.path(run).join("report.html")).unwrap();
+    let drawn = page("run");
+    let (_, figure) = drawn.split_once(r#"id="figure-fidelity""#).unwrap();
+    let (_, data) = figure
+        .split_once(r#"<script type="application/json">"#)
+        .unwrap();
+    let data: Value = serde_json::from_str(data.split_once("</script>").unwrap().0).unwrap();
+    for (panel, column) in [("SSIM of the images × 100", 6), ("right answers in %", 8)] {
+        let panels = data["panels"].as_array().unwrap();
+        let panel = panels.iter().find(|one| one["title"] == panel).unwrap();
+        let points = panel["lines"][0]["points"].as_array().unwrap();
+        let drawn: Vec<f64> = points
+            .iter()
+            .map(|point| point["y"][0].as_f64().unwrap())
+            .collect();
+        let rows = table.lines().skip(1);
+        let filed: Vec<f64> = rows
+            .map(|row| row.split(',').nth(column).unwrap().parse().unwrap())
+            .collect();
+        assert_eq!(drawn.len(), filed.len());
+        for (drawn, filed) in drawn.iter().zip(&filed) {
+            assert!((drawn - filed).abs() < 1e-4, "{drawn} {filed}");
+        }
+    }
+    let line = "--model random --data rooms:frames=8,size=160x120 --out light --levels L0";
+    bench.complete(&words(line));
+    assert!(!page("light").contains(r#"id="fidelity""#));
 }

@@ -204,6 +204,12 @@ fn a_photograph_is_a_condition_of_its_own_beside_synthetic_ones() {
     assert!(figure.contains("dark (real)"), "no mark in the legend");
     let pairs = self::rows(&bench, "run/pairs.csv");
     assert!((number(&pairs[0], "ev") - 3.6).abs() < 0.05, "{pairs:?}");
+    // The light, the photograph, what is as dark, and the photograph enhanced, each once.
+    let figure = fs::read_to_string(bench.path("run/figures/real.svg")).unwrap();
+    for name in ["L0", "dark", "dark+lift"] {
+        let named = format!(">{name}</text>");
+        assert!(figure.contains(&named), "{name}: {figure}");
+    }
 }
 
 #[test]

@@ -107,7 +107,7 @@ impl Combined {
 }
 
 /// A folder as a command on it names it. An absolute path says where somebody's files lie: of it the page has the name alone.
-fn typed(folder: &Path) -> String {
+pub(super) fn typed(folder: &Path) -> String {
     let name = folder.file_name().filter(|_| folder.is_absolute());
     let shown = name.map_or_else(|| folder.to_owned(), |name| Path::new("DIR").join(name));
     shell_word(&shown.display().to_string()).into_owned()

@@ -1,11 +1,12 @@
 //! The report of a run of open questions: scored from its records, and written into its folder.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
 
 use serde_json::Value;
 
 use super::alerts::{of_joining, of_runs};
+use super::combine::typed;
 use super::enhancers;
 use super::join::join;
 use super::listing::listing;
@@ -18,12 +19,14 @@ use crate::job::stored::{ShownModels, StoredRun, in_order};
 use crate::report::alert::{Alert, AlertKind};
 use crate::report::markdown::MarkdownReport;
 use crate::report::openeqa::{OpenReport, ReportedAnswer, products, render, summary_json, tables};
+use crate::report::outcome_words;
 use crate::report::table::Table;
 use crate::report::tables::EnhancerRow;
 use crate::score::llm_match::{Protocol, mark};
 use crate::score::open::{
     AnswerOutcome, OpenSummary, QuestionGroups, ScoredAnswer, open_summary_listed,
 };
+use crate::score::subject::Subject;
 use crate::store::Store;
 use crate::types::flag::read_word;
 use crate::types::manifest::Status;
@@ -60,9 +63,14 @@ impl Scores {
         let ids: Vec<&QuestionId> = run.questions.iter().map(|question| &question.id).collect();
         let predictions = predictions(&run.records, &ids, protocol);
         let marks = marks(&run.records, judge.as_deref());
+        let failures = failures(&run.records);
         let (mut scored, mut answers) = (Vec::new(), Vec::new());
         for prediction in predictions {
-            let outcome = outcome(&prediction, ids[prediction.question], &marks, protocol);
+            let question = ids[prediction.question];
+            let outcome = outcome(&prediction, question, &marks, protocol);
+            let judgement = judgement(&prediction, question, &marks);
+            let failure = failures.get(&(question, prediction.subject.clone()));
+            let failure = failure.filter(|_| outcome == AnswerOutcome::Missing);
             scored.push(ScoredAnswer {
                 subject: prediction.subject.clone(),
                 question: prediction.question,
@@ -74,6 +82,8 @@ impl Scores {
                 question: prediction.question,
                 answer: prediction.full_answer,
                 outcome,
+                judgement,
+                failure: failure.cloned(),
             });
         }
         let topics: Vec<QuestionGroups> = run.questions.iter().map(topic).collect();
@@ -108,6 +118,7 @@ impl Scores {
             judge: self.judge.as_deref(),
             protocol: self.protocol,
             name: self.run.name(),
+            folder: typed(&self.run.folder),
             questions: &self.run.questions,
             answers: &self.answers,
             thumbnails: &self.run.thumbnails,
@@ -274,6 +285,30 @@ fn marks<'a>(records: &'a [Record<OpenDetail>], judge: Option<&str>) -> Marks<'a
     marks
         .filter_map(|record| Some(((&record.question, record.detail.judged.as_deref()?), record)))
         .collect()
+}
+
+/// Why trials have no answer, in words with what the error says, by question and subject.
+fn failures(records: &[Record<OpenDetail>]) -> BTreeMap<(&QuestionId, Subject), String> {
+    let answers = records
+        .iter()
+        .filter(|record| record.detail.step == Step::Answer);
+    let failed = answers.filter_map(|record| {
+        let failure = record.failure.as_ref()?;
+        let why = outcome_words::failed(failure.kind, failure.status);
+        let subject = Subject::new(&record.model, record.condition.as_ref());
+        let why = format!("{why}: {}", failure.message);
+        Some(((&record.question, subject), why))
+    });
+    failed.collect()
+}
+
+/// What the judge said of an answer.
+fn judgement(prediction: &Prediction, question: &QuestionId, marks: &Marks<'_>) -> Option<String> {
+    let AnswerState::Text { answer, .. } = &prediction.state else {
+        return None;
+    };
+    let record = marks.get(&(question, &**answer))?;
+    record.reply.clone()
 }
 
 /// The outcome of an answer, from its mark.

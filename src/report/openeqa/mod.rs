@@ -2,6 +2,7 @@
 
 mod coverage;
 mod figure;
+mod items;
 mod open_report;
 mod page;
 mod tables;

@@ -24,6 +24,8 @@ pub(crate) struct OpenReport<'a> {
     pub protocol: Protocol,
     /// Name of the run: its folder.
     pub name: String,
+    /// The folder of the run as a command on it names it.
+    pub folder: String,
     /// The questions in the order of their file.
     pub questions: &'a [RunQuestion],
     /// The answers, each to one of the questions.
@@ -48,4 +50,8 @@ pub(crate) struct ReportedAnswer {
     /// The full text of the answer; `None` if there is none.
     pub answer: Option<String>,
     pub outcome: AnswerOutcome,
+    /// The judge's reply to the answer; `None` if there is none.
+    pub judgement: Option<String>,
+    /// Why no answer came, in words; `None` if one came, or if nothing was asked yet.
+    pub failure: Option<String>,
 }

@@ -3,14 +3,15 @@
 //! All numbers and figures are text and SVG, so that the page can be read and printed without scripts. The items, with their
 //! thumbnails, are packed data that its script reads. The page needs no network, and its content security policy allows none.
 
+pub(super) mod data;
 mod inputs;
 mod items;
 mod sections;
-pub(super) mod tables;
+mod tables;
 
+pub(crate) use data::shown_thumbnails;
 pub use inputs::PageInputs;
 pub(crate) use inputs::PageRun;
-pub(crate) use items::shown_thumbnails;
 
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -34,22 +35,29 @@ use crate::types::manifest::RunManifest;
 /// The template of the page, its style and its script.
 const PAGE: &str = include_str!("page.html");
 pub(super) const STYLE: &str = include_str!("page.css");
-/// What all pages share: names, the theme, and charts that are drawn at the width there is.
-pub(super) const CHART_SCRIPT: &str = concat!(
+/// What pages share: names, the theme, and charts that are drawn at the width there is.
+const CHART_SCRIPT: &str = concat!(
     include_str!("script/base.js"),
     include_str!("script/charts.js")
 );
-const SCRIPT: &str = include_str!("script/items.js");
+/// The items and their images; the parts of one script.
+const SCRIPT: &str = concat!(
+    include_str!("script/images.js"),
+    include_str!("script/open.js"),
+    include_str!("script/items.js")
+);
 
 /// The values of the template. They are not converted to JSON first, because a large run has 100,000 cells.
 #[derive(Serialize)]
 struct Page<'a> {
     title: String,
+    /// What families of questions are called.
+    family: &'static str,
     /// Warnings at the top of the page.
     alerts: Vec<&'a str>,
     intro: Vec<String>,
-    /// The findings in words.
-    sentences: Vec<PageSentence<'a>>,
+    /// The findings in words; `None` of an experiment that has none.
+    sentences: Option<Vec<PageSentence<'a>>>,
     how_to_read: &'static str,
     /// Heading of the table of answers against answers.
     answers_title: &'static str,
@@ -136,14 +144,56 @@ pub(crate) fn page_of<'a>(
         PAGE,
         Page {
             title: title(inputs),
+            family: "family",
             alerts: content.alerts.iter().map(|alert| &*alert.text).collect(),
-            sentences: content.sentences.iter().map(PageSentence::new).collect(),
+            sentences: Some(content.sentences.iter().map(PageSentence::new).collect()),
             how_to_read: content.how_to_read,
             answers_title: content.answers_title,
             intro: content.intro,
             sections: sections::sections(sections, content.tables, figures, inputs.thumbnails),
             runs: inputs.runs.iter().map(facts).collect(),
             data: items::packed(content.grid, content.confusions, inputs)?,
+            css: STYLE,
+            script: [CHART_SCRIPT, SCRIPT].concat(),
+        },
+    )
+}
+
+/// What the page of open questions shows, besides its figures.
+pub(in crate::report) struct OpenContent<'a> {
+    pub(in crate::report) title: String,
+    pub(in crate::report) intro: Vec<String>,
+    pub(in crate::report) alerts: &'a [String],
+    pub(in crate::report) tables: &'a [Table],
+    pub(in crate::report) sections: &'static [Section],
+    /// Name of the run.
+    pub(in crate::report) name: &'a str,
+    pub(in crate::report) manifest: &'a RunManifest,
+    /// The items, as compressed JSON in base64.
+    pub(in crate::report) items: String,
+}
+
+/// The page of open questions as HTML.
+///
+/// # Errors
+/// If the template cannot be filled.
+pub(in crate::report) fn page_of_open_questions(
+    content: OpenContent<'_>,
+    figures: &[Figure],
+) -> Result<String> {
+    filled(
+        PAGE,
+        Page {
+            title: content.title,
+            family: "category",
+            alerts: content.alerts.iter().map(String::as_str).collect(),
+            sentences: None,
+            how_to_read: "",
+            answers_title: "",
+            intro: content.intro,
+            sections: sections::sections(content.sections, content.tables, figures, &[]),
+            runs: vec![json!({"name": content.name, "rows": manifest_facts(content.manifest)})],
+            data: content.items,
             css: STYLE,
             script: [CHART_SCRIPT, SCRIPT].concat(),
         },
@@ -184,7 +234,7 @@ fn facts(run: &PageRun<'_>) -> Value {
 }
 
 /// The facts of a manifest, as rows of names and values.
-pub(super) fn manifest_facts(manifest: &RunManifest) -> Vec<(String, String)> {
+fn manifest_facts(manifest: &RunManifest) -> Vec<(String, String)> {
     [about(manifest), settings(manifest)].concat()
 }
 

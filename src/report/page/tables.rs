@@ -72,6 +72,8 @@ pub(in crate::report) fn page_tables<'a>(tables: &'a [Table], section: &str) -> 
             foot: table.foot.as_deref(),
             head: head
                 .filter_map(|column| column.heads.page.as_deref())
+                // A column without a head holds verdicts; whoever hears the table needs its name.
+                .map(|head| if head.is_empty() { "verdict" } else { head })
                 .collect(),
             rows,
         }

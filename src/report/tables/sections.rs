@@ -38,7 +38,7 @@ pub(in crate::report) const SECTIONS: [Section; 15] = [
         "Does each finding hold under every reading?",
         "The paper’s noise can be read in several ways. Each finding is computed under every reading on the same items, at L1–L5. It \
          holds where the whole 95 % interval is on its side, is reversed where all of it is on the other side, and is open where it \
-         covers 0. “Under some” is corrected by Holm over the readings; “under all” needs no correction.",
+         covers 0. The curves under each reading are in the figures of accuracy. “Under some” is corrected by Holm over the readings; “under all” needs no correction.",
         &[],
     ),
     (
@@ -82,7 +82,7 @@ pub(in crate::report) const SECTIONS: [Section; 15] = [
         "Photographs of the same scenes in the dark, beside synthetic images that are as dark, and enhanced. How dark they are is log₂ of the \
          ratio of mean linear luminances, frame by frame, or what the data state. The row of images as dark as real says whether \
          synthetic darkness stands for real darkness: the difference, the share of the same answers, and κ of being right.",
-        &[],
+        &["real"],
     ),
     (
         CONFIDENCE,
@@ -107,7 +107,7 @@ pub(in crate::report) const SECTIONS: [Section; 15] = [
         "Does a better picture mean better answers? PSNR and SSIM of each image against its clean frame, in the size sent. The AUC \
          is the share of pairs of a right and a wrong answer, of the same model, family and condition, in which the image of the \
          right one has the higher value; 0.5 is chance.",
-        &[],
+        &["fidelity"],
     ),
     (
         "agreement",

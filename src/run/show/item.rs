@@ -3,15 +3,17 @@
 use std::fmt::Write;
 
 use crate::job::stored::AnyRun;
+use crate::report::outcome_words;
 use crate::types::manifest::RunManifest;
 use crate::types::question::letter;
-use crate::types::{self, Condition, Digest, FrameId, OpenDetail, Record, RunQuestion};
+use crate::types::{Condition, Digest, FrameId, OpenDetail, Record, RunQuestion};
 
 /// The reply of one model to the item, in one condition.
 pub(super) struct ShownAnswer {
     pub(super) model: String,
     pub(super) condition: Option<Condition>,
-    pub(super) outcome: &'static str,
+    /// What became of the trial, in the words of the report.
+    pub(super) outcome: String,
     pub(super) reply: String,
     /// The frame or walk that was shown.
     pub(super) shown: FrameId,
@@ -88,14 +90,8 @@ fn choice_answer(record: &Record) -> ShownAnswer {
     ShownAnswer {
         model: record.model.clone(),
         condition: record.condition.clone(),
-        outcome: match record.detail.outcome {
-            types::TrialOutcome::Right => "right",
-            types::TrialOutcome::Wrong => "wrong",
-            types::TrialOutcome::Answered => "answered",
-            types::TrialOutcome::Unparsed => "not readable",
-            types::TrialOutcome::Failed => "failed",
-        },
-        reply: reply(record.reply.as_deref(), record.failure.as_ref()),
+        outcome: outcome_words::outcome(record),
+        reply: reply(record),
         shown: record.detail.shown().clone(),
         sent: record.detail.sent(),
     }
@@ -115,18 +111,21 @@ fn open_answer(record: &Record<OpenDetail>) -> ShownAnswer {
         model: record.model.clone(),
         condition: record.condition.clone(),
         outcome: match (&record.failure, &record.detail.judged) {
-            (Some(_), _) => "failed",
-            (None, Some(_)) => "marked",
-            (None, None) => "answered",
+            (Some(failure), _) => format!(
+                "failed ({})",
+                outcome_words::failed(failure.kind, failure.status)
+            ),
+            (None, Some(_)) => "marked".to_owned(),
+            (None, None) => "answered".to_owned(),
         },
-        reply: reply(record.reply.as_deref(), record.failure.as_ref()),
+        reply: reply(record),
         shown: FrameId(record.detail.episode.clone()),
         sent: record.detail.images.as_ref().map(|images| images.digest),
     }
 }
 
-fn reply(reply: Option<&str>, failure: Option<&types::Failure>) -> String {
-    let message = failure.map(|failure| failure.message.as_str());
-    let text = reply.or(message).unwrap_or_default();
+/// The head of the reply; of a refusal, or of what the error says, if there is none.
+fn reply<D>(record: &Record<D>) -> String {
+    let text = record.text_or_error().unwrap_or_default();
     text.chars().take(200).collect()
 }

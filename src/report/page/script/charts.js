@@ -41,8 +41,12 @@ const charts = [];
 const NAMED_FROM = 480;
 const LETTER = 7.2;
 const BAND_LINES = 2;
+const BAR_STEP = 3;
 const MOST_FLAT = 3;
 const MOST_NAMED = 14;
+// Widths of a panel on paper (A4 with margins of 10 mm has 718 pixels), by how many panels a figure has.
+const MOST_NAMED_OFF = 4;
+const paperWidth = (panels) => panels === 1 ? 520 : panels === 2 || panels === 4 ? 350 : 232;
 
 class Chart {
   constructor(figure, data) {
@@ -114,7 +118,8 @@ class Chart {
     fold.open = true;
     const body = make("div", undefined, this.data.panels.length > 1 ? "body" : "body single");
     body.append(this.grid, fold);
-    plot.append(this.legend, body);
+    this.paperNote = make("p", undefined, "paper-only small");
+    plot.append(this.legend, body, this.paperNote, " ");
     this.figure.querySelector(".drawing").after(plot);
     this.figure.classList.add("drawn");
     new ResizeObserver(() => {
@@ -139,6 +144,22 @@ class Chart {
     this.draw();
   }
 
+  // Draws for paper, or for the window again. What is not drawn is said there.
+  print(isPaper) {
+    const panels = this.data.panels.filter((panel) => !modelsOff.has(panel.model)).length;
+    this.paper = isPaper ? paperWidth(panels) : undefined;
+    const models = this.data.panels.flatMap((panel) => [panel.model, ...panel.lines.map((line) => line.model)]);
+    const shortest = shortened(unique(models.filter((model) => model)));
+    const off = [...[...shortest].filter(([model]) => modelsOff.has(model)).map(([, short]) => short), ...[...this.linesOff].map((name) => this.names.get(name))];
+    const named = off.slice(0, MOST_NAMED_OFF).join(", ") + (off.length > MOST_NAMED_OFF ? ` and ${off.length - MOST_NAMED_OFF} more` : "");
+    const curves = this.data.panels.some((panel) => panel.lines.filter((line) => line.kind === "curve" && this.isOn(line, panel)).length > BAND_LINES);
+    const notes = [];
+    if (curves && this.levels[this.at]) notes.push(`Intervals are drawn at ${this.levels[this.at].name}.`);
+    if (off.length) notes.push(`Not drawn, as they are switched off: ${named}.`);
+    this.paperNote.textContent = notes.map((note) => note + " ").join("");
+    this.draw();
+  }
+
   draw() {
     for (const [name, button] of this.buttons) {
       button.setAttribute("aria-pressed", !this.linesOff.has(name));
@@ -147,7 +168,8 @@ class Chart {
     for (const { panel, box, room } of this.boxes) {
       const lines = panel.lines.filter((line) => this.isOn(line, panel));
       box.hidden = modelsOff.has(panel.model);
-      if (!box.hidden) room.replaceChildren(this.picture(panel, lines, room.clientWidth || this.width));
+      box.style.width = this.paper ? this.paper + "px" : "";
+      if (!box.hidden) room.replaceChildren(this.picture(panel, lines, this.paper ?? (room.clientWidth || this.width)));
     }
     this.table();
   }
@@ -156,7 +178,7 @@ class Chart {
     const names = lines.map((line) => this.names.get(line.name));
     const isNamed = width >= NAMED_FROM && lines.length > 0 && lines.length <= MOST_NAMED;
     const right = isNamed ? Math.min(Math.max(...names.map((name) => name.length)) * LETTER + 26, width * 0.36) : 14;
-    const height = Math.round(Math.min(Math.max(width * 0.5, 230), 340));
+    const height = Math.round(Math.min(Math.max(width * 0.5, this.paper ? 142 : 230), this.paper ? 166 : 340));
     const area = { left: 46, top: 10, right: width - right, bottom: height - 52 };
     const x = (value) => area.left + 10 + (area.right - area.left - 20) * (panel.end > 0 ? value / panel.end : 0.5);
     const y = (share) => area.bottom - (area.bottom - area.top) * Math.min(Math.max(share, 0), 1);
@@ -198,7 +220,9 @@ class Chart {
             group.append(draw_("path", { d: `M${[...upper, ...lower].join("L")}Z`, class: "band" }));
           } else if (here) {
             const point = line.points.find((p) => p.x[1] === cursor.value);
-            if (point) group.append(draw_("path", { d: `M${x(point.x[1])} ${y(point.y[1])}V${y(point.y[2])}`, class: "bar" }));
+            // Side by side, so that each can be told from the others.
+            const beside = x(point?.x[1]) + (curves.indexOf(line) - (curves.length - 1) / 2) * BAR_STEP;
+            if (point) group.append(draw_("path", { d: `M${beside} ${y(point.y[1])}V${y(point.y[2])}`, class: "bar" }));
           }
           group.append(draw_("path", { d: "M" + points.map((p) => p.join(" ")).join("L"), class: "line", "stroke-dasharray": dash }));
         } else {
@@ -286,6 +310,11 @@ const modelButtons = () => {
   const isBuiltIn = (model) => model === "random" || model.startsWith("observer");
   if (models.some((model) => !isBuiltIn(model))) models.filter(isBuiltIn).forEach((model) => modelsOff.add(model));
   const names = shortened(models);
+  // Rows of tables that are named by a model alone have its short name, too.
+  for (const head of document.querySelectorAll("main table tbody th")) {
+    const model = head.textContent;
+    if (names.has(model) && names.get(model) !== model) { head.textContent = names.get(model); head.title = model; }
+  }
   for (const model of models) {
     const button = make("button", names.get(model));
     button.type = "button";
@@ -307,3 +336,5 @@ for (const figure of document.querySelectorAll("figure.chart")) {
 }
 modelButtons();
 charts.forEach((chart) => chart.draw());
+addEventListener("beforeprint", () => charts.forEach((chart) => chart.print(true)));
+addEventListener("afterprint", () => charts.forEach((chart) => chart.print(false)));

@@ -33,7 +33,7 @@ const chosen = (subject, item) => data.strict[subject][item];
 // Where nobody knows the true choice, a model is held against its own answer at L0: that of the first item of the question.
 const hasTruth = () => !data.lights;
 const findReferences = () => {
-  if (data.items.every((item) => item.truth !== null)) return;
+  if (isOpen() || data.items.every((item) => item.truth !== null)) return;
   data.lights = data.subjects.map((s) => data.subjects.findIndex((o) => o.model === s.model && o.level === "L0" && o.enhancer === null));
   const seen = new Map();
   data.firsts = data.items.map((item, i) => {
@@ -49,12 +49,18 @@ const reference = (subject, item) => {
   const code = there < 0 ? ABSENT : chosen(there, data.firsts[item]);
   return code < UNREAD ? code : null;
 };
-const isRight = (subject, item) => chosen(subject, item) === reference(subject, item);
+const isRight = (subject, item) => chosen(subject, item) === (isOpen() ? BEST_MARK : reference(subject, item));
+// Why a reply was not read, or why none came.
+const because = (subject, item) => {
+  const why = data.reasons[data.why[subject][item]];
+  return why ? ` (${why})` : "";
+};
 const mark = (subject, item) => {
   const code = chosen(subject, item);
   if (code === ABSENT) return ["", "m-none", "not asked"];
-  if (code === FAILED) return ["!", "m-odd", "no reply"];
-  if (code === UNREAD) return ["?", "m-odd", "not readable"];
+  if (isOpen() && code < UNREAD) return openMark(code);
+  if (code === FAILED) return ["!", "m-odd", (isOpen() ? "not answered" : "failed") + because(subject, item)];
+  if (code === UNREAD) return ["?", "m-odd", (isOpen() ? "not marked" : "not read") + because(subject, item)];
   if (reference(subject, item) === null) return [letter(code), "m-none", "no answer at L0"];
   const [same, other] = hasTruth() ? ["right", "wrong"] : [SAME, OTHER];
   return isRight(subject, item) ? ["✓ " + letter(code), "m-right", same] : ["✗ " + letter(code), "m-wrong", other];
@@ -89,8 +95,8 @@ const STATES = {
   "all": () => true,
   "right": (s, i) => isRight(s, i),
   "wrong": (s, i) => chosen(s, i) < UNREAD && !isRight(s, i),
-  "not readable": (s, i) => chosen(s, i) === UNREAD,
-  "no reply": (s, i) => chosen(s, i) === FAILED,
+  "not read": (s, i) => chosen(s, i) === UNREAD,
+  "failed": (s, i) => chosen(s, i) === FAILED,
   "lost since L0": (s, i) => { const l = data.subjects[s].clean ?? -1; return l >= 0 && isRight(l, i) && chosen(s, i) < FAILED && !isRight(s, i); },
   "found since L0": (s, i) => { const l = data.subjects[s].clean ?? -1; return l >= 0 && chosen(l, i) < FAILED && !isRight(l, i) && isRight(s, i); },
   "first lost at this level": (s, i) => isFirstLost(s, i),
@@ -109,7 +115,7 @@ const STATES = {
 // The same without true choices: nothing is right or wrong.
 const SAME = "as at L0", OTHER = "not as at L0";
 const withoutTruth = () => {
-  const kept = [["all", "all"], ["right", SAME], ["wrong", OTHER], ["not readable", "not readable"], ["no reply", "no reply"],
+  const kept = [["all", "all"], ["right", SAME], ["wrong", OTHER], ["not read", "not read"], ["failed", "failed"],
     ["rescued by the enhancer", "brought back by the enhancer"], ["harmed by the enhancer", "changed by the enhancer"],
     ["another answer there", "another answer there"], ["models differ", "models differ"]];
   const states = kept.map(([name, own]) => [own, STATES[name]]);
@@ -153,8 +159,9 @@ const select = () => {
     if (state.family !== "all" && data.families[question.family] !== state.family) continue;
     if (subject < 0 || chosen(subject, i) === ABSENT || !test(subject, i)) continue;
     if (words) {
-      const text = data.texts[data.replies[subject][i]] || "";
-      if (![question.text, question.id, data.frames[question.frame], text].some((t) => t.toLowerCase().includes(words))) continue;
+      const replies = isOpen() ? data.replies.map((row) => row[i]) : [data.replies[subject][i]];
+      const texts = [question.text, question.id, data.frames[question.frame], question.answer || "", ...replies.map((reply) => data.texts[reply] || "")];
+      if (!texts.some((t) => t.toLowerCase().includes(words))) continue;
     }
     shown.push(i);
   }
@@ -231,107 +238,21 @@ const step = (by) => {
   if (next !== undefined) go(next);
 };
 
-// The images of the item at a level, side by side in one view: all zoom and move together.
-const view = { zoom: 1, x: 0, y: 0 };
-const MOST_ZOOM = 16;
-const show = () => {
-  view.zoom = Math.min(Math.max(view.zoom, 1), MOST_ZOOM);
-  const most = 1 - 1 / view.zoom;
-  view.x = Math.min(Math.max(view.x, 0), most);
-  view.y = Math.min(Math.max(view.y, 0), most);
-  for (const frame of $("i-images").querySelectorAll(".frame")) {
-    const { clientWidth: width, clientHeight: height } = frame;
-    frame.querySelector(".whole").style.transform = `scale(${view.zoom}) translate(${-view.x * width}px, ${-view.y * height}px)`;
-    for (const box of frame.querySelectorAll(".box")) {
-      const [left, top, right, bottom] = box.dataset.at.split(" ").map(Number);
-      Object.assign(box.style, {
-        left: (left - view.x) * view.zoom * width + "px", top: (top - view.y) * view.zoom * height + "px",
-        width: (right - left) * view.zoom * width + "px", height: (bottom - top) * view.zoom * height + "px",
-      });
-    }
-  }
-  $("i-zoom").textContent = view.zoom.toFixed(1).replace(".0", "") + " ×";
-};
-const zoom = (factor, x = 0.5, y = 0.5) => {
-  const before = view.zoom;
-  view.zoom = Math.min(Math.max(view.zoom * factor, 1), MOST_ZOOM);
-  view.x += x / before - x / view.zoom;
-  view.y += y / before - y / view.zoom;
-  show();
-};
-const pan = (x, y) => { view.x += x / view.zoom; view.y += y / view.zoom; show(); };
-
-// The boxes of the things that a question is about, as shares of the sides of its frame; none for a question about the whole room.
-const boxes = (question) => {
-  const size = data.sizes[question.frame];
-  if (!size) return [];
-  return question.outlines.map(([left, top, right, bottom]) => [left / size[0], top / size[1], right / size[0], bottom / size[1]]);
-};
-const toTheObject = () => {
-  const all = boxes(data.questions[data.items[state.item].question]);
-  if (!all.length) return;
-  const least = (at) => Math.min(...all.map((box) => box[at])), most = (at) => Math.max(...all.map((box) => box[at]));
-  const [left, top, right, bottom] = [least(0), least(1), most(2), most(3)];
-  view.zoom = 0.8 / Math.max(right - left, bottom - top, 0.05);
-  view.zoom = Math.min(Math.max(view.zoom, 1), MOST_ZOOM);
-  view.x = (left + right) / 2 - 0.5 / view.zoom;
-  view.y = (top + bottom) / 2 - 0.5 / view.zoom;
-  show();
-};
-
-const pictures = (question) => {
-  const kept = data.thumbnails[question.frame], box = $("i-images");
-  box.replaceChildren();
-  const there = everyLevel();
-  const slider = $("i-level");
-  slider.max = Math.max(there.length - 1, 0);
-  const level = state.pictured && there.includes(state.pictured) ? state.pictured : (state.level || there[0]);
-  slider.value = Math.max(there.indexOf(level), 0);
-  $("i-level-name").textContent = level ? level + " (" + severity(level) + ")" : "";
-  $("i-pictures").hidden = !kept;
-  const remake = "darkqa-eval show " + data.folders[0] + " " + question.id;
-  $("i-remake").textContent = (kept ? "Small copies. " : "No small copy of this frame is kept. ") + "The images as they were sent, proved by digest: " + remake;
-  if (!kept) return;
-  const outlines = boxes(question);
-  $("i-object").hidden = !outlines.length;
-  const conditions = unique(data.subjects.filter((s) => s.level === level).map((s) => s.condition));
-  for (const condition of level === "L0" ? conditions : ["L0", ...conditions]) {
-    const image = kept[condition];
-    if (!image) continue;
-    const figure = make("figure"), frame = make("div", undefined, "frame"), whole = make("img", undefined, "whole"), crop = make("img", undefined, "crop");
-    whole.src = image.small;
-    whole.draggable = false;
-    whole.alt = condition + " of " + data.frames[question.frame];
-    frame.append(whole);
-    for (const at of $("i-boxes").checked ? outlines : []) {
-      const outline = make("span", undefined, "box");
-      outline.dataset.at = at.join(" ");
-      frame.append(outline);
-    }
-    whole.addEventListener("load", show);
-    const object = question.object && image.objects.find((one) => one.object.join() === question.object.join());
-    crop.src = object ? object.crop : image.crop;
-    const part = object ? "the thing asked about" : "its middle";
-    crop.alt = part + ", " + whole.alt;
-    const gain = image.stops > 0 ? "light × " + Math.round(2 ** image.stops) + " (" + image.stops + " EV)" : "as it is";
-    figure.append(frame, crop, make("figcaption", condition + "; below, " + part + ", " + gain));
-    box.append(figure);
-  }
-  show();
-};
-
 const marks = (i) => {
   const table = $("i-marks");
   table.replaceChildren();
   const there = everyLevel();
   const head = make("tr");
-  head.append(...["model", "light", ...there].map((name) => { const th = make("th", name); th.scope = "col"; return th; }));
-  table.append(head);
+  head.append(...["model", "light", ...there].map((name) => { const th = make("th", name, name === "light" ? "text" : ""); th.scope = "col"; return th; }));
+  const thead = make("thead");
+  thead.append(head);
+  const body = make("tbody");
+  table.append(thead, body);
   const now = subjectNow(), names = shortened(unique(data.subjects.map((s) => s.model)));
   for (const model of unique(data.subjects.map((s) => s.model))) {
     for (const light of lights(model)) {
       const row = make("tr");
-      const first = make("th", names.get(model)), second = make("td", light, "text");
+      const first = make("th", names.get(model)), second = make("td", light === "blind" ? "without images" : light, "text");
       first.scope = "row";
       first.title = model;
       row.append(first, second);
@@ -341,6 +262,8 @@ const marks = (i) => {
         const [sign, name, word] = subject >= 0 ? mark(subject, i) : ["", "", ""];
         const cell = make("td", own || light === "blind" ? sign : "", name);
         cell.title = word;
+        // What was seen without an image lies at no level.
+        if (light === "blind") cell.colSpan = there.length;
         if (own) {
           const button = make("button", sign);
           button.type = "button";
@@ -353,24 +276,51 @@ const marks = (i) => {
         }
         row.append(cell);
       }
-      table.append(row);
+      body.append(row);
     }
   }
+};
+
+// The answers that were not read or did not come, each with why, and with what was said.
+const LONGEST_QUOTE = 120;
+const unread = (i) => {
+  const names = shortened(unique(data.subjects.map((s) => s.model))), rows = [];
+  // The table of all answers has the same of open questions.
+  if (isOpen()) return;
+  data.subjects.forEach((s, subject) => {
+    const code = chosen(subject, i);
+    if (code !== UNREAD && code !== FAILED) return;
+    const [sign, name, word] = mark(subject, i), row = make("li"), quote = make("q");
+    const text = data.texts[data.replies[subject][i]] || "", letters = [...text];
+    reveal(quote, letters.length > LONGEST_QUOTE ? letters.slice(0, LONGEST_QUOTE).join("") + " …" : text);
+    row.append(make("span", sign + " ", name), `${names.get(s.model)}, ${s.condition}: ${word}`);
+    if (text) row.append(code === FAILED ? "; the error: " : "; the reply: ", quote);
+    rows.push(row);
+  });
+  $("i-unread").replaceChildren(...rows);
 };
 
 const reply = (subject, i) => {
   if (subject < 0 || chosen(subject, i) === ABSENT) {
     $("r-title").textContent = "";
     $("r-text").textContent = "";
-    $("r-reading").textContent = "not asked";
+    $("r-mark").textContent = "not asked";
+    $("r-mark").className = "m-none";
+    $("r-reading").textContent = "";
+    $("r-judged").hidden = true;
     return;
   }
   const s = data.subjects[subject];
-  $("r-title").textContent = "Reply of " + s.model + " at " + s.condition;
+  const judged = isOpen() ? data.texts[data.judged[subject][i]] : "";
+  $("r-judged").hidden = !judged;
+  reveal($("r-judge"), judged || "");
+  $("r-title").textContent = (isOpen() ? "Answer of " : "Reply of ") + s.model + " at " + s.condition;
   reveal($("r-text"), data.texts[data.replies[subject][i]] || "");
-  const said = (code) => code < UNREAD ? letter(code) : code === UNREAD ? "nothing" : "no reply";
-  const why = data.reasons[data.why[subject][i]];
-  $("r-reading").textContent = "strict reading: " + said(chosen(subject, i)) + (why ? " (" + why.replace(/_/g, " ") + ")" : "") + " · lenient: " + said(data.lenient[subject][i]) + " · " + mark(subject, i)[2];
+  const [sign, name, word] = mark(subject, i), lenient = isOpen() ? ABSENT : data.lenient[subject][i];
+  $("r-mark").textContent = (sign ? sign + ", " : "") + word;
+  $("r-mark").className = name;
+  const said = (code) => code < UNREAD ? letter(code) : "nothing";
+  $("r-reading").textContent = lenient < FAILED ? `strict reading: ${said(chosen(subject, i))} · lenient: ${said(lenient)}` : "";
 };
 
 const draw = () => {
@@ -392,9 +342,19 @@ const draw = () => {
     if (subject >= 0 && chosen(subject, i) === index) { row.classList.add("chosen"); row.title = "chosen"; }
     return row;
   });
+  if (isOpen()) {
+    const right = [question.answer, ...(question.also_right || [])].filter((answer) => answer !== undefined);
+    list.push(...right.map((answer, place) => {
+      const row = make("li", undefined, "true");
+      reveal(row, (place ? "also right: " : "right: ") + answer + " ✓");
+      return row;
+    }));
+  }
   $("i-choices").replaceChildren(...list);
   pictures(question);
   marks(i);
+  unread(i);
+  answers(i);
   reply(subject, i);
   $("i-evidence").textContent = question.evidence ? JSON.stringify(question.evidence, null, 1) : "none";
 };
@@ -445,7 +405,11 @@ const follow = () => {
 const start = async () => {
   data = await unpack();
   findReferences();
-  if (!hasTruth()) withoutTruth();
+  if (isOpen()) openStates(); else if (!hasTruth()) withoutTruth();
+  $("i-evidenced").hidden = isOpen();
+  $("i-key").textContent = isOpen()
+    ? "Marks of the judge from 1 to 5 (0: no answer) · ? not marked · ! not answered; a click shows the answer and what the judge said"
+    : `✓ ${hasTruth() ? "right" : SAME} · ✗ ${hasTruth() ? "wrong" : OTHER} · ? not read · ! failed; the letter is the choice that was read; a click shows the reply`;
   const first = data.subjects.find((s) => s.light !== "blind") || data.subjects[0];
   state = { family: "all", model: first?.model, light: undefined, level: undefined, against: "–", show: "all", words: "", item: data.items.length ? 0 : null, pictured: null };
   $("loading").hidden = true;

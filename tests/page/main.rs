@@ -5,12 +5,15 @@
 
 #![allow(clippy::unwrap_used)]
 
+#[path = "../support/mod.rs"]
 mod support;
+
+mod access;
+mod open;
+mod people;
 
 use serde_json::{Value, json};
 use support::browser::{Browser, chromium};
-use support::endpoint::{Answer, MockEndpoint};
-use support::house::House;
 use support::run::{Bench, words};
 
 /// The model that says what it is told.
@@ -69,6 +72,7 @@ fn the_page_works_in_a_browser() {
     deep_link(&mut browser, &url);
     themes(&mut browser);
     narrow(&mut browser, &url);
+    paper(&mut browser);
     assert!(browser.print("page.pdf") > 10_000);
     assert_eq!(browser.complaints(&url), Vec::<String>::new());
 }
@@ -83,7 +87,7 @@ fn filters(browser: &mut Browser) {
     browser.choose("#f-model", SAID);
     assert_eq!(count(browser), "40 of 40 items");
     // The markup, the turned letters and the long reply cannot be read; everything else is right.
-    browser.choose("#f-state", "not readable");
+    browser.choose("#f-state", "not read");
     assert_eq!(count(browser), "3 of 40 items");
     browser.choose("#f-state", "wrong");
     assert_eq!(count(browser), "0 of 40 items");
@@ -259,7 +263,9 @@ fn deep_link(browser: &mut Browser, url: &str) {
     let title = browser.evaluate("document.querySelector('#r-title').textContent");
     assert_eq!(title, format!("Reply of {SAID} at L5-noise"));
     let reading = browser.evaluate("document.querySelector('#r-reading').textContent");
-    assert_eq!(reading, "strict reading: A · lenient: A · wrong");
+    assert_eq!(reading, "strict reading: A · lenient: A");
+    let mark = browser.evaluate("document.querySelector('#r-mark').textContent");
+    assert_eq!(mark, "✗ A, wrong");
     // A link to nowhere shows the page all the same.
     browser.go("about:blank");
     browser.go(&format!("{url}#item=%zz&model=nobody"));
@@ -307,6 +313,39 @@ fn narrow(browser: &mut Browser, url: &str) {
     browser.window(1400, 900, "light");
 }
 
+/// On paper charts have its width, and what is not drawn is said; afterwards they have that of the window again.
+fn paper(browser: &mut Browser) {
+    let widest =
+        "Math.max(...[...document.querySelectorAll('.panel svg')].map((s) => s.clientWidth))";
+    let noted = "document.querySelector('figure.chart .paper-only').textContent";
+    let before = browser.evaluate(widest);
+    browser.evaluate("dispatchEvent(new Event('beforeprint'))");
+    let printed = browser.evaluate(widest).as_f64().unwrap();
+    // A4 has 718 pixels between margins of 10 mm.
+    assert!(
+        printed <= 718.0 && printed < before.as_f64().unwrap(),
+        "{printed} {before}"
+    );
+    let note = browser.evaluate(noted);
+    assert_eq!(note, "Not drawn, as they are switched off: random. ");
+    browser.evaluate("dispatchEvent(new Event('afterprint'))");
+    assert_eq!(browser.evaluate(widest), before);
+    browser.call("Emulation.setEmulatedMedia", &json!({"media": "print"}));
+    let is_shown = |browser: &mut Browser, of: &str| {
+        browser.evaluate(&format!("document.querySelector('{of}').checkVisibility()"))
+    };
+    for (of, expected) in [
+        ("header .paper-only", true),
+        (".plot", true),
+        ("nav", false),
+        ("#items", false),
+    ] {
+        assert_eq!(is_shown(browser, of), expected, "{of}");
+    }
+    browser.call("Emulation.setEmulatedMedia", &json!({"media": ""}));
+    assert_eq!(is_shown(browser, "header .paper-only"), false);
+}
+
 #[test]
 fn the_page_without_true_answers_works_in_a_browser() {
     let Some(mut browser) = browser() else {
@@ -349,7 +388,7 @@ fn the_page_without_true_answers_works_in_a_browser() {
     );
     let title = browser.evaluate("document.querySelector('#i-choices .true').title");
     assert_eq!(title, "its answer at L0");
-    let reading = browser.evaluate("document.querySelector('#r-reading').textContent");
+    let reading = browser.evaluate("document.querySelector('#r-mark').textContent");
     assert!(
         reading.as_str().unwrap().ends_with("not as at L0"),
         "{reading}"
@@ -358,172 +397,4 @@ fn the_page_without_true_answers_works_in_a_browser() {
     assert_eq!(head, "at L0 ↓ given →");
     browser.shot("without-truths.png", true);
     assert_eq!(browser.complaints(&url), Vec::<String>::new());
-}
-
-#[test]
-fn people_can_answer() {
-    let Some(mut browser) = browser() else {
-        return;
-    };
-    let bench = Bench::with_questions(6);
-    bench.complete(&words(
-        "--model random --data set.jsonl --levels L0,L3 --out run",
-    ));
-    bench.complete(&["study", "pack", "run", "--out", "pack"]);
-    let url = format!("file://{}", bench.path("pack/study.html").display());
-    browser.window(1200, 800, "light");
-    browser.go(&url);
-    browser.wait("document.querySelector('#image')?.naturalWidth > 0");
-    let place = "document.querySelector('#count').textContent";
-    assert_eq!(browser.evaluate(place), "0 of 6");
-    browser.press("c");
-    browser.press("0");
-    browser.click("#choices button:nth-child(2)");
-    assert_eq!(browser.evaluate(place), "3 of 6");
-    browser.shot("study.png", false);
-    let answers = browser.evaluate("Object.values(answers).map(a => a.answer)");
-    let mut answers: Vec<Value> = answers.as_array().unwrap().clone();
-    answers.sort_by_key(ToString::to_string);
-    assert_eq!(answers, [json!("B"), json!("C"), Value::Null]);
-    // One frame: a person sees it in one condition alone, the next person in the next.
-    let seen = "[...new Set(Object.values(answers).map(a => a.condition))]";
-    assert_eq!(browser.evaluate(seen), json!(["L0"]));
-    browser.evaluate(
-        "(() => { const p = document.querySelector('#person'); p.value = 2; p.dispatchEvent(new Event('change')); })()",
-    );
-    assert_eq!(browser.evaluate(place), "0 of 6");
-    browser.press("A");
-    assert_eq!(browser.evaluate(seen), json!(["L3-ev"]));
-    // What was answered is there after the page was left.
-    browser.go(&url);
-    browser.wait("document.querySelector('#count')?.textContent === '3 of 6'");
-    let images = format!("{}/images/", bench.path("pack").display());
-    let complaints = browser.complaints(&url).into_iter();
-    let strange: Vec<String> = complaints.filter(|url| !url.contains(&images)).collect();
-    assert_eq!(strange, Vec::<String>::new());
-}
-
-#[test]
-fn the_page_of_open_questions_works_in_a_browser() {
-    let Some(mut browser) = browser() else {
-        return;
-    };
-    let house = House::new();
-    let markup = "</script><img src=x onerror=alert(1)>\u{202e}dna.\u{0}";
-    let replies = [
-        json!({"question": "q1", "reply": markup}),
-        json!({"question": "q2", "condition": "L4-noise", "reply": "in the dark"}),
-        json!({"default": "a sofa"}),
-    ];
-    house.0.file(
-        "said.jsonl",
-        replies.map(|line| format!("{line}\n")).concat(),
-    );
-    let mark = |prompt: &str| {
-        if prompt.ends_with("in the dark") {
-            "1"
-        } else {
-            "5"
-        }
-    };
-    let judge = MockEndpoint::answering(move |request| {
-        let prompt = request["messages"][0]["content"]
-            .as_str()
-            .unwrap_or_default();
-        Answer::text(mark(prompt))
-    });
-    let base = judge.base_url();
-    let called = house.call(&[
-        "--model",
-        SAID,
-        "--judge",
-        "j",
-        "--judge-base-url",
-        &base,
-        "--levels",
-        "L0,L4",
-        "--out",
-        "run",
-    ]);
-    assert_eq!(called.code, Some(0), "{called:?}");
-    let url = format!("file://{}", house.0.path("run/report.html").display());
-    browser.window(1200, 900, "light");
-    browser.go(&url);
-    browser.wait("document.querySelector('#f-count')?.textContent === '3 of 3 questions'");
-    browser.shot("open.png", true);
-    let texts = "document.querySelector('#q-q1').textContent";
-    let text = browser.evaluate(texts);
-    assert!(
-        text.as_str()
-            .unwrap()
-            .contains("</script><img src=x onerror=alert(1)>⟨U+202E⟩dna.⟨U+0000⟩"),
-        "{text}"
-    );
-    assert_eq!(
-        browser.evaluate("document.querySelectorAll('.walk img').length"),
-        4
-    );
-    let count = "document.querySelector('#f-count').textContent";
-    browser.click("#f-lost");
-    assert_eq!(browser.evaluate(count), "1 of 3 questions");
-    assert_eq!(
-        browser.evaluate("document.querySelectorAll('.walk:not([hidden])').length"),
-        1
-    );
-    browser.click("#f-lost");
-    browser.choose("#f-category", "world knowledge");
-    assert_eq!(browser.evaluate(count), "1 of 3 questions");
-    browser.go("about:blank");
-    browser.go(&format!("{url}#q-q3"));
-    browser.wait("document.querySelector('#q-q3')?.open");
-    assert_eq!(browser.complaints(&url), Vec::<String>::new());
-}
-
-#[test]
-fn people_can_answer_in_their_own_words() {
-    let Some(mut browser) = browser() else {
-        return;
-    };
-    let house = House::new();
-    let called = house.call(&["--study", "study", "--levels", "L0,L4"]);
-    assert_eq!(called.code, Some(0), "{called:?}");
-    let url = format!("file://{}", house.0.path("study/study.html").display());
-    browser.window(1200, 800, "light");
-    browser.go(&url);
-    browser.wait("document.querySelector('#image')?.naturalWidth > 0");
-    let frame = "document.querySelector('#place').textContent";
-    assert!(
-        browser
-            .evaluate(frame)
-            .as_str()
-            .unwrap()
-            .starts_with("1 / ")
-    );
-    browser.click("#play");
-    browser.wait("document.querySelector('#place').textContent.startsWith('2 / ')");
-    browser.click("#play");
-    browser.evaluate("document.querySelector('#answer').value = ' by the door '");
-    browser.click("#say");
-    browser.shot("open-study.png", false);
-    browser.click("#none");
-    let place = "document.querySelector('#count').textContent";
-    assert_eq!(browser.evaluate(place), "2 of 3");
-    let saved = browser.evaluate("JSON.stringify(order.filter((i) => items[i].id in answers).map((i) => answers[items[i].id]))");
-    // What the page saves is what the program takes.
-    house.0.file("answers.json", saved.as_str().unwrap());
-    house.0.file("j.jsonl", "{\"default\": \"5\"}");
-    let called = house.call(&words(
-        "--answers human=answers.json --judge script:j.jsonl --out run",
-    ));
-    assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(
-        called.stdout.contains("2 of 2 answers scored")
-            && called.stdout.contains("1 without an answer"),
-        "{}",
-        called.stdout
-    );
-    let images = format!("{}/images/", house.0.path("study").display());
-    let complaints = browser.complaints(&url).into_iter();
-    let strange: Vec<String> = complaints.filter(|url| !url.contains(&images)).collect();
-    assert_eq!(strange, Vec::<String>::new());
 }

@@ -1,0 +1,70 @@
+//! What became of a trial, in words: [`outcome`], and why a reply was not read ([`unread`]) or no reply came ([`failed`]).
+
+use crate::types::{FailureKind, Record, TrialOutcome, UnreadReason};
+
+/// What became of a trial of a question with choices, by the strict reading: `✓ right`, `not read (cut at the token limit)`.
+pub(crate) fn outcome(record: &Record) -> String {
+    match record.detail.outcome {
+        TrialOutcome::Right => "✓ right".to_owned(),
+        TrialOutcome::Wrong => "✗ wrong".to_owned(),
+        TrialOutcome::Answered => "answered".to_owned(),
+        TrialOutcome::Unparsed => match record.detail.strict.and_then(|strict| strict.why) {
+            None => "not read".to_owned(),
+            Some(why) => format!("not read ({})", unread(why)),
+        },
+        TrialOutcome::Failed => match &record.failure {
+            None => "failed".to_owned(),
+            Some(failure) => format!("failed ({})", failed(failure.kind, failure.status)),
+        },
+    }
+}
+
+/// Why the strict reading found no choice in a reply.
+pub(crate) fn unread(why: UnreadReason) -> &'static str {
+    match why {
+        UnreadReason::Empty => "the reply is empty",
+        UnreadReason::Refused => "the model refused",
+        UnreadReason::Truncated => "cut at the token limit before an answer",
+        UnreadReason::Filtered => "withheld by a content filter",
+        UnreadReason::Ambiguous => "names more than one choice",
+        UnreadReason::OutOfRange => "names a letter that no choice has",
+        UnreadReason::Contradiction => "names the letter of one choice with the text of another",
+        UnreadReason::Negated => "names a choice only to deny it",
+        UnreadReason::NoChoice => "names no choice in the form that was asked for",
+    }
+}
+
+/// Why no reply came, with the HTTP status if the server sent one; the error's own text is in its message.
+pub(crate) fn failed(kind: FailureKind, status: Option<u16>) -> String {
+    let kind = match kind {
+        FailureKind::Connection => "no connection",
+        FailureKind::Timeout => "no whole reply in time",
+        FailureKind::RateLimit => "refused by a rate limit",
+        FailureKind::Server => "the server failed",
+        FailureKind::Request => "the request was refused",
+        FailureKind::Filtered => "refused by moderation",
+        FailureKind::Response => "the response was no reply",
+        FailureKind::Image => "the image could not be made",
+    };
+    match status {
+        None => kind.to_owned(),
+        Some(status) => format!("{kind}, HTTP {status}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_reason_has_words_of_its_own() {
+        let reasons: std::collections::BTreeSet<&str> =
+            UnreadReason::ALL.into_iter().map(unread).collect();
+        assert_eq!(reasons.len(), UnreadReason::ALL.len());
+        let kinds = FailureKind::ALL.into_iter().map(|kind| failed(kind, None));
+        let kinds: std::collections::BTreeSet<String> = kinds.collect();
+        assert_eq!(kinds.len(), FailureKind::ALL.len());
+        let status = failed(FailureKind::RateLimit, Some(429));
+        assert_eq!(status, "refused by a rate limit, HTTP 429");
+    }
+}
