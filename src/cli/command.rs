@@ -76,7 +76,7 @@ pub(crate) enum Colours {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Output")]
 pub(crate) struct CommonArgs {
-    /// Show no progress bars
+    /// Show no progress bars, and of the results only where they were written; a table or JSON that was asked for is printed
     #[arg(long, global = true, add = Decides::Nothing)]
     pub quiet: bool,
     /// Colours of results; auto: on a terminal, without NO_COLOR, CLICOLOR=0 and TERM=dumb

@@ -70,11 +70,12 @@ pub fn main(words: impl Iterator<Item = OsString>) -> ExitCode {
         Ok(cli) => cli,
         Err(e) => return fail(&e.to_string()),
     };
-    let progress = Progress::new(if cli.common.quiet {
+    let verbosity = if cli.common.quiet {
         Verbosity::Quiet
     } else {
         Verbosity::Normal
-    });
+    };
+    let progress = Progress::new(verbosity);
     let filter =
         EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("darkqa_eval=warn"));
     tracing_subscriber::fmt()
@@ -92,7 +93,7 @@ pub fn main(words: impl Iterator<Item = OsString>) -> ExitCode {
         Colours::Never => ColorChoice::Never,
     };
     match carry_out(cli, &progress) {
-        Ok(outcome) => finish(&outcome, colours),
+        Ok(outcome) => finish(&outcome, verbosity, colours),
         // The text of an error of this crate includes its cause.
         Err(e) => fail(&format!("{e}{first_steps}")),
     }
@@ -169,26 +170,36 @@ pub fn command() -> clap::Command {
 fn completions(shell: Shell) -> Outcome {
     let mut script = Vec::new();
     clap_complete::generate(shell, &mut command::command(), NAME, &mut script);
-    Outcome {
-        status: Status::Complete,
-        output: String::from_utf8_lossy(&script).into_owned(),
-    }
+    Outcome::text(
+        Status::Complete,
+        String::from_utf8_lossy(&script).into_owned(),
+    )
 }
 
 fn manual(folder: &Path) -> Result<Outcome> {
     std::fs::create_dir_all(folder).map_err(|e| Error::file(folder, "create", e))?;
     let command = command::command().disable_help_subcommand(true);
     clap_mangen::generate_to(command, folder).map_err(|e| Error::file(folder, "write", e))?;
-    Ok(Outcome {
-        status: Status::Complete,
-        output: format!("{}: man {NAME}.1 shows the first page\n", folder.display()),
-    })
+    Ok(Outcome::wrote(
+        folder,
+        Status::Complete,
+        format!("{}: man {NAME}.1 shows the first page\n", folder.display()),
+    ))
 }
 
-fn finish(Outcome { status, output }: &Outcome, colours: ColorChoice) -> ExitCode {
+fn finish(outcome: &Outcome, verbosity: Verbosity, colours: ColorChoice) -> ExitCode {
     let mut stdout = AutoStream::new(std::io::stdout().lock(), colours);
-    let written = stdout.write_all(output.as_bytes());
-    match (status, written) {
+    let said = if verbosity == Verbosity::Normal || outcome.written.is_empty() {
+        stdout.write_all(outcome.output.as_bytes())
+    } else {
+        // What ended with a fault says so, where it takes no place from the paths.
+        if outcome.status != Status::Complete {
+            let _ = std::io::stderr().write_all(outcome.output.as_bytes());
+        }
+        let mut paths = outcome.written.iter();
+        paths.try_for_each(|path| writeln!(stdout, "{}", path.display()))
+    };
+    match (outcome.status, said) {
         (Status::Cancelled, _) => ExitCode::from(INTERRUPTED),
         (Status::OverBudget, _) => ExitCode::from(OVER_BUDGET),
         // A reader of the output, such as `head`, may close the pipe early.

@@ -112,13 +112,13 @@ impl<'a, E: Experiment> Job<'a, E> {
             pipeline.probe(experiment.sources(), &plan.sources)?;
         }
         let forecast = estimate::estimate(experiment, &plans, &measured, &stored, &mut pipeline)?;
-        Ok(Outcome {
-            status: Status::Complete,
-            output: match settings.show {
+        Ok(Outcome::text(
+            Status::Complete,
+            match settings.show {
                 StdoutFormat::Json => json(&forecast)?,
                 _ => render(&forecast),
             },
-        })
+        ))
     }
 
     /// Opens the run folder.

@@ -1,5 +1,7 @@
 //! The result of a command ([`Outcome`]), and the format of its results ([`ShowArgs`], [`StdoutFormat`]).
 
+use std::path::PathBuf;
+
 use clap::Args;
 
 use crate::types::Decides;
@@ -12,6 +14,38 @@ pub(crate) struct Outcome {
     pub status: Status,
     /// Text for standard output.
     pub output: String,
+    /// What was written, which `--quiet` prints alone; empty if the text itself is the result.
+    pub written: Vec<PathBuf>,
+}
+
+impl Outcome {
+    /// A command whose text is its result.
+    pub(crate) fn text(status: Status, output: String) -> Self {
+        let written = Vec::new();
+        Self {
+            status,
+            output,
+            written,
+        }
+    }
+
+    /// A command that wrote something, and says so.
+    pub(crate) fn wrote(path: impl Into<PathBuf>, status: Status, output: String) -> Self {
+        let written = vec![path.into()];
+        Self {
+            status,
+            output,
+            written,
+        }
+    }
+
+    /// The same result, its text wanted as it is unless it is the short one.
+    pub(crate) fn in_format(mut self, format: StdoutFormat) -> Self {
+        if format != StdoutFormat::Short {
+            self.written.clear();
+        }
+        self
+    }
 }
 
 /// Flags that say how a report is printed.

@@ -83,10 +83,11 @@ pub(crate) fn calibrate(args: &CalibrateArgs, progress: &Progress) -> Result<Out
     drop(bar);
     write(&args.out, camera_file(&camera)?.as_bytes())?;
     write(&figure, calibration::figure(&camera)?.as_bytes())?;
-    Ok(Outcome {
-        status: Status::Complete,
-        output: output(args, &camera, &figure)?,
-    })
+    Ok(Outcome::wrote(
+        &args.out,
+        Status::Complete,
+        output(args, &camera, &figure)?,
+    ))
 }
 
 fn settings(args: &CalibrateArgs) -> Result<CalibrateSettings> {

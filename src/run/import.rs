@@ -89,10 +89,7 @@ fn script(kind: DataSetKind) -> Result<Outcome> {
         let problem = format_args!("only the kind habitat has a script, not {kind}");
         return Err(Error::usage("--script", problem));
     }
-    Ok(Outcome {
-        status: Status::Complete,
-        output: HM3D_SCRIPT.to_owned(),
-    })
+    Ok(Outcome::text(Status::Complete, HM3D_SCRIPT.to_owned()))
 }
 
 /// If one frame fails, the error is logged and counted, and the others continue.
@@ -166,14 +163,15 @@ fn import_frames(
         }
     );
     output.push_str(&words(&listing.unlisted));
-    Ok(Outcome {
-        status: if failed == 0 {
+    Ok(Outcome::wrote(
+        out,
+        if failed == 0 {
             Status::Complete
         } else {
             Status::Incomplete
         },
         output,
-    })
+    ))
 }
 
 /// A frame that was written.

@@ -94,14 +94,15 @@ pub(crate) fn init(args: &InitArgs, progress: &Progress) -> Result<Outcome> {
     write(&at("dataset.json"), format!("{info:#}\n").as_bytes())?;
     write(&at("README.txt"), README.as_bytes())?;
     let data = words(&args.folder, args.frames.as_deref());
-    Ok(Outcome {
-        status: Status::Complete,
-        output: format!(
+    Ok(Outcome::wrote(
+        &args.folder,
+        Status::Complete,
+        format!(
             "{}: {} questions\n\nnext:\n  darkqa-eval check {data}\n  darkqa-eval --data {data} --model gpt-4o --dry-run\n  darkqa-eval --data {data} --model gpt-4o\n",
             args.folder.display(),
             lines.len()
         ),
-    })
+    ))
 }
 
 /// The folder as words of a command, with the flag for images that lie outside it.

@@ -75,5 +75,5 @@ pub(crate) fn models(args: &ModelsArgs, progress: &Progress) -> Result<Outcome> 
             let _ = writeln!(output, "{name}: {answer}");
         }
     }
-    Ok(Outcome { status, output })
+    Ok(Outcome::text(status, output))
 }

@@ -73,10 +73,11 @@ pub(crate) fn rooms(args: &RoomsArgs, progress: &Progress) -> Result<Outcome> {
     let labels: Labels = rooms::labels();
     let lines = frames.iter().map(|frame| &frame.line);
     frame_folder::finish(&args.out, &labels, &info, lines)?;
-    Ok(Outcome {
-        status: Status::Complete,
-        output: format!("{}: {} frames\n", args.out.display(), frames.len()),
-    })
+    Ok(Outcome::wrote(
+        &args.out,
+        Status::Complete,
+        format!("{}: {} frames\n", args.out.display(), frames.len()),
+    ))
 }
 
 /// A frame whose files are written.

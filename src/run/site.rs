@@ -54,15 +54,13 @@ pub(crate) fn site(args: &SiteArgs) -> Result<Outcome> {
             "{page}: a page of no run of this site; delete it, or keep it"
         );
     }
+    let index = args.out.join("index.html");
     let _ = writeln!(
         output,
         "site: {} (runs: {runs}, tables: {tables})",
-        args.out.join("index.html").display()
+        index.display()
     );
-    Ok(Outcome {
-        status: Status::Complete,
-        output,
-    })
+    Ok(Outcome::wrote(index, Status::Complete, output))
 }
 
 /// Refuses a run that is named twice: its models would be compared with themselves.

@@ -344,3 +344,44 @@ fn a_cause_is_said_once() {
         .stderr;
     assert_eq!(error.matches("os error").count(), 1, "{error}");
 }
+
+#[test]
+fn quiet_prints_where_things_were_written_alone() {
+    let bench = Bench::with_questions(12);
+    let line = "--model random --data set.jsonl --levels L0,L5 --out run --quiet";
+    assert_eq!(bench.complete(&words(line)), "run\n");
+    assert!(
+        bench
+            .complete(&words(&line.replace(" --quiet", "")))
+            .contains("accuracy")
+    );
+    for (line, said) in [
+        ("report run", "run\n"),
+        ("report run run --out both", "both\n"),
+        ("synthesize run/nowhere --out no", ""),
+        ("figures run --out figures", "figures\n"),
+        ("bundle run --out run.zip", "run.zip\n"),
+        ("site run --out site", "site/index.html\n"),
+        ("man pages", "pages\n"),
+    ] {
+        let called = bench.call(&[&words(line)[..], &["--quiet"]].concat());
+        assert_eq!(called.stdout, said, "{line}: {called:?}");
+        // An error is said, whatever is quiet.
+        assert_eq!(called.code == Some(0), called.stderr.is_empty(), "{line}");
+    }
+    // What is asked for by a flag of its own is printed, and so is what is written nowhere.
+    for more in ["--json", "--findings", "--full", "--markdown"] {
+        let said = bench.complete(&["report", "run", more, "--quiet"]);
+        assert!(said.lines().count() > 2, "{more}: {said}");
+    }
+    bench.complete(&words(
+        "--model random --seed 1 --data set.jsonl --levels L0 --out two",
+    ));
+    assert!(
+        bench
+            .complete(&words("report run two --quiet"))
+            .lines()
+            .count()
+            > 2
+    );
+}

@@ -58,15 +58,9 @@ pub(crate) fn export<E: Experiment>(
             output += "then run the same command again, for the remaining requests and the ";
             output += &(E::PHASES[phase + 1..].join(", ") + "\n");
         }
-        return Ok(Outcome {
-            status: Status::Complete,
-            output,
-        });
+        return Ok(Outcome::text(Status::Complete, output));
     }
-    Ok(Outcome {
-        status: Status::Complete,
-        output: String::new(),
-    })
+    Ok(Outcome::text(Status::Complete, String::new()))
 }
 
 /// Writes the trials of a plan into input files; each with its number of requests.

@@ -327,7 +327,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
             [] => Status::Complete,
             _ => Status::Stopped,
         };
-        Outcome { status, output }
+        Outcome::text(status, output)
     }
 
     fn finish(self, end: EndReason) -> Result<Outcome> {

@@ -28,10 +28,12 @@ pub(crate) fn write(
     let records = run.records.into_iter().map(Record::reread);
     run.records = records.collect::<Result<_>>()?;
     run.leave_out(ShownModels::Current);
-    Ok(Outcome {
-        status: manifest.status,
-        output: in_its_folder(store, &manifest, &combine(vec![run])?, show)?,
-    })
+    Ok(Outcome::wrote(
+        store.folder(),
+        manifest.status,
+        in_its_folder(store, &manifest, &combine(vec![run])?, show)?,
+    )
+    .in_format(show))
 }
 
 pub(super) fn in_its_folder(

@@ -268,10 +268,12 @@ pub(crate) fn write(
     if scores.run.manifest.status == Status::Complete && scores.has_unmarked() {
         scores.run.manifest.status = Status::Incomplete;
     }
-    Ok(Outcome {
-        status: scores.run.manifest.status,
-        output: scores.write(store, show)?,
-    })
+    Ok(Outcome::wrote(
+        store.folder(),
+        scores.run.manifest.status,
+        scores.write(store, show)?,
+    )
+    .in_format(show))
 }
 
 /// The marks of a judge, by question and answer.

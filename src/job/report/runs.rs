@@ -127,7 +127,17 @@ pub(crate) fn report(args: &ReportArgs) -> Result<Outcome> {
             ));
         }
     };
-    Ok(Outcome { status, output })
+    let written = match (&args.out, &args.runs[..]) {
+        (Some(out), _) => vec![out.clone()],
+        (None, [run]) => vec![run.clone()],
+        _ => Vec::new(),
+    };
+    let outcome = Outcome {
+        status,
+        output,
+        written,
+    };
+    Ok(outcome.in_format(args.format()))
 }
 
 /// The folders without those that are named before, and the alerts about these.

@@ -48,10 +48,7 @@ pub(crate) struct BatchFolderArgs {
 pub(crate) fn status(args: &BatchStatusArgs) -> Result<Outcome> {
     let manifest = manifest(&args.run)?;
     let batches = FolderBatches::open(&args.run, &manifest, &args.access)?;
-    Ok(Outcome {
-        status: Status::Complete,
-        output: batches.status()?,
-    })
+    Ok(Outcome::text(Status::Complete, batches.status()?))
 }
 
 /// Looks at each batch once, and takes over the replies of those that have ended.

@@ -112,10 +112,7 @@ pub(crate) fn bundle(args: &BundleArgs) -> Result<Outcome> {
     if !others.is_empty() {
         let _ = writeln!(output, "left out: {}", others.join(", "));
     }
-    Ok(Outcome {
-        status: Status::Complete,
-        output,
-    })
+    Ok(Outcome::wrote(&args.out, Status::Complete, output))
 }
 
 /// Checks that nothing private is left in any file.

@@ -84,13 +84,13 @@ pub(super) fn doctor(
     }
     let _ = writeln!(output, "page: {}", out.join(PAGE).display());
     let _ = writeln!(output, "picture: {}", out.join(PICTURE).display());
-    Ok(Outcome {
-        status: match examination.settled {
+    Ok(Outcome::text(
+        match examination.settled {
             Settled::Yes => Status::Complete,
             Settled::No => Status::Incomplete,
         },
         output,
-    })
+    ))
 }
 
 fn html(

@@ -70,10 +70,7 @@ pub(crate) struct EnhanceArgs {
 pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
     let (mut enhancer, image) = open(args)?;
     let Some(out) = &args.out else {
-        return Ok(Outcome {
-            status: Status::Complete,
-            output: enhancer.describe(),
-        });
+        return Ok(Outcome::text(Status::Complete, enhancer.describe()));
     };
     let images = Inputs::open(
         &args.inputs,
@@ -120,20 +117,21 @@ pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome
         0 => String::new(),
         n => format!(", {n} {what}"),
     };
-    Ok(Outcome {
-        status: if failed == 0 {
+    Ok(Outcome::wrote(
+        out,
+        if failed == 0 {
             Status::Complete
         } else {
             Status::Incomplete
         },
-        output: format!(
+        format!(
             "{}: {written} made by {}{}{}\n",
             out.display(),
             enhancer.name(),
             count(unchanged, "kept as they were (--force makes them again)"),
             count(failed, "failed")
         ),
-    })
+    ))
 }
 
 /// The enhancer, and whether it is known which of its outputs is the image. If it is not, `--doctor` examines all of them.

@@ -3,6 +3,7 @@
 mod set;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -156,17 +157,21 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
     drop(bar);
     let mut paths = Vec::new();
     for set in sets {
-        paths.push(set.finish()?.display().to_string());
+        paths.push(set.finish()?);
+    }
+    let mut output = format!(
+        "{} questions about {} images in {} conditions:\n",
+        questions.len(),
+        sources.len(),
+        conditions.len()
+    );
+    for path in &paths {
+        let _ = writeln!(output, "{}", path.display());
     }
     Ok(Outcome {
         status: Status::Complete,
-        output: format!(
-            "{} questions about {} images in {} conditions:\n{}\n",
-            questions.len(),
-            sources.len(),
-            conditions.len(),
-            paths.join("\n")
-        ),
+        output,
+        written: paths,
     })
 }
 

@@ -154,10 +154,7 @@ pub(crate) fn figures(args: &FiguresArgs) -> Result<Outcome> {
         let _ = writeln!(output, "note: {said}");
     }
     output += &files.write(&args.out)?;
-    Ok(Outcome {
-        status: Status::Complete,
-        output,
-    })
+    Ok(Outcome::wrote(&args.out, Status::Complete, output))
 }
 
 /// The names of all figures, in their order.

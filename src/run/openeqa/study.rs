@@ -75,9 +75,10 @@ pub(super) fn pack(
     drop(bar);
     let path = folder.join("study.html");
     write(&path, page(&asked)?.as_bytes())?;
-    Ok(Outcome {
-        status: Status::Complete,
-        output: format!(
+    Ok(Outcome::wrote(
+        &path,
+        Status::Complete,
+        format!(
             "{}: {} questions about {walks} walks, {images} images, {} conditions; a person sees each walk in one of them, and {} people \
              see it in all\nwhat they save is marked by openeqa --answers NAME=FILE\n",
             path.display(),
@@ -85,7 +86,7 @@ pub(super) fn pack(
             conditions.len(),
             conditions.len()
         ),
-    })
+    ))
 }
 
 /// The file name of an image, which does not reveal the level.

@@ -214,23 +214,21 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
         checked::review(page, &dataset, &frames, &generated.asked)?;
     }
     warn(&generated, making);
-    Ok(Outcome {
-        status: if failed == 0 {
-            Status::Complete
-        } else {
-            Status::Incomplete
-        },
-        output: if args.json {
-            json
-        } else {
-            let looks = compared
-                .as_ref()
-                .map_or_else(String::new, LookComparison::table);
-            let table = report::questions::table(&summary);
-            let checks = report::questions::checks::text(&verdicts.checks);
-            format!("{table}{looks}{checks}{}\n", args.out.display())
-        },
-    })
+    let status = if failed == 0 {
+        Status::Complete
+    } else {
+        Status::Incomplete
+    };
+    if args.json {
+        return Ok(Outcome::text(status, json));
+    }
+    let looks = compared
+        .as_ref()
+        .map_or_else(String::new, LookComparison::table);
+    let table = report::questions::table(&summary);
+    let checks = report::questions::checks::text(&verdicts.checks);
+    let output = format!("{table}{looks}{checks}{}\n", args.out.display());
+    Ok(Outcome::wrote(&args.out, status, output))
 }
 
 /// Writes the statistics into a folder in every form.

@@ -76,13 +76,10 @@ pub(crate) fn realism(args: &RealismArgs, progress: &Progress) -> Result<Outcome
         files::write_files(out, &works, &summary)?;
         files::write_fits(out, &sensor, &fits)?;
     }
-    Ok(Outcome {
-        status,
-        output: if args.json {
-            summary.json()
-        } else {
-            summary.table()
-        },
+    Ok(match &args.out {
+        _ if args.json => Outcome::text(status, summary.json()),
+        None => Outcome::text(status, summary.table()),
+        Some(out) => Outcome::wrote(out, status, summary.table()),
     })
 }
 

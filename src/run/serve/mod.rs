@@ -87,10 +87,7 @@ pub(crate) fn serve(args: &ServeArgs, progress: &Progress) -> Result<Outcome> {
         .build()
         .map_err(|e| Error::usage("serve", e))?;
     runtime.block_on(listen(args, state, progress))?;
-    Ok(Outcome {
-        status: Status::Complete,
-        output: String::new(),
-    })
+    Ok(Outcome::text(Status::Complete, String::new()))
 }
 
 async fn listen(args: &ServeArgs, state: Arc<ServerState>, progress: &Progress) -> Result<()> {

@@ -85,14 +85,14 @@ pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
     if !all_same {
         text += "the data, an enhancement model or this program has changed since the run\n";
     }
-    Ok(Outcome {
-        status: if all_same {
+    Ok(Outcome::text(
+        if all_same {
             Status::Complete
         } else {
             Status::Incomplete
         },
-        output: text,
-    })
+        text,
+    ))
 }
 
 /// The frames that were shown with the item: its own first, then those that a control of the observer was shown.

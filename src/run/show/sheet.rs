@@ -66,13 +66,14 @@ pub(super) fn sheet(args: &ShowArgs, path: &Path) -> Result<Outcome> {
             "NOT the bytes that were sent: {names}; the data, an enhancer or this program has changed since the run\n"
         )
     });
-    Ok(Outcome {
-        status: changed.map_or(Status::Complete, |_| Status::Incomplete),
-        output: [Some(drawn), left_out, note]
+    Ok(Outcome::wrote(
+        path,
+        changed.map_or(Status::Complete, |_| Status::Incomplete),
+        [Some(drawn), left_out, note]
             .into_iter()
             .flatten()
             .collect(),
-    })
+    ))
 }
 
 /// The image of a cell; several stand beside each other.

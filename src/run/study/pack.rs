@@ -113,16 +113,17 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
     drop(bar);
     let path = args.out.join("study.html");
     write(&path, page(&asked)?.as_bytes())?;
-    Ok(Outcome {
-        status: Status::Complete,
-        output: format!(
+    Ok(Outcome::wrote(
+        &path,
+        Status::Complete,
+        format!(
             "{}: {} questions, {images} images, {} conditions; with {} people each image is seen by one of them\n",
             path.display(),
             asked.len(),
             conditions.len(),
             conditions.len()
         ),
-    })
+    ))
 }
 
 fn conditions(records: &[Record], wanted: &[Condition]) -> Result<Vec<Condition>> {

@@ -40,16 +40,16 @@ pub(super) fn check(folder: &Path) -> Result<Outcome> {
         let problem = "no JSON file of an image of `synthesize` is in it";
         return Err(Error::data(folder.display(), problem));
     }
-    Ok(Outcome {
-        status: match wrong {
+    Ok(Outcome::text(
+        match wrong {
             0 => Status::Complete,
             _ => Status::Incomplete,
         },
-        output: format!(
+        format!(
             "{}: {intact} images are as they were written, {wrong} are not\n",
             folder.display()
         ),
-    })
+    ))
 }
 
 /// The part of a JSON file that is checked. All schemas share it.

@@ -150,18 +150,19 @@ impl ImageCounts {
             0 => String::new(),
             n => format!(", {n} failed"),
         };
-        Outcome {
-            status: if failed == 0 {
+        Outcome::wrote(
+            out,
+            if failed == 0 {
                 Status::Complete
             } else {
                 Status::Incomplete
             },
-            output: format!(
+            format!(
                 "{}: {written} made of {frames} frame{}{unchanged}{failures}\n",
                 out.display(),
                 if frames == 1 { "" } else { "s" }
             ),
-        }
+        )
     }
 }
 

@@ -82,7 +82,7 @@ pub(crate) fn check(
         0 => Status::Complete,
         _ => Status::Incomplete,
     };
-    Ok(Outcome { status, output })
+    Ok(Outcome::text(status, output))
 }
 
 fn verdict(asked: usize, problems: usize, warnings: usize) -> String {
