@@ -227,7 +227,10 @@ fn runs_of_open_questions_are_bundled_too() {
     assert_eq!(house.call(&words(line)).code, Some(0));
     house.0.complete(&words("bundle run --out run.zip"));
     unpack(&house.0.path("run.zip"), &house.0.path("unpacked"));
-    house.0.complete(&words("report unpacked/run"));
+    // The page names the folder of the run as it was typed.
+    let mut report = house.0.command(&["report", "run"]);
+    let reported = called(report.current_dir(house.0.path("unpacked")));
+    assert_eq!(reported.code, Some(0), "{reported:?}");
     for name in ["records.jsonl", "summary.csv", "report.html", "upstream"] {
         let unpacked = house.0.path("unpacked/run").join(name);
         assert!(unpacked.exists(), "{name}");

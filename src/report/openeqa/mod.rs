@@ -21,6 +21,7 @@ use crate::error::Result;
 use crate::report::alert::{Alert, lines};
 use crate::report::light_readings::LightReadings;
 use crate::report::products::{PAGE, table_files};
+use crate::report::short::wrapped;
 use crate::report::table::Table;
 use crate::report::{chart, json, terminal};
 use crate::types::manifest::RunManifest;
@@ -93,11 +94,9 @@ pub(crate) fn render(report: &OpenReport<'_>, tables: &[Table], folder: &Path) -
         Some(_) => text += &terminal::render(tables),
         None => text += "No answer is marked: name a judge with --judge NAME\n",
     }
-    for line in coverage(report) {
-        let _ = writeln!(text, "{line}");
-    }
-    if let Some(line) = report.light_readings().open_question() {
-        let _ = writeln!(text, "{line}");
+    let open = report.light_readings().open_question();
+    for line in coverage(report).into_iter().chain(open) {
+        text += &wrapped("", &line, " ");
     }
     let _ = writeln!(text, "run: {}", folder.display());
     let _ = writeln!(text, "report: {}", folder.join(PAGE).display());

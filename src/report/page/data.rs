@@ -25,7 +25,7 @@ const MAX_REPLY_CHARS: [usize; 5] = [20_000, 2_000, 400, 100, 30];
 const SIZE_LIMITS: [SizeLimit; 3] = [
     SizeLimit {
         text: 12_000_000,
-        pictures: 8_500_000,
+        pictures: 7_000_000,
     },
     SizeLimit {
         text: 4_000_000,
@@ -36,8 +36,8 @@ const SIZE_LIMITS: [SizeLimit; 3] = [
         pictures: 1_000_000,
     },
 ];
-/// Maximum size of the packed items in bytes, so that the page stays under 15 MB.
-const MAX_PACKED_BYTES: usize = 13_500_000;
+/// Maximum size of the packed items in bytes, so that the page stays under 12 MB.
+const MAX_PACKED_BYTES: usize = 10_500_000;
 
 /// Maximum sizes of the parts that can be shortened.
 #[derive(Debug, Clone, Copy)]
