@@ -5,6 +5,7 @@
 pub(crate) mod bars;
 pub(crate) mod data;
 pub(crate) mod drawn;
+pub(crate) mod reliability;
 pub(crate) mod thresholds;
 
 use serde::Serialize;

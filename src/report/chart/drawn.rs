@@ -3,6 +3,7 @@
 use super::Chart;
 use super::bars::BarChart;
 use super::data::ChartData;
+use super::reliability::ReliabilityChart;
 use super::thresholds::ThresholdChart;
 use crate::error::Result;
 
@@ -12,6 +13,7 @@ pub(crate) enum Drawn {
     Lines(Chart),
     Bars(BarChart),
     Thresholds(ThresholdChart),
+    Reliability(ReliabilityChart),
 }
 
 impl Drawn {
@@ -20,6 +22,7 @@ impl Drawn {
         match self {
             Self::Lines(chart) => chart.note.clone(),
             Self::Bars(chart) => chart.note.clone(),
+            Self::Reliability(chart) => chart.note.clone(),
             Self::Thresholds(chart) => format!("lines are 95 % intervals by {}", chart.unit),
         }
     }
@@ -31,7 +34,7 @@ impl Drawn {
     pub(crate) fn data(&self) -> Result<Option<String>> {
         match self {
             Self::Lines(chart) => ChartData::json(chart).map(Some),
-            Self::Bars(_) | Self::Thresholds(_) => Ok(None),
+            Self::Bars(_) | Self::Thresholds(_) | Self::Reliability(_) => Ok(None),
         }
     }
 }

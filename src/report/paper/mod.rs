@@ -12,6 +12,7 @@ mod lines;
 mod look;
 mod overview;
 mod pdf;
+mod reliability;
 mod samples;
 mod sheet;
 mod svg;
@@ -35,6 +36,7 @@ pub(crate) fn sheet(figure: &Drawn, look: &Look) -> Sheet {
     match figure {
         Drawn::Lines(chart) => lines::lines(chart, look),
         Drawn::Bars(chart) => bars::bars(chart, look),
+        Drawn::Reliability(chart) => reliability::reliability(chart, look),
         Drawn::Thresholds(chart) => thresholds::thresholds(chart, look),
     }
 }

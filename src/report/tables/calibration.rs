@@ -4,7 +4,7 @@ use crate::report::table::ColumnKind::{Count, Number, Percent, Points, Ratio, Sh
 use crate::report::table::{Table, TableBuilder, TableCell};
 use crate::report::words::light;
 use crate::score::auc::Auc;
-use crate::score::calibration::{Calibration, PositionShare};
+use crate::score::calibration::{Calibration, PositionShare, ReliabilityBin};
 use crate::score::estimate::Estimate;
 use crate::score::findings::Findings;
 use crate::score::subject::Subject;
@@ -19,7 +19,7 @@ pub(super) fn calibration(findings: &Findings<'_>) -> Vec<Table> {
     if all.is_empty() {
         return Vec::new();
     }
-    vec![confidence(findings, all), positions(all)]
+    vec![confidence(findings, all), reliability(all), positions(all)]
 }
 
 /// A number of a row.
@@ -108,6 +108,25 @@ fn condition(subject: &Subject) -> String {
             light(&subject.variant, subject.enhancer.as_ref())
         ),
     }
+}
+
+/// The bins of the reliability diagram.
+fn reliability(all: &[Calibration]) -> Table {
+    let rows = all.iter().flat_map(|row| {
+        let bins = row.bins.iter().enumerate();
+        bins.map(|(number, bin)| (&row.subject, number + 1, *bin))
+    });
+    TableBuilder::new("reliability", rows)
+        .subject(
+            |row: &(&Subject, usize, ReliabilityBin)| row.0,
+            ToString::to_string,
+        )
+        .column(Count, "csv bin", |row| row.1)
+        .column(Number, "csv confidence", |row| row.2.confidence)
+        .column(Share, "csv accuracy accuracy_low accuracy_high n", |row| {
+            row.2.accuracy
+        })
+        .build()
 }
 
 fn positions(all: &[Calibration]) -> Table {

@@ -93,7 +93,7 @@ pub(in crate::report) const SECTIONS: [Section; 15] = [
          likely, and 1 at best. AUROC is the share of pairs of a right and a wrong reply in which the right one is more confident. Risk \
          is the share of wrong replies among all, and among the 80 and 50 % with the most confidence. The blind shift is the distance to \
          the probabilities without an image, 0 to 1: what the pixels still contribute.",
-        &["confidence"],
+        &["confidence", "reliability"],
     ),
     (
         "comparisons",

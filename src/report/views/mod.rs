@@ -2,12 +2,17 @@
 
 mod fidelity;
 mod real;
+mod reliability;
 
 use super::figures::Drawing;
 use crate::score::findings::Findings;
 
 /// The figures for which there are data.
 pub(super) fn drawings(findings: &Findings<'_>) -> impl Iterator<Item = Drawing> {
-    let all = [fidelity::drawing(findings), real::drawing(findings)];
+    let all = [
+        fidelity::drawing(findings),
+        real::drawing(findings),
+        reliability::drawing(findings),
+    ];
     all.into_iter().flatten()
 }

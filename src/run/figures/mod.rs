@@ -205,7 +205,7 @@ impl Files {
         if formats.contains(&FigureFormat::Tex) {
             match &drawing.chart {
                 Drawn::Lines(chart) => self.made.extend(tex(name, chart, &in_tex(look))),
-                Drawn::Bars(_) | Drawn::Thresholds(_) => {
+                Drawn::Bars(_) | Drawn::Thresholds(_) | Drawn::Reliability(_) => {
                     self.leave_out(&format!("{name}.tex"), "it is no chart of lines");
                 }
             }

@@ -1,6 +1,7 @@
 //! One reply with the model's confidence: [`ConfidentReply`].
 
-use crate::score::grid::Grid;
+use crate::score::estimate::Estimate;
+use crate::score::grid::{ClusterCount, Grid};
 use crate::types::{OptionProbabilities, Record, TrialOutcome};
 
 /// The least probability of a true choice that is not listed and has no bound, either: probabilities are kept to six decimals.
@@ -73,6 +74,17 @@ fn reply(record: &Record, options: &OptionProbabilities, cluster: u32) -> Option
         guess: 1.0 - 1.0 / p.len() as f64,
         nll: -libm::log(truth.max(least).min(1.0)),
     })
+}
+
+/// The share of right replies, with its interval by cluster.
+pub(super) fn accuracy(clusters: usize, replies: &[ConfidentReply]) -> Option<Estimate> {
+    let mut counts = vec![ClusterCount::default(); clusters];
+    for reply in replies {
+        let count = &mut counts[reply.cluster as usize];
+        count.replies += 1;
+        count.right += u32::from(reply.right);
+    }
+    Estimate::clustered(&counts)
 }
 
 /// The probabilities of a record that figures may use; `None` if there are none, or reasoning stood before the answer.

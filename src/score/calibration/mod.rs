@@ -7,17 +7,19 @@ mod blind_shift;
 mod confident_reply;
 mod expected_error;
 mod positions;
+mod reliability;
 mod risk;
 mod rotations;
 
 use super::auc::{Auc, PairCounts, RankedReply};
 use super::bootstrap::Resamples;
 use super::estimate::Estimate;
-use super::grid::{ClusterCount, Grid};
+use super::grid::Grid;
 use super::subject::Subject;
-use confident_reply::{ConfidentReply, confident_replies};
+use confident_reply::{ConfidentReply, accuracy, confident_replies};
 
 pub(crate) use positions::PositionShare;
+pub(crate) use reliability::ReliabilityBin;
 pub(crate) use risk::RiskCoverage;
 
 /// The least number of replies for an expected calibration error (chosen).
@@ -56,6 +58,8 @@ pub struct Calibration {
     pub blind_shift: Option<Estimate>,
     /// Accuracy of the choice with the greatest probability averaged over the orders of choices, if there are several.
     pub over_orders: Option<Estimate>,
+    /// Accuracy over confidence, in bins.
+    pub bins: Vec<ReliabilityBin>,
     /// Probability and truth by the place of a choice.
     pub positions: Vec<PositionShare>,
 }
@@ -100,6 +104,7 @@ fn calibration(grid: &Grid<'_>, draws: &Resamples, subject: usize) -> Option<Cal
         auroc: auroc(grid.clusters, replies),
         blind_shift: blind_shift(grid, draws, subject),
         over_orders: rotations::accuracy(grid, subject),
+        bins: reliability::bins(grid.clusters, replies),
         positions: positions::shares(grid, subject),
     })
 }
@@ -112,16 +117,6 @@ fn blind_shift(grid: &Grid<'_>, draws: &Resamples, subject: usize) -> Option<Est
         .map(|(cluster, distance)| (cluster, distance, 1.0))
         .collect();
     (!terms.is_empty()).then(|| ratio_of(draws, &terms))
-}
-
-fn accuracy(clusters: usize, replies: &[ConfidentReply]) -> Option<Estimate> {
-    let mut counts = vec![ClusterCount::default(); clusters];
-    for reply in replies {
-        let count = &mut counts[reply.cluster as usize];
-        count.replies += 1;
-        count.right += u32::from(reply.right);
-    }
-    Estimate::clustered(&counts)
 }
 
 /// The sum of a number over the sum of another one, with its interval by the cluster bootstrap.

@@ -166,6 +166,25 @@ fn the_report_sets_confidence_against_accuracy() {
     let page = std::fs::read_to_string(bench.path("run/report.html")).unwrap();
     assert!(page.contains("Confidence against accuracy"));
     assert!(bench.path("run/figures/confidence.svg").exists());
+    // All replies are equally confident: one bin a condition.
+    let bins = std::fs::read_to_string(bench.path("run/reliability.csv")).unwrap();
+    let mut lines = bins.lines();
+    let head: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let place = |name: &str| head.iter().position(|known| *known == name).unwrap();
+    let lines: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
+    assert_eq!(lines.len(), 3, "{bins}");
+    for line in lines {
+        let number = |name: &str| line[place(name)].parse::<f64>().unwrap();
+        assert!((number("confidence") - 7.0 / 9.0).abs() < 1e-4, "{bins}");
+        assert_eq!(
+            [number("bin"), number("accuracy"), number("n")],
+            [1.0, 1.0, 120.0]
+        );
+    }
+    let figure = std::fs::read_to_string(bench.path("run/figures/reliability.svg")).unwrap();
+    assert!(
+        figure.contains(">confidence in %</text>") && page.contains("Is a model as often right")
+    );
     let not_shown = "It is not shown that m is surer than it is right at L3: its mean confidence is 77.8 %, and 100.0 % of its replies";
     let said = |bench: &Bench| std::fs::read_to_string(bench.path("run/summary.json")).unwrap();
     assert!(said(&bench).contains(not_shown), "{printed}");
@@ -185,7 +204,10 @@ fn the_report_sets_confidence_against_accuracy() {
         "{printed}"
     );
     assert!(!bench.path("run/calibration.csv").exists());
-    assert!(!bench.path("run/figures/confidence.svg").exists());
+    for figure in ["confidence", "reliability"] {
+        assert!(!bench.path(&format!("run/figures/{figure}.svg")).exists());
+    }
+    assert!(!bench.path("run/reliability.csv").exists());
 }
 
 #[test]

@@ -42,6 +42,7 @@ fn calibration(confidence: f64, accuracy: f64) -> Calibration {
         auroc: None,
         blind_shift: None,
         over_orders: None,
+        bins: Vec::new(),
         positions: Vec::new(),
     }
 }

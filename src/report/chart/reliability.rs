@@ -1,0 +1,29 @@
+//! A figure of accuracy over confidence: [`ReliabilityChart`].
+
+use super::LineStyle;
+use crate::score::estimate::Estimate;
+
+/// The bins of one condition.
+#[derive(Debug, Clone)]
+pub(crate) struct ReliabilityLine {
+    /// Name in the legend.
+    pub name: String,
+    pub style: LineStyle,
+    /// Mean confidence and accuracy of each bin, in order of confidence.
+    pub bins: Vec<(f64, Estimate)>,
+}
+
+/// The lines of one model in one light.
+#[derive(Debug, Clone)]
+pub(crate) struct ReliabilityPanel {
+    pub title: String,
+    pub lines: Vec<ReliabilityLine>,
+}
+
+/// A figure of panels with one legend. Accuracy equals confidence on the diagonal.
+#[derive(Debug, Clone)]
+pub(crate) struct ReliabilityChart {
+    pub panels: Vec<ReliabilityPanel>,
+    /// What the caption says besides.
+    pub note: String,
+}
