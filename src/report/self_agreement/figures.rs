@@ -42,13 +42,13 @@ pub(super) fn figures(found: &SelfAgreement<'_>) -> Result<Vec<Figure>> {
             "agreement",
             "Agreement of each model with its own answer at L0, not with the truth. L0: the same images asked again, the ceiling. \
              Broken lines: without images, the floor.",
-            "agreement with its own answer at L0, %",
+            "agreement in %",
             agreement,
         ),
         (
             "evidence",
             "Evidence kept: the share of the way from the floor to the ceiling. Below 0 and above 100 % the line lies on the edge.",
-            "evidence kept, %",
+            "evidence kept in %",
             evidence,
         ),
     ];
