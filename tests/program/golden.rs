@@ -70,6 +70,6 @@ fn open_questions_with_marks_and_an_enhancer() {
     assert_eq!(digest(&house.0, "run"), OPENEQA);
 }
 
-const EVALUATION: &str = "2ebef800deac66a6";
-const READINGS: &str = "f4665aef81ca2db6";
-const OPENEQA: &str = "b736e5fa1ebf14a4";
+const EVALUATION: &str = "e175b0eac8447b39";
+const READINGS: &str = "9e3f8ecf2a471a12";
+const OPENEQA: &str = "4bd4495fc97beb16";
