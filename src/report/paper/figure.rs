@@ -19,6 +19,7 @@ const LETTERS: f64 = 8.5;
 pub(crate) fn figure(name: &'static str, caption: &str, shown: &Drawn) -> Result<Figure> {
     let width = match shown {
         Drawn::Lines(chart) if chart.columns.min(chart.panels.len()) == 1 => NARROW,
+        Drawn::Reliability(chart) if chart.panels.len() == 1 => NARROW,
         _ => WIDE,
     };
     let look = Look {
