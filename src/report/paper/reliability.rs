@@ -208,7 +208,10 @@ mod tests {
         assert!(((second[1] - last[1]) / 0.2 - scale).abs() < 1e-9);
         let bar = sheet.marks.iter().find_map(|mark| match mark {
             Mark::Line { places, .. }
-                if places.len() == 2 && places[0][0] == first[0] && places[1][0] == first[0] =>
+                if places.len() == 2
+                    && places
+                        .iter()
+                        .all(|place| (place[0] - first[0]).abs() < 1e-9) =>
             {
                 Some(places.clone())
             }
