@@ -16,7 +16,7 @@ const BETWEEN: f64 = 2.6;
 const LAST: f64 = 1.0;
 
 /// Room for the sample of a line in the legend, in points.
-const SAMPLE: f64 = 41.0;
+const SAMPLE: f64 = 43.0;
 /// How much wider letters of a paper can be than those of Arial.
 const WIDER: f64 = 1.08;
 
