@@ -66,8 +66,8 @@ pub(super) fn escaped(text: &str) -> String {
 /// Makes what follows smaller where it is wider than the text.
 const FIT: &str = "\\resizebox{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}{!}";
 
-/// Most rows of a table on a page.
-const MOST_ROWS: usize = 40;
+/// Most rows of a table on a page (chosen: of `\footnotesize`, with caption and foot).
+pub(super) const MOST_ROWS: usize = 40;
 
 /// A table as floats of at most [`MOST_ROWS`] rows each, no wider than the text.
 fn table(caption: &str, table: &Table) -> String {
@@ -92,9 +92,10 @@ fn table(caption: &str, table: &Table) -> String {
     let foot = table.foot.as_deref();
     let foot = foot.map(|foot| format!("\n  {{\\footnotesize {}}}\n", escaped(foot)));
     let mut text = String::new();
-    let parts = rows.chunks(MOST_ROWS).count().max(1);
+    let parts = rows.len().div_ceil(MOST_ROWS).max(1);
     for part in 0..parts {
-        let rows = rows.chunks(MOST_ROWS).nth(part).unwrap_or_default();
+        let first = part * MOST_ROWS;
+        let rows = &rows[first..rows.len().min(first + MOST_ROWS)];
         let place = match parts {
             1 => String::new(),
             _ => format!(" (part {} of {parts})", part + 1),

@@ -65,7 +65,7 @@ impl Axes {
     pub(super) fn draw(&self, sheet: &mut Sheet, look: &Look, measure: &str) {
         let (right, bottom) = (self.left + self.width, self.top + self.height);
         let small = look.small();
-        self.shares(sheet, look);
+        shares(sheet, look, [self.left, right], |share| self.y(share));
         sheet.line(&[[self.left, bottom], [right, bottom]], &look.thin(INK));
         let labelled = self.labelled(look);
         for level in &self.levels {
@@ -89,18 +89,6 @@ impl Axes {
         sheet.turned_words(measure, place, look.letters, Anchor::Middle, Turn::Up);
     }
 
-    /// Draws the grid of shares with its numbers in percent.
-    pub(super) fn shares(&self, sheet: &mut Sheet, look: &Look) {
-        let small = look.small();
-        for step in 0..=5 {
-            let y = self.y(f64::from(step) / 5.0);
-            let ends = [[self.left, y], [self.left + self.width, y]];
-            sheet.line(&ends, &look.thin(GRID));
-            let place = [self.left - 0.4 * small, y + 0.35 * small];
-            sheet.words(&(step * 20).to_string(), place, small, Anchor::End);
-        }
-    }
-
     /// The levels whose names have room on the axis, from L0: each that does not touch the one before.
     fn labelled(&self, look: &Look) -> Vec<AxisLevel> {
         let font = Font::bundled();
@@ -118,6 +106,22 @@ impl Axes {
             }
         }
         labelled
+    }
+}
+
+/// Draws the grid of shares between the ends of an axis, with its numbers in percent. `y` is the vertical place of a share.
+pub(super) fn shares(
+    sheet: &mut Sheet,
+    look: &Look,
+    [left, right]: [f64; 2],
+    y: impl Fn(f64) -> f64,
+) {
+    let small = look.small();
+    for step in 0..=5 {
+        let y = y(f64::from(step) / 5.0);
+        sheet.line(&[[left, y], [right, y]], &look.thin(GRID));
+        let place = [left - 0.4 * small, y + 0.35 * small];
+        sheet.words(&(step * 20).to_string(), place, small, Anchor::End);
     }
 }
 

@@ -1,8 +1,10 @@
 //! A chart of bars at the width of a column: [`bars`].
 
+use super::axes::shares;
 use super::font::Font;
 use super::look::Look;
-use super::sheet::{Anchor, GRID, Place, Sheet};
+use super::sheet::{Anchor, Place, Sheet};
+use super::title::{LEADING, Title};
 use crate::report::chart::INK;
 use crate::report::chart::bars::{Bar, BarChart, BarPanel};
 
@@ -18,10 +20,10 @@ pub(crate) fn bars(chart: &BarChart, look: &Look) -> Sheet {
     let mut sheet = Sheet::default();
     let mut top = 0.0;
     for panel in &chart.panels {
-        top += (LINES * 1.15 + 0.3) * look.letters;
+        top += (LINES * LEADING + 0.3) * look.letters;
         let left = Font::bundled().width("100", look.small()) + 0.6 * look.letters;
         draw(&mut sheet, look, panel, [left, top]);
-        top += HEIGHT * look.letters + (LINES * 1.15 + 1.6) * look.small();
+        top += HEIGHT * look.letters + (LINES * LEADING + 1.6) * look.small();
     }
     sheet.size = [look.width, top];
     sheet
@@ -29,19 +31,10 @@ pub(crate) fn bars(chart: &BarChart, look: &Look) -> Sheet {
 
 fn draw(sheet: &mut Sheet, look: &Look, panel: &BarPanel, [left, top]: Place) {
     let (right, bottom) = (look.width - 0.4 * look.letters, top + HEIGHT * look.letters);
-    let small = look.small();
     let y = |share: f64| bottom - HEIGHT * look.letters * share.clamp(0.0, 1.0);
-    for step in 0..=5 {
-        let at = y(f64::from(step) / 5.0);
-        sheet.line(&[[left, at], [right, at]], &look.thin(GRID));
-        let place = [left - 0.4 * small, at + 0.35 * small];
-        sheet.words(&(step * 20).to_string(), place, small, Anchor::End);
-    }
-    let title = Font::bundled().wrapped(&panel.title, look.letters, right - left);
-    for (line, text) in title.iter().rev().enumerate() {
-        let place = [left, top - (0.5 + 1.15 * line as f64) * look.letters];
-        sheet.words(text, place, look.letters, Anchor::Start);
-    }
+    shares(sheet, look, [left, right], y);
+    let title = Title::new(&panel.title, look, right - left);
+    title.draw(sheet, look, [left, top - 0.5 * look.letters]);
     let step = (right - left) / panel.bars.len().max(1) as f64;
     for (index, bar) in panel.bars.iter().enumerate() {
         let middle = left + step * (index as f64 + 0.5);

@@ -2,12 +2,51 @@
 
 use super::font::Font;
 use super::look::Look;
-use super::sheet::{Anchor, Place, Sheet};
+use super::sheet::{Anchor, Place, Sheet, Stroke};
 use crate::report::chart::{Chart, LineStyle, PanelContent, PlotLine};
 
-/// The first line of each name, with the place of its entry.
+/// What stands before a name in a legend.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Sample {
+    /// A line with its mark.
+    Curve,
+    /// A thin line with a hollow mark.
+    Marks,
+    /// A line alone.
+    Flat,
+}
+
+/// A name with its sample.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Entry<'a> {
+    pub name: &'a str,
+    pub style: LineStyle,
+    pub sample: Sample,
+}
+
+impl<'a> From<&'a PlotLine> for Entry<'a> {
+    fn from(line: &'a PlotLine) -> Self {
+        Self {
+            name: &line.name,
+            style: line.style,
+            sample: match line.content {
+                PanelContent::Curve(_) => Sample::Curve,
+                PanelContent::Marks(_) => Sample::Marks,
+                PanelContent::Flat(_) => Sample::Flat,
+            },
+        }
+    }
+}
+
+impl Entry<'_> {
+    fn is_without_images(&self) -> bool {
+        self.sample == Sample::Flat && self.style != LineStyle::REFERENCE
+    }
+}
+
+/// The first entry of each name, with its place.
 pub(super) struct Legend<'a> {
-    entries: Vec<(&'a PlotLine, Place)>,
+    entries: Vec<(Entry<'a>, Place)>,
     /// Height in points.
     pub height: f64,
 }
@@ -21,18 +60,24 @@ const ROW: f64 = 1.4;
 const START: f64 = 0.3;
 
 impl<'a> Legend<'a> {
-    /// The entries of a chart in rows of the width of the figure.
-    pub(super) fn new(chart: &'a Chart, look: &Look) -> Self {
+    /// The legend of a chart of lines.
+    pub(super) fn of_chart(chart: &'a Chart, look: &Look) -> Self {
+        let lines = chart.panels.iter().flat_map(|panel| &panel.lines);
+        Self::new(lines.filter(|line| !line.is_empty()).map(Entry::from), look)
+    }
+
+    /// The entries in rows of the width of the figure.
+    pub(super) fn new(lines: impl Iterator<Item = Entry<'a>>, look: &Look) -> Self {
         let font = Font::bundled();
         let (letters, row) = (look.letters, ROW * look.letters);
-        let mut entries: Vec<(&PlotLine, Place)> = Vec::new();
+        let mut entries: Vec<(Entry<'a>, Place)> = Vec::new();
         let start = START * letters;
         let (mut x, mut y) = (start, 0.0);
-        for line in chart.panels.iter().flat_map(|panel| &panel.lines) {
-            if entries.iter().any(|(entry, _)| entry.name == line.name) || line.is_empty() {
+        for line in lines {
+            if entries.iter().any(|(entry, _)| entry.name == line.name) {
                 continue;
             }
-            let length = (SAMPLE + AFTER_SAMPLE) * letters + font.width(&line.name, letters);
+            let length = (SAMPLE + AFTER_SAMPLE) * letters + font.width(line.name, letters);
             if x > start && x + length > look.width {
                 (x, y) = (start, y + row);
             }
@@ -43,54 +88,40 @@ impl<'a> Legend<'a> {
         Self { entries, height }
     }
 
-    /// The place of a model without images among those of the figure.
-    pub(super) fn place_without_images(&self, name: &str) -> usize {
-        let flat = self.entries.iter().map(|(line, _)| line);
-        let mut flat = flat.filter(|line| is_without_images(line));
-        flat.position(|line| line.name == name).unwrap_or(0)
-    }
-
     /// Draws the entries, the first row beginning at a height.
     pub(super) fn draw(&self, sheet: &mut Sheet, look: &Look, top: f64) {
         let letters = look.letters;
-        for (line, [x, y]) in &self.entries {
+        for (entry, [x, y]) in &self.entries {
             let y = top + y + 0.6 * letters;
             let ends = [[*x, y], [x + SAMPLE * letters, y]];
             let middle = [x + SAMPLE * letters / 2.0, y];
-            match &line.content {
-                PanelContent::Curve(_) => {
-                    let pen = look.pen(line.style);
+            match entry.sample {
+                Sample::Curve => {
+                    let pen = look.pen(entry.style);
                     sheet.line(&ends, &pen.stroke);
                     look.mark(sheet, &pen, middle);
                 }
-                PanelContent::Marks(_) => {
-                    sheet.line(&ends, &look.thin(look.colour(line.style)));
-                    look.hollow(sheet, line.style, middle);
+                Sample::Marks => {
+                    sheet.line(&ends, &look.thin(look.colour(entry.style)));
+                    look.hollow(sheet, entry.style, middle);
                 }
-                PanelContent::Flat(_) => sheet.line(&ends, &self.flat(line, look)),
+                Sample::Flat => sheet.line(&ends, &self.flat(*entry, look)),
             }
             let start = (SAMPLE + AFTER_SAMPLE) * letters;
             let room = look.width - x - start;
-            let name = Font::bundled().shortened(&line.name, letters, room);
-            sheet.words(
-                &name,
-                [x + start, y + 0.35 * letters],
-                letters,
-                Anchor::Start,
-            );
+            let name = Font::bundled().shortened(entry.name, letters, room);
+            let place = [x + start, y + 0.35 * letters];
+            sheet.words(&name, place, letters, Anchor::Start);
         }
     }
 
-    /// The stroke of a flat line.
-    pub(super) fn flat(&self, line: &PlotLine, look: &Look) -> super::sheet::Stroke {
-        if is_without_images(line) {
-            look.without_images(self.place_without_images(&line.name))
-        } else {
-            look.dots()
+    /// The stroke of a flat line. Models without images differ by their place among those of the figure.
+    pub(super) fn flat(&self, entry: Entry<'_>, look: &Look) -> Stroke {
+        if !entry.is_without_images() {
+            return look.dots();
         }
+        let flat = self.entries.iter().map(|(known, _)| known);
+        let mut flat = flat.filter(|known| known.is_without_images());
+        look.without_images(flat.position(|known| known.name == entry.name).unwrap_or(0))
     }
-}
-
-fn is_without_images(line: &PlotLine) -> bool {
-    matches!(line.content, PanelContent::Flat(_)) && line.style != LineStyle::REFERENCE
 }

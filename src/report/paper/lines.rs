@@ -1,10 +1,10 @@
 //! A chart of lines at the width of a column: [`lines`].
 
 use super::axes::Axes;
-use super::font::Font;
 use super::legend::Legend;
 use super::look::{Look, Pen};
-use super::sheet::{Anchor, Mark, PAPER, Place, Sheet, Stroke};
+use super::sheet::{Mark, PAPER, Place, Sheet, Stroke};
+use super::title::Title;
 use crate::report::chart::{Chart, DarkMark, LineStyle, Panel, PanelContent, PlotLine};
 use crate::score::estimate::Estimate;
 use crate::types::AxisLevel;
@@ -16,8 +16,6 @@ const RATIO: f64 = 0.62;
 const HEIGHTS: [f64; 2] = [9.0, 17.0];
 /// Room between panels, in heights of letters.
 const GAP: f64 = 0.9;
-/// Distance of two lines of a title, in heights of letters.
-const LEADING: f64 = 1.15;
 /// Most curves of a panel whose intervals are bands; those of more curves are bars.
 const MOST_BANDS: usize = 3;
 /// Opacity of a band.
@@ -25,7 +23,7 @@ const BAND: f64 = 0.16;
 
 /// The chart as a sheet. Each number is drawn where the axes say; the note of the chart is left to the caption.
 pub(crate) fn lines(chart: &Chart, look: &Look) -> Sheet {
-    let legend = Legend::new(chart, look);
+    let legend = Legend::of_chart(chart, look);
     let most = (look.width / (LEAST * look.letters)) as usize;
     let columns = chart.columns.min(most).min(chart.panels.len()).max(1);
     let (first, next) = margins(look);
@@ -36,18 +34,16 @@ pub(crate) fn lines(chart: &Chart, look: &Look) -> Sheet {
     let mut sheet = Sheet::default();
     let mut top = 0.0;
     for row in chart.panels.chunks(columns) {
-        let titles: Vec<Vec<String>> = row
-            .iter()
-            .map(|panel| Font::bundled().wrapped(&panel.title, look.letters, width))
-            .collect();
-        let head = titles.iter().map(Vec::len).max().unwrap_or(0) as f64;
-        top += (head * LEADING + 0.65) * look.letters;
+        let titles = row.iter();
+        let titles = titles.map(|panel| Title::new(&panel.title, look, width));
+        let titles: Vec<Title> = titles.collect();
+        top += Title::highest(&titles, look) + 0.65 * look.letters;
         let mut left = first;
         for (index, (panel, title)) in row.iter().zip(&titles).enumerate() {
             let axes = Axes::new(panel, [left, top], [width, height]);
             let measure = if index == 0 { chart.measure } else { "" };
             draw_panel(&mut sheet, look, &axes, panel, measure, &legend);
-            draw_title(&mut sheet, look, title, [left, top]);
+            title.draw(&mut sheet, look, [left, top - 0.6 * look.letters]);
             left += width + GAP * look.letters + next;
         }
         top += height + Axes::foot(look) + 0.3 * look.letters;
@@ -61,14 +57,6 @@ pub(crate) fn lines(chart: &Chart, look: &Look) -> Sheet {
 fn margins(look: &Look) -> (f64, f64) {
     let numbers = Axes::numbers_width(look);
     (numbers + 1.35 * look.letters, numbers)
-}
-
-/// Draws the lines of a title, the last one just above a place.
-fn draw_title(sheet: &mut Sheet, look: &Look, title: &[String], [left, bottom]: Place) {
-    for (line, text) in title.iter().rev().enumerate() {
-        let y = bottom - (0.6 + LEADING * line as f64) * look.letters;
-        sheet.words(text, [left, y], look.letters, Anchor::Start);
-    }
 }
 
 fn draw_panel(
@@ -95,7 +83,7 @@ fn draw_panel(
             PanelContent::Flat(share) => {
                 let y = axes.y(*share);
                 let ends = [[axes.left, y], [axes.left + axes.width, y]];
-                sheet.line(&ends, &legend.flat(line, look));
+                sheet.line(&ends, &legend.flat(line.into(), look));
             }
             PanelContent::Marks(_) => {}
         }
@@ -191,6 +179,7 @@ impl Look {
 mod tests {
     use super::*;
     use crate::report::paper::Palette;
+    use crate::report::paper::font::Font;
     use crate::types::Severity;
     use crate::types::degradation::Kind;
 

@@ -19,6 +19,7 @@ mod svg;
 mod tables;
 mod tex;
 mod thresholds;
+mod title;
 
 pub(crate) use figure::figure;
 pub(crate) use look::{Look, Palette};

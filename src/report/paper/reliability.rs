@@ -1,20 +1,18 @@
 //! A reliability diagram at the width of a column: [`reliability`].
 
+use super::axes::shares;
 use super::font::Font;
+use super::legend::{Entry, Legend, Sample};
 use super::look::Look;
-use super::sheet::{Anchor, GRID, Place, Sheet, Turn};
+use super::sheet::{Anchor, Place, Sheet, Turn};
+use super::title::Title;
 use crate::report::chart::INK;
-use crate::report::chart::reliability::{ReliabilityChart, ReliabilityLine, ReliabilityPanel};
+use crate::report::chart::reliability::{ReliabilityChart, ReliabilityPanel};
 
 /// Least width of a panel, in heights of letters.
 const LEAST: f64 = 14.0;
 /// Most panels in a row.
 const COLUMNS: usize = 3;
-/// Length of the sample of a line in the legend, and distances, in heights of letters.
-const SAMPLE: f64 = 2.6;
-const AFTER_SAMPLE: f64 = 0.45;
-const BETWEEN: f64 = 1.1;
-const ROW: f64 = 1.4;
 
 /// The chart as a sheet of square panels.
 pub(super) fn reliability(chart: &ReliabilityChart, look: &Look) -> Sheet {
@@ -27,22 +25,19 @@ pub(super) fn reliability(chart: &ReliabilityChart, look: &Look) -> Sheet {
     let mut top = 0.0;
     for row in chart.panels.chunks(columns) {
         let titles = row.iter();
-        let titles = titles.map(|panel| Font::bundled().wrapped(&panel.title, look.letters, side));
-        let titles: Vec<Vec<String>> = titles.collect();
-        let lines = titles.iter().map(Vec::len).max().unwrap_or(0) as f64;
-        top += (1.15 * lines + 0.65) * look.letters;
+        let titles = titles.map(|panel| Title::new(&panel.title, look, side));
+        let titles: Vec<Title> = titles.collect();
+        top += Title::highest(&titles, look) + 0.65 * look.letters;
         for (index, (panel, title)) in row.iter().zip(&titles).enumerate() {
             let corner = [index as f64 * step + left, top];
-            for (line, text) in title.iter().rev().enumerate() {
-                let y = top - (0.6 + 1.15 * line as f64) * look.letters;
-                sheet.words(text, [corner[0], y], look.letters, Anchor::Start);
-            }
+            title.draw(&mut sheet, look, [corner[0], top - 0.6 * look.letters]);
             draw(&mut sheet, look, panel, Square { corner, side });
         }
         top += side + 1.5 * look.small() + 2.0 * look.letters;
     }
-    let height = legend(&mut sheet, look, chart, top);
-    sheet.size = [look.width, top + height];
+    let legend = legend(chart, look);
+    legend.draw(&mut sheet, look, top);
+    sheet.size = [look.width, top + legend.height];
     sheet
 }
 
@@ -86,22 +81,16 @@ fn draw(sheet: &mut Sheet, look: &Look, panel: &ReliabilityPanel, square: Square
 
 fn axes(sheet: &mut Sheet, look: &Look, square: Square) {
     let small = look.small();
-    for step in 0..=5 {
-        let share = f64::from(step) / 5.0;
-        let number = (step * 20).to_string();
-        let [left, y] = square.place(0.0, share);
-        sheet.line(&[[left, y], square.place(1.0, share)], &look.thin(GRID));
-        sheet.words(
-            &number,
-            [left - 0.4 * small, y + 0.35 * small],
-            small,
-            Anchor::End,
-        );
-        let [x, bottom] = square.place(share, 0.0);
-        sheet.line(&[[x, bottom], [x, bottom + 0.25 * small]], &look.thin(INK));
-        sheet.words(&number, [x, bottom + 1.15 * small], small, Anchor::Middle);
-    }
     let ends = [square.place(0.0, 0.0), square.place(1.0, 0.0)];
+    shares(sheet, look, ends.map(|[x, _]| x), |share| {
+        square.place(0.0, share)[1]
+    });
+    for step in 0..=5 {
+        let [x, bottom] = square.place(f64::from(step) / 5.0, 0.0);
+        sheet.line(&[[x, bottom], [x, bottom + 0.25 * small]], &look.thin(INK));
+        let place = [x, bottom + 1.15 * small];
+        sheet.words(&(step * 20).to_string(), place, small, Anchor::Middle);
+    }
     sheet.line(&ends, &look.thin(INK));
     let [middle, bottom] = square.place(0.5, 0.0);
     let below = [middle, bottom + 1.3 * small + 0.95 * look.letters];
@@ -118,48 +107,22 @@ fn axes(sheet: &mut Sheet, look: &Look, square: Square) {
     );
 }
 
-/// Draws the legend from a height on; returns its own.
-fn legend(sheet: &mut Sheet, look: &Look, chart: &ReliabilityChart, top: f64) -> f64 {
-    let letters = look.letters;
-    let mut entries: Vec<&ReliabilityLine> = Vec::new();
-    for line in chart.panels.iter().flat_map(|panel| &panel.lines) {
-        if entries.iter().all(|entry| entry.name != line.name) {
-            entries.push(line);
-        }
-    }
-    let (mut x, mut y) = (0.3 * letters, top);
-    for line in entries {
-        let text = x + (SAMPLE + AFTER_SAMPLE) * letters;
-        let end = text + Font::bundled().width(&line.name, letters);
-        let back = if x > 0.3 * letters && end > look.width {
-            y += ROW * letters;
-            x - 0.3 * letters
-        } else {
-            0.0
-        };
-        let (start, text) = (x - back, text - back);
-        let middle = y + 0.6 * letters;
-        let pen = look.pen(line.style);
-        sheet.line(
-            &[[start, middle], [start + SAMPLE * letters, middle]],
-            &pen.stroke,
-        );
-        look.mark(sheet, &pen, [start + SAMPLE * letters / 2.0, middle]);
-        sheet.words(
-            &line.name,
-            [text, middle + 0.35 * letters],
-            letters,
-            Anchor::Start,
-        );
-        x = end - back + BETWEEN * letters;
-    }
-    y - top + ROW * letters
+/// An entry for each name of a line.
+fn legend<'a>(chart: &'a ReliabilityChart, look: &Look) -> Legend<'a> {
+    let lines = chart.panels.iter().flat_map(|panel| &panel.lines);
+    let entries = lines.map(|line| Entry {
+        name: &line.name,
+        style: line.style,
+        sample: Sample::Curve,
+    });
+    Legend::new(entries, look)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::report::chart::LineStyle;
+    use crate::report::chart::reliability::ReliabilityLine;
     use crate::report::paper::Palette;
     use crate::report::paper::sheet::Mark;
     use crate::score::estimate::Estimate;

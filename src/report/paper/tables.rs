@@ -10,7 +10,7 @@ use std::ops::Range;
 use super::font::Font;
 use super::look::Look;
 use crate::report::figures::{PaperCell, PaperMark, PaperRow, PaperTable};
-use crate::report::latex::escaped;
+use crate::report::latex::{MOST_ROWS, escaped};
 
 /// Heights of letters of tables and of intervals, in points.
 const LETTERS: f64 = 8.0;
@@ -24,8 +24,6 @@ const TABCOLSEP: f64 = 2.6;
 /// Least width of the column of names, in points, and the least beside intervals with a decimal.
 const LEAST_NAME: f64 = 45.0;
 const AMPLE_NAME: f64 = 60.0;
-/// Most rows of a table on one page; longer ones are long tables.
-const MOST_ROWS: usize = 40;
 
 /// The commands of the tables: a number above its interval, a name in lines, and a head in lines.
 const COMMANDS: &str = "\

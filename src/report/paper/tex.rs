@@ -30,7 +30,7 @@ pub(crate) fn tex(name: &str, chart: &Chart, look: &Look) -> Vec<(String, Vec<u8
     let beside = (FIRST + LAST) * look.letters + between * (columns - 1) as f64;
     // Written with one decimal, and never more than there is.
     let width = (10.0 * (look.width - beside) / columns as f64).floor() / 10.0;
-    let legend = Legend::new(chart, look);
+    let legend = Legend::of_chart(chart, look);
     let mut text = format!(
         "% Made by darkqa-eval. In the preamble: \\usepackage{{pgfplots}}\n\
          % \\usepgfplotslibrary{{groupplots,fillbetween}} \\pgfplotsset{{compat=1.17}}\n\
@@ -153,7 +153,7 @@ fn plot(
     match &line.content {
         PanelContent::Flat(share) => format!(
             "\\addplot[{}, domain=\\pgfkeysvalueof{{/pgfplots/xmin}}:\\pgfkeysvalueof{{/pgfplots/xmax}}, samples=2] {{{}}};\n",
-            stroke(&legend.flat(line, look)),
+            stroke(&legend.flat(line.into(), look)),
             100.0 * share
         ),
         PanelContent::Marks(marks) => {
