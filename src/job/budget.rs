@@ -6,8 +6,9 @@ use super::report;
 use super::trial::{Item, Prompt, Trial};
 use crate::ask::Price;
 use crate::error::{Error, Result};
+use crate::store::StoredTrial;
 use crate::types::manifest::RunManifest;
-use crate::types::{ImageFacts, Record, Usage, Via};
+use crate::types::{ImageFacts, Usage, Via};
 
 /// Characters of English text per token, by the rule of thumb of every provider.
 const CHARACTERS_PER_TOKEN: f64 = 4.0;
@@ -53,10 +54,10 @@ impl Budget {
     ///
     /// # Errors
     /// If `--max-cost` is set and a model has no price, because the limit could not be enforced.
-    pub(crate) fn new<D>(
+    pub(crate) fn new(
         money: &MoneySettings,
         models: &[ModelUnderTest],
-        stored: &[Record<D>],
+        stored: &[StoredTrial],
     ) -> Result<Self> {
         let all: Vec<&ModelUnderTest> = models.iter().collect();
         let answering = Answering {
@@ -70,11 +71,11 @@ impl Budget {
     ///
     /// # Errors
     /// If `--max-cost` is set and a model has no price, because the limit could not be enforced.
-    pub(crate) fn of_run<D>(
+    pub(crate) fn of_run(
         money: &MoneySettings,
         models: &[ModelUnderTest],
         answering: Answering<'_>,
-        stored: &[Record<D>],
+        stored: &[StoredTrial],
     ) -> Result<Self> {
         let price = |model: &ModelUnderTest| model.price(&money.prices);
         let prices: Vec<Option<Price>> = models.iter().map(price).collect();

@@ -7,7 +7,7 @@ use super::batch::{self, BatchFileArgs, BatchRunArgs};
 use super::dark_already;
 use super::enhancers::OpenEnhancers;
 use super::estimate;
-use super::experiment::{DetailOf, Experiment, RecordOf};
+use super::experiment::{DetailOf, Experiment};
 use super::folder;
 use super::manifest;
 use super::measured_tokens::MeasuredTokens;
@@ -87,11 +87,11 @@ impl<'a, E: Experiment> Job<'a, E> {
     fn estimate(self) -> Result<Outcome> {
         let experiment = self.experiment;
         let settings = experiment.settings();
-        let stored: Vec<RecordOf<E>> = store::read_records(&self.folder)?;
+        let stored = store::read_trials(&self.folder)?;
         let answered = answered(&stored);
         let (mut plans, mut measured) = (Vec::new(), Vec::new());
         for phase in 0..E::PHASES.len() {
-            let mut plan = Plan::new(experiment.plan(phase, &stored)?);
+            let mut plan = Plan::new(experiment.plan(phase, || store::read_records(&self.folder))?);
             let models = experiment.models(phase).len();
             measured.push(MeasuredTokens::of_stored(
                 models,
@@ -146,7 +146,7 @@ impl<'a, E: Experiment> Job<'a, E> {
         let present: HashSet<TrialKey> = if experiment.imported_records().is_empty() {
             HashSet::new()
         } else {
-            store.records()?.iter().map(|record| record.key).collect()
+            store.trials()?.iter().map(|trial| trial.key).collect()
         };
         for record in experiment.imported_records() {
             if !present.contains(&record.key) {

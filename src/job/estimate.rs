@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::budget::{Budget, image_tokens, text_tokens};
-use super::experiment::{ExpectedRequest, Experiment, RecordOf};
+use super::experiment::{ExpectedRequest, Experiment};
 use super::frame_work::FrameWork;
 use super::image_pipeline::ImagePipeline;
 use super::measured_tokens::MeasuredTokens;
@@ -17,6 +17,7 @@ use super::trial::Item as _;
 use crate::ask::{ImageLimit, Price, Server};
 use crate::error::Result;
 use crate::report::forecast::{CostLine, Forecast, ReadingCost};
+use crate::store::StoredTrial;
 use crate::types::{Condition, Degradation, ImageFacts, ReadingName, View};
 
 /// Number of sources whose images are made to measure their size; with enhancers, only the first source.
@@ -36,7 +37,7 @@ pub(crate) fn estimate<E: Experiment>(
     experiment: &E,
     plans: &[Plan<E::Item>],
     measured: &[MeasuredTokens],
-    stored: &[RecordOf<E>],
+    stored: &[StoredTrial],
     pipeline: &mut ImagePipeline<'_>,
 ) -> Result<Forecast> {
     let settings = experiment.settings();

@@ -13,6 +13,7 @@ use super::stored::StoredRun;
 use super::trial::Item;
 use crate::error::Result;
 use crate::store::Store;
+use crate::types::manifest::PartPlace;
 use crate::types::{Record, RunQuestion};
 
 /// The record of a trial of an experiment.
@@ -55,6 +56,9 @@ pub(crate) trait Experiment: Sync {
     /// All sources of the run.
     fn sources(&self) -> &[Source];
 
+    /// Place of these sources among those of the whole run; `None` if this is the whole run.
+    fn part(&self) -> Option<PartPlace>;
+
     /// Reader of the frames' files.
     fn frames(&self) -> &dyn Frames;
 
@@ -80,8 +84,12 @@ pub(crate) trait Experiment: Sync {
         &[]
     }
 
-    /// All trials of a phase, including those with a reply.
-    fn plan(&self, phase: usize, stored: &[RecordOf<Self>]) -> Result<Vec<SourcePlan<Self::Item>>>;
+    /// All trials of a phase, including those with a reply. The records so far are read only where the trials follow from replies.
+    fn plan(
+        &self,
+        phase: usize,
+        records: impl FnOnce() -> Result<Vec<RecordOf<Self>>>,
+    ) -> Result<Vec<SourcePlan<Self::Item>>>;
 
     /// Requests of later phases that cannot be planned yet: marks of answers that have not arrived.
     fn expected_requests(&self, _remaining: &[SourcePlan<Self::Item>]) -> Vec<ExpectedRequest> {

@@ -39,7 +39,7 @@ fn automatic<E: Experiment>(experiment: &E) -> Result<PathBuf> {
         "identity": experiment.identity(),
         "columns": experiment.columns(),
         "shard": settings.shard.to_string(),
-        "trials": Plan::new(experiment.plan(0, &[])?).keys,
+        "trials": Plan::new(experiment.plan(0, || Ok(Vec::new()))?).keys,
         "notes": notes,
     });
     let hash = &Digest::canonical("darkqa.command/2", &facts)?.to_string()[..8];

@@ -12,7 +12,7 @@ use super::renamed::{self, OtherSettings};
 use super::settings::JobSettings;
 use super::source::input_summary;
 use crate::error::Result;
-use crate::types::manifest::{Counts, RunManifest, Status};
+use crate::types::manifest::{Counts, RunManifest, RunPart, Status};
 use crate::types::{Detail as _, InputSummary, ListedModel, Record};
 
 /// The manifest of a run. A stored one passes on its date, columns and image flags; one of a complete run all but its identity.
@@ -48,6 +48,10 @@ pub(crate) fn of<E: Experiment>(
         enhancers: BTreeMap::new(),
         inputs: inputs(experiment),
         shard: job.shard.is_part().then(|| job.shard.to_string()),
+        part: experiment.part().map(|place| RunPart {
+            place,
+            trials: vec![0; place.count],
+        }),
         settings,
         images: job.image_flags.clone(),
         reply_reading: DetailOf::<E>::REPLY_READING.map(str::to_owned),
@@ -90,6 +94,7 @@ pub(crate) fn of<E: Experiment>(
         models: manifest.models,
         inputs: manifest.inputs.or(stored.inputs),
         shard: manifest.shard,
+        part: manifest.part,
         images,
         ..stored
     })

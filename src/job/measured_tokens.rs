@@ -9,7 +9,8 @@ use super::budget::text_tokens;
 use super::plan::Plan;
 use super::source::Source;
 use super::trial::Item;
-use crate::types::{Record, TrialKey};
+use crate::store::StoredTrial;
+use crate::types::TrialKey;
 
 /// Number of replies from which the tokens are taken; chosen.
 const REPLIES: usize = 10;
@@ -40,11 +41,11 @@ impl MeasuredTokens {
     }
 
     /// What stored replies to trials of a plan about these sources were charged.
-    pub(crate) fn of_stored<I: Item, D>(
+    pub(crate) fn of_stored<I: Item>(
         models: usize,
         plan: &Plan<I>,
         sources: &[Source],
-        stored: &[Record<D>],
+        stored: &[StoredTrial],
     ) -> Self {
         let charged: HashMap<TrialKey, u64> = stored
             .iter()

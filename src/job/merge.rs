@@ -1,23 +1,26 @@
 //! `merge`: joins the shards of a run into one run.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+mod coverage;
+mod trials;
+
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use self::coverage::Coverage;
+use self::trials::unique;
+use super::placed_trials::{PlacedTrial, append, in_order, placed_trials};
 use super::report::{choice, open};
 use super::shard::Shard;
-use super::stored::{ExperimentKind, StoredRun, in_order};
+use super::stored::{ExperimentKind, StoredRun, manifest};
 use super::thumbnail::MissingThumbnails;
-use super::{Outcome, ShowArgs, StdoutFormat, count};
+use super::{Outcome, ShowArgs, StdoutFormat};
 use crate::error::{Error, Result};
 use crate::store::{self, AddressChange, Store};
-use crate::types::manifest::{RunManifest, Status, differences};
-use crate::types::{
-    ChoiceDetail, Decides, Detail, ImageFidelity, InputSummary, ListedModel, OpenDetail, Record,
-    RunQuestion, Thumbnail, TrialKey,
-};
+use crate::types::manifest::{Counts, RunManifest, Status, differences};
+use crate::types::{ChoiceDetail, Decides, Detail, InputSummary, OpenDetail, RunQuestion};
 
 /// The flags of `merge`.
 #[derive(Debug, Args)]
@@ -36,23 +39,32 @@ pub(crate) struct MergeArgs {
     pub show: ShowArgs,
 }
 
-/// One shard, as read from its folder.
-struct MergePart<D> {
+/// One shard, as read from its folder, with its records by their places.
+struct MergePart {
     shard: Shard,
-    run: StoredRun<D>,
+    folder: PathBuf,
+    manifest: RunManifest,
+    trials: Vec<PlacedTrial>,
+    questions: Vec<RunQuestion>,
 }
 
-impl<D: Detail> MergePart<D> {
-    fn open(folder: &Path) -> Result<Self> {
-        let run = StoredRun::open(folder)?;
-        let Some(shard) = run.manifest.shard.as_deref() else {
-            let problem = "the run is not a shard: it was made without --shard".to_owned();
-            let path = folder.to_owned();
-            return Err(Error::Run { path, problem });
+impl MergePart {
+    fn open<D: Detail>(folder: &Path) -> Result<Self> {
+        let wrong = |problem: &str| Error::Run {
+            path: folder.to_owned(),
+            problem: problem.to_owned(),
+        };
+        let manifest = manifest(folder)?;
+        let trials = placed_trials::<D>(folder, &manifest)?;
+        let Some(shard) = manifest.shard.as_deref() else {
+            return Err(wrong("the run is not a shard: it was made without --shard"));
         };
         Ok(Self {
             shard: shard.parse()?,
-            run,
+            folder: folder.to_owned(),
+            trials,
+            questions: store::read_questions(folder)?,
+            manifest,
         })
     }
 }
@@ -82,64 +94,63 @@ pub(crate) fn merge(args: &MergeArgs) -> Result<Outcome> {
     }
 }
 
-fn merge_all<D: Detail + PartialEq>(
+fn merge_all<D: Detail>(
     args: &MergeArgs,
     folders: &[PathBuf],
     write: impl FnOnce(&Store<D>, StoredRun<D>, StdoutFormat) -> Result<Outcome>,
 ) -> Result<Outcome> {
-    let parts: Result<Vec<MergePart<D>>> = folders
+    let parts: Result<Vec<MergePart>> = folders
         .iter()
-        .map(|folder| MergePart::open(folder))
+        .map(|folder| MergePart::open::<D>(folder))
         .collect();
     let mut parts = parts?;
-    parts.sort_by_key(|part| part.shard);
+    parts.sort_by_key(|part| (part.shard.count(), part.shard));
     check_same_run(&parts)?;
-    let missing = count_missing(&parts, args.partial)?;
+    let places = parts.iter();
+    let places = places.map(|part| (part.shard, &*part.folder, &part.manifest));
+    let coverage = Coverage::of(places)?;
+    let is_missing = check_missing(&parts, &coverage, args.partial)?;
     warn_unfinished(&parts);
-    let mut manifest = merged_manifest(&parts)?;
+    let mut manifest = merged_manifest(&parts, &coverage)?;
     let mut questions: Vec<RunQuestion> = parts
         .iter()
-        .flat_map(|part| part.run.questions.clone())
+        .flat_map(|part| part.questions.clone())
         .collect();
     questions.sort_by_key(|question| question.place);
     // A control of the observer asks a question of one shard with an image of another.
     questions.dedup_by(|later, question| later.id == question.id);
-    let merged = MergedParts::of(parts, &questions, &manifest.models)?;
-    manifest.count(count(manifest.counts.trials, &merged.records));
-    if missing > 0 {
+    let trials: Vec<Vec<PlacedTrial>> = parts
+        .iter_mut()
+        .map(|part| std::mem::take(&mut part.trials))
+        .collect();
+    let folders: Vec<&Path> = parts.iter().map(|part| &*part.folder).collect();
+    let unique = unique::<D>(&folders, trials)?;
+    if unique.twice > 0 {
+        tracing::warn!(
+            "{} replies differ in two parts: they were paid for twice; those of the first part are taken",
+            unique.twice
+        );
+    }
+    let trials = in_order(unique.trials, &questions, &manifest.models);
+    let failed = trials.iter().filter(|(_, trial)| trial.failed()).count();
+    manifest.count(Counts {
+        trials: coverage.trials().max(trials.len()),
+        answered: trials.len() - failed,
+        failed,
+    });
+    if is_missing {
         manifest.status = Status::Incomplete;
     }
     let mut store = Store::<D>::open(&args.out, &manifest, AddressChange::Refused)?;
     store.write_questions(&questions)?;
-    let present: HashMap<TrialKey, Record<D>> = store
-        .records()?
-        .into_iter()
-        .map(|record| (record.key, record))
-        .collect();
-    for record in &merged.records {
-        if present.get(&record.key) != Some(record) {
-            store.append(record)?;
-        }
-    }
+    let shards = parts.iter().map(|part| (&*part.folder, &part.manifest));
+    append(&mut store, &manifest, &shards.collect::<Vec<_>>(), &trials)?;
+    drop(trials);
     store.sync()?;
-    let present: BTreeSet<_> = store::read_thumbnails(&args.out)?
-        .into_iter()
-        .map(|thumbnail| (thumbnail.frame, thumbnail.condition))
-        .collect();
-    for thumbnail in merged.thumbnails {
-        if !present.contains(&(thumbnail.frame.clone(), thumbnail.condition.clone())) {
-            store.append_thumbnail(&thumbnail)?;
-        }
-    }
-    let present: BTreeSet<_> = store::read_fidelity(&args.out)?
-        .into_iter()
-        .map(|image| (image.frame, image.condition))
-        .collect();
-    for image in merged.fidelity {
-        if !present.contains(&(image.frame.clone(), image.condition.clone())) {
-            store.append_fidelity(&image)?;
-        }
-    }
+    let frames = questions.iter().map(|question| &question.frame);
+    let wanted = MissingThumbnails::new(frames, Vec::new());
+    store.add_thumbnails_of(&folders, |frame| wanted.wants(frame))?;
+    store.add_fidelity_of(&folders, |_| true)?;
     let run = StoredRun::of(&args.out, manifest)?;
     write(&store, run, args.show.format())
 }
@@ -171,83 +182,49 @@ fn folders(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
     Ok(folders)
 }
 
-/// Checks that all are shards of the same run, and no shard is present twice.
-fn check_same_run<D>(parts: &[MergePart<D>]) -> Result<()> {
-    let wrong = |part: &MergePart<D>, problem: String| {
-        let path = part.run.folder.clone();
-        Err(Error::Run { path, problem })
-    };
+/// Checks that all are parts of the same run.
+fn check_same_run(parts: &[MergePart]) -> Result<()> {
     let Some(first) = parts.first() else {
         return Ok(());
     };
     for part in parts {
-        if part.shard.count() != first.shard.count() {
-            let problem = format!(
-                "shard {} cannot be of the same run as {}, which is shard {}",
-                part.shard,
-                first.run.folder.display(),
-                first.shard
-            );
-            return wrong(part, problem);
-        }
-        if let Some((field, own, other)) = difference(&part.run.manifest, &first.run.manifest) {
-            let problem = format!(
-                "shard {} is of another run than {}: its {field} is {own}, that of the other run is {other}",
-                part.shard,
-                first.run.folder.display()
-            );
-            return wrong(part, problem);
-        }
+        let Some((field, own, other)) = difference(&part.manifest, &first.manifest) else {
+            continue;
+        };
+        let problem = format!(
+            "shard {} is of another run than {}: its {field} is {own}, that of the other run is {other}",
+            part.shard,
+            first.folder.display()
+        );
+        let path = part.folder.clone();
+        return Err(Error::Run { path, problem });
     }
-    let twice = parts.windows(2).find(|pair| pair[0].shard == pair[1].shard);
-    match twice {
-        None => Ok(()),
-        Some(pair) => {
-            let problem = format!(
-                "shard {} is present twice, also in {}; name only one of them",
-                pair[1].shard,
-                pair[0].run.folder.display()
-            );
-            wrong(&pair[1], problem)
-        }
-    }
+    Ok(())
 }
 
-/// Number of missing shards; an error that names them if a partial merge is not allowed.
-fn count_missing<D>(parts: &[MergePart<D>], partial: bool) -> Result<usize> {
-    let Some(first) = parts.first() else {
-        return Ok(0);
+/// Whether sources are missing; an error that names them if a partial merge is not allowed.
+fn check_missing(parts: &[MergePart], coverage: &Coverage, partial: bool) -> Result<bool> {
+    let (Some(problem), Some(first)) = (coverage.missing(), parts.first()) else {
+        return Ok(false);
     };
-    let present: BTreeSet<Shard> = parts.iter().map(|part| part.shard).collect();
-    let absent = Shard::all(first.shard.count()).filter(|shard| !present.contains(shard));
-    let absent: Vec<String> = absent.map(|shard| shard.to_string()).collect();
-    if absent.is_empty() {
-        return Ok(0);
-    }
-    let verb = if absent.len() == 1 { " is" } else { "s are" };
-    let problem = format!(
-        "{} shard{verb} missing: {}",
-        absent.len(),
-        absent.join(", ")
-    );
     if !partial {
         return Err(Error::Run {
-            path: first.run.folder.clone(),
+            path: first.folder.clone(),
             problem: format!("{problem}; --partial merges the others"),
         });
     }
     tracing::warn!("{problem}; the summary covers only the others");
-    Ok(absent.len())
+    Ok(true)
 }
 
 /// Warns about each shard that is not complete.
-fn warn_unfinished<D>(parts: &[MergePart<D>]) {
+fn warn_unfinished(parts: &[MergePart]) {
     for part in parts {
-        let (status, counts) = (part.run.manifest.status, part.run.manifest.counts);
+        let (status, counts) = (part.manifest.status, part.manifest.counts);
         if status != Status::Complete {
             tracing::warn!(
                 "{}: shard {} is {status}: {} of {} trials answered",
-                part.run.folder.display(),
+                part.folder.display(),
                 part.shard,
                 counts.answered,
                 counts.trials
@@ -268,13 +245,14 @@ fn difference(first: &RunManifest, other: &RunManifest) -> Option<(String, Strin
 }
 
 /// The manifest of the merged run.
-fn merged_manifest<D>(parts: &[MergePart<D>]) -> Result<RunManifest> {
-    let manifests = parts.iter().map(|part| &part.run.manifest);
+fn merged_manifest(parts: &[MergePart], coverage: &Coverage) -> Result<RunManifest> {
+    let manifests = parts.iter().map(|part| &part.manifest);
     let first = manifests.clone().next();
     let mut manifest = first
         .ok_or_else(|| Error::usage("RUN", "no shard is named"))?
         .clone();
     manifest.shard = None;
+    manifest.part = None;
     for other in manifests.clone() {
         for (column, values) in &other.columns {
             let all = manifest.columns.entry(column.clone()).or_default();
@@ -288,7 +266,9 @@ fn merged_manifest<D>(parts: &[MergePart<D>]) -> Result<RunManifest> {
         manifest.enhancers.insert(name.clone(), note);
     }
     let mut inputs: Option<InputSummary> = None;
-    for other in manifests.clone().filter_map(|other| other.inputs.as_ref()) {
+    let once = manifests.clone().zip(coverage.once());
+    let once = once.filter_map(|(other, is_taken)| other.inputs.as_ref().filter(|_| is_taken));
+    for other in once {
         inputs.get_or_insert_default().join(other);
     }
     manifest.inputs = inputs;
@@ -305,51 +285,5 @@ fn merged_manifest<D>(parts: &[MergePart<D>]) -> Result<RunManifest> {
     manifest.reply_reading = readings.min().cloned().flatten();
     manifest.created = created.unwrap_or_default();
     manifest.updated = updated.unwrap_or_default();
-    manifest.counts.trials = manifests.map(|manifest| manifest.counts.trials).sum();
     Ok(manifest)
-}
-
-/// What the shards of a run stored, as one run would have stored it.
-struct MergedParts<D> {
-    /// Records in the order of the questions.
-    records: Vec<Record<D>>,
-    thumbnails: Vec<Thumbnail>,
-    fidelity: Vec<ImageFidelity>,
-}
-
-impl<D: Detail> MergedParts<D> {
-    fn of(
-        parts: Vec<MergePart<D>>,
-        questions: &[RunQuestion],
-        listed: &[ListedModel],
-    ) -> Result<Self> {
-        let frames = questions.iter().map(|question| &question.frame);
-        let wanted = MissingThumbnails::new(frames, Vec::new());
-        let mut merged = Self {
-            records: Vec::new(),
-            thumbnails: Vec::new(),
-            fidelity: Vec::new(),
-        };
-        let mut keys = HashMap::<TrialKey, PathBuf>::new();
-        for MergePart { run, .. } in parts {
-            for record in run.records {
-                if let Some(other) = keys.insert(record.key, run.folder.clone()) {
-                    let problem = format!(
-                        "the trial {} is also in {}: these are not shards of the same run",
-                        record.key,
-                        other.display()
-                    );
-                    let path = run.folder;
-                    return Err(Error::Run { path, problem });
-                }
-                merged.records.push(record);
-            }
-            let copies = run.thumbnails.into_iter();
-            let wanted = copies.filter(|thumbnail| wanted.wants(&thumbnail.frame));
-            merged.thumbnails.extend(wanted);
-            merged.fidelity.extend(run.fidelity);
-        }
-        merged.records = in_order(merged.records, questions, listed);
-        Ok(merged)
-    }
 }

@@ -5,6 +5,7 @@
 //! `Experiment`. Cost limits, resuming, batches, shards and images are here, once.
 
 pub(crate) mod batch;
+mod batch_system;
 pub(crate) mod bilinear;
 pub(crate) mod budget;
 mod circuit_breaker;
@@ -33,9 +34,12 @@ pub(crate) mod money;
 pub(crate) mod montage;
 pub(crate) mod observer;
 mod open_run;
+mod other_parts;
 mod outcome;
+pub(crate) mod part;
 pub(crate) mod photograph;
 pub(crate) mod photographs;
+mod placed_trials;
 pub(crate) mod plan;
 pub(crate) mod predictions;
 pub(crate) mod progress;

@@ -9,13 +9,14 @@ use super::circuit_breaker::EndReason;
 use super::dark_already;
 use super::dispatch::{Dispatcher, TrialCounts};
 use super::enhancers::OpenEnhancers;
-use super::experiment::{DetailOf, Experiment, RecordOf};
+use super::experiment::{DetailOf, Experiment};
 use super::folder::now;
 use super::frame_work::ImageSteps;
 use super::image_notes::MissingNotes;
 use super::image_pipeline::ImagePipeline;
 use super::manifest;
 use super::models::{self, ModelUnderTest};
+use super::other_parts::OtherParts;
 use super::outcome::Outcome;
 use super::plan::Plan;
 use super::progress::Progress;
@@ -28,9 +29,9 @@ use crate::ask::ImageLimit;
 use crate::enhance::{Enhancer, Usage};
 use crate::error::Result;
 use crate::report::forecast::money;
-use crate::store::{self, Store};
+use crate::store::{self, Store, StoredTrial};
 use crate::types::manifest::{Counts, RunManifest};
-use crate::types::{Record, TrialKey, View};
+use crate::types::{TrialKey, View};
 
 /// A run folder that no other process writes to, with all that asking needs.
 pub(crate) struct OpenRun<'a, E: Experiment> {
@@ -46,7 +47,7 @@ pub(crate) struct OpenRun<'a, E: Experiment> {
 /// The trials of a phase that still have to be asked.
 pub(super) struct Remaining<E: Experiment> {
     pub(super) plan: Plan<E::Item>,
-    pub(super) stored: Vec<RecordOf<E>>,
+    pub(super) stored: Vec<StoredTrial>,
     /// Number of trials that wait for a batch, and are not in `plan`.
     pub(super) in_batch: usize,
 }
@@ -88,12 +89,21 @@ impl<E: Experiment> OpenRun<'_, E> {
         self.finish(end)
     }
 
-    /// The trials of a phase that have no reply and wait for no batch.
+    /// The trials of a phase that have no reply and wait for no batch. Replies that parts of another division have are copied first.
     pub(super) fn remaining(&mut self, phase: usize) -> Result<Remaining<E>> {
-        let stored = self.store.records()?;
-        let mut plan = Plan::new(self.experiment.plan(phase, &stored)?);
+        let mut stored = self.store.trials()?;
+        let mut plan = Plan::new(self.experiment.plan(phase, || self.store.records())?);
         self.keys.extend(&plan.keys);
-        let answered = answered(&stored);
+        if let Some(part) = &mut self.manifest.part {
+            for (source, trials) in &plan.by_source {
+                part.trials[*source] += trials;
+            }
+        }
+        let mut answered = answered(&stored);
+        if self.copy_from_other_parts(&plan.keys, &answered)? {
+            stored = self.store.trials()?;
+            answered = self::answered(&stored);
+        }
         plan.exclude(|key| answered.contains(key));
         let sent = self.store.pending_in_batches()?;
         let in_batch = plan.exclude(|key| sent.contains(key));
@@ -102,6 +112,30 @@ impl<E: Experiment> OpenRun<'_, E> {
             stored,
             in_batch,
         })
+    }
+
+    /// Copies the replies to these trials that parts of another division have; returns whether there are any.
+    fn copy_from_other_parts(
+        &mut self,
+        keys: &[TrialKey],
+        answered: &HashSet<TrialKey>,
+    ) -> Result<bool> {
+        let others = OtherParts::beside::<DetailOf<E>>(self.store.folder(), &self.manifest)?;
+        let wanted = keys.iter().filter(|key| !answered.contains(key));
+        let sources = self.experiment.sources().iter();
+        let copied = others.copy_into(
+            &mut self.store,
+            &self.manifest,
+            &wanted.copied().collect(),
+            &sources.map(|source| &source.name).collect(),
+        )?;
+        if copied > 0 {
+            self.progress.note(&format!(
+                "{}: {copied} replies copied from parts of another division",
+                self.store.folder().display()
+            ));
+        }
+        Ok(copied > 0)
     }
 
     /// Warns about trials that wait for a batch. If they were asked here as well, they would be paid for twice.
@@ -187,16 +221,16 @@ impl<E: Experiment> OpenRun<'_, E> {
     }
 
     /// Writes the numbers of trials into the manifest, so that those of a killed run are known.
-    pub(super) fn write_counts(&mut self, stored: &[RecordOf<E>]) -> Result<()> {
+    pub(super) fn write_counts(&mut self, stored: &[StoredTrial]) -> Result<()> {
         self.manifest.counts = Counts {
             failed: 0,
-            ..self.counts(stored)
+            ..self.counts(stored.iter().map(|trial| (trial.key, trial.failed())))
         };
         self.store.write_manifest(&self.manifest)
     }
 
     /// Writes the start of a phase into the manifest, and prints how many of its trials are answered.
-    fn begin(&mut self, counts: TrialCounts, stored: &[RecordOf<E>]) -> Result<()> {
+    fn begin(&mut self, counts: TrialCounts, stored: &[StoredTrial]) -> Result<()> {
         let TrialCounts { trials, answered } = counts;
         manifest::mark_started(self.experiment, &mut self.manifest);
         self.manifest.platform.extend(self.enhancers.version());
@@ -212,18 +246,20 @@ impl<E: Experiment> OpenRun<'_, E> {
 
     /// Numbers of trials of the run: those planned, and those answered under an earlier command. A failed trial that is no longer
     /// planned, because its images have changed, does not count.
-    fn counts(&self, stored: &[RecordOf<E>]) -> Counts {
-        let (mut keys, mut failed) = (self.keys.clone(), 0);
-        for record in stored {
-            if !record.failed() {
-                keys.insert(record.key);
-            } else if keys.contains(&record.key) {
+    /// The stored trials are given by their keys, and whether they failed.
+    fn counts(&self, stored: impl Iterator<Item = (TrialKey, bool)>) -> Counts {
+        let (mut keys, mut answered, mut failed) = (self.keys.clone(), 0, 0);
+        for (key, has_failed) in stored {
+            if !has_failed {
+                keys.insert(key);
+                answered += 1;
+            } else if keys.contains(&key) {
                 failed += 1;
             }
         }
         Counts {
             trials: keys.len(),
-            answered: stored.iter().filter(|record| !record.failed()).count(),
+            answered,
             failed,
         }
     }
@@ -231,7 +267,8 @@ impl<E: Experiment> OpenRun<'_, E> {
     /// Scores the run, and writes the report into its folder.
     pub(super) fn finish(self, end: EndReason) -> Result<Outcome> {
         let mut run = StoredRun::of(self.store.folder(), self.manifest.clone())?;
-        let counts = self.counts(&run.records);
+        let trials = run.records.iter();
+        let counts = self.counts(trials.map(|record| (record.key, record.failed())));
         let status = end.status(counts);
         let manifest = &mut run.manifest;
         if (status, counts) != (manifest.status, manifest.counts) {
@@ -314,7 +351,7 @@ pub(super) fn missing_notes<E: Experiment>(experiment: &E, folder: &Path) -> Res
 }
 
 /// Keys of the trials that have a reply.
-pub(super) fn answered<D>(stored: &[Record<D>]) -> HashSet<TrialKey> {
+pub(super) fn answered(stored: &[StoredTrial]) -> HashSet<TrialKey> {
     let answered = stored.iter().filter(|record| !record.failed());
     answered.map(|record| record.key).collect()
 }

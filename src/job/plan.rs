@@ -1,6 +1,6 @@
 //! The trials to ask: [`Plan`].
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::trial::Trial;
 use crate::types::{Condition, TrialKey};
@@ -38,6 +38,8 @@ impl<I> SourcePlan<I> {
 pub(crate) struct Plan<I> {
     /// Every trial, answered or not, source by source.
     pub(crate) keys: Vec<TrialKey>,
+    /// Numbers of trials, answered or not, by index of their source.
+    pub(crate) by_source: BTreeMap<usize, usize>,
     /// Groups of the trials that remain to be asked, in the same order.
     pub(crate) sources: Vec<SourcePlan<I>>,
 }
@@ -48,7 +50,15 @@ impl<I> Plan<I> {
         let groups = sources.iter().flat_map(|source| &source.groups);
         let trials = groups.flat_map(|group| &group.trials);
         let keys = trials.map(|trial| trial.key).collect();
-        let mut plan = Self { keys, sources };
+        let mut by_source = BTreeMap::new();
+        for part in &sources {
+            *by_source.entry(part.source).or_default() += part.trials();
+        }
+        let mut plan = Self {
+            keys,
+            by_source,
+            sources,
+        };
         plan.exclude(|_| false);
         plan
     }

@@ -74,9 +74,13 @@ pub(crate) struct JobArgs {
 #[command(next_help_heading = "Scale")]
 pub(crate) struct ScaleArgs {
     /// Do one of N parts, by frames or walks: I/N; auto/N or auto as the batch system says (Slurm arrays, indexed Kubernetes jobs);
-    /// none for everything. --rpm, --tpm and --max-cost are for all parts together; default: auto in a Slurm array, else none
+    /// none for everything. --rpm, --tpm and --max-cost are for all parts together; default: auto in a Slurm array, else none. With
+    /// another N, replies that parts of the first N have are copied
     #[arg(long, value_name = "I/N|auto/N|auto|none", add = Decides::Trials)]
     pub shard: Option<String>,
+    /// How many parts run at once, so that each may send that share of --rpm and --tpm; default: all of them
+    #[arg(long, value_name = "N", add = Decides::Nothing)]
+    pub workers: Option<NonZeroU32>,
     /// Print at the end how long each step took, what limits the speed and what would help
     #[arg(long, add = Decides::Nothing)]
     pub timings: bool,
@@ -205,6 +209,7 @@ impl JobArgs {
         let context = ResolveContext {
             typed: &self.typed,
             shard: Shard::WHOLE,
+            workers: None,
             keys: KeyUse::Needed,
             data: experiment.data.as_deref(),
             text_baseline: experiment.text_baseline,
@@ -227,6 +232,7 @@ impl JobArgs {
         let context = ResolveContext {
             typed: &self.typed,
             shard,
+            workers: self.scale.workers,
             keys: if self.money.dry_run {
                 KeyUse::NotNeeded
             } else {

@@ -1,15 +1,15 @@
-//! Parts of a job for several processes: [`Shard`], and its questions: `part`.
+//! Parts of a job for several processes: [`Shard`].
 
-use std::collections::HashMap;
 use std::fmt;
 use std::num::NonZeroU32;
 use std::str::FromStr;
 
+use super::batch_system::BatchSystem;
 use crate::ask::Quota;
 use crate::error::{Error, Result};
 
-/// One of several parts of a run. It contains the sources whose position, counted from 0, has the remainder `index` when divided by
-/// `count`. A source is in one shard, with all its conditions and questions.
+/// One of several parts of a run: neighbouring sources, about as many in each shard. A source is in one shard, with all its conditions
+/// and questions. Which sources a shard has says [`part`](super::part::part).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Shard {
     /// Index of the shard, from 0.
@@ -40,17 +40,16 @@ impl Shard {
         (0..count.get()).map(move |index| Self { index, count })
     }
 
-    /// Whether the shard contains the source at a position.
-    #[must_use]
-    pub(crate) fn has(self, position: usize) -> bool {
-        position as u64 % u64::from(self.count.get()) == u64::from(self.index)
+    /// Index of the shard, from 0.
+    pub(super) fn index(self) -> u32 {
+        self.index
     }
 
-    /// The shard's share of a whole number. The shares sum to it, except that each is at least 1.
-    #[must_use]
-    pub(crate) fn share(self, whole: NonZeroU32) -> NonZeroU32 {
-        let (count, whole) = (self.count.get(), whole.get());
-        let share = whole / count + u32::from(self.index < whole % count);
+    /// The shard's share of a whole number, of which this many shards have a part at once. The shares of as many neighbouring shards sum
+    /// to it, except that each is at least 1.
+    fn share(self, whole: NonZeroU32, at_once: NonZeroU32) -> NonZeroU32 {
+        let (at_once, whole) = (at_once.get(), whole.get());
+        let share = whole / at_once + u32::from(self.index % at_once < whole % at_once);
         NonZeroU32::new(share).unwrap_or(NonZeroU32::MIN)
     }
 
@@ -67,11 +66,12 @@ impl Shard {
         format!("shard-{:0digits$}-of-{}", self.index + 1, self.count)
     }
 
-    /// The shard's share of the requests and tokens per minute.
-    pub(super) fn quota(self, whole: Quota) -> Quota {
+    /// The shard's share of the requests and tokens per minute, if `workers` shards run at once; without, all of them.
+    pub(super) fn quota(self, whole: Quota, workers: Option<NonZeroU32>) -> Quota {
+        let at_once = workers.map_or(self.count, |workers| workers.min(self.count));
         Quota {
-            requests: whole.requests.map(|requests| self.share(requests)),
-            tokens: whole.tokens.map(|tokens| self.share(tokens)),
+            requests: whole.requests.map(|whole| self.share(whole, at_once)),
+            tokens: whole.tokens.map(|whole| self.share(whole, at_once)),
         }
     }
 
@@ -88,17 +88,17 @@ impl Shard {
             (Some("none"), _) | (None, None) => Ok(Self::WHOLE),
             (Some("auto"), system) => {
                 let system = system.ok_or_else(|| usage_error(NO_SYSTEM))?;
-                system.shard(None)
+                Self::of(system, None)
             }
             (Some(text), system) => match text.split_once('/') {
                 Some(("auto", count)) => {
                     let system = system.ok_or_else(|| usage_error(NO_SYSTEM))?;
-                    system.shard(Some(number(count, text)?))
+                    Self::of(system, Some(number(count, text)?))
                 }
                 _ => text.parse(),
             },
             (None, Some(system)) => {
-                let shard = system.shard(None)?;
+                let shard = Self::of(system, None)?;
                 if shard.is_part() {
                     tracing::warn!(
                         "{system}: this process does shard {shard}; --shard none does everything"
@@ -107,6 +107,12 @@ impl Shard {
                 Ok(shard)
             }
         }
+    }
+
+    /// The shard of this process in a batch system.
+    fn of(system: BatchSystem, parts: Option<NonZeroU32>) -> Result<Self> {
+        let (index, count) = system.place(parts)?;
+        Ok(Self { index, count })
     }
 
     fn new(index: u32, count: NonZeroU32) -> Option<Self> {
@@ -130,37 +136,6 @@ impl fmt::Display for Shard {
     }
 }
 
-/// The questions about the sources of a shard. Sources are assigned to the shards in turn, in the order of their first question.
-/// `source` returns the source of a question.
-///
-/// # Errors
-/// If the shard has no question.
-pub(crate) fn part<Q>(
-    questions: Vec<Q>,
-    shard: Shard,
-    source: impl Fn(&Q) -> String,
-) -> Result<Vec<Q>> {
-    if !shard.is_part() {
-        return Ok(questions);
-    }
-    let mut positions = HashMap::<String, usize>::new();
-    for question in &questions {
-        let next = positions.len();
-        positions.entry(source(question)).or_insert(next);
-    }
-    let own = questions.into_iter();
-    let own = own.filter(|question| shard.has(positions[&source(question)]));
-    let own: Vec<Q> = own.collect();
-    if own.is_empty() {
-        let problem = format!(
-            "{shard} is empty: there are {} frames or walks; use at most as many shards",
-            positions.len()
-        );
-        return Err(Error::usage("--shard", problem));
-    }
-    Ok(own)
-}
-
 const NO_SYSTEM: &str = "auto is for a task of a Slurm array (SLURM_ARRAY_TASK_ID) or a pod of an indexed Kubernetes job \
                          (JOB_COMPLETION_INDEX), and this is neither";
 
@@ -176,78 +151,6 @@ fn not_a_shard(text: &str) -> Error {
 
 fn number(text: &str, whole: &str) -> Result<NonZeroU32> {
     text.trim().parse().map_err(|_| not_a_shard(whole))
-}
-
-/// The batch system that started this process, with its variables.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum BatchSystem {
-    /// A task of a job array: its index from 0, and the number of tasks.
-    Slurm { index: u32, count: NonZeroU32 },
-    /// A pod of an indexed job: its index from 0. The number of pods is in no variable.
-    Kubernetes { index: u32 },
-}
-
-impl BatchSystem {
-    fn of(variable: &impl Fn(&str) -> Option<String>) -> Result<Option<Self>> {
-        let value = |name: &str| -> Result<Option<u32>> {
-            let parse = |text: String| {
-                text.trim()
-                    .parse()
-                    .map_err(|_| Error::usage(name, format_args!("{text:?} is not a number")))
-            };
-            variable(name).map(parse).transpose()
-        };
-        if let Some(id) = value("SLURM_ARRAY_TASK_ID")? {
-            let first = value("SLURM_ARRAY_TASK_MIN")?.unwrap_or(id);
-            let step = value("SLURM_ARRAY_TASK_STEP")?.unwrap_or(1).max(1);
-            let count = value("SLURM_ARRAY_TASK_COUNT")?.unwrap_or(1);
-            return Ok(Some(Self::Slurm {
-                index: id.saturating_sub(first) / step,
-                count: NonZeroU32::new(count).unwrap_or(NonZeroU32::MIN),
-            }));
-        }
-        let index = value("JOB_COMPLETION_INDEX")?;
-        Ok(index.map(|index| Self::Kubernetes { index }))
-    }
-
-    /// The shard of this process. `parts` is the number of shards, if `--shard auto/N` sets it.
-    fn shard(self, parts: Option<NonZeroU32>) -> Result<Shard> {
-        let (index, count) = match (self, parts) {
-            (Self::Slurm { count, .. }, Some(parts)) if count != parts => {
-                return Err(usage_error(format_args!(
-                    "the Slurm array has {count} tasks, not {parts}: name the shard itself, as --shard 2/{parts}"
-                )));
-            }
-            (Self::Slurm { index, count }, _) | (Self::Kubernetes { index }, Some(count)) => {
-                (index, count)
-            }
-            (Self::Kubernetes { .. }, None) => {
-                return Err(usage_error(
-                    "JOB_COMPLETION_INDEX is the index of this pod, but the number of pods is unknown: set it with --shard auto/N, or \
-                     do everything in each pod with --shard none",
-                ));
-            }
-        };
-        Shard::new(index, count).ok_or_else(|| {
-            usage_error(format_args!(
-                "{self} is beyond the {count} parts: an index from 0 to {} expected",
-                count.get() - 1
-            ))
-        })
-    }
-}
-
-impl fmt::Display for BatchSystem {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Slurm { index, count } => {
-                write!(f, "task {} of a Slurm array of {count}", index + 1)
-            }
-            Self::Kubernetes { index } => {
-                write!(f, "pod {index} of an indexed Kubernetes job")
-            }
-        }
-    }
 }
 
 #[cfg(test)]
@@ -303,19 +206,26 @@ mod tests {
     }
 
     #[test]
-    fn every_position_is_in_one_shard_and_shares_sum_up() {
-        let count = NonZeroU32::new(3).unwrap();
-        let parts: Vec<Shard> = (0..3).map(|i| Shard::new(i, count).unwrap()).collect();
-        for position in 0..20 {
-            let shards = parts.iter().filter(|part| part.has(position));
-            assert_eq!(shards.count(), 1);
-        }
-        let whole = NonZeroU32::new(500).unwrap();
-        let shares = parts.iter().map(|part| part.share(whole).get());
-        assert_eq!(shares.collect::<Vec<_>>(), [167, 167, 166]);
-        assert_eq!(parts[2].share(NonZeroU32::MIN).get(), 1);
+    fn shares_of_the_shards_that_run_at_once_sum_up() {
+        let number = |n| NonZeroU32::new(n).unwrap();
+        let parts: Vec<Shard> = Shard::all(number(3)).collect();
+        let whole = Quota {
+            requests: Some(number(500)),
+            tokens: Some(number(1)),
+        };
+        let shares = |workers: Option<u32>| -> Vec<u32> {
+            let quotas = parts
+                .iter()
+                .map(|part| part.quota(whole, workers.map(number)));
+            quotas.map(|quota| quota.requests.unwrap().get()).collect()
+        };
+        assert_eq!(shares(None), [167, 167, 166]);
+        assert_eq!(shares(Some(2)), [250, 250, 250]);
+        // More workers than shards are as many as there are shards.
+        assert_eq!(shares(Some(16)), [167, 167, 166]);
+        assert_eq!(parts[2].quota(whole, None).tokens.unwrap().get(), 1);
         assert_eq!(parts[1].folder(), "shard-2-of-3");
-        let many = Shard::new(6, NonZeroU32::new(256).unwrap()).unwrap();
+        let many = Shard::new(6, number(256)).unwrap();
         assert_eq!(many.folder(), "shard-007-of-256");
     }
 }

@@ -1,6 +1,7 @@
 //! Runs as read from their folders: [`StoredRun`], and [`AnyRun`] for either kind of experiment.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
+use std::hash::Hash;
 use std::path::{Path, PathBuf};
 
 use super::renamed;
@@ -8,8 +9,8 @@ use crate::error::{Error, Result};
 use crate::store;
 use crate::types::manifest::RunManifest;
 use crate::types::{
-    ChoiceDetail, Detail, ImageFidelity, ListedModel, ModelListing, OpenDetail, QuestionId, Record,
-    RunQuestion, Thumbnail,
+    ChoiceDetail, Condition, Detail, ImageFidelity, ListedModel, ModelListing, OpenDetail,
+    QuestionId, Record, RunQuestion, Thumbnail, TrialKey,
 };
 
 /// The models of a run that a report shows.
@@ -107,28 +108,79 @@ impl<D: Detail> RunLines<D> {
 
 /// Records in the order of the questions, conditions and models (those that are listed first), whatever order the replies came in.
 pub(crate) fn in_order<D: Detail>(
-    records: Vec<Record<D>>,
+    mut records: Vec<Record<D>>,
     questions: &[RunQuestion],
     listed: &[ListedModel],
 ) -> Vec<Record<D>> {
-    let models = ModelListing::new(listed.iter().cloned());
+    let order = {
+        let places = records.iter().map(|record| TrialPlace {
+            question: &record.question,
+            condition: record.condition.as_ref(),
+            model: &record.model,
+            repeat: record.detail.repeat(),
+            key: record.key,
+        });
+        order(&places.collect::<Vec<_>>(), questions, listed)
+    };
+    arrange(&mut records, order);
+    records
+}
+
+/// What the place of a trial among those of its run follows from.
+pub(super) struct TrialPlace<'t> {
+    pub(super) question: &'t QuestionId,
+    pub(super) condition: Option<&'t Condition>,
+    pub(super) model: &'t str,
+    pub(super) repeat: u32,
+    pub(super) key: TrialKey,
+}
+
+/// The indices of trials in the order of [`in_order`].
+pub(super) fn order(
+    trials: &[TrialPlace<'_>],
+    questions: &[RunQuestion],
+    listed: &[ListedModel],
+) -> Vec<usize> {
     let ids = questions.iter().map(|question| &question.id);
-    let places: HashMap<&QuestionId, usize> = ids.zip(0..).collect();
-    let place = |record: &Record<D>| places.get(&record.question).copied();
-    let mut ordered: Vec<(Option<usize>, Record<D>)> = records
-        .into_iter()
-        .map(|record| (place(&record), record))
-        .collect();
-    ordered.sort_by(|(place, record), (other_place, other)| {
-        let trial = |record: &Record<D>| (record.detail.repeat(), record.key);
-        let model = |name: &str| models.place(name);
-        (place, &record.condition)
-            .cmp(&(other_place, &other.condition))
-            .then_with(|| model(&record.model).cmp(&model(&other.model)))
-            .then_with(|| record.model.cmp(&other.model))
-            .then_with(|| trial(record).cmp(&trial(other)))
-    });
-    ordered.into_iter().map(|(_, record)| record).collect()
+    let questions: HashMap<&QuestionId, usize> = ids.zip(0..).collect();
+    let conditions = numbers(trials.iter().map(|trial| trial.condition));
+    let listing = ModelListing::new(listed.iter().cloned());
+    let models = numbers(trials.iter().map(|trial| {
+        let place = listing.place(trial.model);
+        (place, trial.model)
+    }));
+    let place = |(index, trial): (usize, &TrialPlace<'_>)| {
+        let question = questions.get(trial.question).copied();
+        let model = models[&(listing.place(trial.model), trial.model)];
+        let names = (question, conditions[&trial.condition], model);
+        (names, trial.repeat, trial.key, index)
+    };
+    let mut places: Vec<_> = trials.iter().enumerate().map(place).collect();
+    places.sort_unstable();
+    places.into_iter().map(|(.., index)| index).collect()
+}
+
+/// A number for each of these values, in their order.
+fn numbers<T: Ord + Hash>(values: impl Iterator<Item = T>) -> HashMap<T, usize> {
+    let distinct: HashSet<T> = values.collect();
+    let mut sorted: Vec<T> = distinct.into_iter().collect();
+    sorted.sort_unstable();
+    sorted.into_iter().zip(0..).collect()
+}
+
+/// Puts values into an order in place: first the value at the first index of `order`. It has each index once.
+pub(super) fn arrange<T>(values: &mut [T], mut order: Vec<usize>) {
+    for start in 0..order.len() {
+        let mut place = start;
+        loop {
+            let from = std::mem::replace(&mut order[place], place);
+            if from == start {
+                break;
+            }
+            values.swap(place, from);
+            place = from;
+        }
+    }
 }
 
 /// Name of the run in this folder: that of the folder.
@@ -139,7 +191,6 @@ pub(crate) fn name(folder: &Path) -> String {
 }
 
 /// A run of either experiment. Only this module tells experiments apart by the schema of their folders.
-#[derive(Clone)]
 pub(crate) enum AnyRun {
     Choice(StoredRun<ChoiceDetail>),
     Open(StoredRun<OpenDetail>),
@@ -230,5 +281,22 @@ fn no_run(folder: &Path) -> Error {
     Error::Run {
         path: folder.to_owned(),
         problem: "no run in this folder: it has no manifest.json".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::arrange;
+
+    #[test]
+    fn values_are_put_into_any_order_in_place() {
+        let values: Vec<usize> = (0..40).map(|value| value * value).collect();
+        for step in [1, 3, 7, 9, 39] {
+            let order: Vec<usize> = (0..40).map(|index| (index * step + 5) % 40).collect();
+            let expected: Vec<usize> = order.iter().map(|index| values[*index]).collect();
+            let mut arranged = values.clone();
+            arrange(&mut arranged, order);
+            assert_eq!(arranged, expected, "{step}");
+        }
     }
 }

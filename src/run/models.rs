@@ -53,6 +53,7 @@ pub(crate) fn models(args: &ModelsArgs, progress: &Progress) -> Result<Outcome> 
     let context = ResolveContext {
         typed: &BTreeSet::new(),
         shard: Shard::WHOLE,
+        workers: None,
         keys: if args.check {
             KeyUse::Needed
         } else {

@@ -4,7 +4,7 @@ use super::choice::{LENIENT_VERSION, readings};
 use super::llm_match::{Protocol, mark};
 use super::option_probabilities::option_probabilities;
 use crate::error::Result;
-use crate::types::detail::{ChoiceLine, OpenLine};
+use crate::types::detail::{AlikeChoices, ChoiceLine, OpenLine};
 use crate::types::{
     Answer, ChoiceDetail, Choices, Detail, Digest, FrameId, OpenDetail, Reply, Step, TrialOutcome,
 };
@@ -12,13 +12,15 @@ use crate::types::{
 impl Detail for ChoiceDetail {
     type Line = ChoiceLine;
 
+    type Alike = AlikeChoices;
+
     const SCHEMA: &'static str = "darkqa.run/2";
 
     const REPLY_READING: Option<&'static str> = Some(LENIENT_VERSION);
 
     /// Stores both readings of a reply, and the outcome, which follows from the strict reading.
     fn read(&mut self, reply: &Reply) -> Result<()> {
-        let choices = Choices::known_by(self.choices.clone().into(), self.truth)?;
+        let choices = Choices::known_by(self.choices.to_vec().into(), self.truth)?;
         let (strict, lenient) = readings(reply, &choices);
         self.outcome = match strict {
             Answer::Unparsed(_) => TrialOutcome::Unparsed,
@@ -32,12 +34,16 @@ impl Detail for ChoiceDetail {
         self.lenient = Some(lenient.into());
         // A stored reply that is read again says nothing of what was seen, or of how likely each choice was.
         if let Some(chances) = &reply.chances {
-            self.options = option_probabilities(chances, &self.choices);
+            self.options = option_probabilities(chances, &self.choices).map(Box::new);
         }
         if reply.observed.is_some() {
-            self.observed.clone_from(&reply.observed);
+            self.observed = reply.observed.clone().map(Box::new);
         }
         Ok(())
+    }
+
+    fn share(&mut self, alike: &mut AlikeChoices) {
+        Self::share(self, alike);
     }
 
     fn choices(&self) -> &[String] {
@@ -61,6 +67,8 @@ impl Detail for ChoiceDetail {
 impl Detail for OpenDetail {
     type Line = OpenLine;
 
+    type Alike = ();
+
     const SCHEMA: &'static str = "darkqa.openeqa/2";
 
     const REPLY_READING: Option<&'static str> = None;
@@ -73,6 +81,8 @@ impl Detail for OpenDetail {
         }
         Ok(())
     }
+
+    fn share(&mut self, (): &mut ()) {}
 
     fn choices(&self) -> &[String] {
         &[]

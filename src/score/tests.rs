@@ -34,7 +34,7 @@ pub(super) fn records(model: &str, condition: &str, answers: Answers) -> Vec<Rec
         let detail = ChoiceDetail {
             frame: FrameId(format!("f{:02}", item / 2)),
             family: [Family::Color, Family::RoomType][item % 2].clone(),
-            choices: ["a", "b", "c"].map(str::to_owned).to_vec(),
+            choices: ["a", "b", "c"].map(str::to_owned).to_vec().into(),
             truth: Some(0),
             repeat: 0,
             strict: chosen,
@@ -261,7 +261,7 @@ fn presence(model: &str, condition: &str, reply: fn(usize, bool) -> Option<bool>
         let detail = &mut record.detail;
         let is_there = item % 2 == 0;
         detail.family = Family::Presence;
-        detail.choices = ["Yes", "no"].map(str::to_owned).to_vec();
+        detail.choices = ["Yes", "no"].map(str::to_owned).to_vec().into();
         detail.truth = Some(usize::from(!is_there));
         let chosen = reply(item / 2, is_there).map(|yes| usize::from(!yes));
         detail.strict = Some(AnswerReading { chosen, why: None });

@@ -2,14 +2,15 @@
 
 use std::collections::HashMap;
 use std::ffi::OsStr;
-use std::fs;
+use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
 
-use super::lines::lines;
+use super::lines::{StoredLine, each_line, lines};
+use super::stored_trial::StoredTrial;
 use crate::error::{Error, Result};
 use crate::files::{self, is_unfinished};
 use crate::types::manifest::{ColumnDifference, RunManifest, differences};
-use crate::types::{Detail, ImageFidelity, Record, RunQuestion, Thumbnail, TrialKey};
+use crate::types::{Detail, Distinct, ImageFidelity, Record, RunQuestion, Thumbnail, TrialKey};
 
 const MANIFEST: &str = "manifest.json";
 pub(super) const RECORDS: &str = "records.jsonl";
@@ -53,17 +54,36 @@ pub(super) fn write_manifest(folder: &Path, manifest: &RunManifest) -> Result<()
 /// The last record of each trial in a run folder, in the order of each trial's first record. An incomplete last line is
 /// skipped.
 pub(crate) fn read_records<D: Detail>(folder: &Path) -> Result<Vec<Record<D>>> {
+    let mut alike = D::Alike::default();
+    let share = |record: &mut Record<D>| record.detail.share(&mut alike);
+    last_of_each(folder, |record: &Record<D>| record.key, share)
+}
+
+/// The last state of each trial in a run folder, in the order of [`read_records`].
+pub(crate) fn read_trials(folder: &Path) -> Result<Vec<StoredTrial>> {
+    let mut models = Distinct::default();
+    let share = |trial: &mut StoredTrial| models.share(&mut trial.model);
+    last_of_each(folder, |trial: &StoredTrial| trial.key, share)
+}
+
+/// The last line of each key among the records, at the place of its first one, after `share` has seen it.
+fn last_of_each<T: StoredLine>(
+    folder: &Path,
+    key: impl Fn(&T) -> TrialKey,
+    mut share: impl FnMut(&mut T),
+) -> Result<Vec<T>> {
     let mut latest = HashMap::<TrialKey, usize>::new();
-    let mut records: Vec<Record<D>> = Vec::new();
-    for record in lines::<Record<D>>(&folder.join(RECORDS))? {
-        if let Some(&index) = latest.get(&record.key) {
-            records[index] = record;
+    let mut all: Vec<T> = Vec::new();
+    each_line(&folder.join(RECORDS), |mut line: T| {
+        share(&mut line);
+        if let Some(&index) = latest.get(&key(&line)) {
+            all[index] = line;
         } else {
-            latest.insert(record.key, records.len());
-            records.push(record);
+            latest.insert(key(&line), all.len());
+            all.push(line);
         }
-    }
-    Ok(records)
+    })?;
+    Ok(all)
 }
 
 /// The questions of a run; none if an earlier version made it, which did not store them.
@@ -94,6 +114,24 @@ pub(crate) fn find(base: &Path, hash: &str) -> Option<PathBuf> {
         })
         .filter(|path| path.join(MANIFEST).is_file())
         .max()
+}
+
+/// Whether another process writes to a run folder.
+///
+/// # Errors
+/// If its records cannot be opened.
+pub(crate) fn is_locked(folder: &Path) -> Result<bool> {
+    let path = folder.join(RECORDS);
+    let records = match File::open(&path) {
+        Ok(records) => records,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(false),
+        Err(e) => return Err(Error::file(&path, "open", e)),
+    };
+    match records.try_lock_shared() {
+        Ok(()) => Ok(false),
+        Err(TryLockError::WouldBlock) => Ok(true),
+        Err(TryLockError::Error(e)) => Err(Error::file(&path, "lock", e)),
+    }
 }
 
 /// The schema of the run in a folder; `None` if the folder has no manifest.

@@ -1,12 +1,15 @@
 //! Files of one JSON object a line. A killed process may leave the last line incomplete.
 
 use std::fs::{File, OpenOptions};
-use std::io::{BufRead, BufReader, Read, Seek, SeekFrom, Write};
+use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
+use rayon::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+use super::pieces::{FileLine, LinePlace, Pieces};
+use super::stored_trial::StoredTrial;
 use crate::error::{Error, Result};
 use crate::files::write_synced;
 use crate::types::{Detail, ImageFidelity, Record, RunQuestion, Thumbnail, Usage};
@@ -39,31 +42,42 @@ pub(super) fn json_lines<T: Serialize>(path: &Path, values: &[T]) -> Result<Vec<
 
 /// The complete lines of a file of a run; none if there is no such file.
 pub(super) fn lines<T: StoredLine>(path: &Path) -> Result<Vec<T>> {
-    let file = match File::open(path) {
-        Ok(file) => file,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-        Err(e) => return Err(Error::file(path, "read", e)),
-    };
     let mut values = Vec::new();
-    let mut file = BufReader::new(file);
-    let mut line = Vec::new();
-    for number in 1.. {
-        line.clear();
-        file.read_until(b'\n', &mut line)
-            .map_err(|e| Error::file(path, "read", e))?;
-        if line.pop() != Some(b'\n') {
-            break;
-        }
-        if line.trim_ascii().is_empty() {
-            // A line that was set aside.
-            continue;
-        }
-        values.push(serde_json::from_slice(&line).map_err(|e| {
-            let problem = format!("not {}: {e}; {}", T::WHAT, T::MEND);
-            Error::line(path, number, problem)
-        })?);
-    }
+    each_line(path, |value| values.push(value))?;
     Ok(values)
+}
+
+/// Hands over the complete lines of a file of a run in order, none if there is no such file. They are parsed on all cores, and the
+/// file is not held in memory.
+pub(super) fn each_line<T: StoredLine>(path: &Path, mut take: impl FnMut(T)) -> Result<()> {
+    each_placed_line(path, |value, _| take(value))
+}
+
+/// Hands over the complete lines of a file as [`each_line`], each with its place.
+pub(super) fn each_placed_line<T: StoredLine>(
+    path: &Path,
+    mut take: impl FnMut(T, LinePlace),
+) -> Result<()> {
+    let Some(mut pieces) = Pieces::open(path)? else {
+        return Ok(());
+    };
+    while let Some(piece) = pieces.next()? {
+        let lines = piece.lines();
+        let parsed = lines.par_iter().map(|line| {
+            let line = line.bytes.strip_suffix(b"\n").unwrap_or(line.bytes);
+            serde_json::from_slice::<T>(line)
+        });
+        let parsed: Vec<serde_json::Result<T>> = parsed.collect();
+        for (line, value) in lines.iter().zip(parsed) {
+            let value = value.map_err(|e| {
+                let problem = format!("not {}: {e}; {}", T::WHAT, T::MEND);
+                Error::line(path, line.number, problem)
+            })?;
+            let (start, length) = (line.start, line.bytes.len());
+            take(value, LinePlace { start, length });
+        }
+    }
+    Ok(())
 }
 
 /// Moves the lines that are no `T` into the file `aside`, and leaves blanks in their place. So one damaged line costs its own trial
@@ -72,22 +86,26 @@ pub(super) fn lines<T: StoredLine>(path: &Path) -> Result<Vec<T>> {
 /// # Errors
 /// If no line at all is a `T`: then it is another file.
 pub(super) fn set_aside<T: StoredLine>(path: &Path, aside: &Path) -> Result<()> {
-    let content = std::fs::read(path).map_err(|e| Error::file(path, "read", e))?;
-    let (mut start, mut good) = (0, 0_usize);
-    let mut bad: Vec<BadLine<'_>> = Vec::new();
-    for (index, line) in content.split_inclusive(|byte| *byte == b'\n').enumerate() {
-        if !line.trim_ascii().is_empty() {
-            match serde_json::from_slice::<T>(line) {
-                Ok(_) => good += 1,
-                Err(e) => bad.push(BadLine {
-                    number: index + 1,
-                    start,
-                    line,
+    let Some(mut pieces) = Pieces::open(path)? else {
+        return Ok(());
+    };
+    let mut good = 0_usize;
+    let mut bad: Vec<BadLine> = Vec::new();
+    while let Some(piece) = pieces.next()? {
+        let lines = piece.lines();
+        let problem = |line: &FileLine<'_>| serde_json::from_slice::<T>(line.bytes).err();
+        let problems: Vec<Option<serde_json::Error>> = lines.par_iter().map(problem).collect();
+        for (line, problem) in lines.iter().zip(problems) {
+            match problem {
+                None => good += 1,
+                Some(e) => bad.push(BadLine {
+                    number: line.number,
+                    start: line.start,
+                    line: line.bytes.to_owned(),
                     problem: e.to_string(),
                 }),
             }
         }
-        start += line.len();
     }
     let Some(first) = bad.first() else {
         return Ok(());
@@ -97,7 +115,7 @@ pub(super) fn set_aside<T: StoredLine>(path: &Path, aside: &Path) -> Result<()> 
         return Err(Error::line(path, first.number, problem));
     }
     let mut lines = std::fs::read(aside).unwrap_or_default();
-    lines.extend(bad.iter().flat_map(|bad| bad.line));
+    lines.extend(bad.iter().flat_map(|bad| &bad.line));
     write_synced(aside, &lines)?;
     let mut file = OpenOptions::new()
         .write(true)
@@ -106,7 +124,7 @@ pub(super) fn set_aside<T: StoredLine>(path: &Path, aside: &Path) -> Result<()> 
     for bad in &bad {
         let blanks = vec![b' '; bad.line.len() - 1];
         let written = file
-            .seek(SeekFrom::Start(bad.start as u64))
+            .seek(SeekFrom::Start(bad.start))
             .and_then(|_| file.write_all(&blanks));
         written.map_err(|e| Error::file(path, "write", e))?;
     }
@@ -130,20 +148,20 @@ pub(super) fn set_aside<T: StoredLine>(path: &Path, aside: &Path) -> Result<()> 
 }
 
 /// A line that cannot be read.
-struct BadLine<'f> {
+struct BadLine {
     /// Its number, from 1.
     number: usize,
     /// The place of its first byte in the file.
-    start: usize,
+    start: u64,
     /// The line with its end.
-    line: &'f [u8],
+    line: Vec<u8>,
     problem: String,
 }
 
 /// What the replies of some lines were charged, as far as they can still be read.
-fn paid(bad: &[BadLine<'_>]) -> String {
-    let tokens = |bad: &BadLine<'_>| {
-        let value: serde_json::Value = serde_json::from_slice(bad.line).ok()?;
+fn paid(bad: &[BadLine]) -> String {
+    let tokens = |bad: &BadLine| {
+        let value: serde_json::Value = serde_json::from_slice(&bad.line).ok()?;
         let usage: Usage = serde_json::from_value(value.get("usage")?.clone()).ok()?;
         usage.total()
     };
@@ -158,8 +176,12 @@ fn paid(bad: &[BadLine<'_>]) -> String {
     }
 }
 
+const A_RECORD: &str = "a record";
+const MEND_A_RECORD: &str = "the command that made the run, called again, sets single such lines aside and asks their trials again; \
+                             or restore the file";
+
 /// The content of one line in a file of a run.
-pub(super) trait StoredLine: DeserializeOwned {
+pub(super) trait StoredLine: DeserializeOwned + Send {
     /// The name in error messages, with its article.
     const WHAT: &str;
     /// What a user can do about a line that is none.
@@ -167,9 +189,13 @@ pub(super) trait StoredLine: DeserializeOwned {
 }
 
 impl<D: Detail> StoredLine for Record<D> {
-    const WHAT: &str = "a record";
-    const MEND: &str = "the command that made the run, called again, sets single such lines aside and asks their trials again; \
-                        or restore the file";
+    const WHAT: &str = A_RECORD;
+    const MEND: &str = MEND_A_RECORD;
+}
+
+impl StoredLine for StoredTrial {
+    const WHAT: &str = A_RECORD;
+    const MEND: &str = MEND_A_RECORD;
 }
 
 impl StoredLine for RunQuestion {

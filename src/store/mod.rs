@@ -6,9 +6,12 @@
 
 mod folder;
 mod lines;
+mod pieces;
+mod record_log;
+mod stored_trial;
 
 use std::borrow::Cow;
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::Write;
 use std::marker::PhantomData;
@@ -19,17 +22,22 @@ use crate::error::{Error, Result};
 use crate::types::manifest::RunManifest;
 use crate::types::recorded_names::RecordedNames;
 use crate::types::{
-    ChoiceDetail, Detail, ImageFidelity, QuestionId, Record, RunQuestion, Thumbnail, TrialKey, Via,
+    ChoiceDetail, Detail, Distinct, FrameId, ImageFidelity, QuestionId, Record, RunQuestion,
+    Thumbnail, TrialKey, Via,
 };
 
 use folder::{
     FIDELITY, QUESTIONS, RECORDS, THUMBNAILS, check_same_run, create_run, write, write_manifest,
 };
-use lines::{append, json_lines, lines, repair, set_aside};
+use lines::{append, each_line, json_lines, lines, repair, set_aside};
+
+pub(crate) use pieces::LinePlace;
+pub(crate) use record_log::{RecordLog, each_record};
+pub(crate) use stored_trial::StoredTrial;
 
 pub(crate) use folder::{
-    AddressChange, find, read_fidelity, read_manifest, read_questions, read_records,
-    read_thumbnails, schema,
+    AddressChange, find, is_locked, read_fidelity, read_manifest, read_questions, read_records,
+    read_thumbnails, read_trials, schema,
 };
 
 /// The subfolder of a run for Batch API files.
@@ -105,6 +113,20 @@ impl<D: Detail> Store<D> {
         read_records(&self.folder).map(|records| self.shown(records))
     }
 
+    /// The last state of each trial, in the order of [`records`](Self::records).
+    pub(crate) fn trials(&self) -> Result<Vec<StoredTrial>> {
+        let mut trials = read_trials(&self.folder)?;
+        let mut models = Distinct::default();
+        for trial in &mut trials {
+            let name = self.names.shown(&trial.model);
+            if *name != **trial.model {
+                trial.model = name.to_owned().into();
+                models.share(&mut trial.model);
+            }
+        }
+        Ok(trials)
+    }
+
     /// The records with the names that their models have now.
     fn shown(&self, mut records: Vec<Record<D>>) -> Vec<Record<D>> {
         for record in &mut records {
@@ -148,6 +170,53 @@ impl<D: Detail> Store<D> {
             std::slice::from_ref(thumbnail),
         )
         .map(drop)
+    }
+
+    /// Adds the small copies of images of other run folders that this run lacks, of the frames that are wanted.
+    ///
+    /// # Errors
+    /// If a file cannot be read or written.
+    pub(crate) fn add_thumbnails_of(
+        &mut self,
+        folders: &[&Path],
+        is_wanted: impl Fn(&FrameId) -> bool,
+    ) -> Result<()> {
+        let present = read_thumbnails(&self.folder)?.into_iter();
+        let present = present.map(|thumbnail| (thumbnail.frame, thumbnail.condition));
+        let mut present: HashSet<_> = present.collect();
+        for folder in folders {
+            for thumbnail in read_thumbnails(folder)? {
+                let place = (thumbnail.frame.clone(), thumbnail.condition.clone());
+                if is_wanted(&thumbnail.frame) && present.insert(place) {
+                    self.append_thumbnail(&thumbnail)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the similarities of images of other run folders that this run lacks, of the frames that are wanted.
+    ///
+    /// # Errors
+    /// If a file cannot be read or written.
+    pub(crate) fn add_fidelity_of(
+        &mut self,
+        folders: &[&Path],
+        is_wanted: impl Fn(&FrameId) -> bool,
+    ) -> Result<()> {
+        let present = read_fidelity(&self.folder)?.into_iter();
+        let mut present: HashSet<_> = present
+            .map(|image| (image.frame, image.condition))
+            .collect();
+        for folder in folders {
+            for image in read_fidelity(folder)? {
+                let place = (image.frame.clone(), image.condition.clone());
+                if is_wanted(&image.frame) && present.insert(place) {
+                    self.append_fidelity(&image)?;
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Appends the similarity of an image to its clean frame.
@@ -208,7 +277,7 @@ impl<D: Detail> Store<D> {
         if pending.is_empty() {
             return Ok(BTreeSet::new());
         }
-        for record in lines::<Record<D>>(&self.folder.join(RECORDS))? {
+        each_line(&self.folder.join(RECORDS), |record: StoredTrial| {
             if !record.failed() {
                 pending.remove(&record.key);
             } else if record.via == Via::Batch
@@ -216,7 +285,7 @@ impl<D: Detail> Store<D> {
             {
                 *times = times.saturating_sub(1);
             }
-        }
+        })?;
         let pending = pending.into_iter().filter(|(_, times)| *times > 0);
         Ok(pending.map(|(key, _)| key).collect())
     }
@@ -228,13 +297,17 @@ impl<D: Detail> Store<D> {
 
     /// Appends one record. After this returns, a killed process cannot lose it.
     pub(crate) fn append(&mut self, record: &Record<D>) -> Result<()> {
-        let path = || self.folder.join(RECORDS);
         let mut line = serde_json::to_vec(&*self.recorded(record))
-            .map_err(|e| Error::file(path(), "write", e.into()))?;
+            .map_err(|e| Error::file(self.folder.join(RECORDS), "write", e.into()))?;
         line.push(b'\n');
+        self.append_line(&line)
+    }
+
+    /// Appends the line of a record, with its end, as it is in the file of another run with the same names of models.
+    pub(crate) fn append_line(&mut self, line: &[u8]) -> Result<()> {
         self.records
-            .write_all(&line)
-            .map_err(|e| Error::file(path(), "write", e))?;
+            .write_all(line)
+            .map_err(|e| Error::file(self.folder.join(RECORDS), "write", e))?;
         if self.synced.elapsed() >= SYNC_EVERY {
             self.sync()
         } else {

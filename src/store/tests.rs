@@ -23,6 +23,7 @@ fn manifest(seed: u64) -> RunManifest {
         enhancers: BTreeMap::new(),
         inputs: None,
         shard: None,
+        part: None,
         reply_reading: None,
         counts: Counts::default(),
     }
@@ -32,7 +33,7 @@ fn record(name: &str, outcome: TrialOutcome) -> Record {
     let detail = ChoiceDetail {
         frame: FrameId("f".into()),
         family: Family::Color,
-        choices: vec!["a".into(), "b".into()],
+        choices: vec!["a".into(), "b".into()].into(),
         truth: Some(0),
         repeat: 0,
         strict: None,

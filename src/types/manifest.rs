@@ -127,6 +127,27 @@ fn fields(object: &Value) -> BTreeMap<String, Value> {
         .collect()
 }
 
+/// The place of a part's sources (frames or walks) among all of its run, in the order of their first questions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PartPlace {
+    /// Place of the first source, from 0.
+    pub first: usize,
+    /// Number of sources of the part.
+    pub count: usize,
+    /// Number of sources of the whole run.
+    pub of: usize,
+}
+
+/// What a part of a run does.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RunPart {
+    /// The place of its sources.
+    #[serde(flatten)]
+    pub place: PartPlace,
+    /// Number of trials about each source.
+    pub trials: Vec<usize>,
+}
+
 /// The version of the lenient reading in runs whose manifest names none.
 pub(crate) const FIRST_REPLY_READING: &str = "lenient/1";
 
@@ -163,6 +184,9 @@ pub struct RunManifest {
     /// The part of an evaluation, as `2/4`; `None` for the whole evaluation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shard: Option<String>,
+    /// What the part does; `None` for the whole evaluation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub part: Option<RunPart>,
     /// The settings that change no reply: concurrency, timeouts.
     pub settings: BTreeMap<String, Value>,
     /// The flags that decide the images, as the user wrote them; empty in runs of earlier versions.

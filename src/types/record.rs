@@ -36,7 +36,7 @@ pub struct Record<D> {
     #[serde(skip_serializing_if = "Via::is_direct")]
     pub via: Via,
     /// The reason why no reply came; `None` if one came.
-    pub failure: Option<Failure>,
+    pub failure: Option<Box<Failure>>,
     /// The tokens that the server charged; `None` if it did not say.
     pub usage: Option<Usage>,
     /// The model's name in the server's reply.
@@ -57,9 +57,12 @@ pub struct Record<D> {
 }
 
 /// The fields that an experiment adds to a record.
-pub trait Detail: Clone + Serialize + Send {
+pub trait Detail: Clone + PartialEq + Serialize + Send {
     /// A complete line of a record file; records are read through this type in one pass.
     type Line: DeserializeOwned + Into<Record<Self>>;
+
+    /// What many records of a run hold alike.
+    type Alike: Default;
 
     /// The schema of a run with these records.
     const SCHEMA: &'static str;
@@ -72,6 +75,9 @@ pub trait Detail: Clone + Serialize + Send {
     /// # Errors
     /// If the choices of the detail are not valid.
     fn read(&mut self, reply: &Reply) -> Result<()>;
+
+    /// Keeps once what other records hold alike.
+    fn share(&mut self, alike: &mut Self::Alike);
 
     /// The choices in the order shown; empty if the question is open.
     fn choices(&self) -> &[String];
@@ -141,7 +147,7 @@ impl<D> Record<D> {
     #[must_use]
     pub fn failed_by(self, failure: Failure, attempts: u32) -> Self {
         Self {
-            failure: Some(failure),
+            failure: Some(Box::new(failure)),
             attempts,
             ..self
         }

@@ -374,6 +374,9 @@ fn quiet_prints_where_things_were_written_alone() {
         let said = bench.complete(&["report", "run", more, "--quiet"]);
         assert!(said.lines().count() > 2, "{more}: {said}");
     }
+    // A report on shared items alone is written nowhere without --out.
+    let common = bench.complete(&words("report run --common --quiet"));
+    assert!(common.contains("report: not written"), "{common}");
     bench.complete(&words(
         "--model random --seed 1 --data set.jsonl --levels L0 --out two",
     ));

@@ -46,13 +46,13 @@ fn reply(condition: &Condition, place: (usize, usize), confidence: f64, right: b
     let rest = (1.0 - confidence) / (CHOICES - 1) as f64;
     let mut p = vec![rest; CHOICES];
     p[usize::from(!right)] = confidence;
-    detail.options = Some(OptionProbabilities {
+    detail.options = Some(Box::new(OptionProbabilities {
         p,
         mass: 1.0,
         bound: 0.0,
         token: "A".to_owned(),
         reasoned: false,
-    });
+    }));
     record
 }
 

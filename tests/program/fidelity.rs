@@ -27,7 +27,7 @@ fn findings(
         for question in 0..questions {
             let name = (frame * questions + question, frame);
             let mut reply: Record = record("m", &condition, name, random.random_bool(rate));
-            reply.detail.image = Some(facts(image));
+            reply.detail.image = Some(facts(image).into());
             records.push(reply);
         }
         measured.push(ImageFidelity {
@@ -82,7 +82,7 @@ fn two_frames_with_the_same_dark_image_have_their_own_fidelity() {
     let (mut records, mut measured) = (Vec::new(), Vec::new());
     for (frame, psnr) in [(0, 10.0), (1, 30.0)] {
         let mut reply: Record = record("m", &condition, (frame, frame), true);
-        reply.detail.image = Some(facts(black));
+        reply.detail.image = Some(facts(black).into());
         measured.push(ImageFidelity {
             frame: reply.detail.frame.clone(),
             condition: condition.clone(),

@@ -402,6 +402,7 @@ const NOTHING: [&str; 32] = [
     "--max-cost 5",
     "--prices prices.toml",
     "--dry-run",
+    "--workers 2",
     "--timings",
     "--full",
     "--findings",

@@ -119,12 +119,13 @@ fn missing_double_and_foreign_parts_are_named() {
         "{}",
         partial.stdout
     );
-    bench.complete(&args("--out again --shard 3/3"));
-    refused("parts again --out n", "shard 3/3 is present twice, also in");
     bench.complete(&args("--out other --shard 2/3 --seed 9"));
     refused("parts other --out n", "is of another run than");
     bench.complete(&args("--out four --shard 2/4"));
-    refused("parts four --out n", "cannot be of the same run");
+    refused(
+        "parts four --out n",
+        "frames or walks 4 of 6 are in no part",
+    );
     bench.complete(&args("--out whole"));
     refused("whole --out n", "the run is not a shard");
     refused("nowhere --out n", "nowhere");
@@ -134,6 +135,77 @@ fn missing_double_and_foreign_parts_are_named() {
         "{}",
         empty.stderr
     );
+}
+
+/// A mock that gives the same reply to the same request, and the arguments of an evaluation with it.
+fn asked_of(mock: &MockEndpoint) -> String {
+    format!(
+        "--model a --base-url {} --levels L0,L2 --data rooms:frames=6,size=120x90",
+        mock.base_url()
+    )
+}
+
+#[test]
+fn a_stopped_division_goes_on_with_another_number_of_parts() {
+    let bench = Bench::new();
+    let mock = MockEndpoint::start([Answer::text("B")]);
+    let flags = asked_of(&mock);
+    bench.complete(&words(&format!("{flags} --out whole")));
+    let whole = mock.requests().len();
+    for part in ["1/3", "3/3"] {
+        bench.complete(&words(&format!("{flags} --out parts --shard {part}")));
+    }
+    let before = mock.requests().len();
+    // While a part of another division is written, no part of this one begins.
+    let own = bench.path("parts/shard-1-of-3/records.jsonl");
+    let locked = fs::File::open(own).unwrap();
+    locked.lock().unwrap();
+    let refused = bench.call(&words(&format!("{flags} --out parts --shard 1/2")));
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    assert!(
+        refused.stderr.contains("shard-1-of-3") && refused.stderr.contains("another division"),
+        "{}",
+        refused.stderr
+    );
+    drop(locked);
+    for part in ["1/2", "2/2"] {
+        let said = bench.call(&words(&format!("{flags} --out parts --shard {part}")));
+        assert_eq!(said.code, Some(0), "{said:?}");
+        assert!(said.stderr.contains("replies copied"), "{}", said.stderr);
+    }
+    let all = mock.requests().len() - whole;
+    assert_eq!(all, whole, "nothing is asked twice");
+    assert!(mock.requests().len() > before);
+    let merged = bench.call(&words("merge parts --out merged"));
+    assert_eq!(merged.code, Some(0), "{merged:?}");
+    assert!(!merged.stderr.contains("twice"), "{}", merged.stderr);
+    assert_same_products(&bench.path("whole"), &bench.path("merged"));
+    // A part of another run beside them is refused.
+    let other = bench.call(&words(&format!("{flags} --seed 7 --out parts --shard 1/4")));
+    assert_eq!(other.code, Some(2), "{other:?}");
+    assert!(
+        other.stderr.contains("this part is of another run"),
+        "{}",
+        other.stderr
+    );
+}
+
+#[test]
+fn replies_that_two_parts_paid_for_are_said() {
+    let bench = Bench::new();
+    let mock = MockEndpoint::start([Answer::text("A"), Answer::text("B")]);
+    let flags = asked_of(&mock);
+    for out in ["one", "two"] {
+        bench.complete(&words(&format!("{flags} --out {out} --shard 1/2")));
+    }
+    bench.complete(&words(&format!("{flags} --out one --shard 2/2")));
+    let merged = bench.call(&words("merge one two --out merged"));
+    assert_eq!(merged.code, Some(0), "{merged:?}");
+    let said = "replies differ in two parts: they were paid for twice";
+    assert!(merged.stderr.contains(said), "{}", merged.stderr);
+    let first = bench.call(&words("merge one --out first"));
+    assert_eq!(first.code, Some(0), "{first:?}");
+    assert_same_products(&bench.path("first"), &bench.path("merged"));
 }
 
 #[test]

@@ -87,8 +87,8 @@ impl<D: Detail> Driver<'_, D> {
                 models: self.models,
                 manifest: Some(self.manifest),
             };
-            let records = self.store.records()?;
-            Budget::of_run(money, &[], answering, &records)?.charged()
+            let trials = self.store.trials()?;
+            Budget::of_run(money, &[], answering, &trials)?.charged()
         };
         self.notes.charged.set(Some(charged));
         let out = self.journal.parts.iter().filter(|part| part.is_out());

@@ -204,7 +204,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         scouts: &BTreeMap<usize, TrialKey>,
         errors: Vec<Error>,
     ) -> Result<()> {
-        let answered = answered(&self.run.store.records()?);
+        let answered = answered(&self.run.store.trials()?);
         let models = self.run.experiment.models(phase);
         for (model, _) in scouts.iter().filter(|(_, key)| !answered.contains(key)) {
             // Each error begins with the name of its model. Another failure is that of the question alone.

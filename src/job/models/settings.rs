@@ -1,6 +1,7 @@
 //! The models of a run, resolved: [`AskSettings`], one [`ModelSettings`] a model.
 
 use std::collections::BTreeSet;
+use std::num::NonZeroU32;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -60,6 +61,8 @@ pub(crate) struct ResolveContext<'a> {
     /// The flags of the call itself, by long name: those of variables and files are not among them.
     pub(crate) typed: &'a BTreeSet<String>,
     pub(crate) shard: Shard,
+    /// How many shards run at once; `None` for all.
+    pub(crate) workers: Option<NonZeroU32>,
     /// Whether keys are read.
     pub(crate) keys: KeyUse,
     /// The file or folder of the data, if a file of models may have come with it.
@@ -291,7 +294,7 @@ fn resolve(
         parameters.require_greedy().map_err(placed)?;
     }
     let sending = Sending {
-        quota: context.shard.quota(sending.quota),
+        quota: context.shard.quota(sending.quota, context.workers),
         ..sending
     };
     // A dry run sends nothing, so it needs no key.

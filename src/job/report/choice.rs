@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::alerts::alerts;
 use super::combine::{Combined, combine};
+use super::whole_report::SUMMARY_JSON;
 use super::{enhancers, own_answers};
 use crate::error::Result;
 use crate::job::outcome::Outcome;
@@ -48,20 +49,29 @@ pub(super) fn in_its_folder(
     let (folder, findings) = (store.folder(), combined.findings());
     let report = ChoiceReport::new(&findings, alerts(combined, &findings))
         .with_enhancers(&enhancers::rows(&combined.runs));
-    for (name, content) in products(&report, &combined.shown())? {
+    for (name, content) in files(&report, combined, RunList::One(manifest, None))? {
         store.write(&name, &content)?;
     }
-    let json = |folder| summary(&report, RunList::One(manifest, folder));
-    store.write("summary.json", json(None)?.as_bytes())?;
     store.write_manifest(manifest)?;
     if show == StdoutFormat::Json {
-        return json(Some(folder));
+        return summary(&report, RunList::One(manifest, Some(folder)));
     }
     if show.is_document() {
         return Ok(text(&report, &[(manifest, folder)], show));
     }
     let page = folder.join(PAGE);
     Ok(text(&report, &[(manifest, folder)], show) + &format!("report: {}\n", page.display()))
+}
+
+/// The files of a report by name.
+pub(super) fn files(
+    report: &ChoiceReport<'_>,
+    combined: &Combined,
+    runs: RunList<'_>,
+) -> Result<Vec<(String, Vec<u8>)>> {
+    let mut files = products(report, &combined.shown())?;
+    files.push((SUMMARY_JSON.to_owned(), summary(report, runs)?.into_bytes()));
+    Ok(files)
 }
 
 /// The text of a report in a format other than JSON.

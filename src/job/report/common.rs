@@ -56,7 +56,7 @@ pub(super) fn restrict(mut combined: Combined) -> Result<Combined> {
 fn item_of(record: &Record) -> (QuestionId, Vec<String>, u32) {
     (
         record.question.clone(),
-        record.detail.choices.clone(),
+        record.detail.choices.to_vec(),
         record.detail.repeat,
     )
 }

@@ -127,7 +127,8 @@ impl<D: Detail> Joined<D> {
         let mut records = Vec::with_capacity(run.records.len());
         let (mut replies, mut added) = (0, 0);
         let served = served(&run.records);
-        for mut record in run.records {
+        let mut next = self.records.len();
+        let new = run.records.into_iter().filter_map(|mut record| {
             replies += usize::from(!record.failed());
             let group = self.models.group(&record.model, index);
             let trial = (
@@ -136,17 +137,25 @@ impl<D: Detail> Joined<D> {
             );
             if let Some(place) = known.trials.get(&trial) {
                 records.push(*place);
-                continue;
+                return None;
             }
             if !record.failed() {
-                known.trials.insert(trial, self.records.len());
+                known.trials.insert(trial, next);
                 added += 1;
             }
             if let Some((_, name)) = group {
                 record.model.clone_from(name);
             }
-            records.push(self.records.len());
-            self.records.push(record);
+            records.push(next);
+            next += 1;
+            Some(record)
+        });
+        // The records of the first run stay where they are.
+        let mut new: Vec<Record<D>> = new.collect();
+        if self.records.is_empty() {
+            self.records = new;
+        } else {
+            self.records.append(&mut new);
         }
         for question in &run.questions {
             let next = self.questions.len();

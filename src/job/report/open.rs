@@ -135,11 +135,8 @@ impl Scores {
     pub(super) fn whole(&self) -> Result<WholeReport> {
         let report = self.report();
         let tables = tables(&report);
-        let mut files = products(&report, &tables)?;
-        let json = summary_json(&report, &tables, None)?;
-        files.push((SUMMARY_JSON.to_owned(), json.into_bytes()));
         Ok(WholeReport {
-            files,
+            files: files(&report, &tables)?,
             markdown: self.show(&report, &tables, StdoutFormat::Markdown)?,
         })
     }
@@ -168,14 +165,20 @@ impl Scores {
     pub(crate) fn write(&self, store: &Store<OpenDetail>, show: StdoutFormat) -> Result<String> {
         let report = self.report();
         let tables = tables(&report);
-        for (name, content) in products(&report, &tables)? {
+        for (name, content) in files(&report, &tables)? {
             store.write(&name, &content)?;
         }
-        let json = summary_json(&report, &tables, None)?;
-        store.write("summary.json", json.as_bytes())?;
         store.write_manifest(&self.run.manifest)?;
         self.show(&report, &tables, show)
     }
+}
+
+/// The files of the report of one run, by name.
+fn files(report: &OpenReport<'_>, tables: &[Table]) -> Result<Vec<(String, Vec<u8>)>> {
+    let mut files = products(report, tables)?;
+    let json = summary_json(report, tables, None)?;
+    files.push((SUMMARY_JSON.to_owned(), json.into_bytes()));
+    Ok(files)
 }
 
 /// Several runs, joined to one.

@@ -34,17 +34,15 @@ pub(super) fn in_its_folder(
 ) -> Result<String> {
     let found = found(combined);
     let report = report(combined, &found, &[]);
-    for (name, content) in products(&report, &combined.shown())? {
+    for (name, content) in files(&report, combined, RunList::One(manifest, None))? {
         store.write(&name, &content)?;
     }
-    let json = |folder| summary(&report, RunList::One(manifest, folder));
-    store.write("summary.json", json(None)?.as_bytes())?;
     store.write_manifest(manifest)?;
     let folder = store.folder();
     let runs = [(manifest, folder)];
     Ok(match length(show) {
         None if show == StdoutFormat::Markdown => markdown(&report, &runs),
-        None => json(Some(folder))?,
+        None => summary(&report, RunList::One(manifest, Some(folder)))?,
         Some(length) => {
             let page = folder.join(PAGE);
             text(&report, &runs, length) + &format!("report: {}\n", page.display())
@@ -62,15 +60,15 @@ pub(super) fn compared(
     let found = found(combined);
     let report = report(combined, &found, again);
     let runs = combined.manifests();
-    let json = || summary(&report, RunList::Several(&runs));
-    let mut files = Vec::new();
-    if wanted {
-        files = products(&report, &combined.shown())?;
-        files.push(("summary.json".to_owned(), json()?.into_bytes()));
-    }
+    let list = RunList::Several(&runs);
+    let files = if wanted {
+        files(&report, combined, list)?
+    } else {
+        Vec::new()
+    };
     let text = match length(show) {
         None if show == StdoutFormat::Markdown => markdown(&report, &runs),
-        None => json()?,
+        None => summary(&report, list)?,
         Some(length) => text(&report, &runs, length),
     };
     Ok(ReportOutput { files, text })
@@ -81,13 +79,21 @@ pub(super) fn whole(combined: &Combined) -> Result<WholeReport> {
     let found = found(combined);
     let report = report(combined, &found, &[]);
     let runs = combined.manifests();
-    let mut files = products(&report, &combined.shown())?;
-    let json = summary(&report, RunList::One(runs[0].0, None))?;
-    files.push((SUMMARY_JSON.to_owned(), json.into_bytes()));
     Ok(WholeReport {
-        files,
+        files: files(&report, combined, RunList::One(runs[0].0, None))?,
         markdown: markdown(&report, &runs),
     })
+}
+
+/// The files of a report by name.
+fn files(
+    report: &AgreementReport<'_>,
+    combined: &Combined,
+    runs: RunList<'_>,
+) -> Result<Vec<(String, Vec<u8>)>> {
+    let mut files = products(report, &combined.shown())?;
+    files.push((SUMMARY_JSON.to_owned(), summary(report, runs)?.into_bytes()));
+    Ok(files)
 }
 
 fn found(combined: &Combined) -> SelfAgreement<'_> {

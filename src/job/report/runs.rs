@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::alerts::{alerts, named_again};
 use super::baseline::{Baseline, FAIL_IF_WORSE};
-use super::choice::{in_its_folder, text};
+use super::choice::{files as report_files, in_its_folder, text};
 use super::combine::{Combined, combine};
 use super::common::restrict;
 use super::enhancers;
@@ -22,7 +22,7 @@ use crate::job::{Outcome, ShowArgs, StdoutFormat, count};
 use crate::report::alert::Alert;
 use crate::report::choice_report::ChoiceReport;
 use crate::report::json::{RunList, summary};
-use crate::report::products::{PAGE, products};
+use crate::report::products::PAGE;
 use crate::store::{AddressChange, Store};
 use crate::types::manifest::Status;
 use crate::types::{ChoiceDetail, Decides, Detail as _, ModelColumn, OpenDetail, Truths};
@@ -117,25 +117,15 @@ pub(crate) fn report(args: &ReportArgs) -> Result<Outcome> {
             AnyRun::Open(run) => open.push(run),
         }
     }
-    let (status, output) = match (choice.is_empty(), open.is_empty()) {
+    let outcome = match (choice.is_empty(), open.is_empty()) {
         (_, true) => of_choices(args, choice, &again)?,
-        (true, false) => (Status::Complete, of_open(args, open, &again)?),
+        (true, false) => of_open(args, open, &again)?,
         (false, false) => {
             return Err(Error::usage(
                 "RUN",
                 "runs of questions with choices and of open questions cannot be compared; report each kind alone",
             ));
         }
-    };
-    let written = match (&args.out, &args.runs[..]) {
-        (Some(out), _) => vec![out.clone()],
-        (None, [run]) => vec![run.clone()],
-        _ => Vec::new(),
-    };
-    let outcome = Outcome {
-        status,
-        output,
-        written,
     };
     Ok(outcome.in_format(args.format()))
 }
@@ -163,20 +153,20 @@ fn of_choices(
     args: &ReportArgs,
     mut runs: Vec<StoredRun<ChoiceDetail>>,
     again: &[Alert],
-) -> Result<(Status, String)> {
-    let mut output = String::new();
+) -> Result<Outcome> {
+    let mut reread_lines = String::new();
     for run in &mut runs {
         if run.records.is_empty() {
             return Err(no_records(run.folder.clone()));
         }
         if args.rescore {
-            output += &reread(run)?;
+            reread_lines += &reread(run)?;
             run.manifest.counts = count(run.manifest.counts.trials, &run.records);
         }
         run.leave_out(args.shown());
     }
     if args.format().is_document() {
-        output.clear();
+        reread_lines.clear();
     }
     let old = args.baseline.baseline.as_ref().map(|folder| {
         let mut old =
@@ -199,10 +189,14 @@ fn of_choices(
     let is_worse = judged.map(|baseline| baseline.is_worse(combined.unit()));
     let is_worse = is_worse.transpose()?.unwrap_or(false);
     let in_folder = args.out.is_none() && !args.common && baseline.is_none() && again.is_empty();
-    output += &match &*combined.runs {
+    let reported = match &*combined.runs {
         [run] if in_folder => match Store::open(&run.folder, &run.manifest, AddressChange::Allowed)
         {
-            Ok(store) => in_its_folder(&store, &run.manifest, &combined, args.format())?,
+            Ok(store) => Outcome::wrote(
+                &run.folder,
+                Status::Complete,
+                in_its_folder(&store, &run.manifest, &combined, args.format())?,
+            ),
             // A run that another process writes, or in a read-only folder, is shown anyway.
             Err(error) => {
                 tracing::warn!("the report is not written: {error}");
@@ -217,7 +211,11 @@ fn of_choices(
     } else {
         Status::Complete
     };
-    Ok((status, output))
+    Ok(Outcome {
+        status,
+        output: reread_lines + &reported.output,
+        written: reported.written,
+    })
 }
 
 /// Refuses what compares accuracies, for runs whose questions have no true answers.
@@ -246,7 +244,7 @@ fn compare(
     baseline: Option<&Baseline>,
     args: &ReportArgs,
     again: &[Alert],
-) -> Result<String> {
+) -> Result<Outcome> {
     if combined.truths() == Truths::Unknown {
         let show = args.format();
         let output = own_answers::compared(combined, again, show, args.out.is_some())?;
@@ -261,16 +259,15 @@ fn compare(
     if let Some(baseline) = baseline {
         baseline.add_to(&mut report);
     }
-    let json = || summary(&report, RunList::Several(&runs));
+    let list = RunList::Several(&runs);
     let shown = match args.format() {
-        StdoutFormat::Json => json()?,
+        StdoutFormat::Json => summary(&report, list)?,
         show => text(&report, &runs, show),
     };
-    let mut files = Vec::new();
-    if args.out.is_some() {
-        files = products(&report, &combined.shown())?;
-        files.push(("summary.json".to_owned(), json()?.into_bytes()));
-    }
+    let files = match args.out {
+        Some(_) => report_files(&report, combined, list)?,
+        None => Vec::new(),
+    };
     write_files(args, shown, files)
 }
 
@@ -279,12 +276,12 @@ fn write_files(
     args: &ReportArgs,
     mut text: String,
     contents: Vec<(String, Vec<u8>)>,
-) -> Result<String> {
+) -> Result<Outcome> {
     let Some(out) = &args.out else {
         if !args.format().is_document() {
             text += "report: not written; --out DIR writes one\n";
         }
-        return Ok(text);
+        return Ok(Outcome::text(Status::Complete, text));
     };
     for (name, content) in contents {
         files::write(&out.join(name), &content)?;
@@ -292,14 +289,14 @@ fn write_files(
     if !args.format().is_document() {
         let _ = writeln!(text, "report: {}", out.join(PAGE).display());
     }
-    Ok(text)
+    Ok(Outcome::wrote(out, Status::Complete, text))
 }
 
 fn of_open(
     args: &ReportArgs,
     mut runs: Vec<StoredRun<OpenDetail>>,
     again: &[Alert],
-) -> Result<String> {
+) -> Result<Outcome> {
     let flags = [
         ("--common", args.common),
         ("--baseline", args.baseline.baseline.is_some()),
@@ -322,7 +319,10 @@ fn of_open(
     let run = &scores.run;
     if is_single && args.out.is_none() {
         match Store::open(&run.folder, &run.manifest, AddressChange::Allowed) {
-            Ok(store) => return scores.write(&store, args.format()),
+            Ok(store) => {
+                let text = scores.write(&store, args.format())?;
+                return Ok(Outcome::wrote(&run.folder, Status::Complete, text));
+            }
             Err(error) => tracing::warn!("the report is not written: {error}"),
         }
     }

@@ -2,14 +2,13 @@
 
 use super::alerts::alerts;
 use super::combine::combine;
-use super::whole_report::{SUMMARY_JSON, WholeReport, shown};
-use super::{enhancers, open, own_answers};
+use super::whole_report::{WholeReport, shown};
+use super::{choice, enhancers, open, own_answers};
 use crate::error::Result;
 use crate::job::StdoutFormat;
 use crate::job::stored::{AnyRun, StoredRun};
 use crate::report::choice_report::ChoiceReport;
-use crate::report::json::{RunList, summary};
-use crate::report::products::products;
+use crate::report::json::RunList;
 use crate::types::{ChoiceDetail, OpenDetail, Truths};
 
 /// The report of a run with the models that it shows now.
@@ -32,12 +31,9 @@ fn of_choices(run: StoredRun<ChoiceDetail>) -> Result<WholeReport> {
     let report = ChoiceReport::new(&findings, alerts(&combined, &findings))
         .with_enhancers(&enhancers::rows(&combined.runs));
     let runs = combined.manifests();
-    let mut files = products(&report, &combined.shown())?;
-    let json = summary(&report, RunList::One(runs[0].0, None))?;
-    files.push((SUMMARY_JSON.to_owned(), json.into_bytes()));
     Ok(WholeReport {
-        files,
-        markdown: super::choice::text(&report, &runs, StdoutFormat::Markdown),
+        files: choice::files(&report, &combined, RunList::One(runs[0].0, None))?,
+        markdown: choice::text(&report, &runs, StdoutFormat::Markdown),
     })
 }
 

@@ -22,7 +22,7 @@ use crate::types::manifest::Status;
 use archive::{is_bundle, zipped};
 use parts::RunParts;
 pub(crate) use parts::ThumbnailChoice;
-use readme::{ReadmeInputs, readme};
+use readme::{ReadmeInputs, command, readme};
 use redact::Redactor;
 
 /// The flags of `bundle`.
@@ -58,7 +58,7 @@ pub(crate) fn bundle(args: &BundleArgs) -> Result<Outcome> {
         run,
         thumbnails,
     } = parts;
-    let command_run = run.clone();
+    let command = command(&manifest, &run);
     let report = whole(run)?;
     files.extend(report.files);
     let mut changes: Vec<String> = redactor
@@ -89,8 +89,7 @@ pub(crate) fn bundle(args: &BundleArgs) -> Result<Outcome> {
         .collect();
     let text = readme(&ReadmeInputs {
         name: &folder_name,
-        manifest: &manifest,
-        run: &command_run,
+        command: &command,
         findings: &report.markdown,
         changes: &changes,
         files: &sizes,

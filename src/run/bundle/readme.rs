@@ -7,14 +7,14 @@ use serde_json::Value;
 
 use crate::job::stored::AnyRun;
 use crate::types::manifest::RunManifest;
-use crate::types::{AxisLevel, Condition, shell_word};
+use crate::types::{AxisLevel, Record, shell_word};
 
 /// What a README is written from.
 pub(super) struct ReadmeInputs<'a> {
     /// Name of the run, and of the folder in the archive.
     pub(super) name: &'a str,
-    pub(super) manifest: &'a RunManifest,
-    pub(super) run: &'a AnyRun,
+    /// The command that asks the same again: [`command`].
+    pub(super) command: &'a str,
     /// The findings and the table by level, as Markdown.
     pub(super) findings: &'a str,
     /// What was left out or changed, a line each.
@@ -33,7 +33,7 @@ pub(super) fn readme(inputs: &ReadmeInputs<'_>) -> String {
     text += &fenced("sha256sum --check SHA256SUMS");
     text += "\n## Ask again\n\n";
     text += "The command that asks the same, as far as the manifest tells; `DIR/` stands for a folder of your own:\n\n";
-    text += &fenced(&command(inputs.manifest, inputs.run));
+    text += &fenced(inputs.command);
     text += "\n## Changed, or left out\n\n";
     if inputs.changes.is_empty() {
         text += "Nothing.\n";
@@ -77,36 +77,33 @@ struct Asked {
 }
 
 impl Asked {
-    fn add(&mut self, model: &str, condition: Option<&Condition>) {
-        match condition {
-            None => self.blind.insert(model.to_owned()),
-            Some(condition) => {
-                self.levels.insert(condition.level());
-                self.seeing.insert(model.to_owned())
-            }
-        };
+    fn of<D>(records: &[Record<D>]) -> Self {
+        let mut asked = Self::default();
+        for record in records {
+            match &record.condition {
+                None => asked.blind.insert(record.model.to_string()),
+                Some(condition) => {
+                    asked.levels.insert(condition.level());
+                    asked.seeing.insert(record.model.to_string())
+                }
+            };
+        }
+        asked
     }
 }
 
-/// The command that asks what the run asked.
-fn command(manifest: &RunManifest, run: &AnyRun) -> String {
-    let mut asked = Asked::default();
+/// The command that asks what the run asked, as far as its manifest tells.
+pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
     let mut words = vec!["darkqa-eval".to_owned()];
-    match run {
-        AnyRun::Choice(run) => {
-            for record in &run.records {
-                asked.add(&record.model, record.condition.as_ref());
-            }
-        }
+    let asked = match run {
+        AnyRun::Choice(run) => Asked::of(&run.records),
         AnyRun::Open(run) => {
             // The manifest has the digest of the questions, not their place.
             let questions = ["openeqa", "--questions", "DIR/questions.json"];
             words.extend(questions.map(str::to_owned));
-            for record in &run.records {
-                asked.add(&record.model, record.condition.as_ref());
-            }
+            Asked::of(&run.records)
         }
-    }
+    };
     let setting = |name: &str| manifest.settings.get(name).and_then(Value::as_str);
     let judge = setting("--judge");
     for model in asked.seeing.iter().filter(|model| !is_control(model)) {

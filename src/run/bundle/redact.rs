@@ -71,22 +71,26 @@ pub(super) enum Paths {
 }
 
 /// An absolute path within a text, behind what may stand before it.
-static PATH: LazyLock<Option<Regex>> = LazyLock::new(|| {
-    Regex::new(
+static PATH: LazyLock<Regex> = LazyLock::new(|| {
+    pattern(
         r#"(^|[\s"'=:,;(\[])((?:/[^\s"',;:()\[\]/]+){2,}/?|[A-Za-z]:\\[^\s"',;]+|\\\\[^\s"',;]+)"#,
     )
-    .ok()
 });
 /// A user and password before a host.
-static USER: LazyLock<Option<Regex>> =
-    LazyLock::new(|| Regex::new(r#"([A-Za-z][A-Za-z0-9+.-]*://)[^/\s"'@?#]+@"#).ok());
+static USER: LazyLock<Regex> =
+    LazyLock::new(|| pattern(r#"([A-Za-z][A-Za-z0-9+.-]*://)[^/\s"'@?#]+@"#));
 /// What follows an address behind `?` or `#`.
-static QUERY: LazyLock<Option<Regex>> =
-    LazyLock::new(|| Regex::new(r#"(https?://[^\s"'?#]+)[?#][^\s"']*"#).ok());
+static QUERY: LazyLock<Regex> = LazyLock::new(|| pattern(r#"(https?://[^\s"'?#]+)[?#][^\s"']*"#));
 /// Forms of keys of known vendors.
-static KEY: LazyLock<Option<Regex>> = LazyLock::new(|| {
-    Regex::new(r"\b(?:sk-[A-Za-z0-9_-]{16,}|AIza[A-Za-z0-9_-]{30,}|(?:hf|gsk|ghp)_[A-Za-z0-9]{20,}|xai-[A-Za-z0-9]{20,}|Bearer\s+[A-Za-z0-9._~+/-]{12,}=*)").ok()
+static KEY: LazyLock<Regex> = LazyLock::new(|| {
+    pattern(
+        r"\b(?:sk-[A-Za-z0-9_-]{16,}|AIza[A-Za-z0-9_-]{30,}|(?:hf|gsk|ghp)_[A-Za-z0-9]{20,}|xai-[A-Za-z0-9]{20,}|Bearer\s+[A-Za-z0-9._~+/-]{12,}=*)",
+    )
 });
+
+fn pattern(text: &str) -> Regex {
+    Regex::new(text).unwrap_or_else(|e| unreachable!("a test compiles it: {e}"))
+}
 
 impl Redactor {
     /// For the run in a folder: the places of this process, and the keys in its environment.
@@ -176,30 +180,24 @@ impl Redactor {
             if is_absolute(&text) && !text.contains('\n') {
                 self.learn(&text);
             }
-            if let Some(pattern) = &*PATH {
-                let places: Vec<String> = pattern
-                    .captures_iter(&text)
-                    .map(|found| found[2].to_owned())
-                    .collect();
-                for place in places {
-                    self.learn(&place);
-                }
+            for found in PATH.captures_iter(&text) {
+                self.learn(&found[2]);
             }
             text = self.replaced(&QUERY, &text, Change::Address, |found| found[1].to_owned());
         }
         text = self.replaced(&USER, &text, Change::Address, |found| found[1].to_owned());
-        for key in self.keys.clone() {
-            if text.contains(&key) {
-                self.count(Change::Key);
-                text = text.replace(&key, SECRET);
+        for key in &self.keys {
+            if text.contains(key) {
+                *self.changes.entry(Change::Key).or_default() += 1;
+                text = text.replace(key, SECRET);
             }
         }
         text = self.replaced(&KEY, &text, Change::Key, |_| SECRET.to_owned());
-        for place in self.places.clone() {
-            let starts: Vec<usize> = found(&text, &place).collect();
+        for place in &self.places {
+            let starts: Vec<usize> = found(&text, place).collect();
             let name = place.rsplit(['/', '\\']).next().unwrap_or_default();
             for start in starts.into_iter().rev() {
-                self.count(Change::Path);
+                *self.changes.entry(Change::Path).or_default() += 1;
                 text.replace_range(start..start + place.len(), &format!("DIR/{name}"));
             }
         }
@@ -208,14 +206,11 @@ impl Redactor {
 
     fn replaced(
         &mut self,
-        pattern: &LazyLock<Option<Regex>>,
+        pattern: &Regex,
         text: &str,
         change: Change,
         with: impl Fn(&Captures<'_>) -> String,
     ) -> String {
-        let Some(pattern) = &**pattern else {
-            return text.to_owned();
-        };
         let times = pattern.find_iter(text).count();
         if times == 0 {
             return text.to_owned();
@@ -224,10 +219,6 @@ impl Redactor {
         pattern
             .replace_all(text, |found: &Captures<'_>| with(found))
             .into_owned()
-    }
-
-    fn count(&mut self, change: Change) {
-        *self.changes.entry(change).or_default() += 1;
     }
 }
 

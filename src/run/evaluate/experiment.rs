@@ -21,6 +21,7 @@ use crate::job::stored::StoredRun;
 use crate::job::{Outcome, StdoutFormat};
 use crate::questions::rules::Rules;
 use crate::store::Store;
+use crate::types::manifest::PartPlace;
 use crate::types::{ChoiceDetail, QuestionId, Record, RunQuestion, SetLight};
 
 impl Experiment for ChoiceSetup<'_> {
@@ -43,6 +44,10 @@ impl Experiment for ChoiceSetup<'_> {
 
     fn sources(&self) -> &[Source] {
         &self.sources
+    }
+
+    fn part(&self) -> Option<PartPlace> {
+        self.part
     }
 
     fn frames(&self) -> &dyn Frames {
@@ -121,7 +126,11 @@ impl Experiment for ChoiceSetup<'_> {
         identity::columns(&self.models, &self.recipe, &self.config.job)
     }
 
-    fn plan(&self, _: usize, _: &[Record]) -> Result<Vec<SourcePlan<ChoiceItem>>> {
+    fn plan(
+        &self,
+        _: usize,
+        _: impl FnOnce() -> Result<Vec<Record>>,
+    ) -> Result<Vec<SourcePlan<ChoiceItem>>> {
         trials(self)
     }
 

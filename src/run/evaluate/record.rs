@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::plan::ChoiceItem;
 use crate::ask::{Payload, Query};
 use crate::job::trial::{Item, Stimulus, Trial};
-use crate::types::{ChoiceDetail, Record, TrialOutcome};
+use crate::types::{ChoiceDetail, Record, Shared, TrialOutcome};
 
 impl Item for ChoiceItem {
     type Detail = ChoiceDetail;
@@ -35,13 +35,13 @@ impl Item for ChoiceItem {
         let detail = ChoiceDetail {
             frame: question.frame.clone(),
             family: question.family.clone(),
-            choices: question.choices.texts().to_vec(),
+            choices: question.choices.texts().to_vec().into(),
             truth: question.choices.truth(),
             repeat: trial.item.repeat,
             strict: None,
             lenient: None,
             outcome: TrialOutcome::Failed,
-            image: images.next(),
+            image: images.next().map(Shared::from),
             more_images: images.collect(),
             shown_frame: trial.item.shown_frame.clone(),
             observed: None,

@@ -14,12 +14,13 @@ use crate::job::conditions::{check_enhanced, conditions};
 use crate::job::dark_already;
 use crate::job::models::{self, ModelName, ModelUnderTest};
 use crate::job::observer::Observer;
+use crate::job::part::part;
 use crate::job::photographs;
 use crate::job::progress::Progress;
 use crate::job::questions::{QuestionBank, open_data, select};
 use crate::job::recipe::Recipe;
-use crate::job::shard::part;
 use crate::job::source::{Source, first_asked, inspect_all};
+use crate::types::manifest::PartPlace;
 use crate::types::{Condition, Digest, FrameId, Question, QuestionId, SetLight, TreatmentSet};
 
 /// All data and models of an evaluation, opened and checked. Nothing is asked or written yet.
@@ -31,6 +32,8 @@ pub(super) struct ChoiceSetup<'a> {
     pub(super) with_other_rooms: Vec<Question>,
     pub(super) other_rooms: OtherRooms,
     pub(super) sources: Vec<Source>,
+    /// Place of the sources among those of the whole run; `None` if this is the whole run.
+    pub(super) part: Option<PartPlace>,
     /// The index of each frame in `sources`.
     pub(super) places: HashMap<FrameId, usize>,
     /// The place of each question among all that are selected, for models that are asked the first ones alone.
@@ -78,7 +81,12 @@ impl<'a> ChoiceSetup<'a> {
         let all = select(dataset.questions().to_vec(), &config.selection)?;
         let other_rooms = OtherRooms::of(&all, |frame| dataset.scene(frame));
         let controls = AddedControls::of(config, other_rooms.is_some())?;
-        let questions = part(all.clone(), job.shard, |question| question.frame.0.clone())?;
+        let (questions, part) = part(
+            all.clone(),
+            job.shard,
+            |question| question.frame.0.clone(),
+            |question| dataset.scene(&question.frame),
+        )?;
         let models = open_models(config, &controls, &dataset, &all)?;
         let mut sources = if shows_images {
             inspect_all(&dataset, &questions, progress)?
@@ -119,6 +127,7 @@ impl<'a> ChoiceSetup<'a> {
                 .collect(),
             digests: digests(&sources),
             sources,
+            part,
             models,
             bank: config.bank.as_ref().map(QuestionBank::digest).transpose()?,
             conditions,

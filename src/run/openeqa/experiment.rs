@@ -24,6 +24,7 @@ use crate::job::stored::StoredRun;
 use crate::job::trial::Item as _;
 use crate::job::{Outcome, StdoutFormat};
 use crate::store::Store;
+use crate::types::manifest::PartPlace;
 use crate::types::{Family, FrameId, OpenDetail, Record, RunQuestion};
 
 /// A typical answer, for estimating the length of a judge's prompt.
@@ -54,6 +55,10 @@ impl Experiment for OpenSetup<'_> {
 
     fn sources(&self) -> &[Source] {
         &self.sources
+    }
+
+    fn part(&self) -> Option<PartPlace> {
+        self.part
     }
 
     fn frames(&self) -> &dyn Frames {
@@ -128,11 +133,11 @@ impl Experiment for OpenSetup<'_> {
     fn plan(
         &self,
         phase: usize,
-        stored: &[Record<OpenDetail>],
+        records: impl FnOnce() -> Result<Vec<Record<OpenDetail>>>,
     ) -> Result<Vec<SourcePlan<OpenItem>>> {
         Ok(match phase {
             0 => answers(self)?,
-            _ => marks(self, stored)?,
+            _ => marks(self, &records()?)?,
         })
     }
 

@@ -13,11 +13,12 @@ use crate::enhance::ModelFile;
 use crate::error::{Error, Result};
 use crate::job::conditions::{check_enhanced, conditions};
 use crate::job::models::{self, ModelUnderTest};
+use crate::job::part::part;
 use crate::job::progress::Progress;
 use crate::job::recipe::Recipe;
-use crate::job::shard::part;
 use crate::job::source::Source;
 use crate::job::walk::WalkFolder;
+use crate::types::manifest::PartPlace;
 use crate::types::{Condition, FrameId, OpenDetail, QuestionId, Record, View};
 
 /// All data and models of an evaluation by open questions, opened and checked. Nothing is asked or written yet.
@@ -32,6 +33,8 @@ pub(super) struct OpenSetup<'a> {
     pub(super) walks: WalkFolder,
     /// The walks in the order in which questions name them.
     pub(super) sources: Vec<Source>,
+    /// Place of the walks among those of the whole run; `None` if this is the whole run.
+    pub(super) part: Option<PartPlace>,
     pub(super) conditions: Vec<Condition>,
     pub(super) models: Vec<ModelUnderTest>,
     pub(super) judge: Option<ModelUnderTest>,
@@ -50,7 +53,8 @@ impl<'a> OpenSetup<'a> {
         let selected = select(all, &config.chosen)?;
         let ids = selected.iter().map(|question| question.id.clone());
         let question_places = ids.zip(0..).collect();
-        let questions = part(selected, job.shard, |question| question.episode.clone())?;
+        let walk = |question: &OpenQuestion| question.episode.clone();
+        let (questions, part) = part(selected, job.shard, walk, |_| String::new())?;
         let models = models::open_all(&job.ask, &[], |name| {
             models::open(name, None, &Parameters::new(String::new()))
         })?;
@@ -86,6 +90,7 @@ impl<'a> OpenSetup<'a> {
             file_places,
             walks,
             sources,
+            part,
             conditions,
             models,
             judge,

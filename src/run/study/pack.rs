@@ -147,7 +147,7 @@ fn first_order(records: &[Record]) -> BTreeMap<QuestionId, Vec<String>> {
     for record in records {
         orders
             .entry(record.question.clone())
-            .or_insert_with(|| record.detail.choices.clone());
+            .or_insert_with(|| record.detail.choices.to_vec());
     }
     orders
 }

@@ -226,6 +226,7 @@ fn of_people(run: &RunManifest, args: &ReadArgs) -> RunManifest {
         enhancers: BTreeMap::new(),
         inputs: run.inputs.clone(),
         shard: None,
+        part: None,
         settings: BTreeMap::new(),
         images: run.images.clone(),
         reply_reading: ChoiceDetail::REPLY_READING.map(str::to_owned),

@@ -124,7 +124,7 @@ impl MadeRun {
                 for question in frame * QUESTIONS..(frame + 1) * QUESTIONS {
                     let mut reply = record("m", &condition, (question, frame), true);
                     reply.detail.family = families[question % families.len()].clone();
-                    reply.detail.image = Some(ImageFacts {
+                    let facts = ImageFacts {
                         digest: image,
                         bytes: 1,
                         width: 1,
@@ -133,7 +133,8 @@ impl MadeRun {
                         orientation: None,
                         exposure: None,
                         pair: None,
-                    });
+                    };
+                    reply.detail.image = Some(facts.into());
                     records.push(reply);
                 }
                 measured.push(ImageFidelity {

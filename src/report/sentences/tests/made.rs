@@ -26,7 +26,7 @@ fn asked(model: &str, frames: usize, conditions: &[(&str, f64)]) -> Vec<Record> 
             let detail = ChoiceDetail {
                 frame: FrameId(format!("f{:02}", item / 2)),
                 family: [Family::Color, Family::RoomType][item % 2].clone(),
-                choices: ["a", "b", "c"].map(str::to_owned).to_vec(),
+                choices: ["a", "b", "c"].map(str::to_owned).to_vec().into(),
                 truth: Some(0),
                 repeat: 0,
                 strict: reading,

@@ -1,0 +1,140 @@
+//! A file of lines that is read piece by piece, so that it may be larger than the memory: [`Pieces`].
+
+use std::fs::File;
+use std::io::{ErrorKind, Read};
+use std::path::Path;
+
+use crate::error::{Error, Result};
+
+/// The bytes that are read at once. A piece is longer only if one line is. Chosen: enough lines for all cores.
+const PIECE_BYTES: u64 = 4 << 20;
+
+/// The complete lines of a file, some at a time.
+pub(super) struct Pieces<'p> {
+    path: &'p Path,
+    file: File,
+    /// What is read and belongs to a line that is not complete yet.
+    unread: Vec<u8>,
+    /// The place of the next line in the file, in bytes.
+    start: u64,
+    /// The number of lines before it.
+    lines: usize,
+}
+
+/// Some complete lines of a file.
+pub(super) struct Piece {
+    bytes: Vec<u8>,
+    start: u64,
+    lines: usize,
+}
+
+/// The place of a line in its file, with its end, in bytes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LinePlace {
+    pub(super) start: u64,
+    pub(super) length: usize,
+}
+
+/// One line that is not blank: a line that was set aside is.
+pub(super) struct FileLine<'p> {
+    /// Its number, from 1.
+    pub(super) number: usize,
+    /// The place of its first byte in the file.
+    pub(super) start: u64,
+    /// The line with its end.
+    pub(super) bytes: &'p [u8],
+}
+
+impl<'p> Pieces<'p> {
+    /// Opens a file; `None` if there is no such file.
+    pub(super) fn open(path: &'p Path) -> Result<Option<Self>> {
+        match File::open(path) {
+            Ok(file) => Ok(Some(Self {
+                path,
+                file,
+                unread: Vec::new(),
+                start: 0,
+                lines: 0,
+            })),
+            Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
+            Err(e) => Err(Error::file(path, "read", e)),
+        }
+    }
+
+    /// The next complete lines; `None` after the last. An incomplete last line is left out.
+    pub(super) fn next(&mut self) -> Result<Option<Piece>> {
+        let mut bytes = std::mem::take(&mut self.unread);
+        loop {
+            let searched = bytes.len();
+            let read = (&self.file).take(PIECE_BYTES).read_to_end(&mut bytes);
+            if read.map_err(|e| Error::file(self.path, "read", e))? == 0 {
+                return Ok(None);
+            }
+            let end = bytes[searched..].iter().rposition(|byte| *byte == b'\n');
+            if let Some(end) = end {
+                self.unread = bytes.split_off(searched + end + 1);
+                break;
+            }
+        }
+        let piece = Piece {
+            start: self.start,
+            lines: self.lines,
+            bytes,
+        };
+        self.start += piece.bytes.len() as u64;
+        self.lines += piece.bytes.iter().filter(|byte| **byte == b'\n').count();
+        Ok(Some(piece))
+    }
+}
+
+impl Piece {
+    /// The lines that are not blank, in order.
+    pub(super) fn lines(&self) -> Vec<FileLine<'_>> {
+        let (mut start, mut lines) = (self.start, Vec::new());
+        let split = self.bytes.split_inclusive(|byte| *byte == b'\n');
+        for (number, bytes) in (self.lines + 1..).zip(split) {
+            if !bytes.trim_ascii().is_empty() {
+                lines.push(FileLine {
+                    number,
+                    start,
+                    bytes,
+                });
+            }
+            start += bytes.len() as u64;
+        }
+        lines
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_complete_lines_are_read_with_their_places() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lines");
+        let long = "x".repeat(2 * PIECE_BYTES as usize);
+        let mut text = format!("one\n   \n{long}\n");
+        for number in 0..700_000 {
+            text += &format!("{number}\n");
+        }
+        std::fs::write(&path, text.clone() + "incomplete").unwrap();
+        let mut pieces = Pieces::open(&path).unwrap().unwrap();
+        let (mut seen, mut parts) = (Vec::new(), 0);
+        while let Some(piece) = pieces.next().unwrap() {
+            parts += 1;
+            for line in piece.lines() {
+                let start = line.start as usize;
+                assert_eq!(
+                    &text.as_bytes()[start..start + line.bytes.len()],
+                    line.bytes
+                );
+                seen.push(line.number);
+            }
+        }
+        let expected = std::iter::once(1).chain(3..700_004);
+        assert!(parts > 1 && seen.into_iter().eq(expected), "{parts}");
+        assert!(Pieces::open(&folder.path().join("none")).unwrap().is_none());
+    }
+}

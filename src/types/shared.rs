@@ -1,0 +1,105 @@
+//! A value that many records hold, kept once: [`Shared`].
+
+use std::collections::HashSet;
+use std::fmt;
+use std::hash::Hash;
+use std::ops::Deref;
+use std::sync::Arc;
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+/// A value that several owners share and none changes. It is read and written as the value itself.
+#[derive(PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Shared<T>(Arc<T>);
+
+impl<T> Deref for Shared<T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        &self.0
+    }
+}
+
+impl<T> AsRef<T> for Shared<T> {
+    fn as_ref(&self) -> &T {
+        self
+    }
+}
+
+impl<T> Clone for Shared<T> {
+    fn clone(&self) -> Self {
+        Self(Arc::clone(&self.0))
+    }
+}
+
+impl<T: fmt::Debug> fmt::Debug for Shared<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+impl<T> From<T> for Shared<T> {
+    fn from(value: T) -> Self {
+        Self(Arc::new(value))
+    }
+}
+
+impl<T> FromIterator<T> for Shared<Vec<T>> {
+    fn from_iter<I: IntoIterator<Item = T>>(values: I) -> Self {
+        Self::from(values.into_iter().collect::<Vec<T>>())
+    }
+}
+
+impl<T: Serialize> Serialize for Shared<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.0.serialize(serializer)
+    }
+}
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Shared<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        T::deserialize(deserializer).map(Self::from)
+    }
+}
+
+/// The distinct values of one kind that were seen so far.
+#[derive(Debug)]
+pub struct Distinct<T>(HashSet<Shared<T>>);
+
+impl<T> Default for Distinct<T> {
+    fn default() -> Self {
+        Self(HashSet::new())
+    }
+}
+
+impl<T: Eq + Hash> Distinct<T> {
+    /// Puts the first of all equal values in the place of this one.
+    pub fn share(&mut self, value: &mut Shared<T>) {
+        if let Some(first) = self.0.get(value) {
+            *value = first.clone();
+        } else {
+            self.0.insert(value.clone());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_values_are_kept_once() {
+        let mut distinct = Distinct::default();
+        let text = |text: &str| Shared::from(text.to_owned());
+        let [mut one, mut other, mut same] = ["a", "b", "a"].map(text);
+        for value in [&mut one, &mut other, &mut same] {
+            distinct.share(value);
+        }
+        assert!(std::ptr::eq::<String>(&*one, &*same) && one == same);
+        assert!(one != other && serde_json::to_string(&one).unwrap() == "\"a\"");
+        assert_eq!(
+            serde_json::from_str::<Shared<String>>("\"b\"").unwrap(),
+            other
+        );
+    }
+}
