@@ -13,7 +13,7 @@ use super::settings::JobSettings;
 use super::source::input_summary;
 use crate::error::Result;
 use crate::types::manifest::{Counts, RunManifest, RunPart, Status};
-use crate::types::{Detail as _, InputSummary, ListedModel, Record};
+use crate::types::{Detail as _, InputSummary, ListedModel};
 
 /// The manifest of a run. A stored one passes on its date, columns and image flags; one of a complete run all but its identity.
 ///
@@ -143,12 +143,16 @@ fn merged_flags(stored: &ImageWords, now: ImageWords) -> ImageWords {
     all
 }
 
-/// Numbers of these trials, of those with a reply, and of those that failed.
-pub(crate) fn count<D>(trials: usize, records: &[Record<D>]) -> Counts {
-    let failed = records.iter().filter(|record| record.failed()).count();
+/// Numbers of trials, of those with a reply, and of those that failed; `failed` says of each that is stored whether it did.
+pub(crate) fn count(trials: usize, failed: impl IntoIterator<Item = bool>) -> Counts {
+    let (mut all, mut failures) = (0, 0);
+    for has_failed in failed {
+        all += 1;
+        failures += usize::from(has_failed);
+    }
     Counts {
         trials,
-        answered: records.len() - failed,
-        failed,
+        answered: all - failures,
+        failed: failures,
     }
 }

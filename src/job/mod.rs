@@ -49,6 +49,8 @@ pub(crate) mod rebuild;
 pub(crate) mod recipe;
 mod renamed;
 pub(crate) mod report;
+pub(crate) mod run_files;
+mod run_texts;
 pub(crate) mod scaling;
 pub(crate) mod settings;
 pub(crate) mod shard;

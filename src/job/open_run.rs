@@ -267,8 +267,8 @@ impl<E: Experiment> OpenRun<'_, E> {
     /// Scores the run, and writes the report into its folder.
     pub(super) fn finish(self, end: EndReason) -> Result<Outcome> {
         let mut run = StoredRun::of(self.store.folder(), self.manifest.clone())?;
-        let trials = run.records.iter();
-        let counts = self.counts(trials.map(|record| (record.key, record.failed())));
+        let trials = run.trials.iter();
+        let counts = self.counts(trials.map(|trial| (trial.key(), trial.failed())));
         let status = end.status(counts);
         let manifest = &mut run.manifest;
         if (status, counts) != (manifest.status, manifest.counts) {

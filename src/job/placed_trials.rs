@@ -147,7 +147,7 @@ pub(super) fn append<D: Detail>(
         .into_iter()
         .map(|trial| (trial.key, trial.place))
         .collect();
-    let mut own = RecordLog::open(store.folder())?;
+    let own = RecordLog::open(store.folder())?;
     let mut logs = PartLogs::of(&parts.iter().map(|(folder, _)| *folder).collect::<Vec<_>>());
     for (part, trial) in trials {
         let of_part = parts[*part].1;

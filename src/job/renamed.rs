@@ -13,7 +13,7 @@ use crate::types::control::OBSERVER;
 use crate::types::manifest::RunManifest;
 use crate::types::model_views::{Fit, StoredViews, Views};
 use crate::types::recorded_names::RecordedNames;
-use crate::types::{Control, Digest, Record};
+use crate::types::{Control, Detail, Digest, Record, Trials};
 
 /// The entry of a manifest's settings that holds the models which its file of models no longer has.
 const LEFT_OUT: &str = "models left out";
@@ -186,7 +186,7 @@ fn left_out(
 ) -> BTreeSet<String> {
     let known = manifest.columns.get("model").into_iter().flatten();
     let known: BTreeSet<String> = known.map(|(name, _)| name.clone()).collect();
-    let earlier: BTreeSet<String> = read(stored).into_iter().collect();
+    let earlier: BTreeSet<String> = left_out_models(stored).into_iter().collect();
     let earlier = earlier
         .iter()
         .map(|name| moves.get(name).unwrap_or(name).clone());
@@ -216,7 +216,7 @@ fn decides(content: &Value) -> Value {
 }
 
 /// The models that a report leaves out.
-fn read(manifest: &RunManifest) -> Vec<String> {
+pub(super) fn left_out_models(manifest: &RunManifest) -> Vec<String> {
     let names = manifest.settings.get(LEFT_OUT).cloned();
     names
         .and_then(|names| serde_json::from_value(names).ok())
@@ -234,13 +234,11 @@ pub(super) fn rename<D>(records: &mut [Record<D>], manifest: &RunManifest) {
     }
 }
 
-/// Takes the records of models that a report leaves out of these records.
-pub(super) fn leave_out<D>(records: &mut Vec<Record<D>>, manifest: &RunManifest) -> Vec<Record<D>> {
-    let names = read(manifest);
-    if names.is_empty() {
-        return Vec::new();
-    }
-    records
-        .extract_if(.., |record| names.contains(&record.model))
-        .collect()
+/// Gives trials the names that the models have now.
+pub(super) fn rename_trials<D: Detail>(trials: &mut Trials<D>, manifest: &RunManifest) {
+    let names = RecordedNames::of(manifest);
+    trials.rename(|model| {
+        let shown = names.shown(model);
+        (shown != model).then(|| shown.to_owned())
+    });
 }

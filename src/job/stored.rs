@@ -5,12 +5,14 @@ use std::hash::Hash;
 use std::path::{Path, PathBuf};
 
 use super::renamed;
+use super::run_files::RunFiles;
+pub(crate) use super::run_texts::RunTexts;
 use crate::error::{Error, Result};
 use crate::store;
 use crate::types::manifest::RunManifest;
 use crate::types::{
     ChoiceDetail, Condition, Detail, ImageFidelity, ListedModel, ModelListing, OpenDetail,
-    QuestionId, Record, RunQuestion, Thumbnail, TrialKey,
+    QuestionId, Record, RunQuestion, TextPlace, Thumbnail, TrialKey, TrialRef, Trials,
 };
 
 /// The models of a run that a report shows.
@@ -22,14 +24,15 @@ pub(crate) enum ShownModels {
     All,
 }
 
-/// A run as read from its folder.
+/// A run as reports need it.
 #[derive(Clone)]
-pub(crate) struct StoredRun<D> {
+pub(crate) struct StoredRun<D: Detail> {
     pub(crate) folder: PathBuf,
     pub(crate) manifest: RunManifest,
-    pub(crate) records: Vec<Record<D>>,
-    /// The records of models that a report leaves out.
-    pub(crate) left_out: Vec<Record<D>>,
+    pub(crate) trials: Trials<D>,
+    /// The trials of models that a report leaves out.
+    pub(crate) left_out: Trials<D>,
+    pub(crate) texts: RunTexts<D>,
     pub(crate) questions: Vec<RunQuestion>,
     pub(crate) thumbnails: Vec<Thumbnail>,
     pub(crate) fidelity: Vec<ImageFidelity>,
@@ -45,36 +48,84 @@ impl<D: Detail> StoredRun<D> {
         Self::of(folder, manifest.ok_or_else(|| no_run(folder))?)
     }
 
-    /// Reads everything in a run folder except `manifest`.
+    /// Reads everything in a run folder except `manifest`. Of its records no more than reports need is held.
     pub(crate) fn of(folder: &Path, manifest: RunManifest) -> Result<Self> {
-        Ok(Self::of_lines(folder, manifest, RunLines::read(folder)?))
+        let mut trials = Trials::default();
+        store::each_record(folder, |record, place| {
+            trials.add(record, TextPlace::new(place.start()));
+        })?;
+        let texts = RunTexts::of(folder)?;
+        let files = RunFiles::read(folder)?;
+        Ok(Self::of_parts(folder, manifest, (trials, texts), files))
     }
 
-    /// The run of a folder from its manifest and the lines of its files.
-    pub(crate) fn of_lines(folder: &Path, manifest: RunManifest, lines: RunLines<D>) -> Self {
-        let RunLines {
-            mut records,
-            questions,
-            thumbnails,
-            fidelity,
-        } = lines;
-        renamed::rename(&mut records, &manifest);
+    /// The run of a folder from its manifest, records that are held in memory, and the lines of its other files.
+    pub(crate) fn of_lines(
+        folder: &Path,
+        manifest: RunManifest,
+        (records, files): (Vec<Record<D>>, RunFiles),
+    ) -> Self {
+        let trials = records.iter().cloned().collect();
+        Self::of_parts(
+            folder,
+            manifest,
+            (trials, RunTexts::Held(records.into())),
+            files,
+        )
+    }
+
+    fn of_parts(
+        folder: &Path,
+        manifest: RunManifest,
+        (mut trials, texts): (Trials<D>, RunTexts<D>),
+        files: RunFiles,
+    ) -> Self {
+        renamed::rename_trials(&mut trials, &manifest);
+        sort(&mut trials, &files.questions, &manifest.models);
         Self {
-            records: in_order(records, &questions, &manifest.models),
-            left_out: Vec::new(),
-            questions,
-            thumbnails,
-            fidelity,
             folder: folder.to_owned(),
             manifest,
+            trials,
+            left_out: Trials::default(),
+            texts,
+            questions: files.questions,
+            thumbnails: files.thumbnails,
+            fidelity: files.fidelity,
         }
     }
 
-    /// Takes the records apart that a report does not show.
+    /// Takes the trials apart that a report does not show.
     pub(crate) fn leave_out(&mut self, shown: ShownModels) {
         if shown == ShownModels::Current {
-            self.left_out = renamed::leave_out(&mut self.records, &self.manifest);
+            let names = renamed::left_out_models(&self.manifest);
+            if !names.is_empty() {
+                let is_left_out =
+                    |trial: TrialRef<'_, D>| names.iter().any(|name| name == trial.model());
+                self.left_out = self.trials.extract(is_left_out);
+            }
         }
+    }
+
+    /// The whole record of a trial, with the names that its model and condition have here.
+    ///
+    /// # Errors
+    /// If the file of the run cannot be read any more, or was changed.
+    pub(crate) fn record(&self, trial: TrialRef<'_, D>) -> Result<Record<D>> {
+        Ok(Record {
+            model: trial.model().to_owned(),
+            condition: trial.condition().cloned(),
+            ..self.texts.record(trial.text())?
+        })
+    }
+
+    /// The whole records of the trials of a question.
+    ///
+    /// # Errors
+    /// As for [`record`](Self::record).
+    pub(crate) fn records_of(&self, question: &str) -> Result<Vec<Record<D>>> {
+        let trials = self.trials.iter();
+        let trials = trials.filter(|trial| trial.question().0 == question);
+        trials.map(|trial| self.record(trial)).collect()
     }
 
     /// Name of the run: that of its folder.
@@ -83,47 +134,19 @@ impl<D: Detail> StoredRun<D> {
     }
 }
 
-/// The lines of the files in a run folder, as they are stored.
-pub(crate) struct RunLines<D> {
-    pub(crate) records: Vec<Record<D>>,
-    pub(crate) questions: Vec<RunQuestion>,
-    pub(crate) thumbnails: Vec<Thumbnail>,
-    pub(crate) fidelity: Vec<ImageFidelity>,
-}
-
-impl<D: Detail> RunLines<D> {
-    /// Reads the files of a run folder: of each trial the last record.
-    ///
-    /// # Errors
-    /// If a line of a file is broken.
-    pub(crate) fn read(folder: &Path) -> Result<Self> {
-        Ok(Self {
-            records: store::read_records(folder)?,
-            questions: store::read_questions(folder)?,
-            thumbnails: store::read_thumbnails(folder)?,
-            fidelity: store::read_fidelity(folder)?,
-        })
-    }
-}
-
-/// Records in the order of the questions, conditions and models (those that are listed first), whatever order the replies came in.
-pub(crate) fn in_order<D: Detail>(
-    mut records: Vec<Record<D>>,
+/// Puts trials in the order of the questions, conditions and models (those that are listed first), whatever order the replies came in.
+pub(super) fn sort<D: Detail>(
+    trials: &mut Trials<D>,
     questions: &[RunQuestion],
     listed: &[ListedModel],
-) -> Vec<Record<D>> {
-    let order = {
-        let places = records.iter().map(|record| TrialPlace {
-            question: &record.question,
-            condition: record.condition.as_ref(),
-            model: &record.model,
-            repeat: record.detail.repeat(),
-            key: record.key,
-        });
-        order(&places.collect::<Vec<_>>(), questions, listed)
-    };
-    arrange(&mut records, order);
-    records
+) {
+    let ids = questions.iter().map(|question| &question.id);
+    let places: HashMap<&QuestionId, usize> = ids.zip(0..).collect();
+    let listing = ModelListing::new(listed.iter().cloned());
+    trials.sort(
+        |question| places.get(question).copied(),
+        |model| listing.place(model),
+    );
 }
 
 /// What the place of a trial among those of its run follows from.
@@ -233,13 +256,27 @@ impl AnyRun {
 }
 
 impl StoredRun<ChoiceDetail> {
+    /// Reads a run of questions with choices.
+    ///
+    /// # Errors
+    /// If the folder holds no run, or one of open questions. That error tells the user what to do `instead`.
+    pub(crate) fn of_choices(folder: &Path, instead: &str) -> Result<Self> {
+        match ExperimentKind::of(folder)? {
+            ExperimentKind::Choice => Self::open(folder),
+            ExperimentKind::Open => Err(Error::Run {
+                path: folder.to_owned(),
+                problem: format!("the run asked open questions: {instead}"),
+            }),
+        }
+    }
+
     /// The run, if the true answers to its questions are known.
     ///
     /// # Errors
     /// If they are not. That error tells the user `why` they are needed.
     pub(crate) fn with_truths(self, why: &str) -> Result<Self> {
-        let mut records = self.records.iter();
-        if records.all(|record| record.detail.truth.is_some()) {
+        let mut items = self.trials.items().into_iter().flatten();
+        if items.all(|item| item.truth.is_some()) {
             return Ok(self);
         }
         Err(Error::Run {
@@ -250,18 +287,17 @@ impl StoredRun<ChoiceDetail> {
         })
     }
 
-    /// Reads a run of questions with choices.
+    /// The run with its replies read again, by the rules of this version of the program.
     ///
     /// # Errors
-    /// If the folder holds no run, or one of open questions. That error tells the user what to do `instead`.
-    pub(crate) fn of_choices(folder: &Path, instead: &str) -> Result<Self> {
-        match AnyRun::open(folder)? {
-            AnyRun::Choice(run) => Ok(run),
-            AnyRun::Open(run) => Err(Error::Run {
-                path: run.folder,
-                problem: format!("the run asked open questions: {instead}"),
-            }),
+    /// If the file of the run cannot be read any more, or the choices of a record are not valid.
+    pub(crate) fn reread(mut self) -> Result<Self> {
+        let mut trials = Trials::default();
+        for trial in self.trials.iter() {
+            trials.add(self.record(trial)?.reread()?, trial.text());
         }
+        self.trials = trials;
+        Ok(self)
     }
 }
 

@@ -4,15 +4,15 @@ use std::collections::BTreeMap;
 
 use super::words::counted;
 use crate::score::grid::Grid;
-use crate::types::FrameId;
+use crate::types::{FrameId, SentImages};
 
 /// The number of frames that were asked about; where some stand for several images, as `3 frames (2 of 2 to 4 images)`.
 pub(super) fn frames(grid: &Grid<'_>) -> String {
     let mut images = BTreeMap::<&FrameId, usize>::new();
     for (place, item) in grid.items.iter().enumerate() {
-        let records = (0..grid.subjects.len()).filter_map(|subject| grid.record(subject, place));
-        let shown = records.map(|record| record.detail.images().count());
-        let most = images.entry(&item.record.detail.frame).or_default();
+        let trials = (0..grid.subjects.len()).filter_map(|subject| grid.trial(subject, place));
+        let shown = trials.map(|trial| trial.images().map_or(0, SentImages::count));
+        let most = images.entry(&*item.asked.frame).or_default();
         *most = shown.max().unwrap_or(0).max(*most);
     }
     let frames = counted(images.len(), "frame");

@@ -114,7 +114,7 @@ pub(super) fn head(report: &ChoiceReport<'_>) -> String {
     let questions: std::collections::BTreeSet<_> = grid
         .items
         .iter()
-        .map(|item| &item.record.question)
+        .map(|item| &*item.asked.question)
         .collect();
     let replies: usize = findings.health.iter().map(|health| health.replies).sum();
     let failed: usize = findings.health.iter().map(Health::failures).sum();

@@ -144,7 +144,7 @@ fn always(
     for (item, result) in grid.of_family(subject, family) {
         if let Some(chosen) = result.reading(mode) {
             let count = questions
-                .entry((item.cluster, &item.record.question))
+                .entry((item.cluster, &*item.asked.question))
                 .or_default();
             count.replies += 1;
             count.right += u32::from(item.is_right(chosen));

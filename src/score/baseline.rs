@@ -53,7 +53,7 @@ pub(crate) fn baseline_rows(
         cost: cost(subject),
     };
     let rows = pairs.iter().filter_map(|&(new, old)| {
-        let image = |subject, item| grid.record(subject, item)?.detail.sent();
+        let image = |subject, item| grid.trial(subject, item)?.sent();
         let is_other = |item| {
             let images = image(new, item).zip(image(old, item));
             images.is_some_and(|(new, old)| new != old)

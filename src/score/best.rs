@@ -220,7 +220,7 @@ impl Scores {
                 cluster: item.cluster as usize,
                 weighted: weighted.collect(),
                 clean: right.iter().map(|levels| levels[0]).collect(),
-                guess: 1.0 / item.record.detail.choices.len() as f64,
+                guess: 1.0 / item.asked.choices.len() as f64,
             });
         }
         scores

@@ -1,7 +1,7 @@
 //! The accuracy of guessing: [`chance`].
 
 use super::estimate::Estimate;
-use crate::types::{Family, Question, Record};
+use crate::types::{AskedItem, Family, Question};
 
 /// Family of a question and the number of its choices.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -13,11 +13,11 @@ pub struct OfferedChoices {
 }
 
 impl OfferedChoices {
-    /// The choices that a record offers.
-    pub(crate) fn of(record: &Record) -> Self {
+    /// The choices that an item offers.
+    pub(crate) fn of(item: &AskedItem) -> Self {
         Self {
-            family: record.detail.family.clone(),
-            choices: record.detail.choices.len(),
+            family: item.family.as_ref().clone(),
+            choices: item.choices.len(),
         }
     }
 }

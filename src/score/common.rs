@@ -38,7 +38,7 @@ impl CommonItems {
         let all: BTreeSet<&QuestionId> = grid
             .items
             .iter()
-            .map(|item| &item.record.question)
+            .map(|item| &*item.asked.question)
             .collect();
         let mut asked = BTreeMap::<(bool, &str), BTreeSet<&QuestionId>>::new();
         for (index, subject) in grid.subjects.iter().enumerate() {
@@ -48,8 +48,8 @@ impl CommonItems {
                 continue;
             }
             let items = grid.items.iter().enumerate();
-            let items = items.filter(|(item, _)| grid.record(index, *item).is_some());
-            questions.extend(items.map(|(_, item)| &item.record.question));
+            let items = items.filter(|(item, _)| grid.trial(index, *item).is_some());
+            questions.extend(items.map(|(_, item)| &*item.asked.question));
         }
         if asked.values().all(|questions| questions.len() == all.len()) {
             return None;
@@ -59,9 +59,9 @@ impl CommonItems {
         let items = restricted.items.iter();
         let offers: Vec<OfferedChoices> = items
             .clone()
-            .map(|item| OfferedChoices::of(item.record))
+            .map(|item| OfferedChoices::of(item.asked))
             .collect();
-        let shared: BTreeSet<&QuestionId> = items.map(|item| &item.record.question).collect();
+        let shared: BTreeSet<&QuestionId> = items.map(|item| &*item.asked.question).collect();
         let asked = asked
             .into_iter()
             .map(|((is_blind, model), questions)| AskedQuestions {

@@ -32,9 +32,9 @@ pub(crate) fn confusions(grid: &Grid<'_>) -> Vec<Confusion> {
         let items = grid
             .items
             .iter()
-            .filter(|item| item.record.detail.family == *family);
+            .filter(|item| *item.asked.family == *family);
         let labels: BTreeSet<&str> = items
-            .flat_map(|item| item.record.detail.choices.iter().map(String::as_str))
+            .flat_map(|item| item.asked.choices.iter().map(String::as_str))
             .collect();
         if labels.len() > MAX_LABELS {
             continue;
@@ -65,10 +65,10 @@ fn counts(grid: &Grid<'_>, subject: usize, family: &Family, labels: &[String]) -
             continue;
         };
         let position = |index: usize| {
-            let text = item.record.detail.choices.get(index)?;
+            let text = item.asked.choices.get(index)?;
             labels.binary_search(text).ok()
         };
-        if let Some(truth) = item.record.detail.truth.and_then(position) {
+        if let Some(truth) = item.asked.truth.and_then(position) {
             let predicted = chosen.and_then(|index| position(usize::from(index)));
             counts[truth][predicted.unwrap_or(labels.len())] += 1;
         }
@@ -139,7 +139,7 @@ impl Collapse {
             let Some(chosen) = result.reading(ReadingMode::Strict) else {
                 continue;
             };
-            let choices = &item.record.detail.choices;
+            let choices = &*item.asked.choices;
             let given = chosen.and_then(|index| choices.get(usize::from(index)));
             let count = clusters.entry(item.cluster).or_default();
             count.replies += 1;
@@ -207,7 +207,7 @@ impl FalseAnswer {
             Self::No => Self::Yes,
             Self::Yes => Self::No,
         };
-        let known = item.record.detail.truth;
+        let known = item.asked.truth;
         item.is_of(Some(&Family::Presence))
             && known.is_some_and(|known| truth.is_choice(item, known))
     }
@@ -218,7 +218,7 @@ impl FalseAnswer {
     }
 
     fn is_choice(self, item: &GridItem<'_>, index: usize) -> bool {
-        let choice = item.record.detail.choices.get(index);
+        let choice = item.asked.choices.get(index);
         choice.is_some_and(|choice| choice.eq_ignore_ascii_case(self.word()))
     }
 }

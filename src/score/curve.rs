@@ -118,7 +118,7 @@ fn guesses(grid: &Grid<'_>, clean: usize, family: Option<&Family>) -> Vec<f32> {
     let mut guesses = vec![0.0_f32; grid.clusters];
     for (item, result) in grid.of_family(clean, family) {
         if let TrialResult::Read { .. } = result {
-            guesses[item.cluster as usize] += 1.0 / item.record.detail.choices.len() as f32;
+            guesses[item.cluster as usize] += 1.0 / item.asked.choices.len() as f32;
         }
     }
     guesses

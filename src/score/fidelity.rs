@@ -64,7 +64,7 @@ type Measured<'a> = HashMap<ImageKey<'a>, [Option<f64>; 2]>;
 /// frame.
 type ImageKey<'a> = (&'a FrameId, Digest);
 
-/// A condition of the records with its subjects, one for each model.
+/// A condition of the trials with its subjects, one for each model.
 type ConditionKey<'a> = (AxisLevel, &'a KindReading, Option<&'a EnhancerName>);
 
 impl FidelityFindings {
@@ -150,9 +150,9 @@ impl<'a> ConditionSums<'a> {
             let mut strata = BTreeMap::<&Family, [Vec<RankedReply>; 2]>::new();
             for (index, item) in grid.items.iter().enumerate() {
                 let reading = grid.result(subject, index).reading(ReadingMode::Strict);
-                let image = grid.record(subject, index).and_then(|record| {
-                    let image = record.detail.image.as_ref()?;
-                    Some((&record.detail.frame, image.digest))
+                let image = grid.trial(subject, index).and_then(|trial| {
+                    let image = trial.images()?;
+                    Some((trial.frame(), image.first))
                 });
                 let (Some(reading), Some(image)) = (reading, image) else {
                     continue;
@@ -164,7 +164,7 @@ impl<'a> ConditionSums<'a> {
                 sums.images.insert(image, numbers);
                 sums.right += usize::from(right);
                 sums.replies += 1;
-                let stratum = strata.entry(&item.record.detail.family).or_default();
+                let stratum = strata.entry(&*item.asked.family).or_default();
                 for (replies, number) in stratum.iter_mut().zip(numbers) {
                     replies.extend(number.map(|number| RankedReply {
                         cluster: item.cluster,

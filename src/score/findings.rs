@@ -23,12 +23,12 @@ use super::pooled::{LevelsLeftOut, PooledFinding, levels_left_out, pooled};
 use super::significance::Significance;
 use super::strict_score::StrictScore;
 use super::subject::{Subject, is_control, is_observer};
-use crate::types::{Family, ImageFidelity, ModelListing, Record, RunQuestion};
+use crate::types::{ChoiceDetail, Family, ImageFidelity, ModelListing, RunQuestion, Trials};
 
-/// All results that are computed from the records of a run.
+/// All results that are computed from the trials of a run.
 #[derive(Debug)]
 pub struct Findings<'a> {
-    /// The records by subject and item.
+    /// The trials by subject and item.
     pub grid: Grid<'a>,
     /// The unit that is treated as independent.
     pub unit: ClusterUnit,
@@ -77,38 +77,36 @@ pub struct Findings<'a> {
 }
 
 impl<'a> Findings<'a> {
-    /// Results of the records. `ties` says what ties frames to each other; `questions` are all questions
+    /// Results of the trials. `ties` says what ties frames to each other; `questions` are all questions
     /// of the run, for the chance line; `measured` holds the images that were compared with their clean frames.
     #[must_use]
     pub fn new(
-        records: &'a [Record],
+        trials: &'a Trials<ChoiceDetail>,
         ties: &FrameTies,
         questions: impl IntoIterator<Item = OfferedChoices>,
         measured: &[ImageFidelity],
     ) -> Self {
         let listing = ModelListing::default();
-        Self::listed(records, ties, questions, measured, &listing)
+        Self::listed(trials, ties, questions, measured, &listing)
     }
 
     /// The same results with the models as listed.
     #[must_use]
     pub fn listed(
-        records: &'a [Record],
+        trials: &'a Trials<ChoiceDetail>,
         ties: &FrameTies,
         questions: impl IntoIterator<Item = OfferedChoices>,
         measured: &[ImageFidelity],
         listing: &ModelListing,
     ) -> Self {
-        let pairs = records
-            .iter()
-            .map(|record| (&record.question, &record.detail.frame));
+        let pairs = trials.iter().map(|trial| (trial.question(), trial.frame()));
         let clusters = Clusters::new(pairs, ties);
         let questions: Vec<OfferedChoices> = questions.into_iter().collect();
-        let observer = ObserverSummary::of(records, &clusters);
+        let observer = ObserverSummary::of(trials, &clusters);
         let is_model = |model: &str| !is_control(model);
         let is_shown = |model: &str| is_model(model) && !is_observer(model);
         let without_observer = observer.is_hidden().then(|| {
-            let grid = Grid::of_models(records, &clusters, listing, is_shown);
+            let grid = Grid::of_models(trials, &clusters, listing, is_shown);
             Box::new(Self::of(
                 grid,
                 &clusters,
@@ -117,7 +115,7 @@ impl<'a> Findings<'a> {
                 measured,
             ))
         });
-        let grid = Grid::of_models(records, &clusters, listing, is_model);
+        let grid = Grid::of_models(trials, &clusters, listing, is_model);
         Self {
             without_observer,
             ..Self::of(grid, &clusters, &questions, observer, measured)

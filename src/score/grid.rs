@@ -7,7 +7,8 @@ use super::cluster::Clusters;
 use super::subject::Subject;
 use crate::types::degradation::Kind;
 use crate::types::{
-    AnswerReading, Family, KindReading, ModelListing, QuestionId, Record, TrialOutcome,
+    AnswerReading, AskedItem, ChoiceDetail, Family, KindReading, ModelListing, TrialOutcome,
+    TrialRef, Trials,
 };
 
 /// Result of one item for one subject.
@@ -54,8 +55,8 @@ impl TrialResult {
 /// One question in one order of its choices and one repeat.
 #[derive(Debug, Clone, Copy)]
 pub struct GridItem<'a> {
-    /// A record of the item, for its question, frame, family, choices and truth.
-    pub record: &'a Record,
+    /// What was asked.
+    pub asked: &'a AskedItem,
     /// Index of its cluster.
     pub cluster: u32,
 }
@@ -64,13 +65,13 @@ impl GridItem<'_> {
     /// Whether a reading is the true choice of the item; never if nobody knows that.
     #[must_use]
     pub fn is_right(&self, chosen: Option<u8>) -> bool {
-        chosen.is_some_and(|chosen| self.record.detail.truth == Some(usize::from(chosen)))
+        chosen.is_some_and(|chosen| self.asked.truth == Some(usize::from(chosen)))
     }
 
     /// Whether the item belongs to a family; always true for `None`.
     #[must_use]
     pub fn is_of(&self, family: Option<&Family>) -> bool {
-        family.is_none_or(|family| self.record.detail.family == *family)
+        family.is_none_or(|family| *self.asked.family == *family)
     }
 }
 
@@ -89,9 +90,9 @@ pub struct Grid<'a> {
     results: Vec<TrialResult>,
     /// Index of each subject.
     indices: BTreeMap<Subject, usize>,
-    records: &'a [Record],
-    /// Index in `records` of the record behind each result; [`u32::MAX`] if there is none.
-    record_indices: Vec<u32>,
+    trials: &'a Trials<ChoiceDetail>,
+    /// Place of the trial behind each result; [`u32::MAX`] if there is none.
+    places: Vec<u32>,
 }
 
 /// Numbers of replies and of right replies in a cluster.
@@ -104,82 +105,94 @@ pub struct ClusterCount {
 }
 
 impl<'a> Grid<'a> {
-    /// Table of records whose true choice is known. Of two records for the same subject and item, the later one counts. Records of
-    /// frames without a cluster are ignored.
+    /// Table of trials whose true choice is known. Of two trials of the same subject and item, the later one counts. Trials of frames
+    /// without a cluster are ignored.
     #[must_use]
-    pub fn new(records: &'a [Record], clusters: &Clusters) -> Self {
-        Self::of_models(records, clusters, &ModelListing::default(), |_| true)
+    pub fn new(trials: &'a Trials<ChoiceDetail>, clusters: &Clusters) -> Self {
+        Self::of_models(trials, clusters, &ModelListing::default(), |_| true)
     }
 
-    /// Table of the records of some models in their order, else as [`Grid::new`].
+    /// Table of the trials of some models in their order, else as [`Grid::new`].
     #[must_use]
     pub fn of_models(
-        records: &'a [Record],
+        trials: &'a Trials<ChoiceDetail>,
         clusters: &Clusters,
         listing: &ModelListing,
         is_shown: impl Fn(&str) -> bool,
     ) -> Self {
         // A question whose true choice nobody knows is never scored.
-        Self::of(records, clusters, listing, |record| {
-            record.detail.truth.is_some() && is_shown(&record.model)
+        Self::of(trials, clusters, listing, |asked, model| {
+            asked.truth.is_some() && is_shown(model)
         })
     }
 
     /// Table of what was answered to questions whose true choice nobody knows: to look at, not to score.
     #[must_use]
     pub(crate) fn without_truths(
-        records: &'a [Record],
+        trials: &'a Trials<ChoiceDetail>,
         clusters: &Clusters,
         listing: &ModelListing,
     ) -> Self {
-        Self::of(records, clusters, listing, |record| {
-            record.detail.truth.is_none()
-        })
+        Self::of(trials, clusters, listing, |asked, _| asked.truth.is_none())
     }
 
     fn of(
-        records: &'a [Record],
+        trials: &'a Trials<ChoiceDetail>,
         clusters: &Clusters,
         listing: &ModelListing,
-        is_shown: impl Fn(&Record) -> bool,
+        is_shown: impl Fn(&AskedItem, &str) -> bool,
     ) -> Self {
-        let mut subjects = BTreeMap::<Subject, usize>::new();
-        let mut item_indices = HashMap::<(&QuestionId, &[String], u32), usize>::new();
-        let mut items: Vec<GridItem<'a>> = Vec::new();
-        for record in records.iter().filter(|record| is_shown(record)) {
-            let Some(cluster) = clusters.of(&record.detail.frame, &record.question) else {
-                continue;
-            };
-            subjects.entry(Subject::of(record)).or_default();
-            item_indices.entry(key(record)).or_insert_with(|| {
-                items.push(GridItem { record, cluster });
-                items.len() - 1
-            });
+        let met = Met::of(trials, |item, model| {
+            let has_cluster = clusters.of(&item.frame, &item.question).is_some();
+            has_cluster && is_shown(item, model)
+        });
+        let asked = trials.asked();
+        let mut indices = BTreeMap::<Subject, usize>::new();
+        let mut subjects_of = Vec::with_capacity(asked.len());
+        for (asked, is_met) in asked.iter().zip(met.asked) {
+            let subject = asked.filter(|_| is_met);
+            let subject = subject.map(|(model, condition)| Subject::new(model, condition));
+            subjects_of.push(subject.clone());
+            indices.extend(subject.map(|subject| (subject, 0)));
         }
-        let mut indices = subjects;
         let mut subjects: Vec<Subject> = indices.keys().cloned().collect();
         // Subjects of one model stay sorted: the sort is stable.
         subjects.sort_by_cached_key(|subject| listing.place(&subject.model));
         for (number, subject) in subjects.iter().enumerate() {
             indices.insert(subject.clone(), number);
         }
-        items.sort_by(|a, b| sort_key(a.record).cmp(&sort_key(b.record)));
-        for (index, item) in items.iter().enumerate() {
-            item_indices.insert(key(item.record), index);
+        let subject_of: Vec<Option<usize>> = subjects_of
+            .iter()
+            .map(|subject| indices.get(subject.as_ref()?).copied())
+            .collect();
+        let mut keys = HashMap::<_, u32>::new();
+        let mut items: Vec<GridItem<'a>> = Vec::new();
+        for asked in met.items.iter().map(|number| trials.item(*number)) {
+            if let Some(cluster) = clusters.of(&asked.frame, &asked.question) {
+                keys.entry(asked.key()).or_insert_with(|| {
+                    items.push(GridItem { asked, cluster });
+                    0
+                });
+            }
+        }
+        items.sort_by(|a, b| sort_key(a.asked).cmp(&sort_key(b.asked)));
+        for (item, index) in items.iter().zip(0..) {
+            keys.insert(item.asked.key(), index);
+        }
+        let mut item_of = vec![u32::MAX; trials.item_count()];
+        for number in &met.items {
+            item_of[*number] = keys[&trials.item(*number).key()];
         }
         let size = subjects.len() * items.len();
-        let (mut results, mut record_indices) =
-            (vec![TrialResult::Absent; size], vec![u32::MAX; size]);
-        let shown = records.iter().enumerate();
-        for (index, record) in shown.filter(|(_, record)| is_shown(record)) {
-            let (subject, item) = (
-                indices.get(&Subject::of(record)),
-                item_indices.get(&key(record)),
-            );
-            if let (Some(subject), Some(item)) = (subject, item) {
-                let cell = subject * items.len() + item;
-                results[cell] = result(record);
-                record_indices[cell] = index as u32;
+        let (mut results, mut places) = (vec![TrialResult::Absent; size], vec![u32::MAX; size]);
+        for (place, trial) in (0..).zip(trials.iter()) {
+            let item = item_of[trial.item_number()];
+            let subject = subject_of[trial.asked_number()].filter(|_| item != u32::MAX);
+            // An item may be met with one model, and not be shown of another.
+            if let Some(subject) = subject.filter(|_| is_shown(trial.item(), trial.model())) {
+                let cell = subject * items.len() + item as usize;
+                results[cell] = result(trial);
+                places[cell] = place;
             }
         }
         Self {
@@ -189,8 +202,8 @@ impl<'a> Grid<'a> {
             items,
             clusters: clusters.count(),
             results,
-            records,
-            record_indices,
+            trials,
+            places,
         }
     }
 
@@ -200,11 +213,11 @@ impl<'a> Grid<'a> {
         self.results[subject * self.items.len() + item]
     }
 
-    /// The record behind a result; `None` if the item was not asked.
+    /// The trial behind a result; `None` if the item was not asked.
     #[must_use]
-    pub fn record(&self, subject: usize, item: usize) -> Option<&'a Record> {
-        let index = self.record_indices[subject * self.items.len() + item];
-        self.records.get(index as usize)
+    pub fn trial(&self, subject: usize, item: usize) -> Option<TrialRef<'a>> {
+        let place = self.places[subject * self.items.len() + item];
+        self.trials.get(place as usize)
     }
 
     /// Index of a subject, if the grid has it.
@@ -291,22 +304,16 @@ impl<'a> Grid<'a> {
                 .collect(),
             clusters: self.clusters,
             results: cells.iter().map(|cell| self.results[*cell]).collect(),
-            records: self.records,
-            record_indices: cells
-                .iter()
-                .map(|cell| self.record_indices[*cell])
-                .collect(),
+            trials: self.trials,
+            places: cells.iter().map(|cell| self.places[*cell]).collect(),
         }
     }
 
     /// The families of the items, sorted.
     #[must_use]
     pub fn families(&self) -> Vec<&'a Family> {
-        let families: BTreeSet<&Family> = self
-            .items
-            .iter()
-            .map(|item| &item.record.detail.family)
-            .collect();
+        let families: BTreeSet<&Family> =
+            self.items.iter().map(|item| &*item.asked.family).collect();
         families.into_iter().collect()
     }
 
@@ -318,35 +325,52 @@ impl<'a> Grid<'a> {
     }
 }
 
-/// What identifies an item: question, order of choices and repeat.
-fn key(record: &Record) -> (&QuestionId, &[String], u32) {
-    (
-        &record.question,
-        &record.detail.choices,
-        record.detail.repeat,
-    )
+/// What of trials a grid shows.
+struct Met {
+    /// Whether a model in a condition is shown, by its number.
+    asked: Vec<bool>,
+    /// The numbers of the items, in the order of the first trials about them.
+    items: Vec<usize>,
+}
+
+impl Met {
+    fn of(trials: &Trials<ChoiceDetail>, is_shown: impl Fn(&AskedItem, &str) -> bool) -> Self {
+        let mut met = Self {
+            asked: vec![false; trials.asked().len()],
+            items: Vec::new(),
+        };
+        // Most trials are about an item and of a model that were met together with others.
+        let mut is_met = vec![false; trials.item_count()];
+        for trial in trials.iter() {
+            let (item, asked) = (trial.item_number(), trial.asked_number());
+            if is_met[item] && met.asked[asked] || !is_shown(trial.item(), trial.model()) {
+                continue;
+            }
+            met.asked[asked] = true;
+            if !is_met[item] {
+                is_met[item] = true;
+                met.items.push(item);
+            }
+        }
+        met
+    }
 }
 
 /// Sort key of items.
-fn sort_key(record: &Record) -> impl Ord + '_ {
-    (
-        &record.detail.frame,
-        &record.question,
-        record.detail.repeat,
-        &record.detail.choices,
-    )
+fn sort_key(asked: &AskedItem) -> impl Ord + '_ {
+    (&asked.frame, &asked.question, asked.repeat, &asked.choices)
 }
 
-fn result(record: &Record) -> TrialResult {
+fn result(trial: TrialRef<'_>) -> TrialResult {
     let chosen = |reading: AnswerReading| {
         let index = reading.chosen?;
         Some(index.min(usize::from(u8::MAX)) as u8)
     };
-    match (record.detail.outcome, record.detail.strict) {
+    match (trial.outcome(), trial.strict()) {
         (TrialOutcome::Failed, _) | (_, None) => TrialResult::Failed,
         (_, Some(strict)) => TrialResult::Read {
             strict: chosen(strict),
-            lenient: record.detail.lenient.and_then(chosen),
+            lenient: trial.lenient().and_then(chosen),
         },
     }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::choice::ReadingMode;
 use super::grid::{Grid, TrialResult};
 use super::subject::Subject;
-use crate::types::{FailureKind, Record, UnreadReason};
+use crate::types::{FailureKind, TrialRef, UnreadReason};
 
 /// Counts of replies, unreadable replies and failures of one subject.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,10 +24,10 @@ pub struct Health {
 }
 
 impl Health {
-    fn count(&mut self, result: TrialResult, record: &Record) {
+    fn count(&mut self, result: TrialResult, trial: TrialRef<'_>) {
         let Some(strict) = result.reading(ReadingMode::Strict) else {
-            if let Some(failure) = &record.failure {
-                *self.failed.entry(failure.kind).or_default() += 1;
+            if let Some((kind, _)) = trial.failure() {
+                *self.failed.entry(kind).or_default() += 1;
             }
             return;
         };
@@ -35,7 +35,7 @@ impl Health {
         self.read += usize::from(strict.is_some());
         let lenient = result.reading(ReadingMode::Lenient).flatten();
         self.lenient_only += usize::from(strict.is_none() && lenient.is_some());
-        if let Some(reason) = record.detail.strict.and_then(|reading| reading.why) {
+        if let Some(reason) = trial.strict().and_then(|reading| reading.why) {
             *self.unread.entry(reason).or_default() += 1;
         }
     }
@@ -68,8 +68,8 @@ pub(crate) fn healths(grid: &Grid<'_>) -> Vec<Health> {
             failed: BTreeMap::new(),
         };
         for item in 0..grid.items.len() {
-            if let Some(record) = grid.record(index, item) {
-                health.count(grid.result(index, item), record);
+            if let Some(trial) = grid.trial(index, item) {
+                health.count(grid.result(index, item), trial);
             }
         }
         health

@@ -6,7 +6,10 @@ use super::cluster::Clusters;
 use super::estimate::Estimate;
 use super::subject::{Subject, is_control, is_observer};
 use crate::types::control::OBSERVER;
-use crate::types::{AnswerSource, Control, FrameId, Observed, QuestionId, Record, TrialOutcome};
+use crate::types::{
+    AnswerSource, ChoiceDetail, Control, FrameId, Observed, QuestionId, TrialOutcome, TrialRef,
+    Trials,
+};
 
 /// Results of the observer, or of one of its controls, in one condition.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,32 +65,31 @@ pub struct ObserverSummary {
 }
 
 impl ObserverSummary {
-    /// The results of these records.
+    /// The results of these trials.
     #[must_use]
-    pub fn of(records: &[Record], clusters: &Clusters) -> Self {
-        // Of two records for the same item, the later one counts.
-        let mut items = BTreeMap::<Subject, BTreeMap<ItemKey<'_>, &Record>>::new();
-        for record in records {
-            let detail = &record.detail;
-            if detail.observed.is_some() {
-                let key = (&record.question, &detail.choices[..], detail.repeat);
-                let subject = items.entry(Subject::of(record)).or_default();
-                subject.insert(key, record);
+    pub fn of(trials: &Trials<ChoiceDetail>, clusters: &Clusters) -> Self {
+        // Of two trials for the same item, the later one counts.
+        let mut items = BTreeMap::<Subject, BTreeMap<ItemKey<'_>, TrialRef<'_>>>::new();
+        for trial in trials.iter() {
+            if trial.observed().is_some() {
+                let key = trial.item().key();
+                let subject = items.entry(Subject::of(trial)).or_default();
+                subject.insert(key, trial);
             }
         }
-        let mut by_control = BTreeMap::<&str, Vec<&Record>>::new();
+        let mut by_control = BTreeMap::<&str, Vec<TrialRef<'_>>>::new();
         let mut cells = Vec::new();
-        for (subject, records) in &items {
-            let records: Vec<&Record> = records.values().copied().collect();
+        for (subject, trials) in &items {
+            let trials: Vec<TrialRef<'_>> = trials.values().copied().collect();
             if is_control(&subject.model) {
                 let all = by_control.entry(&subject.model).or_default();
-                all.extend(&records);
+                all.extend(&trials);
             }
-            cells.extend(cell(subject.clone(), &records, clusters));
+            cells.extend(cell(subject.clone(), &trials, clusters));
         }
         let controls = by_control
             .into_iter()
-            .filter_map(|(model, records)| cell(Subject::new(model, None), &records, clusters));
+            .filter_map(|(model, trials)| cell(Subject::new(model, None), &trials, clusters));
         Self {
             controls: controls.collect(),
             cells,
@@ -154,21 +156,20 @@ impl ObserverSummary {
 /// What identifies an item: question, order of choices and repeat.
 type ItemKey<'a> = (&'a QuestionId, &'a [String], u32);
 
-/// The results of some records; `None` without records of frames that have a cluster.
-fn cell(subject: Subject, records: &[&Record], clusters: &Clusters) -> Option<ObserverCell> {
+/// The results of some trials; `None` without trials of frames that have a cluster.
+fn cell(subject: Subject, trials: &[TrialRef<'_>], clusters: &Clusters) -> Option<ObserverCell> {
     let mut sums = vec![(0.0, 0.0); clusters.count()];
     let mut frames = BTreeMap::<(&FrameId, String), &Observed>::new();
     let (mut guesses, mut evidence, mut n) = (0.0, 0, 0);
-    for record in records {
-        let detail = &record.detail;
-        let cluster = clusters.of(&detail.frame, &record.question);
-        let (Some(cluster), Some(observed)) = (cluster, &detail.observed) else {
+    for trial in trials {
+        let cluster = clusters.of(trial.frame(), trial.question());
+        let (Some(cluster), Some(observed)) = (cluster, trial.observed()) else {
             continue;
         };
-        let guess = 1.0 / detail.choices.len().max(1) as f64;
+        let guess = 1.0 / trial.choices().len().max(1) as f64;
         let score = match observed.from {
             AnswerSource::Guess => guess,
-            AnswerSource::Evidence => f64::from(u8::from(detail.outcome == TrialOutcome::Right)),
+            AnswerSource::Evidence => f64::from(u8::from(trial.outcome() == TrialOutcome::Right)),
         };
         let (sum, count) = &mut sums[cluster as usize];
         *sum += score;
@@ -176,8 +177,8 @@ fn cell(subject: Subject, records: &[&Record], clusters: &Clusters) -> Option<Ob
         guesses += guess;
         evidence += usize::from(observed.from == AnswerSource::Evidence);
         n += 1;
-        let condition = record.condition.as_ref().map(ToString::to_string);
-        frames.insert((&detail.frame, condition.unwrap_or_default()), observed);
+        let condition = trial.condition().map(ToString::to_string);
+        frames.insert((trial.frame(), condition.unwrap_or_default()), observed);
     }
     sums.retain(|(_, count)| *count > 0.0);
     let sum = |of: fn(&Observed) -> usize| frames.values().map(|frame| of(frame)).sum::<usize>();

@@ -12,10 +12,10 @@ const ONE_EXPOSURE: f64 = 0.5;
 /// How dark the photographs of the frames are that a subject was shown, or that its images were made as dark as.
 #[must_use]
 pub(crate) fn pair_facts<'g>(grid: &Grid<'g>, subject: usize) -> BTreeMap<&'g FrameId, PairFacts> {
-    let records = (0..grid.items.len()).filter_map(|item| grid.record(subject, item));
-    let facts = records.filter_map(|record| {
-        let image = record.detail.image.as_ref()?;
-        Some((record.detail.shown(), image.pair?))
+    let trials = (0..grid.items.len()).filter_map(|item| grid.trial(subject, item));
+    let facts = trials.filter_map(|trial| {
+        let image = trial.images()?;
+        Some((trial.shown(), *image.pair.as_deref()?))
     });
     facts.collect()
 }

@@ -1,18 +1,24 @@
 //! Reading of a reply into the record of its trial, for both experiments.
 
+use std::borrow::Cow;
+
 use super::choice::{LENIENT_VERSION, readings};
 use super::llm_match::{Protocol, mark};
 use super::option_probabilities::option_probabilities;
 use crate::error::Result;
-use crate::types::detail::{AlikeChoices, ChoiceLine, OpenLine};
+use crate::types::detail::{ChoiceLine, OpenLine};
+use crate::types::trials::{AskedParts, ChoiceFacts, ChoiceTables, SentImages};
 use crate::types::{
-    Answer, ChoiceDetail, Choices, Detail, Digest, FrameId, OpenDetail, Reply, Step, TrialOutcome,
+    Answer, ChoiceDetail, Choices, Detail, Digest, Family, FrameId, OpenDetail, Record, Reply,
+    Step, TrialOutcome,
 };
 
 impl Detail for ChoiceDetail {
     type Line = ChoiceLine;
 
-    type Alike = AlikeChoices;
+    type Facts = ChoiceFacts;
+
+    type Tables = ChoiceTables;
 
     const SCHEMA: &'static str = "darkqa.run/2";
 
@@ -20,7 +26,7 @@ impl Detail for ChoiceDetail {
 
     /// Stores both readings of a reply, and the outcome, which follows from the strict reading.
     fn read(&mut self, reply: &Reply) -> Result<()> {
-        let choices = Choices::known_by(self.choices.to_vec().into(), self.truth)?;
+        let choices = Choices::known_by(self.choices.clone().into(), self.truth)?;
         let (strict, lenient) = readings(reply, &choices);
         self.outcome = match strict {
             Answer::Unparsed(_) => TrialOutcome::Unparsed,
@@ -34,16 +40,38 @@ impl Detail for ChoiceDetail {
         self.lenient = Some(lenient.into());
         // A stored reply that is read again says nothing of what was seen, or of how likely each choice was.
         if let Some(chances) = &reply.chances {
-            self.options = option_probabilities(chances, &self.choices).map(Box::new);
+            self.options = option_probabilities(chances, &self.choices);
         }
         if reply.observed.is_some() {
-            self.observed = reply.observed.clone().map(Box::new);
+            self.observed = reply.observed.clone();
         }
         Ok(())
     }
 
-    fn share(&mut self, alike: &mut AlikeChoices) {
-        Self::share(self, alike);
+    fn asked(&self) -> AskedParts<'_> {
+        AskedParts {
+            frame: &self.frame.0,
+            family: Cow::Borrowed(&self.family),
+            choices: &self.choices,
+            truth: self.truth,
+            repeat: self.repeat,
+        }
+    }
+
+    fn keep(record: &Record, tables: &mut ChoiceTables) -> ChoiceFacts {
+        tables.keep(record)
+    }
+
+    fn move_facts(facts: &ChoiceFacts, from: &ChoiceTables, to: &mut ChoiceTables) -> ChoiceFacts {
+        to.move_from(*facts, from)
+    }
+
+    fn source_of<'t>(facts: &'t ChoiceFacts, tables: &'t ChoiceTables) -> Option<&'t str> {
+        tables.shown_frame(*facts).map(|frame| &*frame.0)
+    }
+
+    fn sent_of(facts: &ChoiceFacts, tables: &ChoiceTables) -> Option<Digest> {
+        tables.images(*facts).map(SentImages::digest)
     }
 
     fn choices(&self) -> &[String] {
@@ -67,7 +95,9 @@ impl Detail for ChoiceDetail {
 impl Detail for OpenDetail {
     type Line = OpenLine;
 
-    type Alike = ();
+    type Facts = Box<Record<Self>>;
+
+    type Tables = ();
 
     const SCHEMA: &'static str = "darkqa.openeqa/2";
 
@@ -82,7 +112,31 @@ impl Detail for OpenDetail {
         Ok(())
     }
 
-    fn share(&mut self, (): &mut ()) {}
+    fn asked(&self) -> AskedParts<'_> {
+        AskedParts {
+            frame: &self.episode,
+            family: Cow::Owned(Family::from(&*self.category)),
+            choices: &[],
+            truth: None,
+            repeat: 0,
+        }
+    }
+
+    fn keep(record: &Record<Self>, (): &mut ()) -> Self::Facts {
+        Box::new(record.clone())
+    }
+
+    fn move_facts(record: &Self::Facts, (): &(), (): &mut ()) -> Self::Facts {
+        record.clone()
+    }
+
+    fn source_of<'t>(_: &'t Self::Facts, (): &'t ()) -> Option<&'t str> {
+        None
+    }
+
+    fn sent_of(record: &Self::Facts, (): &()) -> Option<Digest> {
+        record.detail.shown()
+    }
 
     fn choices(&self) -> &[String] {
         &[]

@@ -143,7 +143,7 @@ fn groups<'a>(grid: &Grid<'_>, questions: &'a [RunQuestion]) -> Vec<Group<'a>> {
     }
     let mut items = HashMap::<&QuestionId, Vec<usize>>::new();
     for (index, item) in grid.items.iter().enumerate() {
-        items.entry(&item.record.question).or_default().push(index);
+        items.entry(&*item.asked.question).or_default().push(index);
     }
     let groups = by_name.into_values().map(|members| {
         let questions: Vec<&RunQuestion> = members.iter().map(|(_, question)| *question).collect();
@@ -211,7 +211,7 @@ impl Group<'_> {
             has_failed |= result == TrialResult::Failed;
             if let Some(chosen) = result.reading(mode) {
                 let item = &grid.items[item];
-                replied.insert(&item.record.question);
+                replied.insert(&*item.asked.question);
                 is_right &= item.is_right(chosen);
             }
         }
@@ -273,7 +273,7 @@ fn chance(grid: &Grid<'_>, groups: &[&Group<'_>]) -> Option<Estimate> {
         questions.sort_by(|one, other| one.id.cmp(&other.id));
         let guess = questions.iter().map(|question| {
             let items = group.items.iter();
-            let times = items.filter(|item| grid.items[**item].record.question == question.id);
+            let times = items.filter(|item| *grid.items[**item].asked.question == question.id);
             let times = i32::try_from(times.count().max(1)).unwrap_or(i32::MAX);
             (question.choices.len() as f64).recip().powi(times)
         });

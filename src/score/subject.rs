@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::types::control::OBSERVER;
 use crate::types::{
-    AxisLevel, Condition, Control, EnhancerName, KindReading, LightGroup, Record, View,
+    AxisLevel, Condition, Control, EnhancerName, KindReading, LightGroup, TrialRef, View,
 };
 
 /// The model name of the chance line.
@@ -74,10 +74,10 @@ pub struct Subject {
 }
 
 impl Subject {
-    /// The subject of a record.
+    /// The subject of a trial.
     #[must_use]
-    pub fn of(record: &Record) -> Self {
-        Self::new(&record.model, record.condition.as_ref())
+    pub fn of(trial: TrialRef<'_>) -> Self {
+        Self::new(trial.model(), trial.condition())
     }
 
     /// A model in a condition; without images if the condition is `None`.

@@ -34,7 +34,7 @@ pub(super) fn records(model: &str, condition: &str, answers: Answers) -> Vec<Rec
         let detail = ChoiceDetail {
             frame: FrameId(format!("f{:02}", item / 2)),
             family: [Family::Color, Family::RoomType][item % 2].clone(),
-            choices: ["a", "b", "c"].map(str::to_owned).to_vec().into(),
+            choices: ["a", "b", "c"].map(str::to_owned).to_vec(),
             truth: Some(0),
             repeat: 0,
             strict: chosen,
@@ -63,7 +63,7 @@ pub(super) fn with_grid<T>(records: &[Record], check: impl FnOnce(&Grid<'_>) -> 
         .iter()
         .map(|record| (&record.question, &record.detail.frame));
     let clusters = Clusters::new(asked, &FrameTies::default());
-    check(&Grid::new(records, &clusters))
+    check(&Grid::new(&records.iter().cloned().collect(), &clusters))
 }
 
 fn find<'f>(
@@ -243,7 +243,8 @@ fn below_blind_is_what_the_corrected_test_shows() {
         records("m", "L5-noise", |_| Some(false)),
     ]
     .concat();
-    let findings = Findings::new(&records, &FrameTies::default(), [], &[]);
+    let trials = records.iter().cloned().collect();
+    let findings = Findings::new(&trials, &FrameTies::default(), [], &[]);
     let below = |condition: &str| {
         let condition: Condition = condition.parse().unwrap();
         findings.below_blind(&Subject::new("m", Some(&condition)), None)

@@ -54,9 +54,7 @@ pub(super) fn write_manifest(folder: &Path, manifest: &RunManifest) -> Result<()
 /// The last record of each trial in a run folder, in the order of each trial's first record. An incomplete last line is
 /// skipped.
 pub(crate) fn read_records<D: Detail>(folder: &Path) -> Result<Vec<Record<D>>> {
-    let mut alike = D::Alike::default();
-    let share = |record: &mut Record<D>| record.detail.share(&mut alike);
-    last_of_each(folder, |record: &Record<D>| record.key, share)
+    last_of_each(folder, |record: &Record<D>| record.key, |_| ())
 }
 
 /// The last state of each trial in a run folder, in the order of [`read_records`].

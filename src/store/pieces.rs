@@ -35,6 +35,13 @@ pub(crate) struct LinePlace {
     pub(super) length: usize,
 }
 
+impl LinePlace {
+    /// The first byte of the line in its file.
+    pub(crate) fn start(self) -> u64 {
+        self.start
+    }
+}
+
 /// One line that is not blank: a line that was set aside is.
 pub(super) struct FileLine<'p> {
     /// Its number, from 1.

@@ -33,7 +33,7 @@ fn record(name: &str, outcome: TrialOutcome) -> Record {
     let detail = ChoiceDetail {
         frame: FrameId("f".into()),
         family: Family::Color,
-        choices: vec!["a".into(), "b".into()].into(),
+        choices: vec!["a".into(), "b".into()],
         truth: Some(0),
         repeat: 0,
         strict: None,

@@ -1,7 +1,5 @@
 //! The fields that an experiment adds to the record of a trial: [`ChoiceDetail`], [`OpenDetail`].
 
-use std::hash::{Hash, Hasher};
-
 use serde::{Deserialize, Serialize};
 
 use super::condition::Condition;
@@ -14,7 +12,6 @@ use super::pair_facts::PairFacts;
 use super::question::{Answer, Family, QuestionId, UnreadReason};
 use super::record::{Failure, Record, Via, View};
 use super::reply::{Finish, Usage};
-use super::shared::{Distinct, Shared};
 use super::trial_key::TrialKey;
 
 /// Declares a detail, and the line of a record with it. serde's `flatten` would take a quarter more time to read a line,
@@ -40,7 +37,7 @@ macro_rules! details {
             finish: Option<Finish>,
             #[serde(default)]
             via: Via,
-            failure: Option<Box<Failure>>,
+            failure: Option<Failure>,
             usage: Option<Usage>,
             served_model: Option<String>,
             #[serde(default)]
@@ -86,7 +83,7 @@ details! {
         /// The family of the question.
         family: Family,
         /// The choices in the order shown.
-        choices: Shared<Vec<String>>,
+        choices: Vec<String>,
         /// The index of the true choice; `None` if nobody knows it.
         truth: Option<usize>,
         /// How many times the same question was asked before; not in the file if 0.
@@ -99,7 +96,7 @@ details! {
         /// How the trial ended.
         outcome: TrialOutcome,
         /// The image as it was sent; of several the first.
-        image: Option<Shared<ImageFacts>>,
+        image: Option<ImageFacts>,
         /// The other images of a question that shows several, in order; not in the file otherwise.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         more_images: Vec<ImageFacts>,
@@ -109,32 +106,17 @@ details! {
         shown_frame: Option<FrameId>,
         /// What the observer saw; not in the file for other models, and without an image.
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        observed: Option<Box<Observed>>,
+        observed: Option<Observed>,
         /// How likely the model held each choice; not in the file if it was not asked for, or if the server did not say.
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        options: Option<Box<OptionProbabilities>>,
+        options: Option<OptionProbabilities>,
     }
-}
-
-/// What many records of questions with choices hold alike: each question is asked, and each image shown, many times.
-#[derive(Debug, Default)]
-pub struct AlikeChoices {
-    choices: Distinct<Vec<String>>,
-    images: Distinct<ImageFacts>,
 }
 
 impl ChoiceDetail {
-    /// Keeps once what other records hold alike.
-    pub(crate) fn share(&mut self, alike: &mut AlikeChoices) {
-        alike.choices.share(&mut self.choices);
-        if let Some(image) = &mut self.image {
-            alike.images.share(image);
-        }
-    }
-
     /// All images as they were sent, in order.
     pub fn images(&self) -> impl Iterator<Item = &ImageFacts> {
-        self.image.as_deref().into_iter().chain(&self.more_images)
+        self.image.iter().chain(&self.more_images)
     }
 
     /// The digest of the file that was sent, or of all files in order; `None` without an image.
@@ -270,11 +252,4 @@ pub struct ImageFacts {
     /// How dark the photograph of the frame is, of images in its darkness; not in the file for others.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pair: Option<PairFacts>,
-}
-
-/// By the digest: facts are equal only if it is.
-impl Hash for ImageFacts {
-    fn hash<H: Hasher>(&self, state: &mut H) {
-        self.digest.hash(state);
-    }
 }

@@ -46,6 +46,7 @@ mod strict_group;
 pub(crate) mod treatment;
 pub(crate) mod treatment_set;
 pub(crate) mod trial_key;
+pub(crate) mod trials;
 pub(crate) mod words;
 
 pub use axis_level::{AxisLevel, KindReading};
@@ -87,6 +88,9 @@ pub use strict_group::StrictGroup;
 pub use treatment::Treatment;
 pub use treatment_set::TreatmentSet;
 pub use trial_key::TrialKey;
+pub use trials::{
+    AskedItem, AskedParts, ChoiceFacts, ChoiceTables, SentImages, TextPlace, TrialRef, Trials,
+};
 
 /// The record of a trial; by default of a question with choices.
 pub type Record<D = ChoiceDetail> = record::Record<D>;

@@ -10,6 +10,7 @@ use super::digest::Digest;
 use super::question::QuestionId;
 use super::reply::{Finish, Reply, Usage};
 use super::trial_key::TrialKey;
+use super::trials::AskedParts;
 use crate::error::Result;
 
 /// One line of `records.jsonl`: the fields of every trial, and those that its experiment adds.
@@ -36,7 +37,7 @@ pub struct Record<D> {
     #[serde(skip_serializing_if = "Via::is_direct")]
     pub via: Via,
     /// The reason why no reply came; `None` if one came.
-    pub failure: Option<Box<Failure>>,
+    pub failure: Option<Failure>,
     /// The tokens that the server charged; `None` if it did not say.
     pub usage: Option<Usage>,
     /// The model's name in the server's reply.
@@ -61,8 +62,11 @@ pub trait Detail: Clone + PartialEq + Serialize + Send {
     /// A complete line of a record file; records are read through this type in one pass.
     type Line: DeserializeOwned + Into<Record<Self>>;
 
-    /// What many records of a run hold alike.
-    type Alike: Default;
+    /// What reports keep of a record, beside what they keep of every record.
+    type Facts: Clone + fmt::Debug + Send + Sync;
+
+    /// What these facts refer to.
+    type Tables: Clone + Default + fmt::Debug + Send + Sync;
 
     /// The schema of a run with these records.
     const SCHEMA: &'static str;
@@ -76,8 +80,20 @@ pub trait Detail: Clone + PartialEq + Serialize + Send {
     /// If the choices of the detail are not valid.
     fn read(&mut self, reply: &Reply) -> Result<()>;
 
-    /// Keeps once what other records hold alike.
-    fn share(&mut self, alike: &mut Self::Alike);
+    /// What was asked, whoever was asked.
+    fn asked(&self) -> AskedParts<'_>;
+
+    /// What reports keep of a record.
+    fn keep(record: &Record<Self>, tables: &mut Self::Tables) -> Self::Facts;
+
+    /// The same facts, which refer to other tables.
+    fn move_facts(facts: &Self::Facts, from: &Self::Tables, to: &mut Self::Tables) -> Self::Facts;
+
+    /// The name of what was shown, if it is not the frame that was asked about.
+    fn source_of<'t>(facts: &'t Self::Facts, tables: &'t Self::Tables) -> Option<&'t str>;
+
+    /// The digest of what was sent of it; `None` if nothing was sent, or if that is not known.
+    fn sent_of(facts: &Self::Facts, tables: &Self::Tables) -> Option<Digest>;
 
     /// The choices in the order shown; empty if the question is open.
     fn choices(&self) -> &[String];
@@ -147,7 +163,7 @@ impl<D> Record<D> {
     #[must_use]
     pub fn failed_by(self, failure: Failure, attempts: u32) -> Self {
         Self {
-            failure: Some(Box::new(failure)),
+            failure: Some(failure),
             attempts,
             ..self
         }
@@ -322,7 +338,7 @@ pub struct Failure {
 }
 
 /// The way in which a question reached its model.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Via {
     /// As a single request.

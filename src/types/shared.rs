@@ -32,6 +32,12 @@ impl<T> Clone for Shared<T> {
     }
 }
 
+impl<T: fmt::Display> fmt::Display for Shared<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
 impl<T: fmt::Debug> fmt::Debug for Shared<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.0.fmt(f)
@@ -65,6 +71,12 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Shared<T> {
 /// The distinct values of one kind that were seen so far.
 #[derive(Debug)]
 pub struct Distinct<T>(HashSet<Shared<T>>);
+
+impl<T> Clone for Distinct<T> {
+    fn clone(&self) -> Self {
+        Self(self.0.clone())
+    }
+}
 
 impl<T> Default for Distinct<T> {
     fn default() -> Self {

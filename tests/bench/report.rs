@@ -17,7 +17,9 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use darkqa_eval::Kind;
 use darkqa_eval::internals::report::{ChoiceReport, PageInputs, products};
 use darkqa_eval::internals::score::{Findings, FrameTies};
-use darkqa_eval::types::{Condition, Degradation, Digest, Family, Record, Severity};
+use darkqa_eval::types::{
+    ChoiceDetail, Condition, Degradation, Digest, Family, Record, Severity, Trials,
+};
 use made::record;
 
 /// Eleven conditions of five models on four questions about each of 456 frames: 100,320 records.
@@ -49,8 +51,8 @@ fn records() -> Vec<Record> {
 }
 
 fn bench(c: &mut Criterion) {
-    let records = records();
-    let find = || Findings::new(&records, &FrameTies::default(), [], &[]);
+    let trials: Trials<ChoiceDetail> = records().into_iter().collect();
+    let find = || Findings::new(&trials, &FrameTies::default(), [], &[]);
     let mut group = c.benchmark_group("100,320 records");
     group.sample_size(10);
     group.bench_function("find what they say", |b| b.iter(|| black_box(find())));
@@ -59,6 +61,7 @@ fn bench(c: &mut Criterion) {
         runs: Vec::new(),
         questions: &[],
         thumbnails: &[],
+        texts: Box::new(|_| Ok(String::new())),
     };
     group.bench_function("make the report", |b| {
         b.iter(|| {

@@ -46,13 +46,13 @@ fn reply(condition: &Condition, place: (usize, usize), confidence: f64, right: b
     let rest = (1.0 - confidence) / (CHOICES - 1) as f64;
     let mut p = vec![rest; CHOICES];
     p[usize::from(!right)] = confidence;
-    detail.options = Some(Box::new(OptionProbabilities {
+    detail.options = Some(OptionProbabilities {
         p,
         mass: 1.0,
         bound: 0.0,
         token: "A".to_owned(),
         reasoned: false,
-    }));
+    });
     record
 }
 
@@ -77,7 +77,8 @@ fn of(records: &[Record], draws: &Resamples) -> Calibration {
         .iter()
         .map(|record| (&record.question, &record.detail.frame));
     let clusters = Clusters::new(asked, &FrameTies::default());
-    let mut found = calibrations(&Grid::new(records, &clusters), draws);
+    let trials = records.iter().cloned().collect();
+    let mut found = calibrations(&Grid::new(&trials, &clusters), draws);
     assert_eq!(found.len(), 1);
     found.remove(0)
 }

@@ -27,7 +27,7 @@ fn findings(
         for question in 0..questions {
             let name = (frame * questions + question, frame);
             let mut reply: Record = record("m", &condition, name, random.random_bool(rate));
-            reply.detail.image = Some(facts(image).into());
+            reply.detail.image = Some(facts(image));
             records.push(reply);
         }
         measured.push(ImageFidelity {
@@ -38,7 +38,8 @@ fn findings(
             ssim: None,
         });
     }
-    let found = Findings::new(&records, &FrameTies::default(), [], &measured);
+    let trials = records.iter().cloned().collect();
+    let found = Findings::new(&trials, &FrameTies::default(), [], &measured);
     found.fidelity.unwrap()
 }
 
@@ -82,7 +83,7 @@ fn two_frames_with_the_same_dark_image_have_their_own_fidelity() {
     let (mut records, mut measured) = (Vec::new(), Vec::new());
     for (frame, psnr) in [(0, 10.0), (1, 30.0)] {
         let mut reply: Record = record("m", &condition, (frame, frame), true);
-        reply.detail.image = Some(facts(black).into());
+        reply.detail.image = Some(facts(black));
         measured.push(ImageFidelity {
             frame: reply.detail.frame.clone(),
             condition: condition.clone(),
@@ -94,7 +95,8 @@ fn two_frames_with_the_same_dark_image_have_their_own_fidelity() {
     }
     for _ in 0..2 {
         measured.reverse();
-        let found = Findings::new(&records, &FrameTies::default(), [], &measured);
+        let trials = records.iter().cloned().collect();
+        let found = Findings::new(&trials, &FrameTies::default(), [], &measured);
         let row = &found.fidelity.unwrap().conditions[0];
         assert_eq!((row.images, row.means[0]), (2, Some(20.0)));
     }

@@ -233,7 +233,8 @@ fn pair(
 
 fn paired(records: &[Record]) -> PairedComparison {
     let clusters = clusters_of(records);
-    let grid = Grid::new(records, &clusters);
+    let trials = records.iter().cloned().collect();
+    let grid = Grid::new(&trials, &clusters);
     let raw = grid
         .subjects
         .iter()
@@ -348,7 +349,8 @@ fn thresholds_are_recovered() {
             }
         }
         let clusters = clusters_of(&records);
-        let grid = Grid::new(&records, &clusters);
+        let trials = records.iter().cloned().collect();
+        let grid = Grid::new(&trials, &clusters);
         let made = curves(&grid, &Resamples::new(clusters.count()), None);
         let threshold = made[0].summary.threshold.unwrap();
         sum += threshold.value;
@@ -407,8 +409,9 @@ fn a_made_set_gives_the_papers_arithmetic() {
             family: record.detail.family.clone(),
             choices: record.detail.choices.len(),
         });
+    let trials = records.iter().cloned().collect();
     let findings = Findings::new(
-        &records,
+        &trials,
         &FrameTies::default(),
         offers.collect::<Vec<_>>(),
         &[],

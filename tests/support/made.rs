@@ -19,7 +19,7 @@ pub fn record(
     let detail = ChoiceDetail {
         frame: FrameId(format!("f{frame:04}")),
         family: Family::Color,
-        choices: ["a", "b", "c"].map(str::to_owned).to_vec().into(),
+        choices: ["a", "b", "c"].map(str::to_owned).to_vec(),
         truth: Some(0),
         repeat: 0,
         strict: Some(chosen),

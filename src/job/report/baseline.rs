@@ -18,7 +18,7 @@ use crate::score::grid::Grid;
 use crate::score::health::healths;
 use crate::score::significance::Significance;
 use crate::score::subject::{Subject, is_control, is_observer};
-use crate::types::{ChoiceDetail, Record};
+use crate::types::{ChoiceDetail, TrialRef};
 
 /// The flag that makes a worse model a failure.
 pub(super) const FAIL_IF_WORSE: &str = "--fail-if-worse";
@@ -49,14 +49,15 @@ impl Baseline {
         // The names of models and conditions tell nothing apart here: a new model is held against the old one of its name.
         let alerts = of_runs(&join(runs, |_| true)?);
         let mark = |model: &str| format!("{model} (baseline {name})");
-        let mut records = combined.records.clone();
-        records.extend(old.records.into_iter().map(|record| Record {
-            model: mark(&record.model),
-            ..record
-        }));
+        let (mut trials, mut old_trials) = (combined.trials.clone(), old.trials);
+        old_trials.rename(|model| Some(mark(model)));
+        let logs = trials.logs();
+        for trial in old_trials.iter() {
+            trials.copy(trial, logs);
+        }
         let questions = combined.questions.iter().chain(&old.questions);
-        let clusters = clusters(&records, questions);
-        let grid = Grid::of_models(&records, &clusters, &combined.listing, |_| true);
+        let clusters = clusters(&trials, questions);
+        let grid = Grid::of_models(&trials, &clusters, &combined.listing, |_| true);
         let pairs = grid
             .subjects
             .iter()
@@ -71,12 +72,12 @@ impl Baseline {
                 Some((index, grid.find(&old)?))
             });
         let pairs: Vec<(usize, usize)> = pairs.collect();
-        let mut by_subject = BTreeMap::<Subject, Vec<&Record>>::new();
-        for record in &records {
+        let mut by_subject = BTreeMap::<Subject, Vec<TrialRef<'_>>>::new();
+        for trial in trials.iter() {
             by_subject
-                .entry(Subject::of(record))
+                .entry(Subject::of(trial))
                 .or_default()
-                .push(record);
+                .push(trial);
         }
         let cost = |index: usize| {
             let subject = &grid.subjects[index];
@@ -84,8 +85,8 @@ impl Baseline {
                 .model
                 .strip_suffix(&mark(""))
                 .unwrap_or(&subject.model);
-            let records = by_subject.get(subject).map_or(&[][..], Vec::as_slice);
-            dollars(combined.models.asked(unmarked), records)
+            let trials = by_subject.get(subject).into_iter().flatten().copied();
+            dollars(combined.models.asked(unmarked), trials)
                 .ok()
                 .flatten()
         };

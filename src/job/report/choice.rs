@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::alerts::alerts;
 use super::combine::{Combined, combine};
+use super::rereading::LenientChange;
 use super::whole_report::SUMMARY_JSON;
 use super::{enhancers, own_answers};
 use crate::error::Result;
@@ -17,17 +18,18 @@ use crate::report::products::{PAGE, products};
 use crate::report::short::{findings, full, short};
 use crate::store::Store;
 use crate::types::manifest::RunManifest;
-use crate::types::{ChoiceDetail, Record, Truths};
+use crate::types::{ChoiceDetail, Truths};
 
-/// Reads the replies of a run again, and writes its report and manifest into its folder.
+/// Writes the report and the manifest of a run into its folder. Replies that were read by other rules than those of now are read again.
 pub(crate) fn write(
     store: &Store,
     mut run: StoredRun<ChoiceDetail>,
     show: StdoutFormat,
 ) -> Result<Outcome> {
     let manifest = run.manifest.clone();
-    let records = run.records.into_iter().map(Record::reread);
-    run.records = records.collect::<Result<_>>()?;
+    if !LenientChange::of(&manifest).is_current() {
+        run = run.reread()?;
+    }
     run.leave_out(ShownModels::Current);
     Ok(Outcome::wrote(
         store.folder(),

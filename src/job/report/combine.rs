@@ -16,7 +16,9 @@ use crate::score::findings::Findings;
 use crate::score::grid::Grid;
 use crate::score::photographed_set::PhotographedSet;
 use crate::types::manifest::RunManifest;
-use crate::types::{ChoiceDetail, QuestionId, Record, RunQuestion, SetLight, Truths, shell_word};
+use crate::types::{
+    ChoiceDetail, QuestionId, RunQuestion, SetLight, TextPlace, Trials, Truths, shell_word,
+};
 
 /// Several runs of questions with choices, joined.
 pub(super) type Combined = Joined<ChoiceDetail>;
@@ -24,9 +26,9 @@ pub(super) type Combined = Joined<ChoiceDetail>;
 impl Combined {
     /// The results that follow from the records.
     pub(super) fn findings(&self) -> Findings<'_> {
-        let offers = offers(&self.records, &self.questions);
+        let offers = offers(&self.trials, &self.questions);
         let findings = Findings::listed(
-            &self.records,
+            &self.trials,
             &ties(&self.questions),
             offers,
             &self.fidelity,
@@ -63,20 +65,20 @@ impl Combined {
 
     /// Whether the true answers are known; [`combine`] has checked that they are known of all questions or of none.
     pub(super) fn truths(&self) -> Truths {
-        match self.records.first() {
-            Some(record) if record.detail.truth.is_none() => Truths::Unknown,
+        match self.trials.first() {
+            Some(trial) if trial.truth().is_none() => Truths::Unknown,
             _ => Truths::Known,
         }
     }
 
     /// The unit that is treated as independent.
     pub(super) fn unit(&self) -> ClusterUnit {
-        clusters(&self.records, &self.questions).unit()
+        clusters(&self.trials, &self.questions).unit()
     }
 
-    /// The records by subject and item.
+    /// The trials by subject and item.
     pub(super) fn grid(&self) -> Grid<'_> {
-        Grid::new(&self.records, &clusters(&self.records, &self.questions))
+        Grid::new(&self.trials, &clusters(&self.trials, &self.questions))
     }
 
     /// Further inputs of the HTML page.
@@ -85,17 +87,14 @@ impl Combined {
             folder: typed(&run.folder),
             name: run.name.clone(),
             manifest: &run.manifest,
-            records: run
-                .records
-                .iter()
-                .map(|place| &self.records[*place])
-                .collect(),
+            usage: page::RunUsage::of(self.of(run)),
             cost: run.cost.clone(),
         });
         PageInputs {
             runs: runs.collect(),
             questions: &self.questions,
             thumbnails: &self.thumbnails,
+            texts: Box::new(|place: TextPlace| self.texts[place.log()].text(place)),
         }
     }
 
@@ -126,15 +125,12 @@ pub(super) fn ties<'a>(questions: impl IntoIterator<Item = &'a RunQuestion>) -> 
     ties
 }
 
-/// The clusters of records, with what these questions say of their frames.
+/// The clusters of trials, with what these questions say of their frames.
 pub(super) fn clusters<'a>(
-    records: &[Record],
+    trials: &Trials<ChoiceDetail>,
     questions: impl IntoIterator<Item = &'a RunQuestion>,
 ) -> Clusters {
-    let pairs = records
-        .iter()
-        .map(|record| (&record.question, &record.detail.frame));
-    Clusters::new(pairs, &ties(questions))
+    Clusters::new(trials.questions(), &ties(questions))
 }
 
 /// Joins runs that can be compared.
@@ -153,20 +149,19 @@ pub(super) fn combine(runs: Vec<StoredRun<ChoiceDetail>>) -> Result<Combined> {
 }
 
 /// The choices of all questions, for the chance line. A question is repeated for each order of its choices, since the answer to each
-/// order counts separately. Questions that are not asked yet are included once. Without stored questions, those in the records count.
-fn offers(records: &[Record], questions: &[RunQuestion]) -> Vec<OfferedChoices> {
+/// order counts separately. Questions that are not asked yet are included once. Without stored questions, those in the trials count.
+fn offers(trials: &Trials<ChoiceDetail>, questions: &[RunQuestion]) -> Vec<OfferedChoices> {
     let mut orders = BTreeMap::<&QuestionId, BTreeSet<&[String]>>::new();
     let mut all = BTreeMap::<&QuestionId, OfferedChoices>::new();
-    for record in records {
+    for item in trials.items().into_iter().flatten() {
         orders
-            .entry(&record.question)
+            .entry(&item.question)
             .or_default()
-            .insert(&record.detail.choices);
-        all.entry(&record.question)
-            .or_insert_with(|| OfferedChoices {
-                family: record.detail.family.clone(),
-                choices: record.detail.choices.len(),
-            });
+            .insert(&item.choices);
+        all.entry(&item.question).or_insert_with(|| OfferedChoices {
+            family: item.family.as_ref().clone(),
+            choices: item.choices.len(),
+        });
     }
     for question in questions {
         all.entry(&question.id).or_insert_with(|| OfferedChoices {
@@ -185,16 +180,17 @@ fn offers(records: &[Record], questions: &[RunQuestion]) -> Vec<OfferedChoices> 
 fn check_one_measure(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
     let mut first: Option<(&Path, bool)> = None;
     for run in runs {
-        for record in &run.records {
-            let is_known = record.detail.truth.is_some();
+        for item in run.trials.items().into_iter().flatten() {
+            let is_known = item.truth.is_some();
             let (folder, known) = *first.get_or_insert((&run.folder, is_known));
             if known == is_known {
                 continue;
             }
             let problem = if folder == run.folder {
                 format!(
-                    "the record {} has no true choice, and others have one: these are not the records of one run",
-                    record.key
+                    "nobody knows the true choice of the question {} or of others, and that of the rest is known: these are not the records of one \
+                     run",
+                    item.question
                 )
             } else {
                 format!(
@@ -220,23 +216,25 @@ pub(super) fn check_comparable(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
     };
     for (index, run) in runs.iter().enumerate() {
         let (mut shared, others) = (false, !questions.is_empty());
-        for record in &run.records {
-            let choices: BTreeSet<&String> = record.detail.choices.iter().collect();
-            let truth = record.detail.truth;
-            let truth = truth.map(|truth| record.detail.choices.get(truth));
+        for item in run.trials.items().into_iter().flatten() {
+            let choices: BTreeSet<&String> = item.choices.iter().collect();
+            let truth = item.truth.map(|truth| item.choices.get(truth));
             if truth == Some(None) {
-                let problem = format!("the record {} has no true choice", record.key);
+                let problem = format!(
+                    "a record of the question {} has no true choice",
+                    item.question
+                );
                 return wrong(run, problem);
             }
             let truth = truth.flatten();
             let (first, known, known_truth) = questions
-                .entry(&record.question)
+                .entry(&item.question)
                 .or_insert_with(|| (index, choices.clone(), truth));
             shared |= *first != index;
             if (&*known, *known_truth) != (&choices, truth) {
                 let problem = format!(
                     "the question {} has other choices or another truth in {}; report each run alone",
-                    record.question,
+                    item.question,
                     runs[*first].folder.display()
                 );
                 return wrong(run, problem);

@@ -5,9 +5,9 @@ use std::collections::HashSet;
 use super::combine::Combined;
 use crate::error::{Error, Result};
 use crate::score::common::shared_items;
-use crate::types::{QuestionId, Record};
+use crate::types::{AskedItem, QuestionId};
 
-/// Keeps the records of the items to which every model with images has a reply in any condition; a model without any reply does not
+/// Keeps the trials of the items to which every model with images has a reply in any condition; a model without any reply does not
 /// count.
 ///
 /// # Errors
@@ -17,7 +17,7 @@ pub(super) fn restrict(mut combined: Combined) -> Result<Combined> {
         let grid = combined.grid();
         let items = grid.items.iter().zip(shared_items(&grid));
         let items = items.filter(|(_, is_shared)| *is_shared);
-        items.map(|(item, _)| item_of(item.record)).collect()
+        items.map(|(item, _)| owned(item.asked)).collect()
     };
     if shared.is_empty() {
         return Err(Error::usage(
@@ -25,26 +25,27 @@ pub(super) fn restrict(mut combined: Combined) -> Result<Combined> {
             "no item was answered by every model; leave it out",
         ));
     }
-    let kept: Vec<bool> = combined
-        .records
-        .iter()
-        .map(|record| shared.contains(&item_of(record)))
-        .collect();
+    let items = combined.trials.items().into_iter();
+    let is_shared = items.map(|item| item.is_some_and(|item| shared.contains(&owned(item))));
+    let is_shared: Vec<bool> = is_shared.collect();
+    let trials = combined.trials.iter();
+    let kept: Vec<bool> = trials.map(|trial| is_shared[trial.item_number()]).collect();
     let mut places = Vec::with_capacity(kept.len());
     let mut next = 0;
     for kept in &kept {
         places.push(kept.then_some(next));
-        next += usize::from(*kept);
+        next += u32::from(*kept);
     }
     for run in &mut combined.runs {
-        run.records = run
-            .records
+        run.trials = run
+            .trials
             .iter()
-            .filter_map(|place| places[*place])
+            .filter_map(|place| places[*place as usize])
             .collect();
     }
-    let mut kept = kept.into_iter();
-    combined.records.retain(|_| kept.next() == Some(true));
+    combined
+        .trials
+        .retain(|trial| is_shared[trial.item_number()]);
     let questions: HashSet<&QuestionId> = shared.iter().map(|(question, ..)| question).collect();
     combined
         .questions
@@ -53,10 +54,7 @@ pub(super) fn restrict(mut combined: Combined) -> Result<Combined> {
 }
 
 /// What identifies an item: question, order of choices and repeat.
-fn item_of(record: &Record) -> (QuestionId, Vec<String>, u32) {
-    (
-        record.question.clone(),
-        record.detail.choices.to_vec(),
-        record.detail.repeat,
-    )
+fn owned(item: &AskedItem) -> (QuestionId, Vec<String>, u32) {
+    let (question, choices, repeat) = item.key();
+    (question.clone(), choices.to_vec(), repeat)
 }

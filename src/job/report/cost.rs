@@ -6,29 +6,32 @@ use crate::ask::{Price, Prices};
 use crate::error::Result;
 use crate::report::forecast::money;
 use crate::types::manifest::RunManifest;
-use crate::types::{Record, Via};
+use crate::types::{Detail, TrialRef, Via};
 
 /// The cost of replies of a model at list prices, in US dollars; `None` if the model has no known price or no reply says its tokens.
-pub(super) fn dollars<D>(model: &str, records: &[&Record<D>]) -> Result<Option<f64>> {
+pub(super) fn dollars<'t, D: Detail + 't>(
+    model: &str,
+    trials: impl Iterator<Item = TrialRef<'t, D>>,
+) -> Result<Option<f64>> {
     let prices = Prices::built_in()?;
-    let replies = records.iter().filter(|record| record.reply.is_some());
-    let charged = replies.filter_map(|record| charged(&prices, model, record));
+    let replies = trials.filter(|trial| trial.has_reply());
+    let charged = replies.filter_map(|trial| charged(&prices, model, trial));
     let charged: Vec<f64> = charged.collect();
     Ok((!charged.is_empty()).then(|| charged.iter().sum()))
 }
 
 /// The cost of a reply; `None` if it is not known.
-fn charged<D>(prices: &Prices, model: &str, record: &Record<D>) -> Option<f64> {
-    charged_at(prices.of(model)?, prices.batch, record)
+fn charged<D: Detail>(prices: &Prices, model: &str, trial: TrialRef<'_, D>) -> Option<f64> {
+    charged_at(prices.of(model)?, prices.batch, trial)
 }
 
 /// The cost of a reply at this price; `batch` is the share of it that a batch costs.
-fn charged_at<D>(price: Price, batch: f64, record: &Record<D>) -> Option<f64> {
-    let share = match record.via {
+fn charged_at<D: Detail>(price: Price, batch: f64, trial: TrialRef<'_, D>) -> Option<f64> {
+    let share = match trial.via() {
         Via::Direct | Via::File => 1.0,
         Via::Batch => batch,
     };
-    Some(share * price.charged(record.usage?))
+    Some(share * price.charged(trial.usage()?))
 }
 
 /// The price of a model of a run: the one that its file of models states, else that of the table by the name that the endpoint knows.
@@ -50,15 +53,15 @@ pub(in crate::job) fn price(prices: &Prices, manifest: &RunManifest, model: &str
 }
 
 /// The cost of a run's replies at list prices, as text; `None` if no model of the run has a known price.
-pub(super) fn cost<'a, D: 'a>(
-    records: impl Iterator<Item = &'a Record<D>>,
+pub(super) fn cost<'t, D: Detail + 't>(
+    trials: impl Iterator<Item = TrialRef<'t, D>>,
     manifest: &RunManifest,
 ) -> Result<Option<String>> {
     let prices = Prices::built_in()?;
     let (mut dollars, mut counted, mut unknown) = (0.0, 0_usize, 0_usize);
-    for record in records.filter(|record| record.reply.is_some()) {
-        let price = price(&prices, manifest, &record.model);
-        match price.and_then(|price| charged_at(price, prices.batch, record)) {
+    for trial in trials.filter(|trial| trial.has_reply()) {
+        let price = price(&prices, manifest, trial.model());
+        match price.and_then(|price| charged_at(price, prices.batch, trial)) {
             Some(cost) => {
                 dollars += cost;
                 counted += 1;

@@ -29,7 +29,7 @@ impl FigureRuns {
             let instead =
                 "figures draws runs of questions with choices; `report` draws the figures of these";
             let mut run: StoredRun<ChoiceDetail> = StoredRun::of_choices(folder, instead)?;
-            if run.records.is_empty() {
+            if run.trials.is_empty() {
                 return Err(no_records(run.folder));
             }
             run.leave_out(ShownModels::Current);

@@ -1,24 +1,26 @@
 //! Joining several runs of either kind: [`join`].
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::path::PathBuf;
 
 use super::cost::cost;
 use super::lights::Lights;
 use super::models::Names;
 use crate::error::Result;
-use crate::job::stored::StoredRun;
+use crate::job::stored::{RunTexts, StoredRun};
 use crate::types::manifest::RunManifest;
 use crate::types::{
-    Condition, Detail, FrameId, ImageFidelity, ModelListing, QuestionId, Record, RunQuestion,
-    Thumbnail, TrialKey,
+    Condition, Detail, FrameId, ImageFidelity, ModelListing, QuestionId, RunQuestion, Thumbnail,
+    TrialKey, TrialRef, Trials,
 };
 
-/// The runs, with all records, questions and thumbnails.
-pub(super) struct Joined<D> {
+/// The runs, with all trials, questions and thumbnails.
+pub(super) struct Joined<D: Detail> {
     /// The runs in the order in which they were named.
     pub(super) runs: Vec<JoinedRun>,
-    pub(super) records: Vec<Record<D>>,
+    pub(super) trials: Trials<D>,
+    /// The texts of the replies, by the number of the file in the place of a text.
+    pub(super) texts: Vec<RunTexts<D>>,
     pub(super) questions: Vec<RunQuestion>,
     pub(super) thumbnails: Vec<Thumbnail>,
     pub(super) fidelity: Vec<ImageFidelity>,
@@ -38,26 +40,26 @@ pub(super) struct JoinedRun {
     pub(super) cost: Option<String>,
     /// The questions of the run, of which [`Joined::questions`] holds each once.
     pub(super) questions: Vec<RunQuestion>,
-    /// Places of its records among those of all runs. A record that several runs have is stored once, and listed by each.
-    pub(super) records: Vec<usize>,
+    /// Places of its trials among those of all runs. A trial that several runs have is stored once, and listed by each.
+    pub(super) trials: Vec<u32>,
     /// Number of its replies.
     pub(super) replies: usize,
     /// Number of its replies that no run before it by name has.
     pub(super) added: usize,
     /// The names that servers gave for each model, by the name under which it was asked.
     pub(super) served: BTreeMap<String, BTreeSet<String>>,
-    /// The models whose records are not shown.
+    /// The models whose trials are not shown.
     pub(super) left_out: BTreeSet<String>,
 }
 
 /// Joins runs. Conditions whose images differ between runs are kept apart ([`Lights`]), and so are models that were asked in
 /// different ways or gave other replies to the same trials ([`Names`]). A trial to which two runs have the same reply counts once.
-/// Only records that are `compared` decide about models.
+/// Only trials that are `compared` decide about models.
 ///
 /// The result does not depend on the order of the runs, but for the order of [`Joined::runs`].
 pub(super) fn join<D: Detail>(
     mut runs: Vec<StoredRun<D>>,
-    compared: impl Fn(&Record<D>) -> bool,
+    compared: impl Fn(TrialRef<'_, D>) -> bool,
 ) -> Result<Joined<D>> {
     let names = names(&runs);
     let mut order: Vec<usize> = (0..runs.len()).collect();
@@ -66,10 +68,8 @@ pub(super) fn join<D: Detail>(
     });
     let lights = Lights::of(&runs, &names, &order);
     for (index, run) in runs.iter_mut().enumerate().filter(|_| !lights.is_one()) {
-        let records = run.records.iter_mut();
-        for condition in records.filter_map(|record| record.condition.as_mut()) {
-            lights.mark(condition, index);
-        }
+        run.trials
+            .change_conditions(|condition| lights.mark(condition, index));
         for thumbnail in &mut run.thumbnails {
             lights.mark(&mut thumbnail.condition, index);
         }
@@ -77,7 +77,8 @@ pub(super) fn join<D: Detail>(
     let models = Names::of(&runs, &names, &order, &compared);
     let mut joined = Joined {
         runs: Vec::new(),
-        records: Vec::new(),
+        trials: Trials::default(),
+        texts: Vec::new(),
         questions: Vec::new(),
         thumbnails: Vec::new(),
         fidelity: Vec::new(),
@@ -85,7 +86,10 @@ pub(super) fn join<D: Detail>(
         models,
         listing: ModelListing::default(),
     };
-    let mut known = Known::default();
+    let mut known = Known {
+        trials: (runs.len() > 1).then(HashMap::new),
+        ..Known::default()
+    };
     let mut runs: Vec<Option<StoredRun<D>>> = runs.into_iter().map(Some).collect();
     let mut by_name = Vec::new();
     for index in order {
@@ -102,13 +106,74 @@ pub(super) fn join<D: Detail>(
 /// What the runs that are already joined have, so that nothing is added twice.
 #[derive(Default)]
 struct Known {
-    /// Places of the records with a reply, by key and by the group of the model's name.
-    trials: HashMap<(TrialKey, usize), usize>,
+    /// Places of the trials with a reply, by key and by the group of the model's name; `None` of a single run, which has each trial once.
+    trials: Option<HashMap<(TrialKey, usize), u32>>,
     questions: HashMap<QuestionId, usize>,
     thumbnails: BTreeSet<(FrameId, Condition)>,
 }
 
 impl<D: Detail> Joined<D> {
+    /// The trials of a run.
+    pub(super) fn of(&self, run: &JoinedRun) -> impl Iterator<Item = TrialRef<'_, D>> {
+        run.trials
+            .iter()
+            .map(|place| self.trials.at(*place as usize))
+    }
+
+    /// Adds the trials of a run that no run before it has. Returns the places of all of its trials, and the numbers of its replies and
+    /// of those that are new.
+    fn add_trials(
+        &mut self,
+        mut own: Trials<D>,
+        index: usize,
+        known: &mut Known,
+    ) -> (Vec<u32>, usize, usize) {
+        let replies = own.iter().filter(|trial| !trial.failed()).count();
+        let key = |trial: TrialRef<'_, D>| {
+            let group = self.models.group(trial.model(), index);
+            let group = group.map_or(0, |(group, _)| group + 1);
+            (self.models.key(trial.key()), group)
+        };
+        let mut places = Vec::with_capacity(own.len());
+        let mut is_new = Vec::with_capacity(own.len());
+        let (mut next, mut added) = (self.trials.len() as u32, 0);
+        for trial in own.iter() {
+            let key = key(trial);
+            let found = known.trials.as_ref();
+            let found = found.and_then(|trials| trials.get(&key).copied());
+            let place = found.unwrap_or(next);
+            is_new.push(place == next);
+            if place == next {
+                next += 1;
+                if !trial.failed() {
+                    added += 1;
+                    known
+                        .trials
+                        .as_mut()
+                        .map(|trials| trials.insert(key, place));
+                }
+            }
+            places.push(place);
+        }
+        own.rename(|model| {
+            self.models
+                .group(model, index)
+                .map(|(_, name)| name.clone())
+        });
+        if self.trials.is_empty() && self.texts.is_empty() {
+            // The trials of the first run stay where they are.
+            let mut is_new = is_new.into_iter();
+            own.retain(|_| is_new.next() == Some(true));
+            self.trials = own;
+        } else {
+            let logs = self.texts.len();
+            for (trial, _) in own.iter().zip(is_new).filter(|(_, is_new)| *is_new) {
+                self.trials.copy(trial, logs);
+            }
+        }
+        (places, replies, added)
+    }
+
     /// Adds what a run has and no run before it.
     fn add(
         &mut self,
@@ -117,46 +182,13 @@ impl<D: Detail> Joined<D> {
         name: String,
         known: &mut Known,
     ) -> Result<JoinedRun> {
-        let charged = run.records.iter().chain(&run.left_out);
+        let charged = run.trials.iter().chain(run.left_out.iter());
         let cost = cost(charged, &run.manifest)?;
-        let left_out: BTreeSet<String> = run
-            .left_out
-            .into_iter()
-            .map(|record| record.model)
-            .collect();
-        let mut records = Vec::with_capacity(run.records.len());
-        let (mut replies, mut added) = (0, 0);
-        let served = served(&run.records);
-        let mut next = self.records.len();
-        let new = run.records.into_iter().filter_map(|mut record| {
-            replies += usize::from(!record.failed());
-            let group = self.models.group(&record.model, index);
-            let trial = (
-                self.models.key(record.key),
-                group.map_or(0, |(group, _)| group + 1),
-            );
-            if let Some(place) = known.trials.get(&trial) {
-                records.push(*place);
-                return None;
-            }
-            if !record.failed() {
-                known.trials.insert(trial, next);
-                added += 1;
-            }
-            if let Some((_, name)) = group {
-                record.model.clone_from(name);
-            }
-            records.push(next);
-            next += 1;
-            Some(record)
-        });
-        // The records of the first run stay where they are.
-        let mut new: Vec<Record<D>> = new.collect();
-        if self.records.is_empty() {
-            self.records = new;
-        } else {
-            self.records.append(&mut new);
-        }
+        let left_out = run.left_out.asked().into_iter().flatten();
+        let left_out = left_out.map(|(model, _)| model.to_owned()).collect();
+        let served = served(&run.trials);
+        let (trials, replies, added) = self.add_trials(run.trials, index, known);
+        self.texts.push(run.texts);
         for question in &run.questions {
             let next = self.questions.len();
             let place = *known.questions.entry(question.id.clone()).or_insert(next);
@@ -178,7 +210,7 @@ impl<D: Detail> Joined<D> {
             manifest: run.manifest,
             cost,
             questions: run.questions,
-            records,
+            trials,
             replies,
             added,
             served,
@@ -188,17 +220,17 @@ impl<D: Detail> Joined<D> {
 }
 
 /// The names that servers gave for each model.
-fn served<D>(records: &[Record<D>]) -> BTreeMap<String, BTreeSet<String>> {
-    let pairs = records
+fn served<D: Detail>(trials: &Trials<D>) -> BTreeMap<String, BTreeSet<String>> {
+    let pairs = trials
         .iter()
-        .filter_map(|record| Some((&record.model, record.served_model.as_ref()?)));
-    let pairs: BTreeSet<(&String, &String)> = pairs.collect();
+        .filter_map(|trial| Some((trial.model(), trial.served_model()?)));
+    let pairs: HashSet<(&str, &str)> = pairs.collect();
     let mut served = BTreeMap::<String, BTreeSet<String>>::new();
     for (model, name) in pairs {
         served
-            .entry(model.clone())
+            .entry(model.to_owned())
             .or_default()
-            .insert(name.clone());
+            .insert(name.to_owned());
     }
     served
 }

@@ -7,7 +7,7 @@ use crate::job::stored::StoredRun;
 use crate::score::subject::is_control;
 use crate::types::degradation::Kind;
 use crate::types::manifest::RunManifest;
-use crate::types::{Condition, Detail, Digest, EnhancerName, KindReading, LightGroup, Record};
+use crate::types::{Condition, Detail, Digest, EnhancerName, KindReading, LightGroup, TrialRef};
 
 /// The conditions of one curve: a kind of degradation in a light reading, raw or with an enhancer, at all levels.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -164,7 +164,7 @@ fn parted_by(group: &[usize], bases: &[&Vec<Vec<usize>>]) -> Vec<Vec<usize>> {
     parts.into_iter().map(|(_, part)| part).collect()
 }
 
-/// What the records of the runs hold about their images.
+/// What the trials of the runs say of their images.
 struct Seen {
     /// The runs that have each curve.
     curves: BTreeMap<LightCurve, BTreeSet<usize>>,
@@ -219,7 +219,7 @@ impl Seen {
         let mut undigested = Vec::new();
         for (index, run) in runs.iter().enumerate() {
             let (mut with, mut without) = (false, false);
-            for (condition, source, digest) in run.records.iter().filter_map(image) {
+            for (condition, source, digest) in run.trials.iter().filter_map(image) {
                 curves.entry(condition).or_default().insert(index);
                 with |= digest.is_some();
                 without |= digest.is_none();
@@ -267,12 +267,14 @@ impl Seen {
     }
 }
 
-/// The condition, the frame or walk, and the digest of the images of a record; `None` if the model saw none or the trial failed. A
+/// The condition, the frame or walk, and the digest of the images of a trial; `None` if the model saw none or the trial failed. A
 /// control of the observer is shown a changed image, which says nothing of the light.
-fn image<D: Detail>(record: &Record<D>) -> Option<(&Condition, &str, Option<Digest>)> {
-    let is_image = !record.failed() && !is_control(&record.model);
-    let condition = record.condition.as_ref().filter(|_| is_image)?;
-    Some((condition, record.detail.source(), record.detail.shown()))
+fn image<'t, D: Detail>(
+    trial: TrialRef<'t, D>,
+) -> Option<(&'t Condition, &'t str, Option<Digest>)> {
+    let is_image = !trial.failed() && !is_control(trial.model());
+    let condition = trial.condition().filter(|_| is_image)?;
+    Some((condition, trial.source(), trial.sent()))
 }
 
 /// Whether two runs show the same images on a curve, by their manifests.

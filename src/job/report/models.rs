@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::settings::{Setting, Settings, differing, is_digest, parameters};
 use crate::job::stored::StoredRun;
-use crate::types::{Condition, Detail, QuestionId, Record, RunQuestion, TrialKey, View};
+use crate::types::{Condition, Detail, QuestionId, RunQuestion, TrialKey, TrialRef, View};
 
 /// The most settings in the name of a model; with more, the run's name stands there.
 const MOST_SETTINGS: usize = 2;
@@ -19,12 +19,12 @@ pub(super) type Item<'a> = (
     (&'a [String], u32),
 );
 
-/// The item of a record.
-pub(super) fn item<D: Detail>(record: &Record<D>) -> Item<'_> {
+/// The item of a trial.
+pub(super) fn item<'t, D: Detail>(trial: TrialRef<'t, D>) -> Item<'t> {
     (
-        (record.view, &record.model),
-        (record.condition.as_ref(), &record.question),
-        (record.detail.choices(), record.detail.repeat()),
+        (trial.view(), trial.model()),
+        (trial.condition(), trial.question()),
+        (trial.choices(), trial.repeat()),
     )
 }
 
@@ -72,12 +72,12 @@ impl ModelApart {
 
 impl Names {
     /// The names of the models in these runs; conditions are marked by their light. `order` holds the numbers of the runs in the
-    /// order of their names, `names`. Only records that are `compared` count.
+    /// order of their names, `names`. Only trials that are `compared` count.
     pub(super) fn of<D: Detail>(
         runs: &[StoredRun<D>],
         names: &[String],
         order: &[usize],
-        compared: impl Fn(&Record<D>) -> bool,
+        compared: impl Fn(TrialRef<'_, D>) -> bool,
     ) -> Self {
         let mut found = Self::default();
         if runs.len() < 2 {
@@ -86,8 +86,8 @@ impl Names {
         // The runs of each model, in the order of their names.
         let mut having = BTreeMap::<&str, Vec<usize>>::new();
         for &index in order {
-            for record in runs[index].records.iter().filter(|record| compared(record)) {
-                let runs = having.entry(&record.model).or_default();
+            for trial in runs[index].trials.iter().filter(|trial| compared(*trial)) {
+                let runs = having.entry(trial.model()).or_default();
                 if runs.last() != Some(&index) {
                     runs.push(index);
                 }
@@ -232,14 +232,13 @@ impl Overlap {
     }
 
     /// Adds a trial that both runs asked.
-    fn add<D>(&mut self, one: &Record<D>, other: &Record<D>) {
+    fn add<D: Detail>(&mut self, one: TrialRef<'_, D>, other: TrialRef<'_, D>) {
         if one.failed() || other.failed() {
             return;
         }
-        let served = one.served_model.as_ref().zip(other.served_model.as_ref());
+        let served = one.served_model().zip(other.served_model());
         self.repeated += 1;
-        self.other_replies +=
-            usize::from((&one.reply, &one.refusal) != (&other.reply, &other.refusal));
+        self.other_replies += usize::from(!one.has_reply_of(other));
         self.other_served += usize::from(served.is_some_and(|(one, other)| one != other));
     }
 }
@@ -247,12 +246,12 @@ impl Overlap {
 /// The overlap of each two runs, by model.
 type Overlaps<'a> = HashMap<(&'a str, usize, usize), Overlap>;
 
-/// The overlaps of each two runs; and the trials that repeat another one. The keys of two records may differ although the image, the
+/// The overlaps of each two runs; and the trials that repeat another one. The keys of two trials may differ although the image, the
 /// words, the model and its parameters are the same: the program may make the same image in two ways.
 fn overlaps<'a, D: Detail>(
     runs: &'a [StoredRun<D>],
     order: &[usize],
-    compared: impl Fn(&Record<D>) -> bool,
+    compared: impl Fn(TrialRef<'_, D>) -> bool,
 ) -> (Overlaps<'a>, HashMap<TrialKey, TrialKey>) {
     let texts: Vec<HashMap<&QuestionId, &RunQuestion>> = runs
         .iter()
@@ -263,47 +262,46 @@ fn overlaps<'a, D: Detail>(
                 .collect()
         })
         .collect();
-    let is_repeated = |[one, other]: [(usize, &Record<D>); 2]| {
-        let words = [one, other].map(|(run, record)| texts[run].get(&record.question));
+    let is_repeated = |[one, other]: [(usize, TrialRef<'_, D>); 2]| {
+        let words = [one, other].map(|(run, trial)| texts[run].get(trial.question()));
         let same_words = match words {
             [Some(one), Some(other)] => (&one.text, &one.choices) == (&other.text, &other.choices),
             _ => false,
         };
-        let [(run, record), (other_run, other)] = [one, other];
-        let image = record.detail.shown();
-        let same_image =
-            record.view == View::Image && image.is_some() && image == other.detail.shown();
-        let has = |run: usize| parameters_are_known(&runs[run], &record.model);
+        let [(run, trial), (other_run, other)] = [one, other];
+        let image = trial.sent();
+        let same_image = trial.view() == View::Image && image.is_some() && image == other.sent();
+        let has = |run: usize| parameters_are_known(&runs[run], trial.model());
         same_words && same_image && has(run) && has(other_run)
     };
-    // For each item its first record in each run.
-    let mut firsts = HashMap::<Item<'_>, Vec<(usize, &Record<D>)>>::new();
+    // For each item its first trial in each run.
+    let mut firsts = HashMap::<Item<'_>, Vec<(usize, TrialRef<'_, D>)>>::new();
     let (mut overlaps, mut repeated) = (Overlaps::new(), HashMap::new());
     for &index in order {
-        for record in runs[index].records.iter().filter(|record| compared(record)) {
-            let known = firsts.entry(item(record)).or_default();
+        for trial in runs[index].trials.iter().filter(|trial| compared(*trial)) {
+            let known = firsts.entry(item(trial)).or_default();
             if known.last().is_some_and(|(run, _)| *run == index) {
                 continue;
             }
             for &(run, other) in &*known {
-                let pair = (&*record.model, run.min(index), run.max(index));
+                let pair = (trial.model(), run.min(index), run.max(index));
                 let overlap: &mut Overlap = overlaps.entry(pair).or_default();
-                if record.key != other.key {
-                    if !is_repeated([(index, record), (run, other)]) {
+                if trial.key() != other.key() {
+                    if !is_repeated([(index, trial), (run, other)]) {
                         overlap.other_trials += 1;
                         continue;
                     }
-                    repeated.entry(record.key).or_insert(other.key);
+                    repeated.entry(trial.key()).or_insert(other.key());
                 }
-                overlap.add(record, other);
+                overlap.add(trial, other);
             }
-            known.push((index, record));
+            known.push((index, trial));
         }
     }
     (overlaps, repeated)
 }
 
-fn parameters_are_known<D>(run: &StoredRun<D>, model: &str) -> bool {
+fn parameters_are_known<D: Detail>(run: &StoredRun<D>, model: &str) -> bool {
     let models = run.manifest.columns.get("model");
     models.is_some_and(|models| models.contains_key(model))
 }

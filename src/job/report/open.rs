@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::job::outcome::Outcome;
 use crate::job::outcome::StdoutFormat;
 use crate::job::predictions::{AnswerState, Prediction, predictions};
-use crate::job::stored::{ShownModels, StoredRun, in_order};
+use crate::job::stored::{ShownModels, StoredRun, name, sort};
 use crate::report::alert::{Alert, AlertKind};
 use crate::report::markdown::MarkdownReport;
 use crate::report::openeqa::{OpenReport, ReportedAnswer, products, render, summary_json, tables};
@@ -29,8 +29,10 @@ use crate::score::open::{
 use crate::score::subject::Subject;
 use crate::store::Store;
 use crate::types::flag::read_word;
-use crate::types::manifest::Status;
-use crate::types::{ModelListing, OpenDetail, QuestionId, Record, RunQuestion, Step};
+use crate::types::manifest::{RunManifest, Status};
+use crate::types::{
+    ModelListing, OpenDetail, QuestionId, Record, RunQuestion, Step, Thumbnail, TrialRef,
+};
 
 /// Setting in the manifest with the name of the judge.
 pub(crate) const JUDGE: &str = "--judge";
@@ -39,7 +41,7 @@ pub(crate) const PROTOCOL: &str = "--protocol";
 
 /// The answers of a run, with their scores.
 pub(crate) struct Scores {
-    pub(crate) run: StoredRun<OpenDetail>,
+    pub(crate) run: OpenRun,
     judge: Option<String>,
     protocol: Protocol,
     summary: OpenSummary,
@@ -117,7 +119,7 @@ impl Scores {
             enhancers: &self.enhancers,
             judge: self.judge.as_deref(),
             protocol: self.protocol,
-            name: self.run.name(),
+            name: name(&self.run.folder),
             folder: typed(&self.run.folder),
             questions: &self.run.questions,
             answers: &self.answers,
@@ -181,9 +183,19 @@ fn files(report: &OpenReport<'_>, tables: &[Table]) -> Result<Vec<(String, Vec<u
     Ok(files)
 }
 
+/// A run of open questions, or several joined to one, with its whole records.
+pub(crate) struct OpenRun {
+    pub(crate) folder: PathBuf,
+    pub(crate) manifest: RunManifest,
+    /// In the order of the questions, conditions and models.
+    pub(crate) records: Vec<Record<OpenDetail>>,
+    pub(crate) questions: Vec<RunQuestion>,
+    pub(crate) thumbnails: Vec<Thumbnail>,
+}
+
 /// Several runs, joined to one.
 pub(super) struct JoinedRuns {
-    pub(super) run: StoredRun<OpenDetail>,
+    pub(super) run: OpenRun,
     /// What differs between the runs, and what is wrong with their numbers.
     pub(super) alerts: Vec<Alert>,
     /// How their enhancers were used.
@@ -232,7 +244,7 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
             }
         }
     }
-    let joined = join(runs, |record| record.detail.step == Step::Answer)?;
+    let joined = join(runs, |trial| trial.is_answer())?;
     let mut alerts = of_runs(&joined);
     alerts.extend(of_joining(&joined));
     if joined.runs.len() == 1 {
@@ -243,14 +255,14 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
     let listing = listing(&joined);
     let first = joined.runs.into_iter().next();
     let first = first.ok_or_else(|| Error::usage("RUN", "no run is named"))?;
-    let run = StoredRun {
-        left_out: Vec::new(),
-        records: in_order(joined.records, &joined.questions, &first.manifest.models),
+    let mut trials = joined.trials;
+    sort(&mut trials, &joined.questions, &first.manifest.models);
+    let run = OpenRun {
+        records: trials.iter().map(TrialRef::record).collect(),
         folder: first.folder,
         manifest: first.manifest,
         questions: joined.questions,
         thumbnails: joined.thumbnails,
-        fidelity: joined.fidelity,
     };
     Ok(JoinedRuns {
         run,

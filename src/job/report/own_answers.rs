@@ -98,7 +98,7 @@ fn files(
 
 fn found(combined: &Combined) -> SelfAgreement<'_> {
     SelfAgreement::new(
-        &combined.records,
+        &combined.trials,
         &ties(&combined.questions),
         &combined.questions,
         &combined.listing,

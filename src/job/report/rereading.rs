@@ -38,12 +38,13 @@ impl LenientChange {
     /// The change for stored records.
     ///
     /// # Errors
-    /// If the choices of a record are not valid.
-    pub(super) fn through<'a>(
+    /// If a record cannot be read, or its choices are not valid.
+    pub(super) fn through(
         mut self,
-        records: impl IntoIterator<Item = &'a Record>,
+        records: impl IntoIterator<Item = Result<Record>>,
     ) -> Result<Self> {
         for record in records {
+            let record = record?;
             self.add(&record.detail, &record.clone().reread()?.detail);
         }
         Ok(self)

@@ -156,12 +156,13 @@ fn of_choices(
 ) -> Result<Outcome> {
     let mut reread_lines = String::new();
     for run in &mut runs {
-        if run.records.is_empty() {
+        if run.trials.is_empty() {
             return Err(no_records(run.folder.clone()));
         }
         if args.rescore {
             reread_lines += &reread(run)?;
-            run.manifest.counts = count(run.manifest.counts.trials, &run.records);
+            let failed = run.trials.iter().map(|trial| trial.failed());
+            run.manifest.counts = count(run.manifest.counts.trials, failed);
         }
         run.leave_out(args.shown());
     }
@@ -305,7 +306,7 @@ fn of_open(
         let problem = "compares runs of questions with choices; marks of open questions have no such test: leave it out";
         return Err(Error::usage(*flag, problem));
     }
-    if let Some(run) = runs.iter().find(|run| run.records.is_empty()) {
+    if let Some(run) = runs.iter().find(|run| run.trials.is_empty()) {
         return Err(no_records(run.folder.clone()));
     }
     for run in &mut runs {
@@ -339,23 +340,26 @@ fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<String> {
     let mut store = Store::open(&run.folder, &run.manifest, AddressChange::Allowed)?;
     let mut changed = 0;
     let mut lenient = LenientChange::of(&run.manifest);
-    for record in &mut run.records {
+    for trial in run.trials.iter() {
+        let record = run.record(trial)?;
         let now = record.clone().reread()?;
         lenient.add(&record.detail, &now.detail);
-        if now != *record {
+        if now != record {
             store.append(&now)?;
             changed += 1;
-            *record = now;
         }
     }
     store.sync()?;
-    let records = run.records.len();
+    let records = run.trials.len();
     let mut lines = format!("{changed} of {records} records now read differently\n");
     if !lenient.is_current() {
         let _ = writeln!(lines, "{}", lenient.words());
         run.manifest.reply_reading = ChoiceDetail::REPLY_READING.map(str::to_owned);
         run.manifest.updated = now();
         store.write_manifest(&run.manifest)?;
+    }
+    if changed > 0 {
+        *run = StoredRun::of(&run.folder, run.manifest.clone())?;
     }
     Ok(lines)
 }

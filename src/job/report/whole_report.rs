@@ -22,7 +22,7 @@ pub(crate) struct WholeReport {
 /// # Errors
 /// If the run has no record.
 pub(super) fn shown<D: Detail>(mut run: StoredRun<D>) -> Result<StoredRun<D>> {
-    if run.records.is_empty() {
+    if run.trials.is_empty() {
         return Err(no_records(run.folder));
     }
     run.leave_out(ShownModels::Current);

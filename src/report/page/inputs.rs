@@ -1,7 +1,9 @@
 //! Data of the page besides the findings: [`PageInputs`].
 
+use super::run_usage::RunUsage;
+use crate::error::Result;
 use crate::types::manifest::RunManifest;
-use crate::types::{Record, RunQuestion, Thumbnail};
+use crate::types::{RunQuestion, TextPlace, Thumbnail};
 
 /// A run on the page.
 #[derive(Debug, Clone)]
@@ -11,14 +13,13 @@ pub struct PageRun<'a> {
     /// The folder of the run as a command on it names it; of an absolute path the name alone, behind `DIR/`.
     pub folder: String,
     pub manifest: &'a RunManifest,
-    /// Records of the run, for totals of requests, tokens and latency.
-    pub records: Vec<&'a Record>,
-    /// Cost of the records in words; `None` if it is not known.
+    /// What the trials of the run took.
+    pub usage: RunUsage,
+    /// Cost of the replies in words; `None` if it is not known.
     pub cost: Option<String>,
 }
 
 /// Data of the page besides the findings.
-#[derive(Debug)]
 pub struct PageInputs<'a> {
     /// The runs that the page is about.
     pub runs: Vec<PageRun<'a>>,
@@ -26,4 +27,6 @@ pub struct PageInputs<'a> {
     pub questions: &'a [RunQuestion],
     /// Thumbnails of the images; empty if the runs do not store them.
     pub thumbnails: &'a [Thumbnail],
+    /// Reads what stands in the place of a reply: its text, that of a refusal, or what the error says.
+    pub texts: Box<dyn Fn(TextPlace) -> Result<String> + 'a>,
 }

@@ -12,25 +12,26 @@ use crate::report::outcome_words;
 use crate::score::choice::ReadingMode;
 use crate::score::confusion;
 use crate::score::grid::{Grid, TrialResult};
-use crate::types::{AxisLevel, FailureKind, QuestionId, Record, RunQuestion, UnreadReason, View};
+use crate::types::{AxisLevel, FailureKind, QuestionId, RunQuestion, TrialRef, UnreadReason, View};
 
 /// Everything that the script shows, as compressed JSON in base64.
 ///
 /// # Errors
-/// If the data cannot be written.
+/// If a reply cannot be read, or the data cannot be written.
 pub(super) fn packed<'a>(
     grid: &'a Grid<'a>,
     confusions: &'a [confusion::Confusion],
     inputs: &PageInputs<'a>,
 ) -> Result<String> {
-    packed_by(|limit| data(grid, confusions, inputs, limit))
+    let replies = Replies::read(grid, inputs)?;
+    packed_by(|limit| data(grid, confusions, inputs, (&replies, limit)))
 }
 
 fn data<'a>(
     grid: &'a Grid<'a>,
     confusions: &'a [confusion::Confusion],
     inputs: &PageInputs<'a>,
-    limit: SizeLimit,
+    (replies, limit): (&Replies, SizeLimit),
 ) -> PageData<'a> {
     let run_questions: HashMap<&QuestionId, &RunQuestion> = inputs
         .questions
@@ -43,14 +44,14 @@ fn data<'a>(
     let mut items = Vec::new();
     let mut times = HashMap::<&QuestionId, usize>::new();
     for item in &grid.items {
-        let record = item.record;
-        let number = question_ids.index_of(&record.question);
+        let asked = item.asked;
+        let number = question_ids.index_of(&*asked.question);
         if number == questions.len() {
-            let run_question = run_questions.get(&record.question);
+            let run_question = run_questions.get(&*asked.question);
             questions.push(Question {
-                id: &record.question.0,
-                frame: frames.index_of(&*record.detail.frame.0),
-                family: families.index_of(record.detail.family.name()),
+                id: &asked.question.0,
+                frame: frames.index_of(&*asked.frame.0),
+                family: families.index_of(asked.family.name()),
                 text: run_question.map_or("", |run_question| &run_question.text),
                 outlines: run_question.map_or_else(Vec::new, |question| question.outlines()),
                 object: run_question.and_then(|question| question.object()),
@@ -61,19 +62,18 @@ fn data<'a>(
                     .filter(|e| !e.is_null()),
             });
         }
-        let time = times.entry(&record.question).or_default();
+        let time = times.entry(&asked.question).or_default();
         *time += 1;
         items.push(Item {
             name: match time {
-                1 => record.question.to_string(),
-                time => format!("{}#{time}", record.question),
+                1 => asked.question.to_string(),
+                time => format!("{}#{time}", asked.question),
             },
             question: number,
-            choices: choices.index_of(record.detail.choices.as_slice()),
-            truth: record.detail.truth,
+            choices: choices.index_of(asked.choices.as_slice()),
+            truth: asked.truth,
         });
     }
-    let (texts, replies) = replies(grid, limit.text);
     let marks = |mode| {
         let of =
             |subject| (0..grid.items.len()).map(move |item| code(grid.result(subject, item), mode));
@@ -100,8 +100,8 @@ fn data<'a>(
         lenient: marks(ReadingMode::Lenient),
         reasons,
         why,
-        texts,
-        replies,
+        texts: shortened(&replies.texts(), limit.text),
+        replies: replies.indices.clone(),
         confusions: confusions_of(grid, confusions),
     }
 }
@@ -150,12 +150,12 @@ enum Why {
 }
 
 impl Why {
-    fn of(record: Option<&Record>) -> Self {
-        let unread = record.and_then(|record| record.detail.strict?.why);
-        let failed = record.and_then(|record| record.failure.as_ref());
+    fn of(trial: Option<TrialRef<'_>>) -> Self {
+        let unread = trial.and_then(|trial| trial.strict()?.why);
+        let failed = trial.and_then(TrialRef::failure);
         match (unread, failed) {
             (Some(why), _) => Self::Unread(why),
-            (None, Some(failure)) => Self::Failed(failure.kind, failure.status),
+            (None, Some((kind, status))) => Self::Failed(kind, status),
             (None, None) => Self::Nothing,
         }
     }
@@ -177,29 +177,47 @@ fn reasons(grid: &Grid<'_>) -> (Vec<String>, Vec<Vec<usize>>) {
     let mut indices = Vec::new();
     for subject in 0..grid.subjects.len() {
         let why =
-            (0..grid.items.len()).map(|item| reasons.index_of(Why::of(grid.record(subject, item))));
+            (0..grid.items.len()).map(|item| reasons.index_of(Why::of(grid.trial(subject, item))));
         indices.push(why.collect());
     }
     (reasons.list.into_iter().map(Why::words).collect(), indices)
 }
 
-/// The different replies, cut if they are too long, and for each subject and item the index of its reply.
+/// The different replies, and for each subject and item the index of its reply; the first is empty.
 ///
 /// Refusals and failure messages take the place of a reply.
-fn replies(grid: &Grid<'_>, limit: usize) -> (Vec<String>, Vec<Vec<usize>>) {
-    let mut texts: Distinct<&str> = Distinct::new();
-    texts.index_of("");
-    let mut indices = Vec::new();
-    for subject in 0..grid.subjects.len() {
-        let of_subject = (0..grid.items.len()).map(|item| {
-            let Some(record) = grid.record(subject, item) else {
-                return 0;
-            };
-            texts.index_of(record.text_or_error().unwrap_or_default())
-        });
-        indices.push(of_subject.collect());
+struct Replies {
+    numbers: HashMap<String, usize>,
+    indices: Vec<Vec<usize>>,
+}
+
+impl Replies {
+    fn read(grid: &Grid<'_>, inputs: &PageInputs<'_>) -> Result<Self> {
+        let mut numbers = HashMap::from([(String::new(), 0)]);
+        let mut indices = Vec::new();
+        for subject in 0..grid.subjects.len() {
+            let mut of_subject = Vec::with_capacity(grid.items.len());
+            for item in 0..grid.items.len() {
+                let text = match grid.trial(subject, item) {
+                    None => String::new(),
+                    Some(trial) => (inputs.texts)(trial.text())?,
+                };
+                let next = numbers.len();
+                of_subject.push(*numbers.entry(text).or_insert(next));
+            }
+            indices.push(of_subject);
+        }
+        Ok(Self { numbers, indices })
     }
-    (shortened(&texts.list, limit), indices)
+
+    /// The replies in the order of their indices.
+    fn texts(&self) -> Vec<&str> {
+        let mut texts = vec![""; self.numbers.len()];
+        for (text, number) in &self.numbers {
+            texts[*number] = text;
+        }
+        texts
+    }
 }
 
 fn confusions_of<'a>(

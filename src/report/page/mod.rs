@@ -6,12 +6,14 @@
 pub(super) mod data;
 mod inputs;
 mod items;
+mod run_usage;
 mod sections;
 mod tables;
 
 pub(crate) use data::shown_thumbnails;
 pub use inputs::PageInputs;
 pub(crate) use inputs::PageRun;
+pub(crate) use run_usage::RunUsage;
 
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -29,7 +31,6 @@ use crate::error::Result;
 use crate::score::confusion::Confusion;
 use crate::score::findings::Findings;
 use crate::score::grid::Grid;
-use crate::types::Record;
 use crate::types::manifest::RunManifest;
 
 /// The template of the page, its style and its script.
@@ -227,7 +228,7 @@ fn intro(findings: &Findings<'_>) -> Vec<String> {
 fn facts(run: &PageRun<'_>) -> Value {
     let manifest = run.manifest;
     let mut rows = about(manifest);
-    rows.extend(usage(&run.records));
+    rows.extend(run.usage.facts());
     rows.extend(run.cost.iter().map(|cost| fact("cost", cost.clone())));
     rows.extend(settings(manifest));
     json!({"name": run.name, "rows": rows})
@@ -264,60 +265,5 @@ fn about(manifest: &RunManifest) -> Vec<(String, String)> {
         fact("made by", format!("darkqa-eval {}", manifest.version)),
         fact("created", manifest.created.clone()),
         fact("updated", manifest.updated.clone()),
-    ]
-}
-
-/// Totals over the records: requests, tokens, bytes, latency, and the models that the servers named.
-fn usage(records: &[&Record]) -> Vec<(String, String)> {
-    let requests: u64 = records
-        .iter()
-        .map(|record| u64::from(record.attempts))
-        .sum();
-    let tokens = |of: fn(&crate::types::Usage) -> Option<u64>| -> u64 {
-        let usages = records.iter().filter_map(|record| record.usage.as_ref());
-        usages.filter_map(of).sum()
-    };
-    let bytes: u64 = records
-        .iter()
-        .flat_map(|record| record.detail.images())
-        .map(|image| image.bytes as u64)
-        .sum();
-    let mut waits: Vec<u64> = records
-        .iter()
-        .filter_map(|record| record.latency_ms)
-        .collect();
-    waits.sort_unstable();
-    let served: std::collections::BTreeSet<&str> = records
-        .iter()
-        .filter_map(|record| record.served_model.as_deref())
-        .collect();
-    let at = |share: f64| {
-        let last = waits.len().saturating_sub(1) as f64;
-        waits
-            .get((last * share).round() as usize)
-            .map_or("–".to_owned(), |ms| format!("{ms} ms"))
-    };
-    vec![
-        fact(
-            "requests",
-            format!("{requests} for {} trials", records.len()),
-        ),
-        fact(
-            "tokens",
-            format!(
-                "{} of prompts, {} of replies",
-                tokens(|usage| usage.prompt_tokens),
-                tokens(|usage| usage.completion_tokens)
-            ),
-        ),
-        fact("image bytes", format!("{bytes}")),
-        fact(
-            "latency",
-            format!("median {}, 95 % within {}", at(0.5), at(0.95)),
-        ),
-        fact(
-            "served as",
-            served.into_iter().collect::<Vec<_>>().join(", "),
-        ),
     ]
 }

@@ -9,19 +9,15 @@ pub(super) fn flips(findings: &Findings<'_>) -> Table {
     let items = &findings.grid.items;
     let rows = findings.first_failures.iter().flat_map(|failure| {
         let items = items.iter().zip(&failure.first);
-        items.map(move |(item, first)| (failure, item.record, *first))
+        items.map(move |(item, first)| (failure, item.asked, *first))
     });
     TableBuilder::new("flips", rows)
-        .column(Text, "csv question", |(_, record, _)| {
-            record.question.to_string()
+        .column(Text, "csv question", |(_, asked, _)| {
+            asked.question.to_string()
         })
-        .column(Text, "csv frame", |(_, record, _)| {
-            record.detail.frame.to_string()
-        })
-        .family(|(_, record, _)| Some(&record.detail.family))
-        .column(Count, "csv repeat", |(_, record, _)| {
-            record.detail.repeat as usize
-        })
+        .column(Text, "csv frame", |(_, asked, _)| asked.frame.to_string())
+        .family(|(_, asked, _)| Some(&*asked.family))
+        .column(Count, "csv repeat", |(_, asked, _)| asked.repeat as usize)
         .line(|(failure, _, _)| (&failure.model, &failure.variant, failure.enhancer.as_ref()))
         .column(Text, "csv first_failing", |(_, _, first)| {
             first.map(|level| level.to_string())

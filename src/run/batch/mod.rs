@@ -61,8 +61,9 @@ fn reported<D: Detail>(
     write: impl FnOnce(&Store<D>, StoredRun<D>, StdoutFormat) -> Result<Outcome>,
 ) -> Result<Outcome> {
     let mut run = StoredRun::of(store.folder(), manifest)?;
-    let trials = run.manifest.counts.trials.max(run.records.len());
-    run.manifest.count(count(trials, &run.records));
+    let trials = run.manifest.counts.trials.max(run.trials.len());
+    let failed = run.trials.iter().map(|trial| trial.failed());
+    run.manifest.count(count(trials, failed));
     let mut outcome = write(store, run, show)?;
     if show != StdoutFormat::Json {
         outcome.output.insert_str(0, text);

@@ -9,10 +9,12 @@ use serde_json::Value;
 
 use super::redact::{Paths, Redactor};
 use crate::error::{Error, Result};
-use crate::job::stored::{AnyRun, ExperimentKind, RunLines, StoredRun, manifest};
+use crate::job::run_files::RunFiles;
+use crate::job::stored::{AnyRun, ExperimentKind, StoredRun, manifest};
 use crate::report::page::shown_thumbnails;
+use crate::store;
 use crate::types::manifest::RunManifest;
-use crate::types::{Detail, Thumbnail};
+use crate::types::{Detail, Record, Thumbnail};
 
 /// The small images that a bundle has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -58,15 +60,16 @@ impl RunParts {
         let place = Path::new(name);
         match ExperimentKind::of(folder)? {
             ExperimentKind::Choice => {
-                let lines = RunLines::read(folder)?;
-                let frames: Vec<_> = lines.questions.iter().map(|q| q.frame.clone()).collect();
+                let files = RunFiles::read(folder)?;
+                let frames: Vec<_> = files.questions.iter().map(|q| q.frame.clone()).collect();
                 let shown = |all: &[Thumbnail]| shown_thumbnails(all, &frames);
+                let lines = (store::read_records(folder)?, files);
                 let parts = parts(lines, thumbnails, shown, redactor)?;
                 let run = StoredRun::of_lines(place, manifest.clone(), parts.lines);
                 Self::new(manifest, parts.files, AnyRun::Choice(run), parts.thumbnails)
             }
             ExperimentKind::Open => {
-                let lines = RunLines::read(folder)?;
+                let lines = (store::read_records(folder)?, RunFiles::read(folder)?);
                 let parts = parts(lines, thumbnails, <[Thumbnail]>::to_vec, redactor)?;
                 let run = StoredRun::of_lines(place, manifest.clone(), parts.lines);
                 Self::new(manifest, parts.files, AnyRun::Open(run), parts.thumbnails)
@@ -95,13 +98,13 @@ impl RunParts {
 
 /// The lines of a run's files without what is private, and the files.
 struct Parts<D> {
-    lines: RunLines<D>,
+    lines: (Vec<Record<D>>, RunFiles),
     files: Vec<NamedFile>,
     thumbnails: [usize; 2],
 }
 
 fn parts<D: Detail>(
-    lines: RunLines<D>,
+    (records, lines): (Vec<Record<D>>, RunFiles),
     thumbnails: ThumbnailChoice,
     shown: impl Fn(&[Thumbnail]) -> Vec<Thumbnail>,
     redactor: &mut Redactor,
@@ -112,8 +115,7 @@ fn parts<D: Detail>(
         ThumbnailChoice::Shown => shown(&lines.thumbnails),
         ThumbnailChoice::All => lines.thumbnails,
     };
-    let records = lines.records.into_iter();
-    let (records, records_file) = redacted("records.jsonl", records, redactor)?;
+    let (records, records_file) = redacted("records.jsonl", records.into_iter(), redactor)?;
     let questions = lines.questions.into_iter();
     let (questions, questions_file) = redacted("questions.jsonl", questions, redactor)?;
     let (thumbnails, thumbnails_file) = redacted("thumbnails.jsonl", kept.into_iter(), redactor)?;
@@ -124,12 +126,14 @@ fn parts<D: Detail>(
     let files = files.into_iter().filter(|(_, content)| !content.is_empty());
     Ok(Parts {
         thumbnails: [thumbnails.len(), all - thumbnails.len()],
-        lines: RunLines {
+        lines: (
             records,
-            questions,
-            thumbnails,
-            fidelity,
-        },
+            RunFiles {
+                questions,
+                thumbnails,
+                fidelity,
+            },
+        ),
         files: files.collect(),
     })
 }

@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::job::stored::AnyRun;
 use crate::types::manifest::RunManifest;
-use crate::types::{AxisLevel, Record, shell_word};
+use crate::types::{AxisLevel, Detail, Trials, shell_word};
 
 /// What a README is written from.
 pub(super) struct ReadmeInputs<'a> {
@@ -67,7 +67,7 @@ fn fenced(lines: &str) -> String {
     format!("{fence}sh\n{shown}\n{fence}\n")
 }
 
-/// What a run asked, as its records tell.
+/// What a run asked, as its trials tell.
 #[derive(Default)]
 struct Asked {
     levels: BTreeSet<AxisLevel>,
@@ -77,14 +77,14 @@ struct Asked {
 }
 
 impl Asked {
-    fn of<D>(records: &[Record<D>]) -> Self {
+    fn of<D: Detail>(trials: &Trials<D>) -> Self {
         let mut asked = Self::default();
-        for record in records {
-            match &record.condition {
-                None => asked.blind.insert(record.model.to_string()),
+        for (model, condition) in trials.asked().into_iter().flatten() {
+            match condition {
+                None => asked.blind.insert(model.to_owned()),
                 Some(condition) => {
                     asked.levels.insert(condition.level());
-                    asked.seeing.insert(record.model.to_string())
+                    asked.seeing.insert(model.to_owned())
                 }
             };
         }
@@ -96,12 +96,12 @@ impl Asked {
 pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
     let mut words = vec!["darkqa-eval".to_owned()];
     let asked = match run {
-        AnyRun::Choice(run) => Asked::of(&run.records),
+        AnyRun::Choice(run) => Asked::of(&run.trials),
         AnyRun::Open(run) => {
             // The manifest has the digest of the questions, not their place.
             let questions = ["openeqa", "--questions", "DIR/questions.json"];
             words.extend(questions.map(str::to_owned));
-            Asked::of(&run.records)
+            Asked::of(&run.trials)
         }
     };
     let setting = |name: &str| manifest.settings.get(name).and_then(Value::as_str);

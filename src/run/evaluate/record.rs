@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::plan::ChoiceItem;
 use crate::ask::{Payload, Query};
 use crate::job::trial::{Item, Stimulus, Trial};
-use crate::types::{ChoiceDetail, Record, Shared, TrialOutcome};
+use crate::types::{ChoiceDetail, Record, TrialOutcome};
 
 impl Item for ChoiceItem {
     type Detail = ChoiceDetail;
@@ -41,7 +41,7 @@ impl Item for ChoiceItem {
             strict: None,
             lenient: None,
             outcome: TrialOutcome::Failed,
-            image: images.next().map(Shared::from),
+            image: images.next(),
             more_images: images.collect(),
             shown_frame: trial.item.shown_frame.clone(),
             observed: None,

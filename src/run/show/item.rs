@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use crate::error::Result;
 use crate::job::stored::AnyRun;
 use crate::report::outcome_words;
 use crate::types::manifest::RunManifest;
@@ -29,35 +30,30 @@ pub(super) struct ShownItem {
 }
 
 /// The manifest of a run, and one item of it; `None` if the run did not ask the item.
-pub(super) fn read(run: AnyRun, name: &str) -> (RunManifest, Option<ShownItem>) {
-    match run {
+///
+/// # Errors
+/// If a record cannot be read.
+pub(super) fn read(run: AnyRun, name: &str) -> Result<(RunManifest, Option<ShownItem>)> {
+    Ok(match run {
         AnyRun::Choice(run) => {
-            let matching = run
-                .records
-                .iter()
-                .filter(|record| record.question.0 == name);
-            let records: Vec<&Record> = matching.collect();
+            let records = run.records_of(name)?;
             let item = records.first().map(|first| ShownItem {
                 source: first.detail.frame.clone(),
                 text: choice_text(first, stored_question(&run.questions, name)),
-                answers: records.iter().map(|record| choice_answer(record)).collect(),
+                answers: records.iter().map(choice_answer).collect(),
             });
             (run.manifest, item)
         }
         AnyRun::Open(run) => {
-            let matching = run
-                .records
-                .iter()
-                .filter(|record| record.question.0 == name);
-            let records: Vec<&Record<OpenDetail>> = matching.collect();
+            let records = run.records_of(name)?;
             let item = records.first().map(|first| ShownItem {
                 source: FrameId(first.detail.episode.clone()),
                 text: open_text(first, stored_question(&run.questions, name)),
-                answers: records.iter().map(|record| open_answer(record)).collect(),
+                answers: records.iter().map(open_answer).collect(),
             });
             (run.manifest, item)
         }
-    }
+    })
 }
 
 fn stored_question<'a>(questions: &'a [RunQuestion], name: &str) -> Option<&'a RunQuestion> {

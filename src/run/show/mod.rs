@@ -32,7 +32,7 @@ pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
     }
     let folder = args.run.clone();
     let name = args.question_id();
-    let (manifest, item) = read(AnyRun::open(&folder)?, name);
+    let (manifest, item) = read(AnyRun::open(&folder)?, name)?;
     let Some(item) = item else {
         let problem = format!(
             "no question {name:?} in this run; report.html and questions.jsonl have their ids"

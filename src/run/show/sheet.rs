@@ -117,13 +117,10 @@ impl SheetItem {
             problem,
         };
         let name = args.question_id();
-        let records = run.records.iter();
-        let shown =
-            records.filter(|record| record.question.0 == name && record.condition.is_some());
-        let shown = shown.filter(|record| !is_control(&record.model));
-        let records: Vec<Record> = shown.cloned().collect();
+        let mut records = run.records_of(name)?;
+        records.retain(|record| record.condition.is_some() && !is_control(&record.model));
         let Some(first) = records.first() else {
-            let example = run.records.first().map_or("", |record| &record.question.0);
+            let example = run.trials.first().map_or("", |trial| &trial.question().0);
             return Err(problem(format!(
                 "the run did not ask {name:?} with images; an item is named by the id of its question, as {example}"
             )));

@@ -15,7 +15,9 @@ use crate::job::rebuild::{ImageRebuilder, RebuildArgs};
 use crate::job::stored::StoredRun;
 use crate::report::study::{StudyImage, StudyQuestion, page};
 use crate::types::manifest::Status;
-use crate::types::{Condition, Decides, Digest, FrameId, QuestionId, Record, RunQuestion};
+use crate::types::{
+    ChoiceDetail, Condition, Decides, Digest, FrameId, QuestionId, RunQuestion, Trials,
+};
 
 /// The flags of `study pack`.
 #[derive(Debug, Args)]
@@ -44,7 +46,7 @@ pub(crate) struct PackArgs {
 pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
     let StoredRun {
         manifest,
-        records,
+        trials,
         questions,
         ..
     } = StoredRun::of_choices(&args.run, "openeqa --study DIR makes their page")?
@@ -53,11 +55,11 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
         let path = args.run.clone();
         Error::Run { path, problem }
     };
-    let conditions = conditions(&records, &args.condition)?;
+    let conditions = conditions(&trials, &args.condition)?;
     if questions.is_empty() || conditions.is_empty() {
         return Err(wrong("this run has no questions about images".to_owned()));
     }
-    let shown = first_order(&records);
+    let shown = first_order(&trials);
     let chosen = chosen(questions, args.items.map_or(usize::MAX, usize::from));
     let mut frames = BTreeMap::<FrameId, Vec<RunQuestion>>::new();
     for question in chosen {
@@ -66,7 +68,7 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
             .or_default()
             .push(question);
     }
-    let sent = sent(&records);
+    let sent = sent(&trials);
     let mut rebuilder = ImageRebuilder::open(args.rebuild, &manifest, &args.run, &conditions)?;
     let bar = progress.bar("images", frames.len() * conditions.len());
     let (mut asked, mut images) = (Vec::new(), 0);
@@ -126,10 +128,10 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
     ))
 }
 
-fn conditions(records: &[Record], wanted: &[Condition]) -> Result<Vec<Condition>> {
-    let asked: BTreeSet<Condition> = records
-        .iter()
-        .filter_map(|record| record.condition.clone())
+fn conditions(trials: &Trials<ChoiceDetail>, wanted: &[Condition]) -> Result<Vec<Condition>> {
+    let asked = trials.asked().into_iter().flatten();
+    let asked: BTreeSet<Condition> = asked
+        .filter_map(|(_, condition)| condition.cloned())
         .collect();
     if let Some(missing) = wanted.iter().find(|condition| !asked.contains(condition)) {
         let problem = format_args!("nothing was asked at {missing} in this run");
@@ -142,12 +144,12 @@ fn conditions(records: &[Record], wanted: &[Condition]) -> Result<Vec<Condition>
 }
 
 /// The choices of each question, in the first order in which they were shown.
-fn first_order(records: &[Record]) -> BTreeMap<QuestionId, Vec<String>> {
+fn first_order(trials: &Trials<ChoiceDetail>) -> BTreeMap<QuestionId, Vec<String>> {
     let mut orders = BTreeMap::new();
-    for record in records {
+    for trial in trials.iter() {
         orders
-            .entry(record.question.clone())
-            .or_insert_with(|| record.detail.choices.to_vec());
+            .entry(trial.question().clone())
+            .or_insert_with(|| trial.choices().to_vec());
     }
     orders
 }
@@ -160,10 +162,10 @@ fn chosen(mut questions: Vec<RunQuestion>, count: usize) -> Vec<RunQuestion> {
 }
 
 /// The digest of what was sent, by frame and condition.
-fn sent(records: &[Record]) -> BTreeMap<(FrameId, Condition), Digest> {
-    let sent = records.iter().filter_map(|record| {
-        let place = (record.detail.shown().clone(), record.condition.clone()?);
-        Some((place, record.detail.sent()?))
+fn sent(trials: &Trials<ChoiceDetail>) -> BTreeMap<(FrameId, Condition), Digest> {
+    let sent = trials.iter().filter_map(|trial| {
+        let place = (trial.shown().clone(), trial.condition()?.clone());
+        Some((place, trial.sent()?))
     });
     sent.collect()
 }

@@ -19,7 +19,7 @@ use crate::store::{AddressChange, Store};
 use crate::types::manifest::{Counts, RunManifest, Status};
 use crate::types::{
     ChoiceDetail, Condition, Decides, Detail, Digest, QuestionId, Record, Reply, TrialKey,
-    UnreadReason,
+    TrialRef, Trials, UnreadReason,
 };
 
 /// The flags of `study read`.
@@ -80,34 +80,27 @@ struct PlacedAnswer<'a> {
 /// # Errors
 /// If the folder holds no run, a line is not an answer, or the run asked nothing that is in the files.
 pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
-    let StoredRun {
-        manifest,
-        records,
-        questions,
-        ..
-    } = StoredRun::of_choices(
-        &args.run,
-        "openeqa --answers NAME=FILE reads what people answered",
-    )?
-    .with_truths("what people answer is scored by them")?;
-    let asked = asked(records);
+    let instead = "openeqa --answers NAME=FILE reads what people answered";
+    let asked_run = StoredRun::of_choices(&args.run, instead)?
+        .with_truths("what people answer is scored by them")?;
+    let asked = asked(&asked_run.trials);
     let mut counts = AnswerCounts::default();
     let mut lines = Vec::new();
     for path in &args.files {
         lines.extend(answers(path)?);
     }
     // Checked before the folder is created, so that files of another study leave no empty run.
-    let known: Vec<(&Record, PlacedAnswer<'_>)> = lines
+    let known: Vec<(TrialRef<'_>, PlacedAnswer<'_>)> = lines
         .into_iter()
         .filter_map(|line| {
             let answer = &line.answer;
             let (question, condition) = (name(&answer.question), answer.condition.clone());
-            let place = (QuestionId(question), condition.parse::<Condition>().ok()?);
-            let record = asked.get(&place);
-            if record.is_none() {
+            let place = (&QuestionId(question), &condition.parse::<Condition>().ok()?);
+            let trial = asked.get(&place).copied();
+            if trial.is_none() {
                 counts.unknown.insert(format!("{} at {condition}", place.0));
             }
-            Some((record?, line))
+            Some((trial?, line))
         })
         .collect();
     if known.is_empty() {
@@ -116,13 +109,14 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
         let path = args.run.clone();
         return Err(Error::Run { path, problem });
     }
-    let people_manifest = of_people(&manifest, args);
+    let people_manifest = of_people(&asked_run.manifest, args);
     let mut store = Store::open(&args.out, &people_manifest, AddressChange::Allowed)?;
-    store.write_questions(&questions)?;
+    store.write_questions(&asked_run.questions)?;
     let mut people = People::new(store.records()?);
     for (asked, line) in known {
         counts.answers += 1;
-        let record = people.record(asked, &line.answer, &args.name)?;
+        let asked = asked_run.record(asked)?;
+        let record = people.record(&asked, &line.answer, &args.name)?;
         counts.no_choice.extend(no_choice(&line, &record));
         if people.is_new(&record) {
             store.append(&record)?;
@@ -132,7 +126,8 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
     store.sync()?;
     warn_about(&counts.no_choice);
     let mut run = StoredRun::of(&args.out, people_manifest)?;
-    run.manifest.count(count(run.records.len(), &run.records));
+    let failed = run.trials.iter().map(|trial| trial.failed());
+    run.manifest.count(count(run.trials.len(), failed));
     let mut outcome = choice::write(&store, run, args.show.format())?;
     if args.show.format() != StdoutFormat::Json {
         outcome.output.insert_str(0, &summary(&counts));
@@ -192,14 +187,12 @@ fn name(value: &Value) -> String {
         .map_or_else(|| value.to_string(), str::to_owned)
 }
 
-/// One record of each question and condition that was asked with an image.
-fn asked(records: Vec<Record>) -> HashMap<(QuestionId, Condition), Record> {
+/// One trial of each question and condition that was asked with an image.
+fn asked(trials: &Trials<ChoiceDetail>) -> HashMap<(&QuestionId, &Condition), TrialRef<'_>> {
     let mut asked = HashMap::new();
-    for record in records {
-        if let Some(condition) = record.condition.clone() {
-            asked
-                .entry((record.question.clone(), condition))
-                .or_insert(record);
+    for trial in trials.iter() {
+        if let Some(condition) = trial.condition() {
+            asked.entry((trial.question(), condition)).or_insert(trial);
         }
     }
     asked

@@ -16,8 +16,8 @@ pub(super) fn distances(grid: &Grid<'_>, subject: usize) -> Vec<(u32, f64)> {
     };
     let items = grid.items.iter().enumerate();
     let distances = items.filter_map(|(index, item)| {
-        let seen = usable(grid.record(subject, index))?;
-        let unseen = usable(grid.record(blind, index))?;
+        let seen = usable(grid.trial(subject, index))?;
+        let unseen = usable(grid.trial(blind, index))?;
         Some((item.cluster, distance(&seen.p, &unseen.p)))
     });
     distances.collect()

@@ -2,7 +2,7 @@
 
 use crate::score::estimate::Estimate;
 use crate::score::grid::{ClusterCount, Grid};
-use crate::types::{OptionProbabilities, Record, TrialOutcome};
+use crate::types::{OptionProbabilities, TrialOutcome, TrialRef};
 
 /// The least probability of a true choice that is not listed and has no bound, either: probabilities are kept to six decimals.
 const LEAST: f64 = 1e-6;
@@ -42,14 +42,14 @@ pub(super) fn confident_replies(grid: &Grid<'_>, subject: usize) -> SortedReplie
         unstated: 0,
     };
     for (index, item) in grid.items.iter().enumerate() {
-        let record = grid.record(subject, index);
-        let Some(record) = record.filter(|record| !record.failed()) else {
+        let trial = grid.trial(subject, index);
+        let Some(trial) = trial.filter(|trial| !trial.failed()) else {
             continue;
         };
-        match &record.detail.options {
+        match trial.options() {
             None => sorted.unstated += 1,
             Some(options) if options.reasoned => sorted.reasoned += 1,
-            Some(options) => sorted.replies.extend(reply(record, options, item.cluster)),
+            Some(options) => sorted.replies.extend(reply(trial, options, item.cluster)),
         }
     }
     let replies = &mut sorted.replies;
@@ -57,11 +57,15 @@ pub(super) fn confident_replies(grid: &Grid<'_>, subject: usize) -> SortedReplie
     sorted
 }
 
-/// The reply of a record; `None` if the probabilities are not those of its choices, as in a file that was edited.
-fn reply(record: &Record, options: &OptionProbabilities, cluster: u32) -> Option<ConfidentReply> {
-    let (detail, p) = (&record.detail, &options.p);
-    let truth = *p.get(detail.truth?)?;
-    if p.len() != detail.choices.len() || options.mass <= 0.0 {
+/// The reply of a trial; `None` if the probabilities are not those of its choices, as in a file that was edited.
+fn reply(
+    trial: TrialRef<'_>,
+    options: &OptionProbabilities,
+    cluster: u32,
+) -> Option<ConfidentReply> {
+    let p = &options.p;
+    let truth = *p.get(trial.truth()?)?;
+    if p.len() != trial.choices().len() || options.mass <= 0.0 {
         return None;
     }
     let squares: f64 = p.iter().map(|p| p * p).sum();
@@ -69,7 +73,7 @@ fn reply(record: &Record, options: &OptionProbabilities, cluster: u32) -> Option
     Some(ConfidentReply {
         cluster,
         confidence: options.confidence(),
-        right: detail.outcome == TrialOutcome::Right,
+        right: trial.outcome() == TrialOutcome::Right,
         brier: squares - 2.0 * truth + 1.0,
         guess: 1.0 - 1.0 / p.len() as f64,
         nll: -libm::log(truth.max(least).min(1.0)),
@@ -87,10 +91,10 @@ pub(super) fn accuracy(clusters: usize, replies: &[ConfidentReply]) -> Option<Es
     Estimate::clustered(&counts)
 }
 
-/// The probabilities of a record that figures may use; `None` if there are none, or reasoning stood before the answer.
-pub(super) fn usable(record: Option<&Record>) -> Option<&OptionProbabilities> {
-    let record = record.filter(|record| !record.failed())?;
-    let options = record.detail.options.as_ref()?;
-    let fits = options.p.len() == record.detail.choices.len();
+/// The probabilities of a trial that figures may use; `None` if there are none, or reasoning stood before the answer.
+pub(super) fn usable(trial: Option<TrialRef<'_>>) -> Option<&OptionProbabilities> {
+    let trial = trial.filter(|trial| !trial.failed())?;
+    let options = trial.options()?;
+    let fits = options.p.len() == trial.choices().len();
     (fits && !options.reasoned).then_some(options)
 }

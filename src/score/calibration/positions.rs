@@ -20,7 +20,7 @@ pub struct PositionShare {
 pub(super) fn shares(grid: &Grid<'_>, subject: usize) -> Vec<PositionShare> {
     let mut shares: Vec<PositionShare> = Vec::new();
     for (index, item) in grid.items.iter().enumerate() {
-        let Some(options) = usable(grid.record(subject, index)) else {
+        let Some(options) = usable(grid.trial(subject, index)) else {
             continue;
         };
         for (position, p) in options.p.iter().enumerate() {
@@ -34,7 +34,7 @@ pub(super) fn shares(grid: &Grid<'_>, subject: usize) -> Vec<PositionShare> {
             }
             let share = &mut shares[position];
             share.p += p;
-            share.truth += f64::from(u8::from(item.record.detail.truth == Some(position)));
+            share.truth += f64::from(u8::from(item.asked.truth == Some(position)));
             share.n += 1;
         }
     }

@@ -23,20 +23,19 @@ struct AskedInOrders<'a> {
 pub(super) fn accuracy(grid: &Grid<'_>, subject: usize) -> Option<Estimate> {
     let mut questions = BTreeMap::<(&QuestionId, u32), AskedInOrders<'_>>::new();
     for (index, item) in grid.items.iter().enumerate() {
-        let Some(record) = grid.record(subject, index) else {
+        let Some(trial) = grid.trial(subject, index) else {
             continue;
         };
-        let Some(options) = usable(Some(record)) else {
+        let Some(options) = usable(Some(trial)) else {
             continue;
         };
-        let detail = &record.detail;
         let asked = questions
-            .entry((&record.question, detail.repeat))
+            .entry((trial.question(), trial.repeat()))
             .or_default();
         asked.cluster = item.cluster;
-        asked.truth = detail.choices.get(detail.truth?)?;
-        asked.shown.insert(&detail.choices);
-        for (text, p) in detail.choices.iter().zip(&options.p) {
+        asked.truth = trial.choices().get(trial.truth()?)?;
+        asked.shown.insert(trial.choices());
+        for (text, p) in trial.choices().iter().zip(&options.p) {
             *asked.by_text.entry(text).or_default() += p;
         }
     }

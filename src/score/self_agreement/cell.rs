@@ -87,7 +87,7 @@ pub(super) fn cells(
         .filter(|question| question.is_informative());
     let informative: BTreeSet<usize> = informative.map(|question| question.index).collect();
     let kept = grid.items.iter().map(|item| {
-        let question = bank.of(&item.record.question);
+        let question = bank.of(&*item.asked.question);
         question.is_some_and(|question| informative.contains(&question))
     });
     let restricted = grid.restricted(&kept.collect::<Vec<_>>());
@@ -156,7 +156,7 @@ impl Part<'_, '_> {
             let Some(reading) = result.reading(self.mode) else {
                 continue;
             };
-            let choices = &item.record.detail.choices;
+            let choices = &*item.asked.choices;
             let answer = reading.and_then(|index| choices.get(usize::from(index)));
             let count = &mut counts[item.cluster as usize];
             count.replies += 1;
@@ -168,7 +168,7 @@ impl Part<'_, '_> {
     fn cannot_tell(&self) -> Option<Estimate> {
         let mut items = self.grid.of_family(self.subject, self.family);
         let has_way_out = items.any(|(item, _)| {
-            let mut choices = item.record.detail.choices.iter();
+            let mut choices = item.asked.choices.iter();
             choices.any(|choice| is_way_out(choice))
         });
         let share = || self.share(|answer, _| answer.is_some_and(is_way_out));
@@ -177,9 +177,9 @@ impl Part<'_, '_> {
 
     fn refused(&self) -> usize {
         let items = self.grid.items.iter().enumerate();
-        let records = items
+        let trials = items
             .filter(|(_, item)| item.is_of(self.family))
-            .filter_map(|(index, _)| self.grid.record(self.subject, index));
-        records.filter(|record| is_refused(record)).count()
+            .filter_map(|(index, _)| self.grid.trial(self.subject, index));
+        trials.filter(|trial| is_refused(*trial)).count()
     }
 }

@@ -42,23 +42,23 @@ impl<'g> BankCounts<'g> {
         for (index, item) in grid.items.iter().enumerate() {
             let result = grid.result(subject, index);
             let (Some(question), Some(reading)) =
-                (bank.of(&item.record.question), result.reading(mode))
+                (bank.of(&*item.asked.question), result.reading(mode))
             else {
                 continue;
             };
             if !item.is_of(family) {
                 continue;
             }
-            let detail = &item.record.detail;
-            let text = |index: usize| detail.choices.get(index).map(String::as_str);
-            let light = detail.truth.and_then(text);
+            let asked = item.asked;
+            let text = |index: usize| asked.choices.get(index).map(String::as_str);
+            let light = asked.truth.and_then(text);
             let here = reading.and_then(|index| text(usize::from(index)));
             let whole = counts.whole.entry(question).or_default();
             let of_cluster = (item.cluster, question);
             let of_cluster = counts.by_cluster.entry(of_cluster).or_default();
             for counts in [whole, of_cluster] {
                 counts.items += 1;
-                counts.choices = detail.choices.len();
+                counts.choices = asked.choices.len();
                 for (place, answer) in [light, here].into_iter().enumerate() {
                     if let Some(answer) = answer {
                         counts.answers.entry(answer).or_default()[place] += 1;

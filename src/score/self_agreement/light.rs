@@ -1,4 +1,4 @@
-//! A model's own answers in the light ([`LightAnswers`]), and records held against them.
+//! A model's own answers in the light ([`LightAnswers`]), and trials held against them.
 
 use std::collections::{HashMap, HashSet};
 
@@ -6,8 +6,8 @@ use crate::score::choice::ReadingMode;
 use crate::score::estimate::Estimate;
 use crate::types::question::CANNOT_TELL;
 use crate::types::{
-    AnswerReading, ChoiceDetail, Condition, LightGroup, QuestionId, Record, Treatment,
-    TrialOutcome, UnreadReason, View,
+    ChoiceDetail, Condition, LightGroup, QuestionId, Treatment, TrialRef, Trials, UnreadReason,
+    View,
 };
 
 /// What identifies a question to a model: its name, and the order of its choices.
@@ -16,7 +16,7 @@ type QuestionKey<'a> = (&'a QuestionId, &'a [String]);
 /// The replies of one model at L0, each question once: the reference of everything else that it says.
 pub(super) struct LightAnswers<'a> {
     model: &'a str,
-    by_question: HashMap<QuestionKey<'a>, Vec<&'a Record>>,
+    by_question: HashMap<QuestionKey<'a>, Vec<TrialRef<'a>>>,
 }
 
 /// What became of the questions to a model in the light.
@@ -49,21 +49,21 @@ impl LightReplies {
     }
 }
 
-/// Whether a record is about an untouched image, without an enhancer.
-pub(super) fn is_light(record: &Record) -> bool {
-    let condition = record.condition.as_ref();
-    record.view == View::Image && condition.is_some_and(is_untouched)
+/// Whether a trial is about an untouched image, without an enhancer.
+pub(super) fn is_light(trial: TrialRef<'_>) -> bool {
+    let condition = trial.condition();
+    trial.view() == View::Image && condition.is_some_and(is_untouched)
 }
 
 fn is_untouched(condition: &Condition) -> bool {
     condition.treatment == Treatment::Untouched && condition.enhancer.is_none()
 }
 
-/// The index of the choice that a reading of a record names; `None` if it names none.
-pub(super) fn chosen(record: &Record, mode: ReadingMode) -> Option<usize> {
+/// The index of the choice that a reading of a trial names; `None` if it names none.
+pub(super) fn chosen(trial: TrialRef<'_>, mode: ReadingMode) -> Option<usize> {
     let reading = match mode {
-        ReadingMode::Strict => record.detail.strict,
-        ReadingMode::Lenient => record.detail.lenient,
+        ReadingMode::Strict => trial.strict(),
+        ReadingMode::Lenient => trial.lenient(),
     };
     reading?.chosen
 }
@@ -74,81 +74,85 @@ pub(super) fn is_way_out(choice: &str) -> bool {
 }
 
 /// Whether a reply refuses, or was withheld.
-pub(super) fn is_refused(record: &Record) -> bool {
-    let why = record.detail.strict.and_then(|reading| reading.why);
+pub(super) fn is_refused(trial: TrialRef<'_>) -> bool {
+    let why = trial.strict().and_then(|reading| reading.why);
     matches!(why, Some(UnreadReason::Refused | UnreadReason::Filtered))
 }
 
 impl<'a> LightAnswers<'a> {
     /// The first reply of a model to each question at L0.
-    pub(super) fn of(records: &'a [Record], model: &'a str) -> Self {
-        let mut by_question = HashMap::<QuestionKey<'a>, Vec<&'a Record>>::new();
-        let of_model = records.iter().filter(|record| record.model == model);
-        let first = of_model.filter(|record| is_light(record) && record.detail.repeat == 0);
-        for record in first {
-            let key = (&record.question, record.detail.choices.as_slice());
-            by_question.entry(key).or_default().push(record);
+    pub(super) fn of(trials: &'a Trials<ChoiceDetail>, model: &'a str) -> Self {
+        let mut by_question = HashMap::<QuestionKey<'a>, Vec<TrialRef<'a>>>::new();
+        let of_model = trials.iter().filter(|trial| trial.model() == model);
+        let first = of_model.filter(|trial| is_light(*trial) && trial.repeat() == 0);
+        for trial in first {
+            let key = (trial.question(), trial.choices());
+            by_question.entry(key).or_default().push(trial);
         }
         Self { model, by_question }
     }
 
     /// The first replies, in no order.
-    pub(super) fn first(&self) -> impl Iterator<Item = &'a Record> + '_ {
+    pub(super) fn first(&self) -> impl Iterator<Item = TrialRef<'a>> + '_ {
         let lists = self.by_question.values();
-        lists.filter_map(|records| records.first().copied())
+        lists.filter_map(|trials| trials.first().copied())
     }
 
     /// The choice that the model named at L0; `None` if no choice could be read there.
-    fn reference(&self, record: &Record, mode: ReadingMode) -> Option<usize> {
-        let key = (&record.question, record.detail.choices.as_slice());
-        let group = |record: &Record| record.condition.as_ref().and_then(|at| at.group.clone());
-        let own = group(record);
+    fn reference(&self, trial: TrialRef<'_>, mode: ReadingMode) -> Option<usize> {
+        let key = (trial.question(), trial.choices());
+        let group = |trial: TrialRef<'_>| trial.condition().and_then(|at| at.group.clone());
+        let own = group(trial);
         let mut light = self.by_question.get(&key)?.iter();
-        let met = light.find(|light| LightGroup::meet(group(light).as_ref(), own.as_ref()));
-        chosen(met?, mode)
+        let met = light.find(|light| LightGroup::meet(group(**light).as_ref(), own.as_ref()));
+        chosen(*met?, mode)
     }
 
-    /// The records of the model with its own answer at L0 in the place of the truth. A question without such an answer is left out.
+    /// The trials of the model with its own answer at L0 in the place of the truth. A question without such an answer is left out.
     ///
-    /// The first record at L0 is the reference itself and left out; the one after it, where the question was asked again, takes its
-    /// place, so that it is paired with the first record of every other condition.
-    pub(super) fn held_against(&self, records: &'a [Record], mode: ReadingMode) -> Vec<Record> {
-        let of_model = records.iter().filter(|record| record.model == self.model);
-        let held = of_model.filter_map(|record| {
-            let repeat = if is_light(record) {
-                record.detail.repeat.checked_sub(1)?
+    /// The first trial at L0 is the reference itself and left out; the one after it, where the question was asked again, takes its
+    /// place, so that it is paired with the first trial of every other condition.
+    pub(super) fn held_against(
+        &self,
+        trials: &'a Trials<ChoiceDetail>,
+        mode: ReadingMode,
+    ) -> Trials<ChoiceDetail> {
+        let of_model = trials.iter().filter(|trial| trial.model() == self.model);
+        let held = of_model.filter_map(|trial| {
+            let repeat = if is_light(trial) {
+                trial.repeat().checked_sub(1)?
             } else {
-                record.detail.repeat
+                trial.repeat()
             };
-            Some(held(record, repeat, self.reference(record, mode)?))
+            Some((trial, repeat, self.reference(trial, mode)?))
         });
-        held.collect()
+        all_held(held)
     }
 
-    /// The first readable records of another model at L0, with the answers of this one in the place of the truth.
+    /// The first readable trials of another model at L0, with the answers of this one in the place of the truth.
     pub(super) fn held_against_other(
         &self,
-        records: &'a [Record],
+        trials: &'a Trials<ChoiceDetail>,
         other: &str,
         mode: ReadingMode,
-    ) -> Vec<Record> {
-        let light = records
+    ) -> Trials<ChoiceDetail> {
+        let light = trials
             .iter()
-            .filter(|record| record.model == other && is_light(record));
-        let first = light.filter(|record| record.detail.repeat == 0);
-        let read = first.filter(|record| chosen(record, mode).is_some());
-        let held = read.filter_map(|record| Some(held(record, 0, self.reference(record, mode)?)));
-        held.collect()
+            .filter(|trial| trial.model() == other && is_light(*trial));
+        let first = light.filter(|trial| trial.repeat() == 0);
+        let read = first.filter(|trial| chosen(*trial, mode).is_some());
+        let held = read.filter_map(|trial| Some((trial, 0, self.reference(trial, mode)?)));
+        all_held(held)
     }
 
     /// What became of the questions in the light, in a reading.
     pub(super) fn replies(&self, mode: ReadingMode) -> LightReplies {
-        let replied: Vec<&Record> = self.first().filter(|record| !record.failed()).collect();
+        let replied: Vec<TrialRef<'_>> = self.first().filter(|trial| !trial.failed()).collect();
         let read = replied
             .iter()
-            .filter(|record| chosen(record, mode).is_some());
-        let way_out = |record: &&&Record| {
-            let choice = chosen(record, mode).and_then(|index| record.detail.choices.get(index));
+            .filter(|trial| chosen(**trial, mode).is_some());
+        let way_out = |trial: &&TrialRef<'_>| {
+            let choice = chosen(**trial, mode).and_then(|index| trial.choices().get(index));
             choice.is_some_and(|choice| is_way_out(choice))
         };
         LightReplies {
@@ -156,7 +160,7 @@ impl<'a> LightAnswers<'a> {
             mode,
             asked: self.by_question.len(),
             read: Estimate::share(read.count(), replied.len()),
-            refused: replied.iter().filter(|record| is_refused(record)).count(),
+            refused: replied.iter().filter(|trial| is_refused(**trial)).count(),
             cannot_tell: replied.iter().filter(way_out).count(),
             has_way_out: self.has_way_out(),
         }
@@ -174,34 +178,11 @@ impl<'a> LightAnswers<'a> {
     }
 }
 
-/// A record without its reply, with an answer in the light in the place of the truth.
-fn held(record: &Record, repeat: u32, reference: usize) -> Record {
-    let detail = &record.detail;
-    let is_same = |reading: AnswerReading| reading.chosen == Some(reference);
-    let outcome = match detail.strict {
-        None => TrialOutcome::Failed,
-        Some(reading) if is_same(reading) => TrialOutcome::Right,
-        Some(AnswerReading { chosen: None, .. }) => TrialOutcome::Unparsed,
-        Some(_) => TrialOutcome::Wrong,
-    };
-    let held = ChoiceDetail {
-        frame: detail.frame.clone(),
-        family: detail.family.clone(),
-        choices: detail.choices.clone(),
-        truth: Some(reference),
-        repeat,
-        strict: detail.strict,
-        lenient: detail.lenient,
-        outcome,
-        image: None,
-        more_images: Vec::new(),
-        shown_frame: None,
-        observed: None,
-        options: None,
-    };
-    let (question, condition) = (record.question.clone(), record.condition.clone());
-    Record {
-        failure: record.failure.clone(),
-        ..Record::blank(record.key, question, &record.model, condition, held)
+/// Trials of other numbers of repeats, each with an answer in the light in the place of the truth.
+fn all_held<'t>(held: impl Iterator<Item = (TrialRef<'t>, u32, usize)>) -> Trials<ChoiceDetail> {
+    let mut trials = Trials::default();
+    for (trial, repeat, reference) in held {
+        trials.hold(trial, repeat, reference);
     }
+    trials
 }

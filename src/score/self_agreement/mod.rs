@@ -1,7 +1,7 @@
 //! How far each model agrees with its own answers in the light, where nobody knows the true ones: [`SelfAgreement`].
 //!
-//! The reference of a model is its own reading at L0, for each question and order of choices. A record is held against it as another
-//! record is held against the truth, so that the counts by cluster, the paired tests, Holm's correction and the crossing of a curve
+//! The reference of a model is its own reading at L0, for each question and order of choices. A trial is held against it as another
+//! trial is held against the truth, so that the counts by cluster, the paired tests, Holm's correction and the crossing of a curve
 //! are those of the other reports; nothing here is an accuracy. By the triangle inequality the accuracy that is lost in a
 //! condition is at most one minus the agreement there, whatever the true answers are.
 //!
@@ -38,7 +38,7 @@ use super::confusion::{Confusion, Hallucination, confusions, hallucinations};
 use super::grid::Grid;
 use super::health::{Health, healths};
 use super::photographed_set::PhotographedSet;
-use crate::types::{ModelListing, Record, RunQuestion};
+use crate::types::{ChoiceDetail, ModelListing, RunQuestion, Trials};
 
 /// All results of a run without true answers.
 #[derive(Debug)]
@@ -70,21 +70,19 @@ pub(crate) struct SelfAgreement<'a> {
 }
 
 impl<'a> SelfAgreement<'a> {
-    /// The results of records without true answers. `ties` says what ties frames to each other.
+    /// The results of trials without true answers. `ties` says what ties frames to each other.
     #[must_use]
     pub(crate) fn new(
-        records: &'a [Record],
+        trials: &'a Trials<ChoiceDetail>,
         ties: &FrameTies,
         questions: &'a [RunQuestion],
         listing: &ModelListing,
     ) -> Self {
-        let pairs = records
-            .iter()
-            .map(|record| (&record.question, &record.detail.frame));
+        let pairs = trials.iter().map(|trial| (trial.question(), trial.frame()));
         let clusters = Clusters::new(pairs, ties);
         let draws = Resamples::new(clusters.count());
         let bank = BankIndex::new(questions);
-        let grid = Grid::without_truths(records, &clusters, listing);
+        let grid = Grid::without_truths(trials, &clusters, listing);
         let subjects = grid.subjects.iter();
         let mut models: Vec<String> = subjects.map(|subject| subject.model.clone()).collect();
         models.dedup();
@@ -98,15 +96,15 @@ impl<'a> SelfAgreement<'a> {
             confusions: Vec::new(),
             hallucinations: Vec::new(),
             health: healths(&grid),
-            between: models_in_light(records, &clusters, &models, &bank),
+            between: models_in_light(trials, &clusters, &models, &bank),
             set: PhotographedSet::default(),
             grid,
         };
         for model in &models {
-            let answers = LightAnswers::of(records, model);
+            let answers = LightAnswers::of(trials, model);
             for mode in ReadingMode::ALL {
                 let replies = answers.replies(mode);
-                let held = answers.held_against(records, mode);
+                let held = answers.held_against(trials, mode);
                 let grid = Grid::new(&held, &clusters);
                 let questions = questions_in_light(model, &answers, &bank, mode);
                 all.cells
@@ -145,7 +143,7 @@ impl<'a> SelfAgreement<'a> {
     /// Number of items: questions about images, each in one order of its choices, without those that were only asked again.
     pub(crate) fn items(&self) -> usize {
         let items = self.grid.items.iter();
-        items.filter(|item| item.record.detail.repeat == 0).count()
+        items.filter(|item| item.asked.repeat == 0).count()
     }
 
     /// What a model answered in the light, in the strict reading.

@@ -8,7 +8,7 @@ use crate::score::choice::ReadingMode;
 use crate::score::cluster::Clusters;
 use crate::score::estimate::Estimate;
 use crate::score::grid::Grid;
-use crate::types::Record;
+use crate::types::{ChoiceDetail, Trials};
 
 /// Agreement of two models at L0, in the strict reading, on the items that both answered readably. Each model has its own reference, so
 /// that their agreements with themselves in the dark compare only as far as they agree here.
@@ -24,7 +24,7 @@ pub(crate) struct ModelsInLight {
 
 /// Every pair of models that answered the same items in the light.
 pub(super) fn models_in_light(
-    records: &[Record],
+    trials: &Trials<ChoiceDetail>,
     clusters: &Clusters,
     models: &[String],
     bank: &BankIndex<'_>,
@@ -32,9 +32,9 @@ pub(super) fn models_in_light(
     let mode = ReadingMode::Strict;
     let mut pairs = Vec::new();
     for (place, first) in models.iter().enumerate() {
-        let answers = LightAnswers::of(records, first);
+        let answers = LightAnswers::of(trials, first);
         for second in &models[place + 1..] {
-            let held = answers.held_against_other(records, second, mode);
+            let held = answers.held_against_other(trials, second, mode);
             let grid = Grid::new(&held, clusters);
             if grid.subjects.is_empty() {
                 continue;

@@ -45,12 +45,12 @@ pub(super) fn questions_in_light(
     mode: ReadingMode,
 ) -> Vec<QuestionInLight> {
     let mut counts = BTreeMap::<usize, BTreeMap<&str, usize>>::new();
-    for record in answers.first().filter(|record| !record.failed()) {
-        let Some(question) = bank.of(&record.question) else {
+    for trial in answers.first().filter(|trial| !trial.failed()) {
+        let Some(question) = bank.of(trial.question()) else {
             continue;
         };
         let counts = counts.entry(question).or_default();
-        let choice = chosen(record, mode).and_then(|index| record.detail.choices.get(index));
+        let choice = chosen(trial, mode).and_then(|index| trial.choices().get(index));
         if let Some(choice) = choice {
             *counts.entry(choice).or_default() += 1;
         }

@@ -19,7 +19,7 @@ fn questions(records: &[Record], group: impl Fn(usize) -> Option<String>) -> Vec
             frame: record.detail.frame.clone(),
             family: record.detail.family.clone(),
             text: "?".to_owned(),
-            choices: record.detail.choices.to_vec(),
+            choices: record.detail.choices.clone(),
             answer: Some("a".to_owned()),
             extra_answers: None,
             evidence: serde_json::Value::Null,

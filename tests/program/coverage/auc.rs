@@ -124,7 +124,7 @@ impl MadeRun {
                 for question in frame * QUESTIONS..(frame + 1) * QUESTIONS {
                     let mut reply = record("m", &condition, (question, frame), true);
                     reply.detail.family = families[question % families.len()].clone();
-                    let facts = ImageFacts {
+                    reply.detail.image = Some(ImageFacts {
                         digest: image,
                         bytes: 1,
                         width: 1,
@@ -133,8 +133,7 @@ impl MadeRun {
                         orientation: None,
                         exposure: None,
                         pair: None,
-                    };
-                    reply.detail.image = Some(facts.into());
+                    });
                     records.push(reply);
                 }
                 measured.push(ImageFidelity {
@@ -218,7 +217,8 @@ fn auc_rates(design: AucDesign, runs: usize) -> AucRates {
     let (mut made, mut held, mut rejected, mut sum) = (0, 0, 0, 0.0);
     for _ in 0..runs {
         run.draw(&mut random);
-        let grid = Grid::new(&run.records, &run.clusters);
+        let trials = run.records.iter().cloned().collect();
+        let grid = Grid::new(&trials, &run.clusters);
         let found = FidelityFindings::new(&grid, &run.measured).unwrap();
         assert_eq!(found.conditions.len(), design.conditions);
         let Some(auc) = found.within[0] else { continue };

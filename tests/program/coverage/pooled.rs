@@ -76,7 +76,8 @@ fn pooled_rates(design: &PooledDesign, runs: usize) -> PooledRates {
     let mut rates = PooledRates::default();
     for _ in 0..runs {
         answer(&mut random, &mut records, &clusters, design);
-        let grid = Grid::new(&records, &units);
+        let trials = records.iter().cloned().collect();
+        let grid = Grid::new(&trials, &units);
         let findings = pooled(&grid);
         let all = |finding: &&_| {
             let finding: &darkqa_eval::internals::score::PooledFinding = finding;

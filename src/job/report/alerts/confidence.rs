@@ -6,22 +6,20 @@ use serde_json::Value;
 
 use crate::job::report::join::JoinedRun;
 use crate::report::alert::{Alert, AlertKind};
-use crate::types::Record;
+use crate::types::{ChoiceDetail, TrialRef, Trials};
 
 /// One alert for each model that was asked with `--probabilities` and has no reply with any.
-pub(super) fn of_confidence(runs: &[JoinedRun], records: &[Record]) -> Vec<Alert> {
+pub(super) fn of_confidence(runs: &[JoinedRun], trials: &Trials<ChoiceDetail>) -> Vec<Alert> {
     let columns = runs
         .iter()
         .filter_map(|run| run.manifest.columns.get("model"));
     let models = columns.flat_map(BTreeMap::iter);
     let asked = models.filter(|(_, content)| content["--probabilities"] == Value::Bool(true));
     let asked: BTreeSet<&String> = asked.map(|(name, _)| name).collect();
-    let stated = records
-        .iter()
-        .filter(|record| record.detail.options.is_some());
-    let stated: BTreeSet<&str> = stated.map(|record| &*record.model).collect();
-    let replied = records.iter().filter(|record| !record.failed());
-    let replied: BTreeSet<&str> = replied.map(|record| &*record.model).collect();
+    let stated = trials.iter().filter(|trial| trial.options().is_some());
+    let stated: BTreeSet<&str> = stated.map(TrialRef::model).collect();
+    let replied = trials.iter().filter(|trial| !trial.failed());
+    let replied: BTreeSet<&str> = replied.map(TrialRef::model).collect();
     let without = asked
         .into_iter()
         .filter(|name| replied.contains(&***name) && !stated.contains(&***name));

@@ -5,12 +5,11 @@ use std::collections::BTreeMap;
 use super::words::plural;
 use crate::job::report::join::JoinedRun;
 use crate::report::alert::{Alert, AlertKind};
-use crate::types::Record;
-use crate::types::question::letter;
+use crate::types::{ChoiceDetail, Trials};
 
 /// One alert for each model that was asked with `--constrain` and has replies of another form. A reply that keeps it is stored as its
 /// letter alone.
-pub(super) fn of_constraints(runs: &[JoinedRun], records: &[Record]) -> Vec<Alert> {
+pub(super) fn of_constraints(runs: &[JoinedRun], trials: &Trials<ChoiceDetail>) -> Vec<Alert> {
     let columns = runs
         .iter()
         .filter_map(|run| run.manifest.columns.get("model"));
@@ -20,11 +19,11 @@ pub(super) fn of_constraints(runs: &[JoinedRun], records: &[Record]) -> Vec<Aler
         .filter(|(_, constraint)| *constraint != "none")
         .collect();
     let alerts = constrained.iter().filter_map(|(model, constraint)| {
-        let replied = records
+        let replied = trials
             .iter()
-            .filter(|record| record.model == **model && !record.failed());
-        let (all, other) = replied.fold((0_usize, 0_usize), |(all, other), record| {
-            (all + 1, other + usize::from(!is_letter(record)))
+            .filter(|trial| trial.model() == **model && !trial.failed());
+        let (all, other) = replied.fold((0_usize, 0_usize), |(all, other), trial| {
+            (all + 1, other + usize::from(!trial.is_letter()))
         });
         (other > 0).then(|| {
             let replies = plural(all, "reply", "replies");
@@ -36,10 +35,4 @@ pub(super) fn of_constraints(runs: &[JoinedRun], records: &[Record]) -> Vec<Aler
         })
     });
     alerts.collect()
-}
-
-/// Whether a reply is the letter of a choice and nothing else.
-fn is_letter(record: &Record) -> bool {
-    let mut letters = (0..record.detail.choices.len()).map(|index| letter(index).to_string());
-    letters.any(|letter| record.reply.as_ref() == Some(&letter))
 }

@@ -35,10 +35,10 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
     alerts.extend(replies::of_replies(&findings.health, "count as wrong"));
     alerts.extend(replies::of_people(combined));
     alerts.extend(readings::of_readings(combined));
-    alerts.extend(confidence::of_confidence(&combined.runs, &combined.records));
+    alerts.extend(confidence::of_confidence(&combined.runs, &combined.trials));
     alerts.extend(constraints::of_constraints(
         &combined.runs,
-        &combined.records,
+        &combined.trials,
     ));
     alerts.extend(questions::of_repeats(combined));
     alerts.extend(questions::of_items(findings));
@@ -58,7 +58,7 @@ pub(super) fn alerts_without_truths(combined: &Combined, found: &SelfAgreement<'
     alerts.extend(readings::of_readings(combined));
     alerts.extend(constraints::of_constraints(
         &combined.runs,
-        &combined.records,
+        &combined.trials,
     ));
     alerts.extend(of_clusters(found.grid.clusters, found.unit));
     alerts.extend(of_set(found.set));
@@ -87,7 +87,7 @@ fn of_clusters(clusters: usize, unit: ClusterUnit) -> Option<Alert> {
 pub(super) fn of_runs<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut alerts = of_progress(&joined.runs);
     alerts.extend(servers::of_servers(joined));
-    alerts.extend(providers::of_providers(&joined.records));
+    alerts.extend(providers::of_providers(&joined.trials));
     alerts.extend(of_enhancers(&joined.runs));
     alerts.extend(of_inputs(&joined.runs));
     alerts.extend(adapted::of_adaptations(&joined.runs));

@@ -1,14 +1,14 @@
 //! What the levels of runs do to the signal-to-noise ratio of images with sensor noise, and to their codes: [`of_noise`],
 //! [`of_rounding`].
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use serde_json::Value;
 
 use crate::job::report::join::Joined;
 use crate::report::alert::{Alert, AlertKind};
 use crate::types::degradation::Kind;
-use crate::types::{Degradation, Detail, Severity};
+use crate::types::{Condition, Degradation, Detail, Severity, TrialRef};
 
 /// The exposure drop in hundredths of EV above which at most nine codes are left: white has code
 /// 255 · 2^(−EV/2.2) = 8 there.
@@ -19,8 +19,8 @@ pub(super) fn of_noise<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut of_draws = BTreeMap::<&str, BTreeSet<&str>>::new();
     for run in &joined.runs {
         let mut levels = BTreeMap::<String, BTreeSet<Severity>>::new();
-        for place in &run.records {
-            let Some(degradation) = degradation(joined, *place) else {
+        for condition in conditions(joined.of(run)) {
+            let Some(degradation) = condition.degradation() else {
                 continue;
             };
             if let Some(reading) = degradation.reading() {
@@ -59,7 +59,8 @@ fn same_noise(reading: &Value) -> &'static str {
 
 /// The levels at which an image has so few codes that their rounding decides.
 pub(super) fn of_rounding<D: Detail>(joined: &Joined<D>) -> Option<Alert> {
-    let shown = (0..joined.records.len()).filter_map(|place| degradation(joined, place));
+    let shown = conditions(joined.trials.iter()).into_iter();
+    let shown = shown.filter_map(Condition::degradation);
     let darkest = shown.filter(|degradation| {
         matches!(degradation.kind(), Kind::Exposure | Kind::Sensor)
             && degradation.severity().in_hundredths() > FEW_CODES
@@ -79,7 +80,9 @@ pub(super) fn of_rounding<D: Detail>(joined: &Joined<D>) -> Option<Alert> {
     Some(Alert::new(AlertKind::Noise, text))
 }
 
-/// How the image of a record was made; `None` if it is as the frame, or there is none.
-fn degradation<D: Detail>(joined: &Joined<D>, place: usize) -> Option<&Degradation> {
-    joined.records[place].condition.as_ref()?.degradation()
+/// The different conditions of some trials.
+fn conditions<'t, D: Detail + 't>(
+    trials: impl Iterator<Item = TrialRef<'t, D>>,
+) -> HashSet<&'t Condition> {
+    trials.filter_map(TrialRef::condition).collect()
 }

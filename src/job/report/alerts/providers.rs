@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 
 use super::words::plural;
 use crate::report::alert::{Alert, AlertKind};
-use crate::types::{Detail, Record};
+use crate::types::{Detail, Trials};
 
 /// One alert for each model whose replies name several providers, with the number of replies of each.
-pub(super) fn of_providers<D: Detail>(records: &[Record<D>]) -> Vec<Alert> {
+pub(super) fn of_providers<D: Detail>(trials: &Trials<D>) -> Vec<Alert> {
     let mut counts = BTreeMap::<&str, BTreeMap<&str, usize>>::new();
-    for record in records {
-        if let Some(provider) = &record.provider {
-            let of_model = counts.entry(&record.model).or_default();
+    for trial in trials.iter() {
+        if let Some(provider) = trial.provider() {
+            let of_model = counts.entry(trial.model()).or_default();
             *of_model.entry(provider).or_default() += 1;
         }
     }

@@ -1,6 +1,6 @@
 //! Questions that differ between runs, and models that were not asked the same: [`of_questions`], [`of_repeats`], [`of_items`].
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use super::words::counted;
 use crate::job::report::combine::Combined;
@@ -9,17 +9,17 @@ use crate::job::report::settings::{is_of_people, listed};
 use crate::report::alert::{Alert, AlertKind};
 use crate::score::findings::Findings;
 use crate::score::subject::is_control;
-use crate::types::{Detail, QuestionId, RunQuestion};
+use crate::types::{Detail, QuestionId, RunQuestion, TrialRef};
 
 /// What differs between the questions of the runs, and between the files that they are about.
 pub(super) fn of_questions<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut asked = Vec::<BTreeMap<&QuestionId, Option<&RunQuestion>>>::new();
     for run in &joined.runs {
-        let records = run.records.iter().map(|place| &joined.records[*place]);
         // A control is shown frames of its own choice, in a shard others than the models.
-        let records = records.filter(|record| !is_control(&record.model));
+        let trials = joined.of(run).filter(|trial| !is_control(trial.model()));
+        let ids: HashSet<&QuestionId> = trials.map(TrialRef::question).collect();
         let mut ids: BTreeMap<&QuestionId, Option<&RunQuestion>> =
-            records.map(|record| (&record.question, None)).collect();
+            ids.into_iter().map(|id| (id, None)).collect();
         for question in &run.questions {
             if let Some(place) = ids.get_mut(&question.id) {
                 *place = Some(question);
@@ -93,14 +93,8 @@ pub(super) fn of_questions<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
 pub(super) fn of_repeats(combined: &Combined) -> Option<Alert> {
     let people = |run: &&JoinedRun| !is_of_people(&run.manifest);
     let times = combined.runs.iter().filter(people).map(|run| {
-        let records = run.records.iter().map(|place| &combined.records[*place]);
-        (
-            &run.name,
-            records
-                .map(|record| record.detail.repeat + 1)
-                .max()
-                .unwrap_or(1),
-        )
+        let times = combined.of(run).map(|trial| trial.repeat() + 1).max();
+        (&run.name, times.unwrap_or(1))
     });
     let times: Vec<(&String, u32)> = times.collect();
     let differs = times

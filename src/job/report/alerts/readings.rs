@@ -3,6 +3,7 @@
 use crate::job::report::combine::Combined;
 use crate::job::report::rereading::LenientChange;
 use crate::report::alert::{Alert, AlertKind};
+use crate::types::TrialRef;
 
 /// How the lenient reading of each run would change by the rules of this version.
 pub(super) fn of_readings(combined: &Combined) -> Vec<Alert> {
@@ -11,7 +12,8 @@ pub(super) fn of_readings(combined: &Combined) -> Vec<Alert> {
         if change.is_current() {
             return None;
         }
-        let records = run.records.iter().map(|place| &combined.records[*place]);
+        let places = combined.of(run).map(TrialRef::text);
+        let records = places.map(|place| combined.texts[place.log()].record(place));
         let text = match change.through(records) {
             Ok(change) if change.has_changed() => {
                 format!(

@@ -46,13 +46,12 @@ pub(super) fn of_people(combined: &Combined) -> Vec<Alert> {
         .iter()
         .filter(|run| is_of_people(&run.manifest));
     let alerts = people.filter_map(|run| {
-        let records = run.records.iter().map(|place| &combined.records[*place]);
-        let unread = records.filter_map(|record| record.detail.strict?.why);
+        let unread = combined.of(run).filter_map(|trial| trial.strict()?.why);
         let count = unread.filter(|why| *why != UnreadReason::Empty).count();
         let text = format!(
             "{} of {} of people are no choice of their question, and count as wrong.",
             count,
-            counted(run.records.len(), "answer")
+            counted(run.trials.len(), "answer")
         );
         (count > 0).then(|| Alert::new(AlertKind::NoChoice, text))
     });

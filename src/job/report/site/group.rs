@@ -12,7 +12,7 @@ use crate::job::report::settings::{Settings, differing, identity, pixels, short,
 use crate::job::stored::StoredRun;
 use crate::report::site::{GroupDifference, GroupDigests};
 use crate::types::manifest::RunManifest;
-use crate::types::{AxisLevel, Digest, KindReading, OpenDetail, Record, RunQuestion};
+use crate::types::{AxisLevel, Digest, KindReading, OpenDetail, RunQuestion};
 
 /// The field of an identity with the digest of the words around the questions.
 const PROMPTS: &str = "--prompts";
@@ -51,23 +51,22 @@ impl GroupKey {
         let mut levels = BTreeSet::new();
         let mut images = HashMap::<_, BTreeSet<Digest>>::new();
         let mut truths = HashMap::new();
-        for record in &combined.records {
-            let detail = &record.detail;
-            let truth = detail.truth.and_then(|truth| detail.choices.get(truth));
-            truths
-                .entry(record.question.to_string())
-                .or_insert_with(|| {
-                    let choices: BTreeSet<String> = detail.choices.iter().cloned().collect();
-                    (choices, truth.cloned())
-                });
-            let Some(condition) = record.condition.as_ref() else {
+        for item in combined.trials.items().into_iter().flatten() {
+            let truth = item.truth.and_then(|truth| item.choices.get(truth));
+            truths.entry(item.question.to_string()).or_insert_with(|| {
+                let choices: BTreeSet<String> = item.choices.iter().cloned().collect();
+                (choices, truth.cloned())
+            });
+        }
+        for trial in combined.trials.iter() {
+            let Some(condition) = trial.condition() else {
                 continue;
             };
             let own = condition.kind_reading();
             if condition.enhancer.is_none() && (own.is_untouched() || own == *variant) {
                 levels.insert(condition.level());
-                let place = (record.question.to_string(), condition.to_string());
-                images.entry(place).or_default().extend(detail.sent());
+                let place = (trial.question().to_string(), condition.to_string());
+                images.entry(place).or_default().extend(trial.sent());
             }
         }
         let light = variant.title();
@@ -94,14 +93,14 @@ impl GroupKey {
     pub(super) fn of_open(run: &StoredRun<OpenDetail>) -> Result<Self> {
         let mut images = HashMap::<_, BTreeSet<Digest>>::new();
         let mut levels = BTreeSet::new();
-        for record in &run.records {
-            let Some(condition) = record.condition.as_ref() else {
+        for trial in run.trials.iter() {
+            let Some(condition) = trial.condition() else {
                 continue;
             };
             levels.insert(condition.level());
             if condition.enhancer.is_none() {
-                let place = (record.question.to_string(), condition.to_string());
-                images.entry(place).or_default().extend(sent(record));
+                let place = (trial.question().to_string(), condition.to_string());
+                images.entry(place).or_default().extend(trial.sent());
             }
         }
         let setting = |name: &str| {
@@ -258,12 +257,6 @@ fn light(manifest: &RunManifest) -> Settings {
 fn listed(levels: &BTreeSet<AxisLevel>) -> String {
     let levels = levels.iter().map(ToString::to_string);
     levels.collect::<Vec<_>>().join(", ")
-}
-
-/// The digests of the images of a walk.
-fn sent(record: &Record<OpenDetail>) -> Option<Digest> {
-    let images = record.detail.images.iter();
-    Digest::of_files(images.map(|image| image.digest))
 }
 
 #[cfg(test)]

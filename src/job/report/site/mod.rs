@@ -18,7 +18,7 @@ use crate::report::choice_report::ChoiceReport;
 use crate::report::products::{PAGE, products};
 use crate::report::site::{GroupRows, OpenRow, RunLink, Site, SiteGroup, choice_rows, open_rows};
 use crate::types::manifest::RunManifest;
-use crate::types::{ChoiceDetail, KindReading, OpenDetail, Record, Truths};
+use crate::types::{ChoiceDetail, KindReading, OpenDetail, Trials, Truths};
 
 use group::{GroupKey, grouped};
 use member::ChoiceMember;
@@ -138,21 +138,25 @@ fn add_choices(
     Ok(Some(ChoiceMember {
         key,
         rows,
-        records: compared_records(&combined, &variant),
+        trials: compared_trials(&combined, &variant),
         questions: combined.questions,
         run: link,
     }))
 }
 
-/// The records that models are compared by: of raw images at L0 and in the main variant.
-fn compared_records(combined: &Combined, variant: &KindReading) -> Vec<Record> {
-    let records = combined.records.iter().filter(|record| {
-        record.condition.as_ref().is_some_and(|condition| {
+/// The trials that models are compared by: of raw images at L0 and in the main variant.
+fn compared_trials(combined: &Combined, variant: &KindReading) -> Trials<ChoiceDetail> {
+    let trials = combined.trials.iter().filter(|trial| {
+        trial.condition().is_some_and(|condition| {
             let own = condition.kind_reading();
             condition.enhancer.is_none() && (own.is_untouched() || own == *variant)
         })
     });
-    records.cloned().collect()
+    let mut compared = Trials::default();
+    for trial in trials {
+        compared.copy(trial, 0);
+    }
+    compared
 }
 
 fn add_open(run: StoredRun<OpenDetail>, link: RunLink, site: &mut Site) -> Result<OpenMember> {

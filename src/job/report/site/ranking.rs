@@ -9,27 +9,28 @@ use crate::report::site::{ChoiceRow, GroupRows, Ranking};
 use crate::score::best::{BestInTheDark, best_in_the_dark};
 use crate::score::grid::Grid;
 use crate::score::ranks::rank_ranges;
-use crate::types::{ModelListing, Record, RunQuestion};
+use crate::types::{ChoiceDetail, ModelListing, RunQuestion, Trials};
 
 /// The rows of runs that can be compared, in the order of their ranks. Models are compared by area on the items that all of them answered
 /// at all levels, as in the report; those that stand for comparison only are not.
 pub(super) fn ranked(members: Vec<ChoiceMember>) -> GroupRows {
     let names = names(&members);
-    let (mut records, mut questions, mut rows) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut trials, mut questions, mut rows) = (Trials::default(), Vec::new(), Vec::new());
     for member in members {
         let name = |model: &str| names[&(member.run.page.clone(), model.to_owned())].clone();
-        let own = member.records.into_iter();
-        let own = own
-            .filter(|record| names.contains_key(&(member.run.page.clone(), record.model.clone())));
-        records.extend(own.map(|record| Record {
-            model: name(&record.model),
-            ..record
-        }));
+        let is_named =
+            |model: &str| names.contains_key(&(member.run.page.clone(), model.to_owned()));
+        let mut own = member.trials;
+        own.retain(|trial| is_named(trial.model()));
+        own.rename(|model| is_named(model).then(|| name(model)));
+        for trial in own.iter() {
+            trials.copy(trial, 0);
+        }
         rows.extend(member.rows.into_iter().map(|row| (name(&row.model), row)));
         questions.extend(member.questions);
     }
     let models = rows.iter().filter(|(_, row)| !row.is_reference()).count();
-    let (best, unit) = best(&records, &questions);
+    let (best, unit) = best(&trials, &questions);
     // References alone are ranked by no test.
     let best = best.filter(|_| models > 1);
     let ranks: BTreeMap<String, _> = best
@@ -65,9 +66,12 @@ fn names(members: &[ChoiceMember]) -> BTreeMap<(String, String), String> {
 }
 
 /// The comparison of all models, and the unit that is treated as independent.
-fn best(records: &[Record], questions: &[RunQuestion]) -> (Option<BestInTheDark>, String) {
-    let clusters = clusters(records, questions);
-    let grid = Grid::of_models(records, &clusters, &ModelListing::default(), |_| true);
+fn best(
+    trials: &Trials<ChoiceDetail>,
+    questions: &[RunQuestion],
+) -> (Option<BestInTheDark>, String) {
+    let clusters = clusters(trials, questions);
+    let grid = Grid::of_models(trials, &clusters, &ModelListing::default(), |_| true);
     (best_in_the_dark(&grid), clusters.unit().to_string())
 }
 

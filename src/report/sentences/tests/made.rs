@@ -26,7 +26,7 @@ fn asked(model: &str, frames: usize, conditions: &[(&str, f64)]) -> Vec<Record> 
             let detail = ChoiceDetail {
                 frame: FrameId(format!("f{:02}", item / 2)),
                 family: [Family::Color, Family::RoomType][item % 2].clone(),
-                choices: ["a", "b", "c"].map(str::to_owned).to_vec().into(),
+                choices: ["a", "b", "c"].map(str::to_owned).to_vec(),
                 truth: Some(0),
                 repeat: 0,
                 strict: reading,
@@ -58,7 +58,8 @@ fn asked(model: &str, frames: usize, conditions: &[(&str, f64)]) -> Vec<Record> 
 
 /// All sentences about records.
 fn said(records: &[Record]) -> Vec<Sentence> {
-    sentences(&Findings::new(records, &FrameTies::default(), [], &[]))
+    let trials = records.iter().cloned().collect();
+    sentences(&Findings::new(&trials, &FrameTies::default(), [], &[]))
 }
 
 /// The sentences of a kind, each with its detail.
@@ -262,7 +263,8 @@ fn the_best_model_has_its_light_and_each_level_once() {
             all.extend(records);
         }
     }
-    let findings = Findings::new(&all, &FrameTies::default(), [], &[]);
+    let trials = all.iter().cloned().collect();
+    let findings = Findings::new(&trials, &FrameTies::default(), [], &[]);
     let best = findings.best.as_ref().unwrap();
     let names: Vec<String> = best.levels.iter().map(ToString::to_string).collect();
     assert_eq!(names, ["L0", "L3"]);

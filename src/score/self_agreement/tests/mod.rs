@@ -191,7 +191,8 @@ fn nothing_without_a_truth_is_scored_as_an_accuracy() {
         dark: keep,
     };
     let records = model.records(&[]);
-    let findings = Findings::new(&records, &FrameTies::default(), [], &[]);
+    let trials = records.iter().cloned().collect();
+    let findings = Findings::new(&trials, &FrameTies::default(), [], &[]);
     assert!(findings.grid.items.is_empty());
     let mut cells = findings.summary.cells.iter();
     assert!(cells.all(|cell| cell.accuracy.is_none() && cell.right == 0));

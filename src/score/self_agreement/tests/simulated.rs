@@ -60,7 +60,7 @@ pub(super) fn record(
     let detail = ChoiceDetail {
         frame: FrameId(format!("i{image:03}")),
         family: [Family::Presence, Family::Other("light".into())][question % 2].clone(),
-        choices: ["yes", "no"].map(str::to_owned).to_vec().into(),
+        choices: ["yes", "no"].map(str::to_owned).to_vec(),
         truth: None,
         repeat,
         strict: Some(reading),
@@ -87,7 +87,7 @@ pub(super) fn questions() -> Vec<RunQuestion> {
         frame: FrameId(format!("i{image:03}")),
         family: [Family::Presence, Family::Other("light".into())][question % 2].clone(),
         text: format!("Is there thing {question}?"),
-        choices: ["yes", "no"].map(str::to_owned).to_vec().into(),
+        choices: ["yes", "no"].map(str::to_owned).to_vec(),
         answer: None,
         extra_answers: None,
         group: None,
@@ -129,8 +129,9 @@ impl Simulated {
 pub(super) fn found<T>(records: &[Record], read: impl FnOnce(&SelfAgreement<'_>) -> T) -> T {
     let questions = questions();
     let listing = ModelListing::default();
+    let trials = records.iter().cloned().collect();
     read(&SelfAgreement::new(
-        records,
+        &trials,
         &FrameTies::default(),
         &questions,
         &listing,

@@ -1,0 +1,28 @@
+//! The files of a run folder beside its records: [`RunFiles`].
+
+use std::path::Path;
+
+use crate::error::Result;
+use crate::store;
+use crate::types::{ImageFidelity, RunQuestion, Thumbnail};
+
+/// The lines of the files in a run folder beside its records, as they are stored.
+pub(crate) struct RunFiles {
+    pub(crate) questions: Vec<RunQuestion>,
+    pub(crate) thumbnails: Vec<Thumbnail>,
+    pub(crate) fidelity: Vec<ImageFidelity>,
+}
+
+impl RunFiles {
+    /// Reads the files of a run folder.
+    ///
+    /// # Errors
+    /// If a line of a file is broken.
+    pub(crate) fn read(folder: &Path) -> Result<Self> {
+        Ok(Self {
+            questions: store::read_questions(folder)?,
+            thumbnails: store::read_thumbnails(folder)?,
+            fidelity: store::read_fidelity(folder)?,
+        })
+    }
+}
