@@ -1,7 +1,7 @@
 //! The trials of runs as reports need them: [`Trials`], and one of them ([`TrialRef`]).
 //!
 //! What many trials have in common is held once, and the texts of replies stay in the file of the run. So a trial with choices takes
-//! 84 bytes, and sixteen million of them less than 2 GB with all that a report makes of them.
+//! 80 bytes, and sixteen million of them less than 2 GB with all that a report makes of them.
 
 mod asked_item;
 mod asked_model;

@@ -102,8 +102,8 @@ mod tests {
     use crate::types::trials::ChoiceFacts;
 
     #[test]
-    fn a_trial_with_choices_takes_84_bytes() {
-        assert_eq!(size_of::<TrialFacts<ChoiceFacts>>(), 84);
+    fn a_trial_with_choices_takes_80_bytes() {
+        assert_eq!(size_of::<TrialFacts<ChoiceFacts>>(), 80);
     }
 
     #[test]
