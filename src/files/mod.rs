@@ -4,8 +4,8 @@ pub(crate) mod reading;
 
 use std::ffi::OsStr;
 use std::fs::{self, File};
-use std::io::{self, Write as _};
-use std::path::Path;
+use std::io::{self, BufRead as _, BufReader, BufWriter, Write as _};
+use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 
@@ -33,14 +33,63 @@ pub(crate) fn is_unfinished(name: &OsStr) -> bool {
     name.to_string_lossy().ends_with(UNFINISHED)
 }
 
-// tempfile's `persist` is not used: its random name leaves a further file after each killed process, and its file mode denies
-// access to colleagues who share a results folder.
-fn replace(path: &Path, content: &[u8], sync: impl FnOnce(&File) -> io::Result<()>) -> Result<()> {
+/// Writes a file by `write`, and forces it to the disk before it returns. A file with the same content is left untouched.
+///
+/// # Errors
+/// If the folder cannot be created, the file cannot be written, or `write` fails.
+pub(crate) fn write_with(
+    path: &Path,
+    write: impl FnOnce(&mut dyn io::Write) -> Result<()>,
+) -> Result<()> {
+    let unfinished = unfinished(path)?;
+    let unwritable = |e| Error::file(&unfinished, "write", e);
+    let mut file = BufWriter::new(File::create(&unfinished).map_err(unwritable)?);
+    write(&mut file)?;
+    file.flush().map_err(unwritable)?;
+    file.get_ref().sync_all().map_err(unwritable)?;
+    drop(file);
+    if is_same(path, &unfinished).unwrap_or(false) {
+        return fs::remove_file(&unfinished).map_err(unwritable);
+    }
+    fs::rename(&unfinished, path).map_err(|e| Error::file(path, "write", e))
+}
+
+/// Whether two files have the same content.
+fn is_same(one: &Path, other: &Path) -> io::Result<bool> {
+    if fs::metadata(one)?.len() != fs::metadata(other)?.len() {
+        return Ok(false);
+    }
+    let [mut one, mut other] = [
+        BufReader::new(File::open(one)?),
+        BufReader::new(File::open(other)?),
+    ];
+    loop {
+        let (a, b) = (one.fill_buf()?, other.fill_buf()?);
+        let length = a.len().min(b.len());
+        if length == 0 {
+            return Ok(a.len() == b.len());
+        }
+        if a[..length] != b[..length] {
+            return Ok(false);
+        }
+        one.consume(length);
+        other.consume(length);
+    }
+}
+
+/// The place of a file until it is complete; its folder is created.
+fn unfinished(path: &Path) -> Result<PathBuf> {
     if let Some(folder) = path.parent() {
         fs::create_dir_all(folder).map_err(|e| Error::file(folder, "create", e))?;
     }
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let unfinished = path.with_file_name(format!(".{name}{UNFINISHED}"));
+    Ok(path.with_file_name(format!(".{name}{UNFINISHED}")))
+}
+
+// tempfile's `persist` is not used: its random name leaves a further file after each killed process, and its file mode denies
+// access to colleagues who share a results folder.
+fn replace(path: &Path, content: &[u8], sync: impl FnOnce(&File) -> io::Result<()>) -> Result<()> {
+    let unfinished = unfinished(path)?;
     let written = File::create(&unfinished).and_then(|mut file| {
         file.write_all(content)?;
         sync(&file)

@@ -14,6 +14,22 @@ pub(crate) struct RunFiles {
 }
 
 impl RunFiles {
+    /// Reads the files of a run folder, without the evidence of questions.
+    ///
+    /// # Errors
+    /// If a line of a file is broken.
+    pub(crate) fn read_light(folder: &Path) -> Result<Self> {
+        let mut questions = Vec::new();
+        store::each_question(folder, |question| {
+            questions.push(question.without_evidence())
+        })?;
+        Ok(Self {
+            questions,
+            thumbnails: store::read_thumbnails(folder)?,
+            fidelity: store::read_fidelity(folder)?,
+        })
+    }
+
     /// Reads the files of a run folder.
     ///
     /// # Errors

@@ -1,19 +1,40 @@
-//! The texts of a run's replies: [`RunTexts`].
+//! What reports read of a run where they show it: [`RunTexts`].
 
-use std::path::Path;
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::error::{Error, Result};
-use crate::store::RecordLog;
-use crate::types::{Detail, Record, TextPlace};
+use crate::store::{RecordLog, each_question};
+use crate::types::{Detail, QuestionId, Record, RunQuestion, TextPlace};
 
-/// Where the texts of a run's replies are read.
+/// Where the texts of a run's replies, and the evidence of its questions, are read.
 #[derive(Debug, Clone)]
 pub(crate) enum RunTexts<D> {
-    /// In the file of the run.
-    Stored(Arc<RecordLog>),
+    /// In the files of the run.
+    Stored(Arc<StoredTexts>),
     /// In records that are held, by their numbers.
-    Held(Arc<[Record<D>]>),
+    Held(Arc<HeldTexts<D>>),
+}
+
+/// The files of a run.
+#[derive(Debug)]
+pub(crate) struct StoredTexts {
+    folder: PathBuf,
+    log: RecordLog,
+}
+
+/// Records and questions that are held in memory.
+#[derive(Debug)]
+pub(crate) struct HeldTexts<D> {
+    records: Vec<Record<D>>,
+    questions: Vec<RunQuestion>,
+}
+
+impl<D> HeldTexts<D> {
+    pub(super) fn new(records: Vec<Record<D>>, questions: Vec<RunQuestion>) -> Self {
+        Self { records, questions }
+    }
 }
 
 impl<D: Detail> RunTexts<D> {
@@ -22,8 +43,13 @@ impl<D: Detail> RunTexts<D> {
     /// # Errors
     /// If its file cannot be opened.
     pub(super) fn of(folder: &Path) -> Result<Self> {
-        let log = RecordLog::open_if_there(folder)?;
-        Ok(log.map_or_else(|| Self::Held([].into()), |log| Self::Stored(log.into())))
+        Ok(match RecordLog::open_if_there(folder)? {
+            None => Self::Held(HeldTexts::new(Vec::new(), Vec::new()).into()),
+            Some(log) => {
+                let folder = folder.to_owned();
+                Self::Stored(StoredTexts { folder, log }.into())
+            }
+        })
     }
 
     /// The record of a trial.
@@ -32,14 +58,15 @@ impl<D: Detail> RunTexts<D> {
     /// If the file of the run cannot be read any more, or was changed.
     pub(crate) fn record(&self, place: TextPlace) -> Result<Record<D>> {
         match self {
-            Self::Stored(log) => log.record(&log.line_from(place.start())?),
-            Self::Held(records) => {
-                let record = records.get(place.start() as usize);
+            Self::Stored(texts) => {
+                let line = texts.log.line_from(place.start())?;
+                texts.log.record(&line)
+            }
+            Self::Held(texts) => {
+                let record = texts.records.get(place.start() as usize);
                 record.cloned().ok_or_else(|| {
-                    Error::data(
-                        "records",
-                        format_args!("there is none at {}", place.start()),
-                    )
+                    let problem = format_args!("there is none at {}", place.start());
+                    Error::data("records", problem)
                 })
             }
         }
@@ -52,5 +79,28 @@ impl<D: Detail> RunTexts<D> {
     pub(crate) fn text(&self, place: TextPlace) -> Result<String> {
         let record = self.record(place)?;
         Ok(record.text_or_error().unwrap_or_default().to_owned())
+    }
+
+    /// Adds those of the wanted questions that are not found yet, with their evidence.
+    ///
+    /// # Errors
+    /// If the questions of the run cannot be read.
+    pub(crate) fn questions(
+        &self,
+        wanted: &HashSet<&QuestionId>,
+        found: &mut HashMap<QuestionId, RunQuestion>,
+    ) -> Result<()> {
+        let mut add = |question: RunQuestion| {
+            if wanted.contains(&question.id) {
+                found.entry(question.id.clone()).or_insert(question);
+            }
+        };
+        match self {
+            Self::Stored(texts) => each_question(&texts.folder, add),
+            Self::Held(texts) => {
+                texts.questions.iter().cloned().for_each(&mut add);
+                Ok(())
+            }
+        }
     }
 }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::renamed;
 use super::run_files::RunFiles;
+use super::run_texts::HeldTexts;
 pub(crate) use super::run_texts::RunTexts;
 use crate::error::{Error, Result};
 use crate::store;
@@ -33,6 +34,7 @@ pub(crate) struct StoredRun<D: Detail> {
     /// The trials of models that a report leaves out.
     pub(crate) left_out: Trials<D>,
     pub(crate) texts: RunTexts<D>,
+    /// The questions; those of a folder without their evidence, which [`RunTexts::questions`] reads.
     pub(crate) questions: Vec<RunQuestion>,
     pub(crate) thumbnails: Vec<Thumbnail>,
     pub(crate) fidelity: Vec<ImageFidelity>,
@@ -55,7 +57,7 @@ impl<D: Detail> StoredRun<D> {
             trials.add(record, TextPlace::new(place.start()));
         })?;
         let texts = RunTexts::of(folder)?;
-        let files = RunFiles::read(folder)?;
+        let files = RunFiles::read_light(folder)?;
         Ok(Self::of_parts(folder, manifest, (trials, texts), files))
     }
 
@@ -66,12 +68,8 @@ impl<D: Detail> StoredRun<D> {
         (records, files): (Vec<Record<D>>, RunFiles),
     ) -> Self {
         let trials = records.iter().cloned().collect();
-        Self::of_parts(
-            folder,
-            manifest,
-            (trials, RunTexts::Held(records.into())),
-            files,
-        )
+        let texts = RunTexts::Held(HeldTexts::new(records, files.questions.clone()).into());
+        Self::of_parts(folder, manifest, (trials, texts), files)
     }
 
     fn of_parts(

@@ -1,7 +1,8 @@
 //! Tables as CSV: [`files`], and [`safe`] texts in them. Numbers are written with all their digits.
 
-use std::borrow::Cow;
+use std::borrow::{Borrow, Cow};
 use std::fmt::Write as _;
+use std::io::Write;
 
 use serde::{Serialize, Serializer};
 
@@ -127,10 +128,24 @@ pub(super) fn files(tables: &[Table]) -> Result<Vec<(String, Vec<u8>)>> {
 /// # Errors
 /// If the file cannot be written.
 pub(super) fn csv(parts: &[Table]) -> Result<Vec<u8>> {
+    let mut file = Vec::new();
+    write(&mut file, parts)?;
+    Ok(file)
+}
+
+/// Writes tables with the same columns one by one: a header and rows.
+///
+/// # Errors
+/// If they cannot be written.
+pub(super) fn write<T: Borrow<Table>>(
+    out: impl Write,
+    parts: impl IntoIterator<Item = T>,
+) -> Result<()> {
     let failed = |e: ::csv::Error| Error::data("CSV", e);
-    let mut file = ::csv::Writer::from_writer(Vec::new());
+    let mut file = ::csv::Writer::from_writer(out);
     let mut has_header = false;
     for table in parts {
+        let table = table.borrow();
         let names = table.columns.iter().flat_map(|column| &column.heads.csv);
         for row in &table.rows {
             if names.clone().next().is_none() {
@@ -156,7 +171,7 @@ pub(super) fn csv(parts: &[Table]) -> Result<Vec<u8>> {
             file.serialize(row).map_err(failed)?;
         }
     }
-    file.into_inner().map_err(|e| Error::data("CSV", e))
+    file.flush().map_err(|e| Error::data("CSV", e))
 }
 
 /// The text of a field as [`safe`] writes it; empty for a number.

@@ -30,12 +30,13 @@ impl Curve {
 }
 
 /// The points of one curve: one model in one variant, raw or with one enhancer.
-pub(super) struct CurvePoints {
-    pub(super) model: String,
-    pub(super) variant: KindReading,
-    pub(super) enhancer: Option<EnhancerName>,
+#[derive(Debug)]
+pub(crate) struct CurvePoints {
+    pub(crate) model: String,
+    pub(crate) variant: KindReading,
+    pub(crate) enhancer: Option<EnhancerName>,
     /// Levels in increasing severity, with the index of the subject at each. L0 is the clean frame for every curve.
-    pub(super) subjects: Vec<(AxisLevel, usize)>,
+    pub(crate) subjects: Vec<(AxisLevel, usize)>,
 }
 
 impl CurvePoints {

@@ -89,6 +89,11 @@ pub(crate) fn read_questions(folder: &Path) -> Result<Vec<RunQuestion>> {
     lines(&folder.join(QUESTIONS))
 }
 
+/// Hands over the questions of a run in order; none as for [`read_questions`].
+pub(crate) fn each_question(folder: &Path, take: impl FnMut(RunQuestion)) -> Result<()> {
+    each_line(&folder.join(QUESTIONS), take)
+}
+
 /// The small copies of images of a run; none if the run has no such file.
 pub(crate) fn read_thumbnails(folder: &Path) -> Result<Vec<Thumbnail>> {
     lines(&folder.join(THUMBNAILS))

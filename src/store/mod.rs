@@ -36,8 +36,8 @@ pub(crate) use record_log::{RecordLog, each_record};
 pub(crate) use stored_trial::StoredTrial;
 
 pub(crate) use folder::{
-    AddressChange, find, is_locked, read_fidelity, read_manifest, read_questions, read_records,
-    read_thumbnails, read_trials, schema,
+    AddressChange, each_question, find, is_locked, read_fidelity, read_manifest, read_questions,
+    read_records, read_thumbnails, read_trials, schema,
 };
 
 /// The subfolder of a run for Batch API files.
@@ -77,6 +77,17 @@ impl<D: Detail> Store<D> {
         manifest: &RunManifest,
         address_change: AddressChange,
     ) -> Result<Self> {
+        let store = Self::open_read(folder, manifest, address_change)?;
+        set_aside::<Record<D>>(&folder.join(RECORDS), &folder.join(SET_ASIDE))?;
+        Ok(store)
+    }
+
+    /// Opens a run folder as [`open`](Self::open). Its records were read without an error, so that none is looked at again.
+    pub(crate) fn open_read(
+        folder: &Path,
+        manifest: &RunManifest,
+        address_change: AddressChange,
+    ) -> Result<Self> {
         match read_manifest(folder, D::SCHEMA)? {
             Some(stored) => check_same_run(folder, &stored, manifest, address_change)?,
             None => create_run(folder, manifest)?,
@@ -98,7 +109,6 @@ impl<D: Detail> Store<D> {
             TryLockError::Error(e) => Error::file(&path, "lock", e),
         })?;
         repair(&path, &records)?;
-        set_aside::<Record<D>>(&path, &folder.join(SET_ASIDE))?;
         Ok(Self {
             folder: folder.to_owned(),
             records,

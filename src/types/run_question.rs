@@ -68,6 +68,14 @@ impl RunQuestion {
             && groups.is_none_or(|(group, other)| group == other)
     }
 
+    /// The question without its evidence, which may be ten times as large as the rest; the name in [`bank_id`](Self::bank_id) stays.
+    #[must_use]
+    pub(crate) fn without_evidence(mut self) -> Self {
+        let bank_id = self.evidence.get_mut(BANK_ID).map(Value::take);
+        self.evidence = bank_id.map_or(Value::Null, |id| serde_json::json!({ BANK_ID: id }));
+        self
+    }
+
     /// The name of the question among those that are asked about every image; its own name if it is about one image alone.
     #[must_use]
     pub fn bank_id(&self) -> &str {

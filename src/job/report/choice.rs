@@ -8,6 +8,7 @@ use super::rereading::LenientChange;
 use super::whole_report::SUMMARY_JSON;
 use super::{enhancers, own_answers};
 use crate::error::Result;
+use crate::files::write_with;
 use crate::job::outcome::Outcome;
 use crate::job::outcome::StdoutFormat;
 use crate::job::stored::{ShownModels, StoredRun, name};
@@ -16,6 +17,8 @@ use crate::report::json::{RunList, summary};
 use crate::report::markdown::MarkdownReport;
 use crate::report::products::{PAGE, products};
 use crate::report::short::{findings, full, short};
+use crate::report::tables::{FLIPS, write_flips};
+use crate::score::findings::Findings;
 use crate::store::Store;
 use crate::types::manifest::RunManifest;
 use crate::types::{ChoiceDetail, Truths};
@@ -54,6 +57,7 @@ pub(super) fn in_its_folder(
     for (name, content) in files(&report, combined, RunList::One(manifest, None))? {
         store.write(&name, &content)?;
     }
+    write_rows(&findings, folder)?;
     store.write_manifest(manifest)?;
     if show == StdoutFormat::Json {
         return summary(&report, RunList::One(manifest, Some(folder)));
@@ -74,6 +78,14 @@ pub(super) fn files(
     let mut files = products(report, &combined.shown())?;
     files.push((SUMMARY_JSON.to_owned(), summary(report, runs)?.into_bytes()));
     Ok(files)
+}
+
+/// Writes the file that has a row for each item into a folder.
+pub(super) fn write_rows(findings: &Findings<'_>, folder: &Path) -> Result<()> {
+    if findings.first_failures.is_empty() {
+        return Ok(());
+    }
+    write_with(&folder.join(FLIPS), |out| write_flips(findings, out))
 }
 
 /// The text of a report in a format other than JSON.

@@ -1,6 +1,6 @@
 //! Joining several runs of questions with choices: [`combine`].
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
 
 use serde_json::json;
@@ -92,7 +92,13 @@ impl Combined {
         });
         PageInputs {
             runs: runs.collect(),
-            questions: &self.questions,
+            questions: Box::new(|wanted| {
+                let mut found = HashMap::new();
+                for texts in &self.texts {
+                    texts.questions(wanted, &mut found)?;
+                }
+                Ok(found)
+            }),
             thumbnails: &self.thumbnails,
             texts: Box::new(|place: TextPlace| self.texts[place.log()].text(place)),
         }

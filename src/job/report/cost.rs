@@ -1,5 +1,7 @@
 //! The cost of the replies of a run: [`cost`], [`dollars`].
 
+use std::collections::HashMap;
+
 use serde_json::Value;
 
 use crate::ask::{Price, Prices};
@@ -59,8 +61,12 @@ pub(super) fn cost<'t, D: Detail + 't>(
 ) -> Result<Option<String>> {
     let prices = Prices::built_in()?;
     let (mut dollars, mut counted, mut unknown) = (0.0, 0_usize, 0_usize);
+    let mut by_model = HashMap::new();
     for trial in trials.filter(|trial| trial.has_reply()) {
-        let price = price(&prices, manifest, trial.model());
+        let model = trial.model();
+        let price = by_model
+            .entry(model)
+            .or_insert_with(|| price(&prices, manifest, model));
         match price.and_then(|price| charged_at(price, prices.batch, trial)) {
             Some(cost) => {
                 dollars += cost;

@@ -38,7 +38,7 @@ pub(super) struct JoinedRun {
     pub(super) name: String,
     pub(super) manifest: RunManifest,
     pub(super) cost: Option<String>,
-    /// The questions of the run, of which [`Joined::questions`] holds each once.
+    /// The questions of the run, of which [`Joined::questions`] holds each once; none of a single run.
     pub(super) questions: Vec<RunQuestion>,
     /// Places of its trials among those of all runs. A trial that several runs have is stored once, and listed by each.
     pub(super) trials: Vec<u32>,
@@ -113,6 +113,19 @@ struct Known {
 }
 
 impl<D: Detail> Joined<D> {
+    /// Adds the questions of a run that no run before it has.
+    fn add_questions(&mut self, own: &[RunQuestion], known: &mut Known) {
+        for question in own {
+            let next = self.questions.len();
+            let place = *known.questions.entry(question.id.clone()).or_insert(next);
+            if place == next {
+                self.questions.push(question.clone());
+            } else if self.questions[place].group.is_none() {
+                self.questions[place].group.clone_from(&question.group);
+            }
+        }
+    }
+
     /// The trials of a run.
     pub(super) fn of(&self, run: &JoinedRun) -> impl Iterator<Item = TrialRef<'_, D>> {
         run.trials
@@ -189,15 +202,13 @@ impl<D: Detail> Joined<D> {
         let served = served(&run.trials);
         let (trials, replies, added) = self.add_trials(run.trials, index, known);
         self.texts.push(run.texts);
-        for question in &run.questions {
-            let next = self.questions.len();
-            let place = *known.questions.entry(question.id.clone()).or_insert(next);
-            if place == next {
-                self.questions.push(question.clone());
-            } else if self.questions[place].group.is_none() {
-                self.questions[place].group.clone_from(&question.group);
-            }
-        }
+        let questions = if known.trials.is_some() {
+            self.add_questions(&run.questions, known);
+            run.questions
+        } else {
+            self.questions = run.questions;
+            Vec::new()
+        };
         let thumbnails = run.thumbnails.into_iter();
         self.thumbnails.extend(thumbnails.filter(|thumbnail| {
             let place = (thumbnail.frame.clone(), thumbnail.condition.clone());
@@ -209,7 +220,7 @@ impl<D: Detail> Joined<D> {
             name,
             manifest: run.manifest,
             cost,
-            questions: run.questions,
+            questions,
             trials,
             replies,
             added,

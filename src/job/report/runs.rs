@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::alerts::{alerts, named_again};
 use super::baseline::{Baseline, FAIL_IF_WORSE};
-use super::choice::{files as report_files, in_its_folder, text};
+use super::choice::{files as report_files, in_its_folder, text, write_rows};
 use super::combine::{Combined, combine};
 use super::common::restrict;
 use super::enhancers;
@@ -191,19 +191,20 @@ fn of_choices(
     let is_worse = is_worse.transpose()?.unwrap_or(false);
     let in_folder = args.out.is_none() && !args.common && baseline.is_none() && again.is_empty();
     let reported = match &*combined.runs {
-        [run] if in_folder => match Store::open(&run.folder, &run.manifest, AddressChange::Allowed)
-        {
-            Ok(store) => Outcome::wrote(
-                &run.folder,
-                Status::Complete,
-                in_its_folder(&store, &run.manifest, &combined, args.format())?,
-            ),
-            // A run that another process writes, or in a read-only folder, is shown anyway.
-            Err(error) => {
-                tracing::warn!("the report is not written: {error}");
-                compare(&combined, baseline.as_ref(), args, again)?
+        [run] if in_folder => {
+            match Store::open_read(&run.folder, &run.manifest, AddressChange::Allowed) {
+                Ok(store) => Outcome::wrote(
+                    &run.folder,
+                    Status::Complete,
+                    in_its_folder(&store, &run.manifest, &combined, args.format())?,
+                ),
+                // A run that another process writes, or in a read-only folder, is shown anyway.
+                Err(error) => {
+                    tracing::warn!("the report is not written: {error}");
+                    compare(&combined, baseline.as_ref(), args, again)?
+                }
             }
-        },
+        }
         _ => compare(&combined, baseline.as_ref(), args, again)?,
     };
     // A command whose outcome is not what was asked for ends with 1.
@@ -265,8 +266,12 @@ fn compare(
         StdoutFormat::Json => summary(&report, list)?,
         show => text(&report, &runs, show),
     };
-    let files = match args.out {
-        Some(_) => report_files(&report, combined, list)?,
+    let files = match &args.out {
+        Some(out) => {
+            let files = report_files(&report, combined, list)?;
+            write_rows(&findings, out)?;
+            files
+        }
         None => Vec::new(),
     };
     write_files(args, shown, files)
@@ -319,7 +324,7 @@ fn of_open(
     let scores = open::Scores::new(joined)?;
     let run = &scores.run;
     if is_single && args.out.is_none() {
-        match Store::open(&run.folder, &run.manifest, AddressChange::Allowed) {
+        match Store::open_read(&run.folder, &run.manifest, AddressChange::Allowed) {
             Ok(store) => {
                 let text = scores.write(&store, args.format())?;
                 return Ok(Outcome::wrote(&run.folder, Status::Complete, text));

@@ -9,6 +9,7 @@ use crate::job::StdoutFormat;
 use crate::job::stored::{AnyRun, StoredRun};
 use crate::report::choice_report::ChoiceReport;
 use crate::report::json::RunList;
+use crate::report::tables::{FLIPS, write_flips};
 use crate::types::{ChoiceDetail, OpenDetail, Truths};
 
 /// The report of a run with the models that it shows now.
@@ -31,8 +32,14 @@ fn of_choices(run: StoredRun<ChoiceDetail>) -> Result<WholeReport> {
     let report = ChoiceReport::new(&findings, alerts(&combined, &findings))
         .with_enhancers(&enhancers::rows(&combined.runs));
     let runs = combined.manifests();
+    let mut files = choice::files(&report, &combined, RunList::One(runs[0].0, None))?;
+    if !findings.first_failures.is_empty() {
+        let mut rows = Vec::new();
+        write_flips(&findings, &mut rows)?;
+        files.push((FLIPS.to_owned(), rows));
+    }
     Ok(WholeReport {
-        files: choice::files(&report, &combined, RunList::One(runs[0].0, None))?,
+        files,
         markdown: choice::text(&report, &runs, StdoutFormat::Markdown),
     })
 }

@@ -1,9 +1,11 @@
 //! Data of the page besides the findings: [`PageInputs`].
 
+use std::collections::{HashMap, HashSet};
+
 use super::run_usage::RunUsage;
 use crate::error::Result;
 use crate::types::manifest::RunManifest;
-use crate::types::{RunQuestion, TextPlace, Thumbnail};
+use crate::types::{QuestionId, RunQuestion, TextPlace, Thumbnail};
 
 /// A run on the page.
 #[derive(Debug, Clone)]
@@ -19,12 +21,16 @@ pub struct PageRun<'a> {
     pub cost: Option<String>,
 }
 
+/// Reads questions by their names.
+pub(crate) type ReadQuestions<'a> =
+    Box<dyn Fn(&HashSet<&QuestionId>) -> Result<HashMap<QuestionId, RunQuestion>> + 'a>;
+
 /// Data of the page besides the findings.
 pub struct PageInputs<'a> {
     /// The runs that the page is about.
     pub runs: Vec<PageRun<'a>>,
-    /// Questions of the runs; empty if the runs do not store them.
-    pub questions: &'a [RunQuestion],
+    /// Reads those of the wanted questions that the runs store.
+    pub questions: ReadQuestions<'a>,
     /// Thumbnails of the images; empty if the runs do not store them.
     pub thumbnails: &'a [Thumbnail],
     /// Reads what stands in the place of a reply: its text, that of a refusal, or what the error says.

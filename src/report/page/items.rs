@@ -7,6 +7,7 @@ use super::data::{
     UNREAD, levels, packed_by, shortened, sizes, thumbnails,
 };
 use super::inputs::PageInputs;
+use super::sample::sample;
 use crate::error::Result;
 use crate::report::outcome_words;
 use crate::score::choice::ReadingMode;
@@ -23,21 +24,19 @@ pub(super) fn packed<'a>(
     confusions: &'a [confusion::Confusion],
     inputs: &PageInputs<'a>,
 ) -> Result<String> {
+    let sample = sample(grid);
+    let grid = sample.as_ref().unwrap_or(grid);
     let replies = Replies::read(grid, inputs)?;
-    packed_by(|limit| data(grid, confusions, inputs, (&replies, limit)))
+    let questions = questions(grid, inputs)?;
+    packed_by(|limit| data(grid, confusions, inputs, (&questions, &replies, limit)))
 }
 
 fn data<'a>(
     grid: &'a Grid<'a>,
     confusions: &'a [confusion::Confusion],
     inputs: &PageInputs<'a>,
-    (replies, limit): (&Replies, SizeLimit),
+    (run_questions, replies, limit): (&'a RunQuestions, &Replies, SizeLimit),
 ) -> PageData<'a> {
-    let run_questions: HashMap<&QuestionId, &RunQuestion> = inputs
-        .questions
-        .iter()
-        .map(|question| (&question.id, question))
-        .collect();
     let (mut frames, mut families) = (Distinct::new(), Distinct::new());
     let (mut question_ids, mut choices) = (Distinct::new(), Distinct::new());
     let mut questions = Vec::new();
@@ -104,6 +103,15 @@ fn data<'a>(
         replies: replies.indices.clone(),
         confusions: confusions_of(grid, confusions),
     }
+}
+
+/// The stored questions, by name.
+type RunQuestions = HashMap<QuestionId, RunQuestion>;
+
+/// The stored questions of the items.
+fn questions(grid: &Grid<'_>, inputs: &PageInputs<'_>) -> Result<RunQuestions> {
+    let asked = grid.items.iter().map(|item| &*item.asked.question);
+    (inputs.questions)(&asked.collect())
 }
 
 fn code(result: TrialResult, mode: ReadingMode) -> u8 {

@@ -7,6 +7,7 @@ pub(super) mod data;
 mod inputs;
 mod items;
 mod run_usage;
+mod sample;
 mod sections;
 mod tables;
 
@@ -150,7 +151,7 @@ pub(crate) fn page_of<'a>(
             sentences: Some(content.sentences.iter().map(PageSentence::new).collect()),
             how_to_read: content.how_to_read,
             answers_title: content.answers_title,
-            intro: content.intro,
+            intro: [content.intro, Vec::from_iter(sample::words(content.grid))].concat(),
             sections: sections::sections(sections, content.tables, figures, inputs.thumbnails),
             runs: inputs.runs.iter().map(facts).collect(),
             data: items::packed(content.grid, content.confusions, inputs)?,

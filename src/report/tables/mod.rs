@@ -35,6 +35,7 @@ pub(crate) use baseline::baseline;
 pub(super) use comparisons::comparisons_of;
 pub(crate) use enhancers::EnhancerRow;
 pub(super) use enhancers::enhancers;
+pub(crate) use flips::{FLIPS, write_flips};
 pub(super) use health::health;
 pub(super) use levels::unread;
 pub(super) use observer::{notes as observer_notes, what_it_is};
@@ -70,7 +71,6 @@ fn all(findings: &Findings<'_>) -> Vec<Table> {
         comparisons::comparisons(findings),
         answers::answers(findings),
         calibration::calibration(findings),
-        vec![flips::flips(findings)],
         Vec::from_iter(fidelity::fidelity(findings.fidelity.as_ref())),
         vec![pairs::darkness(&findings.pairs)],
         vec![pairs::light_agreement(&findings.light_agreements)],

@@ -15,7 +15,7 @@ use crate::job::report::choice;
 use crate::job::stored::StoredRun;
 
 use crate::job::{Outcome, ShowArgs, StdoutFormat, count, now};
-use crate::store::{AddressChange, Store};
+use crate::store::{AddressChange, Store, read_questions};
 use crate::types::manifest::{Counts, RunManifest, Status};
 use crate::types::{
     ChoiceDetail, Condition, Decides, Detail, Digest, QuestionId, Record, Reply, TrialKey,
@@ -111,7 +111,7 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
     }
     let people_manifest = of_people(&asked_run.manifest, args);
     let mut store = Store::open(&args.out, &people_manifest, AddressChange::Allowed)?;
-    store.write_questions(&asked_run.questions)?;
+    store.write_questions(&read_questions(&args.run)?)?;
     let mut people = People::new(store.records()?);
     for (asked, line) in known {
         counts.answers += 1;
