@@ -1,6 +1,7 @@
 //! `merge`: joins the shards of a run into one run.
 
 mod coverage;
+mod questions;
 mod trials;
 
 use std::collections::BTreeMap;
@@ -10,17 +11,18 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use self::coverage::Coverage;
-use self::trials::unique;
-use super::placed_trials::{PlacedTrial, append, in_order, placed_trials};
+use self::questions::PartQuestions;
+use self::trials::each_once;
+use super::placed_trials::{append, read_part};
 use super::report::{choice, open};
 use super::shard::Shard;
-use super::stored::{ExperimentKind, StoredRun, manifest};
+use super::stored::{ExperimentKind, StoredRun, manifest, sort};
 use super::thumbnail::MissingThumbnails;
 use super::{Outcome, ShowArgs, StdoutFormat};
 use crate::error::{Error, Result};
 use crate::store::{self, AddressChange, Store};
 use crate::types::manifest::{Counts, RunManifest, Status, differences};
-use crate::types::{ChoiceDetail, Decides, Detail, InputSummary, OpenDetail, RunQuestion};
+use crate::types::{ChoiceDetail, Decides, Detail, InputSummary, OpenDetail, Trials};
 
 /// The flags of `merge`.
 #[derive(Debug, Args)]
@@ -39,31 +41,26 @@ pub(crate) struct MergeArgs {
     pub show: ShowArgs,
 }
 
-/// One shard, as read from its folder, with its records by their places.
+/// One shard, as read from its folder.
 struct MergePart {
     shard: Shard,
     folder: PathBuf,
     manifest: RunManifest,
-    trials: Vec<PlacedTrial>,
-    questions: Vec<RunQuestion>,
 }
 
 impl MergePart {
-    fn open<D: Detail>(folder: &Path) -> Result<Self> {
+    fn open(folder: &Path) -> Result<Self> {
         let wrong = |problem: &str| Error::Run {
             path: folder.to_owned(),
             problem: problem.to_owned(),
         };
         let manifest = manifest(folder)?;
-        let trials = placed_trials::<D>(folder, &manifest)?;
         let Some(shard) = manifest.shard.as_deref() else {
             return Err(wrong("the run is not a shard: it was made without --shard"));
         };
         Ok(Self {
             shard: shard.parse()?,
             folder: folder.to_owned(),
-            trials,
-            questions: store::read_questions(folder)?,
             manifest,
         })
     }
@@ -101,7 +98,7 @@ fn merge_all<D: Detail>(
 ) -> Result<Outcome> {
     let parts: Result<Vec<MergePart>> = folders
         .iter()
-        .map(|folder| MergePart::open::<D>(folder))
+        .map(|folder| MergePart::open(folder))
         .collect();
     let mut parts = parts?;
     parts.sort_by_key(|part| (part.shard.count(), part.shard));
@@ -112,27 +109,20 @@ fn merge_all<D: Detail>(
     let is_missing = check_missing(&parts, &coverage, args.partial)?;
     warn_unfinished(&parts);
     let mut manifest = merged_manifest(&parts, &coverage)?;
-    let mut questions: Vec<RunQuestion> = parts
-        .iter()
-        .flat_map(|part| part.questions.clone())
-        .collect();
-    questions.sort_by_key(|question| question.place);
-    // A control of the observer asks a question of one shard with an image of another.
-    questions.dedup_by(|later, question| later.id == question.id);
-    let trials: Vec<Vec<PlacedTrial>> = parts
-        .iter_mut()
-        .map(|part| std::mem::take(&mut part.trials))
-        .collect();
     let folders: Vec<&Path> = parts.iter().map(|part| &*part.folder).collect();
-    let unique = unique::<D>(&folders, trials)?;
-    if unique.twice > 0 {
+    let questions = PartQuestions::read(&folders)?;
+    let mut trials = Trials::<D>::default();
+    for (number, part) in parts.iter().enumerate() {
+        read_part(&mut trials, &part.folder, &part.manifest, number)?;
+    }
+    let twice = each_once(&mut trials, &folders)?;
+    if twice > 0 {
         tracing::warn!(
-            "{} replies differ in two parts: they were paid for twice; those of the first part are taken",
-            unique.twice
+            "{twice} replies differ in two parts: they were paid for twice; those of the first part are taken"
         );
     }
-    let trials = in_order(unique.trials, &questions, &manifest.models);
-    let failed = trials.iter().filter(|(_, trial)| trial.failed()).count();
+    sort(&mut trials, questions.ids(), &manifest.models);
+    let failed = trials.iter().filter(|trial| trial.failed()).count();
     manifest.count(Counts {
         trials: coverage.trials().max(trials.len()),
         answered: trials.len() - failed,
@@ -142,13 +132,13 @@ fn merge_all<D: Detail>(
         manifest.status = Status::Incomplete;
     }
     let mut store = Store::<D>::open(&args.out, &manifest, AddressChange::Refused)?;
-    store.write_questions(&questions)?;
+    questions.write(&store, &folders)?;
     let shards = parts.iter().map(|part| (&*part.folder, &part.manifest));
-    append(&mut store, &manifest, &shards.collect::<Vec<_>>(), &trials)?;
+    let records = trials.iter().map(|trial| (trial.key(), trial.text()));
+    append(&mut store, &manifest, &shards.collect::<Vec<_>>(), records)?;
     drop(trials);
     store.sync()?;
-    let frames = questions.iter().map(|question| &question.frame);
-    let wanted = MissingThumbnails::new(frames, Vec::new());
+    let wanted = MissingThumbnails::new(questions.frames(), Vec::new());
     store.add_thumbnails_of(&folders, |frame| wanted.wants(frame))?;
     store.add_fidelity_of(&folders, |_| true)?;
     let run = StoredRun::of(&args.out, manifest)?;

@@ -4,11 +4,11 @@ use std::collections::{BTreeSet, HashSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::placed_trials::{PlacedTrial, append, placed_trials};
+use super::placed_trials::{append, trials_of};
 use crate::error::{Error, Result};
 use crate::store::{self, Store};
 use crate::types::manifest::{RunManifest, differences};
-use crate::types::{Detail, FrameId, TrialKey};
+use crate::types::{Detail, FrameId, TextPlace, TrialKey};
 
 /// The parts of a run in another number than now, as when a job array was stopped and goes on with another size.
 pub(super) struct OtherParts(Vec<(PathBuf, RunManifest)>);
@@ -71,16 +71,18 @@ impl OtherParts {
         wanted: &HashSet<TrialKey>,
         sources: &BTreeSet<&FrameId>,
     ) -> Result<usize> {
-        let mut found: Vec<(usize, PlacedTrial)> = Vec::new();
+        let mut found: Vec<(TrialKey, TextPlace)> = Vec::new();
         let mut keys = HashSet::new();
         for (part, (folder, other)) in self.0.iter().enumerate() {
-            let trials = placed_trials::<D>(folder, other)?.into_iter();
-            let answered = trials.filter(|trial| wanted.contains(&trial.key) && !trial.failed());
-            found.extend(
-                answered
-                    .filter(|trial| keys.insert(trial.key))
-                    .map(|trial| (part, trial)),
-            );
+            let trials = trials_of::<D>(folder, other)?;
+            let mut answered: Vec<(TextPlace, TrialKey)> = trials
+                .iter()
+                .filter(|trial| wanted.contains(&trial.key()) && !trial.failed())
+                .map(|trial| (trial.text().in_log(part), trial.key()))
+                .collect();
+            answered.sort_unstable();
+            let new = answered.into_iter().filter(|(_, key)| keys.insert(*key));
+            found.extend(new.map(|(place, key)| (key, place)));
         }
         if found.is_empty() {
             return Ok(0);
@@ -90,7 +92,7 @@ impl OtherParts {
             .iter()
             .map(|(folder, manifest)| (&**folder, manifest))
             .collect();
-        append(store, manifest, &parts, &found)?;
+        append(store, manifest, &parts, found.iter().copied())?;
         let folders: Vec<&Path> = parts.iter().map(|(folder, _)| *folder).collect();
         store.add_thumbnails_of(&folders, |frame| sources.contains(frame))?;
         store.add_fidelity_of(&folders, |frame| sources.contains(frame))?;

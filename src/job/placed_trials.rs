@@ -1,4 +1,4 @@
-//! The trials of parts of a run by the places of their records, so that joining them holds no record: [`PlacedTrial`].
+//! Trials of parts of a run by the places of their records, so that joining them holds no record: [`read_part`], [`append`].
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -6,89 +6,43 @@ use std::path::Path;
 
 use crate::error::{Error, Result};
 use crate::job::renamed::rename;
-use crate::job::stored::{TrialPlace, arrange, order};
-use crate::store::{LinePlace, RecordLog, Store, each_record};
+use crate::store::{RecordLog, Store, each_record};
 use crate::types::manifest::RunManifest;
 use crate::types::recorded_names::RecordedNames;
-use crate::types::{
-    Condition, Detail, Distinct, ListedModel, QuestionId, Record, RunQuestion, Shared, TrialKey,
-};
+use crate::types::{Detail, KeptTrial, Record, TextPlace, TrialKey, Trials};
 
-/// A trial, with the place of its record in the file of a run.
-pub(super) struct PlacedTrial {
-    pub(super) key: TrialKey,
-    question: Shared<QuestionId>,
-    condition: Option<Shared<Condition>>,
-    /// The name of the model in tables.
-    model: Shared<String>,
-    repeat: u32,
-    failed: bool,
-    pub(super) place: LinePlace,
-}
+/// The bytes of records that are written at once. Chosen: fewer calls of the system than records.
+const CHUNK: usize = 1 << 20;
 
-impl PlacedTrial {
-    /// Whether no reply came.
-    pub(super) fn failed(&self) -> bool {
-        self.failed
-    }
-}
-
-/// The trials of a run folder, by the last record of each, in the order of the first.
+/// Adds the trials of a run folder, which is the part of this number: each as its last record says, with the name that its model has now.
 ///
 /// # Errors
 /// If a line is not a record.
-pub(super) fn placed_trials<D: Detail>(
+pub(super) fn read_part<D: Detail>(
+    trials: &mut Trials<D>,
     folder: &Path,
     manifest: &RunManifest,
-) -> Result<Vec<PlacedTrial>> {
+    part: usize,
+) -> Result<()> {
     let names = RecordedNames::of(manifest);
-    let mut latest = HashMap::<TrialKey, usize>::new();
-    let mut trials: Vec<PlacedTrial> = Vec::new();
-    let (mut questions, mut conditions) = (Distinct::default(), Distinct::default());
-    let mut models = Distinct::default();
-    each_record(folder, |record: Record<D>, place| {
-        let mut trial = PlacedTrial {
-            key: record.key,
-            failed: record.failed(),
-            repeat: record.detail.repeat(),
-            model: names.shown(&record.model).to_owned().into(),
-            question: record.question.into(),
-            condition: record.condition.map(Shared::from),
-            place,
-        };
-        questions.share(&mut trial.question);
-        models.share(&mut trial.model);
-        if let Some(condition) = &mut trial.condition {
-            conditions.share(condition);
+    each_record(folder, |mut record: Record<D>, place| {
+        let shown = names.shown(&record.model);
+        if shown != record.model {
+            record.model = shown.to_owned();
         }
-        if let Some(&index) = latest.get(&trial.key) {
-            trials[index] = trial;
-        } else {
-            latest.insert(trial.key, trials.len());
-            trials.push(trial);
-        }
-    })?;
-    Ok(trials)
+        trials.add(record, TextPlace::new(place.start()).in_log(part));
+    })
 }
 
-/// The trials of all parts in the order of the questions, each with the index of its part.
-pub(super) fn in_order(
-    mut trials: Vec<(usize, PlacedTrial)>,
-    questions: &[RunQuestion],
-    listed: &[ListedModel],
-) -> Vec<(usize, PlacedTrial)> {
-    let order = {
-        let places = trials.iter().map(|(_, trial)| TrialPlace {
-            question: &trial.question,
-            condition: trial.condition.as_deref(),
-            model: &trial.model,
-            repeat: trial.repeat,
-            key: trial.key,
-        });
-        order(&places.collect::<Vec<_>>(), questions, listed)
-    };
-    arrange(&mut trials, order);
-    trials
+/// The trials of a run folder, each as its last record says.
+///
+/// # Errors
+/// If a line is not a record.
+pub(super) fn trials_of<D: Detail>(folder: &Path, manifest: &RunManifest) -> Result<Trials<D>> {
+    let mut trials = Trials::default();
+    read_part(&mut trials, folder, manifest, 0)?;
+    trials.each_key_once(|_, _| Ok(KeptTrial::Later))?;
+    Ok(trials)
 }
 
 /// The records of several run folders, to read single ones.
@@ -106,31 +60,31 @@ impl<'a> PartLogs<'a> {
         }
     }
 
-    fn log(&mut self, part: usize) -> Result<&mut RecordLog> {
+    fn log(&mut self, part: usize) -> Result<&RecordLog> {
         Ok(match self.open.entry(part) {
             Entry::Occupied(open) => open.into_mut(),
             Entry::Vacant(first) => first.insert(RecordLog::open(self.folders[part])?),
         })
     }
 
-    /// The line of a trial of a folder.
+    /// The line of a trial.
     ///
     /// # Errors
     /// If the file cannot be read.
-    pub(super) fn line(&mut self, part: usize, place: LinePlace) -> Result<Vec<u8>> {
-        self.log(part)?.line(place)
+    pub(super) fn line(&mut self, place: TextPlace) -> Result<Vec<u8>> {
+        self.log(place.log())?.line_from(place.start())
     }
 
-    /// A record of a folder from its line.
+    /// A record from the line at a place.
     ///
     /// # Errors
     /// If the line is not a record.
-    pub(super) fn record<D: Detail>(&mut self, part: usize, line: &[u8]) -> Result<Record<D>> {
-        self.log(part)?.record(line)
+    pub(super) fn record<D: Detail>(&mut self, place: TextPlace, line: &[u8]) -> Result<Record<D>> {
+        self.log(place.log())?.record(line)
     }
 }
 
-/// Appends the records of these trials to a run that lacks them, one after another. Where a run has the same names of models in its
+/// Appends the records at these places to a run that lacks them, one after another. Where a run has the same names of models in its
 /// records as the part that a record is from, its line is copied.
 ///
 /// # Errors
@@ -139,38 +93,47 @@ pub(super) fn append<D: Detail>(
     store: &mut Store<D>,
     manifest: &RunManifest,
     parts: &[(&Path, &RunManifest)],
-    trials: &[(usize, PlacedTrial)],
+    trials: impl Iterator<Item = (TrialKey, TextPlace)>,
 ) -> Result<()> {
     let names = RecordedNames::of(manifest);
-    let present = placed_trials::<D>(store.folder(), manifest)?;
-    let present: HashMap<TrialKey, LinePlace> = present
-        .into_iter()
-        .map(|trial| (trial.key, trial.place))
+    let is_copied: Vec<bool> = parts
+        .iter()
+        .map(|(_, part)| RecordedNames::of(part) == names)
+        .collect();
+    let present = trials_of::<D>(store.folder(), manifest)?;
+    let present: HashMap<TrialKey, TextPlace> = present
+        .iter()
+        .map(|trial| (trial.key(), trial.text()))
         .collect();
     let own = RecordLog::open(store.folder())?;
     let mut logs = PartLogs::of(&parts.iter().map(|(folder, _)| *folder).collect::<Vec<_>>());
-    for (part, trial) in trials {
-        let of_part = parts[*part].1;
-        let log = logs.log(*part)?;
-        let line = log.line(trial.place)?;
+    let mut chunk = Vec::new();
+    for (key, place) in trials {
+        let of_part = parts[place.log()].1;
+        let line = logs.line(place)?;
+        let log = logs.log(place.log())?;
         let shown = |log: &RecordLog, line: &[u8], manifest: &RunManifest| {
             let mut record = log.record::<D>(line)?;
             rename(std::slice::from_mut(&mut record), manifest);
             Ok::<_, Error>(record)
         };
-        if let Some(place) = present.get(&trial.key) {
-            let present = own.line(*place)?;
+        if let Some(place) = present.get(&key) {
+            let present = own.line_from(place.start())?;
             let is_same =
                 || Ok::<_, Error>(shown(&own, &present, manifest)? == shown(log, &line, of_part)?);
             if present == line || is_same()? {
                 continue;
             }
         }
-        if RecordedNames::of(of_part) == names {
-            store.append_line(&line)?;
+        if is_copied[place.log()] {
+            chunk.extend_from_slice(&line);
         } else {
-            store.append(&shown(log, &line, of_part)?)?;
+            chunk.extend_from_slice(&store.line(&shown(log, &line, of_part)?)?);
+        }
+        if chunk.len() >= CHUNK {
+            store.append_lines(&chunk)?;
+            chunk.clear();
         }
     }
-    Ok(())
+    store.append_lines(&chunk)
 }

@@ -1,7 +1,6 @@
 //! Runs as read from their folders: [`StoredRun`], and [`AnyRun`] for either kind of experiment.
 
-use std::collections::{HashMap, HashSet};
-use std::hash::Hash;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use super::renamed;
@@ -12,8 +11,8 @@ use crate::error::{Error, Result};
 use crate::store;
 use crate::types::manifest::RunManifest;
 use crate::types::{
-    ChoiceDetail, Condition, Detail, ImageFidelity, ListedModel, ModelListing, OpenDetail,
-    QuestionId, Record, RunQuestion, TextPlace, Thumbnail, TrialKey, TrialRef, Trials,
+    ChoiceDetail, Detail, ImageFidelity, KeptTrial, ListedModel, ModelListing, OpenDetail,
+    QuestionId, Record, RunQuestion, TextPlace, Thumbnail, TrialRef, Trials,
 };
 
 /// The models of a run that a report shows.
@@ -58,7 +57,7 @@ impl<D: Detail> StoredRun<D> {
         })?;
         let texts = RunTexts::of(folder)?;
         let files = RunFiles::read_light(folder)?;
-        Ok(Self::of_parts(folder, manifest, (trials, texts), files))
+        Self::of_parts(folder, manifest, (trials, texts), files)
     }
 
     /// The run of a folder from its manifest, records that are held in memory, and the lines of its other files.
@@ -66,7 +65,7 @@ impl<D: Detail> StoredRun<D> {
         folder: &Path,
         manifest: RunManifest,
         (records, files): (Vec<Record<D>>, RunFiles),
-    ) -> Self {
+    ) -> Result<Self> {
         let trials = records.iter().cloned().collect();
         let texts = RunTexts::Held(HeldTexts::new(records, files.questions.clone()).into());
         Self::of_parts(folder, manifest, (trials, texts), files)
@@ -77,10 +76,12 @@ impl<D: Detail> StoredRun<D> {
         manifest: RunManifest,
         (mut trials, texts): (Trials<D>, RunTexts<D>),
         files: RunFiles,
-    ) -> Self {
+    ) -> Result<Self> {
         renamed::rename_trials(&mut trials, &manifest);
-        sort(&mut trials, &files.questions, &manifest.models);
-        Self {
+        trials.each_key_once(|_, _| Ok(KeptTrial::Later))?;
+        let ids = files.questions.iter().map(|question| &question.id);
+        sort(&mut trials, ids, &manifest.models);
+        Ok(Self {
             folder: folder.to_owned(),
             manifest,
             trials,
@@ -89,7 +90,7 @@ impl<D: Detail> StoredRun<D> {
             questions: files.questions,
             thumbnails: files.thumbnails,
             fidelity: files.fidelity,
-        }
+        })
     }
 
     /// Takes the trials apart that a report does not show.
@@ -133,75 +134,17 @@ impl<D: Detail> StoredRun<D> {
 }
 
 /// Puts trials in the order of the questions, conditions and models (those that are listed first), whatever order the replies came in.
-pub(super) fn sort<D: Detail>(
+pub(super) fn sort<'q, D: Detail>(
     trials: &mut Trials<D>,
-    questions: &[RunQuestion],
+    questions: impl Iterator<Item = &'q QuestionId>,
     listed: &[ListedModel],
 ) {
-    let ids = questions.iter().map(|question| &question.id);
-    let places: HashMap<&QuestionId, usize> = ids.zip(0..).collect();
+    let places: HashMap<&QuestionId, usize> = questions.zip(0..).collect();
     let listing = ModelListing::new(listed.iter().cloned());
     trials.sort(
         |question| places.get(question).copied(),
         |model| listing.place(model),
     );
-}
-
-/// What the place of a trial among those of its run follows from.
-pub(super) struct TrialPlace<'t> {
-    pub(super) question: &'t QuestionId,
-    pub(super) condition: Option<&'t Condition>,
-    pub(super) model: &'t str,
-    pub(super) repeat: u32,
-    pub(super) key: TrialKey,
-}
-
-/// The indices of trials in the order of [`in_order`].
-pub(super) fn order(
-    trials: &[TrialPlace<'_>],
-    questions: &[RunQuestion],
-    listed: &[ListedModel],
-) -> Vec<usize> {
-    let ids = questions.iter().map(|question| &question.id);
-    let questions: HashMap<&QuestionId, usize> = ids.zip(0..).collect();
-    let conditions = numbers(trials.iter().map(|trial| trial.condition));
-    let listing = ModelListing::new(listed.iter().cloned());
-    let models = numbers(trials.iter().map(|trial| {
-        let place = listing.place(trial.model);
-        (place, trial.model)
-    }));
-    let place = |(index, trial): (usize, &TrialPlace<'_>)| {
-        let question = questions.get(trial.question).copied();
-        let model = models[&(listing.place(trial.model), trial.model)];
-        let names = (question, conditions[&trial.condition], model);
-        (names, trial.repeat, trial.key, index)
-    };
-    let mut places: Vec<_> = trials.iter().enumerate().map(place).collect();
-    places.sort_unstable();
-    places.into_iter().map(|(.., index)| index).collect()
-}
-
-/// A number for each of these values, in their order.
-fn numbers<T: Ord + Hash>(values: impl Iterator<Item = T>) -> HashMap<T, usize> {
-    let distinct: HashSet<T> = values.collect();
-    let mut sorted: Vec<T> = distinct.into_iter().collect();
-    sorted.sort_unstable();
-    sorted.into_iter().zip(0..).collect()
-}
-
-/// Puts values into an order in place: first the value at the first index of `order`. It has each index once.
-pub(super) fn arrange<T>(values: &mut [T], mut order: Vec<usize>) {
-    for start in 0..order.len() {
-        let mut place = start;
-        loop {
-            let from = std::mem::replace(&mut order[place], place);
-            if from == start {
-                break;
-            }
-            values.swap(place, from);
-            place = from;
-        }
-    }
 }
 
 /// Name of the run in this folder: that of the folder.
@@ -315,22 +258,5 @@ fn no_run(folder: &Path) -> Error {
     Error::Run {
         path: folder.to_owned(),
         problem: "no run in this folder: it has no manifest.json".to_owned(),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::arrange;
-
-    #[test]
-    fn values_are_put_into_any_order_in_place() {
-        let values: Vec<usize> = (0..40).map(|value| value * value).collect();
-        for step in [1, 3, 7, 9, 39] {
-            let order: Vec<usize> = (0..40).map(|index| (index * step + 5) % 40).collect();
-            let expected: Vec<usize> = order.iter().map(|index| values[*index]).collect();
-            let mut arranged = values.clone();
-            arrange(&mut arranged, order);
-            assert_eq!(arranged, expected, "{step}");
-        }
     }
 }

@@ -5,7 +5,8 @@ use std::ffi::OsStr;
 use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
 
-use super::lines::{StoredLine, each_line, lines};
+use super::lines::{StoredLine, each_line, each_placed_line, lines};
+use super::pieces::LinePlace;
 use super::stored_trial::StoredTrial;
 use crate::error::{Error, Result};
 use crate::files::{self, is_unfinished};
@@ -92,6 +93,14 @@ pub(crate) fn read_questions(folder: &Path) -> Result<Vec<RunQuestion>> {
 /// Hands over the questions of a run in order; none as for [`read_questions`].
 pub(crate) fn each_question(folder: &Path, take: impl FnMut(RunQuestion)) -> Result<()> {
     each_line(&folder.join(QUESTIONS), take)
+}
+
+/// Hands over the questions of a run in order, each with the place of its line.
+pub(crate) fn each_placed_question(
+    folder: &Path,
+    take: impl FnMut(RunQuestion, LinePlace),
+) -> Result<()> {
+    each_placed_line(&folder.join(QUESTIONS), take)
 }
 
 /// The small copies of images of a run; none if the run has no such file.

@@ -19,6 +19,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
+use crate::files::write_with;
 use crate::types::manifest::RunManifest;
 use crate::types::recorded_names::RecordedNames;
 use crate::types::{
@@ -32,12 +33,12 @@ use folder::{
 use lines::{append, each_line, json_lines, lines, repair, set_aside};
 
 pub(crate) use pieces::LinePlace;
-pub(crate) use record_log::{RecordLog, each_record};
+pub(crate) use record_log::{QuestionFile, RecordLog, each_record};
 pub(crate) use stored_trial::StoredTrial;
 
 pub(crate) use folder::{
-    AddressChange, each_question, find, is_locked, read_fidelity, read_manifest, read_questions,
-    read_records, read_thumbnails, read_trials, schema,
+    AddressChange, each_placed_question, each_question, find, is_locked, read_fidelity,
+    read_manifest, read_questions, read_records, read_thumbnails, read_trials, schema,
 };
 
 /// The subfolder of a run for Batch API files.
@@ -273,6 +274,20 @@ impl<D: Detail> Store<D> {
         )
     }
 
+    /// Replaces the stored questions of the run by lines that `write` hands over, as they are in the file of another run.
+    pub(crate) fn write_question_lines(
+        &self,
+        write: impl FnOnce(&mut dyn FnMut(&[u8]) -> Result<()>) -> Result<()>,
+    ) -> Result<()> {
+        let path = self.folder.join(QUESTIONS);
+        write_with(&path, |out| {
+            write(&mut |line| {
+                out.write_all(line)
+                    .map_err(|e| Error::file(&path, "write", e))
+            })
+        })
+    }
+
     /// The trials that were sent in batches, without replies; a trial that was sent again is in the list again.
     pub(crate) fn batch_trials(&self) -> Result<Vec<Record<D>>> {
         lines(&self.folder.join(BATCH).join(TRIALS)).map(|records| self.shown(records))
@@ -307,16 +322,22 @@ impl<D: Detail> Store<D> {
 
     /// Appends one record. After this returns, a killed process cannot lose it.
     pub(crate) fn append(&mut self, record: &Record<D>) -> Result<()> {
+        let line = self.line(record)?;
+        self.append_lines(&line)
+    }
+
+    /// The line of a record, with its end.
+    pub(crate) fn line(&self, record: &Record<D>) -> Result<Vec<u8>> {
         let mut line = serde_json::to_vec(&*self.recorded(record))
             .map_err(|e| Error::file(self.folder.join(RECORDS), "write", e.into()))?;
         line.push(b'\n');
-        self.append_line(&line)
+        Ok(line)
     }
 
-    /// Appends the line of a record, with its end, as it is in the file of another run with the same names of models.
-    pub(crate) fn append_line(&mut self, line: &[u8]) -> Result<()> {
+    /// Appends the lines of records, with their ends, as they are in the file of another run with the same names of models.
+    pub(crate) fn append_lines(&mut self, lines: &[u8]) -> Result<()> {
         self.records
-            .write_all(line)
+            .write_all(lines)
             .map_err(|e| Error::file(self.folder.join(RECORDS), "write", e))?;
         if self.synced.elapsed() >= SYNC_EVERY {
             self.sync()

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use super::folder::RECORDS;
+use super::folder::{QUESTIONS, RECORDS};
 use super::lines::each_placed_line;
 use super::pieces::LinePlace;
 use crate::error::{Error, Result};
@@ -44,19 +44,6 @@ impl RecordLog {
         }
     }
 
-    /// The line at a place, with its end.
-    ///
-    /// # Errors
-    /// If the file has become shorter.
-    pub(crate) fn line(&self, place: LinePlace) -> Result<Vec<u8>> {
-        let mut line = vec![0; place.length];
-        let mut file = &self.file;
-        let read = file.seek(SeekFrom::Start(place.start));
-        let read = read.and_then(|_| file.read_exact(&mut line));
-        read.map_err(|e| Error::file(&self.path, "read", e))?;
-        Ok(line)
-    }
-
     /// The line that begins at a place, with its end.
     ///
     /// # Errors
@@ -77,6 +64,41 @@ impl RecordLog {
     /// If the line is not a record.
     pub(crate) fn record<D: Detail>(&self, line: &[u8]) -> Result<Record<D>> {
         serde_json::from_slice(line).map_err(|e| Error::file(&self.path, "read", e.into()))
+    }
+}
+
+/// The file of a run's questions, to read single lines.
+#[derive(Debug)]
+pub(crate) struct QuestionFile {
+    path: PathBuf,
+    file: File,
+}
+
+impl QuestionFile {
+    /// Opens the questions of a run folder; `None` if it stores none.
+    ///
+    /// # Errors
+    /// If they cannot be opened.
+    pub(crate) fn open(folder: &Path) -> Result<Option<Self>> {
+        let path = folder.join(QUESTIONS);
+        match File::open(&path) {
+            Ok(file) => Ok(Some(Self { path, file })),
+            Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
+            Err(e) => Err(Error::file(path, "open", e)),
+        }
+    }
+
+    /// The line at a place, with its end.
+    ///
+    /// # Errors
+    /// If the file has become shorter.
+    pub(crate) fn line(&self, place: LinePlace) -> Result<Vec<u8>> {
+        let mut line = vec![0; place.length];
+        let mut file = &self.file;
+        let read = file.seek(SeekFrom::Start(place.start));
+        let read = read.and_then(|_| file.read_exact(&mut line));
+        read.map_err(|e| Error::file(&self.path, "read", e))?;
+        Ok(line)
     }
 }
 

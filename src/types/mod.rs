@@ -89,7 +89,8 @@ pub use treatment::Treatment;
 pub use treatment_set::TreatmentSet;
 pub use trial_key::TrialKey;
 pub use trials::{
-    AskedItem, AskedParts, ChoiceFacts, ChoiceTables, SentImages, TextPlace, TrialRef, Trials,
+    AskedItem, AskedParts, ChoiceFacts, ChoiceTables, KeptTrial, SentImages, TextPlace, TrialRef,
+    Trials,
 };
 
 /// The record of a trial; by default of a question with choices.

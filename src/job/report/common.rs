@@ -3,6 +3,7 @@
 use std::collections::HashSet;
 
 use super::combine::Combined;
+use super::join::TrialPlaces;
 use crate::error::{Error, Result};
 use crate::score::common::shared_items;
 use crate::types::{AskedItem, QuestionId};
@@ -37,11 +38,8 @@ pub(super) fn restrict(mut combined: Combined) -> Result<Combined> {
         next += u32::from(*kept);
     }
     for run in &mut combined.runs {
-        run.trials = run
-            .trials
-            .iter()
-            .filter_map(|place| places[*place as usize])
-            .collect();
+        let kept = run.trials.iter().filter_map(|place| places[place]);
+        run.trials = TrialPlaces::Some(kept.collect());
     }
     combined
         .trials

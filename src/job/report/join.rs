@@ -41,7 +41,7 @@ pub(super) struct JoinedRun {
     /// The questions of the run, of which [`Joined::questions`] holds each once; none of a single run.
     pub(super) questions: Vec<RunQuestion>,
     /// Places of its trials among those of all runs. A trial that several runs have is stored once, and listed by each.
-    pub(super) trials: Vec<u32>,
+    pub(super) trials: TrialPlaces,
     /// Number of its replies.
     pub(super) replies: usize,
     /// Number of its replies that no run before it by name has.
@@ -50,6 +50,33 @@ pub(super) struct JoinedRun {
     pub(super) served: BTreeMap<String, BTreeSet<String>>,
     /// The models whose trials are not shown.
     pub(super) left_out: BTreeSet<String>,
+}
+
+/// The places of the trials of a run among those of all runs.
+pub(super) enum TrialPlaces {
+    /// All of so many.
+    All(usize),
+    /// Some of them.
+    Some(Vec<u32>),
+}
+
+impl TrialPlaces {
+    /// The places.
+    pub(super) fn iter(&self) -> impl Iterator<Item = usize> {
+        let (all, some) = match self {
+            Self::All(count) => (0..*count, &[][..]),
+            Self::Some(places) => (0..0, &**places),
+        };
+        all.chain(some.iter().map(|place| *place as usize))
+    }
+
+    /// Number of places.
+    pub(super) fn len(&self) -> usize {
+        match self {
+            Self::All(count) => *count,
+            Self::Some(places) => places.len(),
+        }
+    }
 }
 
 /// Joins runs. Conditions whose images differ between runs are kept apart ([`Lights`]), and so are models that were asked in
@@ -128,9 +155,7 @@ impl<D: Detail> Joined<D> {
 
     /// The trials of a run.
     pub(super) fn of(&self, run: &JoinedRun) -> impl Iterator<Item = TrialRef<'_, D>> {
-        run.trials
-            .iter()
-            .map(|place| self.trials.at(*place as usize))
+        run.trials.iter().map(|place| self.trials.at(place))
     }
 
     /// Adds the trials of a run that no run before it has. Returns the places of all of its trials, and the numbers of its replies and
@@ -140,8 +165,13 @@ impl<D: Detail> Joined<D> {
         mut own: Trials<D>,
         index: usize,
         known: &mut Known,
-    ) -> (Vec<u32>, usize, usize) {
+    ) -> (TrialPlaces, usize, usize) {
         let replies = own.iter().filter(|trial| !trial.failed()).count();
+        if known.trials.is_none() {
+            let places = TrialPlaces::All(own.len());
+            self.trials = own;
+            return (places, replies, replies);
+        }
         let key = |trial: TrialRef<'_, D>| {
             let group = self.models.group(trial.model(), index);
             let group = group.map_or(0, |(group, _)| group + 1);
@@ -184,7 +214,7 @@ impl<D: Detail> Joined<D> {
                 self.trials.copy(trial, logs);
             }
         }
-        (places, replies, added)
+        (TrialPlaces::Some(places), replies, added)
     }
 
     /// Adds what a run has and no run before it.

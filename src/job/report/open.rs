@@ -256,7 +256,8 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
     let first = joined.runs.into_iter().next();
     let first = first.ok_or_else(|| Error::usage("RUN", "no run is named"))?;
     let mut trials = joined.trials;
-    sort(&mut trials, &joined.questions, &first.manifest.models);
+    let ids = joined.questions.iter().map(|question| &question.id);
+    sort(&mut trials, ids, &first.manifest.models);
     let run = OpenRun {
         records: trials.iter().map(TrialRef::record).collect(),
         folder: first.folder,

@@ -65,13 +65,13 @@ impl RunParts {
                 let shown = |all: &[Thumbnail]| shown_thumbnails(all, &frames);
                 let lines = (store::read_records(folder)?, files);
                 let parts = parts(lines, thumbnails, shown, redactor)?;
-                let run = StoredRun::of_lines(place, manifest.clone(), parts.lines);
+                let run = StoredRun::of_lines(place, manifest.clone(), parts.lines)?;
                 Self::new(manifest, parts.files, AnyRun::Choice(run), parts.thumbnails)
             }
             ExperimentKind::Open => {
                 let lines = (store::read_records(folder)?, RunFiles::read(folder)?);
                 let parts = parts(lines, thumbnails, <[Thumbnail]>::to_vec, redactor)?;
-                let run = StoredRun::of_lines(place, manifest.clone(), parts.lines);
+                let run = StoredRun::of_lines(place, manifest.clone(), parts.lines)?;
                 Self::new(manifest, parts.files, AnyRun::Open(run), parts.thumbnails)
             }
         }

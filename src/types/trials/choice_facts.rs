@@ -54,10 +54,10 @@ impl From<Reading> for AnswerReading {
 }
 
 /// What few trials have: what the observer saw, and how likely a model held each choice.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 struct More {
     observed: u32,
-    options: Option<OptionProbabilities>,
+    options: u32,
 }
 
 /// What the facts of trials with choices refer to.
@@ -65,6 +65,7 @@ struct More {
 pub struct ChoiceTables {
     images: Values<SentImages>,
     observed: Values<Observed>,
+    options: Vec<OptionProbabilities>,
     more: Vec<More>,
 }
 
@@ -107,7 +108,12 @@ impl ChoiceTables {
         if observed == NONE && options.is_none() {
             return NONE;
         }
-        self.more.push(More { observed, options });
+        let number = self.options.len() as u32;
+        self.more.push(More {
+            observed,
+            options: options.as_ref().map_or(NONE, |_| number),
+        });
+        self.options.extend(options);
         self.more.len() as u32 - 1
     }
 
@@ -129,7 +135,8 @@ impl ChoiceTables {
 
     /// How likely the model held each choice.
     pub(super) fn options(&self, facts: ChoiceFacts) -> Option<&OptionProbabilities> {
-        self.more.get(facts.more as usize)?.options.as_ref()
+        let number = self.more.get(facts.more as usize)?.options;
+        self.options.get(number as usize)
     }
 }
 

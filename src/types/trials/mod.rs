@@ -25,6 +25,8 @@ use rayon::slice::ParallelSliceMut;
 use trial_facts::{Tokens, TrialFacts, reply_digest};
 use values::Values;
 
+use crate::error::Error;
+
 use super::record::{Detail, FailureKind, Record};
 use super::{ChoiceDetail, Condition, Distinct, Family, FrameId, QuestionId};
 
@@ -40,6 +42,15 @@ pub struct Trials<D: Detail> {
     /// Number of files of runs that the places of texts refer to.
     logs: usize,
     texts: Texts,
+}
+
+/// Which of two trials of one key is kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum KeptTrial {
+    /// The one whose text stands first.
+    First,
+    /// The other.
+    Later,
 }
 
 /// The texts that items share.
@@ -268,7 +279,36 @@ impl<D: Detail> Trials<D> {
         item
     }
 
-    /// Keeps of each key the trial whose line is the last, and puts the trials in an order: by the places of their questions, their
+    /// Keeps one trial of each key. `choose` is asked about each two in the order of the places of their texts.
+    ///
+    /// # Errors
+    /// What `choose` returns.
+    pub fn each_key_once(
+        &mut self,
+        mut choose: impl FnMut(TrialRef<'_, D>, TrialRef<'_, D>) -> Result<KeptTrial, Error>,
+    ) -> Result<(), Error> {
+        self.facts
+            .par_sort_unstable_by_key(|facts| (facts.key, facts.text));
+        let mut is_kept = vec![true; self.facts.len()];
+        let mut first = 0;
+        for later in 1..self.facts.len() {
+            if self.facts[first].key == self.facts[later].key {
+                match choose(self.at(first), self.at(later))? {
+                    KeptTrial::First => {
+                        is_kept[later] = false;
+                        continue;
+                    }
+                    KeptTrial::Later => is_kept[first] = false,
+                }
+            }
+            first = later;
+        }
+        let mut is_kept = is_kept.into_iter();
+        self.facts.retain(|_| is_kept.next() == Some(true));
+        Ok(())
+    }
+
+    /// Puts the trials in an order: by the places of their questions, their
     /// conditions, the places of their models, and repeats. Questions and models without a place stand first.
     pub fn sort(
         &mut self,
@@ -289,15 +329,6 @@ impl<D: Detail> Trials<D> {
         distinct.dedup();
         let ranks: BTreeMap<_, u32> = distinct.into_iter().zip(0..).collect();
         let places: Vec<u32> = places.iter().map(|place| ranks[place]).collect();
-        self.facts
-            .par_sort_unstable_by_key(|facts| (facts.key, facts.text));
-        self.facts.dedup_by(|later, earlier| {
-            let is_same = later.key == earlier.key;
-            if is_same {
-                *earlier = later.clone();
-            }
-            is_same
-        });
         self.facts.par_sort_unstable_by_key(|facts| {
             let (question, repeat) = questions[facts.item as usize];
             (question, places[facts.asked as usize], repeat, facts.key)

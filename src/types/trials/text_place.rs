@@ -19,6 +19,15 @@ impl TextPlace {
         }
     }
 
+    /// The same place in the file of another number.
+    #[must_use]
+    pub(crate) fn in_log(self, log: usize) -> Self {
+        Self {
+            log: log as u16,
+            ..self
+        }
+    }
+
     /// The number of the file among those of all runs.
     #[must_use]
     pub fn log(self) -> usize {
