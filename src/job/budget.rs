@@ -100,7 +100,7 @@ impl Budget {
         };
         for record in stored {
             let price = answering.price(money, &record.model);
-            let Some((price, usage)) = price.zip(record.usage) else {
+            let Some((price, usage)) = price.zip(record.usage()) else {
                 continue;
             };
             let dollars = price.charged(usage);

@@ -49,7 +49,7 @@ impl MeasuredTokens {
     ) -> Self {
         let charged: HashMap<TrialKey, u64> = stored
             .iter()
-            .filter_map(|record| Some((record.key, record.usage?.prompt_tokens?)))
+            .filter_map(|record| Some((record.key, record.usage()?.prompt_tokens?)))
             .collect();
         let mut measured = Self::new(models);
         for (place, group) in plan.groups().filter(|(_, group)| group.condition.is_some()) {

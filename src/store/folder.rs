@@ -1,9 +1,10 @@
 //! The files of a run folder, and the check that a folder belongs to the requested run.
 
-use std::collections::HashMap;
 use std::ffi::OsStr;
 use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
+
+use rayon::slice::ParallelSliceMut;
 
 use super::lines::{StoredLine, each_line, each_placed_line, lines};
 use super::pieces::LinePlace;
@@ -71,17 +72,25 @@ fn last_of_each<T: StoredLine>(
     key: impl Fn(&T) -> TrialKey,
     mut share: impl FnMut(&mut T),
 ) -> Result<Vec<T>> {
-    let mut latest = HashMap::<TrialKey, usize>::new();
     let mut all: Vec<T> = Vec::new();
     each_line(&folder.join(RECORDS), |mut line: T| {
         share(&mut line);
-        if let Some(&index) = latest.get(&key(&line)) {
-            all[index] = line;
-        } else {
-            latest.insert(key(&line), all.len());
-            all.push(line);
-        }
+        all.push(line);
     })?;
+    // Sorted keys take a fifth of the memory of a map.
+    let mut keys: Vec<(TrialKey, u32)> = all.iter().map(key).zip(0..).collect();
+    keys.par_sort_unstable();
+    let mut is_repeated = vec![false; all.len()];
+    let again = keys.chunk_by(|one, next| one.0 == next.0);
+    for places in again.filter(|places| places.len() > 1) {
+        let (first, last) = (places[0].1 as usize, places[places.len() - 1].1 as usize);
+        all.swap(first, last);
+        for (_, place) in &places[1..] {
+            is_repeated[*place as usize] = true;
+        }
+    }
+    let mut is_repeated = is_repeated.into_iter();
+    all.retain(|_| is_repeated.next() == Some(false));
     Ok(all)
 }
 

@@ -42,6 +42,7 @@ pub(crate) mod severity;
 pub(crate) mod shared;
 mod shell;
 mod shown_codes;
+pub(crate) mod small_number;
 mod strict_group;
 pub(crate) mod treatment;
 pub(crate) mod treatment_set;

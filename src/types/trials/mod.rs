@@ -22,7 +22,7 @@ use std::collections::BTreeMap;
 
 use asked_model::{AskedModel, Server};
 use rayon::slice::ParallelSliceMut;
-use trial_facts::{Tokens, TrialFacts, reply_digest};
+use trial_facts::{TrialFacts, reply_digest};
 use values::Values;
 
 use crate::error::Error;
@@ -102,8 +102,8 @@ impl<D: Detail> Trials<D> {
             item,
             asked,
             server,
-            tokens: Tokens::of(record.usage),
-            latency: TrialFacts::<D::Facts>::latency(record.latency_ms),
+            tokens: record.usage.into(),
+            latency: record.latency_ms.into(),
             attempts: record.attempts.min(u32::from(u16::MAX)) as u16,
             failure: failure.unwrap_or(u16::MAX),
             facts,

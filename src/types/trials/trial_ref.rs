@@ -156,7 +156,7 @@ impl<'t, D: Detail> TrialRef<'t, D> {
     /// The duration of the last try, in milliseconds.
     #[must_use]
     pub fn latency_ms(self) -> Option<u64> {
-        self.facts().latency_ms()
+        self.facts().latency.get()
     }
 
     /// The number of requests that were sent.
