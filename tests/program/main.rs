@@ -14,6 +14,7 @@ mod bundle;
 mod calibrate;
 mod camera;
 mod cli;
+mod cluster;
 mod compared;
 mod confidence;
 mod coverage;
