@@ -17,6 +17,7 @@ mod cli;
 mod cluster;
 mod compared;
 mod confidence;
+mod container;
 mod coverage;
 mod documentation;
 mod enhance;
