@@ -27,8 +27,8 @@ pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
     let mut idle = NoEffect::new(layers::command_matches(matches));
     match &cli.command {
         None => idle.evaluation(&cli.evaluate),
-        Some(Command::Batch(BatchCommand::Export(args))) => idle.evaluation(&args.evaluate),
-        Some(Command::Batch(BatchCommand::Run(args))) => idle.evaluation(&args.evaluate),
+        Some(Command::Batch(BatchCommand::Export(args))) => idle.batch(&args.evaluate),
+        Some(Command::Batch(BatchCommand::Run(args))) => idle.batch(&args.evaluate),
         Some(Command::Check(args)) => idle.check(args),
         Some(Command::OpenEqa(args)) => idle.open(args),
         Some(Command::Synthesize(args)) if args.check.is_some() => {
@@ -171,6 +171,11 @@ impl NoEffect {
         self.job(&args.job, &images, &replies, None);
     }
 
+    fn batch(&mut self, args: &EvaluateArgs) {
+        self.because("a batch has no request in flight", &["grace".to_owned()]);
+        self.evaluation(args);
+    }
+
     fn check(&mut self, args: &CheckCommand) {
         if let Some(place) = &args.check.place {
             let why = "the data are named without it";
@@ -244,16 +249,16 @@ impl NoEffect {
                 ids::<Sending>(),
                 replies.to_vec(),
             ];
-            let paid = ["max_cost".into(), "prices".into()];
+            let others = ["max_cost".into(), "prices".into(), "grace".into()];
             self.because(
                 "all models are built in",
-                &[sent.concat(), paid.to_vec()].concat(),
+                &[sent.concat(), others.to_vec()].concat(),
             );
         }
         if args.money.dry_run {
             self.because(
                 "--dry-run sends nothing",
-                &["timings".into(), "max_failures".into(), "fail_fast".into()],
+                &["grace", "timings", "max_failures", "fail_fast"].map(String::from),
             );
         }
     }
@@ -337,8 +342,8 @@ mod tests {
             "--llie-on, --llie-max-side, --ort-lib: no effect: no --llie is named",
         ),
         (
-            "--model random --temperature 0 --rpm 9 --max-cost 1",
-            "--temperature, --rpm, --max-cost: no effect: all models are built in",
+            "--model random --temperature 0 --rpm 9 --max-cost 1 --grace 9",
+            "--temperature, --rpm, --max-cost, --grace: no effect: all models are built in",
         ),
         (
             "--model random --constrain json",
@@ -357,8 +362,12 @@ mod tests {
             "--trust-models: no effect: no file of models is named",
         ),
         (
-            "--model m --dry-run --timings",
-            "--timings: no effect: --dry-run sends nothing",
+            "--model m --dry-run --timings --grace 9",
+            "--grace, --timings: no effect: --dry-run sends nothing",
+        ),
+        (
+            "batch run --model m --grace 9",
+            "--grace: no effect: a batch has no request in flight",
         ),
         (
             "openeqa --questions q --frames f --model m --judge-temperature 1",

@@ -117,23 +117,6 @@ fn the_flag_reference_is_up_to_date() {
     );
 }
 
-#[test]
-fn the_kubernetes_job_uses_flags_that_exist() {
-    let text = include_str!("../run/cluster/job.yaml");
-    let flags = text
-        .lines()
-        .filter_map(|line| line.trim().strip_prefix("- --"));
-    let flags: Vec<String> = flags.map(|flag| format!("--{flag}")).collect();
-    assert!(flags.len() > 4);
-    let words = std::iter::once("darkqa-eval".to_owned()).chain(flags);
-    let args = Cli::try_parse_from(words).unwrap().evaluate;
-    let shard = args.job.scale.shard.unwrap();
-    let parts = shard.strip_prefix("auto/").unwrap();
-    for field in ["completions", "parallelism"] {
-        assert!(text.contains(&format!("\n  {field}: {parts}\n")), "{field}");
-    }
-}
-
 /// All commands, the program itself first.
 fn commands(command: &Clap) -> Vec<&Clap> {
     let inner = command

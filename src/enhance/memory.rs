@@ -6,6 +6,8 @@
 
 use std::fs;
 
+use super::control_group::unused_memory;
+
 /// Sides of the images, in pixels; chosen: 64² pixels squared are 67 MB of 32-bit attention, 256² would be 17 GB,
 /// and is then left out.
 pub(super) const PROBES: [usize; 4] = [64, 128, 256, 512];
@@ -103,25 +105,10 @@ pub(super) fn resident() -> Option<u64> {
     kilobytes(&status, "VmRSS:")
 }
 
-/// Memory that this process may still use, in bytes: the smaller of the machine's free memory and its control group's rest.
+/// Memory that this process may still use, in bytes: the smaller of the machine's free memory and the rest of its control groups.
 pub(super) fn available() -> Option<u64> {
     let free = kilobytes(&fs::read_to_string("/proc/meminfo").ok()?, "MemAvailable:")?;
-    let number = |path: &str| -> Option<u64> {
-        let text = fs::read_to_string(path).ok()?;
-        text.trim().parse().ok()
-    };
-    let groups = [
-        ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
-        (
-            "/sys/fs/cgroup/memory/memory.limit_in_bytes",
-            "/sys/fs/cgroup/memory/memory.usage_in_bytes",
-        ),
-    ];
-    let unused = groups.iter().filter_map(|(limit, used)| {
-        let (limit, used) = (number(limit)?, number(used)?);
-        Some(limit.saturating_sub(used))
-    });
-    Some(unused.fold(free, u64::min))
+    Some(unused_memory().map_or(free, |unused| unused.min(free)))
 }
 
 /// Value of a line like `VmRSS:  1234 kB`, in bytes.

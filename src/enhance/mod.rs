@@ -31,6 +31,7 @@
 
 mod built_in;
 mod composition;
+mod control_group;
 mod convention;
 mod describe;
 mod doctor;

@@ -1,7 +1,7 @@
 //! The asynchronous part: asks about the images from the pipeline, and stores every reply when it arrives.
 
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use tokio::runtime;
 use tokio::sync::mpsc::{self, Receiver, Sender};
@@ -17,12 +17,13 @@ use super::progress::{Progress, StepBar};
 use super::settings::JobSettings;
 use super::timings::{TimedStep, Timings};
 use super::trial::{Item, PreparedGroup};
+use super::truncation::TruncationCheck;
 use super::workers::unstarted;
 use crate::ask::{AskError, Call, Reach};
 use crate::enhance::Stopper;
 use crate::error::{Error, Result};
 use crate::store::Store;
-use crate::types::{Failure, FailureKind, Finish, Reply};
+use crate::types::{Failure, FailureKind, Reply};
 
 /// Number of finished groups that may wait until they are asked about.
 const GROUPS_AHEAD: usize = 2;
@@ -117,41 +118,13 @@ enum Said {
     Done,
 }
 
-/// Counts replies that the token limit cut before an answer. The first replies show whether the limit is too low.
-#[derive(Debug, Default)]
-struct TruncationCheck {
-    replies: usize,
-    cut: usize,
-}
-
-impl TruncationCheck {
-    /// Number of replies that are checked.
-    const CHECKED: usize = 10;
-
-    /// Counts a reply, and warns if most of the first ones were cut.
-    fn count(&mut self, reply: &Reply) {
-        if self.replies >= Self::CHECKED {
-            return;
-        }
-        self.replies += 1;
-        self.cut += usize::from(reply.finish == Finish::Length && reply.text.trim().is_empty());
-        if self.replies == Self::CHECKED && self.cut > Self::CHECKED / 2 {
-            tracing::warn!(
-                "{} of the first {} replies were cut at the token limit before any text: a reasoning model needs a larger \
-                 --max-tokens, or a lower --reasoning-effort",
-                self.cut,
-                self.replies
-            );
-        }
-    }
-}
-
 impl<I: Item> ReplySink<'_, I> {
     async fn ask(mut self, mut groups: Receiver<PreparedGroup<I>>) -> Result<EndReason> {
         let concurrency = self.dispatcher.settings.concurrency.most();
         let mut lanes = Lanes::<I>::new(self.dispatcher.models, concurrency);
         let mut in_flight = JoinSet::<Finished<I>>::new();
         let mut interrupt = Interrupt::listen()?;
+        let mut grace = None;
         let mut more_groups = true;
         loop {
             while let Some(ready) = lanes.next(|model| self.breaker.is_stopped(model)) {
@@ -178,7 +151,10 @@ impl<I: Item> ReplySink<'_, I> {
             let wants_more =
                 more_groups && lanes.wants_more(|model| self.breaker.is_stopped(model));
             tokio::select! {
-                () = interrupt.next() => self.breaker.interrupted(),
+                () = interrupt.next() => {
+                    grace = Some(self.dispatcher.settings.grace);
+                    self.breaker.interrupted();
+                }
                 Some(done) = in_flight.join_next() => {
                     self.record_wait(state, since);
                     if let Ok((ready, _)) = &done {
@@ -199,7 +175,7 @@ impl<I: Item> ReplySink<'_, I> {
         drop(groups);
         if self.breaker.stopped() {
             self.stoppers.iter().for_each(Stopper::stop);
-            self.drain(in_flight, interrupt).await?;
+            self.drain(in_flight, interrupt, grace).await?;
         }
         self.store.sync()?;
         Ok(self.breaker.into_end())
@@ -222,26 +198,55 @@ impl<I: Item> ReplySink<'_, I> {
         }
     }
 
-    /// Waits for the requests in flight, because they may be paid for already. A second interrupt aborts them. Requests that wait
-    /// for their turn or for a retry are aborted at once.
+    /// Waits for the requests in flight, because they may be paid for already, for as long as `grace` at most, if there is one. A further
+    /// interrupt aborts them. Requests that wait for their turn or for a retry are aborted at once.
     async fn drain(
         &mut self,
         mut in_flight: JoinSet<Finished<I>>,
         mut interrupt: Interrupt,
+        grace: Option<Duration>,
     ) -> Result<()> {
+        let progress = self.dispatcher.progress;
         if !in_flight.is_empty() {
-            let count = in_flight.len();
-            self.dispatcher.progress.say(&format!(
-                "stopping when the requests in flight ({count}) have ended; interrupt again to abort them"
+            let (at_most, again) = match grace {
+                Some(grace) => (
+                    format!(", after {} s (--grace) at the latest", grace.as_secs_f64()),
+                    " again",
+                ),
+                None => (String::new(), ""),
+            };
+            progress.say(&format!(
+                "stopping when the requests in flight ({}) have ended{at_most}; interrupt{again} to abort them",
+                in_flight.len()
             ));
         }
         for model in self.dispatcher.models {
             model.model.close();
         }
+        let out_of_grace = async {
+            match grace {
+                Some(grace) => tokio::time::sleep(grace).await,
+                None => std::future::pending().await,
+            }
+        };
+        tokio::pin!(out_of_grace);
+        let mut given_up = false;
         while !in_flight.is_empty() {
-            tokio::select! {
-                () = interrupt.next() => in_flight.abort_all(),
-                Some(done) = in_flight.join_next() => self.store_result(done)?,
+            let gives_up = tokio::select! {
+                () = interrupt.next() => true,
+                () = &mut out_of_grace, if !given_up => true,
+                Some(done) = in_flight.join_next() => {
+                    self.store_result(done)?;
+                    false
+                }
+            };
+            if gives_up && !given_up {
+                given_up = true;
+                tracing::warn!(
+                    "requests given up while in flight: {}; they may be paid for, and the same command asks them again",
+                    in_flight.len()
+                );
+                in_flight.abort_all();
             }
         }
         Ok(())

@@ -59,6 +59,7 @@ pub(crate) mod stored;
 pub(crate) mod thumbnail;
 pub(crate) mod timings;
 pub(crate) mod trial;
+mod truncation;
 pub(crate) mod walk;
 pub(crate) mod workers;
 

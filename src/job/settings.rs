@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt::Display;
 use std::num::NonZeroU32;
 use std::path::{self, Path, PathBuf};
+use std::time::Duration;
 
 use clap::Args;
 
@@ -20,6 +21,7 @@ use crate::ask::{
 use crate::enhance::{EnhancerArgs, ModelFile};
 use crate::error::{Error, Result};
 use crate::synthesis::{LightArgs, LightSettings};
+use crate::types::flag::seconds;
 use crate::types::{Decides, SetLight, View};
 
 /// The flags that every experiment has.
@@ -70,7 +72,7 @@ pub(crate) struct JobArgs {
 }
 
 /// Flags that distribute a job over processes.
-#[derive(Debug, Clone, Default, Args)]
+#[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Scale")]
 pub(crate) struct ScaleArgs {
     /// Do one of N parts, by frames or walks: I/N; auto/N or auto as the batch system says (Slurm arrays, indexed Kubernetes jobs);
@@ -81,6 +83,10 @@ pub(crate) struct ScaleArgs {
     /// How many parts run at once, so that each may send that share of --rpm and --tpm; default: all of them
     #[arg(long, value_name = "N", add = Decides::Nothing)]
     pub workers: Option<NonZeroU32>,
+    /// Seconds for which an interrupted run (Ctrl-C, SIGTERM, SIGHUP) waits for requests in flight before it gives them up; less than
+    /// the time that a batch system leaves it
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "120", add = Decides::Nothing)]
+    pub grace: Duration,
     /// Print at the end how long each step took, what limits the speed and what would help
     #[arg(long, add = Decides::Nothing)]
     pub timings: bool,
@@ -123,6 +129,8 @@ pub(crate) struct JobSettings {
     pub money: MoneySettings,
     /// Part of the run that this process does.
     pub shard: Shard,
+    /// The longest wait for the requests in flight after an interrupt.
+    pub grace: Duration,
     /// Print at the end how long each step took.
     pub show_timings: bool,
     /// Folder of the run.
@@ -252,6 +260,7 @@ impl JobArgs {
             concurrency: self.sending.concurrency,
             money: MoneySettings::resolve(&self.money, shard)?,
             shard,
+            grace: self.scale.grace,
             show_timings: self.scale.timings,
             show: self.output.show.format(),
             place: RunPlace::from(self.output).checked()?,

@@ -12,7 +12,7 @@ use crate::types::flag::threads;
 /// Flag of the number of threads that make images.
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub(crate) struct ThreadArgs {
-    /// Threads for synthesis, enhancement and reading, 1024 at most; default: all cores
+    /// Threads for synthesis, enhancement and reading, 1024 at most; default: all cores, or as many as a control group allows (Slurm, containers)
     #[arg(long, value_name = "N", value_parser = threads, help_heading = "Scale", add = Decides::Nothing)]
     pub threads: Option<NonZeroUsize>,
 }

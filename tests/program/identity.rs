@@ -376,7 +376,7 @@ const OPEN_ADDITIONS: [Addition; 10] = [
 ];
 
 /// What changes no answer: given on the folder of a run, it asks nothing.
-const NOTHING: [&str; 33] = [
+const NOTHING: [&str; 34] = [
     "--max-pixels 1000000",
     "--threads 1",
     "--offline",
@@ -403,6 +403,7 @@ const NOTHING: [&str; 33] = [
     "--prices prices.toml",
     "--dry-run",
     "--workers 2",
+    "--grace 9",
     "--timings",
     "--full",
     "--findings",

@@ -256,6 +256,7 @@ fn the_script_of_slurm_has_a_stopped_task_started_again() {
         "--data set.jsonl --levels L0 --concurrency 1 --out run",
     );
     let variables = [
+        ("SLURM_JOB_ID", "8"),
         ("SLURM_ARRAY_JOB_ID", "7"),
         ("SLURM_ARRAY_TASK_ID", "0"),
         ("SLURM_ARRAY_TASK_COUNT", "1"),

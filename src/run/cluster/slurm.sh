@@ -1,22 +1,47 @@
 #!/usr/bin/env bash
-# An evaluation as a Slurm job array:
+# An evaluation as jobs of Slurm: its plan, 256 parts of which 16 run at once, and the merge of them into runs/a-whole.
 #
-#     sbatch --array=0-15 slurm.sh --out runs/a --model gpt-4o --data frames/ --rpm 500
-#     darkqa-eval merge runs/a --out runs/a-whole        # when all tasks are done
+#     ./slurm.sh --out runs/a --model gpt-4o --data frames/ --rpm 500
 #
-# Each task does the part with its number in the array. The key comes from the environment of sbatch, or --api-key-file.
-# A task that is preempted, or near its time limit, finishes the requests in flight, and continues when it is started again.
+# PARTS=64 AT_ONCE=8 in front divides otherwise; SBATCH_ACCOUNT, SBATCH_PARTITION and the like are sbatch's own. The key comes from
+# the environment, or --api-key-file. One array alone, where the plan is there or none is wanted:
+#
+#     sbatch --array=0-15%4 slurm.sh --workers 4 --out runs/a --model gpt-4o --data frames/ --rpm 500
+#
+# A task that is preempted, or near its time limit, finishes the requests in flight, and Slurm starts it again. A task that was
+# killed (kill -9, no memory), cancelled or lost with its node is not started again, and the merge is cancelled with it: give the
+# same line again. Only what is missing is asked, and PARTS may be another number.
 #SBATCH --job-name=darkqa
-#SBATCH --array=0-3
 #SBATCH --cpus-per-task=1
 #SBATCH --time=12:00:00
 #SBATCH --requeue
 #SBATCH --open-mode=append
-#SBATCH --output=darkqa-%A_%a.log
-#SBATCH --signal=B:TERM@120
-set -u
+#SBATCH --output=%x-%j.log
+#SBATCH --signal=B:TERM@150
+set -eu
+
+# Outside of a job: submits the three.
+if [ -z "${SLURM_JOB_ID:-}" ]; then
+  parts=${PARTS:-256} at_once=${AT_ONCE:-16} out='' before=''
+  for word in "$@"; do
+    case $word in --out=*) out=${word#--out=} ;; esac
+    [ "$before" = --out ] && out=$word
+    before=$word
+  done
+  [ -n "$out" ] || { echo "$0: --out DIR is missing: the tasks share the folder of the run" >&2; exit 2; }
+  submit() { sbatch --parsable --kill-on-invalid-dep=yes "$@"; }
+  plan=$(submit --job-name=darkqa-plan "$0" plan "$@")
+  array=$(submit --array="0-$((parts - 1))%$at_once" --output=darkqa-%A_%a.log --dependency="afterok:$plan" \
+    "$0" --workers "$at_once" "$@")
+  merge=$(submit --job-name=darkqa-merge --dependency="afterok:$array" "$0" merge "$out" --out "${out%/}-whole" --quiet)
+  echo "plan $plan, $parts parts $array, merge $merge: squeue --me shows them"
+  exit
+fi
+
+set +e
 stopped=
-darkqa-eval --threads "${SLURM_CPUS_PER_TASK:-1}" "$@" &
+export DARKQA_THREADS=${DARKQA_THREADS:-${SLURM_CPUS_PER_TASK:-1}}
+darkqa-eval "$@" &
 child=$!
 trap 'stopped=yes; kill -TERM "$child"' TERM
 wait "$child"

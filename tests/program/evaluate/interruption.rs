@@ -32,6 +32,44 @@ fn an_interrupt_keeps_what_was_answered() {
     assert!(manifest.contains("\"cancelled\""), "{manifest}");
 }
 
+/// A batch system sends one SIGTERM, and kills some time later: what came is written before that.
+#[test]
+fn an_interrupt_gives_up_after_the_grace_what_is_never_answered() {
+    let bench = Bench::with_frames();
+    let endpoint = MockEndpoint::start([Answer::text("A"), Answer::silent()]);
+    let url = endpoint.base_url();
+    let args = "--data frames --levels L0 --concurrency 1 --timeout 100000 --out run --grace 1.5";
+    let args = model_args(&url, args);
+    let mut program = Command::new(assert_cmd::cargo::cargo_bin("darkqa-eval"))
+        .args(&args)
+        .current_dir(bench.path(""))
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    wait_until(|| endpoint.requests().len() >= 2);
+    signal(&program, "-TERM");
+    thread::sleep(Duration::from_millis(300));
+    assert!(
+        program.try_wait().unwrap().is_none(),
+        "what is on the wire is waited for"
+    );
+    // Would take 100,000 s otherwise, and the run of the tests with it.
+    let output = program.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130), "{output:?}");
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        said.contains("requests given up while in flight: 1;"),
+        "{said}"
+    );
+    assert_eq!(records(&bench.path("run")).len(), 1);
+    let table = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        table.contains("cancelled: 1 of 3 trials answered, 0 failed"),
+        "{table}"
+    );
+}
+
 #[test]
 fn an_interrupt_does_not_wait_for_retries() {
     let bench = Bench::with_frames();

@@ -1,0 +1,329 @@
+//! The manifests for Kubernetes and the scripts in `src/run/cluster`: their flags exist, and they agree with each other.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::PathBuf;
+
+use darkqa_eval::cli;
+
+use crate::support::run::Bench;
+
+/// A file of the folder.
+fn file(name: &str) -> String {
+    let path = path(name);
+    fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+fn path(name: &str) -> PathBuf {
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+    root.join("src/run/cluster").join(name)
+}
+
+/// The words after `args:` in a manifest.
+fn words(manifest: &str) -> Vec<String> {
+    let text = file(manifest);
+    let lines = text.lines().skip_while(|line| line.trim() != "args:");
+    let words = lines.skip(1).map_while(|line| {
+        let word = line.trim().strip_prefix("- ")?;
+        Some(word.to_owned())
+    });
+    words.collect()
+}
+
+/// The value of a field of a manifest that has it once.
+fn field(manifest: &str, name: &str) -> String {
+    let text = file(manifest);
+    let begin = format!("{name}: ");
+    let found: Vec<&str> = text
+        .lines()
+        .filter_map(|line| line.trim().strip_prefix(&begin))
+        .collect();
+    assert_eq!(found.len(), 1, "{manifest}: {name}: {found:?}");
+    found[0].to_owned()
+}
+
+/// The value of a flag among words such as `--rpm=500`.
+fn value(words: &[String], flag: &str) -> String {
+    let begin = format!("{flag}=");
+    let value = words.iter().find_map(|word| word.strip_prefix(&begin));
+    value
+        .unwrap_or_else(|| panic!("{flag}: {words:?}"))
+        .to_owned()
+}
+
+/// Checks that the program takes these words.
+fn parse(words: &[String]) {
+    let program = "darkqa-eval".to_owned();
+    // `plan` takes the flags of an evaluation.
+    let has_plan = cli::command().find_subcommand("plan").is_some();
+    let skipped = usize::from(!has_plan && words[0] == "plan");
+    let words = std::iter::once(&program).chain(&words[skipped..]);
+    if let Err(e) = cli::command().try_get_matches_from(words) {
+        panic!("{e}");
+    }
+}
+
+const MANIFESTS: [&str; 3] = ["plan.yaml", "job.yaml", "merge.yaml"];
+
+#[test]
+fn every_manifest_has_flags_that_exist() {
+    for manifest in MANIFESTS {
+        let words = words(manifest);
+        assert!(words.len() > 3, "{manifest}: {words:?}");
+        parse(&words);
+    }
+}
+
+#[test]
+fn the_manifests_are_of_one_run() {
+    let (plan, job, merge) = (words("plan.yaml"), words("job.yaml"), words("merge.yaml"));
+    assert_eq!(plan[0], "plan");
+    // What the plan leaves out is about asking and dividing alone.
+    let planned: BTreeSet<&String> = plan[1..].iter().collect();
+    let asked: BTreeSet<&String> = job.iter().collect();
+    assert!(planned.is_subset(&asked), "{planned:?} {asked:?}");
+    let others = asked.difference(&planned).map(|word| {
+        let flag = word.split('=').next();
+        flag.unwrap_or_default()
+    });
+    let others: Vec<&str> = others.collect();
+    let expected = ["--grace", "--quiet", "--rpm", "--shard", "--workers"];
+    assert_eq!(others, expected);
+    assert_eq!(merge[..2], ["merge".to_owned(), value(&job, "--out")]);
+    // Kubernetes tells a pod neither how many there are nor how many run at once.
+    let parts = value(&job, "--shard");
+    let parts = parts.strip_prefix("auto/").unwrap();
+    assert_eq!(parts, field("job.yaml", "completions"));
+    assert_eq!(value(&job, "--workers"), field("job.yaml", "parallelism"));
+    let grace: u32 = value(&job, "--grace").parse().unwrap();
+    let given = field("job.yaml", "terminationGracePeriodSeconds");
+    assert!(grace < given.parse().unwrap());
+    let images = MANIFESTS.map(|manifest| field(manifest, "image"));
+    assert!(images[0].contains("@sha256:"));
+    assert!(images.iter().all(|image| *image == images[0]), "{images:?}");
+}
+
+#[test]
+fn a_pod_that_its_node_ends_has_not_failed() {
+    for (manifest, ends, codes) in [
+        ("plan.yaml", "FailJob", "[2]"),
+        ("job.yaml", "FailIndex", "[2, 3]"),
+        ("merge.yaml", "FailJob", "[2]"),
+    ] {
+        let text = file(manifest);
+        let rules = text.split_once("rules:\n").unwrap().1;
+        let rules = rules.split_once("  template:").unwrap().0;
+        let lines = rules.lines().map(str::trim);
+        let rules: Vec<&str> = lines.filter(|line| !line.starts_with('#')).collect();
+        let codes =
+            format!("onExitCodes: {{containerName: darkqa, operator: In, values: {codes}}}");
+        let expected = [
+            "- action: Ignore",
+            "onPodConditions:",
+            "- {type: DisruptionTarget, status: \"True\"}",
+            &format!("- action: {ends}"),
+            &codes,
+        ];
+        assert_eq!(rules, expected, "{manifest}");
+        // The rules ask for it.
+        assert_eq!(field(manifest, "restartPolicy"), "Never");
+    }
+}
+
+/// What a namespace asks of its pods that enforces the standard `restricted`.
+#[test]
+fn a_restricted_namespace_takes_the_pods() {
+    for manifest in MANIFESTS {
+        for (name, value) in [
+            ("runAsNonRoot", "true"),
+            ("runAsUser", "65532"),
+            ("fsGroup", "65532"),
+            ("seccompProfile", "{type: RuntimeDefault}"),
+            ("allowPrivilegeEscalation", "false"),
+            ("readOnlyRootFilesystem", "true"),
+            ("capabilities", "{drop: [ALL]}"),
+            ("automountServiceAccountToken", "false"),
+        ] {
+            assert_eq!(field(manifest, name), value, "{manifest}: {name}");
+        }
+    }
+}
+
+#[test]
+fn every_volume_is_claimed_with_its_mode() {
+    let claims = file("claims.yaml");
+    let mode = |claim: &str| {
+        let own = claims.split("---").find(|own| {
+            let name = format!("\n  name: {claim}\n");
+            own.contains(&name)
+        });
+        let own = own.unwrap_or_else(|| panic!("claims.yaml has no {claim}"));
+        let mode = own.split_once("accessModes: [").unwrap().1;
+        mode.split_once(']').unwrap().0
+    };
+    for manifest in MANIFESTS {
+        let text = file(manifest);
+        let mut count = 0;
+        for line in text.lines() {
+            let Some((_, rest)) = line.split_once("persistentVolumeClaim: {claimName: ") else {
+                continue;
+            };
+            let (claim, rest) = rest.split_at(rest.find([',', '}']).unwrap());
+            let name = claim.strip_prefix("darkqa-").unwrap();
+            let is_read_only = rest.contains("readOnly: true");
+            let expected = if is_read_only {
+                "ReadOnlyMany"
+            } else {
+                "ReadWriteMany"
+            };
+            assert_eq!(mode(claim), expected, "{manifest}: {claim}");
+            let mount = format!("- {{name: {name}, mountPath: /{name}");
+            let mount = text.lines().find(|line| line.contains(&mount)).unwrap();
+            assert_eq!(mount.contains("readOnly: true"), is_read_only, "{mount}");
+            count += 1;
+        }
+        assert!(count > 0, "{manifest}");
+    }
+}
+
+/// The script with a `kubectl` that writes down what it is told, and whose jobs end as `ends` says.
+#[cfg(unix)]
+fn kubectl(ends: &str) -> (Option<i32>, Vec<String>, String) {
+    use std::os::unix::fs::PermissionsExt as _;
+
+    let bench = Bench::new();
+    let script = format!("#!/bin/sh\necho \"$@\" >> \"$TOLD\"\n{ends}\n");
+    let program = bench.file("bin/kubectl", &script);
+    fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+    let own = [bench.path("bin")].into_iter();
+    let others = std::env::var_os("PATH").unwrap_or_default();
+    let search = std::env::join_paths(own.chain(std::env::split_paths(&others))).unwrap();
+    let output = std::process::Command::new("bash")
+        .arg(path("kubernetes.sh"))
+        .args(["--namespace", "night"])
+        .env("PATH", search)
+        .env("TOLD", bench.path("told"))
+        .output()
+        .unwrap();
+    let told = fs::read_to_string(bench.path("told")).unwrap();
+    let told = told.lines().map(|line| {
+        let line = line.strip_prefix("--namespace night ").unwrap();
+        // The format of `get` is the rest of its line.
+        line.split(" -o ").next().unwrap_or_default().to_owned()
+    });
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    (output.status.code(), told.collect(), said)
+}
+
+#[cfg(unix)]
+#[test]
+fn the_script_applies_each_step_after_the_one_before() {
+    // Each step is complete at the second wait.
+    let slow = "case \"$*\" in *wait*) test $(($(grep -c wait \"$TOLD\") % 2)) = 0;; esac";
+    let (code, told, said) = kubectl(slow);
+    assert_eq!(code, Some(0), "{said}");
+    let wait = "wait --for=condition=complete --timeout=30s -f";
+    let mut expected = vec!["apply -f claims.yaml".to_owned()];
+    for step in MANIFESTS {
+        expected.push(format!("apply -f {step}"));
+        expected.push(format!("{wait} {step}"));
+        expected.push(format!("get -f {step}"));
+        expected.push(format!("{wait} {step}"));
+    }
+    assert_eq!(told, expected);
+}
+
+/// The script of Slurm on a login node, with an `sbatch` that writes down what it is told; its code and these lines.
+#[cfg(unix)]
+fn sbatch(words: &[&str]) -> (Option<i32>, Vec<String>) {
+    use std::os::unix::fs::PermissionsExt as _;
+
+    let bench = Bench::new();
+    let script = "#!/bin/sh\necho \"$@\" >> \"$TOLD\"\nwc -l < \"$TOLD\"\n";
+    let program = bench.file("bin/sbatch", script);
+    fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+    let own = [bench.path("bin")].into_iter();
+    let others = std::env::var_os("PATH").unwrap_or_default();
+    let search = std::env::join_paths(own.chain(std::env::split_paths(&others))).unwrap();
+    let output = std::process::Command::new("bash")
+        .arg(path("slurm.sh"))
+        .args(words)
+        .env("PATH", search)
+        .env("TOLD", bench.path("told"))
+        .env("PARTS", "12")
+        .env("AT_ONCE", "3")
+        .env_remove("SLURM_JOB_ID")
+        .output()
+        .unwrap();
+    let told = fs::read_to_string(bench.path("told")).unwrap_or_default();
+    let own = path("slurm.sh").display().to_string();
+    let told = told.lines().map(|line| line.replace(&own, "SCRIPT"));
+    (output.status.code(), told.collect())
+}
+
+#[cfg(unix)]
+#[test]
+fn the_script_of_slurm_submits_three_jobs_in_order() {
+    let flags = "--model gpt-4o --data frames/ --rpm 500";
+    for out in ["--out runs/a", "--out=runs/a"] {
+        let line = format!("{out} {flags}");
+        let words: Vec<&str> = line.split(' ').collect();
+        let (code, told) = sbatch(&words);
+        assert_eq!(code, Some(0), "{told:?}");
+        let calls: Vec<(&str, &str)> = told
+            .iter()
+            .map(|line| line.split_once(" SCRIPT ").unwrap())
+            .collect();
+        let [plan, array, merge] = calls[..] else {
+            panic!("{told:?}");
+        };
+        assert_eq!(plan.1, format!("plan {line}"));
+        assert_eq!(array.1, format!("--workers 3 {line}"));
+        assert!(
+            array.0.contains("--array=0-11%3") && array.0.contains("--dependency=afterok:1"),
+            "{array:?}"
+        );
+        assert_eq!(merge.1, "merge runs/a --out runs/a-whole --quiet");
+        assert!(merge.0.contains("--dependency=afterok:2"), "{merge:?}");
+        for (_, words) in calls {
+            let words: Vec<String> = words.split(' ').map(str::to_owned).collect();
+            parse(&words);
+        }
+    }
+    let (code, told) = sbatch(&["--model", "gpt-4o"]);
+    assert_eq!((code, told.len()), (Some(2), 0));
+}
+
+/// The lines in the heads of the scripts and on the page of clusters that start the script of Slurm.
+#[test]
+fn every_line_that_starts_the_script_has_flags_that_exist() {
+    let page = fs::read_to_string(path("../../docs/cluster.md")).unwrap();
+    let mut count = 0;
+    for line in file("slurm.sh").lines().chain(page.lines()) {
+        let words = line.split_once("slurm.sh --").map(|(_, words)| words);
+        if let Some(words) = words {
+            let words = format!("--{words}");
+            let words: Vec<String> = words.split(' ').map(str::to_owned).collect();
+            parse(&words);
+            count += 1;
+        }
+    }
+    assert_eq!(count, 3);
+}
+
+#[cfg(unix)]
+#[test]
+fn the_script_stops_at_a_step_that_failed() {
+    let failing =
+        "case \"$*\" in *\"wait\"*job.yaml*) exit 1;; *get*) echo MaxFailedIndexesExceeded;; esac";
+    let (code, told, said) = kubectl(failing);
+    assert_eq!(code, Some(1), "{said}");
+    assert!(
+        said.contains("job.yaml has failed (MaxFailedIndexesExceeded)"),
+        "{said}"
+    );
+    assert!(
+        !told.iter().any(|line| line.contains("merge.yaml")),
+        "{told:?}"
+    );
+}
