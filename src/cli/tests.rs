@@ -2,7 +2,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use clap::{Arg, Command as Clap, CommandFactory as _, Parser as _};
+use clap::{Arg, Command as Clap, CommandFactory as _};
 
 use super::*;
 use crate::types::Decides;

@@ -3,6 +3,11 @@
 //! The file system is the one that `.ci/image-files` puts together, with the libraries of this machine. The program runs in it as
 //! user 65532 in namespaces of its own, which needs no builder of images.
 #![cfg(target_os = "linux")]
+#![expect(
+    clippy::print_stderr,
+    clippy::print_stdout,
+    reason = "what a test leaves out, and the size of the image"
+)]
 
 use std::collections::BTreeSet;
 use std::fs;

@@ -57,6 +57,7 @@ mod serve;
 mod several_images;
 mod shards;
 mod site;
+mod slurm;
 mod spreadsheets;
 mod statistics;
 mod synthesize;
