@@ -47,6 +47,10 @@ pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
             }
             idle.light(&args.light);
         }
+        Some(Command::Report(args)) if !args.writes_into_run() => {
+            let why = "the report is not written into the folder of a run";
+            idle.because(why, &["no_parquet".into()]);
+        }
         Some(Command::Export(args)) => {
             idle.light(&args.light);
             idle.enhancement(&args.enhancers);
@@ -253,7 +257,12 @@ impl NoEffect {
         if args.money.dry_run {
             self.because(
                 "--dry-run sends nothing",
-                &["timings".into(), "max_failures".into(), "fail_fast".into()],
+                &[
+                    "timings".into(),
+                    "max_failures".into(),
+                    "fail_fast".into(),
+                    "no_parquet".into(),
+                ],
             );
         }
     }
@@ -361,6 +370,18 @@ mod tests {
             "--timings: no effect: --dry-run sends nothing",
         ),
         (
+            "--model m --dry-run --no-parquet",
+            "--no-parquet: no effect: --dry-run sends nothing",
+        ),
+        (
+            "report a b --no-parquet",
+            "--no-parquet: no effect: the report is not written",
+        ),
+        (
+            "report a --out b --no-parquet",
+            "--no-parquet: no effect: the report is not written",
+        ),
+        (
             "openeqa --questions q --frames f --model m --judge-temperature 1",
             "--judge-temperature: no effect: no judge is named",
         ),
@@ -433,6 +454,8 @@ mod tests {
             "--model m",
             "--model m --llie f.onnx --tile whole --profile eld --image jpeg:90 --rpm 9",
             "--model m --ask home --ask-per-image 3",
+            "report a --no-parquet",
+            "merge a --out b --no-parquet",
             "--model m --blind --seed 3 --temperature 1",
             "--model random --seed 3 --shuffle-options",
             "--model observer --observer-controls",

@@ -12,6 +12,7 @@ use clap::Args;
 use self::coverage::Coverage;
 use self::trials::unique;
 use super::placed_trials::{PlacedTrial, append, in_order, placed_trials};
+use super::record_table;
 use super::report::{choice, open};
 use super::shard::Shard;
 use super::stored::{ExperimentKind, StoredRun, manifest};
@@ -152,7 +153,9 @@ fn merge_all<D: Detail>(
     store.add_thumbnails_of(&folders, |frame| wanted.wants(frame))?;
     store.add_fidelity_of(&folders, |_| true)?;
     let run = StoredRun::of(&args.out, manifest)?;
-    write(&store, run, args.show.format())
+    let outcome = write(&store, run, args.show.format())?;
+    record_table::update(&args.out, args.show.table())?;
+    Ok(outcome)
 }
 
 /// The run folders among those named, and directly in them.

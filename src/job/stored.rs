@@ -161,7 +161,7 @@ pub(super) fn order(
 }
 
 /// A number for each of these values, in their order.
-fn numbers<T: Ord + Hash>(values: impl Iterator<Item = T>) -> HashMap<T, usize> {
+pub(super) fn numbers<T: Ord + Hash>(values: impl Iterator<Item = T>) -> HashMap<T, usize> {
     let distinct: HashSet<T> = values.collect();
     let mut sorted: Vec<T> = distinct.into_iter().collect();
     sorted.sort_unstable();

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use super::folder::RECORDS;
 use super::lines::each_placed_line;
 use super::pieces::LinePlace;
+use super::trial_line::TrialLine;
 use crate::error::{Error, Result};
 use crate::types::{Detail, Record};
 
@@ -40,6 +41,29 @@ impl RecordLog {
         Ok(line)
     }
 
+    /// The lines at these places, in their order. Neighbouring lines of the file are read together.
+    ///
+    /// # Errors
+    /// If the file has become shorter.
+    pub(crate) fn lines(&mut self, places: &[LinePlace]) -> Result<Vec<Vec<u8>>> {
+        let mut in_file: Vec<usize> = (0..places.len()).collect();
+        in_file.sort_unstable_by_key(|index| places[*index].start);
+        let follows = |one: &usize, next: &usize| places[*one].end() == places[*next].start;
+        let mut lines = vec![Vec::new(); places.len()];
+        for together in in_file.chunk_by(follows) {
+            let start = places[together[0]].start;
+            let lengths = together.iter().map(|index| places[*index].length);
+            let length = lengths.sum();
+            let block = self.line(LinePlace { start, length })?;
+            for index in together {
+                let place = places[*index];
+                let at = (place.start - start) as usize;
+                lines[*index] = block[at..at + place.length].to_vec();
+            }
+        }
+        Ok(lines)
+    }
+
     /// A record from its line.
     ///
     /// # Errors
@@ -47,6 +71,15 @@ impl RecordLog {
     pub(crate) fn record<D: Detail>(&self, line: &[u8]) -> Result<Record<D>> {
         serde_json::from_slice(line).map_err(|e| Error::file(&self.path, "read", e.into()))
     }
+}
+
+/// Hands over what names the trial of each record of a run folder, in the order of the file, with the record's place; of a trial that was
+/// asked again all.
+///
+/// # Errors
+/// If a line is not a record.
+pub(crate) fn each_trial(folder: &Path, take: impl FnMut(TrialLine, LinePlace)) -> Result<()> {
+    each_placed_line(&folder.join(RECORDS), take)
 }
 
 /// Hands over all records of a run folder in the order of the file, each with its place; of a trial that was asked again all.

@@ -17,6 +17,7 @@ use super::{open, own_answers};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::job::folder::now;
+use crate::job::record_table;
 use crate::job::stored::{AnyRun, ShownModels, StoredRun, name};
 use crate::job::{Outcome, ShowArgs, StdoutFormat, count};
 use crate::report::alert::Alert;
@@ -88,6 +89,12 @@ impl ReportArgs {
         } else {
             ShownModels::Current
         }
+    }
+
+    /// Whether the report goes into the folder of its one run.
+    pub(crate) fn writes_into_run(&self) -> bool {
+        let is_of_one = self.runs.len() == 1 && self.baseline.baseline.is_none();
+        is_of_one && self.out.is_none() && !self.common
     }
 
     /// How the report is printed.
@@ -192,11 +199,11 @@ fn of_choices(
     let reported = match &*combined.runs {
         [run] if in_folder => match Store::open(&run.folder, &run.manifest, AddressChange::Allowed)
         {
-            Ok(store) => Outcome::wrote(
-                &run.folder,
-                Status::Complete,
-                in_its_folder(&store, &run.manifest, &combined, args.format())?,
-            ),
+            Ok(store) => {
+                let text = in_its_folder(&store, &run.manifest, &combined, args.format())?;
+                record_table::update(&run.folder, args.show.show.table())?;
+                Outcome::wrote(&run.folder, Status::Complete, text)
+            }
             // A run that another process writes, or in a read-only folder, is shown anyway.
             Err(error) => {
                 tracing::warn!("the report is not written: {error}");
@@ -321,6 +328,7 @@ fn of_open(
         match Store::open(&run.folder, &run.manifest, AddressChange::Allowed) {
             Ok(store) => {
                 let text = scores.write(&store, args.format())?;
+                record_table::update(&run.folder, args.show.show.table())?;
                 return Ok(Outcome::wrote(&run.folder, Status::Complete, text));
             }
             Err(error) => tracing::warn!("the report is not written: {error}"),

@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
 use crate::files::reading;
+use crate::job::record_table;
 use crate::job::report::choice;
 use crate::job::stored::StoredRun;
 
@@ -134,6 +135,7 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
     let mut run = StoredRun::of(&args.out, people_manifest)?;
     run.manifest.count(count(run.records.len(), &run.records));
     let mut outcome = choice::write(&store, run, args.show.format())?;
+    record_table::update(&args.out, args.show.table())?;
     if args.show.format() != StdoutFormat::Json {
         outcome.output.insert_str(0, &summary(&counts));
     }
