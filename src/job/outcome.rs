@@ -61,6 +61,15 @@ pub(crate) struct ShowArgs {
     /// Print the summary as JSON instead of text
     #[arg(long, add = Decides::Nothing)]
     pub json: bool,
+    /// What is written beside the report.
+    #[command(flatten)]
+    pub written: WrittenArgs,
+}
+
+/// Flags that say what is written beside a report.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Output")]
+pub(crate) struct WrittenArgs {
     /// Do not write records.parquet, the records as a table for DuckDB, pandas and R
     #[arg(long, add = Decides::Nothing)]
     pub no_parquet: bool,
@@ -69,7 +78,7 @@ pub(crate) struct ShowArgs {
 impl ShowArgs {
     /// Whether the table of records is written.
     pub(crate) fn table(&self) -> RecordTable {
-        if self.no_parquet {
+        if self.written.no_parquet {
             RecordTable::LeftOut
         } else {
             RecordTable::Written

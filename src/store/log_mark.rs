@@ -85,7 +85,7 @@ mod tests {
         marks.push(mark());
         write(
             RECORDS,
-            &(&*"one line\n".repeat(20_000)).replacen("one", "two", 1),
+            &"one line\n".repeat(20_000).replacen("one", "two", 1),
         )
         .unwrap();
         assert_eq!(mark(), marks[2], "the beginning is not looked at");

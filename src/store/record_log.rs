@@ -92,3 +92,33 @@ pub(crate) fn each_record<D: Detail>(
 ) -> Result<()> {
     each_placed_line(&folder.join(RECORDS), take)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_at_places_in_any_order_are_those_lines() {
+        let folder = tempfile::tempdir().unwrap();
+        let lines: Vec<String> = (0..40)
+            .map(|number| format!("{}\n", "x".repeat(number)))
+            .collect();
+        std::fs::write(folder.path().join(RECORDS), lines.concat()).unwrap();
+        let mut log = RecordLog::open(folder.path()).unwrap();
+        let place = |index: usize| LinePlace {
+            start: lines[..index].iter().map(|line| line.len() as u64).sum(),
+            length: lines[index].len(),
+        };
+        for order in [vec![], vec![5], vec![7, 3, 4, 5, 39, 0], (0..40).collect()] {
+            let places: Vec<LinePlace> = order.iter().map(|index| place(*index)).collect();
+            let read = log.lines(&places).unwrap();
+            let expected = order.iter().map(|index| lines[*index].clone().into_bytes());
+            assert!(read.into_iter().eq(expected), "{order:?}");
+        }
+        let behind = LinePlace {
+            start: 1_000,
+            length: 2,
+        };
+        assert!(log.lines(&[place(0), behind]).is_err());
+    }
+}

@@ -181,6 +181,13 @@ fn written_again_and_from_parts_it_is_the_same() {
         rows
     };
     assert_eq!(timeless(&merged), timeless(&path));
+    // It stands in the order in which merge writes the records.
+    let keys = |rows: Vec<Value>| -> Vec<Value> {
+        let keys = rows.into_iter().map(|mut row| row["key"].take());
+        keys.collect()
+    };
+    let table = rows(&merged).into_iter().map(Value::Object).collect();
+    assert_eq!(keys(table), keys(records(&bench.path("merged"))));
     // The same parts, joined again in another order, are the same bytes of values.
     bench.complete(&words(
         "merge parts/shard-3-of-3 parts/shard-1-of-3 parts/shard-2-of-3 --out again",

@@ -26,7 +26,7 @@ pub(super) struct Marks {
     judge: Option<String>,
     protocol: Protocol,
     /// The mark of an answer; `None` if none is read in the judge's reply. By the digest of question and answer.
-    marks: HashMap<Digest, Option<i64>>,
+    by_answer: HashMap<Digest, Option<i64>>,
 }
 
 /// An answer with its mark.
@@ -79,7 +79,7 @@ impl Tabled for OpenDetail {
         Ok(Marks {
             judge,
             protocol,
-            marks,
+            by_answer: marks,
         })
     }
 
@@ -124,7 +124,7 @@ impl Marks {
             AnswerState::Null => return unmarked(AnswerOutcome::Null),
             AnswerState::Text { answer, .. } => answer,
         };
-        let known = self.marks.get(&judged(&record.question, &answer));
+        let known = self.by_answer.get(&judged(&record.question, &answer));
         let outcome = match known {
             None => AnswerOutcome::Unjudged,
             Some(None) => AnswerOutcome::Unmarked,

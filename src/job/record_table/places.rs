@@ -53,7 +53,7 @@ pub(super) fn places(
     // Of each trial the last record.
     all.sort_unstable_by_key(|place| (place.key, std::cmp::Reverse(place.line.start)));
     all.dedup_by_key(|place| place.key);
-    let conditions = conditions.ranks(|condition| condition.clone());
+    let conditions = conditions.ranks(Clone::clone);
     let listing = ModelListing::new(manifest.models.iter().cloned());
     let models = models.ranks(|model| {
         let model = names.shown(model);

@@ -137,15 +137,13 @@ impl<'r, D: Tabled> Rows<'r, D> {
             record.model = shown.to_owned();
         }
         let further = D::further(&self.context, &record)?;
-        let light = match self.lights.get(&record.condition) {
-            Some(known) => Arc::clone(known),
-            None => {
-                let light = Arc::new(LightTexts::of(record.condition.as_ref()));
-                let condition = record.condition.clone();
-                self.lights.insert(condition, Arc::clone(&light));
-                light
-            }
-        };
+        let known = self.lights.get(&record.condition).map(Arc::clone);
+        let light = known.unwrap_or_else(|| {
+            let light = Arc::new(LightTexts::of(record.condition.as_ref()));
+            let condition = record.condition.clone();
+            self.lights.insert(condition, Arc::clone(&light));
+            light
+        });
         Some(Row {
             question: self.questions.get(&record.question).map(Arc::clone),
             light,

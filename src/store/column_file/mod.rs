@@ -148,7 +148,7 @@ impl<'c, R: Sync> ColumnFile<'c, R> {
 /// Snappy, which every reader has; dictionaries for all but keys, which have no value twice.
 fn properties<R>(columns: &[Column<R>], metadata: &FileMetadata) -> WriterProperties {
     let pairs = metadata.pairs.iter();
-    let pairs = pairs.map(|(key, value)| KeyValue::new((*key).to_owned(), value.clone()));
+    let pairs = pairs.map(|(key, value)| KeyValue::new(key.clone(), value.clone()));
     let mut properties = WriterProperties::builder()
         .set_compression(Compression::SNAPPY)
         .set_created_by(metadata.created_by.clone())

@@ -66,7 +66,7 @@ fn row(index: u64) -> Values {
         small: -3,
         number: is_even.then_some(index),
         ev: is_even.then_some(7.5),
-        right: (index % 3 > 0).then_some(is_even),
+        right: (!index.is_multiple_of(3)).then_some(is_even),
     }
 }
 
