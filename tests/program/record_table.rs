@@ -342,6 +342,7 @@ fn open_questions_have_a_row_an_answer_with_its_mark() {
 
 /// Skipped where Python has no DuckDB.
 #[test]
+#[expect(clippy::print_stderr, reason = "a test that does nothing says so")]
 fn duckdb_counts_as_the_summary_does() {
     let query = "select model, view, coalesce(level, ''), variant, coalesce(enhancer, ''), family, 'strict', coalesce(reading, ''), \
                  count(\"right\"), count(*) filter (\"right\"), count(*) filter (\"right\" is null) \
