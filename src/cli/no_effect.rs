@@ -47,6 +47,10 @@ pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
             }
             idle.light(&args.light);
         }
+        Some(Command::Report(args)) if !args.writes_into_run() => {
+            let why = "the report is not written into the folder of a run";
+            idle.because(why, &["no_parquet".into()]);
+        }
         Some(Command::Export(args)) => {
             idle.light(&args.light);
             idle.enhancement(&args.enhancers);
@@ -258,7 +262,14 @@ impl NoEffect {
         if args.money.dry_run {
             self.because(
                 "--dry-run sends nothing",
-                &["grace", "timings", "max_failures", "fail_fast"].map(String::from),
+                &[
+                    "grace",
+                    "timings",
+                    "max_failures",
+                    "fail_fast",
+                    "no_parquet",
+                ]
+                .map(String::from),
             );
         }
     }
@@ -370,6 +381,18 @@ mod tests {
             "--grace: no effect: a batch has no request in flight",
         ),
         (
+            "--model m --dry-run --no-parquet",
+            "--no-parquet: no effect: --dry-run sends nothing",
+        ),
+        (
+            "report a b --no-parquet",
+            "--no-parquet: no effect: the report is not written",
+        ),
+        (
+            "report a --out b --no-parquet",
+            "--no-parquet: no effect: the report is not written",
+        ),
+        (
             "openeqa --questions q --frames f --model m --judge-temperature 1",
             "--judge-temperature: no effect: no judge is named",
         ),
@@ -442,6 +465,8 @@ mod tests {
             "--model m",
             "--model m --llie f.onnx --tile whole --profile eld --image jpeg:90 --rpm 9",
             "--model m --ask home --ask-per-image 3",
+            "report a --no-parquet",
+            "merge a --out b --no-parquet",
             "--model m --blind --seed 3 --temperature 1",
             "--model random --seed 3 --shuffle-options",
             "--model observer --observer-controls",

@@ -21,10 +21,10 @@ use self::exr_layers::ExrFile;
 use self::facts::{Depth, FileFacts, fault, unshowable};
 use self::format::FileFormat;
 use super::colour::{CodeDepth, ColourSpace, ColourTag, Meaning};
-use super::guarded::guarded;
 use super::maps::MapPaths;
 use super::reading_rule::{ColourRule, ReadingRule, Transfer};
 use crate::error::{Error, Result};
+use crate::files::guarded::guarded;
 use crate::types::{
     Codes16, ColourHandling, ColourNote, DepthNote, Digest, InputNote, Light, Pixels, Rgb,
 };

@@ -9,7 +9,6 @@ mod dark_photos;
 mod family;
 pub(crate) mod frame_folder;
 pub(crate) mod frames;
-pub(crate) mod guarded;
 pub(crate) mod image_file;
 pub(crate) mod image_names;
 mod image_source;

@@ -1,5 +1,6 @@
 //! Files that are written completely or not at all, by [`write()`] and [`write_synced`]; and helpers to read files, in [`reading`].
 
+pub(crate) mod guarded;
 pub(crate) mod reading;
 
 use std::ffi::OsStr;
@@ -41,7 +42,8 @@ pub(crate) fn write_with(
     path: &Path,
     write: impl FnOnce(&mut dyn io::Write) -> Result<()>,
 ) -> Result<()> {
-    let unfinished = unfinished(path)?;
+    create_folder(path)?;
+    let unfinished = unfinished(path);
     let unwritable = |e| Error::file(&unfinished, "write", e);
     let mut file = BufWriter::new(File::create(&unfinished).map_err(unwritable)?);
     write(&mut file)?;
@@ -77,19 +79,24 @@ fn is_same(one: &Path, other: &Path) -> io::Result<bool> {
     }
 }
 
-/// The place of a file until it is complete; its folder is created.
-fn unfinished(path: &Path) -> Result<PathBuf> {
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).map_err(|e| Error::file(folder, "create", e))?;
-    }
+/// The path of a file until it is complete.
+pub(crate) fn unfinished(path: &Path) -> PathBuf {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    Ok(path.with_file_name(format!(".{name}{UNFINISHED}")))
+    path.with_file_name(format!(".{name}{UNFINISHED}"))
+}
+
+fn create_folder(path: &Path) -> Result<()> {
+    match path.parent() {
+        Some(folder) => fs::create_dir_all(folder).map_err(|e| Error::file(folder, "create", e)),
+        None => Ok(()),
+    }
 }
 
 // tempfile's `persist` is not used: its random name leaves a further file after each killed process, and its file mode denies
 // access to colleagues who share a results folder.
 fn replace(path: &Path, content: &[u8], sync: impl FnOnce(&File) -> io::Result<()>) -> Result<()> {
-    let unfinished = unfinished(path)?;
+    create_folder(path)?;
+    let unfinished = unfinished(path);
     let written = File::create(&unfinished).and_then(|mut file| {
         file.write_all(content)?;
         sync(&file)

@@ -14,6 +14,7 @@ use self::coverage::Coverage;
 use self::questions::PartQuestions;
 use self::trials::each_once;
 use super::placed_trials::{append, read_part};
+use super::record_table;
 use super::report::{choice, open};
 use super::shard::Shard;
 use super::stored::{ExperimentKind, StoredRun, manifest, sort};
@@ -142,7 +143,9 @@ fn merge_all<D: Detail>(
     store.add_thumbnails_of(&folders, |frame| wanted.wants(frame))?;
     store.add_fidelity_of(&folders, |_| true)?;
     let run = StoredRun::of(&args.out, manifest)?;
-    write(&store, run, args.show.format())
+    let outcome = write(&store, run, args.show.format())?;
+    record_table::update(&args.out, args.show.table())?;
+    Ok(outcome)
 }
 
 /// The run folders among those named, and directly in them.

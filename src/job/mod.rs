@@ -47,6 +47,7 @@ pub(crate) mod questions;
 mod questions_by_rule;
 pub(crate) mod rebuild;
 pub(crate) mod recipe;
+pub(crate) mod record_table;
 mod renamed;
 pub(crate) mod report;
 pub(crate) mod run_files;

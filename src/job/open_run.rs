@@ -20,6 +20,7 @@ use super::other_parts::OtherParts;
 use super::outcome::Outcome;
 use super::plan::Plan;
 use super::progress::Progress;
+use super::record_table;
 use super::settings::JobSettings;
 use super::stored::StoredRun;
 use super::thumbnail::MissingThumbnails;
@@ -275,8 +276,9 @@ impl<E: Experiment> OpenRun<'_, E> {
             (manifest.status, manifest.counts) = (status, counts);
             manifest.updated = now();
         }
-        let show = self.experiment.settings().show;
-        let outcome = self.experiment.report(&self.store, run, show)?;
+        let settings = self.experiment.settings();
+        let outcome = self.experiment.report(&self.store, run, settings.show)?;
+        record_table::update(self.store.folder(), settings.table)?;
         match end {
             EndReason::Stopped(error) => Err(error),
             EndReason::ModelsStopped(errors) => {

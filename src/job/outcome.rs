@@ -48,7 +48,7 @@ impl Outcome {
     }
 }
 
-/// Flags that say how a report is printed.
+/// Flags that say how a report is printed, and what is written with it.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Output")]
 pub(crate) struct ShowArgs {
@@ -61,9 +61,30 @@ pub(crate) struct ShowArgs {
     /// Print the summary as JSON instead of text
     #[arg(long, add = Decides::Nothing)]
     pub json: bool,
+    /// What is written beside the report.
+    #[command(flatten)]
+    pub written: WrittenArgs,
+}
+
+/// Flags that say what is written beside a report.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Output")]
+pub(crate) struct WrittenArgs {
+    /// Do not write records.parquet, the records as a table for DuckDB, pandas and R
+    #[arg(long, add = Decides::Nothing)]
+    pub no_parquet: bool,
 }
 
 impl ShowArgs {
+    /// Whether the table of records is written.
+    pub(crate) fn table(&self) -> RecordTable {
+        if self.written.no_parquet {
+            RecordTable::LeftOut
+        } else {
+            RecordTable::Written
+        }
+    }
+
     /// The format that the flags ask for.
     #[must_use]
     pub(crate) fn format(&self) -> StdoutFormat {
@@ -96,4 +117,12 @@ impl StdoutFormat {
     pub(crate) fn is_document(self) -> bool {
         matches!(self, Self::Markdown | Self::Json)
     }
+}
+
+/// Whether `records.parquet` is written beside the records.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum RecordTable {
+    Written,
+    /// By `--no-parquet`.
+    LeftOut,
 }

@@ -30,7 +30,7 @@ pub(super) fn read_part<D: Detail>(
         if shown != record.model {
             record.model = shown.to_owned();
         }
-        trials.add(record, TextPlace::new(place.start()).in_log(part));
+        trials.add(record, TextPlace::new(place.start).in_log(part));
     })
 }
 

@@ -78,6 +78,11 @@ pub(crate) fn predictions(
     predictions
 }
 
+/// The state of the answer in a record that has not failed.
+pub(crate) fn answer_state(record: &Record<OpenDetail>, protocol: Protocol) -> AnswerState {
+    state(Some(record), protocol).1
+}
+
 fn state(record: Option<&Record<OpenDetail>>, protocol: Protocol) -> (Option<String>, AnswerState) {
     let Some(record) = record else {
         return (None, AnswerState::Missing);

@@ -13,7 +13,7 @@ use super::enhancers::{self, EnhancerRunArgs};
 use super::image_words::ImageWords;
 use super::models::{AskSettings, AskingArgs, KeyUse, ModelArgs, ResolveContext, TextBaseline};
 use super::money::{MoneyArgs, MoneySettings};
-use super::outcome::{ShowArgs, StdoutFormat};
+use super::outcome::{RecordTable, ShowArgs, StdoutFormat};
 use super::shard::Shard;
 use crate::ask::{
     AccessArgs, Bounds, Constrain, ImageArgs, Parameters, PayloadFormat, RequestArgs, Sending,
@@ -137,6 +137,8 @@ pub(crate) struct JobSettings {
     pub place: RunPlace,
     /// Format of the results on standard output.
     pub show: StdoutFormat,
+    /// Whether the table of records is written.
+    pub table: RecordTable,
     /// Flags that decide the images, as typed.
     pub image_flags: ImageWords,
 }
@@ -263,6 +265,7 @@ impl JobArgs {
             grace: self.scale.grace,
             show_timings: self.scale.timings,
             show: self.output.show.format(),
+            table: self.output.show.table(),
             place: RunPlace::from(self.output).checked()?,
             image_flags: self.image_flags,
         })

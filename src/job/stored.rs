@@ -53,7 +53,7 @@ impl<D: Detail> StoredRun<D> {
     pub(crate) fn of(folder: &Path, manifest: RunManifest) -> Result<Self> {
         let mut trials = Trials::default();
         store::each_record(folder, |record, place| {
-            trials.add(record, TextPlace::new(place.start()));
+            trials.add(record, TextPlace::new(place.start));
         })?;
         let texts = RunTexts::of(folder)?;
         let files = RunFiles::read_light(folder)?;

@@ -14,7 +14,7 @@ use crate::files::{self, is_unfinished};
 use crate::types::manifest::{ColumnDifference, RunManifest, differences};
 use crate::types::{Detail, Distinct, ImageFidelity, Record, RunQuestion, Thumbnail, TrialKey};
 
-const MANIFEST: &str = "manifest.json";
+pub(super) const MANIFEST: &str = "manifest.json";
 pub(super) const RECORDS: &str = "records.jsonl";
 /// The questions of a run, with their words and scenes.
 pub(super) const QUESTIONS: &str = "questions.jsonl";

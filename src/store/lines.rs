@@ -10,6 +10,7 @@ use serde::de::DeserializeOwned;
 
 use super::pieces::{FileLine, LinePlace, Pieces};
 use super::stored_trial::StoredTrial;
+use super::trial_line::TrialLine;
 use crate::error::{Error, Result};
 use crate::files::write_synced;
 use crate::types::{Detail, ImageFidelity, Record, RunQuestion, Thumbnail, Usage};
@@ -194,6 +195,11 @@ impl<D: Detail> StoredLine for Record<D> {
 }
 
 impl StoredLine for StoredTrial {
+    const WHAT: &str = A_RECORD;
+    const MEND: &str = MEND_A_RECORD;
+}
+
+impl StoredLine for TrialLine {
     const WHAT: &str = A_RECORD;
     const MEND: &str = MEND_A_RECORD;
 }

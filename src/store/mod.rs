@@ -2,13 +2,17 @@
 //!
 //! `records.jsonl` is the source of truth: one line a trial, appended and handed to the operating system as soon as a reply
 //! arrives, so that a killed run loses nothing. `manifest.json` describes the run, `questions.jsonl` has its questions,
-//! `thumbnails.jsonl` small copies of its images, and `fidelity.jsonl` their similarity to the clean frames. All other files are made again from these.
+//! `thumbnails.jsonl` small copies of its images, and `fidelity.jsonl` their similarity to the clean frames. All other files are made again from these,
+//! `records.parquet` among them: the records once more, as a table for other programs ([`ColumnFile`]).
 
+mod column_file;
 mod folder;
 mod lines;
+mod log_mark;
 mod pieces;
 mod record_log;
 mod stored_trial;
+mod trial_line;
 
 use std::borrow::Cow;
 use std::collections::{BTreeSet, HashMap, HashSet};
@@ -32,8 +36,12 @@ use folder::{
 };
 use lines::{append, each_line, json_lines, lines, repair, set_aside};
 
+pub(crate) use column_file::{
+    CREATED_BY, Cell, CellKind, Column, ColumnFile, FileMetadata, Presence,
+};
+pub(crate) use log_mark::LogMark;
 pub(crate) use pieces::LinePlace;
-pub(crate) use record_log::{QuestionFile, RecordLog, each_record};
+pub(crate) use record_log::{QuestionFile, RecordLog, each_record, each_trial};
 pub(crate) use stored_trial::StoredTrial;
 
 pub(crate) use folder::{

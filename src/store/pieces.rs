@@ -31,14 +31,14 @@ pub(super) struct Piece {
 /// The place of a line in its file, with its end, in bytes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LinePlace {
-    pub(super) start: u64,
-    pub(super) length: usize,
+    pub(crate) start: u64,
+    pub(crate) length: usize,
 }
 
 impl LinePlace {
-    /// The first byte of the line in its file.
-    pub(crate) fn start(self) -> u64 {
-        self.start
+    /// Where the next line begins.
+    pub(super) fn end(self) -> u64 {
+        self.start + self.length as u64
     }
 }
 

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use super::folder::{QUESTIONS, RECORDS};
 use super::lines::each_placed_line;
 use super::pieces::LinePlace;
+use super::trial_line::TrialLine;
 use crate::error::{Error, Result};
 use crate::types::{Detail, Record};
 
@@ -58,6 +59,30 @@ impl RecordLog {
         line.map_err(|e| Error::file(&self.path, "read", e))
     }
 
+    /// The lines at these places, in their order. Neighbouring lines of the file are read together.
+    ///
+    /// # Errors
+    /// If the file has become shorter.
+    pub(crate) fn lines(&self, places: &[LinePlace]) -> Result<Vec<Vec<u8>>> {
+        let mut in_file: Vec<usize> = (0..places.len()).collect();
+        in_file.sort_unstable_by_key(|index| places[*index].start);
+        let follows = |one: &usize, next: &usize| places[*one].end() == places[*next].start;
+        let mut lines = vec![Vec::new(); places.len()];
+        for together in in_file.chunk_by(follows) {
+            let start = places[together[0]].start;
+            let lengths = together.iter().map(|index| places[*index].length);
+            let length = lengths.sum();
+            let block = bytes_at(&self.file, LinePlace { start, length });
+            let block = block.map_err(|e| Error::file(&self.path, "read", e))?;
+            for index in together {
+                let place = places[*index];
+                let at = (place.start - start) as usize;
+                lines[*index] = block[at..at + place.length].to_vec();
+            }
+        }
+        Ok(lines)
+    }
+
     /// A record from its line.
     ///
     /// # Errors
@@ -93,13 +118,25 @@ impl QuestionFile {
     /// # Errors
     /// If the file has become shorter.
     pub(crate) fn line(&self, place: LinePlace) -> Result<Vec<u8>> {
-        let mut line = vec![0; place.length];
-        let mut file = &self.file;
-        let read = file.seek(SeekFrom::Start(place.start));
-        let read = read.and_then(|_| file.read_exact(&mut line));
-        read.map_err(|e| Error::file(&self.path, "read", e))?;
-        Ok(line)
+        bytes_at(&self.file, place).map_err(|e| Error::file(&self.path, "read", e))
     }
+}
+
+/// The bytes at a place of a file.
+fn bytes_at(mut file: &File, place: LinePlace) -> std::io::Result<Vec<u8>> {
+    let mut bytes = vec![0; place.length];
+    file.seek(SeekFrom::Start(place.start))?;
+    file.read_exact(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// Hands over what names the trial of each record of a run folder, in the order of the file, with the record's place; of a trial that was
+/// asked again all.
+///
+/// # Errors
+/// If a line is not a record.
+pub(crate) fn each_trial(folder: &Path, take: impl FnMut(TrialLine, LinePlace)) -> Result<()> {
+    each_placed_line(&folder.join(RECORDS), take)
 }
 
 /// Hands over all records of a run folder in the order of the file, each with its place; of a trial that was asked again all.
@@ -111,4 +148,34 @@ pub(crate) fn each_record<D: Detail>(
     take: impl FnMut(Record<D>, LinePlace),
 ) -> Result<()> {
     each_placed_line(&folder.join(RECORDS), take)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_at_places_in_any_order_are_those_lines() {
+        let folder = tempfile::tempdir().unwrap();
+        let lines: Vec<String> = (0..40)
+            .map(|number| format!("{}\n", "x".repeat(number)))
+            .collect();
+        std::fs::write(folder.path().join(RECORDS), lines.concat()).unwrap();
+        let log = RecordLog::open(folder.path()).unwrap();
+        let place = |index: usize| LinePlace {
+            start: lines[..index].iter().map(|line| line.len() as u64).sum(),
+            length: lines[index].len(),
+        };
+        for order in [vec![], vec![5], vec![7, 3, 4, 5, 39, 0], (0..40).collect()] {
+            let places: Vec<LinePlace> = order.iter().map(|index| place(*index)).collect();
+            let read = log.lines(&places).unwrap();
+            let expected = order.iter().map(|index| lines[*index].clone().into_bytes());
+            assert!(read.into_iter().eq(expected), "{order:?}");
+        }
+        let behind = LinePlace {
+            start: 1_000,
+            length: 2,
+        };
+        assert!(log.lines(&[place(0), behind]).is_err());
+    }
 }

@@ -3,9 +3,10 @@
 use std::fmt;
 
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::condition::Condition;
+use super::condition_columns::ConditionColumns;
 use super::digest::Digest;
 use super::question::QuestionId;
 use super::reply::{Finish, Reply, Usage};
@@ -25,7 +26,7 @@ pub struct Record<D> {
     /// Whether the model was shown the images.
     pub view: View,
     /// The condition of the images; `None` if the model was shown none. Further columns of the line follow from it.
-    #[serde(flatten, serialize_with = "condition_columns::serialize")]
+    #[serde(flatten, serialize_with = "condition_columns")]
     pub condition: Option<Condition>,
     /// The text of the reply; `None` if no reply came.
     pub reply: Option<String>,
@@ -55,6 +56,14 @@ pub struct Record<D> {
     /// The fields that the experiment adds.
     #[serde(flatten)]
     pub detail: D,
+}
+
+#[expect(clippy::ref_option, reason = "serde hands a reference")]
+fn condition_columns<S: Serializer>(
+    condition: &Option<Condition>,
+    serializer: S,
+) -> std::result::Result<S::Ok, S::Error> {
+    ConditionColumns::of(condition.as_ref()).serialize(serializer)
 }
 
 /// The fields that an experiment adds to a record.
@@ -218,59 +227,6 @@ impl<D: Detail> Record<D> {
         let question = &self.question.0;
         let read = self.detail.read(reply);
         read.map_err(|e| e.at(format!("the record of question {question:?}")))
-    }
-}
-
-/// The columns that follow from a condition.
-mod condition_columns {
-    use serde::{Serialize, Serializer};
-
-    use crate::types::degradation::{Axis, Degradation, ReadingName, Severity};
-    use crate::types::{AxisLevel, Condition, EnhancerName, PairDark};
-
-    #[derive(Serialize)]
-    struct Columns<'a> {
-        condition: Option<&'a Condition>,
-        level: Option<AxisLevel>,
-        variant: String,
-        ev: Option<f64>,
-        /// The severity of kinds that are not measured in EV; they have no `ev`.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        severity: Option<Severity>,
-        reading: Option<&'a ReadingName>,
-        enhancer: Option<&'a EnhancerName>,
-    }
-
-    #[expect(clippy::ref_option, reason = "serde hands a reference")]
-    pub(super) fn serialize<S: Serializer>(
-        condition: &Option<Condition>,
-        serializer: S,
-    ) -> Result<S::Ok, S::Error> {
-        let condition = condition.as_ref();
-        let degradation = condition.and_then(|condition| condition.degradation());
-        let level = condition.map(Condition::level);
-        // The darkness of pairs differs by frame; it is in the facts about the image.
-        let same = level.filter(|level| *level != AxisLevel::PAIR);
-        let light = same.filter(|level| level.axis().is_none_or(|axis| axis == Axis::LIGHT));
-        let severity = degradation.map(Degradation::severity);
-        Columns {
-            condition,
-            level,
-            variant: match condition.and_then(Condition::pair) {
-                Some(pair) => pair.to_string(),
-                None => degradation
-                    .map_or("none", |how| how.kind().word())
-                    .to_owned(),
-            },
-            ev: light.map(AxisLevel::value),
-            severity: severity.filter(|_| light.is_none()),
-            reading: degradation.and_then(Degradation::reading).or_else(|| {
-                let pair = condition.and_then(Condition::pair);
-                pair.and_then(PairDark::reading)
-            }),
-            enhancer: condition.and_then(|condition| condition.enhancer.as_ref()),
-        }
-        .serialize(serializer)
     }
 }
 

@@ -18,7 +18,7 @@ use files::Files;
 use map::Map;
 
 /// The libraries that stand in some places (folders or files in `src/`) alone. Test code may use them anywhere.
-const LIBRARIES: [(&str, &[&str]); 19] = [
+const LIBRARIES: [(&str, &[&str]); 20] = [
     ("anstream", &["cli"]),
     ("anstyle", &["report"]),
     ("axum", &["run/serve"]),
@@ -38,6 +38,10 @@ const LIBRARIES: [(&str, &[&str]); 19] = [
     ("tiff", &["calibrate/mosaic"]),
     ("exr", &["dataset/frame_folder.rs", "dataset/image_file"]),
     ("moxcms", &["dataset/colour"]),
+    (
+        "parquet",
+        &["dataset/ready_made/container", "store/column_file"],
+    ),
 ];
 
 /// The places where a future may be awaited. Test code may await anywhere.

@@ -376,7 +376,7 @@ const OPEN_ADDITIONS: [Addition; 10] = [
 ];
 
 /// What changes no answer: given on the folder of a run, it asks nothing.
-const NOTHING: [&str; 34] = [
+const NOTHING: [&str; 35] = [
     "--max-pixels 1000000",
     "--threads 1",
     "--offline",
@@ -408,6 +408,7 @@ const NOTHING: [&str; 34] = [
     "--full",
     "--findings",
     "--json",
+    "--no-parquet",
     "--quiet",
     "--color never",
     "--config other.toml",

@@ -48,6 +48,7 @@ mod pins;
 mod questions;
 mod ready_made;
 mod realism;
+mod record_table;
 mod replicas;
 mod report;
 mod rooms;

@@ -19,6 +19,7 @@ pub mod icc_files;
 pub mod image_files;
 pub mod made;
 pub mod onnx;
+pub mod parquet_file;
 pub mod process;
 pub mod run;
 pub mod table;

@@ -156,6 +156,7 @@ pub fn assert_same_products(run: &Path, other: &Path) -> usize {
     let timed = [
         "manifest.json",
         "records.jsonl",
+        "records.parquet",
         "summary.json",
         "report.html",
         "thumbnails.jsonl",

@@ -4,7 +4,6 @@ use std::borrow::Cow;
 
 use image::metadata::Orientation;
 
-use super::super::guarded::guarded;
 use super::exr_layers::ExrFile;
 use super::format::FileFormat;
 use super::jpeg_markers::{self, JpegOutline};
@@ -13,6 +12,7 @@ use super::tiff_tags::TiffOutline;
 use super::webp_chunks::{self, WebpOutline};
 use crate::dataset::colour::ColourTag;
 use crate::dataset::reading_rule::ReadingRule;
+use crate::files::guarded::guarded;
 
 /// The facts of a file beside its pixels.
 pub(super) struct FileFacts<'a> {

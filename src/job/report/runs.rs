@@ -17,6 +17,7 @@ use super::{open, own_answers};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::job::folder::now;
+use crate::job::record_table;
 use crate::job::stored::{AnyRun, ShownModels, StoredRun, name};
 use crate::job::{Outcome, ShowArgs, StdoutFormat, count};
 use crate::report::alert::Alert;
@@ -88,6 +89,12 @@ impl ReportArgs {
         } else {
             ShownModels::Current
         }
+    }
+
+    /// Whether the report goes into the folder of its one run.
+    pub(crate) fn writes_into_run(&self) -> bool {
+        let is_of_one = self.runs.len() == 1 && self.baseline.baseline.is_none();
+        is_of_one && self.out.is_none() && !self.common
     }
 
     /// How the report is printed.
@@ -190,14 +197,15 @@ fn of_choices(
     let is_worse = judged.map(|baseline| baseline.is_worse(combined.unit()));
     let is_worse = is_worse.transpose()?.unwrap_or(false);
     let in_folder = args.out.is_none() && !args.common && baseline.is_none() && again.is_empty();
+    let mut folder = None;
     let reported = match &*combined.runs {
         [run] if in_folder => {
             match Store::open_read(&run.folder, &run.manifest, AddressChange::Allowed) {
-                Ok(store) => Outcome::wrote(
-                    &run.folder,
-                    Status::Complete,
-                    in_its_folder(&store, &run.manifest, &combined, args.format())?,
-                ),
+                Ok(store) => {
+                    let text = in_its_folder(&store, &run.manifest, &combined, args.format())?;
+                    folder = Some(run.folder.clone());
+                    Outcome::wrote(&run.folder, Status::Complete, text)
+                }
                 // A run that another process writes, or in a read-only folder, is shown anyway.
                 Err(error) => {
                     tracing::warn!("the report is not written: {error}");
@@ -207,6 +215,11 @@ fn of_choices(
         }
         _ => compare(&combined, baseline.as_ref(), args, again)?,
     };
+    // The table takes as much memory as the trials.
+    drop(combined);
+    if let Some(folder) = folder {
+        record_table::update(&folder, args.show.show.table())?;
+    }
     // A command whose outcome is not what was asked for ends with 1.
     let status = if is_worse {
         Status::Incomplete
@@ -327,6 +340,7 @@ fn of_open(
         match Store::open_read(&run.folder, &run.manifest, AddressChange::Allowed) {
             Ok(store) => {
                 let text = scores.write(&store, args.format())?;
+                record_table::update(&run.folder, args.show.show.table())?;
                 return Ok(Outcome::wrote(&run.folder, Status::Complete, text));
             }
             Err(error) => tracing::warn!("the report is not written: {error}"),

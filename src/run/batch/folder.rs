@@ -85,5 +85,5 @@ fn in_run<D: Detail>(
     let mut store = Store::<D>::open(folder, &manifest, AddressChange::Allowed)?;
     let batches = FolderBatches::open(folder, &manifest, &args.run.access)?;
     let text = batches.carry_out(task, &mut store, &args.collect, progress)?;
-    reported(&store, manifest, args.show.format(), &text, write)
+    reported(&store, manifest, &args.show, &text, write)
 }

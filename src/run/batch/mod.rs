@@ -8,6 +8,7 @@ use clap::Args;
 
 use crate::error::Result;
 use crate::job::batch::replies;
+use crate::job::record_table;
 use crate::job::report::{choice, open};
 use crate::job::stored::{ExperimentKind, StoredRun, manifest};
 use crate::job::{Outcome, ShowArgs, StdoutFormat, count};
@@ -49,14 +50,14 @@ fn import_into<D: Detail>(
     let manifest = manifest(&args.run)?;
     let mut store = Store::<D>::open(&args.run, &manifest, AddressChange::Allowed)?;
     let imported = replies::import(&mut store, &manifest, &args.files)?;
-    reported(&store, manifest, args.show.format(), &imported, write)
+    reported(&store, manifest, &args.show, &imported, write)
 }
 
 /// The report of a run with new replies, behind a text about them.
 fn reported<D: Detail>(
     store: &Store<D>,
     manifest: RunManifest,
-    show: StdoutFormat,
+    show: &ShowArgs,
     text: &str,
     write: impl FnOnce(&Store<D>, StoredRun<D>, StdoutFormat) -> Result<Outcome>,
 ) -> Result<Outcome> {
@@ -64,8 +65,9 @@ fn reported<D: Detail>(
     let trials = run.manifest.counts.trials.max(run.trials.len());
     let failed = run.trials.iter().map(|trial| trial.failed());
     run.manifest.count(count(trials, failed));
-    let mut outcome = write(store, run, show)?;
-    if show != StdoutFormat::Json {
+    let mut outcome = write(store, run, show.format())?;
+    record_table::update(store.folder(), show.table())?;
+    if show.format() != StdoutFormat::Json {
         outcome.output.insert_str(0, text);
     }
     Ok(outcome)

@@ -14,6 +14,7 @@ use clap::Args;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::job::Outcome;
+use crate::job::record_table::RECORDS_PARQUET;
 use crate::job::report::whole;
 use crate::job::stored::name;
 use crate::types::Decides;
@@ -73,7 +74,14 @@ pub(crate) fn bundle(args: &BundleArgs) -> Result<Outcome> {
             thumbnails[1]
         ));
     }
-    let others = others(&args.run, &files)?;
+    let mut others = others(&args.run, &files)?;
+    if let Some(table) = others.iter().position(|name| name == RECORDS_PARQUET) {
+        // What it has of users and paths is not taken out of it.
+        others.remove(table);
+        changes.push(format!(
+            "{RECORDS_PARQUET} is left out: report writes it again, from records.jsonl"
+        ));
+    }
     match others.len() {
         0 => {}
         1 => changes

@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
 use crate::files::reading;
+use crate::job::record_table;
 use crate::job::report::choice;
 use crate::job::stored::StoredRun;
 
@@ -129,6 +130,7 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
     let failed = run.trials.iter().map(|trial| trial.failed());
     run.manifest.count(count(run.trials.len(), failed));
     let mut outcome = choice::write(&store, run, args.show.format())?;
+    record_table::update(&args.out, args.show.table())?;
     if args.show.format() != StdoutFormat::Json {
         outcome.output.insert_str(0, &summary(&counts));
     }

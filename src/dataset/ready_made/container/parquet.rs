@@ -22,8 +22,8 @@ use super::super::row::{RowPlace, Table};
 use super::super::step::Step;
 use super::super::text_list::list;
 use super::json_scan::LONGEST_ROW;
-use crate::dataset::guarded::guarded;
 use crate::error::{Error, Result};
+use crate::files::guarded::guarded;
 
 /// How many rows are decoded at a time. Each holds its image until the next.
 const ROWS_AT_A_TIME: usize = 8;

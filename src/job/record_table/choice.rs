@@ -1,0 +1,141 @@
+//! The table of records of questions with choices.
+
+use std::path::Path;
+
+use super::common::{column, head, image, last, reply, word};
+use super::row::{Row, SentImage, Tabled};
+use crate::error::Result;
+use crate::store::CellKind::{Bool, Int8, Int32, Text};
+use crate::store::Presence::{Always, MayBeNull};
+use crate::store::{Cell, Column};
+use crate::types::manifest::RunManifest;
+use crate::types::{AnswerReading, ChoiceDetail, Record};
+
+impl Tabled for ChoiceDetail {
+    const TABLE: &'static str = "darkqa.records/1";
+
+    type Context = ();
+
+    type Further = ();
+
+    fn columns() -> Vec<Column<Row<Self>>> {
+        let own = vec![column("shown_frame", Text, MayBeNull, |row: &Row<Self>| {
+            let shown = row.record.detail.shown_frame.as_ref();
+            Cell::text(shown.map(|frame| &*frame.0))
+        })];
+        let parts = [
+            head(),
+            question(),
+            readings(),
+            reply(),
+            image(),
+            last(),
+            own,
+        ];
+        parts.into_iter().flatten().collect()
+    }
+
+    fn context(_folder: &Path, _manifest: &RunManifest) -> Result<()> {
+        Ok(())
+    }
+
+    fn further((): &(), _record: &Record) -> Option<()> {
+        Some(())
+    }
+
+    fn frame(&self) -> &str {
+        &self.frame.0
+    }
+
+    fn family(&self) -> &str {
+        self.family.name()
+    }
+
+    fn image(&self) -> Option<SentImage<'_>> {
+        self.image.as_ref().map(|image| SentImage {
+            digest: &image.digest,
+            bytes: image.bytes,
+            width: image.width,
+            height: image.height,
+            format: &image.format,
+        })
+    }
+}
+
+type ChoiceRow = Row<ChoiceDetail>;
+
+/// The choices, and the true one.
+fn question() -> Vec<Column<ChoiceRow>> {
+    vec![
+        column("truth", Int8, MayBeNull, |row: &ChoiceRow| {
+            Cell::int(row.record.detail.truth)
+        }),
+        column("choice_count", Int8, Always, |row| {
+            Cell::int(Some(row.record.detail.choices.len()))
+        }),
+        column("repeat", Int32, MayBeNull, |row| {
+            Cell::int(Some(row.record.detail.repeat))
+        }),
+        column("answer", Text, MayBeNull, |row| {
+            choice(row, row.record.detail.truth)
+        }),
+        column("choices", Text, Always, |row| {
+            let choices = serde_json::to_string(&row.record.detail.choices);
+            choices.map_or(Cell::Null, |choices| Cell::Text(choices.into()))
+        }),
+    ]
+}
+
+/// What both readings found in the reply.
+fn readings() -> Vec<Column<ChoiceRow>> {
+    vec![
+        column("strict", Int8, MayBeNull, |row: &ChoiceRow| {
+            Cell::int(chosen(row.record.detail.strict))
+        }),
+        column("lenient", Int8, MayBeNull, |row| {
+            Cell::int(chosen(row.record.detail.lenient))
+        }),
+        column("predicted", Text, MayBeNull, |row| {
+            choice(row, chosen(row.record.detail.strict))
+        }),
+        column("predicted_lenient", Text, MayBeNull, |row| {
+            choice(row, chosen(row.record.detail.lenient))
+        }),
+        column("right", Bool, MayBeNull, |row| {
+            right(row, row.record.detail.strict)
+        }),
+        column("right_lenient", Bool, MayBeNull, |row| {
+            right(row, row.record.detail.lenient)
+        }),
+        column("outcome", Text, Always, |row| {
+            word(&row.record.detail.outcome)
+        }),
+        column("why", Text, MayBeNull, |row| why(row.record.detail.strict)),
+        column("why_lenient", Text, MayBeNull, |row| {
+            why(row.record.detail.lenient)
+        }),
+    ]
+}
+
+fn chosen(reading: Option<AnswerReading>) -> Option<usize> {
+    reading.and_then(|reading| reading.chosen)
+}
+
+/// The text of a choice; null if there is none.
+fn choice(row: &ChoiceRow, index: Option<usize>) -> Cell<'_> {
+    let text = index.and_then(|index| row.record.detail.choices.get(index));
+    Cell::text(text.map(String::as_str))
+}
+
+/// Whether a reading found the true choice; null if the trial failed, or if nobody knows the true choice.
+fn right<'r>(row: &ChoiceRow, reading: Option<AnswerReading>) -> Cell<'r> {
+    match (reading, row.record.detail.truth) {
+        (Some(reading), Some(truth)) => Cell::Bool(reading.chosen == Some(truth)),
+        _ => Cell::Null,
+    }
+}
+
+fn why<'r>(reading: Option<AnswerReading>) -> Cell<'r> {
+    let why = reading.and_then(|reading| reading.why);
+    why.map_or(Cell::Null, |why| word(&why))
+}

@@ -1,0 +1,142 @@
+//! A column of a Parquet file, and its values: [`Column`], [`Cell`].
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use parquet::basic::{ConvertedType, LogicalType, Repetition, Type as PhysicalType};
+use parquet::errors::Result;
+use parquet::schema::types::{Type, TypePtr};
+
+/// A column of a table whose rows are `R`.
+pub(crate) struct Column<R> {
+    pub(crate) name: &'static str,
+    pub(crate) kind: CellKind,
+    pub(crate) presence: Presence,
+    /// The value of a row.
+    pub(crate) value: for<'r> fn(&'r R) -> Cell<'r>,
+}
+
+/// The type of the values of a column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum CellKind {
+    /// A text that many rows have.
+    Text,
+    /// A text of any length, which counts against the size of a row group.
+    LongText,
+    /// 16 bytes that no other row has.
+    Key,
+    /// 32 bytes.
+    Digest,
+    /// A whole number of 8 bits, with its sign.
+    Int8,
+    /// A whole number of 16 bits, with its sign.
+    Int16,
+    /// A whole number of 32 bits, with its sign.
+    Int32,
+    Double,
+    Bool,
+}
+
+/// Whether each row has a value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Presence {
+    Always,
+    MayBeNull,
+}
+
+/// The value of a row in a column.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Cell<'r> {
+    Null,
+    Text(Cow<'r, str>),
+    Bytes(&'r [u8]),
+    Int(i128),
+    Double(f64),
+    Bool(bool),
+}
+
+impl<'r> Cell<'r> {
+    /// A text that the row holds; null if there is none.
+    pub(crate) fn text(text: Option<&'r str>) -> Self {
+        text.map_or(Self::Null, |text| Self::Text(text.into()))
+    }
+
+    /// A whole number; null if there is none.
+    pub(crate) fn int<T: TryInto<i128>>(number: Option<T>) -> Self {
+        let number = number.and_then(|number| number.try_into().ok());
+        number.map_or(Self::Null, Self::Int)
+    }
+}
+
+impl CellKind {
+    /// The bits of a whole number; `None` for other kinds.
+    fn bits(self) -> Option<u32> {
+        match self {
+            Self::Int8 => Some(8),
+            Self::Int16 => Some(16),
+            Self::Int32 => Some(32),
+            _ => None,
+        }
+    }
+
+    /// The number in the form in which it is stored; `None` if it is too large for the column.
+    pub(super) fn stored(self, number: i128) -> Option<i32> {
+        let largest = (1_i128 << (self.bits()? - 1)) - 1;
+        let fits = (-largest - 1..=largest).contains(&number);
+        fits.then_some(number as i32)
+    }
+}
+
+impl<R> Column<R> {
+    /// The column in the schema of the file.
+    pub(super) fn field(&self) -> Result<TypePtr> {
+        let (physical, length) = match self.kind {
+            CellKind::Text | CellKind::LongText => (PhysicalType::BYTE_ARRAY, 0),
+            CellKind::Key => (PhysicalType::FIXED_LEN_BYTE_ARRAY, 16),
+            CellKind::Digest => (PhysicalType::FIXED_LEN_BYTE_ARRAY, 32),
+            CellKind::Int8 | CellKind::Int16 | CellKind::Int32 => (PhysicalType::INT32, 0),
+            CellKind::Double => (PhysicalType::DOUBLE, 0),
+            CellKind::Bool => (PhysicalType::BOOLEAN, 0),
+        };
+        let (logical, converted) = match self.kind {
+            CellKind::Text | CellKind::LongText => (Some(LogicalType::String), ConvertedType::UTF8),
+            CellKind::Int8 => (Some(LogicalType::integer(8, true)), ConvertedType::INT_8),
+            CellKind::Int16 => (Some(LogicalType::integer(16, true)), ConvertedType::INT_16),
+            _ => (None, ConvertedType::NONE),
+        };
+        let repetition = match self.presence {
+            Presence::Always => Repetition::REQUIRED,
+            Presence::MayBeNull => Repetition::OPTIONAL,
+        };
+        Type::primitive_type_builder(self.name, physical)
+            .with_repetition(repetition)
+            .with_length(length)
+            .with_logical_type(logical)
+            .with_converted_type(converted)
+            .build()
+            .map(Arc::new)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_that_a_column_cannot_hold_are_none() {
+        for (kind, number, stored) in [
+            (CellKind::Int8, 127, Some(127)),
+            (CellKind::Int8, 128, None),
+            (CellKind::Int8, -128, Some(-128)),
+            (CellKind::Int16, -32769, None),
+            (CellKind::Int32, 2_147_483_647, Some(i32::MAX)),
+            (CellKind::Int32, 2_147_483_648, None),
+            (CellKind::Int32, i128::from(u64::MAX), None),
+            (CellKind::Text, 1, None),
+        ] {
+            assert_eq!(kind.stored(number), stored, "{kind:?} {number}");
+        }
+        assert_eq!(Cell::int(Some(u64::MAX)), Cell::Int(u64::MAX.into()));
+        assert_eq!(Cell::int(None::<u8>), Cell::Null);
+    }
+}

@@ -1,0 +1,52 @@
+//! What a Parquet file says of itself: [`FileMetadata`].
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::ErrorKind;
+use std::path::Path;
+
+use parquet::file::metadata::ParquetMetaDataReader;
+
+use crate::error::{Error, Result};
+use crate::files::guarded::guarded;
+
+/// What the program writes of itself into its Parquet files.
+pub(crate) const CREATED_BY: &str = concat!("darkqa-eval version ", env!("CARGO_PKG_VERSION"));
+
+/// The metadata of a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct FileMetadata {
+    /// The program that wrote it.
+    pub(crate) created_by: String,
+    /// Values by key.
+    pub(crate) pairs: BTreeMap<String, String>,
+}
+
+impl FileMetadata {
+    /// The metadata of a file; `None` if there is no such file, or if it is no whole Parquet file.
+    ///
+    /// # Errors
+    /// If it cannot be read.
+    pub(crate) fn of(path: &Path) -> Result<Option<Self>> {
+        let file = match File::open(path) {
+            Ok(file) => file,
+            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
+            Err(e) => return Err(Error::file(path, "read", e)),
+        };
+        let footer = guarded(|| {
+            let mut reader = ParquetMetaDataReader::new();
+            let read = reader.try_parse(&file).and_then(|()| reader.finish());
+            read.map_err(|e| e.to_string())
+        });
+        let Ok(footer) = footer else {
+            return Ok(None);
+        };
+        let footer = footer.file_metadata();
+        let pairs = footer.key_value_metadata().into_iter().flatten();
+        let pairs = pairs.filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?)));
+        Ok(Some(Self {
+            created_by: footer.created_by().unwrap_or_default().to_owned(),
+            pairs: pairs.collect(),
+        }))
+    }
+}

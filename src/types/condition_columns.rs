@@ -1,0 +1,51 @@
+//! The columns of a record that follow from the condition of its images: [`ConditionColumns`].
+
+use serde::Serialize;
+
+use super::degradation::{Axis, Degradation, ReadingName, Severity};
+use super::{AxisLevel, Condition, EnhancerName, PairDark};
+
+/// The columns that follow from a condition; without a condition no image was shown.
+#[derive(Debug, Serialize)]
+pub(crate) struct ConditionColumns<'a> {
+    pub(crate) condition: Option<&'a Condition>,
+    pub(crate) level: Option<AxisLevel>,
+    /// The kind of degradation, the darkness of a pair, or `none`.
+    pub(crate) variant: String,
+    /// The exposure drop in EV; `None` where it is not measured in EV, or differs by frame.
+    pub(crate) ev: Option<f64>,
+    /// The severity of kinds that are not measured in EV; they have no `ev`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) severity: Option<Severity>,
+    pub(crate) reading: Option<&'a ReadingName>,
+    pub(crate) enhancer: Option<&'a EnhancerName>,
+}
+
+impl<'a> ConditionColumns<'a> {
+    /// The columns of a condition.
+    pub(crate) fn of(condition: Option<&'a Condition>) -> Self {
+        let degradation = condition.and_then(|condition| condition.degradation());
+        let level = condition.map(Condition::level);
+        // The darkness of pairs differs by frame; it is in the facts about the image.
+        let same = level.filter(|level| *level != AxisLevel::PAIR);
+        let light = same.filter(|level| level.axis().is_none_or(|axis| axis == Axis::LIGHT));
+        let severity = degradation.map(Degradation::severity);
+        Self {
+            condition,
+            level,
+            variant: match condition.and_then(Condition::pair) {
+                Some(pair) => pair.to_string(),
+                None => degradation
+                    .map_or("none", |how| how.kind().word())
+                    .to_owned(),
+            },
+            ev: light.map(AxisLevel::value),
+            severity: severity.filter(|_| light.is_none()),
+            reading: degradation.and_then(Degradation::reading).or_else(|| {
+                let pair = condition.and_then(Condition::pair);
+                pair.and_then(PairDark::reading)
+            }),
+            enhancer: condition.and_then(|condition| condition.enhancer.as_ref()),
+        }
+    }
+}
