@@ -89,7 +89,7 @@ pub(crate) fn estimate<E: Experiment>(
             }
         }
     }
-    let latencies = stored.iter().filter_map(|record| record.latency_ms());
+    let latencies = stored.iter().filter_map(StoredTrial::latency_ms);
     let latencies: Vec<u64> = latencies.collect();
     // Endpoints are asked side by side: the slowest decides.
     let times = loads.iter().map(|load| asking_time(load, &latencies));

@@ -28,7 +28,8 @@ pub(super) fn read_part<D: Detail>(
     each_record(folder, |mut record: Record<D>, place| {
         let shown = names.shown(&record.model);
         if shown != record.model {
-            record.model = shown.to_owned();
+            let shown = shown.to_owned();
+            record.model = shown;
         }
         trials.add(record, TextPlace::new(place.start).in_log(part));
     })

@@ -21,7 +21,7 @@ impl RunFiles {
     pub(crate) fn read_light(folder: &Path) -> Result<Self> {
         let mut questions = Vec::new();
         store::each_question(folder, |question| {
-            questions.push(question.without_evidence())
+            questions.push(question.without_evidence());
         })?;
         Ok(Self {
             questions,

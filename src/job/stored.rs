@@ -155,6 +155,10 @@ pub(crate) fn name(folder: &Path) -> String {
 }
 
 /// A run of either experiment. Only this module tells experiments apart by the schema of their folders.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "of the few that are held, none is moved often"
+)]
 pub(crate) enum AnyRun {
     Choice(StoredRun<ChoiceDetail>),
     Open(StoredRun<OpenDetail>),

@@ -43,7 +43,7 @@ impl Detail for ChoiceDetail {
             self.options = option_probabilities(chances, &self.choices);
         }
         if reply.observed.is_some() {
-            self.observed = reply.observed.clone();
+            self.observed.clone_from(&reply.observed);
         }
         Ok(())
     }

@@ -262,7 +262,7 @@ fn presence(model: &str, condition: &str, reply: fn(usize, bool) -> Option<bool>
         let detail = &mut record.detail;
         let is_there = item % 2 == 0;
         detail.family = Family::Presence;
-        detail.choices = ["Yes", "no"].map(str::to_owned).to_vec().into();
+        detail.choices = ["Yes", "no"].map(str::to_owned).to_vec();
         detail.truth = Some(usize::from(!is_there));
         let chosen = reply(item / 2, is_there).map(|yes| usize::from(!yes));
         detail.strict = Some(AnswerReading { chosen, why: None });

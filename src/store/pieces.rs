@@ -89,7 +89,7 @@ impl<'p> Pieces<'p> {
             bytes,
         };
         self.start += piece.bytes.len() as u64;
-        self.lines += piece.bytes.iter().filter(|byte| **byte == b'\n').count();
+        self.lines += memchr::memchr_iter(b'\n', &piece.bytes).count();
         Ok(Some(piece))
     }
 }
@@ -123,9 +123,8 @@ mod tests {
         let path = folder.path().join("lines");
         let long = "x".repeat(2 * PIECE_BYTES as usize);
         let mut text = format!("one\n   \n{long}\n");
-        for number in 0..700_000 {
-            text += &format!("{number}\n");
-        }
+        let numbers = (0..700_000).map(|number| format!("{number}\n"));
+        text.extend(numbers);
         std::fs::write(&path, text.clone() + "incomplete").unwrap();
         let mut pieces = Pieces::open(&path).unwrap().unwrap();
         let (mut seen, mut parts) = (Vec::new(), 0);

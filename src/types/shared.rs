@@ -107,7 +107,7 @@ mod tests {
         for value in [&mut one, &mut other, &mut same] {
             distinct.share(value);
         }
-        assert!(std::ptr::eq::<String>(&*one, &*same) && one == same);
+        assert!(std::sync::Arc::ptr_eq(&one.0, &same.0) && one == same);
         assert!(one != other && serde_json::to_string(&one).unwrap() == "\"a\"");
         assert_eq!(
             serde_json::from_str::<Shared<String>>("\"b\"").unwrap(),

@@ -65,7 +65,7 @@ fn write<D: Tabled>(folder: &Path, path: &Path, metadata: &FileMetadata) -> Resu
     let manifest = manifest(folder)?;
     let mut questions = Vec::new();
     each_question(folder, |question| {
-        questions.push(question.without_evidence())
+        questions.push(question.without_evidence());
     })?;
     let places = places(folder, &manifest, &questions)?;
     let mut rows = Rows::<D>::new(folder, &manifest, &questions)?;

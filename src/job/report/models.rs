@@ -20,7 +20,7 @@ pub(super) type Item<'a> = (
 );
 
 /// The item of a trial.
-pub(super) fn item<'t, D: Detail>(trial: TrialRef<'t, D>) -> Item<'t> {
+pub(super) fn item<D: Detail>(trial: TrialRef<'_, D>) -> Item<'_> {
     (
         (trial.view(), trial.model()),
         (trial.condition(), trial.question()),

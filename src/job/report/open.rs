@@ -244,7 +244,7 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
             }
         }
     }
-    let joined = join(runs, |trial| trial.is_answer())?;
+    let joined = join(runs, is_answer)?;
     let mut alerts = of_runs(&joined);
     alerts.extend(of_joining(&joined));
     if joined.runs.len() == 1 {
@@ -290,6 +290,11 @@ pub(crate) fn write(
         scores.write(store, show)?,
     )
     .in_format(show))
+}
+
+/// Whether an answer was asked for, and no mark.
+fn is_answer(trial: TrialRef<'_, OpenDetail>) -> bool {
+    trial.is_answer()
 }
 
 /// The marks of a judge, by question and answer.

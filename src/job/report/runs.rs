@@ -26,7 +26,7 @@ use crate::report::json::{RunList, summary};
 use crate::report::products::PAGE;
 use crate::store::{AddressChange, Store};
 use crate::types::manifest::Status;
-use crate::types::{ChoiceDetail, Decides, Detail as _, ModelColumn, OpenDetail, Truths};
+use crate::types::{ChoiceDetail, Decides, Detail as _, ModelColumn, OpenDetail, TrialRef, Truths};
 
 /// The flags of `report`.
 #[derive(Debug, Args)]
@@ -168,7 +168,7 @@ fn of_choices(
         }
         if args.rescore {
             reread_lines += &reread(run)?;
-            let failed = run.trials.iter().map(|trial| trial.failed());
+            let failed = run.trials.iter().map(TrialRef::failed);
             run.manifest.counts = count(run.manifest.counts.trials, failed);
         }
         run.leave_out(args.shown());

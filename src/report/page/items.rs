@@ -52,8 +52,8 @@ fn data<'a>(
                 frame: frames.index_of(&*asked.frame.0),
                 family: families.index_of(asked.family.name()),
                 text: run_question.map_or("", |run_question| &run_question.text),
-                outlines: run_question.map_or_else(Vec::new, |question| question.outlines()),
-                object: run_question.and_then(|question| question.object()),
+                outlines: run_question.map_or_else(Vec::new, RunQuestion::outlines),
+                object: run_question.and_then(RunQuestion::object),
                 answer: None,
                 also_right: &[],
                 evidence: run_question

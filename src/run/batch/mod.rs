@@ -14,7 +14,7 @@ use crate::job::stored::{ExperimentKind, StoredRun, manifest};
 use crate::job::{Outcome, ShowArgs, StdoutFormat, count};
 use crate::store::{AddressChange, Store};
 use crate::types::manifest::RunManifest;
-use crate::types::{ChoiceDetail, Decides, Detail, OpenDetail};
+use crate::types::{ChoiceDetail, Decides, Detail, OpenDetail, TrialRef};
 
 pub(crate) use folder::{BatchFolderArgs, BatchStatusArgs, cancel, fetch, status};
 
@@ -63,7 +63,7 @@ fn reported<D: Detail>(
 ) -> Result<Outcome> {
     let mut run = StoredRun::of(store.folder(), manifest)?;
     let trials = run.manifest.counts.trials.max(run.trials.len());
-    let failed = run.trials.iter().map(|trial| trial.failed());
+    let failed = run.trials.iter().map(TrialRef::failed);
     run.manifest.count(count(trials, failed));
     let mut outcome = write(store, run, show.format())?;
     record_table::update(store.folder(), show.table())?;

@@ -35,7 +35,7 @@ impl Item for ChoiceItem {
         let detail = ChoiceDetail {
             frame: question.frame.clone(),
             family: question.family.clone(),
-            choices: question.choices.texts().to_vec().into(),
+            choices: question.choices.texts().to_vec(),
             truth: question.choices.truth(),
             repeat: trial.item.repeat,
             strict: None,

@@ -87,7 +87,7 @@ pub(super) fn cells(
         .filter(|question| question.is_informative());
     let informative: BTreeSet<usize> = informative.map(|question| question.index).collect();
     let kept = grid.items.iter().map(|item| {
-        let question = bank.of(&*item.asked.question);
+        let question = bank.of(&item.asked.question);
         question.is_some_and(|question| informative.contains(&question))
     });
     let restricted = grid.restricted(&kept.collect::<Vec<_>>());

@@ -42,7 +42,7 @@ impl<'g> BankCounts<'g> {
         for (index, item) in grid.items.iter().enumerate() {
             let result = grid.result(subject, index);
             let (Some(question), Some(reading)) =
-                (bank.of(&*item.asked.question), result.reading(mode))
+                (bank.of(&item.asked.question), result.reading(mode))
             else {
                 continue;
             };

@@ -225,8 +225,10 @@ impl<D: Detail> Trials<D> {
     /// Takes some of the trials out.
     #[must_use]
     pub fn extract(&mut self, is_taken: impl Fn(TrialRef<'_, D>) -> bool) -> Self {
-        let mut taken = Self::default();
-        taken.logs = self.logs;
+        let mut taken = Self {
+            logs: self.logs,
+            ..Self::default()
+        };
         for trial in self.iter().filter(|trial| is_taken(*trial)) {
             taken.copy(trial, 0);
         }

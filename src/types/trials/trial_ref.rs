@@ -15,6 +15,10 @@ pub struct TrialRef<'t, D: Detail = ChoiceDetail> {
     place: usize,
 }
 
+#[expect(
+    clippy::expl_impl_clone_on_copy,
+    reason = "derived, it would ask the same of the detail"
+)]
 impl<D: Detail> Clone for TrialRef<'_, D> {
     fn clone(&self) -> Self {
         *self
