@@ -10,6 +10,7 @@ use super::layers;
 use crate::ask::{AccessArgs, ImageArgs, Parameters, RequestArgs, Sending};
 use crate::dataset::{CodesArgs, SetArgs};
 use crate::enhance::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
+use crate::image_store::StoreArgs;
 use crate::job::batch::{BatchFileArgs, BatchRunArgs};
 use crate::job::models::ModelName;
 use crate::job::settings::JobArgs;
@@ -189,6 +190,7 @@ impl NoEffect {
                 ids::<RequestArgs>(),
                 ids::<Sending>(),
                 ids::<JudgeArgs>(),
+                ids::<StoreArgs>(),
             ];
             self.because("--study asks no model", &asking.concat());
         }
@@ -253,8 +255,15 @@ impl NoEffect {
         if args.money.dry_run {
             self.because(
                 "--dry-run sends nothing",
-                &["timings".into(), "max_failures".into(), "fail_fast".into()],
+                &[
+                    vec!["timings".into(), "max_failures".into(), "fail_fast".into()],
+                    ids::<StoreArgs>(),
+                ]
+                .concat(),
             );
+        }
+        if args.stored.images_cache.is_none() {
+            self.because("no --images-cache is named", &ids::<StoreArgs>());
         }
     }
 
@@ -359,6 +368,18 @@ mod tests {
         (
             "--model m --dry-run --timings",
             "--timings: no effect: --dry-run sends nothing",
+        ),
+        (
+            "--model m --images-cache-size 9",
+            "--images-cache-size: no effect: no --images-cache is named",
+        ),
+        (
+            "--model m --dry-run --images-cache d",
+            "--images-cache: no effect: --dry-run sends nothing",
+        ),
+        (
+            "openeqa --questions q --frames f --study s --images-cache d",
+            "--images-cache: no effect: --study asks no model",
         ),
         (
             "openeqa --questions q --frames f --model m --judge-temperature 1",

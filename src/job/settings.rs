@@ -19,6 +19,7 @@ use crate::ask::{
 };
 use crate::enhance::{EnhancerArgs, ModelFile};
 use crate::error::{Error, Result};
+use crate::image_store::StoreArgs;
 use crate::synthesis::{LightArgs, LightSettings};
 use crate::types::{Decides, SetLight, View};
 
@@ -58,6 +59,9 @@ pub(crate) struct JobArgs {
     /// Shard of this process, and timings.
     #[command(flatten)]
     pub scale: ScaleArgs,
+    /// Folder of images that are shared with other runs.
+    #[command(flatten)]
+    pub stored: StoreArgs,
     /// Run folder and output.
     #[command(flatten)]
     pub output: OutputArgs,
@@ -125,6 +129,8 @@ pub(crate) struct JobSettings {
     pub shard: Shard,
     /// Print at the end how long each step took.
     pub show_timings: bool,
+    /// Folder of images that are shared with other runs.
+    pub images: StoreArgs,
     /// Folder of the run.
     pub place: RunPlace,
     /// Format of the results on standard output.
@@ -253,6 +259,7 @@ impl JobArgs {
             money: MoneySettings::resolve(&self.money, shard)?,
             shard,
             show_timings: self.scale.timings,
+            images: self.stored,
             show: self.output.show.format(),
             place: RunPlace::from(self.output).checked()?,
             image_flags: self.image_flags,

@@ -376,7 +376,7 @@ const OPEN_ADDITIONS: [Addition; 10] = [
 ];
 
 /// What changes no answer: given on the folder of a run, it asks nothing.
-const NOTHING: [&str; 32] = [
+const NOTHING: [&str; 36] = [
     "--max-pixels 1000000",
     "--threads 1",
     "--offline",
@@ -404,6 +404,9 @@ const NOTHING: [&str; 32] = [
     "--dry-run",
     "--workers 2",
     "--timings",
+    "--images-cache images",
+    "--images-cache images --images-cache-what all",
+    "--images-cache images --images-cache-size 1",
     "--full",
     "--findings",
     "--json",
