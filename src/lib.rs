@@ -88,6 +88,7 @@
 //! - [`ask`]: a prompt and images → a reply; the only asynchronous stage. `ask/wire`: one file an API.
 //! - [`score`]: a reply → a choice or a mark; records → numbers with their intervals.
 //! - [`store`]: `results/<run>/`, append-only and resumable.
+//! - `image_store`: a folder of images that were made, shared by runs and processes; it may be deleted at any time.
 //! - [`report`]: tables, figures and one HTML file, from the records alone, and a leaderboard of many; figures of pictures that are handed in.
 //! - [`job`]: the engine. A `Job` carries out an `Experiment`: it plans, has the one image pipeline make images, asks, keeps, and
 //!   has the experiment score. Questions with choices and open ones differ in their `Experiment` alone.
@@ -140,11 +141,12 @@
 //! | `import` | `dataset`, `labels`, `files`, `types`, `error` |
 //! | `calibrate` | `dataset`, `synthesis`, `files`, `types`, `error` |
 //! | `store` | `files`, `types`, `error` |
+//! | `image_store` | `types`, `error` |
 //! | `report` | `types`, `error`, `score`, `questions`, `calibrate` |
-//! | `job` | `files`, `types`, `error`, `rooms`, `labels`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `report` |
-//! | `run` | `job`, `files`, `types`, `error`, `rooms`, `labels`, `import`, `dataset`, `calibrate`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `report` |
+//! | `job` | `files`, `types`, `error`, `rooms`, `labels`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `image_store`, `report` |
+//! | `run` | `job`, `files`, `types`, `error`, `rooms`, `labels`, `import`, `dataset`, `calibrate`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `image_store`, `report` |
 //! | `internals` | `ask`, `dataset`, `enhance`, `job`, `labels`, `questions`, `report`, `rooms`, `score`, `synthesis`, `types`, `error` |
-//! | `cli` | `run`, `job`, `files`, `rooms`, `dataset`, `ask`, `enhance`, `score`, `synthesis`, `types`, `error` |
+//! | `cli` | `run`, `job`, `image_store`, `files`, `rooms`, `dataset`, `ask`, `enhance`, `score`, `synthesis`, `types`, `error` |
 //! | `main` | `cli`, `enhance` |
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
@@ -157,6 +159,7 @@ mod dataset;
 pub mod enhance;
 mod error;
 mod files;
+mod image_store;
 mod import;
 #[doc(hidden)]
 pub mod internals;

@@ -225,7 +225,8 @@ impl Payload {
         self.data_url.clone()
     }
 
-    fn of_file(file: &[u8], width: u32, height: u32, format: PayloadFormat) -> Self {
+    /// The payload of a file that was encoded in this format, with its width and height in pixels.
+    pub(crate) fn of_file(file: &[u8], width: u32, height: u32, format: PayloadFormat) -> Self {
         let mut url = format!("data:image/{};base64,", format.name());
         url.reserve_exact(file.len().div_ceil(3) * 4);
         STANDARD.encode_string(file, &mut url);

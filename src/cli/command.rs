@@ -10,6 +10,7 @@ use crate::job::merge::MergeArgs;
 use crate::job::report::ReportArgs;
 use crate::run::batch::{BatchFolderArgs, BatchImportArgs, BatchStatusArgs};
 use crate::run::bundle::BundleArgs;
+use crate::run::cache::CacheArgs;
 use crate::run::calibrate::CalibrateArgs;
 use crate::run::enhance::EnhanceArgs;
 use crate::run::evaluate::{CheckArgs, EvaluateArgs};
@@ -136,6 +137,8 @@ pub(crate) enum Command {
     Merge(MergeArgs),
     /// Make the images of one question again, bit for bit, and check their digests
     Show(ShowArgs),
+    /// Show which images an image store (--images-cache) holds, or empty it
+    Cache(CacheArgs),
     /// Let people answer what the models were asked: write a page for them, import their answers as a model's
     #[command(subcommand)]
     Study(StudyCommand),

@@ -151,6 +151,7 @@ fn carry_out(cli: Cli, progress: &Progress) -> Result<Outcome> {
         Command::Report(args) => report(&args),
         Command::Figures(args) => run::figures::figures(&args),
         Command::Bundle(args) => run::bundle::bundle(&args),
+        Command::Cache(args) => run::cache::cache(&args),
         Command::Site(args) => run::site::site(&args),
         Command::Merge(args) => merge(&args),
         Command::Show(args) => run::show::show(args),

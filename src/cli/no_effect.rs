@@ -10,6 +10,7 @@ use super::layers;
 use crate::ask::{AccessArgs, ImageArgs, Parameters, RequestArgs, Sending};
 use crate::dataset::{CodesArgs, SetArgs};
 use crate::enhance::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
+use crate::image_store::StoreArgs;
 use crate::job::batch::{BatchFileArgs, BatchRunArgs};
 use crate::job::models::ModelName;
 use crate::job::settings::JobArgs;
@@ -198,6 +199,7 @@ impl NoEffect {
                 ids::<RequestArgs>(),
                 ids::<Sending>(),
                 ids::<JudgeArgs>(),
+                ids::<StoreArgs>(),
             ];
             self.because("--study asks no model", &asking.concat());
         }
@@ -263,14 +265,22 @@ impl NoEffect {
             self.because(
                 "--dry-run sends nothing",
                 &[
-                    "grace",
-                    "timings",
-                    "max_failures",
-                    "fail_fast",
-                    "no_parquet",
+                    [
+                        "grace",
+                        "timings",
+                        "max_failures",
+                        "fail_fast",
+                        "no_parquet",
+                    ]
+                    .map(String::from)
+                    .to_vec(),
+                    ids::<StoreArgs>(),
                 ]
-                .map(String::from),
+                .concat(),
             );
+        }
+        if args.stored.images_cache.is_none() {
+            self.because("no --images-cache is named", &ids::<StoreArgs>());
         }
     }
 
@@ -391,6 +401,18 @@ mod tests {
         (
             "report a --out b --no-parquet",
             "--no-parquet: no effect: the report is not written",
+        ),
+        (
+            "--model m --images-cache-size 9",
+            "--images-cache-size: no effect: no --images-cache is named",
+        ),
+        (
+            "--model m --dry-run --images-cache d",
+            "--images-cache: no effect: --dry-run sends nothing",
+        ),
+        (
+            "openeqa --questions q --frames f --study s --images-cache d",
+            "--images-cache: no effect: --study asks no model",
         ),
         (
             "openeqa --questions q --frames f --model m --judge-temperature 1",

@@ -93,7 +93,7 @@ pub(crate) use settings::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
 pub use sizes::{SeamCounts, SizeLog};
 pub use tiles::Tiling;
 pub use time_limit::TimeLimit;
-pub(crate) use usage::{Implausible, Usage};
+pub(crate) use usage::{ImageUse, Implausible, Usage};
 
 /// Version of feeding and reading models, raised whenever a pixel changes, so that results of an older version are not
 /// reused.

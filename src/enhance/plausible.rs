@@ -6,6 +6,8 @@
 
 use std::fmt;
 
+use serde::{Deserialize, Serialize};
+
 use super::convention::LUMA;
 use super::planes::Planes;
 use crate::types::{Flaw, Rgb};
@@ -23,7 +25,8 @@ const LIFTED: f64 = 1.5;
 const BLOCK: usize = 4;
 
 /// Whether a flaw rules out an enhanced image, or only makes it doubtful.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub(super) enum Gravity {
     /// It can be no enhanced image.
     Impossible,
@@ -32,7 +35,7 @@ pub(super) enum Gravity {
 }
 
 /// What is wrong with one output, and the figure that shows it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct Verdict {
     pub(super) flaw: Flaw,
     pub(super) gravity: Gravity,

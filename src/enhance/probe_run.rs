@@ -7,7 +7,7 @@ use super::planes::Planes;
 use super::plausible::Codes;
 use super::probe::{Conclusion, PairTrial, Probe, RangePair, Ranges};
 use super::sidecar::ModelSidecar;
-use super::usage::Implausible;
+use super::usage::{ImageUse, Implausible, Seen};
 use crate::error::{Error, Result};
 use crate::types::Rgb;
 use crate::types::enhancer_note::{ProbeNote, ProbeOutcome};
@@ -67,17 +67,51 @@ impl Enhancer {
         self.set_probed(note)
     }
 
-    /// Looks at what it made of a frame in a condition.
+    /// Enhances a frame in a condition, and looks at the result; with what its note got from it.
+    ///
+    /// # Errors
+    /// As by [`Self::enhance`], and if most of its images of dark frames so far cannot be enhanced images.
+    pub(crate) fn enhance_noted(
+        &mut self,
+        image: &Rgb,
+        place: [&dyn ToString; 2],
+        implausible: Implausible,
+    ) -> Result<(Rgb, ImageUse)> {
+        let before = self.sizes().clone();
+        let enhanced = self.enhance(image)?;
+        let used = ImageUse {
+            // Looked at in any case: another run may read the image from a store and look for such images.
+            seen: Seen::on([image, &enhanced]),
+            sizes: self.sizes().since(&before),
+        };
+        self.judge(&used.seen, place, implausible)?;
+        Ok((enhanced, used))
+    }
+
+    /// Notes an image of a frame in a condition that it made in another run or process, as if it was made now.
     ///
     /// # Errors
     /// If most of its images of dark frames so far cannot be enhanced images.
-    pub(crate) fn judge(
+    pub(crate) fn note_stored(
         &self,
-        images: [&Rgb; 2],
+        used: &ImageUse,
         place: [&dyn ToString; 2],
         implausible: Implausible,
     ) -> Result<()> {
-        let judged = self.usage().judge(images, place, implausible);
+        self.usage().add_sizes_of_stored(&used.sizes);
+        self.judge(&used.seen, place, implausible)
+    }
+
+    fn judge(
+        &self,
+        seen: &Seen,
+        place: [&dyn ToString; 2],
+        implausible: Implausible,
+    ) -> Result<()> {
+        if implausible == Implausible::NotLookedFor {
+            return Ok(());
+        }
+        let judged = self.usage().judge(seen, place, implausible);
         judged.map_err(|problem| Error::EnhancerEnded {
             path: self.path().to_owned(),
             problem,

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::failure::by;
 use super::size_plan::{SizePlan, SizeRule};
@@ -10,7 +10,7 @@ use super::tiles::Seam;
 
 /// Counts of what was done to the sizes of an enhancer's images, and the figures that decided it. An image can be counted as
 /// both padded and tiled.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SizeLog {
     /// Images that were enhanced.
     pub images: usize,
@@ -43,7 +43,7 @@ pub struct SizeLog {
 }
 
 /// Comparison of the samples that two tiles gave, over all images.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SeamCounts {
     /// Samples that were compared.
     pub compared: usize,
@@ -126,6 +126,26 @@ impl SizeLog {
         self.seam.compared += seam.compared;
         self.seam.differing += seam.differing;
         self.seam.most = self.seam.most.max(seam.most);
+    }
+
+    /// What was done since an earlier state of this log.
+    pub(crate) fn since(&self, earlier: &Self) -> Self {
+        Self {
+            images: self.images - earlier.images,
+            whole: self.whole - earlier.whole,
+            padded: self.padded - earlier.padded,
+            tiled: self.tiled - earlier.tiled,
+            resized: self.resized - earlier.resized,
+            reduced: self.reduced - earlier.reduced,
+            too_long: self.too_long - earlier.too_long,
+            seam: SeamCounts {
+                compared: self.seam.compared - earlier.seam.compared,
+                differing: self.seam.differing - earlier.seam.differing,
+                // The largest of all images so far; sums of parts have the same largest.
+                most: self.seam.most,
+            },
+            ..self.clone()
+        }
     }
 
     /// What was done, in words, as `12 images: 8 as they are, 4 in tiles of 512 × 512 with 8 px context`.

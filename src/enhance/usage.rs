@@ -3,13 +3,17 @@
 use std::collections::{BTreeMap, HashSet};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::plausible::{Codes, DARK, Gravity, brightness, judge};
+use serde::{Deserialize, Serialize};
+
+use super::plausible::{Codes, DARK, Gravity, Verdict, brightness, judge};
 use super::sizes::SizeLog;
 use crate::types::enhancer_note::{EnhancerNote, FlawedImage};
 use crate::types::{Digest, Rgb};
 
 /// Number of dark images from which on a verdict on the enhancer is possible; chosen as the number of frames of the probe.
 const ENOUGH: usize = super::probe::FRAMES;
+/// Number of the twin that stands for images that were read from a store.
+const STORED: usize = usize::MAX;
 
 /// What happens to a model whose images cannot be enhanced images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -21,6 +25,35 @@ pub(crate) enum Implausible {
     Used,
     /// Its images are not looked at, because they are those of a run that is there.
     NotLookedFor,
+}
+
+/// What was seen on an enhanced image.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub(super) enum Seen {
+    /// It was not looked at, because the degraded image is not dark: good models fail the rules on those.
+    #[default]
+    Bright,
+    /// The degraded image is dark; what is wrong with the enhanced one, if something is.
+    Dark(Option<Verdict>),
+}
+
+impl Seen {
+    /// What is seen on the enhanced image of a degraded one.
+    pub(super) fn on([degraded, made]: [&Rgb; 2]) -> Self {
+        if brightness(degraded) > DARK {
+            Self::Bright
+        } else {
+            Self::Dark(judge(&Codes::small(degraded), &Codes::small(made)))
+        }
+    }
+}
+
+/// What the note of an enhancer gets from one image; kept with images that are stored.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub(crate) struct ImageUse {
+    pub(super) seen: Seen,
+    /// What was done because of the size of the image.
+    pub(super) sizes: SizeLog,
 }
 
 /// A handle to the note of an enhancer, which grows while it is used.
@@ -46,8 +79,12 @@ impl Usage {
 
     /// Notes what a twin did so far because of sizes.
     pub(super) fn set_sizes(&self, twin: usize, log: &SizeLog) {
+        self.change_sizes(twin, |sizes| sizes.clone_from(log));
+    }
+
+    fn change_sizes(&self, twin: usize, change: impl FnOnce(&mut SizeLog)) {
         self.with(|state| {
-            state.sizes.insert(twin, log.clone());
+            change(state.sizes.entry(twin).or_default());
             let mut all = SizeLog::default();
             state.sizes.values().for_each(|log| all.add(log));
             state.note.sizes = all.summary();
@@ -55,32 +92,40 @@ impl Usage {
         });
     }
 
+    /// Adds what was done because of sizes to an image that was made earlier and is read now.
+    pub(super) fn add_sizes_of_stored(&self, log: &SizeLog) {
+        self.change_sizes(STORED, |sizes| sizes.add(log));
+    }
+
+    /// Forgets what was done to stored images because of sizes.
+    pub(super) fn count_stored_anew(&self) {
+        self.set_sizes(STORED, &SizeLog::default());
+    }
+
     /// Changes the note.
     pub(super) fn update(&self, change: impl FnOnce(&mut EnhancerNote)) {
         self.with(|state| change(&mut state.note));
     }
 
-    /// Looks at what an enhancer made of a frame in a condition; an image that is made again counts once. Images that are not dark are
-    /// not judged, because good models fail the rules on them.
+    /// Counts what was seen on the image of a frame in a condition; an image that is made again counts once.
     ///
     /// # Errors
     /// What was seen, if more than half of at least six images cannot be enhanced images, unless such images are used.
-    pub(crate) fn judge(
+    pub(super) fn judge(
         &self,
-        [dark, made]: [&Rgb; 2],
+        seen: &Seen,
         [frame, condition]: [&dyn ToString; 2],
         implausible: Implausible,
     ) -> Result<(), String> {
-        if implausible == Implausible::NotLookedFor || brightness(dark) > DARK {
+        let &Seen::Dark(verdict) = seen else {
             return Ok(());
-        }
+        };
         let place = [frame, condition].map(ToString::to_string);
         let key = Digest::of_parts(place.iter().map(String::as_bytes));
         if !self.with(|state| state.judged.insert(key)) {
             return Ok(());
         }
         let [frame, condition] = place;
-        let verdict = judge(&Codes::small(dark), &Codes::small(made));
         let flawed = verdict.map(|verdict| FlawedImage {
             frame,
             condition,
@@ -124,7 +169,7 @@ mod tests {
     }
 
     fn judged(usage: &Usage, frame: usize, made: &Rgb, how: Implausible) -> Result<(), String> {
-        usage.judge([&squares(1.0), made], [&frame, &"L3+ev+m"], how)
+        usage.judge(&Seen::on([&squares(1.0), made]), [&frame, &"L3+ev+m"], how)
     }
 
     #[test]
@@ -150,9 +195,9 @@ mod tests {
         for frame in [0, 1, 0, 1, 1] {
             judged(&usage, frame, &flat, Implausible::Used).unwrap();
         }
-        let again = [&squares(1.0), &flat];
+        let again = Seen::on([&squares(1.0), &flat]);
         usage
-            .judge(again, [&0, &"L4+ev+m"], Implausible::Used)
+            .judge(&again, [&0, &"L4+ev+m"], Implausible::Used)
             .unwrap();
         let judged = usage.note().judged;
         assert_eq!((judged.images, judged.flaws()), (3, 3));
@@ -164,8 +209,10 @@ mod tests {
         let usage = Usage::default();
         let bright = squares(6.0);
         let made = Rgb::black(96, 96);
+        let seen = Seen::on([&bright, &made]);
+        assert_eq!(seen, Seen::Bright);
         usage
-            .judge([&bright, &made], [&"frame", &"L0"], Implausible::Refused)
+            .judge(&seen, [&"frame", &"L0"], Implausible::Refused)
             .unwrap();
         assert_eq!(usage.note().judged.images, 0);
     }

@@ -140,6 +140,7 @@ impl<'a, E: Experiment> Job<'a, E> {
         } else {
             OpenEnhancers::load(files, &settings.loading)?
         };
+        let images = settings.images.open()?;
         let manifest = manifest::of(experiment, stored)?;
         let mut store = Store::open(&folder, &manifest, folder::address_change(&settings.place))?;
         store.add_questions(experiment.questions())?;
@@ -160,6 +161,7 @@ impl<'a, E: Experiment> Job<'a, E> {
             store,
             manifest,
             keys: HashSet::new(),
+            images,
         })
     }
 }

@@ -5,12 +5,14 @@ pub(crate) mod pairs;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Duration;
 
 use super::bilinear::bilinear;
 use super::photograph::SourcePhotograph;
 use super::recipe::Recipe;
 use super::scaling::Scaling;
 use super::source::{Frames, Source, SourceFrame};
+use super::stored_images::{MadeNotes, Needed, StoredImage, StoredImages, StoredPlace};
 use super::timings::{TimedStep, Timings};
 use super::walk::DegradedAt;
 use crate::ask::{ImageLimit, Payload, PayloadFormat};
@@ -30,9 +32,44 @@ pub(crate) struct ImageSteps<'a> {
     /// Largest image that the endpoint takes; `None` if all models are built in.
     pub(crate) limit: Option<ImageLimit>,
     pub(crate) timings: &'a Timings,
+    /// The image store; `None` without one.
+    pub(crate) stored: Option<StoredImages<'a>>,
 }
 
 impl ImageSteps<'_> {
+    /// The image of a place in the store, if it is there with all that is needed.
+    pub(crate) fn stored_image(
+        &self,
+        place: &StoredPlace<'_>,
+        needed: Needed,
+    ) -> Option<StoredImage> {
+        let read = || place.read(self.recipe, needed);
+        self.timings.time(TimedStep::Decode, read)
+    }
+
+    /// Adds an image that took this time to make to the store.
+    pub(crate) fn store(
+        &self,
+        place: &StoredPlace<'_>,
+        image: &Payload,
+        notes: &MadeNotes,
+        took: Duration,
+    ) -> Result<()> {
+        let write = || place.write(image, notes, took);
+        self.timings.time(TimedStep::Encode, write)
+    }
+
+    /// An image from the store as it is sent, with what the camera did. `note` says how the file of its frame was read.
+    pub(crate) fn stored_payload(
+        &self,
+        payload: Payload,
+        note: &InputNote,
+        exposure: Option<ExposureFacts>,
+    ) -> Result<Arc<Payload>> {
+        let payload = payload.turned_by(note.orientation);
+        self.checked(payload.exposed_by(exposure))
+    }
+
     /// The image as it is sent, with what the camera did, and the pixels that were encoded. `note` says how the file of its frame was
     /// read.
     pub(crate) fn payload<'p>(
@@ -75,7 +112,7 @@ fn longer_side(image: &Rgb) -> usize {
 
 /// A frame in one condition, before enhancement.
 #[expect(clippy::large_enum_variant, reason = "few are alive at a time")]
-pub(crate) enum StagedFrame {
+pub(crate) enum StagedFrame<'a> {
     /// The image as it is sent.
     Ready(Arc<Payload>),
     /// The pixels to enhance.
@@ -88,6 +125,16 @@ pub(crate) enum StagedFrame {
         /// How dark the photograph of the frame is; `None` without a darkness of pairs.
         pair: Option<PairFacts>,
         enhancer: EnhancerName,
+        /// Place in the store; `None` if it is not kept there.
+        place: Option<StoredPlace<'a>>,
+        /// Time that the pixels took so far.
+        took: Duration,
+    },
+    /// An image of an enhancer from the store, as it is sent.
+    Stored {
+        payload: Arc<Payload>,
+        enhancer: EnhancerName,
+        notes: MadeNotes,
     },
 }
 
@@ -98,6 +145,8 @@ pub(crate) struct FrameWork<'a> {
     key: NoiseKey,
     /// Digest of the file when the plan was made; `None` if any file is accepted.
     planned: Option<Digest>,
+    /// Name of the source, and the frame, for the store; `None` without a store or a plan.
+    origin: Option<Box<(FrameId, SourceFrame)>>,
     /// Width and height of the file, in pixels.
     size: Option<(u32, u32)>,
     picture: Option<Picture>,
@@ -119,8 +168,10 @@ pub(crate) struct FrameWork<'a> {
 impl<'a> FrameWork<'a> {
     /// Work on a frame of a planned source. Its file is read when it is needed, and must still have the same digest.
     pub(crate) fn planned(steps: ImageSteps<'a>, source: &Source, frame: &SourceFrame) -> Self {
-        let key = steps.recipe.noise(source, &frame.id);
+        let key = steps.recipe.noise(&source.name, &frame.id);
+        let origin = || Box::new((source.name.clone(), frame.clone()));
         Self {
+            origin: steps.stored.map(|_| origin()),
             size: Some(frame.size),
             photographs: frame.photographs.clone(),
             ..Self::new(steps, frame.id.clone(), key, Some(frame.digest))
@@ -139,6 +190,7 @@ impl<'a> FrameWork<'a> {
             frame,
             key,
             planned,
+            origin: None,
             size: None,
             picture: None,
             pixels: None,
@@ -160,6 +212,18 @@ impl<'a> FrameWork<'a> {
     /// The name of the frame.
     pub(crate) fn frame(&self) -> &FrameId {
         &self.frame
+    }
+
+    /// The place of the frame in a condition in the store; `None` if it is not kept there.
+    ///
+    /// # Errors
+    /// If the condition cannot be made of this frame.
+    pub(crate) fn stored_place(&self, condition: &Condition) -> Result<Option<StoredPlace<'a>>> {
+        let (Some(stored), Some(origin)) = (self.steps.stored, &self.origin) else {
+            return Ok(None);
+        };
+        let (source, frame) = &**origin;
+        stored.place(self.steps.recipe, (source, frame), condition)
     }
 
     /// How the file of the frame is read.

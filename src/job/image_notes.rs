@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use super::stored_images::Similarity;
 use super::thumbnail::MissingThumbnails;
 use crate::ask::Payload;
 use crate::error::Result;
@@ -81,19 +82,27 @@ impl MissingNotes {
 ///
 /// # Errors
 /// If the sizes differ.
-pub(crate) fn fidelity(
-    frame: &FrameId,
-    condition: &Condition,
-    sent: &Payload,
-    [image, clean]: [&Rgb; 2],
-) -> Result<ImageFidelity> {
+pub(crate) fn similarity([image, clean]: [&Rgb; 2]) -> Result<Similarity> {
     let psnr = psnr(image, clean)?;
-    Ok(ImageFidelity {
-        frame: frame.clone(),
-        condition: condition.clone(),
-        image: sent.facts().digest,
+    Ok(Similarity {
         psnr: psnr.is_finite().then_some(psnr),
         // An error means that the image is smaller than the window.
         ssim: ssim(image, clean).ok(),
     })
+}
+
+/// The similarity of an image as a run stores it.
+pub(crate) fn fidelity(
+    frame: &FrameId,
+    condition: &Condition,
+    sent: &Payload,
+    similarity: Similarity,
+) -> ImageFidelity {
+    ImageFidelity {
+        frame: frame.clone(),
+        condition: condition.clone(),
+        image: sent.facts().digest,
+        psnr: similarity.psnr,
+        ssim: similarity.ssim,
+    }
 }

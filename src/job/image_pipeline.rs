@@ -8,21 +8,23 @@ mod preparation;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
 
 use rayon::prelude::*;
 use tokio::sync::mpsc::Sender;
 
 use super::frame_work::pairs::{Resolved, paired};
 use super::frame_work::{FrameWork, ImageSteps, StagedFrame};
-use super::image_notes::{ImageNotes, MissingNotes, WantedNotes, fidelity};
+use super::image_notes::{ImageNotes, MissingNotes, WantedNotes, fidelity, similarity};
 use super::plan::{SourcePlan, TrialGroup};
 use super::source::Source;
+use super::stored_images::{MadeNotes, Needed};
 use super::thumbnail::{ShownObjects, thumbnail, thumbnail_of_all};
 use super::timings::TimedStep;
 use super::trial::{Item, PreparedGroup, Stimulus};
 use super::workers::Workers;
 use crate::ask::Payload;
-use crate::enhance::{Enhancer, Implausible};
+use crate::enhance::{Enhancer, ImageUse, Implausible};
 use crate::error::{Error, Result};
 use crate::types::{Condition, EnhancerName, FrameId, Rgb};
 
@@ -214,9 +216,9 @@ impl<'a> ImagePipeline<'a> {
             pair,
         } = work.resolved(condition)?;
         let steps = work.steps;
-        let small_copy = |image: &Payload, encoded: &Rgb| {
+        let small_copy = |image: &Payload, encoded: Option<&Rgb>| {
             let make = || {
-                let made = thumbnail(name, condition, image, Some(encoded), shown);
+                let made = thumbnail(name, condition, image, encoded, shown);
                 or_warning(name, condition, made)
             };
             steps.timings.time(TimedStep::Encode, make)
@@ -226,22 +228,51 @@ impl<'a> ImagePipeline<'a> {
             let image = paired(image, pair);
             // The file is decoded only for its thumbnail.
             if wanted.thumbnail {
-                notes.thumbnail = small_copy(&image, work.clean()?);
+                notes.thumbnail = small_copy(&image, Some(work.clean()?));
             }
             return Ok((image, notes));
         }
-        let clean = wanted.fidelity.then(|| work.clean_as_sent()).transpose()?;
         let (read, exposure) = (work.note()?, work.exposure(&made)?);
-        let pixels = self.pixels(work, &made)?;
+        let place = work.stored_place(&made)?;
+        let needed = match wanted.fidelity {
+            true => Needed::Similarity,
+            false => Needed::Image,
+        };
+        let found = place
+            .as_ref()
+            .and_then(|place| steps.stored_image(place, needed));
+        if let Some(stored) = found {
+            self.note_stored(&stored.notes, &made, work.frame())?;
+            let image = steps.stored_payload(stored.payload, &read, exposure)?;
+            let image = paired(image, pair);
+            if wanted.thumbnail {
+                notes.thumbnail = small_copy(&image, None);
+            }
+            let similarity = stored.notes.similarity.filter(|_| wanted.fidelity);
+            notes.fidelity = similarity.map(|found| fidelity(name, condition, &image, found));
+            return Ok((image, notes));
+        }
+        let started = Instant::now();
+        let clean = wanted.fidelity.then(|| work.clean_as_sent()).transpose()?;
+        let (pixels, enhanced) = self.pixels_noted(work, &made)?;
         let (image, encoded) = steps.payload(&pixels, &read, exposure)?;
+        let measure = |clean: Arc<Rgb>| {
+            let measure = || similarity([&*encoded, &*clean]);
+            steps.timings.time(TimedStep::Measure, measure)
+        };
+        let similarity = clean.map(measure).transpose()?;
+        if let Some(place) = place {
+            let notes = MadeNotes {
+                enhanced,
+                similarity,
+            };
+            steps.store(&place, &image, &notes, started.elapsed())?;
+        }
         let image = paired(image, pair);
         if wanted.thumbnail {
-            notes.thumbnail = small_copy(&image, &encoded);
+            notes.thumbnail = small_copy(&image, Some(&encoded));
         }
-        if let Some(clean) = clean {
-            let measure = || fidelity(name, condition, &image, [&*encoded, &*clean]);
-            notes.fidelity = Some(steps.timings.time(TimedStep::Measure, measure)?);
-        }
+        notes.fidelity = similarity.map(|found| fidelity(name, condition, &image, found));
         Ok((image, notes))
     }
 
@@ -263,14 +294,17 @@ impl<'a> ImagePipeline<'a> {
         for frames in source.frames.chunks(rayon::current_num_threads()) {
             let staged = frames.par_iter().map(|frame| {
                 let mut work = FrameWork::planned(steps, source, frame);
-                let staged = conditions.iter().map(|condition| work.stage(condition));
-                staged.collect::<Result<Vec<StagedFrame>>>()
+                let mut staged = Vec::with_capacity(conditions.len());
+                for condition in conditions {
+                    staged.push(work.stage(condition)?);
+                }
+                Ok(staged)
             });
-            let staged = staged.collect::<Result<Vec<_>>>()?;
+            let staged = staged.collect::<Result<Vec<Vec<StagedFrame<'_>>>>>()?;
             for (frame, staged) in frames.iter().zip(staged) {
                 let conditions = conditions.iter().zip(&mut images);
                 for (staged, (condition, images)) in staged.into_iter().zip(conditions) {
-                    images.push(self.finish(staged, [&frame.id, condition])?);
+                    images.push(self.finish(staged, &frame.id, condition)?);
                 }
             }
         }
@@ -307,32 +341,66 @@ impl<'a> ImagePipeline<'a> {
         work: &'w mut FrameWork<'_>,
         condition: &Condition,
     ) -> Result<Cow<'w, Rgb>> {
+        Ok(self.pixels_noted(work, condition)?.0)
+    }
+
+    /// The same, with what the note of the enhancer got from it; `None` without one.
+    fn pixels_noted<'w>(
+        &mut self,
+        work: &'w mut FrameWork<'_>,
+        condition: &Condition,
+    ) -> Result<(Cow<'w, Rgb>, Option<ImageUse>)> {
         let Resolved {
             work, condition, ..
         } = work.resolved(condition)?;
         let frame = work.frame().clone();
         let degraded = work.degraded(condition.degradation())?;
         match &condition.enhancer {
-            None => Ok(Cow::Borrowed(degraded)),
+            None => Ok((Cow::Borrowed(degraded), None)),
             Some(name) => {
-                let enhanced = self.enhanced(degraded, name, [&frame, &condition]);
-                enhanced.map(Cow::Owned)
+                let (image, used) = self.enhanced(degraded, name, [&frame, &condition])?;
+                Ok((Cow::Owned(image), Some(used)))
             }
         }
     }
 
-    fn finish(&mut self, staged: StagedFrame, place: [&dyn ToString; 2]) -> Result<Arc<Payload>> {
+    fn finish(
+        &mut self,
+        staged: StagedFrame<'_>,
+        frame: &FrameId,
+        condition: &Condition,
+    ) -> Result<Arc<Payload>> {
         match staged {
             StagedFrame::Ready(payload) => Ok(payload),
+            StagedFrame::Stored {
+                payload,
+                enhancer,
+                notes,
+            } => {
+                self.note_stored_by(&notes, &enhancer, [frame, condition])?;
+                Ok(payload)
+            }
             StagedFrame::ToEnhance {
                 degraded,
                 note,
                 exposure,
                 pair,
                 enhancer,
+                place,
+                took,
             } => {
-                let image = self.enhanced(&degraded, &enhancer, place)?;
-                Ok(paired(self.steps.payload(&image, &note, exposure)?.0, pair))
+                let started = Instant::now();
+                let (image, used) = self.enhanced(&degraded, &enhancer, [frame, condition])?;
+                let payload = self.steps.payload(&image, &note, exposure)?.0;
+                if let Some(place) = place {
+                    let notes = MadeNotes {
+                        enhanced: Some(used),
+                        similarity: None,
+                    };
+                    let took = took + started.elapsed();
+                    self.steps.store(&place, &payload, &notes, took)?;
+                }
+                Ok(paired(payload, pair))
             }
         }
     }
@@ -343,17 +411,45 @@ impl<'a> ImagePipeline<'a> {
         image: &Rgb,
         name: &EnhancerName,
         place: [&dyn ToString; 2],
-    ) -> Result<Rgb> {
+    ) -> Result<(Rgb, ImageUse)> {
+        let (timings, implausible) = (self.steps.timings, self.implausible);
+        let enhancer = self.enhancer(name)?;
+        let enhance = || enhancer.enhance_noted(image, place, implausible);
+        timings.time(TimedStep::Enhance, enhance)
+    }
+
+    /// Notes an image of the store as its enhancer would, if it has one.
+    fn note_stored(
+        &mut self,
+        notes: &MadeNotes,
+        condition: &Condition,
+        frame: &FrameId,
+    ) -> Result<()> {
+        match &condition.enhancer {
+            None => Ok(()),
+            Some(name) => self.note_stored_by(notes, name, [frame, condition]),
+        }
+    }
+
+    fn note_stored_by(
+        &mut self,
+        notes: &MadeNotes,
+        name: &EnhancerName,
+        place: [&dyn ToString; 2],
+    ) -> Result<()> {
+        let implausible = self.implausible;
+        let enhancer = self.enhancer(name)?;
+        let used = notes.enhanced.as_ref();
+        used.map_or(Ok(()), |used| {
+            enhancer.note_stored(used, place, implausible)
+        })
+    }
+
+    fn enhancer(&mut self, name: &EnhancerName) -> Result<&mut Enhancer> {
         let mut enhancers = self.enhancers.iter_mut();
-        let enhancer = enhancers
+        enhancers
             .find(|enhancer| enhancer.name() == name)
-            .ok_or_else(|| Error::data(name, "this enhancer is not open"))?;
-        let enhance = || {
-            let enhanced = enhancer.enhance(image)?;
-            enhancer.judge([image, &enhanced], place, self.implausible)?;
-            Ok(enhanced)
-        };
-        self.steps.timings.time(TimedStep::Enhance, enhance)
+            .ok_or_else(|| Error::data(name, "this enhancer is not open"))
     }
 }
 

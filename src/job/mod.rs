@@ -57,6 +57,7 @@ pub(crate) mod settings;
 pub(crate) mod shard;
 pub(crate) mod source;
 pub(crate) mod stored;
+pub(crate) mod stored_images;
 pub(crate) mod thumbnail;
 pub(crate) mod timings;
 pub(crate) mod trial;

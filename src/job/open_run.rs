@@ -23,12 +23,14 @@ use super::progress::Progress;
 use super::record_table;
 use super::settings::JobSettings;
 use super::stored::StoredRun;
+use super::stored_images::{Maker, StoredImages};
 use super::thumbnail::MissingThumbnails;
 use super::timings::Timings;
 use super::workers::Workers;
 use crate::ask::ImageLimit;
 use crate::enhance::{Enhancer, Usage};
 use crate::error::Result;
+use crate::image_store::ImageStore;
 use crate::report::forecast::money;
 use crate::store::{self, Store, StoredTrial};
 use crate::types::manifest::{Counts, RunManifest};
@@ -43,6 +45,8 @@ pub(crate) struct OpenRun<'a, E: Experiment> {
     pub(super) manifest: RunManifest,
     /// Keys of all trials planned so far, in all phases.
     pub(super) keys: HashSet<TrialKey>,
+    /// The image store; `None` without one.
+    pub(super) images: Option<ImageStore>,
 }
 
 /// The trials of a phase that still have to be asked.
@@ -179,7 +183,10 @@ impl<E: Experiment> OpenRun<'_, E> {
         let timings = Timings::default();
         let limit = limit(settings);
         let (sources, usages) = (experiment.sources(), usages(&enhancers));
+        let maker = Maker::new(self.enhancers.version(), &settings.loading.size);
+        let images = self.images.as_ref();
         let mut pipeline = pipeline(experiment, enhancers, limit, &timings);
+        pipeline.steps.stored = images.map(|images| StoredImages::new(images, &maker));
         workers.all.install(|| {
             if shows_images {
                 dark_already::warn(experiment);
@@ -208,6 +215,9 @@ impl<E: Experiment> OpenRun<'_, E> {
                 phases => format!("{}: {line}", phases[phase]),
             };
             self.progress.note(&line);
+            if let Some(images) = self.images.as_ref().filter(|_| shows_images) {
+                self.progress.note(&images.summary());
+            }
         }
         Ok(end)
     }
@@ -306,7 +316,7 @@ pub(super) fn usages(enhancers: &[Enhancer]) -> Vec<(String, Usage)> {
         .collect()
 }
 
-/// The image pipeline of an experiment.
+/// The image pipeline of an experiment, without an image store.
 pub(crate) fn pipeline<'a, E: Experiment>(
     experiment: &'a E,
     enhancers: Vec<Enhancer>,
@@ -319,6 +329,7 @@ pub(crate) fn pipeline<'a, E: Experiment>(
             recipe: experiment.recipe(),
             limit,
             timings,
+            stored: None,
         },
         enhancers,
         sets: Vec::new(),

@@ -137,6 +137,7 @@ impl ImageRebuilder {
                 recipe: &self.recipe,
                 limit: None,
                 timings: &Timings::default(),
+                stored: None,
             },
             enhancers: std::mem::take(&mut self.enhancers),
             sets: Vec::new(),

@@ -72,11 +72,11 @@ impl Recipe {
     }
 
     /// The key that the noise of a frame is drawn from.
-    pub(crate) fn noise(&self, source: &Source, frame: &FrameId) -> NoiseKey {
+    pub(crate) fn noise(&self, source: &FrameId, frame: &FrameId) -> NoiseKey {
         let own = NoiseKey::new(self.seed, frame);
         match self.camera_of {
             CameraOf::Frame => own,
-            CameraOf::Episode => own.with_camera_of(&NoiseKey::new(self.seed, &source.name)),
+            CameraOf::Episode => own.with_camera_of(&NoiseKey::new(self.seed, source)),
         }
     }
 
@@ -89,16 +89,20 @@ impl Recipe {
         let images: Vec<ImageKeyFacts<'_>> = source
             .frames
             .iter()
-            .map(|frame| self.facts(source, frame, condition))
+            .map(|frame| self.facts(&source.name, frame, condition))
             .collect::<Result<_>>()?;
         let in_order: Vec<&ImageKeyFacts<'_>> =
             source.order.iter().map(|index| &images[*index]).collect();
         Digest::canonical("darkqa.images/2", &in_order)
     }
 
-    fn facts<'a>(
+    /// All that decides the image of a frame in a condition.
+    ///
+    /// # Errors
+    /// If the condition has a reading that the recipe lacks.
+    pub(super) fn facts<'a>(
         &'a self,
-        source: &'a Source,
+        source: &'a FrameId,
         frame: &'a SourceFrame,
         condition: &Condition,
     ) -> Result<ImageKeyFacts<'a>> {
@@ -133,7 +137,7 @@ impl Recipe {
                 let how = shown.map(|condition| frame.degradation(condition));
                 let how = how.collect::<Result<BTreeSet<Option<Degradation>>>>()?;
                 for how in how.iter().flatten().filter(|how| how.kind().has_motion()) {
-                    self.applied(source, frame, how)?;
+                    self.applied(&source.name, frame, how)?;
                 }
             }
         }
@@ -142,7 +146,7 @@ impl Recipe {
 
     fn applied(
         &self,
-        source: &Source,
+        source: &FrameId,
         frame: &SourceFrame,
         how: &Degradation,
     ) -> Result<AppliedDegradation> {
@@ -154,7 +158,7 @@ impl Recipe {
 
     fn degradation<'a>(
         &'a self,
-        source: &'a Source,
+        source: &'a FrameId,
         frame: &'a SourceFrame,
         how: &Degradation,
     ) -> Result<DegradationFacts<'a>> {
@@ -169,7 +173,7 @@ impl Recipe {
             reading: applied.synthesis().cloned(),
             seed: random.then_some(self.seed),
             frame: random.then_some(&frame.id),
-            camera_of: of_source.then_some(&source.name),
+            camera_of: of_source.then_some(source),
             exposure: applied.exposure(),
         })
     }
@@ -192,7 +196,7 @@ impl Recipe {
 
 /// All that decides an image, as it enters the digest.
 #[derive(Serialize)]
-struct ImageKeyFacts<'a> {
+pub(super) struct ImageKeyFacts<'a> {
     picture: Digest,
     degradation: Option<DegradationFacts<'a>>,
     enhancer: Option<EnhancerFacts>,

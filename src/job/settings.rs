@@ -20,6 +20,7 @@ use crate::ask::{
 };
 use crate::enhance::{EnhancerArgs, ModelFile};
 use crate::error::{Error, Result};
+use crate::image_store::StoreArgs;
 use crate::synthesis::{LightArgs, LightSettings};
 use crate::types::flag::seconds;
 use crate::types::{Decides, SetLight, View};
@@ -60,6 +61,9 @@ pub(crate) struct JobArgs {
     /// Shard of this process, and timings.
     #[command(flatten)]
     pub scale: ScaleArgs,
+    /// Folder of images that are shared with other runs.
+    #[command(flatten)]
+    pub stored: StoreArgs,
     /// Run folder and output.
     #[command(flatten)]
     pub output: OutputArgs,
@@ -133,6 +137,8 @@ pub(crate) struct JobSettings {
     pub grace: Duration,
     /// Print at the end how long each step took.
     pub show_timings: bool,
+    /// Folder of images that are shared with other runs.
+    pub images: StoreArgs,
     /// Folder of the run.
     pub place: RunPlace,
     /// Format of the results on standard output.
@@ -264,6 +270,7 @@ impl JobArgs {
             shard,
             grace: self.scale.grace,
             show_timings: self.scale.timings,
+            images: self.stored,
             show: self.output.show.format(),
             table: self.output.show.table(),
             place: RunPlace::from(self.output).checked()?,

@@ -2,6 +2,7 @@
 
 pub(crate) mod batch;
 pub(crate) mod bundle;
+pub(crate) mod cache;
 pub(crate) mod calibrate;
 pub(crate) mod enhance;
 pub(crate) mod evaluate;

@@ -5,14 +5,14 @@ use serde::Serialize;
 use serde::ser::Error as _;
 use serde_json::{Error, Value};
 
-/// The compact JSON of a value: keys are sorted, and `null`s and absent fields are left out at every depth. A new field that
+/// The JSON of a value, whose compact text is the canonical one: keys are sorted, and `null`s and absent fields are left out at every depth. A new field that
 /// is `None` therefore changes no digest.
 ///
 /// Floats are written in the shortest form that reads back (serde_json); an `f32` is written as its shortest decimal.
 ///
 /// # Errors
 /// If a number is infinite or NaN, or a key is not a text.
-pub(super) fn canonical(value: &impl Serialize) -> Result<String, Error> {
+pub(super) fn canonical(value: &impl Serialize) -> Result<Value, Error> {
     let content = Content::serialized(value).map_err(Error::custom)?;
     if !is_finite(&content) {
         return Err(Error::custom("a number in a digest is not finite"));
@@ -20,7 +20,7 @@ pub(super) fn canonical(value: &impl Serialize) -> Result<String, Error> {
     // A `serde_json::Map` is sorted by key.
     let mut value = serde_json::from_str(&serde_json::to_string(value)?)?;
     remove_nulls(&mut value);
-    serde_json::to_string(&value)
+    Ok(value)
 }
 
 /// Whether all numbers are finite; serde_json would write `null` for the others.
@@ -85,7 +85,7 @@ mod tests {
     #[test]
     fn text_is_sorted_and_without_nulls() {
         assert_eq!(
-            canonical(&facts()).unwrap(),
+            canonical(&facts()).unwrap().to_string(),
             r#"{"names":{"b":true},"narrow":0.1,"parts":["Alone",{"Number":3.3},{"Fields":{"a":1}}],"seed":18446744073709551615,"wide":7.5}"#
         );
     }

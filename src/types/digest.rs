@@ -4,6 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use serde::Serialize;
+use serde_json::Value;
 
 use super::canonical::canonical;
 use super::words::as_text;
@@ -26,11 +27,19 @@ impl Digest {
     /// # Errors
     /// If a number in it is infinite or NaN, or a key of a map is not a text.
     pub fn canonical(domain: &'static str, value: &impl Serialize) -> Result<Self, Error> {
-        let text = canonical(value).map_err(|e| Error::data(domain, e))?;
+        Ok(Self::canonical_value(domain, value)?.0)
+    }
+
+    /// The same digest, with the value that it is the digest of: keys sorted, nulls and absent fields left out at every depth.
+    pub(crate) fn canonical_value(
+        domain: &'static str,
+        value: &impl Serialize,
+    ) -> Result<(Self, Value), Error> {
+        let value = canonical(value).map_err(|e| Error::data(domain, e))?;
         let mut hasher = blake3::Hasher::new();
         hasher.update(domain.as_bytes()).update(&[0]);
-        hasher.update(text.as_bytes());
-        Ok(Self(*hasher.finalize().as_bytes()))
+        hasher.update(value.to_string().as_bytes());
+        Ok((Self(*hasher.finalize().as_bytes()), value))
     }
 
     /// The digest of several parts in order. Each part's length is hashed too, so that no two lists have the same input.

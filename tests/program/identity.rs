@@ -376,7 +376,7 @@ const OPEN_ADDITIONS: [Addition; 10] = [
 ];
 
 /// What changes no answer: given on the folder of a run, it asks nothing.
-const NOTHING: [&str; 35] = [
+const NOTHING: [&str; 38] = [
     "--max-pixels 1000000",
     "--threads 1",
     "--offline",
@@ -405,6 +405,9 @@ const NOTHING: [&str; 35] = [
     "--workers 2",
     "--grace 9",
     "--timings",
+    "--images-cache images",
+    "--images-cache images --images-cache-what all",
+    "--images-cache images --images-cache-size 1",
     "--full",
     "--findings",
     "--json",

@@ -30,6 +30,7 @@ mod figures;
 mod golden;
 mod hm3d;
 mod identity;
+mod image_store;
 mod import;
 mod inputs;
 mod levels;

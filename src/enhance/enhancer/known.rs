@@ -76,6 +76,7 @@ impl Enhancer {
     pub(crate) fn count_anew(&mut self) {
         self.log = SizeLog::default();
         self.usage.set_sizes(self.twin, &self.log);
+        self.usage.count_stored_anew();
     }
 
     /// Sizes that were found by trial.

@@ -14,6 +14,7 @@ use crate::job::open_run::{
 };
 use crate::job::outcome::Outcome;
 use crate::job::plan::Plan;
+use crate::job::stored_images::{Maker, StoredImages};
 use crate::job::timings::Timings;
 use crate::job::trial::Item;
 use crate::job::workers::pool;
@@ -81,7 +82,10 @@ pub(super) fn write<E: Experiment>(
     };
     let limit = limit(settings);
     let usages = usages(&enhancers);
+    let maker = Maker::new(run.enhancers.version(), &settings.loading.size);
+    let images = run.images.as_ref();
     let mut pipeline = pipeline(experiment, enhancers, limit, &timings);
+    pipeline.steps.stored = images.map(|images| StoredImages::new(images, &maker));
     let missing = missing_notes(experiment, run.store.folder())?;
     let sources = experiment.sources();
     workers.install(|| {

@@ -48,6 +48,7 @@ fn pipeline_output(
         recipe: &recipe,
         limit: None,
         timings: &Timings::default(),
+        stored: None,
     };
     let mut pipeline = ImagePipeline {
         steps,

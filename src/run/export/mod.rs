@@ -121,6 +121,7 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
             recipe: &recipe,
             limit: None,
             timings: &Timings::default(),
+            stored: None,
         },
         enhancers: OpenEnhancers::load(files, &args.loading)?.take()?,
         sets: Vec::new(),

@@ -199,6 +199,7 @@ fn write_files(
         recipe: &recipe,
         limit: None,
         timings: &timings,
+        stored: None,
     };
     let mut work = SynthesisWork {
         making,

@@ -1,0 +1,234 @@
+//! The file of one image in the store: [`Entry`].
+//!
+//! A file is the image as it is sent, then facts about it as JSON, then a footer of [`FOOTER`] bytes:
+//!
+//! | bytes | |
+//! |---|---|
+//! | 32 | BLAKE3 of the key, the next four numbers, the image and the facts |
+//! | 8 | length of the image |
+//! | 4, 4, 4 | length of the facts, width and height in pixels |
+//! | 8 | `DQIMAGE1` |
+//!
+//! Numbers are little-endian. The key is in the digest, so that an entry in the place of another is noticed.
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::key::Key;
+
+/// Last bytes of each file: kind and version of the form.
+const MAGIC: &[u8; 8] = b"DQIMAGE1";
+/// Length of the footer in bytes.
+pub(super) const FOOTER: usize = 32 + 8 + 3 * 4 + 8;
+
+/// An image as it is in the store.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Entry {
+    /// The file of the image, as it is sent.
+    pub(crate) image: Vec<u8>,
+    /// Width and height in pixels.
+    pub(crate) size: [u32; 2],
+    pub(crate) facts: EntryFacts,
+}
+
+/// What is stored beside an image.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub(crate) struct EntryFacts {
+    /// What it shows, for lists of the store.
+    pub(crate) shown: Shown,
+    /// Time that it took to make, in milliseconds.
+    pub(crate) milliseconds: u64,
+    /// What was found out about the image when it was made, in a form of the user of the store.
+    #[serde(default)]
+    pub(crate) notes: Value,
+    /// What its key is the digest of.
+    #[serde(default)]
+    recipe: Value,
+}
+
+/// What an image of the store shows, in words.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
+pub(crate) struct Shown {
+    /// Name of the enhancer; `None` without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) enhancer: Option<String>,
+    /// What was done to the frame, as `L3-noise`.
+    pub(crate) light: String,
+    /// Format, as `png`.
+    pub(crate) format: String,
+}
+
+impl EntryFacts {
+    /// Facts of an image that took so many milliseconds to make.
+    pub(crate) fn new(shown: Shown, milliseconds: u64, notes: Value) -> Self {
+        Self {
+            shown,
+            milliseconds,
+            notes,
+            recipe: Value::Null,
+        }
+    }
+}
+
+/// Why a file is no entry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Damaged;
+
+impl Entry {
+    /// The bytes of the file for a key.
+    pub(super) fn file(&self, key: &Key) -> Vec<u8> {
+        let facts = EntryFacts {
+            recipe: key.recipe().clone(),
+            ..self.facts.clone()
+        };
+        let facts = serde_json::json!(facts).to_string();
+        let numbers = numbers(self.image.len() as u64, facts.len() as u32, self.size);
+        let digest = digest(key, &numbers, &self.image, facts.as_bytes());
+        [
+            &self.image,
+            facts.as_bytes(),
+            digest.as_bytes(),
+            &numbers,
+            MAGIC,
+        ]
+        .concat()
+    }
+
+    /// The entry in the bytes of a file.
+    ///
+    /// # Errors
+    /// If the file is cut or changed, has another form, or is that of another key.
+    pub(super) fn read(key: &Key, mut file: Vec<u8>) -> Result<Self, Damaged> {
+        let footer = Footer::read(&file)?;
+        let (image, rest) = file.split_at(footer.image);
+        let facts = rest.get(..footer.facts).ok_or(Damaged)?;
+        if digest(key, &footer.numbers, image, facts) != footer.digest {
+            return Err(Damaged);
+        }
+        let facts = serde_json::from_slice(facts).map_err(|_| Damaged)?;
+        file.truncate(footer.image);
+        Ok(Self {
+            image: file,
+            size: footer.size,
+            facts,
+        })
+    }
+}
+
+/// What the end of a file says, without a check of its digest: the facts, and the length of the image in bytes. `tail` is the end of the
+/// file, `length` the length of the whole.
+pub(super) fn facts_at_end(tail: &[u8], length: u64) -> Option<(EntryFacts, u64)> {
+    let start = tail.len().checked_sub(FOOTER)?;
+    let (body, footer) = tail.split_at(start);
+    let (numbers, facts_len) = (footer.get(32..52)?, footer.get(40..44)?);
+    let image = u64::from_le_bytes(numbers.get(..8)?.try_into().ok()?);
+    let facts = u32::from_le_bytes(facts_len.try_into().ok()?) as usize;
+    let whole = image.checked_add(facts as u64 + FOOTER as u64)?;
+    if &footer[52..] != MAGIC || whole != length {
+        return None;
+    }
+    let facts = body.get(body.len().checked_sub(facts)?..)?;
+    Some((serde_json::from_slice(facts).ok()?, image))
+}
+
+/// The footer of a file whose length fits.
+struct Footer {
+    digest: blake3::Hash,
+    numbers: [u8; 20],
+    image: usize,
+    facts: usize,
+    size: [u32; 2],
+}
+
+impl Footer {
+    fn read(file: &[u8]) -> Result<Self, Damaged> {
+        let start = file.len().checked_sub(FOOTER).ok_or(Damaged)?;
+        let (digest, rest) = file[start..].split_at(32);
+        let (numbers, magic) = rest.split_at(20);
+        let digest: [u8; 32] = digest.try_into().map_err(|_| Damaged)?;
+        let numbers: [u8; 20] = numbers.try_into().map_err(|_| Damaged)?;
+        let word = |at: usize| {
+            let bytes = [
+                numbers[at],
+                numbers[at + 1],
+                numbers[at + 2],
+                numbers[at + 3],
+            ];
+            u32::from_le_bytes(bytes)
+        };
+        let image = u64::from(word(0)) | u64::from(word(4)) << 32;
+        let facts = u64::from(word(8));
+        if magic != MAGIC || image.checked_add(facts) != Some(start as u64) {
+            return Err(Damaged);
+        }
+        Ok(Self {
+            digest: blake3::Hash::from_bytes(digest),
+            numbers,
+            image: image as usize,
+            facts: facts as usize,
+            size: [word(12), word(16)],
+        })
+    }
+}
+
+fn numbers(image: u64, facts: u32, [width, height]: [u32; 2]) -> [u8; 20] {
+    let mut numbers = [0; 20];
+    numbers[..8].copy_from_slice(&image.to_le_bytes());
+    for (place, number) in [facts, width, height].into_iter().enumerate() {
+        numbers[8 + 4 * place..][..4].copy_from_slice(&number.to_le_bytes());
+    }
+    numbers
+}
+
+fn digest(key: &Key, numbers: &[u8; 20], image: &[u8], facts: &[u8]) -> blake3::Hash {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(MAGIC).update(key.digest().as_bytes());
+    hasher.update(numbers).update(image).update(facts);
+    hasher.finalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entry() -> Entry {
+        Entry {
+            image: (0..=255).collect(),
+            size: [16, 9],
+            facts: EntryFacts {
+                milliseconds: 120,
+                notes: serde_json::json!({"psnr": 21.5}),
+                ..EntryFacts::default()
+            },
+        }
+    }
+
+    #[test]
+    fn an_entry_reads_back_and_no_changed_byte_does() {
+        let (key, other) = (Key::of(&["a"]).unwrap(), Key::of(&["b"]).unwrap());
+        let file = entry().file(&key);
+        let read = Entry::read(&key, file.clone()).unwrap();
+        assert_eq!((&read.image, read.size), (&entry().image, [16, 9]));
+        assert_eq!(read.facts.notes, entry().facts.notes);
+        assert_eq!(Entry::read(&other, file.clone()), Err(Damaged));
+        for place in 0..file.len() {
+            let mut changed = file.clone();
+            changed[place] ^= 1;
+            assert_eq!(Entry::read(&key, changed), Err(Damaged), "{place}");
+            assert_eq!(Entry::read(&key, file[..place].to_vec()), Err(Damaged));
+        }
+        assert_eq!(Entry::read(&key, [&file[..], b"x"].concat()), Err(Damaged));
+    }
+
+    #[test]
+    fn the_end_of_a_file_tells_what_it_shows() {
+        let key = Key::of(&["a"]).unwrap();
+        let file = entry().file(&key);
+        let (facts, image) = facts_at_end(&file[200..], file.len() as u64).unwrap();
+        assert_eq!((facts.milliseconds, image), (120, 256));
+        assert_eq!(facts.recipe, serde_json::json!(["a"]));
+        assert_eq!(facts_at_end(&file, file.len() as u64 + 1), None);
+        assert_eq!(facts_at_end(&file[file.len() - FOOTER..], 1), None);
+        assert_eq!(facts_at_end(b"short", 5), None);
+    }
+}

@@ -1,0 +1,143 @@
+//! What a store holds, in a table: [`listing`]; and emptying it: [`clear`].
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::fs::{self, File};
+use std::io::{self, Read as _, Seek as _, SeekFrom};
+use std::path::Path;
+use std::time::{Duration, SystemTime};
+
+use super::entry::{Shown, facts_at_end};
+use super::folder::{FileKind, StoreFolder, StoredFile};
+use crate::error::{Error, Result};
+
+/// Bytes at the end of a file that are read for its facts; chosen: facts have less than 4 kB.
+const TAIL: u64 = 16 << 10;
+/// Ages by which images are counted, in days.
+const AGES: [u64; 3] = [1, 7, 14];
+
+/// Number of images, their bytes and the time that they took to make.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sum {
+    images: usize,
+    bytes: u64,
+    milliseconds: u64,
+}
+
+impl Sum {
+    fn add(&mut self, bytes: u64, milliseconds: u64) {
+        self.images += 1;
+        self.bytes += bytes;
+        self.milliseconds += milliseconds;
+    }
+
+    fn line(&self, what: &str) -> String {
+        let (megabytes, seconds) = (self.bytes as f64 / 1e6, self.milliseconds as f64 / 1e3);
+        let images = self.images;
+        format!("{images:>9} {megabytes:>11.1} {seconds:>13.1}  {what}\n")
+    }
+}
+
+/// A table of the images in the store of a folder: by what they show, and by the time since they were used.
+///
+/// # Errors
+/// If the folder is not that of a store, or cannot be read.
+pub(crate) fn listing(folder: &Path) -> Result<String> {
+    let (files, now) = (files(folder)?, SystemTime::now());
+    let (mut all, mut by_shown) = (Sum::default(), BTreeMap::<Option<Shown>, Sum>::new());
+    let mut by_age = [Sum::default(); AGES.len() + 1];
+    let mut unfinished = 0;
+    for file in &files {
+        if file.kind == FileKind::Unfinished {
+            unfinished += 1;
+            continue;
+        }
+        let facts = facts(file);
+        let (shown, milliseconds) = match facts {
+            Some(facts) => (Some(facts.shown), facts.milliseconds),
+            None => (None, 0),
+        };
+        all.add(file.bytes, milliseconds);
+        let sum = by_shown.entry(shown).or_default();
+        sum.add(file.bytes, milliseconds);
+        let age = now.duration_since(file.used).unwrap_or_default();
+        let is_younger = |days: &u64| age < Duration::from_hours(24 * days);
+        let place = AGES.iter().position(is_younger).unwrap_or(AGES.len());
+        by_age[place].add(file.bytes, milliseconds);
+    }
+    let mut text = String::from("   images          MB  s to make it\n");
+    for (shown, sum) in &by_shown {
+        text += &sum.line(&shown.as_ref().map_or_else(
+            || "damaged, or of another version of the program".to_owned(),
+            |shown| {
+                let Shown {
+                    enhancer,
+                    light,
+                    format,
+                } = shown;
+                let by = enhancer
+                    .as_ref()
+                    .map(|name| format!(", enhanced by {name}"));
+                format!("{light}{}, {format}", by.unwrap_or_default())
+            },
+        ));
+    }
+    for (place, sum) in by_age.iter().enumerate().filter(|(_, sum)| sum.images > 0) {
+        let days = |days: u64| if days == 1 { "day" } else { "days" };
+        text += &sum.line(&match AGES.get(place) {
+            Some(age) => format!("used less than {age} {} ago", days(*age)),
+            None => format!("not used for {} days", AGES[AGES.len() - 1]),
+        });
+    }
+    text += &all.line(&format!("in all, in {}", folder.display()));
+    if unfinished > 0 {
+        let _ = writeln!(
+            text,
+            "{unfinished} unfinished: being written, or left by a killed process and removed after a day"
+        );
+    }
+    Ok(text)
+}
+
+/// Removes all images of the store of a folder; other files stay. Returns what was removed, in words.
+///
+/// # Errors
+/// If the folder is not that of a store, or a file cannot be removed.
+pub(crate) fn clear(folder: &Path) -> Result<String> {
+    let mut sum = Sum::default();
+    for file in files(folder)? {
+        match fs::remove_file(&file.path) {
+            Ok(()) => sum.add(file.bytes, 0),
+            Err(e) if e.kind() == io::ErrorKind::NotFound => {}
+            Err(e) => return Err(Error::file(&file.path, "remove", e)),
+        }
+    }
+    let (images, megabytes) = (sum.images, sum.bytes as f64 / 1e6);
+    let files = if images == 1 { "file" } else { "files" };
+    Ok(format!(
+        "{}: {images} {files} removed ({megabytes:.1} MB)\n",
+        folder.display()
+    ))
+}
+
+/// The files of the store of a folder.
+fn files(folder: &Path) -> Result<Vec<StoredFile>> {
+    let store = StoreFolder::new(folder);
+    if !store.root().is_dir() {
+        let problem = "no image store: the folder that --images-cache named is expected";
+        return Err(Error::data(folder.display(), problem));
+    }
+    store
+        .files()
+        .map_err(|e| Error::file(store.root(), "read", e))
+}
+
+/// The facts of an entry; `None` if it is damaged. Its image is not read.
+fn facts(file: &StoredFile) -> Option<super::EntryFacts> {
+    let mut content = File::open(&file.path).ok()?;
+    let start = file.bytes.saturating_sub(TAIL);
+    content.seek(SeekFrom::Start(start)).ok()?;
+    let mut tail = Vec::new();
+    content.read_to_end(&mut tail).ok()?;
+    facts_at_end(&tail, file.bytes).map(|(facts, _)| facts)
+}

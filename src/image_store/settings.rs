@@ -1,0 +1,51 @@
+//! The flags of the image store: [`StoreArgs`].
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::access::ImageStore;
+use crate::error::Result;
+use crate::types::flag::positive;
+use crate::types::{Decides, flag};
+
+/// Flags of the folder in which images are kept for other runs.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Scale")]
+pub(crate) struct StoreArgs {
+    /// A folder in which images are kept, so that other runs, models, shards and processes need not make them again; it may be deleted
+    /// at any time, and holds what `darkqa-eval cache DIR` lists; default: no image is kept
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
+    pub images_cache: Option<PathBuf>,
+    /// Which images are kept there
+    #[arg(long, value_name = "WHAT", value_enum, default_value_t = StoredKinds::Enhanced, add = Decides::Nothing)]
+    pub images_cache_what: StoredKinds,
+    /// Room for them in GB (10⁹ bytes); if it is full, images that nobody used for 14 days leave, else none is added
+    #[arg(long, value_name = "GB", value_parser = positive, default_value = "20", add = Decides::Nothing)]
+    pub images_cache_size: f64,
+}
+
+/// Which images are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum StoredKinds {
+    /// Those that an enhancer made
+    Enhanced,
+    /// Degraded ones too, which are made faster than a network share is read: for slow processors and fast disks
+    All,
+}
+
+flag::flag_words!(StoredKinds);
+
+impl StoreArgs {
+    /// The store that the flags name; `None` without a folder.
+    ///
+    /// # Errors
+    /// If its folder cannot be made or written to.
+    pub(crate) fn open(&self) -> Result<Option<ImageStore>> {
+        let bytes = (self.images_cache_size * 1e9) as u64;
+        let folder = self.images_cache.as_deref();
+        folder
+            .map(|folder| ImageStore::open(folder, self.images_cache_what, bytes))
+            .transpose()
+    }
+}

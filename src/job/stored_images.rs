@@ -1,0 +1,188 @@
+//! The image store as the image pipeline uses it: [`StoredImages`], and the place of one image in it ([`StoredPlace`]).
+
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+use super::recipe::{ImageKeyFacts, Recipe};
+use super::source::SourceFrame;
+use crate::ask::Payload;
+use crate::enhance::{ImageUse, SizeArgs};
+use crate::error::Result;
+use crate::image_store::{Entry, EntryFacts, ImageStore, Key, Shown, StoredKinds};
+use crate::types::{Condition, FrameId};
+
+/// What decides images besides their recipes: the program, the machine's kind, and how enhancers are run.
+#[derive(Debug, Serialize)]
+pub(crate) struct Maker {
+    /// Version of this program, because encoders may change with it.
+    program: &'static str,
+    /// Processor and operating system, because ONNX Runtime's results may differ between them.
+    machine: [&'static str; 2],
+    /// Name and version of ONNX Runtime; `None` if no enhancer is open.
+    runtime: Option<(String, String)>,
+    tile: String,
+    max_side: Option<usize>,
+    resize: bool,
+}
+
+impl Maker {
+    /// This program, with this version of ONNX Runtime and these sizes of enhanced images.
+    pub(crate) fn new(runtime: Option<(String, String)>, sizes: &SizeArgs) -> Self {
+        Self {
+            program: env!("CARGO_PKG_VERSION"),
+            machine: [std::env::consts::ARCH, std::env::consts::OS],
+            runtime,
+            tile: sizes.tile.to_string(),
+            max_side: sizes.llie_max_side.map(std::num::NonZeroUsize::get),
+            resize: sizes.llie_resize,
+        }
+    }
+}
+
+/// A store, with what decides images besides their recipes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct StoredImages<'a> {
+    store: &'a ImageStore,
+    maker: &'a Maker,
+}
+
+/// All that decides the file of an image.
+#[derive(Serialize)]
+struct StoredRecipe<'a> {
+    image: ImageKeyFacts<'a>,
+    program: &'static str,
+    /// `None` without an enhancer: neither machine nor runtime decides a degraded image.
+    enhanced_with: Option<&'a Maker>,
+}
+
+impl<'a> StoredImages<'a> {
+    pub(crate) fn new(store: &'a ImageStore, maker: &'a Maker) -> Self {
+        Self { store, maker }
+    }
+
+    /// The place of the image of a frame in a condition; `None` if the store keeps no such images. `source` is the name of what the
+    /// frame is shown in.
+    ///
+    /// # Errors
+    /// If the condition has a reading that the recipe lacks.
+    pub(crate) fn place(
+        self,
+        recipe: &Recipe,
+        (source, frame): (&FrameId, &SourceFrame),
+        condition: &Condition,
+    ) -> Result<Option<StoredPlace<'a>>> {
+        let is_kept = match self.store.kinds() {
+            StoredKinds::All => true,
+            StoredKinds::Enhanced => condition.enhancer.is_some(),
+        };
+        if !is_kept {
+            return Ok(None);
+        }
+        let key = Key::of(&StoredRecipe {
+            image: recipe.facts(source, frame, condition)?,
+            program: self.maker.program,
+            enhanced_with: condition.enhancer.is_some().then_some(self.maker),
+        })?;
+        let light = Condition {
+            enhancer: None,
+            ..condition.clone()
+        };
+        let shown = Shown {
+            enhancer: condition.enhancer.as_ref().map(ToString::to_string),
+            light: light.to_string(),
+            format: recipe.format.to_string(),
+        };
+        Ok(Some(StoredPlace {
+            store: self.store,
+            key,
+            shown,
+        }))
+    }
+}
+
+/// The place of one image in a store.
+#[derive(Debug, Clone)]
+pub(crate) struct StoredPlace<'a> {
+    store: &'a ImageStore,
+    key: Key,
+    shown: Shown,
+}
+
+/// Similarity of an image to its clean frame, both in the size sent; `None` for what cannot be measured.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(crate) struct Similarity {
+    /// PSNR in dB.
+    pub(crate) psnr: Option<f64>,
+    pub(crate) ssim: Option<f64>,
+}
+
+/// What was found out about an image when it was made.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub(crate) struct MadeNotes {
+    /// What the note of the enhancer got; `None` without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) enhanced: Option<ImageUse>,
+    /// `None` if it was not measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) similarity: Option<Similarity>,
+}
+
+/// What must be known of an image besides its file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Needed {
+    /// Nothing.
+    Image,
+    /// How similar it is to its clean frame.
+    Similarity,
+}
+
+/// An image from the store.
+pub(crate) struct StoredImage {
+    pub(crate) payload: Payload,
+    pub(crate) notes: MadeNotes,
+}
+
+impl StoredPlace<'_> {
+    /// The image, if it is there with all that is needed. `format` is that of the recipe.
+    pub(crate) fn read(&self, recipe: &Recipe, needed: Needed) -> Option<StoredImage> {
+        let mut notes = None;
+        let is_enough = |entry: &Entry| {
+            let read: Option<MadeNotes> = serde_json::from_value(entry.facts.notes.clone()).ok();
+            notes = read.filter(|notes| {
+                let is_enhanced = self.shown.enhancer.is_some();
+                (!is_enhanced || notes.enhanced.is_some())
+                    && (needed == Needed::Image || notes.similarity.is_some())
+            });
+            notes.is_some()
+        };
+        let entry = self.store.get(&self.key, is_enough)?;
+        let [width, height] = entry.size;
+        Some(StoredImage {
+            payload: Payload::of_file(&entry.image, width, height, recipe.format),
+            notes: notes?,
+        })
+    }
+
+    /// Adds an image that took this time to make.
+    ///
+    /// # Errors
+    /// None in practice: the image was encoded here.
+    pub(crate) fn write(&self, image: &Payload, notes: &MadeNotes, took: Duration) -> Result<()> {
+        let side = |pixels: usize| u32::try_from(pixels).unwrap_or(u32::MAX);
+        let entry = Entry {
+            image: image.file()?,
+            size: [side(image.facts().width), side(image.facts().height)],
+            facts: EntryFacts::new(
+                self.shown.clone(),
+                took.as_millis() as u64,
+                serde_json::json!(notes),
+            ),
+        };
+        self.store.put(&self.key, &entry);
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests;

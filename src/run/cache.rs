@@ -1,0 +1,34 @@
+//! `cache`: what an image store holds, and emptying it.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::error::Result;
+use crate::image_store::{clear, listing};
+use crate::job::Outcome;
+use crate::types::Decides;
+use crate::types::manifest::Status;
+
+/// The flags of `cache`.
+#[derive(Debug, Args)]
+pub(crate) struct CacheArgs {
+    /// The folder that --images-cache named
+    #[arg(value_name = "DIR", add = Decides::Nothing)]
+    pub folder: PathBuf,
+    /// Remove all its images; a run that uses it meanwhile makes them again
+    #[arg(long, add = Decides::Nothing)]
+    pub clear: bool,
+}
+
+/// Lists or removes the images of a store.
+///
+/// # Errors
+/// If the folder is not that of a store or cannot be read, or a file cannot be removed.
+pub(crate) fn cache(args: &CacheArgs) -> Result<Outcome> {
+    let text = match args.clear {
+        true => clear(&args.folder)?,
+        false => listing(&args.folder)?,
+    };
+    Ok(Outcome::text(Status::Complete, text))
+}

@@ -1,0 +1,201 @@
+//! The image store: what a run takes from it is what it would make, however damaged the store is.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::PathBuf;
+
+use serde_json::Value;
+
+use crate::support::house::House;
+use crate::support::onnx;
+use crate::support::run::{Bench, Called, assert_same_products, files, records, words};
+
+/// Three frames in four enhanced images each.
+const IMAGES: usize = 3 * 4;
+
+/// A run about small rooms with an enhancer; `--timings` says what the store gave.
+fn evaluate(bench: &Bench, model: &str, more: &str) -> Called {
+    let line = format!(
+        "--model {model} --data rooms:frames=3,size=96x64 --levels L3,L5 --variant both --llie one.onnx --llie-on both --llie-anyway --timings {more}"
+    );
+    let called = bench.call(&words(&line));
+    assert_eq!(called.code, Some(0), "{line}: {called:?}");
+    called
+}
+
+fn bench() -> Bench {
+    let bench = Bench::new();
+    onnx::gamma(0.5).write(&bench.path(""), "one.onnx");
+    bench
+}
+
+/// Records without times, in order of their keys.
+fn untimed(run: &PathBuf) -> Vec<String> {
+    let mut lines: Vec<String> = records(run)
+        .into_iter()
+        .map(|mut record| {
+            without_times(&mut record);
+            record.to_string()
+        })
+        .collect();
+    lines.sort_unstable();
+    lines
+}
+
+fn without_times(value: &mut Value) {
+    if let Value::Object(fields) = value {
+        fields.retain(|name, _| !name.ends_with("_ms") && name != "time" && name != "latency");
+        fields.values_mut().for_each(without_times);
+    }
+}
+
+/// Asserts that two runs say the same of the same images: records, measures of fidelity, thumbnails, and the notes about enhancers.
+fn assert_same(bench: &Bench, [one, other]: [&str; 2]) {
+    let [one, other] = [one, other].map(|run| bench.path(run));
+    assert_eq!(untimed(&one), untimed(&other));
+    assert!(assert_same_products(&one, &other) > 8);
+    for name in ["fidelity.jsonl", "thumbnails.jsonl"] {
+        let lines = |run: &PathBuf| {
+            let text = fs::read_to_string(run.join(name)).unwrap();
+            text.lines()
+                .map(str::to_owned)
+                .collect::<BTreeSet<String>>()
+        };
+        assert!(!lines(&one).is_empty());
+        assert_eq!(lines(&one), lines(&other), "{name}");
+    }
+    let notes = |run: &PathBuf| -> Value {
+        let text = fs::read_to_string(run.join("manifest.json")).unwrap();
+        serde_json::from_str::<Value>(&text).unwrap()["enhancers"].clone()
+    };
+    assert!(notes(&one).is_object());
+    assert_eq!(notes(&one), notes(&other));
+}
+
+fn stored(bench: &Bench) -> Vec<PathBuf> {
+    let mut entries = files(&bench.path("images"));
+    entries.retain(|path| path.extension().is_some_and(|extension| extension == "img"));
+    entries.sort_unstable();
+    entries
+}
+
+#[test]
+fn a_second_model_takes_the_images_of_the_first_and_all_is_as_without() {
+    let bench = bench();
+    evaluate(&bench, "random", "--out random-alone");
+    evaluate(&bench, "observer", "--out observer-alone");
+    let first = evaluate(&bench, "random", "--images-cache images --out random");
+    let none = format!("image store images: 0 of {IMAGES} images read");
+    assert!(first.stderr.contains(&none), "{}", first.stderr);
+    assert_eq!(stored(&bench).len(), IMAGES);
+    let second = evaluate(&bench, "observer", "--images-cache images --out observer");
+    let all = format!("image store images: {IMAGES} of {IMAGES} images read");
+    assert!(second.stderr.contains(&all), "{}", second.stderr);
+    assert_same(&bench, ["random-alone", "random"]);
+    assert_same(&bench, ["observer-alone", "observer"]);
+
+    // Another size, format or model of the same name is another image.
+    for (number, more) in ["--max-side 50", "--image jpeg:80", "--seed 9"]
+        .iter()
+        .enumerate()
+    {
+        let more = format!("{more} --images-cache images --out other-{number}");
+        let other = evaluate(&bench, "random", &more);
+        // Only what is drawn depends on the seed.
+        let hits = if number == 2 { IMAGES / 2 } else { 0 };
+        let read = format!("image store images: {hits} of {IMAGES} images read");
+        assert!(other.stderr.contains(&read), "{more}: {}", other.stderr);
+    }
+    onnx::gamma(0.6).write(&bench.path(""), "one.onnx");
+    let other = evaluate(&bench, "random", "--images-cache images --out another-file");
+    assert!(other.stderr.contains(&none), "{}", other.stderr);
+}
+
+#[test]
+fn damaged_and_exchanged_images_are_made_again_and_counted() {
+    let bench = bench();
+    evaluate(&bench, "random", "--images-cache images --out first");
+    let entries = stored(&bench);
+    let mut flipped = fs::read(&entries[0]).unwrap();
+    flipped[20] ^= 1;
+    fs::write(&entries[0], flipped).unwrap();
+    let cut = fs::read(&entries[1]).unwrap();
+    fs::write(&entries[1], &cut[..cut.len() / 2]).unwrap();
+    let [two, three] = [2, 3].map(|place: usize| fs::read(&entries[place]).unwrap());
+    fs::write(&entries[2], three).unwrap();
+    fs::write(&entries[3], two).unwrap();
+    let again = evaluate(&bench, "random", "--images-cache images --out again");
+    let read = format!("{} of {IMAGES} images read", IMAGES - 4);
+    for said in [&read, "4 damaged and made again", "4 written", "is damaged"] {
+        assert!(again.stderr.contains(said), "{said}: {}", again.stderr);
+    }
+    assert_same(&bench, ["first", "again"]);
+    let third = evaluate(&bench, "random", "--images-cache images --out third");
+    let read = format!("{IMAGES} of {IMAGES} images read");
+    assert!(third.stderr.contains(&read), "{}", third.stderr);
+}
+
+#[test]
+fn two_processes_share_a_store_that_a_command_lists_and_empties() {
+    let bench = bench();
+    std::thread::scope(|scope| {
+        for model in ["random", "observer"] {
+            let bench = &bench;
+            scope.spawn(move || {
+                let more = format!("--images-cache images --images-cache-what all --out {model}");
+                evaluate(bench, model, &more)
+            });
+        }
+    });
+    evaluate(&bench, "random", "--out random-alone");
+    evaluate(&bench, "observer", "--out observer-alone");
+    assert_same(&bench, ["random-alone", "random"]);
+    assert_same(&bench, ["observer-alone", "observer"]);
+    let listed = bench.complete(&words("cache images"));
+    assert!(
+        listed.contains("L3-noise, enhanced by one, png"),
+        "{listed}"
+    );
+    assert!(listed.contains("in all, in images"), "{listed}");
+    let foreign = bench.file("images/v1/notes.txt", "mine");
+    let cleared = bench.complete(&words("cache images --clear"));
+    assert!(cleared.contains("files removed"), "{cleared}");
+    assert!(stored(&bench).is_empty() && foreign.exists());
+    let called = bench.call(&words("cache elsewhere"));
+    assert_eq!(called.code, Some(2));
+    assert!(
+        called.stderr.contains("no image store"),
+        "{}",
+        called.stderr
+    );
+}
+
+#[test]
+fn walks_share_their_images_too() {
+    let house = House::new();
+    onnx::gamma(0.5).write(&house.0.path(""), "one.onnx");
+    let ask = |more: &str| {
+        let line = format!(
+            "--model random --levels L3 --variant both --llie one.onnx --llie-on both --llie-anyway --timings {more}"
+        );
+        let called = house.call(&words(&line));
+        assert_eq!(called.code, Some(0), "{called:?}");
+        called.stderr
+    };
+    ask("--out alone");
+    let first = ask("--images-cache images --out first");
+    assert!(
+        first.contains("image store images: 0 of 10 images read"),
+        "{first}"
+    );
+    let second = ask("--images-cache images --out second");
+    assert!(
+        second.contains("image store images: 10 of 10 images read"),
+        "{second}"
+    );
+    for run in ["first", "second"] {
+        let [alone, run] = ["alone", run].map(|run| house.0.path(run));
+        assert_eq!(untimed(&alone), untimed(&run));
+        assert!(assert_same_products(&alone, &run) > 4);
+    }
+}
