@@ -10,7 +10,7 @@ use super::counts::StoreCounts;
 use super::entry::Entry;
 use super::folder::{StoreFolder, found};
 use super::key::Key;
-use super::settings::StoredKinds;
+use super::kinds::StoredKinds;
 use super::sweep::sweep;
 use crate::error::{Error, Result};
 

@@ -2,12 +2,13 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use super::access::ImageStore;
+use super::kinds::StoredKinds;
 use crate::error::Result;
+use crate::types::Decides;
 use crate::types::flag::positive;
-use crate::types::{Decides, flag};
 
 /// Flags of the folder in which images are kept for other runs.
 #[derive(Debug, Clone, Args)]
@@ -24,17 +25,6 @@ pub(crate) struct StoreArgs {
     #[arg(long, value_name = "GB", value_parser = positive, default_value = "20", add = Decides::Nothing)]
     pub images_cache_size: f64,
 }
-
-/// Which images are kept.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum StoredKinds {
-    /// Those that an enhancer made
-    Enhanced,
-    /// Degraded ones too, which are made faster than a network share is read: for slow processors and fast disks
-    All,
-}
-
-flag::flag_words!(StoredKinds);
 
 impl StoreArgs {
     /// The store that the flags name; `None` without a folder.

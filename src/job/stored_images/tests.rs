@@ -82,7 +82,6 @@ fn every_part_of_what_decides_an_image_gives_another_key() {
     let of = |frame: &SourceFrame, condition| key(&recipe(), frame, condition, &maker);
     let mut others = vec![
         changed(|recipe| recipe.seed = 1),
-        changed(|recipe| recipe.kinds.sensor.seed = 1),
         changed(|recipe| recipe.format = "jpeg:80".parse().unwrap()),
         changed(|recipe| recipe.scaling = Scaling::LongerSide(4)),
         changed(|recipe| {
@@ -103,7 +102,9 @@ fn every_part_of_what_decides_an_image_gives_another_key() {
     others.push(of(&SourceFrame { id, ..frame() }, CONDITION));
     let digest = Digest::of(b"other pixels");
     others.push(of(&SourceFrame { digest, ..frame() }, CONDITION));
-    assert!(!others.contains(&same));
+    for (place, other) in others.iter().enumerate() {
+        assert_ne!(*other, same, "{place}");
+    }
 }
 
 #[test]

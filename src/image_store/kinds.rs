@@ -1,0 +1,16 @@
+//! Which images a store keeps: [`StoredKinds`].
+
+use clap::ValueEnum;
+
+use crate::types::flag;
+
+/// Which images are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum StoredKinds {
+    /// Those that an enhancer made
+    Enhanced,
+    /// Degraded ones too, which are made faster than a network share is read: for slow processors and fast disks
+    All,
+}
+
+flag::flag_words!(StoredKinds);
