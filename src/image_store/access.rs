@@ -110,24 +110,13 @@ impl ImageStore {
         let place = self.folder.place(key.digest());
         let entry = match found(read(&place)) {
             Ok(None) => None,
-            Ok(Some(file)) => match Entry::read(key, file) {
-                Ok(entry) => Some(entry).filter(is_enough),
-                Err(_) => {
-                    // If it cannot be removed, the image that is made now replaces it.
-                    let _ = fs::remove_file(&place);
-                    let count = self.with(|state| {
-                        state.counts.damaged += 1;
-                        state.counts.damaged
-                    });
-                    if count == 1 {
-                        let file = place.display();
-                        tracing::warn!(
-                            "--images-cache: {file} is damaged, and made again; so is each further one"
-                        );
-                    }
-                    None
+            Ok(Some(file)) => {
+                let entry = Entry::read(key, file);
+                if entry.is_err() {
+                    self.remove_damaged(&place);
                 }
-            },
+                entry.ok().filter(is_enough)
+            }
             Err(e) => {
                 self.fails(Health::Gone, "read", &e);
                 None
@@ -142,6 +131,22 @@ impl ImageStore {
             None => state.counts.misses += 1,
         });
         entry
+    }
+
+    /// Removes a damaged file; the first one is named in a warning.
+    fn remove_damaged(&self, place: &Path) {
+        // If it cannot be removed, the image that is made now replaces it.
+        let _ = fs::remove_file(place);
+        let count = self.with(|state| {
+            state.counts.damaged += 1;
+            state.counts.damaged
+        });
+        if count == 1 {
+            let file = place.display();
+            tracing::warn!(
+                "--images-cache: {file} is damaged, and made again; so is each further one"
+            );
+        }
     }
 
     /// Adds the image of a key, if there is room.

@@ -13,6 +13,7 @@ use crate::types::flag::positive;
 /// Flags of the folder in which images are kept for other runs.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Scale")]
+#[expect(clippy::struct_field_names, reason = "the names of the flags")]
 pub(crate) struct StoreArgs {
     /// A folder in which images are kept, so that other runs, models, shards and processes need not make them again; it may be deleted
     /// at any time, and holds what `darkqa-eval cache DIR` lists; default: no image is kept

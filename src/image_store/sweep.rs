@@ -33,10 +33,9 @@ pub(super) fn sweep(folder: &StoreFolder, most: u64, now: SystemTime) -> io::Res
     let mut swept = Swept { bytes, evicted: 0 };
     let lock = folder.lock_file()?;
     match lock.try_lock() {
-        Ok(()) => {}
         Err(TryLockError::WouldBlock) => return Ok(swept),
         // Some shares have no locks. Two processes that remove the same files do no harm.
-        Err(TryLockError::Error(_)) => {}
+        Ok(()) | Err(TryLockError::Error(_)) => {}
     }
     files.sort_by(|a, b| (a.used, &a.path).cmp(&(b.used, &b.path)));
     for file in &files {

@@ -234,9 +234,10 @@ impl<'a> ImagePipeline<'a> {
         }
         let (read, exposure) = (work.note()?, work.exposure(&made)?);
         let place = work.stored_place(&made)?;
-        let needed = match wanted.fidelity {
-            true => Needed::Similarity,
-            false => Needed::Image,
+        let needed = if wanted.fidelity {
+            Needed::Similarity
+        } else {
+            Needed::Image
         };
         let found = place
             .as_ref()

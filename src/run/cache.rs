@@ -26,9 +26,10 @@ pub(crate) struct CacheArgs {
 /// # Errors
 /// If the folder is not that of a store or cannot be read, or a file cannot be removed.
 pub(crate) fn cache(args: &CacheArgs) -> Result<Outcome> {
-    let text = match args.clear {
-        true => clear(&args.folder)?,
-        false => listing(&args.folder)?,
+    let text = if args.clear {
+        clear(&args.folder)?
+    } else {
+        listing(&args.folder)?
     };
     Ok(Outcome::text(Status::Complete, text))
 }

@@ -33,8 +33,8 @@ fn sizes() -> SizeArgs {
     }
 }
 
-fn runtime(version: &str) -> Option<(String, String)> {
-    Some(("onnxruntime".to_owned(), version.to_owned()))
+fn runtime(version: &str) -> (String, String) {
+    ("onnxruntime".to_owned(), version.to_owned())
 }
 
 /// The digest of the key of a frame in a condition.
@@ -58,7 +58,7 @@ fn changed(change: impl FnOnce(&mut Recipe)) -> Digest {
         &recipe,
         &frame(),
         CONDITION,
-        &Maker::new(runtime("1"), &sizes()),
+        &Maker::new(Some(runtime("1")), &sizes()),
     )
 }
 
@@ -70,7 +70,7 @@ fn made_by(version: &str, change: impl FnOnce(&mut SizeArgs)) -> Digest {
         &recipe(),
         &frame(),
         CONDITION,
-        &Maker::new(runtime(version), &sizes),
+        &Maker::new(Some(runtime(version)), &sizes),
     )
 }
 
@@ -78,7 +78,7 @@ fn made_by(version: &str, change: impl FnOnce(&mut SizeArgs)) -> Digest {
 fn every_part_of_what_decides_an_image_gives_another_key() {
     let same = changed(|_| {});
     assert_eq!(made_by("1", |_| {}), same);
-    let maker = Maker::new(runtime("1"), &sizes());
+    let maker = Maker::new(Some(runtime("1")), &sizes());
     let of = |frame: &SourceFrame, condition| key(&recipe(), frame, condition, &maker);
     let mut others = vec![
         changed(|recipe| recipe.seed = 1),
@@ -115,5 +115,5 @@ fn what_decides_no_degraded_image_leaves_its_key() {
         ..sizes()
     };
     let without = of(&Maker::new(None, &sizes()));
-    assert_eq!(of(&Maker::new(runtime("1"), &whole)), without);
+    assert_eq!(of(&Maker::new(Some(runtime("1")), &whole)), without);
 }
