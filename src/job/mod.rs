@@ -49,6 +49,7 @@ pub(crate) mod rebuild;
 pub(crate) mod recipe;
 mod renamed;
 pub(crate) mod report;
+pub(crate) mod run_plan;
 pub(crate) mod scaling;
 pub(crate) mod settings;
 pub(crate) mod shard;

@@ -376,7 +376,7 @@ const OPEN_ADDITIONS: [Addition; 10] = [
 ];
 
 /// What changes no answer: given on the folder of a run, it asks nothing.
-const NOTHING: [&str; 32] = [
+const NOTHING: [&str; 33] = [
     "--max-pixels 1000000",
     "--threads 1",
     "--offline",

@@ -43,6 +43,7 @@ mod openeqa;
 mod own_requests;
 mod photographs;
 mod pins;
+mod plan;
 mod questions;
 mod ready_made;
 mod realism;
