@@ -61,3 +61,4 @@ mod statistics;
 mod synthesize;
 mod unlabelled;
 mod walks;
+mod walks_in_parts;

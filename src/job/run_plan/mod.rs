@@ -97,7 +97,9 @@ impl RunPlan {
     /// # Errors
     /// Names the setting that differs.
     pub(crate) fn check_identity(&self, run: &Identity) -> Result<()> {
-        match differences(&self.identity, run).next() {
+        // A flag is said before what it is made of: the variant before the light readings that it has.
+        let differences = differences(&self.identity, run);
+        match differences.min_by_key(|(field, ..)| field.contains(" of the ")) {
             None => Ok(()),
             Some((field, planned, now)) => Err(self.error(format!(
                 "the plan is of another run: its {field} is {planned}, now it is {now}; use the same {field}, or another --out, or write the \
