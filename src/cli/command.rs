@@ -104,6 +104,9 @@ pub(crate) enum Command {
     Init(InitArgs),
     /// Check data, images, models and enhancers before anything is asked or paid; takes the flags of the evaluation
     Check(Box<CheckCommand>),
+    /// Write the questions and frames of a run once, with what it will cost, so that no shard of it makes them again; takes the flags of
+    /// the evaluation
+    Plan(Box<EvaluateArgs>),
     /// Import frames of another data set as a folder of frames
     Import(Box<ImportArgs>),
     /// Write ready-made sets for other tools, one for each condition, with its images

@@ -23,7 +23,7 @@ use crate::job::merge::merge;
 use crate::job::progress::{Progress, Verbosity};
 use crate::job::report::report;
 use crate::job::{Outcome, image_words};
-use crate::run::evaluate::{check, evaluate, export_batch, run_batch};
+use crate::run::evaluate::{check, evaluate, export_batch, plan, run_batch};
 use crate::run::openeqa::openeqa;
 use crate::run::{self, study};
 use crate::types::manifest::Status;
@@ -54,6 +54,7 @@ const FIRST_STEPS: &str = "
 pub fn main(words: impl Iterator<Item = OsString>) -> ExitCode {
     let words: Vec<OsString> = words.collect();
     let first_steps = if words.len() == 1 { FIRST_STEPS } else { "" };
+    let called: Vec<String> = words.iter().skip(1).map(text).collect();
     let parsed = match layers::parse(command::command(), words, |name| std::env::var_os(name)) {
         Ok(parsed) => parsed,
         Err(layers::Problem::Error(e)) => return fail(&e.to_string()),
@@ -66,7 +67,7 @@ pub fn main(words: impl Iterator<Item = OsString>) -> ExitCode {
             };
         }
     };
-    let cli = match read(&parsed) {
+    let cli = match read(&parsed, &called) {
         Ok(cli) => cli,
         Err(e) => return fail(&e.to_string()),
     };
@@ -99,8 +100,13 @@ pub fn main(words: impl Iterator<Item = OsString>) -> ExitCode {
     }
 }
 
+/// A word of the call as text.
+fn text(word: &OsString) -> String {
+    word.to_string_lossy().into_owned()
+}
+
 /// The parsed command line, with the image flags that the manifest of a run stores.
-fn read(parsed: &layers::Parsed) -> Result<Cli> {
+fn read(parsed: &layers::Parsed, words: &[String]) -> Result<Cli> {
     let matches = &parsed.matches;
     let mut cli = Cli::from_arg_matches(matches)
         .map_err(|e| Error::usage("the command line", one_line(&e)))?;
@@ -110,12 +116,14 @@ fn read(parsed: &layers::Parsed) -> Result<Cli> {
         Some(Command::Batch(BatchCommand::Export(args))) => Some(&mut args.evaluate.job),
         Some(Command::Batch(BatchCommand::Run(args))) => Some(&mut args.evaluate.job),
         Some(Command::Check(args)) => Some(&mut args.evaluate.job),
+        Some(Command::Plan(args)) => Some(&mut args.job),
         Some(Command::OpenEqa(args)) => Some(&mut args.job),
         _ => None,
     };
     if let Some(job) = job {
         job.image_flags = image_words::typed_flags(own)?;
         job.typed.clone_from(&parsed.typed);
+        job.words = words.to_vec();
     }
     Ok(cli)
 }
@@ -131,6 +139,7 @@ fn carry_out(cli: Cli, progress: &Progress) -> Result<Outcome> {
         Command::Questions(args) => run::questions::questions(&args, progress),
         Command::Init(args) => run::init::init(&args, progress),
         Command::Check(args) => check(args.evaluate, &args.check, progress),
+        Command::Plan(args) => plan(*args, progress),
         Command::Import(args) => run::import::import(&args, progress),
         Command::Export(args) => run::export::export(&args, progress),
         Command::Rooms(args) => run::rooms::rooms(&args, progress),

@@ -30,6 +30,20 @@ pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
         None => idle.evaluation(&cli.evaluate),
         Some(Command::Batch(BatchCommand::Export(args))) => idle.batch(&args.evaluate),
         Some(Command::Batch(BatchCommand::Run(args))) => idle.batch(&args.evaluate),
+        Some(Command::Plan(args)) => {
+            let others = [
+                "timings",
+                "max_failures",
+                "fail_fast",
+                "max_cost",
+                "dry_run",
+                "resume",
+            ];
+            idle.because("plan asks nothing", &others.map(str::to_owned));
+            let why = "a plan is of the whole run, and the same for all its parts";
+            idle.because(why, &["shard".to_owned(), "workers".to_owned()]);
+            idle.evaluation(args);
+        }
         Some(Command::Check(args)) => idle.check(args),
         Some(Command::OpenEqa(args)) => idle.open(args),
         Some(Command::Synthesize(args)) if args.check.is_some() => {
@@ -469,6 +483,14 @@ mod tests {
         (
             "realism a --kl-bins kousha --kl-empty drop",
             "--kl-empty: no effect: the bins of kousha",
+        ),
+        (
+            "plan --model m --out r --shard 1/2 --workers 2",
+            "--shard, --workers: no effect: a plan is of the whole run",
+        ),
+        (
+            "plan --model m --out r --dry-run",
+            "--dry-run: no effect: plan asks nothing",
         ),
         (
             "enhance m --describe --force",

@@ -265,6 +265,13 @@ impl Dataset {
         self.series.get(frame).map_or(&[], Vec::as_slice)
     }
 
+    /// Whether the images of a frame, or of the several that it stands for, are in the data set.
+    #[must_use]
+    pub(crate) fn has(&self, frame: &FrameId) -> bool {
+        let mut shown = self.shown(frame).iter();
+        shown.all(|frame| self.sources.contains_key(frame))
+    }
+
     /// The scene of a frame; empty if the data set does not name scenes.
     #[must_use]
     pub fn scene(&self, id: &FrameId) -> String {

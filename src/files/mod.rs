@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use crate::error::{Error, Result};
 
 /// The ending of a file's name until the file is complete.
-const UNFINISHED: &str = ".part";
+pub(crate) const UNFINISHED: &str = ".part";
 
 /// Writes a file that can be made again: a killed process leaves the old or the new one, a power cut may lose both.
 ///

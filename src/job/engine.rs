@@ -19,7 +19,7 @@ use super::source::{input_summary, warn_of_inputs};
 use super::timings::Timings;
 use crate::enhance::ModelFile;
 use crate::error::Result;
-use crate::report::forecast::{json, render};
+use crate::report::forecast::{Forecast, json, render};
 use crate::store::{self, Store};
 use crate::types::manifest::Status;
 use crate::types::{Detail as _, TrialKey};
@@ -83,8 +83,24 @@ impl<'a, E: Experiment> Job<'a, E> {
         batch::run::run(self.open()?, files, args)
     }
 
-    /// An estimate of the remaining requests and their cost. Sends nothing and writes no file.
+    /// An estimate of the remaining requests and their cost, printed. Sends nothing and writes no file.
     fn estimate(self) -> Result<Outcome> {
+        let show = self.experiment.settings().show;
+        let forecast = self.forecast()?;
+        Ok(Outcome::text(
+            Status::Complete,
+            match show {
+                StdoutFormat::Json => json(&forecast)?,
+                _ => render(&forecast),
+            },
+        ))
+    }
+
+    /// An estimate of the remaining requests and their cost. Sends nothing and writes no file.
+    ///
+    /// # Errors
+    /// If an enhancer cannot be opened, or an image cannot be made.
+    pub(crate) fn forecast(self) -> Result<Forecast> {
         let experiment = self.experiment;
         let settings = experiment.settings();
         let stored = store::read_trials(&self.folder)?;
@@ -111,14 +127,7 @@ impl<'a, E: Experiment> Job<'a, E> {
         for plan in &plans {
             pipeline.probe(experiment.sources(), &plan.sources)?;
         }
-        let forecast = estimate::estimate(experiment, &plans, &measured, &stored, &mut pipeline)?;
-        Ok(Outcome::text(
-            Status::Complete,
-            match settings.show {
-                StdoutFormat::Json => json(&forecast)?,
-                _ => render(&forecast),
-            },
-        ))
+        estimate::estimate(experiment, &plans, &measured, &stored, &mut pipeline)
     }
 
     /// Opens the run folder.

@@ -2,6 +2,7 @@
 
 mod coverage;
 mod questions;
+mod missing;
 mod trials;
 
 use std::collections::BTreeMap;
@@ -107,8 +108,9 @@ fn merge_all<D: Detail>(
     let places = parts.iter();
     let places = places.map(|part| (part.shard, &*part.folder, &part.manifest));
     let coverage = Coverage::of(places)?;
-    let is_missing = check_missing(&parts, &coverage, args.partial)?;
-    warn_unfinished(&parts);
+    let plan = missing::plan(&parts, &coverage)?;
+    let is_missing = missing::check(&parts, &coverage, plan.as_ref(), args.partial)?;
+    missing::warn_unfinished(&parts, plan.as_ref());
     let mut manifest = merged_manifest(&parts, &coverage)?;
     let folders: Vec<&Path> = parts.iter().map(|part| &*part.folder).collect();
     let questions = PartQuestions::read(&folders)?;
@@ -193,37 +195,6 @@ fn check_same_run(parts: &[MergePart]) -> Result<()> {
         return Err(Error::Run { path, problem });
     }
     Ok(())
-}
-
-/// Whether sources are missing; an error that names them if a partial merge is not allowed.
-fn check_missing(parts: &[MergePart], coverage: &Coverage, partial: bool) -> Result<bool> {
-    let (Some(problem), Some(first)) = (coverage.missing(), parts.first()) else {
-        return Ok(false);
-    };
-    if !partial {
-        return Err(Error::Run {
-            path: first.folder.clone(),
-            problem: format!("{problem}; --partial merges the others"),
-        });
-    }
-    tracing::warn!("{problem}; the summary covers only the others");
-    Ok(true)
-}
-
-/// Warns about each shard that is not complete.
-fn warn_unfinished(parts: &[MergePart]) {
-    for part in parts {
-        let (status, counts) = (part.manifest.status, part.manifest.counts);
-        if status != Status::Complete {
-            tracing::warn!(
-                "{}: shard {} is {status}: {} of {} trials answered",
-                part.folder.display(),
-                part.shard,
-                counts.answered,
-                counts.trials
-            );
-        }
-    }
 }
 
 /// The first difference between two manifests that makes them different runs: the field, and its value in each.

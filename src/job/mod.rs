@@ -52,6 +52,7 @@ mod renamed;
 pub(crate) mod report;
 pub(crate) mod run_files;
 mod run_texts;
+pub(crate) mod run_plan;
 pub(crate) mod scaling;
 pub(crate) mod settings;
 pub(crate) mod shard;

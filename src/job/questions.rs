@@ -28,19 +28,28 @@ pub(crate) fn rules(path: Option<&Path>) -> Result<Rules> {
 
 /// The opened data. If they have no questions, these are made by rule.
 pub(crate) fn open_data(
-    (place, scene, set): (&DataPlace, &SceneArgs, &SetArgs),
+    data: (&DataPlace, &SceneArgs, &SetArgs),
     selection: &SelectionArgs,
     rules: &Rules,
     rule: ReadingRule,
     progress: &Progress,
 ) -> Result<Dataset> {
-    let dataset = scene.open(place, selection.questions.as_deref(), set)?;
-    let dataset = dataset.with_rule(rule);
+    let dataset = open_unasked(data, selection, rule)?;
     if !dataset.questions().is_empty() {
         return Ok(dataset);
     }
     let questions = by_rule(&dataset, rules, progress)?;
     Ok(dataset.with_questions(questions))
+}
+
+/// The opened data, with the questions that they have themselves. No image is read.
+pub(crate) fn open_unasked(
+    (place, scene, set): (&DataPlace, &SceneArgs, &SetArgs),
+    selection: &SelectionArgs,
+    rule: ReadingRule,
+) -> Result<Dataset> {
+    let dataset = scene.open(place, selection.questions.as_deref(), set)?;
+    Ok(dataset.with_rule(rule))
 }
 
 /// The field of a run's identity that holds the digest of the questions that are asked about every image.
@@ -90,7 +99,7 @@ impl QuestionBank {
     }
 
     /// The number of questions about each image.
-    fn each(&self) -> usize {
+    pub(crate) fn each(&self) -> usize {
         let most = self.bank.len();
         self.per_image.map_or(most, |each| each.get().min(most))
     }

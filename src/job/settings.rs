@@ -73,6 +73,9 @@ pub(crate) struct JobArgs {
     /// Flags of the call itself, by long name: those that variables and files set are not among them.
     #[arg(skip)]
     pub typed: BTreeSet<String>,
+    /// Words of the call, without the name of the program.
+    #[arg(skip)]
+    pub words: Vec<String>,
 }
 
 /// Flags that distribute a job over processes.

@@ -41,7 +41,7 @@ impl Shard {
     }
 
     /// Index of the shard, from 0.
-    pub(super) fn index(self) -> u32 {
+    pub(crate) fn index(self) -> u32 {
         self.index
     }
 

@@ -379,4 +379,32 @@ mod tests {
         assert_eq!(sizes.map(cached), [27, 1, 1]);
         assert_eq!(cached_frames([640, 480], RoomLight::Linear), 14);
     }
+
+    #[test]
+    fn a_room_alone_is_the_room_in_a_row() {
+        for light in [RoomLight::Display, RoomLight::Linear] {
+            let rooms = Rooms {
+                frames: 40,
+                seed: 7,
+                size: [64, 48],
+                light,
+            };
+            let drawn = |room: &Room| {
+                let drawn = room.drawn().unwrap();
+                let frame = Frame::clone(&drawn.frame);
+                let maps = (frame.depth, frame.semantic, frame.segments);
+                let light = drawn.light.map(|light| light.samples().to_vec());
+                (frame.id, frame.rgb, maps, frame.names, light)
+            };
+            // The views of room 17, drawn before any other, and after those of the rooms before it.
+            let some = |first, count| {
+                let rooms = rooms.all().map(|(_, room)| room);
+                let rooms: Vec<Room> = rooms.skip(first).take(count).collect();
+                rooms.iter().map(drawn).collect::<Vec<_>>()
+            };
+            let (alone, row) = (some(34, 2), some(30, 6));
+            assert!(alone == row[4..]);
+            assert!(alone[0] != alone[1]);
+        }
+    }
 }

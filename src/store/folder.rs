@@ -291,8 +291,9 @@ pub(super) fn check_same_run(
 pub(super) fn create_run(folder: &Path, manifest: &RunManifest) -> Result<()> {
     fs::create_dir_all(folder).map_err(|e| Error::file(folder, "create", e))?;
     let mut inside = fs::read_dir(folder).map_err(|e| Error::file(folder, "read", e))?;
-    // Unfinished files of a killed process do not count.
-    if inside.any(|entry| entry.is_ok_and(|entry| !is_unfinished(&entry.file_name()))) {
+    // Unfinished files of a killed process do not count, nor does the plan of the run.
+    let counts = |name: &OsStr| !is_unfinished(name) && name != super::PLAN;
+    if inside.any(|entry| entry.is_ok_and(|entry| counts(&entry.file_name()))) {
         let problem = "the folder is not empty and holds no run; use another --out".to_owned();
         return Err(Error::Run {
             path: folder.to_owned(),

@@ -51,6 +51,8 @@ pub(crate) use folder::{
 
 /// The subfolder of a run for Batch API files.
 pub(crate) const BATCH: &str = "batch";
+/// The subfolder of a run for its plan, which is written before the run.
+pub(crate) const PLAN: &str = "plan";
 /// The trials that were sent in batches.
 const TRIALS: &str = "trials.jsonl";
 

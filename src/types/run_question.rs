@@ -5,8 +5,9 @@ use serde_json::Value;
 
 use super::digest::Digest;
 use super::frame::FrameId;
-use super::question::{Family, Question, QuestionId};
+use super::question::{Choices, Family, Question, QuestionId};
 use super::strict_group::StrictGroup;
+use crate::error::Error;
 
 /// The key in [`RunQuestion::evidence`] under which a question that is asked about every image has its name among such questions.
 pub(crate) const BANK_ID: &str = "bank_id";
@@ -102,5 +103,32 @@ impl RunQuestion {
             images: Vec::new(),
             group: question.group.clone(),
         }
+    }
+    /// The question with choices that is stored.
+    ///
+    /// # Errors
+    /// If its answer is not among its choices, or these are not the choices of a question.
+    pub(crate) fn to_question(&self) -> Result<Question, Error> {
+        let wrong = |problem: &dyn std::fmt::Display| {
+            Error::data(format_args!("question {:?}", self.id.0), problem)
+        };
+        let truth = match &self.answer {
+            None => None,
+            Some(answer) => {
+                let place = self.choices.iter().position(|choice| choice == answer);
+                let problem = "its answer is not among its choices";
+                Some(place.ok_or_else(|| wrong(&problem))?)
+            }
+        };
+        let choices = Choices::known_by(self.choices.as_slice().into(), truth);
+        Ok(Question {
+            id: self.id.clone(),
+            frame: self.frame.clone(),
+            family: self.family.clone(),
+            text: self.text.clone(),
+            choices: choices.map_err(|e| wrong(&e))?,
+            group: self.group.clone(),
+            evidence: self.evidence.clone(),
+        })
     }
 }

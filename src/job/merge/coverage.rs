@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::num::NonZeroU32;
+use std::ops::Range;
 use std::path::Path;
 
 use crate::error::{Error, Result};
@@ -71,18 +72,45 @@ impl Coverage {
         self.more + self.trials.iter().flatten().sum::<usize>()
     }
 
-    /// What is missing, in words; `None` if nothing is.
-    pub(super) fn missing(&self) -> Option<String> {
+    /// The number of sources of the run.
+    pub(super) fn sources(&self) -> usize {
+        self.trials.len()
+    }
+
+    /// The places of the sources that are in no part.
+    pub(super) fn gaps(&self) -> impl Iterator<Item = usize> {
+        let places = self.trials.iter().enumerate();
+        places.filter_map(|(place, trials)| trials.is_none().then_some(place))
+    }
+
+    /// The shards that no part is of and that have what is missing. Of several divisions it is the one with the fewest such shards;
+    /// `part` returns the places of the sources of a shard. None if `part` knows none.
+    pub(super) fn absent(&self, part: impl Fn(Shard) -> Option<Range<usize>>) -> Vec<Shard> {
+        let counts: BTreeSet<NonZeroU32> = self.shards.iter().map(|shard| shard.count()).collect();
+        let is_needed = |shard: &Shard| match part(*shard) {
+            None => counts.len() == 1 && !self.shards.contains(shard),
+            Some(mut places) => places.any(|place| self.trials.get(place) == Some(&None)),
+        };
+        let absent = counts
+            .iter()
+            .map(|count| Shard::all(*count).filter(is_needed).collect::<Vec<Shard>>());
+        let absent = absent.filter(|absent| !absent.is_empty());
+        absent.min_by_key(Vec::len).unwrap_or_default()
+    }
+
+    /// What is missing, in words; `None` if nothing is. `absent` are the shards that have it, as far as they are known.
+    pub(super) fn missing(&self, absent: &[Shard]) -> Option<String> {
         if self.trials.iter().all(Option::is_some) {
             return None;
         }
-        let counts: BTreeSet<NonZeroU32> = self.shards.iter().map(|shard| shard.count()).collect();
-        if let (1, Some(count)) = (counts.len(), counts.first()) {
-            let absent = Shard::all(*count).filter(|shard| !self.shards.contains(shard));
-            let absent: Vec<String> = absent.map(|shard| shard.to_string()).collect();
+        if !absent.is_empty() {
             let verb = if absent.len() == 1 { " is" } else { "s are" };
-            let (number, names) = (absent.len(), absent.join(", "));
-            return Some(format!("{number} shard{verb} missing: {names}"));
+            let names: Vec<String> = absent.iter().map(Shard::to_string).collect();
+            return Some(format!(
+                "{} shard{verb} missing: {}",
+                absent.len(),
+                names.join(", ")
+            ));
         }
         let mut gaps = String::new();
         let mut start = 0;
@@ -100,8 +128,7 @@ impl Coverage {
             start += run.len();
         }
         Some(format!(
-            "frames or walks {gaps} of {} are in no part; the command of the parts with --shard I/N, for all I of one N, asks only what no \
-             part beside it has",
+            "frames or walks {gaps} of {} are in no part",
             self.trials.len()
         ))
     }
@@ -151,18 +178,28 @@ mod tests {
     #[test]
     fn missing_sources_are_named() {
         let whole = coverage(&[("1/2", 0, &[4, 4, 4]), ("2/2", 3, &[4, 4, 2])]);
-        assert_eq!((whole.missing(), whole.trials()), (None, 22));
+        assert_eq!((whole.missing(&[]), whole.trials()), (None, 22));
         let one = coverage(&[("1/3", 0, &[4, 4])]);
-        let said = one.missing().unwrap();
+        let said = one.missing(&one.absent(|_| None)).unwrap();
         assert_eq!(said, "2 shards are missing: 2/3, 3/3");
         // The end of one division and the beginning of another.
         let mixed = coverage(&[("1/3", 0, &[4, 4]), ("5/6", 4, &[4])]);
-        let said = mixed.missing().unwrap();
+        assert_eq!(mixed.absent(|_| None), []);
+        let said = mixed.missing(&[]).unwrap();
         assert!(
             said.starts_with("frames or walks 3 to 4, 6 of 6 are in no part"),
             "{said}"
         );
         assert_eq!(mixed.trials(), 12);
+        assert_eq!(mixed.gaps().collect::<Vec<_>>(), [2, 3, 5]);
+        // Where it is known which sources a shard has, the division with the fewest shards for them.
+        let equal = |shard: Shard| {
+            let each = 6 / shard.count().get() as usize;
+            let first = shard.index() as usize * each;
+            Some(first..first + each)
+        };
+        let absent: Vec<String> = mixed.absent(equal).iter().map(Shard::to_string).collect();
+        assert_eq!(absent, ["2/3", "3/3"]);
     }
 
     #[test]
@@ -174,7 +211,7 @@ mod tests {
             ("1/3", 0, &[3, 4]),
         ];
         let overlapping = coverage(&parts);
-        assert_eq!((overlapping.missing(), overlapping.trials()), (None, 22));
+        assert_eq!((overlapping.missing(&[]), overlapping.trials()), (None, 22));
         let once: Vec<bool> = overlapping.once().collect();
         assert_eq!(once, [true, true, false]);
         let together = coverage(&[
@@ -182,7 +219,7 @@ mod tests {
             ("2/3", 2, &[5, 4]),
             ("3/3", 4, &[4, 2]),
         ]);
-        assert_eq!((together.missing(), together.trials()), (None, 23));
+        assert_eq!((together.missing(&[]), together.trials()), (None, 23));
         assert!(together.once().all(|is_taken| is_taken));
     }
 }

@@ -1,6 +1,6 @@
 //! The [`Experiment`] of questions with choices.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 
 use serde_json::{Value, json};
 
@@ -59,9 +59,6 @@ impl Experiment for ChoiceSetup<'_> {
     }
 
     fn questions(&self) -> Vec<RunQuestion> {
-        let all = self.dataset.questions().iter();
-        let places: HashMap<&QuestionId, usize> =
-            all.map(|question| &question.id).zip(0..).collect();
         // In a shard, questions about frames of other shards are asked with images of this one.
         let ids: HashSet<&QuestionId> =
             self.questions.iter().map(|question| &question.id).collect();
@@ -74,7 +71,7 @@ impl Experiment for ChoiceSetup<'_> {
                 images: self.dataset.several(&question.frame).to_vec(),
                 ..RunQuestion::new(
                     question,
-                    places[&question.id],
+                    self.file_places[&question.id],
                     &self.dataset.scene(&question.frame),
                 )
             })

@@ -6,9 +6,11 @@ mod controls;
 mod experiment;
 mod other_room;
 mod plan;
+mod plan_identity;
 mod record;
 mod settings;
 mod setup;
+mod write_plan;
 
 use crate::error::Result;
 use crate::job::batch::{BatchFileArgs, BatchRunArgs};
@@ -18,6 +20,7 @@ use crate::job::{Job, Outcome};
 pub(crate) use check::{CheckArgs, check};
 pub(crate) use settings::{EvaluateArgs, ShrinkArgs};
 use setup::ChoiceSetup;
+pub(crate) use write_plan::plan;
 
 /// Runs an evaluation or continues it; a dry run prints the estimate of its cost.
 ///

@@ -14,6 +14,7 @@ use crate::dataset::{
 use crate::error::{Error, Result};
 use crate::job::models::{ModelName, TextBaseline};
 use crate::job::questions::{QuestionBank, rules};
+use crate::job::run_plan::RunPlan;
 use crate::job::settings::{ExperimentSettings, JobArgs, JobSettings};
 use crate::questions::rules::Rules;
 use crate::types::{Decides, SetLight, Truths, View};
@@ -115,6 +116,8 @@ pub(super) struct Evaluation {
     pub(super) rules: Rules,
     /// Ask every control of the observer, if it is asked.
     pub(super) observer_controls: bool,
+    /// The plan in the folder of the run; `None` if there is none.
+    pub(super) plan: Option<RunPlan>,
     pub(super) job: JobSettings,
 }
 
@@ -137,7 +140,12 @@ impl EvaluateArgs {
         };
         let bank = QuestionBank::open(&self.bank)?;
         let truths = bank.as_ref().map_or(Truths::Known, |_| Truths::Unknown);
-        let job = self.job.resolve(&experiment)?;
+        let max_cost = self.job.money.max_cost;
+        let mut job = self.job.resolve(&experiment)?;
+        let plan = RunPlan::at(&job.place)?;
+        if let (Some(plan), Some(whole), true) = (&plan, max_cost, job.shard.is_part()) {
+            job.money.max_cost = Some(whole * plan.share(job.shard));
+        }
         if truths == Truths::Unknown {
             check_without_truths(&job)?;
         }
@@ -157,6 +165,7 @@ impl EvaluateArgs {
             repeats: self.order.repeats(truths),
             order: self.order,
             bank,
+            plan,
             prompts: prompts.map_or_else(Prompts::built_in, Prompts::load)?,
             job,
         })

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::controls::{AddedControls, is_other_room};
 use super::other_room::OtherRooms;
+use super::plan_identity::plan_identity;
 use super::settings::Evaluation;
 use crate::ask::{Model, Random};
 use crate::dataset::Dataset;
@@ -17,7 +18,7 @@ use crate::job::observer::Observer;
 use crate::job::part::part;
 use crate::job::photographs;
 use crate::job::progress::Progress;
-use crate::job::questions::{QuestionBank, open_data, select};
+use crate::job::questions::{QuestionBank, open_data, open_unasked, select};
 use crate::job::recipe::Recipe;
 use crate::job::source::{Source, first_asked, inspect_all};
 use crate::types::manifest::PartPlace;
@@ -38,6 +39,8 @@ pub(super) struct ChoiceSetup<'a> {
     pub(super) places: HashMap<FrameId, usize>,
     /// The place of each question among all that are selected, for models that are asked the first ones alone.
     pub(super) question_places: HashMap<QuestionId, usize>,
+    /// The index of each question among all questions of the data.
+    pub(super) file_places: HashMap<QuestionId, usize>,
     /// The digest of the file, or of all files, of each frame that a question is about; empty if no image is read.
     pub(super) digests: HashMap<FrameId, Digest>,
     pub(super) models: Vec<ModelUnderTest>,
@@ -63,22 +66,9 @@ impl<'a> ChoiceSetup<'a> {
         } else {
             Vec::new()
         };
-        let place = &config.place;
-        let set = &config.set;
-        let dataset = if let Some(bank) = &config.bank {
-            bank.data(place, set, config.rule, progress)?
-        } else {
-            let (selection, rules) = (&config.selection, &config.rules);
-            open_data(
-                (place, &config.scene, set),
-                selection,
-                rules,
-                config.rule,
-                progress,
-            )?
-        };
+        let (dataset, all) = asked_data(config, progress)?;
         let dataset = Arc::new(dataset);
-        let all = select(dataset.questions().to_vec(), &config.selection)?;
+        let file_places = file_places(config, &dataset, &all);
         let other_rooms = OtherRooms::of(&all, |frame| dataset.scene(frame));
         let controls = AddedControls::of(config, other_rooms.is_some())?;
         let (questions, part) = part(
@@ -86,8 +76,9 @@ impl<'a> ChoiceSetup<'a> {
             job.shard,
             |question| question.frame.0.clone(),
             |question| dataset.scene(&question.frame),
+            |frame| config.plan.as_ref().map_or(1, |plan| plan.cost(frame)),
         )?;
-        let models = open_models(config, &controls, &dataset, &all)?;
+        let models = open_models(config, &controls, &dataset, &questions)?;
         let mut sources = if shows_images {
             inspect_all(&dataset, &questions, progress)?
         } else {
@@ -96,6 +87,9 @@ impl<'a> ChoiceSetup<'a> {
                 .map(|question| Source::unseen(question.frame.clone()))
                 .collect()
         };
+        if let Some(plan) = &config.plan {
+            plan.check_sources(&sources)?;
+        }
         if !job.light.matches.is_empty() {
             photographs::measure(&*dataset, &mut sources)?;
         }
@@ -125,6 +119,7 @@ impl<'a> ChoiceSetup<'a> {
                 .map(|question| question.id.clone())
                 .zip(0..)
                 .collect(),
+            file_places,
             digests: digests(&sources),
             sources,
             part,
@@ -163,7 +158,13 @@ impl<'a> ChoiceSetup<'a> {
             shown.is_some_and(|shown| self.places.contains_key(shown))
         });
         for question in &all {
-            if !self.digests.contains_key(&question.frame) {
+            if self.digests.contains_key(&question.frame) {
+                continue;
+            }
+            let planned = self.config.plan.as_ref();
+            if let Some(digest) = planned.and_then(|plan| plan.digest(&question.frame)) {
+                self.digests.insert(question.frame.clone(), digest);
+            } else {
                 let source = Source::of_questions(&self.dataset, &question.frame)?;
                 let digest = source.digest();
                 self.digests
@@ -172,6 +173,46 @@ impl<'a> ChoiceSetup<'a> {
         }
         self.with_other_rooms = all;
         Ok(())
+    }
+}
+
+/// The data, and the questions about them that are asked. Those of a plan are taken from there, so that no frame is measured.
+fn asked_data(config: &Evaluation, progress: &Progress) -> Result<(Dataset, Vec<Question>)> {
+    let (place, set, selection) = (&config.place, &config.set, &config.selection);
+    let data = (place, &config.scene, set);
+    let dataset = match (&config.bank, &config.plan) {
+        (Some(bank), _) => bank.data(place, set, config.rule, progress)?,
+        (None, Some(_)) => open_unasked(data, selection, config.rule)?,
+        (None, None) => open_data(data, selection, &config.rules, config.rule, progress)?,
+    };
+    let Some(plan) = &config.plan else {
+        let questions = select(dataset.questions().to_vec(), selection)?;
+        return Ok((dataset, questions));
+    };
+    plan.check_identity(&plan_identity(config, &dataset)?)?;
+    let own = match dataset.questions() {
+        [] => Vec::new(),
+        own => select(own.to_vec(), selection)?,
+    };
+    let questions = plan.questions(&dataset, &own)?;
+    Ok((dataset, questions))
+}
+
+/// The index of each question that is asked among all questions of the data.
+fn file_places(
+    config: &Evaluation,
+    dataset: &Dataset,
+    asked: &[Question],
+) -> HashMap<QuestionId, usize> {
+    match &config.plan {
+        Some(plan) => {
+            let ids = asked.iter().map(|question| question.id.clone());
+            ids.zip(plan.question_places()).collect()
+        }
+        None => {
+            let ids = dataset.questions().iter().map(|question| &question.id);
+            ids.cloned().zip(0..).collect()
+        }
     }
 }
 

@@ -54,7 +54,7 @@ impl<'a> OpenSetup<'a> {
         let ids = selected.iter().map(|question| question.id.clone());
         let question_places = ids.zip(0..).collect();
         let walk = |question: &OpenQuestion| question.episode.clone();
-        let (questions, part) = part(selected, job.shard, walk, |_| String::new())?;
+        let (questions, part) = part(selected, job.shard, walk, |_| String::new(), |_| 1)?;
         let models = models::open_all(&job.ask, &[], |name| {
             models::open(name, None, &Parameters::new(String::new()))
         })?;

@@ -1,0 +1,70 @@
+//! The settings that the plan of a run and the run itself share: [`plan_identity`].
+
+use serde_json::{Value, json};
+
+use super::settings::Evaluation;
+use crate::dataset::{DataPlace, Dataset, ReadingRule};
+use crate::error::Result;
+use crate::job::identity::{self, Identity};
+use crate::job::questions::ASK;
+use crate::job::recipe::Recipe;
+use crate::questions::rules::Rules;
+use crate::types::{AxisLevel, SetLight};
+
+/// The settings of data, questions and light. Models, enhancers and what is sent besides are not among them: they may be added to a
+/// plan later.
+pub(super) fn plan_identity(config: &Evaluation, dataset: &Dataset) -> Result<Identity> {
+    let (selection, rule) = (&config.selection, config.rule);
+    let data = match &config.place {
+        rooms @ DataPlace::Rooms(_) => rooms.to_string(),
+        _ => dataset.name().to_owned(),
+    };
+    let rules = config.rules.digest();
+    let is_own = Rules::built_in().is_ok_and(|built_in| built_in.digest() != rules);
+    let families: Vec<&str> = selection
+        .families
+        .iter()
+        .map(|family| family.name())
+        .collect();
+    let bank = config.bank.as_ref();
+    let usual = ReadingRule::default();
+    let job = &config.job;
+    let levels: Vec<String> = job.light.levels.iter().map(AxisLevel::to_string).collect();
+    let fields = [
+        Some(("--data", json!(data))),
+        is_own.then(|| ("--rules", json!(rules))),
+        selection.limit.map(|limit| ("--limit", json!(limit))),
+        (!families.is_empty()).then(|| ("--families", json!(families))),
+        bank.map(|bank| bank.digest().map(|digest| (ASK, json!(digest))))
+            .transpose()?,
+        bank.map(|bank| ("--ask-per-image", json!(bank.each()))),
+        (rule.colour != usual.colour).then(|| ("--colour", json!(rule.colour.to_string()))),
+        (rule.transfer != usual.transfer).then(|| ("--transfer", json!(rule.transfer.to_string()))),
+        rule.exposure_ev.map(|ev| ("--exposure", json!(ev))),
+        (job.set_light == SetLight::Dark).then(|| ("--light", json!(job.set_light))),
+        Some(("--levels", json!(levels))),
+        (!job.light.matches.is_empty()).then(|| ("--levels match", json!(job.light.matches))),
+        Some(("--variant", json!(job.light.variants.to_string()))),
+        Some(("--seed", json!(job.light.kinds.sensor.seed))),
+    ];
+    let fields = fields.into_iter().flatten();
+    let fields = fields.map(|(field, value)| (field.to_owned(), value));
+    Ok(fields.chain(light(config)).collect())
+}
+
+/// The settings of each light reading and of each further variant, and the version of the synthesis.
+fn light(config: &Evaluation) -> impl Iterator<Item = (String, Value)> {
+    let job = &config.job;
+    let recipe = Recipe::lossless(&job.light.kinds, &[]);
+    let version = identity::images(&recipe).filter(|(field, _)| field == "synthesis");
+    let columns = identity::columns([], &recipe, job).into_iter();
+    let columns = columns.flat_map(|(column, values)| {
+        values.into_iter().flat_map(move |(name, content)| {
+            let place = format!("{column} {name}");
+            let settings = content.as_object().cloned().unwrap_or_default();
+            let settings = settings.into_iter();
+            settings.map(move |(flag, value)| (format!("{flag} of the {place}"), value))
+        })
+    });
+    version.chain(columns).collect::<Vec<_>>().into_iter()
+}

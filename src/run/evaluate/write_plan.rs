@@ -1,0 +1,59 @@
+//! `plan`: the questions and frames of a run, written once, so that no shard makes them again ([`plan`]).
+
+use super::plan_identity::plan_identity;
+use super::settings::EvaluateArgs;
+use super::setup::ChoiceSetup;
+use crate::error::{Error, Result};
+use crate::job::experiment::Experiment as _;
+use crate::job::plan::Plan;
+use crate::job::progress::Progress;
+use crate::job::run_plan::{NewPlan, PlannedFrame, costs, recorded_command};
+use crate::job::{Job, Outcome};
+use crate::types::manifest::Status;
+
+/// Writes the plan of a run into its folder. Nothing is asked.
+///
+/// # Errors
+/// If no folder is named, the data cannot be read, or the run has parts of another plan.
+pub(crate) fn plan(mut args: EvaluateArgs, progress: &Progress) -> Result<Outcome> {
+    let Some(run) = args.job.output.out.clone() else {
+        let problem = "the folder of the run that the plan is for is missing; the evaluation takes the plan from the same --out";
+        return Err(Error::usage("--out", problem));
+    };
+    args.job.scale.shard = Some("none".to_owned());
+    args.job.money.dry_run = true;
+    let command = recorded_command(&args.job.words);
+    let mut config = args.resolve()?;
+    // A plan is made from the data, also where there is one.
+    config.plan = None;
+    let (setup, files) = ChoiceSetup::open(&config, progress)?;
+    setup.say_reading(progress);
+    let trials = setup.plan(0, || Ok(Vec::new()))?;
+    let costs = costs(&setup, &trials);
+    let frames = setup.sources.iter().zip(costs).zip(0..);
+    let new = NewPlan {
+        identity: plan_identity(&config, &setup.dataset)?,
+        questions: setup.questions(),
+        frames: frames
+            .map(|((source, cost), place)| PlannedFrame::new(place, source, &setup.dataset, cost))
+            .collect(),
+        models: setup
+            .columns()
+            .remove("model")
+            .into_iter()
+            .flatten()
+            .map(|(name, _)| name)
+            .collect(),
+        command,
+        trials: Plan::new(trials).keys.len(),
+    };
+    let (questions, count) = (new.questions.len(), new.frames.len());
+    let forecast = Job::new(&setup, files, progress)?.forecast()?;
+    let folder = new.write(&run, &forecast)?;
+    let output = format!(
+        "{}: {questions} questions about {count} frames, {} trials\n",
+        folder.display(),
+        forecast.trials
+    );
+    Ok(Outcome::wrote(folder, Status::Complete, output))
+}

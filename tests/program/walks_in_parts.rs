@@ -1,0 +1,136 @@
+//! Open questions about walks in parts that are stopped, killed, and gone on with in other numbers.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::process::Stdio;
+use std::time::Duration;
+
+use image::{Rgb, RgbImage};
+use serde_json::{Value, json};
+
+use crate::support::endpoint::{Answer, MockEndpoint};
+use crate::support::process::{signal, wait_until};
+use crate::support::run::{Bench, assert_same_products, records, words};
+
+/// Requests that are in flight at once.
+const IN_FLIGHT: usize = 2;
+
+/// Nine walks of two frames, with two questions about each.
+fn with_walks() -> Bench {
+    let bench = Bench::new();
+    let mut questions = Vec::new();
+    for walk in 0..9_u8 {
+        let name = format!("hm3d-v0/{walk:03}-house");
+        for frame in 0..2_u8 {
+            let picture = RgbImage::from_pixel(48, 32, Rgb([60 + 10 * walk + frame; 3]));
+            let path = bench.path(&format!("walks/{name}/{frame:05}-rgb.png"));
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            picture.save(path).unwrap();
+        }
+        for question in 0..2 {
+            questions.push(json!({
+                "question_id": format!("q{walk}-{question}"), "question": format!("Where is thing {question} of house {walk}?"),
+                "answer": "On the table", "category": "object localization", "episode_history": name,
+            }));
+        }
+    }
+    bench.file("questions.json", json!(questions).to_string());
+    bench
+}
+
+/// The same answer or mark to the same request, after a while.
+fn endpoint() -> MockEndpoint {
+    MockEndpoint::answering(|request| {
+        std::thread::sleep(Duration::from_millis(40));
+        let length = request.to_string().len();
+        let is_mark = request["model"] == "j";
+        Answer::text(&if is_mark {
+            (1 + length % 5).to_string()
+        } else {
+            format!("an answer of {} words", length % 3)
+        })
+    })
+}
+
+fn flags(mock: &MockEndpoint, more: &str) -> String {
+    format!(
+        "openeqa --questions questions.json --frames walks --num-frames 2 --image-size native --model m --judge j --base-url {} \
+         --levels L0,L3 --concurrency {IN_FLIGHT} {more}",
+        mock.base_url()
+    )
+}
+
+/// What is asked, by key.
+fn asked(run: &std::path::Path) -> BTreeMap<String, Value> {
+    let records = records(run).into_iter();
+    records
+        .map(|record| (record["key"].to_string(), record["reply"].clone()))
+        .collect()
+}
+
+#[test]
+fn seven_parts_of_which_one_is_killed_go_on_in_other_numbers() {
+    let bench = with_walks();
+    let mock = endpoint();
+    bench.complete(&words(&flags(&mock, "--out whole")));
+    let whole = mock.requests().len();
+    assert_eq!(whole, records(&bench.path("whole")).len());
+    // No part of the seven ends but the first two; the third is killed.
+    let part = |part: &str| flags(&mock, &format!("--out parts --shard {part}"));
+    for done in ["1/7", "2/7"] {
+        bench.complete(&words(&part(done)));
+    }
+    let third = part("3/7");
+    let mut child = bench.spawn(&words(&third), Stdio::null());
+    let path = bench.path("parts/shard-3-of-7/records.jsonl");
+    let stored = || fs::read_to_string(&path).unwrap_or_default();
+    wait_until(|| stored().lines().count() >= 2);
+    signal(&child, "-9");
+    child.wait().unwrap();
+    // Two of five, then all three of three.
+    for next in ["2/5", "4/5", "1/3", "2/3", "3/3"] {
+        bench.complete(&words(&part(next)));
+    }
+    let all = mock.requests().len() - whole;
+    assert!(
+        (whole..=whole + IN_FLIGHT).contains(&all),
+        "{all} requests for {whole}: only what was in flight at the kill is asked again"
+    );
+    let merged = bench.call(&words("merge parts --out merged"));
+    assert_eq!(merged.code, Some(0), "{merged:?}");
+    assert_eq!(asked(&bench.path("whole")), asked(&bench.path("merged")));
+    let compared = assert_same_products(&bench.path("whole"), &bench.path("merged"));
+    assert!(compared > 5, "{compared}");
+    // The merged run is whole: nothing is left to ask.
+    bench.complete(&words(&flags(&mock, "--out merged")));
+    assert_eq!(mock.requests().len() - whole, all);
+}
+
+#[test]
+fn a_model_is_added_to_the_parts_of_a_run() {
+    let bench = Bench::new();
+    let mock = MockEndpoint::start([Answer::text("B")]);
+    let flags = |models: &str, more: &str| {
+        format!(
+            "{models} --base-url {} --levels L0,L2 --data rooms:frames=6,size=120x90 {more}",
+            mock.base_url()
+        )
+    };
+    bench.complete(&words(&flags("--model a --model b", "--out whole")));
+    let whole = mock.requests().len();
+    bench.complete(&words(&format!("plan {}", flags("--model a", "--out run"))));
+    for models in ["--model a", "--model b"] {
+        for part in ["1/3", "2/3", "3/3"] {
+            let part = format!("--out run --shard {part}");
+            bench.complete(&words(&flags(models, &part)));
+        }
+    }
+    assert_eq!(
+        mock.requests().len(),
+        2 * whole,
+        "what a run has is not asked again"
+    );
+    bench.complete(&words("merge run --out merged"));
+    assert_eq!(asked(&bench.path("whole")), asked(&bench.path("merged")));
+    assert_same_products(&bench.path("whole"), &bench.path("merged"));
+}
