@@ -2,6 +2,7 @@
 
 mod coverage;
 mod missing;
+mod part;
 mod trials;
 
 use std::collections::BTreeMap;
@@ -11,11 +12,11 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use self::coverage::Coverage;
+use self::part::MergePart;
 use self::trials::unique;
-use super::placed_trials::{PlacedTrial, append, in_order, placed_trials};
+use super::placed_trials::{PlacedTrial, append, in_order};
 use super::report::{choice, open};
-use super::shard::Shard;
-use super::stored::{ExperimentKind, StoredRun, manifest};
+use super::stored::{ExperimentKind, StoredRun};
 use super::thumbnail::MissingThumbnails;
 use super::{Outcome, ShowArgs, StdoutFormat};
 use crate::error::{Error, Result};
@@ -38,36 +39,6 @@ pub(crate) struct MergeArgs {
     /// How the report is printed.
     #[command(flatten)]
     pub show: ShowArgs,
-}
-
-/// One shard, as read from its folder, with its records by their places.
-struct MergePart {
-    shard: Shard,
-    folder: PathBuf,
-    manifest: RunManifest,
-    trials: Vec<PlacedTrial>,
-    questions: Vec<RunQuestion>,
-}
-
-impl MergePart {
-    fn open<D: Detail>(folder: &Path) -> Result<Self> {
-        let wrong = |problem: &str| Error::Run {
-            path: folder.to_owned(),
-            problem: problem.to_owned(),
-        };
-        let manifest = manifest(folder)?;
-        let trials = placed_trials::<D>(folder, &manifest)?;
-        let Some(shard) = manifest.shard.as_deref() else {
-            return Err(wrong("the run is not a shard: it was made without --shard"));
-        };
-        Ok(Self {
-            shard: shard.parse()?,
-            folder: folder.to_owned(),
-            trials,
-            questions: store::read_questions(folder)?,
-            manifest,
-        })
-    }
 }
 
 /// Merges shards: the records of all in the order of the questions, with the report that one run would have written.
