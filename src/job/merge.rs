@@ -3,6 +3,7 @@
 mod coverage;
 mod questions;
 mod missing;
+mod part;
 mod trials;
 
 use std::collections::BTreeMap;
@@ -12,13 +13,13 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use self::coverage::Coverage;
+use self::part::MergePart;
 use self::questions::PartQuestions;
 use self::trials::each_once;
 use super::placed_trials::{append, read_part};
 use super::record_table;
 use super::report::{choice, open};
-use super::shard::Shard;
-use super::stored::{ExperimentKind, StoredRun, manifest, sort};
+use super::stored::{ExperimentKind, StoredRun, sort};
 use super::thumbnail::MissingThumbnails;
 use super::{Outcome, ShowArgs, StdoutFormat};
 use crate::error::{Error, Result};
@@ -41,31 +42,6 @@ pub(crate) struct MergeArgs {
     /// How the report is printed.
     #[command(flatten)]
     pub show: ShowArgs,
-}
-
-/// One shard, as read from its folder.
-struct MergePart {
-    shard: Shard,
-    folder: PathBuf,
-    manifest: RunManifest,
-}
-
-impl MergePart {
-    fn open(folder: &Path) -> Result<Self> {
-        let wrong = |problem: &str| Error::Run {
-            path: folder.to_owned(),
-            problem: problem.to_owned(),
-        };
-        let manifest = manifest(folder)?;
-        let Some(shard) = manifest.shard.as_deref() else {
-            return Err(wrong("the run is not a shard: it was made without --shard"));
-        };
-        Ok(Self {
-            shard: shard.parse()?,
-            folder: folder.to_owned(),
-            manifest,
-        })
-    }
 }
 
 /// Merges shards: the records of all in the order of the questions, with the report that one run would have written.

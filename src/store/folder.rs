@@ -23,6 +23,11 @@ pub(super) const THUMBNAILS: &str = "thumbnails.jsonl";
 /// The similarity of images to their clean frames.
 pub(super) const FIDELITY: &str = "fidelity.jsonl";
 
+/// The subfolder of a run for Batch API files.
+pub(crate) const BATCH: &str = "batch";
+/// The subfolder of a run for its plan, which is written before the run.
+pub(crate) const PLAN: &str = "plan";
+
 /// Whether a stored run may continue at another address of its endpoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum AddressChange {
@@ -292,7 +297,7 @@ pub(super) fn create_run(folder: &Path, manifest: &RunManifest) -> Result<()> {
     fs::create_dir_all(folder).map_err(|e| Error::file(folder, "create", e))?;
     let mut inside = fs::read_dir(folder).map_err(|e| Error::file(folder, "read", e))?;
     // Unfinished files of a killed process do not count, nor does the plan of the run.
-    let counts = |name: &OsStr| !is_unfinished(name) && name != super::PLAN;
+    let counts = |name: &OsStr| !is_unfinished(name) && name != PLAN;
     if inside.any(|entry| entry.is_ok_and(|entry| counts(&entry.file_name()))) {
         let problem = "the folder is not empty and holds no run; use another --out".to_owned();
         return Err(Error::Run {

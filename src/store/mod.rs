@@ -45,7 +45,7 @@ pub(crate) use record_log::{QuestionFile, RecordLog, each_record, each_trial};
 pub(crate) use stored_trial::StoredTrial;
 
 pub(crate) use folder::{
-    AddressChange, each_placed_question, each_question, find, is_locked, read_fidelity,
+    PLAN, AddressChange, each_placed_question, each_question, find, is_locked, read_fidelity,
     read_manifest, read_questions, read_records, read_thumbnails, read_trials, schema,
 };
 

@@ -1,7 +1,7 @@
 //! What the parts of a run lack, by its plan where there is one: [`check`], [`warn_unfinished`].
 
-use super::MergePart;
 use super::coverage::Coverage;
+use super::part::MergePart;
 use crate::error::{Error, Result};
 use crate::job::run_plan::RunPlan;
 use crate::job::shard::Shard;
