@@ -1,5 +1,6 @@
 //! The manifests for Kubernetes and the scripts in `src/run/cluster`: their flags exist, and they agree with each other.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::PathBuf;
 
@@ -53,13 +54,16 @@ fn value(words: &[String], flag: &str) -> String {
 /// Checks that the program takes these words.
 fn parse(words: &[String]) {
     let program = "darkqa-eval".to_owned();
-    let words = std::iter::once(&program).chain(words);
+    // `plan` takes the flags of an evaluation.
+    let has_plan = cli::command().find_subcommand("plan").is_some();
+    let skipped = usize::from(!has_plan && words[0] == "plan");
+    let words = std::iter::once(&program).chain(&words[skipped..]);
     if let Err(e) = cli::command().try_get_matches_from(words) {
         panic!("{e}");
     }
 }
 
-const MANIFESTS: [&str; 2] = ["job.yaml", "merge.yaml"];
+const MANIFESTS: [&str; 3] = ["plan.yaml", "job.yaml", "merge.yaml"];
 
 #[test]
 fn every_manifest_has_flags_that_exist() {
@@ -72,7 +76,19 @@ fn every_manifest_has_flags_that_exist() {
 
 #[test]
 fn the_manifests_are_of_one_run() {
-    let (job, merge) = (words("job.yaml"), words("merge.yaml"));
+    let (plan, job, merge) = (words("plan.yaml"), words("job.yaml"), words("merge.yaml"));
+    assert_eq!(plan[0], "plan");
+    // What the plan leaves out is about asking and dividing alone.
+    let planned: BTreeSet<&String> = plan[1..].iter().collect();
+    let asked: BTreeSet<&String> = job.iter().collect();
+    assert!(planned.is_subset(&asked), "{planned:?} {asked:?}");
+    let others = asked.difference(&planned).map(|word| {
+        let flag = word.split('=').next();
+        flag.unwrap_or_default()
+    });
+    let others: Vec<&str> = others.collect();
+    let expected = ["--grace", "--quiet", "--rpm", "--shard", "--workers"];
+    assert_eq!(others, expected);
     assert_eq!(merge[..2], ["merge".to_owned(), value(&job, "--out")]);
     // Kubernetes tells a pod neither how many there are nor how many run at once.
     let parts = value(&job, "--shard");
@@ -90,6 +106,7 @@ fn the_manifests_are_of_one_run() {
 #[test]
 fn a_pod_that_its_node_ends_has_not_failed() {
     for (manifest, ends, codes) in [
+        ("plan.yaml", "FailJob", "[2]"),
         ("job.yaml", "FailIndex", "[2, 3]"),
         ("merge.yaml", "FailJob", "[2]"),
     ] {
@@ -246,7 +263,7 @@ fn sbatch(words: &[&str]) -> (Option<i32>, Vec<String>) {
 
 #[cfg(unix)]
 #[test]
-fn the_script_of_slurm_submits_two_jobs_in_order() {
+fn the_script_of_slurm_submits_three_jobs_in_order() {
     let flags = "--model gpt-4o --data frames/ --rpm 500";
     for out in ["--out runs/a", "--out=runs/a"] {
         let line = format!("{out} {flags}");
@@ -257,13 +274,17 @@ fn the_script_of_slurm_submits_two_jobs_in_order() {
             .iter()
             .map(|line| line.split_once(" SCRIPT ").unwrap())
             .collect();
-        let [array, merge] = calls[..] else {
+        let [plan, array, merge] = calls[..] else {
             panic!("{told:?}");
         };
+        assert_eq!(plan.1, format!("plan {line}"));
         assert_eq!(array.1, format!("--workers 3 {line}"));
-        assert!(array.0.contains("--array=0-11%3"), "{array:?}");
+        assert!(
+            array.0.contains("--array=0-11%3") && array.0.contains("--dependency=afterok:1"),
+            "{array:?}"
+        );
         assert_eq!(merge.1, "merge runs/a --out runs/a-whole --quiet");
-        assert!(merge.0.contains("--dependency=afterok:1"), "{merge:?}");
+        assert!(merge.0.contains("--dependency=afterok:2"), "{merge:?}");
         for (_, words) in calls {
             let words: Vec<String> = words.split(' ').map(str::to_owned).collect();
             parse(&words);

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# An evaluation on Kubernetes: its volumes, then parts and merge, each when the one before is complete.
+# An evaluation on Kubernetes: its volumes, then plan, parts and merge, each when the one before is complete.
 #
 #     kubernetes.sh [flags of kubectl, such as --namespace NAME]
 #
@@ -7,7 +7,7 @@
 set -euo pipefail
 cd "$(dirname "$0")"
 kubectl "$@" apply -f claims.yaml
-for step in job merge; do
+for step in plan job merge; do
     kubectl "$@" apply -f "$step.yaml"
     until kubectl "$@" wait --for=condition=complete --timeout=30s -f "$step.yaml" 2> /dev/null; do
         failed=$(kubectl "$@" get -f "$step.yaml" -o 'jsonpath={.status.conditions[?(@.type=="Failed")].reason}')

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# An evaluation as jobs of Slurm: 256 parts of which 16 run at once, and the merge of them into runs/a-whole.
+# An evaluation as jobs of Slurm: its plan, 256 parts of which 16 run at once, and the merge of them into runs/a-whole.
 #
 #     ./slurm.sh --out runs/a --model gpt-4o --data frames/ --rpm 500
 #
 # PARTS=64 AT_ONCE=8 in front divides otherwise; SBATCH_ACCOUNT, SBATCH_PARTITION and the like are sbatch's own. The key comes from
-# the environment, or --api-key-file. One array alone:
+# the environment, or --api-key-file. One array alone, where the plan is there or none is wanted:
 #
 #     sbatch --array=0-15%4 slurm.sh --workers 4 --out runs/a --model gpt-4o --data frames/ --rpm 500
 #
@@ -20,7 +20,7 @@
 #SBATCH --signal=B:TERM@150
 set -eu
 
-# Outside of a job: submits the two.
+# Outside of a job: submits the three.
 if [ -z "${SLURM_JOB_ID:-}" ]; then
   parts=${PARTS:-256} at_once=${AT_ONCE:-16} out='' before=''
   for word in "$@"; do
@@ -30,9 +30,11 @@ if [ -z "${SLURM_JOB_ID:-}" ]; then
   done
   [ -n "$out" ] || { echo "$0: --out DIR is missing: the tasks share the folder of the run" >&2; exit 2; }
   submit() { sbatch --parsable --kill-on-invalid-dep=yes "$@"; }
-  array=$(submit --array="0-$((parts - 1))%$at_once" --output=darkqa-%A_%a.log "$0" --workers "$at_once" "$@")
+  plan=$(submit --job-name=darkqa-plan "$0" plan "$@")
+  array=$(submit --array="0-$((parts - 1))%$at_once" --output=darkqa-%A_%a.log --dependency="afterok:$plan" \
+    "$0" --workers "$at_once" "$@")
   merge=$(submit --job-name=darkqa-merge --dependency="afterok:$array" "$0" merge "$out" --out "${out%/}-whole" --quiet)
-  echo "$parts parts $array, merge $merge: squeue --me shows them"
+  echo "plan $plan, $parts parts $array, merge $merge: squeue --me shows them"
   exit
 fi
 
