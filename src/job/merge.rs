@@ -1,9 +1,9 @@
 //! `merge`: joins the shards of a run into one run.
 
 mod coverage;
-mod questions;
 mod missing;
 mod part;
+mod questions;
 mod trials;
 
 use std::collections::BTreeMap;

@@ -45,14 +45,12 @@ pub(crate) use record_log::{QuestionFile, RecordLog, each_record, each_trial};
 pub(crate) use stored_trial::StoredTrial;
 
 pub(crate) use folder::{
-    PLAN, AddressChange, each_placed_question, each_question, find, is_locked, read_fidelity,
+    AddressChange, PLAN, each_placed_question, each_question, find, is_locked, read_fidelity,
     read_manifest, read_questions, read_records, read_thumbnails, read_trials, schema,
 };
 
 /// The subfolder of a run for Batch API files.
 pub(crate) const BATCH: &str = "batch";
-/// The subfolder of a run for its plan, which is written before the run.
-pub(crate) const PLAN: &str = "plan";
 /// The trials that were sent in batches.
 const TRIALS: &str = "trials.jsonl";
 

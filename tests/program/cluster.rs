@@ -54,10 +54,7 @@ fn value(words: &[String], flag: &str) -> String {
 /// Checks that the program takes these words.
 fn parse(words: &[String]) {
     let program = "darkqa-eval".to_owned();
-    // `plan` takes the flags of an evaluation.
-    let has_plan = cli::command().find_subcommand("plan").is_some();
-    let skipped = usize::from(!has_plan && words[0] == "plan");
-    let words = std::iter::once(&program).chain(&words[skipped..]);
+    let words = std::iter::once(&program).chain(words);
     if let Err(e) = cli::command().try_get_matches_from(words) {
         panic!("{e}");
     }
