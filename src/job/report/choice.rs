@@ -4,7 +4,6 @@ use std::path::Path;
 
 use super::alerts::alerts;
 use super::combine::{Combined, combine};
-use super::rereading::LenientChange;
 use super::whole_report::SUMMARY_JSON;
 use super::{enhancers, own_answers};
 use crate::error::Result;
@@ -23,16 +22,14 @@ use crate::store::Store;
 use crate::types::manifest::RunManifest;
 use crate::types::{ChoiceDetail, Truths};
 
-/// Writes the report and the manifest of a run into its folder. Replies that were read by other rules than those of now are read again.
+/// Reads the replies of a run again, and writes its report and manifest into its folder.
 pub(crate) fn write(
     store: &Store,
     mut run: StoredRun<ChoiceDetail>,
     show: StdoutFormat,
 ) -> Result<Outcome> {
     let manifest = run.manifest.clone();
-    if !LenientChange::of(&manifest).is_current() {
-        run = run.reread()?;
-    }
+    run = run.reread()?;
     run.leave_out(ShownModels::Current);
     Ok(Outcome::wrote(
         store.folder(),
