@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
@@ -30,7 +30,7 @@ fn bench() -> Bench {
 }
 
 /// Records without times, in order of their keys.
-fn untimed(run: &PathBuf) -> Vec<String> {
+fn untimed(run: &Path) -> Vec<String> {
     let mut lines: Vec<String> = records(run)
         .into_iter()
         .map(|mut record| {

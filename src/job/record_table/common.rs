@@ -1,4 +1,4 @@
-//! The columns that the tables of both experiments have: [`head`], [`reply`], [`image`] and [`last`].
+//! The columns that the tables of both experiments have: [`head`], [`reply`], [`image()`] and [`last`].
 
 use serde::Serialize;
 use serde_json::Value;
