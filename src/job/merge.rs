@@ -120,7 +120,7 @@ fn merge_all<D: Detail>(
     let wanted = MissingThumbnails::new(questions.frames(), Vec::new());
     store.add_thumbnails_of(&folders, |frame| wanted.wants(frame))?;
     store.add_fidelity_of(&folders, |_| true)?;
-    let run = StoredRun::of(&args.out, manifest)?;
+    let run = StoredRun::reread(&args.out, manifest)?;
     let outcome = write(&store, run, args.show.format())?;
     record_table::update(&args.out, args.show.table())?;
     Ok(outcome)

@@ -277,7 +277,7 @@ impl<E: Experiment> OpenRun<'_, E> {
 
     /// Scores the run, and writes the report into its folder.
     pub(super) fn finish(self, end: EndReason) -> Result<Outcome> {
-        let mut run = StoredRun::of(self.store.folder(), self.manifest.clone())?;
+        let mut run = StoredRun::reread(self.store.folder(), self.manifest.clone())?;
         let trials = run.trials.iter();
         let counts = self.counts(trials.map(|trial| (trial.key(), trial.failed())));
         let status = end.status(counts);

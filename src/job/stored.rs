@@ -46,15 +46,28 @@ impl<D: Detail> StoredRun<D> {
     /// If the folder holds no run with records of this kind.
     pub(crate) fn open(folder: &Path) -> Result<Self> {
         let manifest = store::read_manifest(folder, D::SCHEMA)?;
-        Self::of(folder, manifest.ok_or_else(|| no_run(folder))?)
-    }
-
-    /// Reads everything in a run folder except `manifest`. Of its records no more than reports need is held.
-    pub(crate) fn of(folder: &Path, manifest: RunManifest) -> Result<Self> {
+        let manifest = manifest.ok_or_else(|| no_run(folder))?;
         let mut trials = Trials::default();
         store::each_record(folder, |record, place| {
             trials.add(record, TextPlace::new(place.start));
         })?;
+        Self::of_trials(folder, manifest, trials)
+    }
+
+    /// Reads everything in a run folder except `manifest`, and its replies again by the rules of this version.
+    ///
+    /// # Errors
+    /// If a line of a file is broken.
+    pub(crate) fn reread(folder: &Path, manifest: RunManifest) -> Result<Self> {
+        let mut trials = Trials::default();
+        store::each_reread_record(folder, |record, place| {
+            trials.add(record, TextPlace::new(place.start));
+        })?;
+        Self::of_trials(folder, manifest, trials)
+    }
+
+    /// The run of a folder from its manifest and trials. Of its records no more than reports need is held.
+    fn of_trials(folder: &Path, manifest: RunManifest, trials: Trials<D>) -> Result<Self> {
         let texts = RunTexts::of(folder)?;
         let files = RunFiles::read_light(folder)?;
         Self::of_parts(folder, manifest, (trials, texts), files)
@@ -230,19 +243,6 @@ impl StoredRun<ChoiceDetail> {
                 "nobody knows the true answers to the questions of this run (--ask): {why}"
             ),
         })
-    }
-
-    /// The run with its replies read again, by the rules of this version of the program.
-    ///
-    /// # Errors
-    /// If the file of the run cannot be read any more, or the choices of a record are not valid.
-    pub(crate) fn reread(mut self) -> Result<Self> {
-        let mut trials = Trials::default();
-        for trial in self.trials.iter() {
-            trials.add(self.record(trial)?.reread()?, trial.text());
-        }
-        self.trials = trials;
-        Ok(self)
     }
 }
 

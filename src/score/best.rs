@@ -7,7 +7,7 @@ use super::estimate::Estimate;
 use super::grid::{ClusterCount, Grid};
 use super::paired::difference;
 use super::pooled::pool;
-use super::significance::{Significance, SwapTest, holm, least_p, swap_test};
+use super::significance::{Significance, SwapMethod, SwapTest, holm, least_p, swap_test};
 use super::subject::Subject;
 use super::trapezoid::weights;
 use crate::types::{AxisLevel, KindReading};
@@ -82,8 +82,8 @@ pub struct AreaPair {
     pub difference: Estimate,
     /// p-value of swapping the two models in whole clusters.
     pub p: f64,
-    /// Number of random swaps behind the p-value; `None` if it is exact.
-    pub draws: Option<usize>,
+    /// How the p-value was found.
+    pub p_by: SwapMethod,
     /// p-value after Holm's correction over all pairs of models.
     pub holm: f64,
     pub significance: Significance,
@@ -294,7 +294,7 @@ impl Scores {
                     second: second.model.clone(),
                     difference,
                     p: tested.p,
-                    draws: tested.draws,
+                    p_by: tested.by,
                     holm: 1.0,
                     significance: Significance::NotShown,
                 });

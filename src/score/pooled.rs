@@ -11,7 +11,7 @@ use super::estimate::Estimate;
 use super::grid::Grid;
 use super::paired::difference;
 use super::pooled_kind::PooledKind;
-use super::significance::{Significance, holm, least_p, swap_test};
+use super::significance::{Significance, SwapMethod, holm, least_p, swap_test};
 use super::subject::{Subject, pooled_models};
 use crate::types::degradation::Kind;
 use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
@@ -42,8 +42,8 @@ pub struct PooledFinding {
     pub difference: Estimate,
     /// p-value of swapping the two sides in whole clusters, of all models at once.
     pub p: f64,
-    /// Number of random swaps behind the p-value; `None` if it is exact.
-    pub draws: Option<usize>,
+    /// How the p-value was found.
+    pub p_by: SwapMethod,
     /// p-value after Holm's correction over the levels of its set: the same kind, variant, enhancer and family.
     pub holm: f64,
     /// Number of findings in its set.
@@ -341,7 +341,7 @@ fn finding(
         second: mean(counted[1]),
         difference: difference(&sums.collect::<Vec<_>>(), squares as f64 / pairs / pairs, n),
         p: tested.p,
-        draws: tested.draws,
+        p_by: tested.by,
         holm: 1.0,
         levels: 1,
         verdict: Significance::NotShown,

@@ -38,6 +38,7 @@ pub(crate) fn rank_ranges(best: &BestInTheDark) -> Vec<RankRange> {
 mod tests {
     use super::super::best::{AreaPair, ModelArea};
     use super::super::estimate::Estimate;
+    use super::super::significance::SwapMethod;
     use super::*;
     use crate::types::KindReading;
 
@@ -59,7 +60,7 @@ mod tests {
             second: (*second).to_owned(),
             difference: share,
             p: 0.01,
-            draws: None,
+            p_by: SwapMethod::Counted,
             holm: 0.01,
             significance: *significance,
         });

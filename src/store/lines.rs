@@ -9,6 +9,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::pieces::{FileLine, LinePlace, Pieces};
+use super::record_log::RereadRecord;
 use super::stored_trial::StoredTrial;
 use super::trial_line::TrialLine;
 use crate::error::{Error, Result};
@@ -190,6 +191,11 @@ pub(super) trait StoredLine: DeserializeOwned + Send {
 }
 
 impl<D: Detail> StoredLine for Record<D> {
+    const WHAT: &str = A_RECORD;
+    const MEND: &str = MEND_A_RECORD;
+}
+
+impl<D: Detail> StoredLine for RereadRecord<D> {
     const WHAT: &str = A_RECORD;
     const MEND: &str = MEND_A_RECORD;
 }

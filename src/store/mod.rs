@@ -41,7 +41,7 @@ pub(crate) use column_file::{
 };
 pub(crate) use log_mark::LogMark;
 pub(crate) use pieces::LinePlace;
-pub(crate) use record_log::{QuestionFile, RecordLog, each_record, each_trial};
+pub(crate) use record_log::{QuestionFile, RecordLog, each_record, each_reread_record, each_trial};
 pub(crate) use stored_trial::StoredTrial;
 
 pub(crate) use folder::{

@@ -4,6 +4,9 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
+
 use super::folder::{QUESTIONS, RECORDS};
 use super::lines::each_placed_line;
 use super::pieces::LinePlace;
@@ -148,6 +151,29 @@ pub(crate) fn each_record<D: Detail>(
     take: impl FnMut(Record<D>, LinePlace),
 ) -> Result<()> {
     each_placed_line(&folder.join(RECORDS), take)
+}
+
+/// Hands over all records of a run folder as [`each_record`], with their replies read again by the rules of this version.
+///
+/// # Errors
+/// If a line is not a record, or the choices of a record are not valid.
+pub(crate) fn each_reread_record<D: Detail>(
+    folder: &Path,
+    mut take: impl FnMut(Record<D>, LinePlace),
+) -> Result<()> {
+    each_placed_line(&folder.join(RECORDS), |line: RereadRecord<D>, place| {
+        take(line.0, place);
+    })
+}
+
+/// A record whose reply is read again as its line is parsed.
+pub(super) struct RereadRecord<D>(Record<D>);
+
+impl<'de, D: Detail> Deserialize<'de> for RereadRecord<D> {
+    fn deserialize<S: Deserializer<'de>>(deserializer: S) -> std::result::Result<Self, S::Error> {
+        let record = Record::<D>::deserialize(deserializer)?;
+        record.reread().map(Self).map_err(S::Error::custom)
+    }
 }
 
 #[cfg(test)]

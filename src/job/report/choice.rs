@@ -22,14 +22,13 @@ use crate::store::Store;
 use crate::types::manifest::RunManifest;
 use crate::types::{ChoiceDetail, Truths};
 
-/// Reads the replies of a run again, and writes its report and manifest into its folder.
+/// Writes the report and the manifest of a run into its folder.
 pub(crate) fn write(
     store: &Store,
     mut run: StoredRun<ChoiceDetail>,
     show: StdoutFormat,
 ) -> Result<Outcome> {
     let manifest = run.manifest.clone();
-    run = run.reread()?;
     run.leave_out(ShownModels::Current);
     Ok(Outcome::wrote(
         store.folder(),

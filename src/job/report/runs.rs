@@ -378,7 +378,7 @@ fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<String> {
         store.write_manifest(&run.manifest)?;
     }
     if changed > 0 {
-        *run = StoredRun::of(&run.folder, run.manifest.clone())?;
+        *run = StoredRun::reread(&run.folder, run.manifest.clone())?;
     }
     Ok(lines)
 }

@@ -8,7 +8,7 @@ use crate::report::words::{counted, p, points};
 use crate::score::cluster::ClusterUnit;
 use crate::score::estimate::Estimate;
 use crate::score::pooled::PooledFinding;
-use crate::score::significance::Significance;
+use crate::score::significance::{Significance, SwapMethod};
 
 /// A finding in words.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -181,9 +181,13 @@ impl Numbers {
             let dropped = self.count("dropped", finding.dropped);
             parts.push(format!("{dropped} left out because a model has no reply"));
         }
-        if let Some(draws) = finding.draws {
-            let draws = self.count("draws", draws);
-            parts.push(format!("p by {draws} draws"));
+        match finding.p_by {
+            SwapMethod::Counted => {}
+            SwapMethod::Drawn(draws) => {
+                let draws = self.count("draws", draws);
+                parts.push(format!("p by {draws} random swaps"));
+            }
+            SwapMethod::Normal => parts.push("p by the normal distribution".to_owned()),
         }
         parts.join(", ")
     }

@@ -1,7 +1,7 @@
 //! The table of the models by area: each less each other, with its test.
 
 use crate::report::sentences::over_levels;
-use crate::report::table::ColumnKind::{Count, Number, P, Percent, Points, Significance, Text};
+use crate::report::table::ColumnKind::{Number, P, Percent, Points, Significance, Text};
 use crate::report::table::{Table, TableBuilder};
 use crate::report::words::{light, points};
 use crate::score::best::{AreaPair, BestInTheDark, ModelArea};
@@ -52,7 +52,7 @@ pub(super) fn best(findings: &Findings<'_>) -> Table {
             |(_, pair)| pair.difference,
         )
         .column(P, "csv p | page p", |(_, pair)| pair.p)
-        .column(Count, "csv draws", |(_, pair)| pair.draws)
+        .column(Text, "csv p_by", |(_, pair)| pair.p_by.to_string())
         .column(P, "csv p_holm | page p (Holm)", |(_, pair)| pair.holm)
         .column(Significance, "page", |(_, pair)| pair.significance)
         .column(Text, "csv verdict", |(_, pair)| pair.significance.word())

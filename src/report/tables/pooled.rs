@@ -10,6 +10,7 @@ use crate::score::confusion::FalseAnswer;
 use crate::score::findings::Findings;
 use crate::score::pooled::PooledFinding;
 use crate::score::pooled_kind::PooledKind;
+use crate::score::significance::SwapMethod;
 
 /// All families together, then by family.
 pub(super) fn pooled(findings: &Findings<'_>) -> Vec<Table> {
@@ -98,7 +99,7 @@ fn numbers(builder: TableBuilder<&PooledFinding>) -> TableBuilder<&PooledFinding
             |finding| finding.difference,
         )
         .column(P, "csv p | page p", |finding| finding.p)
-        .column(Count, "csv draws", |finding| finding.draws)
+        .column(Text, "csv p_by", |finding| finding.p_by.to_string())
         .column(
             P,
             "csv p_holm | terminal p (Holm) | page p (Holm)",
@@ -144,7 +145,7 @@ fn notes(findings: &[&PooledFinding], unit: &str) -> Vec<String> {
             counted(most.items + most.dropped, "item")
         ));
     }
-    notes.extend(draws(findings));
+    notes.extend(not_counted(findings));
     let least = findings
         .iter()
         .map(|finding| (finding.least_holm, finding.clusters));
@@ -152,11 +153,18 @@ fn notes(findings: &[&PooledFinding], unit: &str) -> Vec<String> {
     notes
 }
 
-fn draws(findings: &[&PooledFinding]) -> Option<String> {
-    let draws = findings.iter().find_map(|finding| finding.draws)?;
-    Some(format!(
-        "p by {draws} draws where the exact table would be too large"
-    ))
+/// How p was found where not all swaps were counted.
+fn not_counted(findings: &[&PooledFinding]) -> Option<String> {
+    let methods = findings.iter().map(|finding| finding.p_by);
+    let methods = methods.filter(|method| *method != SwapMethod::Counted);
+    let methods: BTreeSet<String> = methods.map(|method| method.to_string()).collect();
+    let methods: Vec<String> = methods.into_iter().collect();
+    (!methods.is_empty()).then(|| {
+        let methods = methods.join(" or ");
+        format!(
+            "p by {methods} where the table of all swaps would be too large (`p_by` in pooled.csv)"
+        )
+    })
 }
 
 /// The line below a table of tests in which no verdict is possible. `least` holds, for each test, the smallest corrected p-value

@@ -61,7 +61,7 @@ fn reported<D: Detail>(
     text: &str,
     write: impl FnOnce(&Store<D>, StoredRun<D>, StdoutFormat) -> Result<Outcome>,
 ) -> Result<Outcome> {
-    let mut run = StoredRun::of(store.folder(), manifest)?;
+    let mut run = StoredRun::reread(store.folder(), manifest)?;
     let trials = run.manifest.counts.trials.max(run.trials.len());
     let failed = run.trials.iter().map(TrialRef::failed);
     run.manifest.count(count(trials, failed));

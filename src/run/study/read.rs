@@ -126,7 +126,7 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
     }
     store.sync()?;
     warn_about(&counts.no_choice);
-    let mut run = StoredRun::of(&args.out, people_manifest)?;
+    let mut run = StoredRun::reread(&args.out, people_manifest)?;
     let failed = run.trials.iter().map(TrialRef::failed);
     run.manifest.count(count(run.trials.len(), failed));
     let mut outcome = choice::write(&store, run, args.show.format())?;

@@ -20,9 +20,10 @@ const LEAST_IN_BIN: usize = 20;
 /// Bins are drawn again in each draw. A draw has the noise of the replies twice, so that its squared error is too large by as much as
 /// the mean of the draws is above the estimate; the draws are moved by that.
 pub(super) fn estimate(draws: &Resamples, replies: &[ConfidentReply]) -> Estimate {
-    let once = vec![1; draws.clusters()];
-    let value = squared(replies, &once);
-    let drawn: Vec<f64> = draws.all().map(|times| squared(replies, times)).collect();
+    let value = squared(replies, |_| 1);
+    let drawn = draws.all();
+    let drawn = drawn.map(|draw| squared(replies, |cluster| draw.times(cluster)));
+    let drawn: Vec<f64> = drawn.collect();
     let bias = drawn.iter().sum::<f64>() / drawn.len().max(1) as f64 - value;
     let moved = drawn.into_iter().map(|drawn| drawn - bias).collect();
     let interval = draws.interval(moved).map(root);
@@ -56,8 +57,8 @@ impl Bin {
 }
 
 /// The squared error if each cluster counts so many times. Replies of equal confidence are in one bin.
-fn squared(replies: &[ConfidentReply], times: &[u8]) -> f64 {
-    let weight = |reply: &ConfidentReply| usize::from(times[reply.cluster as usize]);
+fn squared(replies: &[ConfidentReply], times: impl Fn(u32) -> usize) -> f64 {
+    let weight = |reply: &ConfidentReply| times(reply.cluster);
     let n: usize = replies.iter().map(weight).sum();
     let bins = (n / LEAST_IN_BIN).clamp(1, MOST_BINS);
     let (mut sum, mut before, mut number, mut bin) = (0.0, 0, 0, Bin::default());
@@ -105,14 +106,13 @@ mod tests {
         // 30 replies are one bin: 18 right of 30 at a confidence of 0.9.
         let made = replies((0..30).map(|i| (0.9, i < 18)));
         let expected = 0.3 * 0.3 - 0.6 * 0.4 / 29.0;
-        assert!((squared(&made, &[1; 30]) - expected).abs() < 1e-12);
+        assert!((squared(&made, |_| 1) - expected).abs() < 1e-12);
         // A cluster that counts twice is two replies.
-        let mut times = [1; 30];
-        times[0] = 2;
+        let times = |cluster: u32| if cluster == 0 { 2 } else { 1 };
         let (accuracy, n) = (19.0 / 31.0, 31.0);
         let gap: f64 = 0.9 - accuracy;
         let expected = gap * gap - accuracy * (1.0 - accuracy) / (n - 1.0);
-        assert!((squared(&made, &times) - expected).abs() < 1e-12);
+        assert!((squared(&made, times) - expected).abs() < 1e-12);
     }
 
     #[test]
@@ -120,11 +120,10 @@ mod tests {
         // 40 replies could be two bins, but all have one confidence: the order within says nothing.
         let made = replies((0..40).map(|i| (0.5, i < 20)));
         let mixed = replies((0..40).map(|i| (0.5, i % 2 == 0)));
-        let times = [1; 40];
-        assert!((squared(&made, &times) - squared(&mixed, &times)).abs() < 1e-15);
-        assert!(squared(&made, &times) < 0.0);
+        assert!((squared(&made, |_| 1) - squared(&mixed, |_| 1)).abs() < 1e-15);
+        assert!(squared(&made, |_| 1) < 0.0);
         // Two confidences are two bins: wrong at 0.3, right at 0.7.
         let two = replies((0..40).map(|i| (if i < 20 { 0.3 } else { 0.7 }, i >= 20)));
-        assert!((root(squared(&two, &times)) - 0.3).abs() < 1e-12);
+        assert!((root(squared(&two, |_| 1)) - 0.3).abs() < 1e-12);
     }
 }

@@ -12,6 +12,7 @@ use crate::score::estimate::Estimate;
 use crate::score::pooled::PooledFinding;
 use crate::score::pooled_kind::PooledKind;
 use crate::score::significance::Significance::{self, Better, NotShown, TooFewClusters, Worse};
+use crate::score::significance::SwapMethod;
 use crate::types::degradation::Kind;
 use crate::types::{AxisLevel, EnhancerName, KindReading, Severity};
 
@@ -47,7 +48,7 @@ fn finding(
             n: 1237,
         },
         p: 0.0124,
-        draws: None,
+        p_by: SwapMethod::Counted,
         holm: if verdict == NotShown { 0.062 } else { 0.0004 },
         levels: 5,
         verdict,
@@ -244,12 +245,12 @@ fn how_far_intervals_reach_is_a_range() {
 fn one_model_and_lost_items_are_named() {
     let mut one = finding(PooledKind::Darkness, 5, -0.3, Worse);
     one.models = vec!["gpt-4o".to_owned()];
-    (one.dropped, one.draws, one.clusters) = (100, Some(100_000), 1);
+    (one.dropped, one.p_by, one.clusters) = (100, SwapMethod::Drawn(100_000), 1);
     let said = checked(&darkness::with_variant(&[&one], None, ClusterUnit::Frame).unwrap());
     assert!(
         said.ends_with(
             "(gpt-4o: −30.0 [−34.0, −26.0], p < 0.001; a loss is shown at L5; n = 1,237 in 1 frame, 100 left out because a model has no \
-             reply, p by 100,000 draws)"
+             reply, p by 100,000 random swaps)"
         ),
         "{said}"
     );
