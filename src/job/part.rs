@@ -1,6 +1,7 @@
 //! What of a run a shard does: [`part`].
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::ops::Range;
 
 use super::shard::Shard;
@@ -28,13 +29,13 @@ pub(crate) fn part<Q>(
     let mut positions = HashMap::<String, usize>::new();
     let mut divided = Vec::new();
     for question in &questions {
-        let (next, name) = (positions.len(), source(question));
-        if !positions.contains_key(&name) {
+        let next = positions.len();
+        if let Entry::Vacant(place) = positions.entry(source(question)) {
             divided.push(Divided {
                 scene: scene(question),
-                cost: cost(&name),
+                cost: cost(place.key()),
             });
-            positions.insert(name, next);
+            place.insert(next);
         }
     }
     let own = own_sources(&divided, shard);

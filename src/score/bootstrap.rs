@@ -190,7 +190,11 @@ mod tests {
         let mut numbers = vec![0.0; 9000];
         numbers[77] = 1.0;
         let sums = draws.sums(&numbers);
-        let times = draws.all().map(|draw| draw.times(77) as f64);
-        assert!(sums.iter().zip(times).all(|(sum, times)| *sum == times));
+        let times = draws.all().map(|draw| draw.times(77));
+        assert!(
+            sums.iter()
+                .zip(times)
+                .all(|(sum, times)| (sum - times as f64).abs() < 0.5)
+        );
     }
 }

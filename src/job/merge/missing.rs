@@ -85,7 +85,7 @@ pub(super) fn warn_unfinished(parts: &[MergePart], plan: Option<&RunPlan>) {
 fn remedy(parts: &[MergePart], plan: Option<&RunPlan>, shards: &[Shard]) -> String {
     let models = parts
         .iter()
-        .flat_map(|part| part.manifest.columns.get("model"));
+        .filter_map(|part| part.manifest.columns.get("model"));
     let models = models.flat_map(|models| models.keys().map(String::as_str));
     let command = plan.and_then(|plan| plan.command(models));
     let command = command.unwrap_or_else(|| "the command of the parts with".to_owned());

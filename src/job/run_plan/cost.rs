@@ -72,13 +72,12 @@ fn add_group<E: Experiment>(
     cost: &mut FrameCost,
 ) {
     let models = experiment.models(0);
-    let shown: Vec<(usize, usize)> = match &group.condition {
-        None => Vec::new(),
-        Some(_) => {
-            let frames = source.order.iter().map(|place| source.frames[*place].size);
-            let sent = frames.map(|size| experiment.recipe().scaling.of(size));
-            sent.collect()
-        }
+    let shown: Vec<(usize, usize)> = if group.condition.is_some() {
+        let frames = source.order.iter().map(|place| source.frames[*place].size);
+        let sent = frames.map(|size| experiment.recipe().scaling.of(size));
+        sent.collect()
+    } else {
+        Vec::new()
     };
     if let Some(condition) = &group.condition {
         let each = match condition.enhancer {

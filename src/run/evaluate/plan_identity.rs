@@ -9,7 +9,7 @@ use crate::job::identity::{self, Identity};
 use crate::job::questions::ASK;
 use crate::job::recipe::Recipe;
 use crate::questions::rules::Rules;
-use crate::types::{AxisLevel, SetLight};
+use crate::types::{AxisLevel, Family, SetLight};
 
 /// The settings of data, questions and light. Models, enhancers and what is sent besides are not among them: they may be added to a
 /// plan later.
@@ -21,11 +21,7 @@ pub(super) fn plan_identity(config: &Evaluation, dataset: &Dataset) -> Result<Id
     };
     let rules = config.rules.digest();
     let is_own = Rules::built_in().is_ok_and(|built_in| built_in.digest() != rules);
-    let families: Vec<&str> = selection
-        .families
-        .iter()
-        .map(|family| family.name())
-        .collect();
+    let families: Vec<&str> = selection.families.iter().map(Family::name).collect();
     let bank = config.bank.as_ref();
     let usual = ReadingRule::default();
     let job = &config.job;

@@ -204,15 +204,12 @@ fn file_places(
     dataset: &Dataset,
     asked: &[Question],
 ) -> HashMap<QuestionId, usize> {
-    match &config.plan {
-        Some(plan) => {
-            let ids = asked.iter().map(|question| question.id.clone());
-            ids.zip(plan.question_places()).collect()
-        }
-        None => {
-            let ids = dataset.questions().iter().map(|question| &question.id);
-            ids.cloned().zip(0..).collect()
-        }
+    if let Some(plan) = &config.plan {
+        let ids = asked.iter().map(|question| question.id.clone());
+        ids.zip(plan.question_places()).collect()
+    } else {
+        let ids = dataset.questions().iter().map(|question| &question.id);
+        ids.cloned().zip(0..).collect()
     }
 }
 
