@@ -9,7 +9,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::pieces::{FileLine, LinePlace, Pieces};
-use super::record_log::RereadRecord;
+use super::reread_record::RereadRecord;
 use super::stored_trial::StoredTrial;
 use super::trial_line::TrialLine;
 use crate::error::{Error, Result};

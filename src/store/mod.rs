@@ -11,6 +11,7 @@ mod lines;
 mod log_mark;
 mod pieces;
 mod record_log;
+mod reread_record;
 mod stored_trial;
 mod trial_line;
 
