@@ -9,6 +9,7 @@ mod column_file;
 mod folder;
 mod lines;
 mod log_mark;
+mod own_files;
 mod pieces;
 mod record_log;
 mod reread_record;
@@ -36,6 +37,8 @@ use folder::{
     FIDELITY, QUESTIONS, RECORDS, THUMBNAILS, check_same_run, create_run, write, write_manifest,
 };
 use lines::{append, each_line, json_lines, lines, repair, set_aside};
+
+use own_files::check_own;
 
 pub(crate) use column_file::{
     CREATED_BY, Cell, CellKind, Column, ColumnFile, FileMetadata, Presence,
@@ -102,6 +105,7 @@ impl<D: Detail> Store<D> {
             Some(stored) => check_same_run(folder, &stored, manifest, address_change)?,
             None => create_run(folder, manifest)?,
         }
+        check_own(folder)?;
         let path = folder.join(RECORDS);
         let records = OpenOptions::new()
             .read(true)
@@ -118,7 +122,7 @@ impl<D: Detail> Store<D> {
             },
             TryLockError::Error(e) => Error::file(&path, "lock", e),
         })?;
-        repair(&path, &records)?;
+        repair::<Record<D>>(&path, &records)?;
         Ok(Self {
             folder: folder.to_owned(),
             records,

@@ -63,6 +63,7 @@ mod site;
 mod slurm;
 mod spreadsheets;
 mod statistics;
+mod strange_runs;
 mod synthesize;
 mod unlabelled;
 mod walks;
