@@ -64,6 +64,7 @@ mod slurm;
 mod spreadsheets;
 mod statistics;
 mod strange_runs;
+mod strange_texts;
 mod synthesize;
 mod unlabelled;
 mod walks;
