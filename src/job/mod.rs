@@ -51,6 +51,7 @@ pub(crate) mod record_table;
 mod renamed;
 pub(crate) mod report;
 pub(crate) mod run_files;
+pub(crate) mod run_parts;
 pub(crate) mod run_plan;
 mod run_texts;
 pub(crate) mod scaling;

@@ -53,6 +53,7 @@ mod realism;
 mod record_table;
 mod replicas;
 mod report;
+mod report_of_parts;
 mod rooms;
 mod same_bytes;
 mod sentences;

@@ -95,6 +95,7 @@ impl<D: Detail> Trials<D> {
             provider: record.provider,
             via: record.via,
         });
+        self.logs = self.logs.max(text.log() + 1);
         self.facts.push(TrialFacts {
             key: record.key,
             text,
