@@ -37,6 +37,8 @@ mod open_run;
 mod other_parts;
 mod outcome;
 pub(crate) mod part;
+pub(crate) mod part_args;
+mod part_cost;
 pub(crate) mod photograph;
 pub(crate) mod photographs;
 mod placed_trials;

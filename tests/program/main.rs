@@ -44,6 +44,7 @@ mod money;
 mod observer;
 mod openeqa;
 mod own_requests;
+mod parts_of_commands;
 mod photographs;
 mod pins;
 mod plan;

@@ -6,6 +6,7 @@ use super::coverage::Coverage;
 use super::no_part;
 use super::part::StoredPart;
 use crate::error::{Error, Result};
+use crate::job::part_cost::PartCost;
 use crate::types::InputSummary;
 use crate::types::manifest::{RunManifest, differences};
 
@@ -53,6 +54,7 @@ pub(super) fn joined_manifest(parts: &[StoredPart], coverage: &Coverage) -> Resu
     let mut manifest = first.ok_or_else(no_part)?.clone();
     manifest.shard = None;
     manifest.part = None;
+    PartCost::forget(&mut manifest);
     for other in manifests.clone() {
         for (column, values) in &other.columns {
             let all = manifest.columns.entry(column.clone()).or_default();
