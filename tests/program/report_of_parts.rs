@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::run::{Bench, words};
+use crate::support::run::{Bench, called, words};
 
 /// The files of a run that are no products of its report.
 const OWN_FILES: [&str; 6] = [
@@ -44,6 +44,14 @@ fn assert_report_of(merged: &Path, parts: &Path) {
     assert!(compared > 8, "{compared}");
 }
 
+/// Reports on the run `a` in a folder, named as the folder of parts is: a report has the name that its run is called by.
+fn report_in(bench: &Bench, folder: &str) -> String {
+    let mut command = bench.command(&["report", "a"]);
+    let reported = called(command.current_dir(bench.path(folder)));
+    assert_eq!(reported.code, Some(0), "{reported:?}");
+    reported.stdout
+}
+
 #[test]
 fn parts_report_what_the_merged_run_does() {
     let bench = Bench::new();
@@ -51,14 +59,15 @@ fn parts_report_what_the_merged_run_does() {
         bench.complete(&evaluation(&format!("--out a --shard {part}")));
     }
     bench.complete(&words("merge a --out whole/a"));
-    let merged = bench.complete(&words("report whole/a"));
+    let merged = report_in(&bench, "whole");
     let reported = bench.call(&words("report a"));
     assert_eq!(reported.code, Some(0), "{reported:?}");
     assert_eq!(reported.stderr, "");
-    assert_eq!(reported.stdout, merged.replace("whole/a/", "a/"));
+    assert_eq!(reported.stdout, merged);
     assert_report_of(&bench.path("whole/a"), &bench.path("a"));
     // The folder is still one of parts.
     bench.complete(&words("merge a --out again/a"));
+    report_in(&bench, "again");
     assert_report_of(&bench.path("again/a"), &bench.path("a"));
     // Beside another run it counts as one.
     bench.complete(&evaluation("--out b --blind-model random --seed 5"));
@@ -67,7 +76,10 @@ fn parts_report_what_the_merged_run_does() {
         "report whole/a b --out of-merged",
     ];
     let texts = texts.map(|line| bench.complete(&words(line)));
-    assert_eq!(texts[0].replace("of-parts", "of-merged"), texts[1]);
+    assert_eq!(
+        texts[0].replace("of-parts", "of-merged"),
+        texts[1].replace("whole/a", "a")
+    );
     let comparisons = ["of-parts", "of-merged"]
         .map(|out| fs::read(bench.path(out).join("comparisons.csv")).unwrap());
     assert_eq!(comparisons[0], comparisons[1]);
@@ -115,6 +127,7 @@ fn what_parts_lack_is_said_with_the_command_that_asks_it() {
     let before = fs::read(bench.path("a/summary.csv")).unwrap();
     let partial = bench.call(&words("merge a --out partial/a --partial"));
     assert_eq!(partial.code, Some(1), "{partial:?}");
+    report_in(&bench, "partial");
     assert_report_of(&bench.path("partial/a"), &bench.path("a"));
     bench.complete(&words(command.strip_prefix("darkqa-eval ").unwrap()));
     let whole = bench.call(&words("report a"));

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::alerts::alerts;
 use super::combine::{Combined, combine};
 use super::report_folder::ReportFolder;
-use super::whole_report::SUMMARY_JSON;
+use super::whole_report::with_summary;
 use super::{enhancers, own_answers};
 use crate::error::Result;
 use crate::files::write_with;
@@ -79,9 +79,8 @@ pub(super) fn files(
     combined: &Combined,
     runs: RunList<'_>,
 ) -> Result<Vec<(String, Vec<u8>)>> {
-    let mut files = products(report, &combined.shown())?;
-    files.push((SUMMARY_JSON.to_owned(), summary(report, runs)?.into_bytes()));
-    Ok(files)
+    let products = products(report, &combined.shown())?;
+    Ok(with_summary(products, summary(report, runs)?))
 }
 
 /// Writes the file that has a row for each item into a folder.

@@ -11,7 +11,7 @@ use super::enhancers;
 use super::join::join;
 use super::listing::listing;
 use super::report_folder::ReportFolder;
-use super::whole_report::{SUMMARY_JSON, WholeReport};
+use super::whole_report::{WholeReport, with_summary};
 use crate::error::{Error, Result};
 use crate::job::outcome::Outcome;
 use crate::job::outcome::StdoutFormat;
@@ -179,10 +179,8 @@ impl Scores {
 
 /// The files of the report of one run, by name.
 fn files(report: &OpenReport<'_>, tables: &[Table]) -> Result<Vec<(String, Vec<u8>)>> {
-    let mut files = products(report, tables)?;
-    let json = summary_json(report, tables, None)?;
-    files.push((SUMMARY_JSON.to_owned(), json.into_bytes()));
-    Ok(files)
+    let products = products(report, tables)?;
+    Ok(with_summary(products, summary_json(report, tables, None)?))
 }
 
 /// A run of open questions, or several joined to one, with its whole records.

@@ -6,7 +6,7 @@ use super::alerts::alerts_without_truths;
 use super::combine::{Combined, ties};
 use super::enhancers;
 use super::report_folder::ReportFolder;
-use super::whole_report::{SUMMARY_JSON, WholeReport};
+use super::whole_report::{WholeReport, with_summary};
 use crate::error::Result;
 use crate::job::StdoutFormat;
 use crate::job::stored::name;
@@ -89,9 +89,8 @@ fn files(
     combined: &Combined,
     runs: RunList<'_>,
 ) -> Result<Vec<(String, Vec<u8>)>> {
-    let mut files = products(report, &combined.shown())?;
-    files.push((SUMMARY_JSON.to_owned(), summary(report, runs)?.into_bytes()));
-    Ok(files)
+    let products = products(report, &combined.shown())?;
+    Ok(with_summary(products, summary(report, runs)?))
 }
 
 fn found(combined: &Combined) -> SelfAgreement<'_> {
