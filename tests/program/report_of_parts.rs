@@ -70,7 +70,7 @@ fn parts_report_what_the_merged_run_does() {
     report_in(&bench, "again");
     assert_report_of(&bench.path("again/a"), &bench.path("a"));
     // Beside another run it counts as one.
-    bench.complete(&evaluation("--out b --blind-model random --seed 5"));
+    bench.complete(&evaluation("--out b --seed 5"));
     let texts = [
         "report a b --out of-parts",
         "report whole/a b --out of-merged",
