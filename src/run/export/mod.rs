@@ -108,12 +108,7 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
     let shard = args.part.resolve()?;
     let asked: BTreeSet<&FrameId> = questions.iter().map(|question| &question.frame).collect();
     let names = names(asked.iter().copied());
-    let mut own: Vec<&FrameId> = asked.into_iter().collect();
-    keep_part(&mut own, shard)?;
-    let own: BTreeSet<&FrameId> = own.into_iter().collect();
-    let own_questions = questions.iter();
-    let own_questions = own_questions.filter(|question| own.contains(&question.frame));
-    let own_questions: Vec<Question> = own_questions.cloned().collect();
+    let own_questions = part_of_frames(&questions, asked, shard)?;
     let files = enhancers::read(&args.enhancers.llie)?;
     let recipe = Recipe::lossless(&light.kinds, &files);
     let workers = pool(args.loading.threads.threads)?;
@@ -176,20 +171,39 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
     for set in sets {
         paths.extend(set.finish()?);
     }
-    let mut output = format!(
+    let output = format!(
         "{} questions about {} images in {} conditions:\n",
         own_questions.len(),
         sources.len(),
         conditions.len()
     );
+    Ok(wrote(output, paths))
+}
+
+/// The outcome of a call that wrote these sets.
+fn wrote(mut output: String, paths: Vec<PathBuf>) -> Outcome {
     for path in &paths {
         let _ = writeln!(output, "{}", path.display());
     }
-    Ok(Outcome {
+    Outcome {
         status: Status::Complete,
         output,
         written: paths,
-    })
+    }
+}
+
+/// The questions about the frames of a part.
+fn part_of_frames(
+    questions: &[Question],
+    asked: BTreeSet<&FrameId>,
+    shard: Shard,
+) -> Result<Vec<Question>> {
+    let mut own: Vec<&FrameId> = asked.into_iter().collect();
+    keep_part(&mut own, shard)?;
+    let own: BTreeSet<&FrameId> = own.into_iter().collect();
+    let questions = questions.iter();
+    let own = questions.filter(|question| own.contains(&question.frame));
+    Ok(own.cloned().collect())
 }
 
 /// Refuses questions that show several images: the forms of the sets have one image a question.
