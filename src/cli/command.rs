@@ -95,6 +95,8 @@ pub(crate) enum Command {
     /// Write the low-light versions of images, as an evaluation would send them
     Synthesize(Box<SynthesizeArgs>),
     /// Compare the synthesis with real pairs of images in normal and low light
+    ///
+    /// It takes no --shard: its means, its pooled residuals and the fitted gain are over all pairs.
     Realism(Box<RealismArgs>),
     /// Measure your own camera, from bias frames and pairs of flats of its sensor, as a file for --camera
     Calibrate(Box<CalibrateArgs>),

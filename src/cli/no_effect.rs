@@ -70,6 +70,23 @@ pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
             idle.light(&args.light);
             idle.enhancement(&args.enhancers);
         }
+        Some(Command::Questions(args))
+            if args.shard.as_deref().is_some_and(|shard| shard != "none") =>
+        {
+            let of_all = [
+                "families",
+                "balance",
+                "room",
+                "candidates",
+                "stats",
+                "against",
+                "review",
+                "verdicts",
+                "json",
+            ];
+            let why = "a part measures its frames, and the same command without --shard makes the questions";
+            idle.because(why, &of_all.map(str::to_owned));
+        }
         Some(Command::Import(args)) if args.script => {
             let mut others = ids::<ImportArgs>();
             others.retain(|id| id != "kind" && id != "script");
@@ -407,6 +424,10 @@ mod tests {
         (
             "--model m --dry-run --no-parquet",
             "--no-parquet: no effect: --dry-run sends nothing",
+        ),
+        (
+            "questions data --out q.jsonl --shard 1/2 --balance none --json",
+            "--balance, --json: no effect: a part measures its frames, and the same command without --shard makes the questions",
         ),
         (
             "report a b --no-parquet",

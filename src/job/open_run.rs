@@ -18,6 +18,7 @@ use super::manifest;
 use super::models::{self, ModelUnderTest};
 use super::other_parts::OtherParts;
 use super::outcome::Outcome;
+use super::part_cost::PartCost;
 use super::plan::Plan;
 use super::progress::Progress;
 use super::record_table;
@@ -90,6 +91,18 @@ impl<E: Experiment> OpenRun<'_, E> {
         for phase in 0..E::PHASES.len() {
             let adapted = models::adapted(self.experiment.models(phase));
             self.manifest.settings.extend(adapted);
+        }
+        let models = every_model(self.experiment);
+        let answering = Answering {
+            models: &models,
+            manifest: Some(&self.manifest),
+        };
+        let cost = PartCost::of(settings, answering, || self.store.trials())?;
+        if let Some(cost) = cost {
+            cost.note(&mut self.manifest);
+            let shard = settings.shard;
+            self.progress
+                .note(&format!("shard {shard}: {}", cost.words()));
         }
         self.finish(end)
     }

@@ -13,6 +13,8 @@ use crate::types::{Detail, QuestionId, Record, RunQuestion, TextPlace};
 pub(crate) enum RunTexts<D> {
     /// In the files of the run.
     Stored(Arc<StoredTexts>),
+    /// In the files of its parts, by the number of the file in the place of a text.
+    Parts(Vec<Self>),
     /// In records that are held, by their numbers.
     Held(Arc<HeldTexts<D>>),
 }
@@ -52,6 +54,14 @@ impl<D: Detail> RunTexts<D> {
         })
     }
 
+    /// The texts in each file of a run, by the number of the file.
+    pub(crate) fn by_file(self) -> Vec<Self> {
+        match self {
+            Self::Parts(parts) => parts,
+            one => vec![one],
+        }
+    }
+
     /// The record of a trial.
     ///
     /// # Errors
@@ -62,6 +72,13 @@ impl<D: Detail> RunTexts<D> {
                 let line = texts.log.line_from(place.start())?;
                 texts.log.record(&line)
             }
+            Self::Parts(parts) => match parts.get(place.log()) {
+                Some(part) => part.record(place),
+                None => Err(Error::data(
+                    "records",
+                    format_args!("there is no part {}", place.log()),
+                )),
+            },
             Self::Held(texts) => {
                 let record = texts.records.get(place.start() as usize);
                 record.cloned().ok_or_else(|| {
@@ -97,6 +114,9 @@ impl<D: Detail> RunTexts<D> {
         };
         match self {
             Self::Stored(texts) => each_question(&texts.folder, add),
+            Self::Parts(parts) => parts
+                .iter()
+                .try_for_each(|part| part.questions(wanted, found)),
             Self::Held(texts) => {
                 texts.questions.iter().cloned().for_each(&mut add);
                 Ok(())

@@ -24,10 +24,20 @@ pub(crate) enum ShownModels {
     All,
 }
 
+/// Where the files of a run are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum RunLayout {
+    /// In its folder.
+    Whole,
+    /// In the folders of its parts, which are in its folder.
+    Parts,
+}
+
 /// A run as reports need it.
 #[derive(Clone)]
 pub(crate) struct StoredRun<D: Detail> {
     pub(crate) folder: PathBuf,
+    pub(crate) layout: RunLayout,
     pub(crate) manifest: RunManifest,
     pub(crate) trials: Trials<D>,
     /// The trials of models that a report leaves out.
@@ -96,6 +106,7 @@ impl<D: Detail> StoredRun<D> {
         sort(&mut trials, ids, &manifest.models);
         Ok(Self {
             folder: folder.to_owned(),
+            layout: RunLayout::Whole,
             manifest,
             trials,
             left_out: Trials::default(),
@@ -221,10 +232,7 @@ impl StoredRun<ChoiceDetail> {
     pub(crate) fn of_choices(folder: &Path, instead: &str) -> Result<Self> {
         match ExperimentKind::of(folder)? {
             ExperimentKind::Choice => Self::open(folder),
-            ExperimentKind::Open => Err(Error::Run {
-                path: folder.to_owned(),
-                problem: format!("the run asked open questions: {instead}"),
-            }),
+            ExperimentKind::Open => Err(open_questions(folder, instead)),
         }
     }
 
@@ -256,6 +264,14 @@ pub(crate) fn manifest(folder: &Path) -> Result<RunManifest> {
         ExperimentKind::Open => OpenDetail::SCHEMA,
     };
     store::read_manifest(folder, schema)?.ok_or_else(|| no_run(folder))
+}
+
+/// The error about a run of open questions, which tells the user what to do `instead`.
+pub(super) fn open_questions(folder: &Path, instead: &str) -> Error {
+    Error::Run {
+        path: folder.to_owned(),
+        problem: format!("the run asked open questions: {instead}"),
+    }
 }
 
 fn no_run(folder: &Path) -> Error {

@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::files;
 use crate::job::Outcome;
 use crate::job::report::site as collected;
-use crate::job::stored::AnyRun;
+use crate::job::run_parts::any_run;
 use crate::report::site::{DATA, PAGES, SCHEMA, products};
 use crate::types::Decides;
 use crate::types::manifest::Status;
@@ -36,7 +36,7 @@ pub(crate) struct SiteArgs {
 pub(crate) fn site(args: &SiteArgs) -> Result<Outcome> {
     check_distinct(&args.runs)?;
     check_target(&args.out)?;
-    let runs = args.runs.iter().map(|folder| AnyRun::open(folder));
+    let runs = args.runs.iter().map(|folder| any_run(folder));
     let site = collected(runs.collect::<Result<_>>()?)?;
     let mut output = String::new();
     for (run, why) in &site.others {

@@ -1,13 +1,13 @@
 //! The files of a run folder, and the check that a folder belongs to the requested run.
 
 use std::ffi::OsStr;
-use std::fs::{self, File, TryLockError};
+use std::fs::{self, TryLockError};
 use std::path::{Path, PathBuf};
 
 use rayon::slice::ParallelSliceMut;
 
 use super::lines::{StoredLine, each_line, each_placed_line, lines};
-use super::pieces::LinePlace;
+use super::pieces::{LinePlace, open_if_there};
 use super::stored_trial::StoredTrial;
 use crate::error::{Error, Result};
 use crate::files::{self, is_unfinished};
@@ -146,10 +146,8 @@ pub(crate) fn find(base: &Path, hash: &str) -> Option<PathBuf> {
 /// If its records cannot be opened.
 pub(crate) fn is_locked(folder: &Path) -> Result<bool> {
     let path = folder.join(RECORDS);
-    let records = match File::open(&path) {
-        Ok(records) => records,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(false),
-        Err(e) => return Err(Error::file(&path, "open", e)),
+    let Some(records) = open_if_there(&path)? else {
+        return Ok(false);
     };
     match records.try_lock_shared() {
         Ok(()) => Ok(false),

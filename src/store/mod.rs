@@ -7,6 +7,7 @@
 
 mod column_file;
 mod folder;
+mod image_notes;
 mod lines;
 mod log_mark;
 mod own_files;
@@ -17,7 +18,7 @@ mod stored_trial;
 mod trial_line;
 
 use std::borrow::Cow;
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::Write;
 use std::marker::PhantomData;
@@ -43,6 +44,7 @@ use own_files::check_own;
 pub(crate) use column_file::{
     CREATED_BY, Cell, CellKind, Column, ColumnFile, FileMetadata, Presence,
 };
+pub(crate) use image_notes::{more_fidelity, more_thumbnails};
 pub(crate) use log_mark::LogMark;
 pub(crate) use pieces::LinePlace;
 pub(crate) use record_log::{QuestionFile, RecordLog, each_record, each_reread_record, each_trial};
@@ -205,16 +207,9 @@ impl<D: Detail> Store<D> {
         folders: &[&Path],
         is_wanted: impl Fn(&FrameId) -> bool,
     ) -> Result<()> {
-        let present = read_thumbnails(&self.folder)?.into_iter();
-        let present = present.map(|thumbnail| (thumbnail.frame, thumbnail.condition));
-        let mut present: HashSet<_> = present.collect();
-        for folder in folders {
-            for thumbnail in read_thumbnails(folder)? {
-                let place = (thumbnail.frame.clone(), thumbnail.condition.clone());
-                if is_wanted(&thumbnail.frame) && present.insert(place) {
-                    self.append_thumbnail(&thumbnail)?;
-                }
-            }
+        let present = read_thumbnails(&self.folder)?;
+        for thumbnail in more_thumbnails(&present, folders, is_wanted)? {
+            self.append_thumbnail(&thumbnail)?;
         }
         Ok(())
     }
@@ -228,17 +223,9 @@ impl<D: Detail> Store<D> {
         folders: &[&Path],
         is_wanted: impl Fn(&FrameId) -> bool,
     ) -> Result<()> {
-        let present = read_fidelity(&self.folder)?.into_iter();
-        let mut present: HashSet<_> = present
-            .map(|image| (image.frame, image.condition))
-            .collect();
-        for folder in folders {
-            for image in read_fidelity(folder)? {
-                let place = (image.frame.clone(), image.condition.clone());
-                if is_wanted(&image.frame) && present.insert(place) {
-                    self.append_fidelity(&image)?;
-                }
-            }
+        let present = read_fidelity(&self.folder)?;
+        for image in more_fidelity(&present, folders, is_wanted)? {
+            self.append_fidelity(&image)?;
         }
         Ok(())
     }

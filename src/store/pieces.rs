@@ -52,20 +52,28 @@ pub(super) struct FileLine<'p> {
     pub(super) bytes: &'p [u8],
 }
 
+/// Opens a file to read it; `None` if there is no such file.
+///
+/// # Errors
+/// If it cannot be opened.
+pub(super) fn open_if_there(path: &Path) -> Result<Option<File>> {
+    match File::open(path) {
+        Ok(file) => Ok(Some(file)),
+        Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
+        Err(e) => Err(Error::file(path, "open", e)),
+    }
+}
+
 impl<'p> Pieces<'p> {
     /// Opens a file; `None` if there is no such file.
     pub(super) fn open(path: &'p Path) -> Result<Option<Self>> {
-        match File::open(path) {
-            Ok(file) => Ok(Some(Self {
-                path,
-                file,
-                unread: Vec::new(),
-                start: 0,
-                lines: 0,
-            })),
-            Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
-            Err(e) => Err(Error::file(path, "read", e)),
-        }
+        Ok(open_if_there(path)?.map(|file| Self {
+            path,
+            file,
+            unread: Vec::new(),
+            start: 0,
+            lines: 0,
+        }))
     }
 
     /// The next complete lines; `None` after the last. An incomplete last line is left out.

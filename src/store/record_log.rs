@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::folder::{QUESTIONS, RECORDS};
 use super::lines::each_placed_line;
-use super::pieces::LinePlace;
+use super::pieces::{LinePlace, open_if_there};
 use super::reread_record::RereadRecord;
 use super::trial_line::TrialLine;
 use crate::error::{Error, Result};
@@ -28,9 +28,8 @@ impl RecordLog {
     /// # Errors
     /// If there are none.
     pub(crate) fn open(folder: &Path) -> Result<Self> {
-        let path = folder.join(RECORDS);
-        let file = File::open(&path).map_err(|e| Error::file(&path, "open", e))?;
-        Ok(Self { path, file })
+        let missing = || Error::file(folder.join(RECORDS), "open", ErrorKind::NotFound.into());
+        Self::open_if_there(folder)?.ok_or_else(missing)
     }
 
     /// Opens the records of a run folder; `None` if there are none.
@@ -39,11 +38,8 @@ impl RecordLog {
     /// If they cannot be opened.
     pub(crate) fn open_if_there(folder: &Path) -> Result<Option<Self>> {
         let path = folder.join(RECORDS);
-        match File::open(&path) {
-            Ok(file) => Ok(Some(Self { path, file })),
-            Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
-            Err(e) => Err(Error::file(path, "open", e)),
-        }
+        let file = open_if_there(&path)?;
+        Ok(file.map(|file| Self { path, file }))
     }
 
     /// The line that begins at a place, with its end.
@@ -107,11 +103,8 @@ impl QuestionFile {
     /// If they cannot be opened.
     pub(crate) fn open(folder: &Path) -> Result<Option<Self>> {
         let path = folder.join(QUESTIONS);
-        match File::open(&path) {
-            Ok(file) => Ok(Some(Self { path, file })),
-            Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
-            Err(e) => Err(Error::file(path, "open", e)),
-        }
+        let file = open_if_there(&path)?;
+        Ok(file.map(|file| Self { path, file }))
     }
 
     /// The line at a place, with its end.

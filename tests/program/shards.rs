@@ -224,6 +224,33 @@ fn limits_and_means_are_shared_by_the_parts() {
     let half = "--levels L0 --rpm 7001 --out part --shard 2/2";
     bench.complete(&model_args(&base, half));
     assert_eq!(requests_per_minute("part/shard-2-of-2"), 3500);
+    // What a part leaves of its half is said and noted; a whole run has no share.
+    let paid = |more: &str| {
+        let flags = format!("--model gpt-4o --base-url {base} --data set.jsonl --levels L0");
+        bench.call(&words(&format!("{flags} --max-cost 8 {more}")))
+    };
+    bench.complete(&words("rooms --out rooms --frames 2 --size 96x64"));
+    let of_part = bench.call(&words(&format!(
+        "--model gpt-4o --base-url {base} --data rooms --levels L0 --max-cost 8 --out paid --shard 1/2"
+    )));
+    assert_eq!(of_part.code, Some(0), "{of_part:?}");
+    let words_of = of_part.stderr.split("shard 1/2: ").nth(1).unwrap();
+    assert!(
+        words_of.contains("of its $4.00 of --max-cost are left"),
+        "{words_of}"
+    );
+    let text = fs::read(bench.path("paid/shard-1-of-2/manifest.json")).unwrap();
+    let manifest: Value = serde_json::from_slice(&text).unwrap();
+    let noted = &manifest["settings"]["--max-cost of this part"];
+    let number = |name: &str| noted[name].as_f64().unwrap();
+    assert!(number("spent") > 0.0, "{noted}");
+    assert!(
+        (number("share") - number("spent") - number("left")).abs() < 1e-9,
+        "{noted}"
+    );
+    let whole = paid("--out unshared");
+    assert_eq!(whole.code, Some(0), "{whole:?}");
+    assert!(!whole.stderr.contains("are left"), "{}", whole.stderr);
     // Half of what may be spent is less than a reply costs.
     let dear = format!(
         "--model gpt-4o --base-url {base} --levels L0 --max-cost 0.0001 --out dear --shard 1/2"

@@ -98,6 +98,11 @@ fn seven_parts_of_which_one_is_killed_go_on_in_other_numbers() {
     );
     let merged = bench.call(&words("merge parts --out merged"));
     assert_eq!(merged.code, Some(0), "{merged:?}");
+    // The killed part is not named: the others have all that it was to ask.
+    assert_eq!(merged.stderr, "");
+    let reported = bench.call(&words("report parts --out reported"));
+    assert_eq!(reported.stderr, "");
+    assert_same_products(&bench.path("reported"), &bench.path("merged"));
     assert_eq!(asked(&bench.path("whole")), asked(&bench.path("merged")));
     let compared = assert_same_products(&bench.path("whole"), &bench.path("merged"));
     assert!(compared > 5, "{compared}");

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use super::alerts::alerts;
 use super::combine::{Combined, combine};
-use super::whole_report::SUMMARY_JSON;
+use super::report_folder::ReportFolder;
+use super::whole_report::with_summary;
 use super::{enhancers, own_answers};
 use crate::error::Result;
 use crate::files::write_with;
@@ -33,28 +34,35 @@ pub(crate) fn write(
     Ok(Outcome::wrote(
         store.folder(),
         manifest.status,
-        in_its_folder(store, &manifest, &combine(vec![run])?, show)?,
+        in_its_folder(
+            &ReportFolder::Run(store),
+            &manifest,
+            &combine(vec![run])?,
+            show,
+        )?,
     )
     .in_format(show))
 }
 
+/// Writes the report of one run; returns the text for standard output.
+///
+/// # Errors
+/// If a file cannot be written.
 pub(super) fn in_its_folder(
-    store: &Store,
+    target: &ReportFolder<'_, ChoiceDetail>,
     manifest: &RunManifest,
     combined: &Combined,
     show: StdoutFormat,
 ) -> Result<String> {
     if combined.truths() == Truths::Unknown {
-        return own_answers::in_its_folder(store, manifest, combined, show);
+        return own_answers::in_its_folder(target, manifest, combined, show);
     }
-    let (folder, findings) = (store.folder(), combined.findings());
+    let (folder, findings) = (target.path(), combined.findings());
     let report = ChoiceReport::new(&findings, alerts(combined, &findings))
         .with_enhancers(&enhancers::rows(&combined.runs));
-    for (name, content) in files(&report, combined, RunList::One(manifest, None))? {
-        store.write(&name, &content)?;
-    }
+    let files = files(&report, combined, RunList::One(manifest, None))?;
     write_rows(&findings, folder)?;
-    store.write_manifest(manifest)?;
+    target.write(&files, manifest)?;
     if show == StdoutFormat::Json {
         return summary(&report, RunList::One(manifest, Some(folder)));
     }
@@ -71,9 +79,8 @@ pub(super) fn files(
     combined: &Combined,
     runs: RunList<'_>,
 ) -> Result<Vec<(String, Vec<u8>)>> {
-    let mut files = products(report, &combined.shown())?;
-    files.push((SUMMARY_JSON.to_owned(), summary(report, runs)?.into_bytes()));
-    Ok(files)
+    let products = products(report, &combined.shown())?;
+    Ok(with_summary(products, summary(report, runs)?))
 }
 
 /// Writes the file that has a row for each item into a folder.

@@ -7,6 +7,7 @@ use super::combine::{Combined, combine};
 use super::runs::distinct;
 use super::whole_report::no_records;
 use crate::error::{Error, Result};
+use crate::job::run_parts::choice_run;
 use crate::job::stored::{ShownModels, StoredRun};
 use crate::report::alert::Alert;
 use crate::score::findings::Findings;
@@ -28,7 +29,7 @@ impl FigureRuns {
         let runs = folders.into_iter().map(|folder| {
             let instead =
                 "figures draws runs of questions with choices; `report` draws the figures of these";
-            let mut run: StoredRun<ChoiceDetail> = StoredRun::of_choices(folder, instead)?;
+            let mut run: StoredRun<ChoiceDetail> = choice_run(folder, instead)?;
             if run.trials.is_empty() {
                 return Err(no_records(run.folder));
             }

@@ -7,7 +7,7 @@ use super::cost::cost;
 use super::lights::Lights;
 use super::models::Names;
 use crate::error::Result;
-use crate::job::stored::{RunTexts, StoredRun};
+use crate::job::stored::{RunLayout, RunTexts, StoredRun};
 use crate::types::manifest::RunManifest;
 use crate::types::{
     Condition, Detail, FrameId, ImageFidelity, ModelListing, QuestionId, RunQuestion, Thumbnail,
@@ -35,6 +35,7 @@ pub(super) struct Joined<D: Detail> {
 /// One of the joined runs.
 pub(super) struct JoinedRun {
     pub(super) folder: PathBuf,
+    pub(super) layout: RunLayout,
     pub(super) name: String,
     pub(super) manifest: RunManifest,
     pub(super) cost: Option<String>,
@@ -232,7 +233,7 @@ impl<D: Detail> Joined<D> {
         let left_out = left_out.map(|(model, _)| model.to_owned()).collect();
         let served = served(&run.trials);
         let (trials, replies, added) = self.add_trials(run.trials, index, known);
-        self.texts.push(run.texts);
+        self.texts.extend(run.texts.by_file());
         let questions = if known.trials.is_some() {
             self.add_questions(&run.questions, known);
             run.questions
@@ -252,6 +253,7 @@ impl<D: Detail> Joined<D> {
         }
         Ok(JoinedRun {
             folder: run.folder,
+            layout: run.layout,
             name,
             manifest: run.manifest,
             cost,

@@ -14,6 +14,7 @@ mod listing;
 mod models;
 pub(crate) mod open;
 mod own_answers;
+mod report_folder;
 mod rereading;
 mod runs;
 mod settings;

@@ -10,12 +10,13 @@ use super::combine::typed;
 use super::enhancers;
 use super::join::join;
 use super::listing::listing;
-use super::whole_report::{SUMMARY_JSON, WholeReport};
+use super::report_folder::ReportFolder;
+use super::whole_report::{WholeReport, with_summary};
 use crate::error::{Error, Result};
 use crate::job::outcome::Outcome;
 use crate::job::outcome::StdoutFormat;
 use crate::job::predictions::{AnswerState, Prediction, predictions};
-use crate::job::stored::{ShownModels, StoredRun, name, sort};
+use crate::job::stored::{RunLayout, ShownModels, StoredRun, name, sort};
 use crate::report::alert::{Alert, AlertKind};
 use crate::report::markdown::MarkdownReport;
 use crate::report::openeqa::{OpenReport, ReportedAnswer, products, render, summary_json, tables};
@@ -163,29 +164,29 @@ impl Scores {
         }
     }
 
-    /// Writes the report and the manifest into the run's folder; returns the text for standard output.
-    pub(crate) fn write(&self, store: &Store<OpenDetail>, show: StdoutFormat) -> Result<String> {
+    /// Writes the report of the run; returns the text for standard output.
+    pub(super) fn write(
+        &self,
+        target: &ReportFolder<'_, OpenDetail>,
+        show: StdoutFormat,
+    ) -> Result<String> {
         let report = self.report();
         let tables = tables(&report);
-        for (name, content) in files(&report, &tables)? {
-            store.write(&name, &content)?;
-        }
-        store.write_manifest(&self.run.manifest)?;
+        target.write(&files(&report, &tables)?, &self.run.manifest)?;
         self.show(&report, &tables, show)
     }
 }
 
 /// The files of the report of one run, by name.
 fn files(report: &OpenReport<'_>, tables: &[Table]) -> Result<Vec<(String, Vec<u8>)>> {
-    let mut files = products(report, tables)?;
-    let json = summary_json(report, tables, None)?;
-    files.push((SUMMARY_JSON.to_owned(), json.into_bytes()));
-    Ok(files)
+    let products = products(report, tables)?;
+    Ok(with_summary(products, summary_json(report, tables, None)?))
 }
 
 /// A run of open questions, or several joined to one, with its whole records.
 pub(crate) struct OpenRun {
     pub(crate) folder: PathBuf,
+    pub(crate) layout: RunLayout,
     pub(crate) manifest: RunManifest,
     /// In the order of the questions, conditions and models.
     pub(crate) records: Vec<Record<OpenDetail>>,
@@ -261,6 +262,7 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
     let run = OpenRun {
         records: trials.iter().map(TrialRef::record).collect(),
         folder: first.folder,
+        layout: first.layout,
         manifest: first.manifest,
         questions: joined.questions,
         thumbnails: joined.thumbnails,
@@ -287,7 +289,7 @@ pub(crate) fn write(
     Ok(Outcome::wrote(
         store.folder(),
         scores.run.manifest.status,
-        scores.write(store, show)?,
+        scores.write(&ReportFolder::Run(store), show)?,
     )
     .in_format(show))
 }

@@ -5,7 +5,8 @@ use std::path::Path;
 use super::alerts::alerts_without_truths;
 use super::combine::{Combined, ties};
 use super::enhancers;
-use super::whole_report::{SUMMARY_JSON, WholeReport};
+use super::report_folder::ReportFolder;
+use super::whole_report::{WholeReport, with_summary};
 use crate::error::Result;
 use crate::job::StdoutFormat;
 use crate::job::stored::name;
@@ -15,7 +16,6 @@ use crate::report::markdown::MarkdownReport;
 use crate::report::products::PAGE;
 use crate::report::self_agreement::{AgreementReport, TextLength, products, summary, text};
 use crate::score::self_agreement::SelfAgreement;
-use crate::store::Store;
 use crate::types::ChoiceDetail;
 use crate::types::manifest::RunManifest;
 
@@ -27,18 +27,16 @@ pub(super) struct ReportOutput {
 
 /// Writes the report and the manifest of a run into its folder; returns the text for standard output.
 pub(super) fn in_its_folder(
-    store: &Store<ChoiceDetail>,
+    target: &ReportFolder<'_, ChoiceDetail>,
     manifest: &RunManifest,
     combined: &Combined,
     show: StdoutFormat,
 ) -> Result<String> {
     let found = found(combined);
     let report = report(combined, &found, &[]);
-    for (name, content) in files(&report, combined, RunList::One(manifest, None))? {
-        store.write(&name, &content)?;
-    }
-    store.write_manifest(manifest)?;
-    let folder = store.folder();
+    let files = files(&report, combined, RunList::One(manifest, None))?;
+    target.write(&files, manifest)?;
+    let folder = target.path();
     let runs = [(manifest, folder)];
     Ok(match length(show) {
         None if show == StdoutFormat::Markdown => markdown(&report, &runs),
@@ -91,9 +89,8 @@ fn files(
     combined: &Combined,
     runs: RunList<'_>,
 ) -> Result<Vec<(String, Vec<u8>)>> {
-    let mut files = products(report, &combined.shown())?;
-    files.push((SUMMARY_JSON.to_owned(), summary(report, runs)?.into_bytes()));
-    Ok(files)
+    let products = products(report, &combined.shown())?;
+    Ok(with_summary(products, summary(report, runs)?))
 }
 
 fn found(combined: &Combined) -> SelfAgreement<'_> {

@@ -11,6 +11,7 @@ use super::choice::{files as report_files, in_its_folder, text, write_rows};
 use super::combine::{Combined, combine};
 use super::common::restrict;
 use super::enhancers;
+use super::report_folder::write_in_place;
 use super::rereading::LenientChange;
 use super::whole_report::no_records;
 use super::{open, own_answers};
@@ -18,7 +19,8 @@ use crate::error::{Error, Result};
 use crate::files;
 use crate::job::folder::now;
 use crate::job::record_table;
-use crate::job::stored::{AnyRun, ShownModels, StoredRun, name};
+use crate::job::run_parts::{any_run, choice_run};
+use crate::job::stored::{AnyRun, RunLayout, ShownModels, StoredRun, name};
 use crate::job::{Outcome, ShowArgs, StdoutFormat, count};
 use crate::report::alert::Alert;
 use crate::report::choice_report::ChoiceReport;
@@ -31,7 +33,7 @@ use crate::types::{ChoiceDetail, Decides, Detail as _, ModelColumn, OpenDetail, 
 /// The flags of `report`.
 #[derive(Debug, Args)]
 pub(crate) struct ReportArgs {
-    /// The folders of the runs; several runs are compared
+    /// The folders of the runs, or of all parts of a run; several runs are compared
     #[arg(value_name = "RUN", required = true, add = Decides::Nothing)]
     pub runs: Vec<PathBuf>,
     /// Read all stored replies again by the rules of this version; asks nothing, and stores the readings that changed
@@ -119,7 +121,7 @@ pub(crate) fn report(args: &ReportArgs) -> Result<Outcome> {
     let (folders, again) = distinct(&args.runs);
     let (mut choice, mut open) = (Vec::new(), Vec::new());
     for folder in folders {
-        match AnyRun::open(folder)? {
+        match any_run(folder)? {
             AnyRun::Choice(run) => choice.push(run),
             AnyRun::Open(run) => open.push(run),
         }
@@ -177,8 +179,7 @@ fn of_choices(
         reread_lines.clear();
     }
     let old = args.baseline.baseline.as_ref().map(|folder| {
-        let mut old =
-            StoredRun::of_choices(folder, "--baseline compares runs of questions with choices")?;
+        let mut old = choice_run(folder, "--baseline compares runs of questions with choices")?;
         old.leave_out(args.shown());
         Ok::<_, Error>((runs.clone(), old))
     });
@@ -197,27 +198,26 @@ fn of_choices(
     let is_worse = judged.map(|baseline| baseline.is_worse(combined.unit()));
     let is_worse = is_worse.transpose()?.unwrap_or(false);
     let in_folder = args.out.is_none() && !args.common && baseline.is_none() && again.is_empty();
-    let mut folder = None;
-    let reported = match &*combined.runs {
-        [run] if in_folder => {
-            match Store::open_read(&run.folder, &run.manifest, AddressChange::Allowed) {
-                Ok(store) => {
-                    let text = in_its_folder(&store, &run.manifest, &combined, args.format())?;
-                    folder = Some(run.folder.clone());
-                    Outcome::wrote(&run.folder, Status::Complete, text)
-                }
-                // A run that another process writes, or in a read-only folder, is shown anyway.
-                Err(error) => {
-                    tracing::warn!("the report is not written: {error}");
-                    compare(&combined, baseline.as_ref(), args, again)?
-                }
-            }
-        }
+    let place = match &*combined.runs {
+        [run] if in_folder => Some((run.folder.clone(), run.layout)),
+        _ => None,
+    };
+    let written = place.as_ref().map(|(folder, layout)| {
+        let manifest = &combined.runs[0].manifest;
+        write_in_place((folder, *layout), manifest, |target| {
+            in_its_folder(target, manifest, &combined, args.format())
+        })
+    });
+    let text = written.transpose()?.flatten();
+    let place = place.filter(|_| text.is_some());
+    let reported = match (&place, text) {
+        (Some((folder, _)), Some(text)) => Outcome::wrote(folder, Status::Complete, text),
         _ => compare(&combined, baseline.as_ref(), args, again)?,
     };
     // The table takes as much memory as the trials.
     drop(combined);
-    if let Some(folder) = folder {
+    // Each part has a table of its own records.
+    if let Some((folder, RunLayout::Whole)) = place {
         record_table::update(&folder, args.show.show.table())?;
     }
     // A command whose outcome is not what was asked for ends with 1.
@@ -337,13 +337,15 @@ fn of_open(
     let scores = open::Scores::new(joined)?;
     let run = &scores.run;
     if is_single && args.out.is_none() {
-        match Store::open_read(&run.folder, &run.manifest, AddressChange::Allowed) {
-            Ok(store) => {
-                let text = scores.write(&store, args.format())?;
+        let place = (&*run.folder, run.layout);
+        let text = write_in_place(place, &run.manifest, |target| {
+            scores.write(target, args.format())
+        })?;
+        if let Some(text) = text {
+            if run.layout == RunLayout::Whole {
                 record_table::update(&run.folder, args.show.show.table())?;
-                return Ok(Outcome::wrote(&run.folder, Status::Complete, text));
             }
-            Err(error) => tracing::warn!("the report is not written: {error}"),
+            return Ok(Outcome::wrote(&run.folder, Status::Complete, text));
         }
     }
     let files = match args.out {
@@ -355,7 +357,17 @@ fn of_open(
 
 /// Reads all stored replies again, and stores the readings that changed, with the version of the reading; returns lines about the
 /// change.
+///
+/// # Errors
+/// If the run is in parts, or one of its files cannot be read or written.
 fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<String> {
+    if run.layout == RunLayout::Parts {
+        let problem = format!(
+            "{} holds the parts of a run, and their readings are stored in each: name the parts, or merge them, which reads all replies again",
+            run.folder.display()
+        );
+        return Err(Error::usage("--rescore", problem));
+    }
     let mut store = Store::open(&run.folder, &run.manifest, AddressChange::Allowed)?;
     let mut changed = 0;
     let mut lenient = LenientChange::of(&run.manifest);

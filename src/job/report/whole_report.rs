@@ -7,7 +7,7 @@ use crate::job::stored::{ShownModels, StoredRun};
 use crate::types::Detail;
 
 /// Name of the file with the rows of the summary.
-pub(super) const SUMMARY_JSON: &str = "summary.json";
+const SUMMARY_JSON: &str = "summary.json";
 
 /// What a report of one run consists of.
 pub(crate) struct WholeReport {
@@ -15,6 +15,15 @@ pub(crate) struct WholeReport {
     pub(crate) files: Vec<(String, Vec<u8>)>,
     /// The findings and the table by level, as Markdown.
     pub(crate) markdown: String,
+}
+
+/// The products of a report, and its summary as JSON, by name.
+pub(super) fn with_summary(
+    mut products: Vec<(String, Vec<u8>)>,
+    summary: String,
+) -> Vec<(String, Vec<u8>)> {
+    products.push((SUMMARY_JSON.to_owned(), summary.into_bytes()));
+    products
 }
 
 /// A run without the models that a report leaves out.

@@ -24,7 +24,7 @@ const PICTURE: &str = "doctor.png";
 pub(crate) struct DoctorArgs {
     /// Run the model on dark versions of the images with each convention that could be meant, and write doctor.html and doctor.png
     /// into the folder of --out, with the sidecar that would mend it; ends with 0 if there is one plausible convention, else with 1
-    #[arg(long, conflicts_with = "describe", requires = "out", add = Decides::Nothing)]
+    #[arg(long, conflicts_with_all = ["describe", "shard"], requires = "out", add = Decides::Nothing)]
     pub doctor: bool,
     /// Write the sidecar that --doctor proposes beside the model; an existing one is never replaced
     #[arg(long, requires = "doctor", add = Decides::Nothing)]

@@ -16,6 +16,7 @@ use crate::job::Outcome;
 use crate::job::dark_frames::{darkened, evenly};
 use crate::job::enhancers::{EnhancerRunArgs, OpenEnhancers};
 use crate::job::input_tally::InputTally;
+use crate::job::part_args::{PartArgs, keep_part};
 use crate::job::progress::Progress;
 use crate::types::manifest::Status;
 use crate::types::{Decides, Rgb};
@@ -39,7 +40,7 @@ pub(crate) struct EnhanceArgs {
     #[arg(long, value_name = "DIR", required_unless_present = "describe", add = Decides::Nothing)]
     pub out: Option<PathBuf>,
     /// Print how the model's input and output are read, and why; enhances nothing
-    #[arg(long, conflicts_with_all = ["inputs", "out"], add = Decides::Nothing)]
+    #[arg(long, conflicts_with_all = ["inputs", "out", "shard"], add = Decides::Nothing)]
     pub describe: bool,
     /// The flags of the examination.
     #[command(flatten)]
@@ -47,6 +48,9 @@ pub(crate) struct EnhanceArgs {
     /// The flags for running enhancers.
     #[command(flatten)]
     pub loading: EnhancerRunArgs,
+    /// The part of the images.
+    #[command(flatten)]
+    pub part: PartArgs,
     /// Replace images that exist already
     #[arg(long, help_heading = "Output", add = Decides::Nothing)]
     pub force: bool,
@@ -72,11 +76,12 @@ pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome
     let Some(out) = &args.out else {
         return Ok(Outcome::text(Status::Complete, enhancer.describe()));
     };
-    let images = Inputs::open(
+    let mut images = Inputs::open(
         &args.inputs,
         &args.root.data_root,
         args.codes.rule(args.limit),
     )?;
+    keep_part(&mut images.entries, args.part.resolve()?)?;
     let sample = evenly(images.entries.len(), FRAMES).into_iter();
     let sample = sample.map(|place| images.picture(&images.entries[place])?.decode());
     // An image that cannot be read is named when its turn comes.

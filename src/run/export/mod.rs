@@ -19,10 +19,12 @@ use crate::job::conditions::{check_enhanced, check_used, conditions};
 use crate::job::enhancers::{self, EnhancerRunArgs, OpenEnhancers};
 use crate::job::frame_work::{FrameWork, ImageSteps};
 use crate::job::image_pipeline::ImagePipeline;
+use crate::job::part_args::{PartArgs, keep_part};
 use crate::job::photographs;
 use crate::job::progress::Progress;
 use crate::job::questions::{open_data, rules, select};
 use crate::job::recipe::Recipe;
+use crate::job::shard::Shard;
 use crate::job::source::{Source, input_summary, inspect_all, warn_of_inputs};
 use crate::job::timings::Timings;
 use crate::job::workers::pool;
@@ -30,7 +32,7 @@ use crate::synthesis::{LightArgs, LightSettings};
 use crate::types::manifest::Status;
 use crate::types::{Condition, Decides, FrameId, Question};
 
-use set::{ReadySet, SetForm};
+use set::{ReadySet, SetForm, SetPlace};
 
 /// The flags of `export`.
 #[derive(Debug, Args)]
@@ -68,6 +70,9 @@ pub(crate) struct ExportArgs {
     /// The flags for running enhancers.
     #[command(flatten)]
     pub loading: EnhancerRunArgs,
+    /// The part of the frames.
+    #[command(flatten)]
+    pub part: PartArgs,
     /// Replace sets that exist already
     #[arg(long, help_heading = "Output", add = Decides::Nothing)]
     pub force: bool,
@@ -100,21 +105,28 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
     }
     let questions = select(dataset.questions().to_vec(), &args.selection)?;
     refuse_several_images(&dataset, &questions)?;
+    let shard = args.part.resolve()?;
+    let asked: BTreeSet<&FrameId> = questions.iter().map(|question| &question.frame).collect();
+    let names = names(asked.iter().copied());
+    let own_questions = part_of_frames(&questions, asked, shard)?;
     let files = enhancers::read(&args.enhancers.llie)?;
     let recipe = Recipe::lossless(&light.kinds, &files);
     let workers = pool(args.loading.threads.threads)?;
-    let mut sources = workers.install(|| inspect_all(&dataset, &questions, progress))?;
+    let mut sources = workers.install(|| inspect_all(&dataset, &own_questions, progress))?;
     if !light.matches.is_empty() {
         workers.install(|| photographs::measure(&dataset, &mut sources))?;
     }
-    photographs::check_matches(&sources, &light.matches)?;
+    if !shard.is_part() {
+        // Frames of another part may have photographs.
+        photographs::check_matches(&sources, &light.matches)?;
+    }
     let photographed = photographs::names(&sources);
     let on = enhancement.on();
     let conditions = conditions(&light, &photographed, on, &recipe.enhancers);
     check_enhanced(&conditions, &enhancement)?;
     warn_of_inputs(&input_summary(&sources));
     recipe.check(&sources, &conditions)?;
-    let mut sets = open_sets(args, &dataset, &conditions, &questions)?;
+    let mut sets = open_sets((args, shard), &dataset, &conditions, &questions)?;
     let mut pipeline = ImagePipeline {
         steps: ImageSteps {
             frames: &dataset,
@@ -132,7 +144,6 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
         .iter()
         .map(|source| (&source.name, source))
         .collect();
-    let names = names(frames.keys().copied());
     let bar = progress.bar("images", frames.len() * conditions.len());
     workers.install(|| {
         for (frame, source) in &frames {
@@ -158,22 +169,41 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
     drop(bar);
     let mut paths = Vec::new();
     for set in sets {
-        paths.push(set.finish()?);
+        paths.extend(set.finish()?);
     }
-    let mut output = format!(
+    let output = format!(
         "{} questions about {} images in {} conditions:\n",
-        questions.len(),
+        own_questions.len(),
         sources.len(),
         conditions.len()
     );
+    Ok(wrote(output, paths))
+}
+
+/// The outcome of a call that wrote these sets.
+fn wrote(mut output: String, paths: Vec<PathBuf>) -> Outcome {
     for path in &paths {
         let _ = writeln!(output, "{}", path.display());
     }
-    Ok(Outcome {
+    Outcome {
         status: Status::Complete,
         output,
         written: paths,
-    })
+    }
+}
+
+/// The questions about the frames of a part.
+fn part_of_frames(
+    questions: &[Question],
+    asked: BTreeSet<&FrameId>,
+    shard: Shard,
+) -> Result<Vec<Question>> {
+    let mut own: Vec<&FrameId> = asked.into_iter().collect();
+    keep_part(&mut own, shard)?;
+    let own: BTreeSet<&FrameId> = own.into_iter().collect();
+    let questions = questions.iter();
+    let own = questions.filter(|question| own.contains(&question.frame));
+    Ok(own.cloned().collect())
 }
 
 /// Refuses questions that show several images: the forms of the sets have one image a question.
@@ -195,14 +225,21 @@ fn refuse_several_images(dataset: &Dataset, questions: &[Question]) -> Result<()
 }
 
 fn open_sets(
-    args: &ExportArgs,
+    (args, shard): (&ExportArgs, Shard),
     dataset: &Dataset,
     conditions: &[Condition],
     questions: &[Question],
 ) -> Result<Vec<ReadySet>> {
     let sets: Vec<ReadySet> = conditions
         .iter()
-        .map(|condition| ReadySet::new(args.kind, &args.out, dataset.name(), condition, questions))
+        .map(|condition| {
+            let place = SetPlace {
+                out: &args.out,
+                data: dataset.name(),
+                shard,
+            };
+            ReadySet::new(args.kind, &place, condition, questions)
+        })
         .collect();
     let existing = sets.iter().find(|set| set.path().exists());
     match existing.filter(|_| !args.force) {

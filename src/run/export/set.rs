@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
 use crate::files::write;
+use crate::job::shard::Shard;
 use crate::types::question::letter;
 use crate::types::{Choices, Condition, Question};
 
@@ -28,6 +29,35 @@ pub(crate) enum SetForm {
 /// The last sentence of each question for LLaVA.
 const LLAVA: &str = "Answer with the option's letter from the given choices directly.";
 
+/// Where sets go.
+pub(super) struct SetPlace<'a> {
+    /// The folder of all sets.
+    pub(super) out: &'a Path,
+    /// The name of the data.
+    pub(super) data: &'a str,
+    /// The part of the data.
+    pub(super) shard: Shard,
+}
+
+impl SetPlace<'_> {
+    /// The main file of the set of a condition. That of a part has the part in its name.
+    fn file(&self, form: SetForm, condition: &Condition) -> PathBuf {
+        let part = if self.shard.is_part() {
+            format!("-{}", self.shard.folder())
+        } else {
+            String::new()
+        };
+        let folder = self.out.join(condition.to_string());
+        match form {
+            SetForm::VlmEvalKit => self
+                .out
+                .join(format!("{}_{condition}{part}.tsv", self.data)),
+            SetForm::ImageFolder => folder.join(format!("metadata{part}.jsonl")),
+            SetForm::Llava => folder.join(format!("questions{part}.jsonl")),
+        }
+    }
+}
+
 /// The set of one condition, written frame by frame, so that only one image is in memory.
 pub(super) struct ReadySet {
     form: SetForm,
@@ -40,24 +70,17 @@ pub(super) struct ReadySet {
 impl ReadySet {
     pub(super) fn new(
         form: SetForm,
-        out: &Path,
-        data: &str,
+        place: &SetPlace<'_>,
         condition: &Condition,
         questions: &[Question],
     ) -> Self {
-        let folder = out.join(condition.to_string());
-        let path = match form {
-            SetForm::VlmEvalKit => out.join(format!("{data}_{condition}.tsv")),
-            SetForm::ImageFolder => folder.join("metadata.jsonl"),
-            SetForm::Llava => folder.join("questions.jsonl"),
-        };
         let max_choices = questions
             .iter()
             .map(|question| question.choices.len())
             .max();
         Self {
             form,
-            path,
+            path: place.file(form, condition),
             max_choices: max_choices.unwrap_or(0),
             part: None,
         }
@@ -138,14 +161,16 @@ impl ReadySet {
             .map_err(|e| Error::data(path.display(), e))
     }
 
-    /// Renames the complete file to its final name, and returns that name.
-    pub(super) fn finish(self) -> Result<PathBuf> {
+    /// Renames the complete file to its final name, and returns that name; `None` if no image of a part is of this condition.
+    pub(super) fn finish(self) -> Result<Option<PathBuf>> {
         let part = partial_path(&self.path);
-        if let Some(mut writer) = self.part {
-            writer.flush().map_err(|e| Error::file(&part, "write", e))?;
-        }
+        let Some(mut writer) = self.part else {
+            return Ok(None);
+        };
+        writer.flush().map_err(|e| Error::file(&part, "write", e))?;
+        drop(writer);
         fs::rename(&part, &self.path).map_err(|e| Error::file(&self.path, "write", e))?;
-        Ok(self.path)
+        Ok(Some(self.path))
     }
 }
 

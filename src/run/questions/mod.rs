@@ -3,6 +3,7 @@
 mod against;
 mod checked;
 mod statistics_cache;
+mod statistics_file;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -17,8 +18,10 @@ use crate::error::{Error, Result};
 use crate::files::{reading, write};
 use crate::job::Outcome;
 use crate::job::input_tally::InputTally;
+use crate::job::part_args::{keep_part, part_of};
 use crate::job::progress::Progress;
 use crate::job::questions::rules;
+use crate::job::shard::Shard;
 use crate::job::workers::{ThreadArgs, pool};
 use crate::questions::balance::BalanceMode;
 use crate::questions::colors::Palette;
@@ -35,6 +38,7 @@ use crate::types::manifest::Status;
 use crate::types::{Decides, Digest, Family, FrameId, Labels, QuestionId};
 
 use statistics_cache::StatisticsCache;
+use statistics_file::{parts_beside, statistics_path};
 
 /// The flags of `questions`.
 #[derive(Debug, Args)]
@@ -93,6 +97,11 @@ pub(crate) struct QuestionsArgs {
     /// Further folders of the frames.
     #[command(flatten)]
     pub root: RootArgs,
+    /// Only measure this part of the frames, as 2/4, or auto/4 for the task of this process in a Slurm array or the pod of an indexed
+    /// Kubernetes job. Questions are balanced over all frames: the same command without --shard makes them from what all parts measured;
+    /// default: all frames
+    #[arg(long, value_name = "I/N|auto/N|auto", help_heading = "Scale", add = Decides::Trials)]
+    pub shard: Option<String>,
     /// The number of threads.
     #[command(flatten)]
     pub threads: ThreadArgs,
@@ -179,7 +188,11 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
         let problem = "no classes.json in this folder, which gives the class of each number in its maps; `darkqa-eval import` writes one";
         Error::data(args.data.display(), problem)
     })?;
-    let (frames, failed) = measured(making, &dataset, labels, progress)?;
+    let shard = part_of(args.shard.as_deref())?;
+    let (frames, failed) = measured(making, (&dataset, labels), shard, progress)?;
+    if shard.is_part() {
+        return Ok(part_measured(args, shard, frames.len(), failed));
+    }
     let verdicts = checked::verdicts(&args.verdicts)?;
     let request = QuestionRequest {
         dataset: dataset.title(),
@@ -257,22 +270,34 @@ fn warn(generated: &Generated, making: &QuestionMaking<'_>) {
     }
 }
 
-/// The path of the statistics cache, next to the questions.
-fn statistics_path(out: &Path) -> PathBuf {
-    let stem = out.file_stem().unwrap_or_default().to_string_lossy();
-    out.with_file_name(format!("{stem}.statistics.jsonl"))
+/// The outcome of a call that measured a part. Questions are balanced over all frames, so that it makes none.
+fn part_measured(args: &QuestionsArgs, shard: Shard, frames: usize, failed: usize) -> Outcome {
+    let path = statistics_path(&args.out, shard);
+    let status = if failed == 0 {
+        Status::Complete
+    } else {
+        Status::Incomplete
+    };
+    let output = format!(
+        "{}: statistics of {frames} frames; the same command without --shard makes the questions from those of all parts\n",
+        path.display()
+    );
+    Outcome::wrote(path, status, output)
 }
 
-/// The statistics of all frames, and the number of frames that failed. Only frames that are not in the cache are measured.
+/// The statistics of the frames of a part, and the number of frames that failed. Only frames that are not in the cache are measured.
 fn measured(
     making: &QuestionMaking<'_>,
-    dataset: &Dataset,
-    labels: &Labels,
+    (dataset, labels): (&Dataset, &Labels),
+    shard: Shard,
     progress: &Progress,
 ) -> Result<(Vec<FrameStatistics>, usize)> {
-    let cache = StatisticsCache::open(&statistics_path(&making.args.out))?;
+    let out = &making.args.out;
+    let cache = StatisticsCache::open(&statistics_path(out, shard), &parts_beside(out)?)?;
     let workers = pool(making.args.threads.threads)?;
-    let (names, tally): (Vec<&FrameId>, _) = (dataset.frames().collect(), InputTally::default());
+    let (mut names, tally): (Vec<&FrameId>, _) =
+        (dataset.frames().collect(), InputTally::default());
+    keep_part(&mut names, shard)?;
     let bar = progress.bar("frames", names.len());
     let context = context(making, labels);
     let results: Vec<Option<FrameStatistics>> = workers.install(|| {

@@ -22,30 +22,20 @@ pub(super) struct StatisticsCache {
 }
 
 impl StatisticsCache {
-    /// Reads the file if it exists. A broken line, as the last one of an interrupted command, is ignored: its frame is
-    /// measured again.
-    pub(super) fn open(path: &Path) -> Result<Self> {
+    /// Reads the file if it exists, and those of parts, which other calls wrote. A broken line, as the last one of an interrupted
+    /// command, is ignored: its frame is measured again.
+    pub(super) fn open(path: &Path, parts: &[PathBuf]) -> Result<Self> {
         let mut known = HashMap::new();
-        let mut broken = false;
-        match File::open(path) {
-            Ok(file) => {
-                for line in BufReader::new(file).split(b'\n') {
-                    let line = line.map_err(|e| Error::file(path, "read", e))?;
-                    match serde_json::from_slice::<FrameStatistics>(&line) {
-                        Ok(statistics) => drop(known.insert(statistics.key, statistics)),
-                        Err(_) => broken = true,
-                    }
-                }
-            }
-            Err(e) if e.kind() == io::ErrorKind::NotFound => {}
-            Err(e) => return Err(Error::file(path, "read", e)),
+        for part in parts {
+            read(part, &mut known)?;
         }
+        let end = read(path, &mut known)?;
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(|e| Error::file(folder, "make", e))?;
         }
         let file = OpenOptions::new().create(true).append(true).open(path);
         let mut file = file.map_err(|e| Error::file(path, "write", e))?;
-        if broken {
+        if end == FileEnd::Broken {
             // The next line must not continue a half-written one.
             file.write_all(b"\n")
                 .map_err(|e| Error::file(path, "write", e))?;
@@ -76,6 +66,33 @@ impl StatisticsCache {
         drop(self.file);
         write(&self.path, &lines.concat())
     }
+}
+
+/// How the lines of a file of statistics are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum FileEnd {
+    /// Each is complete, or there is no file.
+    Complete,
+    /// One is no statistics: an interrupted command was writing it.
+    Broken,
+}
+
+/// Adds the statistics in a file, if it exists, to those that are known.
+fn read(path: &Path, known: &mut HashMap<Digest, FrameStatistics>) -> Result<FileEnd> {
+    let file = match File::open(path) {
+        Ok(file) => file,
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(FileEnd::Complete),
+        Err(e) => return Err(Error::file(path, "read", e)),
+    };
+    let mut end = FileEnd::Complete;
+    for line in BufReader::new(file).split(b'\n') {
+        let line = line.map_err(|e| Error::file(path, "read", e))?;
+        match serde_json::from_slice::<FrameStatistics>(&line) {
+            Ok(statistics) => drop(known.insert(statistics.key, statistics)),
+            Err(_) => end = FileEnd::Broken,
+        }
+    }
+    Ok(end)
 }
 
 fn line(statistics: &FrameStatistics) -> Result<Vec<u8>> {

@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::files::write;
 use crate::job::Outcome;
 use crate::job::rebuild::ImageRebuilder;
-use crate::job::stored::AnyRun;
+use crate::job::run_parts::any_run;
 use crate::types::manifest::Status;
 use crate::types::{Condition, Digest, FrameId};
 
@@ -32,7 +32,7 @@ pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
     }
     let folder = args.run.clone();
     let name = args.question_id();
-    let (manifest, item) = read(AnyRun::open(&folder)?, name)?;
+    let (manifest, item) = read(any_run(&folder)?, name)?;
     let Some(item) = item else {
         let problem = format!(
             "no question {name:?} in this run; report.html and questions.jsonl have their ids"

@@ -13,7 +13,7 @@ use crate::job::Outcome;
 use crate::job::montage::montage;
 use crate::job::rebuild::ImageRebuilder;
 use crate::job::report::story_curves;
-use crate::job::stored::StoredRun;
+use crate::job::run_parts::choice_run;
 use crate::report::figures::StoryCurves;
 use crate::report::sheet::{Story, StoryCell, StoryMark, StoryRow, story};
 use crate::score::subject::is_control;
@@ -109,7 +109,7 @@ struct SheetItem {
 
 impl SheetItem {
     fn read(args: &ShowArgs) -> Result<Self> {
-        let run = StoredRun::of_choices(&args.run, "--sheet draws questions with choices")?;
+        let run = choice_run(&args.run, "--sheet draws questions with choices")?;
         let run =
             run.with_truths("--sheet draws accuracy; leave it out to see the images and replies")?;
         let problem = |problem: String| Error::Run {

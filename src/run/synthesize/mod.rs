@@ -18,6 +18,7 @@ use crate::error::{Error, Result};
 use crate::job::Outcome;
 use crate::job::frame_work::{FrameWork, ImageSteps};
 use crate::job::input_tally::InputTally;
+use crate::job::part_args::{PartArgs, keep_part};
 use crate::job::progress::{Progress, StepBar};
 use crate::job::recipe::Recipe;
 use crate::job::source::Frames;
@@ -45,14 +46,14 @@ pub(crate) struct SynthesizeArgs {
     #[command(flatten)]
     pub light: LightArgs,
     /// Make again the image of this JSON file, from the one INPUT that it was made from; default: make images of all levels
-    #[arg(long, value_name = "FILE", help_heading = "Synthesis", add = Decides::Pixels)]
+    #[arg(long, value_name = "FILE", help_heading = "Synthesis", conflicts_with = "shard", add = Decides::Pixels)]
     pub from: Option<PathBuf>,
     /// One figure per input instead; default: images
     #[arg(long, value_enum, help_heading = "Synthesis", conflicts_with = "from", add = Decides::Nothing)]
     pub sheet: Option<Sheet>,
     /// Hold the images of a folder to the digests in their JSON files; nothing is made or changed; default: make images
     #[arg(long, value_name = "DIR", help_heading = "Synthesis",
-        conflicts_with_all = ["inputs", "out", "from", "sheet", "force"], add = Decides::Nothing)]
+        conflicts_with_all = ["inputs", "out", "from", "sheet", "force", "shard"], add = Decides::Nothing)]
     pub check: Option<PathBuf>,
     /// Write over whatever is in the place of an image
     #[arg(long, help_heading = "Synthesis", add = Decides::Nothing)]
@@ -66,6 +67,9 @@ pub(crate) struct SynthesizeArgs {
     /// Further folders of the images.
     #[command(flatten)]
     pub root: RootArgs,
+    /// The part of the frames.
+    #[command(flatten)]
+    pub part: PartArgs,
     /// The number of threads.
     #[command(flatten)]
     pub threads: ThreadArgs,
@@ -97,11 +101,12 @@ pub(crate) fn synthesize(args: &SynthesizeArgs, progress: &Progress) -> Result<O
         light: LightSettings::resolve(&args.light, SetLight::Lit)?,
     };
     making.light.refuse_matches("synthesize knows none")?;
-    let frames = Inputs::open(
+    let mut frames = Inputs::open(
         &args.inputs,
         &args.root.data_root,
         args.codes.rule(args.limit),
     )?;
+    keep_part(&mut frames.entries, args.part.resolve()?)?;
     let workers = pool(args.threads.threads)?;
     fs::create_dir_all(out).map_err(|e| Error::file(out, "make", e))?;
     if let Some(file) = &args.from {

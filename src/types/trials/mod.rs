@@ -101,6 +101,7 @@ impl<D: Detail> Trials<D> {
             attempts: record.attempts,
         });
         self.keys.push(record.key);
+        self.logs = self.logs.max(text.log() + 1);
         self.facts.push(TrialFacts {
             text,
             reply,

@@ -4,17 +4,15 @@ use std::path::Path;
 
 use crate::error::Result;
 use crate::store::{LinePlace, QuestionFile, Store, each_placed_question};
-use crate::types::{Detail, FrameId, QuestionId};
+use crate::types::{Detail, FrameId, QuestionId, RunQuestion};
 
 /// The questions of several parts in the order of the data, each once.
-pub(super) struct PartQuestions(Vec<PartQuestion>);
+pub(in crate::job) struct PartQuestions(Vec<PartQuestion>);
 
 /// A question of a part.
 struct PartQuestion {
-    /// Its index among all questions of the data.
-    place: usize,
-    id: QuestionId,
-    frame: FrameId,
+    /// The question without its evidence.
+    question: RunQuestion,
     part: usize,
     line: LinePlace,
 }
@@ -24,40 +22,48 @@ impl PartQuestions {
     ///
     /// # Errors
     /// If a line is not a question.
-    pub(super) fn read(folders: &[&Path]) -> Result<Self> {
+    pub(in crate::job) fn read(folders: &[&Path]) -> Result<Self> {
         let mut questions = Vec::new();
         for (part, folder) in folders.iter().enumerate() {
             each_placed_question(folder, |question, line| {
                 questions.push(PartQuestion {
-                    place: question.place,
-                    id: question.id,
-                    frame: question.frame,
+                    question: question.without_evidence(),
                     part,
                     line,
                 });
             })?;
         }
-        questions.sort_by_key(|question| question.place);
+        questions.sort_by_key(|question| question.question.place);
         // A control of the observer asks a question of one shard with an image of another.
-        questions.dedup_by(|later, question| later.id == question.id);
+        questions.dedup_by(|later, question| later.question.id == question.question.id);
         Ok(Self(questions))
     }
 
     /// Their names, in order.
-    pub(super) fn ids(&self) -> impl Iterator<Item = &QuestionId> {
-        self.0.iter().map(|question| &question.id)
+    pub(in crate::job) fn ids(&self) -> impl Iterator<Item = &QuestionId> {
+        self.0.iter().map(|question| &question.question.id)
     }
 
     /// Their frames, in order.
-    pub(super) fn frames(&self) -> impl Iterator<Item = &FrameId> {
-        self.0.iter().map(|question| &question.frame)
+    pub(in crate::job) fn frames(&self) -> impl Iterator<Item = &FrameId> {
+        self.0.iter().map(|question| &question.question.frame)
+    }
+
+    /// The questions without their evidence, in order.
+    pub(in crate::job) fn into_questions(self) -> Vec<RunQuestion> {
+        let questions = self.0.into_iter();
+        questions.map(|question| question.question).collect()
     }
 
     /// Copies their lines into a run.
     ///
     /// # Errors
     /// If a line cannot be read or written.
-    pub(super) fn write<D: Detail>(&self, store: &Store<D>, folders: &[&Path]) -> Result<()> {
+    pub(in crate::job) fn write<D: Detail>(
+        &self,
+        store: &Store<D>,
+        folders: &[&Path],
+    ) -> Result<()> {
         let files = folders.iter().map(|folder| QuestionFile::open(folder));
         let files: Vec<Option<QuestionFile>> = files.collect::<Result<_>>()?;
         store.write_question_lines(|out| {

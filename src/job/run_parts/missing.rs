@@ -1,17 +1,26 @@
 //! What the parts of a run lack, by its plan where there is one: [`check`], [`warn_unfinished`].
 
 use super::coverage::Coverage;
-use super::part::MergePart;
+use super::part::StoredPart;
 use crate::error::{Error, Result};
 use crate::job::run_plan::RunPlan;
 use crate::job::shard::Shard;
 use crate::types::manifest::Status;
 
+/// Whether sources of a run may be in no part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::job) enum MissingParts {
+    /// It is an error.
+    Refused,
+    /// It is said, and the sources of the parts are those of the run.
+    Accepted,
+}
+
 /// The plan beside the parts; `None` if there is none, or if it is not of these parts, which is said.
 ///
 /// # Errors
 /// If it cannot be read.
-pub(super) fn plan(parts: &[MergePart], coverage: &Coverage) -> Result<Option<RunPlan>> {
+pub(super) fn plan(parts: &[StoredPart], coverage: &Coverage) -> Result<Option<RunPlan>> {
     let Some(run) = parts.first().and_then(|part| part.folder.parent()) else {
         return Ok(None);
     };
@@ -31,15 +40,15 @@ pub(super) fn plan(parts: &[MergePart], coverage: &Coverage) -> Result<Option<Ru
     Ok(None)
 }
 
-/// Whether sources are missing; an error that names them if a partial merge is not allowed.
+/// Whether sources are in no part. Says which shards have them, and the command that asks them.
 ///
 /// # Errors
-/// If sources are missing and `partial` is not set; says which shards have them, and the command that asks them.
+/// If sources are in no part and that is refused.
 pub(super) fn check(
-    parts: &[MergePart],
+    parts: &[StoredPart],
     coverage: &Coverage,
     plan: Option<&RunPlan>,
-    partial: bool,
+    missing: MissingParts,
 ) -> Result<bool> {
     let absent = coverage.absent(|shard| plan.map(|plan| plan.part(shard)));
     let (Some(problem), Some(first)) = (coverage.missing(&absent), parts.first()) else {
@@ -53,36 +62,46 @@ pub(super) fn check(
             plan.requests(coverage.gaps())
         )
     });
-    if !partial {
-        let remedy = remedy(parts, plan, &absent);
-        return Err(Error::Run {
+    let remedy = || remedy(parts, plan, &absent);
+    match missing {
+        MissingParts::Refused => Err(Error::Run {
             path: first.folder.clone(),
-            problem: format!("{problem}{counts}; --partial merges the others; {remedy}"),
-        });
-    }
-    tracing::warn!("{problem}{counts}; the summary covers only the others");
-    Ok(true)
-}
-
-/// Warns about each shard that is not complete.
-pub(super) fn warn_unfinished(parts: &[MergePart], plan: Option<&RunPlan>) {
-    for part in parts {
-        let (status, counts) = (part.manifest.status, part.manifest.counts);
-        if status != Status::Complete {
+            problem: format!(
+                "{problem}{counts}; --partial merges the others; {}",
+                remedy()
+            ),
+        }),
+        MissingParts::Accepted => {
             tracing::warn!(
-                "{}: shard {} is {status}: {} of {} trials answered; {}",
-                part.folder.display(),
-                part.shard,
-                counts.answered,
-                counts.trials,
-                remedy(parts, plan, &[part.shard])
+                "{problem}{counts}; the summary covers only the others; {}",
+                remedy()
             );
+            Ok(true)
         }
     }
 }
 
+/// Warns about each part that is not complete, unless complete parts together have all that it was to ask.
+pub(super) fn warn_unfinished(parts: &[StoredPart], plan: Option<&RunPlan>) {
+    let is_complete = |part: &&StoredPart| part.manifest.status == Status::Complete;
+    let complete: Vec<&StoredPart> = parts.iter().filter(is_complete).collect();
+    let unfinished = parts.iter().filter(|part| !is_complete(part));
+    for part in unfinished.filter(|part| !part.is_covered_by(&complete)) {
+        let counts = part.manifest.counts;
+        tracing::warn!(
+            "{}: shard {} is {}: {} of {} trials answered; {}",
+            part.folder.display(),
+            part.shard,
+            part.manifest.status,
+            counts.answered,
+            counts.trials,
+            remedy(parts, plan, &[part.shard])
+        );
+    }
+}
+
 /// The command that asks what these shards lack. What a part beside them has, it asks not again.
-fn remedy(parts: &[MergePart], plan: Option<&RunPlan>, shards: &[Shard]) -> String {
+fn remedy(parts: &[StoredPart], plan: Option<&RunPlan>, shards: &[Shard]) -> String {
     let models = parts
         .iter()
         .filter_map(|part| part.manifest.columns.get("model"));

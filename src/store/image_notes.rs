@@ -1,0 +1,53 @@
+//! What several run folders say about images, each once: [`more_thumbnails`], [`more_fidelity`].
+
+use std::collections::HashSet;
+use std::path::Path;
+
+use super::folder::{read_fidelity, read_thumbnails};
+use crate::error::Result;
+use crate::types::{Condition, FrameId, ImageFidelity, Thumbnail};
+
+/// The small copies of images in these folders that are not `present`, each once, of the frames that are wanted.
+///
+/// # Errors
+/// If a file cannot be read.
+pub(crate) fn more_thumbnails(
+    present: &[Thumbnail],
+    folders: &[&Path],
+    is_wanted: impl Fn(&FrameId) -> bool,
+) -> Result<Vec<Thumbnail>> {
+    let place = |thumbnail: &Thumbnail| (thumbnail.frame.clone(), thumbnail.condition.clone());
+    let more = more(present, folders, read_thumbnails, place)?;
+    let wanted = more.into_iter();
+    Ok(wanted.filter(|one| is_wanted(&one.frame)).collect())
+}
+
+/// The similarities of images in these folders that are not `present`, each once, of the frames that are wanted.
+///
+/// # Errors
+/// If a file cannot be read.
+pub(crate) fn more_fidelity(
+    present: &[ImageFidelity],
+    folders: &[&Path],
+    is_wanted: impl Fn(&FrameId) -> bool,
+) -> Result<Vec<ImageFidelity>> {
+    let place = |image: &ImageFidelity| (image.frame.clone(), image.condition.clone());
+    let more = more(present, folders, read_fidelity, place)?;
+    let wanted = more.into_iter();
+    Ok(wanted.filter(|one| is_wanted(&one.frame)).collect())
+}
+
+fn more<T>(
+    present: &[T],
+    folders: &[&Path],
+    read: impl Fn(&Path) -> Result<Vec<T>>,
+    place: impl Fn(&T) -> (FrameId, Condition),
+) -> Result<Vec<T>> {
+    let mut known: HashSet<_> = present.iter().map(&place).collect();
+    let mut more = Vec::new();
+    for folder in folders {
+        let read = read(folder)?.into_iter();
+        more.extend(read.filter(|one| known.insert(place(one))));
+    }
+    Ok(more)
+}
