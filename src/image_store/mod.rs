@@ -20,7 +20,7 @@ mod settings;
 mod sweep;
 
 pub(crate) use access::ImageStore;
-pub(crate) use entry::{Entry, EntryFacts, Shown};
+pub(crate) use entry::{Content, Entry, EntryFacts, Shown};
 pub(crate) use key::Key;
 pub(crate) use kinds::StoredKinds;
 pub(crate) use listing::{clear, listing};

@@ -3,7 +3,10 @@
 //! The images of a frame are made condition by condition, those of a walk all at once. The channel is bounded. So memory holds only the
 //! images in flight, one or two more groups, and the frame of each worker.
 
+mod opening;
 mod preparation;
+
+pub(crate) use opening::EnhancerStopper;
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -17,6 +20,7 @@ use super::frame_work::pairs::{Resolved, paired};
 use super::frame_work::{FrameWork, ImageSteps, StagedFrame};
 use super::image_notes::{ImageNotes, MissingNotes, WantedNotes, fidelity, similarity};
 use super::plan::{SourcePlan, TrialGroup};
+use super::resting_enhancer::RestingEnhancer;
 use super::source::Source;
 use super::stored_images::{MadeNotes, Needed};
 use super::thumbnail::{ShownObjects, thumbnail, thumbnail_of_all};
@@ -31,11 +35,14 @@ use crate::types::{Condition, EnhancerName, FrameId, Rgb};
 /// The steps from a frame to an image, with the enhancement models that they need.
 pub(crate) struct ImagePipeline<'a> {
     pub(crate) steps: ImageSteps<'a>,
+    /// Enhancers that are open.
     pub(crate) enhancers: Vec<Enhancer>,
+    /// Enhancers whose images are all in the store.
+    resting: Vec<Arc<RestingEnhancer>>,
     /// Further sets of the enhancers, each for a worker of its own; empty if one image is enhanced at a time.
-    pub(crate) sets: Vec<Vec<Enhancer>>,
+    sets: Vec<Vec<Enhancer>>,
     /// What happens to an enhancer whose images cannot be enhanced images.
-    pub(crate) implausible: Implausible,
+    implausible: Implausible,
 }
 
 /// A source in progress.
@@ -49,6 +56,21 @@ enum SourceWork<'a> {
 }
 
 impl<'a> ImagePipeline<'a> {
+    /// A pipeline with enhancers that are open.
+    pub(crate) fn new(
+        steps: ImageSteps<'a>,
+        enhancers: Vec<Enhancer>,
+        implausible: Implausible,
+    ) -> Self {
+        Self {
+            steps,
+            enhancers,
+            resting: Vec::new(),
+            sets: Vec::new(),
+            implausible,
+        }
+    }
+
     /// Makes the images of all sources, until they are done or the channel is closed.
     ///
     /// Normally each worker has one thread and works on one frame at a time, with a set of enhancers of its own. All workers share one
@@ -78,6 +100,7 @@ impl<'a> ImagePipeline<'a> {
                 let mut pipeline = ImagePipeline {
                     steps,
                     enhancers,
+                    resting: self.resting.clone(),
                     sets: Vec::new(),
                     implausible: self.implausible,
                 };
@@ -414,6 +437,10 @@ impl<'a> ImagePipeline<'a> {
         place: [&dyn ToString; 2],
     ) -> Result<(Rgb, ImageUse)> {
         let (timings, implausible) = (self.steps.timings, self.implausible);
+        if let Some(resting) = self.resting(name) {
+            let enhance = || resting.enhance_noted(image, place, implausible);
+            return timings.time(TimedStep::Enhance, enhance);
+        }
         let enhancer = self.enhancer(name)?;
         let enhance = || enhancer.enhance_noted(image, place, implausible);
         timings.time(TimedStep::Enhance, enhance)
@@ -439,11 +466,18 @@ impl<'a> ImagePipeline<'a> {
         place: [&dyn ToString; 2],
     ) -> Result<()> {
         let implausible = self.implausible;
-        let enhancer = self.enhancer(name)?;
-        let used = notes.enhanced.as_ref();
-        used.map_or(Ok(()), |used| {
-            enhancer.note_stored(used, place, implausible)
-        })
+        let Some(used) = &notes.enhanced else {
+            return Ok(());
+        };
+        match self.resting(name) {
+            Some(resting) => used.note_in(resting.usage(), resting.path(), place, implausible),
+            None => self.enhancer(name)?.note_stored(used, place, implausible),
+        }
+    }
+
+    fn resting(&self, name: &EnhancerName) -> Option<&RestingEnhancer> {
+        let mut resting = self.resting.iter().map(Arc::as_ref);
+        resting.find(|enhancer| enhancer.name() == name)
     }
 
     fn enhancer(&mut self, name: &EnhancerName) -> Result<&mut Enhancer> {

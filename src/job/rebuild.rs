@@ -131,18 +131,16 @@ impl ImageRebuilder {
         {
             photographs::measure(frames, std::slice::from_mut(&mut source))?;
         }
-        let mut pipeline = ImagePipeline {
-            steps: ImageSteps {
-                frames,
-                recipe: &self.recipe,
-                limit: None,
-                timings: &Timings::default(),
-                stored: None,
-            },
-            enhancers: std::mem::take(&mut self.enhancers),
-            sets: Vec::new(),
-            implausible: Implausible::NotLookedFor,
+        let timings = Timings::default();
+        let steps = ImageSteps {
+            frames,
+            recipe: &self.recipe,
+            limit: None,
+            timings: &timings,
+            stored: None,
         };
+        let enhancers = std::mem::take(&mut self.enhancers);
+        let mut pipeline = ImagePipeline::new(steps, enhancers, Implausible::NotLookedFor);
         let conditions: Vec<&Condition> = conditions.iter().collect();
         let images = pipeline.images(&source, &conditions);
         self.enhancers = pipeline.enhancers;

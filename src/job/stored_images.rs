@@ -5,11 +5,12 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use super::recipe::{ImageKeyFacts, Recipe};
-use super::source::SourceFrame;
+use super::source::{Source, SourceFrame};
+use super::stored_findings::StoredFindings;
 use crate::ask::Payload;
 use crate::enhance::{ImageUse, SizeArgs};
 use crate::error::Result;
-use crate::image_store::{Entry, EntryFacts, ImageStore, Key, Shown, StoredKinds};
+use crate::image_store::{Content, Entry, EntryFacts, ImageStore, Key, Shown, StoredKinds};
 use crate::types::{Condition, FrameId};
 
 /// What decides images besides their recipes: the program, the machine's kind, and how enhancers are run.
@@ -61,6 +62,34 @@ impl<'a> StoredImages<'a> {
         Self { store, maker }
     }
 
+    /// What the store knows of enhancers.
+    pub(crate) fn findings(self) -> StoredFindings<'a> {
+        StoredFindings::new(self.store, self.maker)
+    }
+
+    /// Whether the store has the images of all frames of a source in a condition. They may be damaged.
+    ///
+    /// # Errors
+    /// If the condition cannot be made of a frame.
+    pub(crate) fn has_all(
+        self,
+        recipe: &Recipe,
+        source: &Source,
+        condition: &Condition,
+    ) -> Result<bool> {
+        if condition.photograph().is_some() {
+            // Photographs in the dark are not kept.
+            return Ok(false);
+        }
+        for frame in &source.frames {
+            match self.place(recipe, (&source.name, frame), condition)? {
+                Some(place) if place.exists() => {}
+                _ => return Ok(false),
+            }
+        }
+        Ok(true)
+    }
+
     /// The place of the image of a frame in a condition; `None` if the store keeps no such images. `source` is the name of what the
     /// frame is shown in.
     ///
@@ -89,6 +118,7 @@ impl<'a> StoredImages<'a> {
             ..condition.clone()
         };
         let shown = Shown {
+            content: Content::Image,
             enhancer: condition.enhancer.as_ref().map(ToString::to_string),
             light: light.to_string(),
             format: recipe.format.to_string(),
@@ -144,6 +174,11 @@ pub(crate) struct StoredImage {
 }
 
 impl StoredPlace<'_> {
+    /// Whether there is a file of the image. It may be damaged.
+    fn exists(&self) -> bool {
+        self.store.contains(&self.key)
+    }
+
     /// The image, if it is there with all that is needed. `format` is that of the recipe.
     pub(crate) fn read(&self, recipe: &Recipe, needed: Needed) -> Option<StoredImage> {
         let mut notes = None;
@@ -156,7 +191,7 @@ impl StoredPlace<'_> {
             });
             notes.is_some()
         };
-        let entry = self.store.get(&self.key, is_enough)?;
+        let entry = self.store.get(&self.key, Content::Image, is_enough)?;
         let [width, height] = entry.size;
         Some(StoredImage {
             payload: Payload::of_file(&entry.image, width, height, recipe.format),

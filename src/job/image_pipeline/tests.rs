@@ -50,12 +50,7 @@ fn pipeline_output(
         timings: &Timings::default(),
         stored: None,
     };
-    let mut pipeline = ImagePipeline {
-        steps,
-        enhancers: Vec::new(),
-        sets: Vec::new(),
-        implausible: Implausible::default(),
-    };
+    let mut pipeline = ImagePipeline::new(steps, Vec::new(), Implausible::default());
     let mut work = FrameWork::planned(steps, &source, &source.frames[0]);
     let condition = condition.parse().unwrap();
     let wanted = WantedNotes {

@@ -115,18 +115,16 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
     warn_of_inputs(&input_summary(&sources));
     recipe.check(&sources, &conditions)?;
     let mut sets = open_sets(args, &dataset, &conditions, &questions)?;
-    let mut pipeline = ImagePipeline {
-        steps: ImageSteps {
-            frames: &dataset,
-            recipe: &recipe,
-            limit: None,
-            timings: &Timings::default(),
-            stored: None,
-        },
-        enhancers: OpenEnhancers::load(files, &args.loading)?.take()?,
-        sets: Vec::new(),
-        implausible: args.loading.probe.implausible(),
+    let timings = Timings::default();
+    let steps = ImageSteps {
+        frames: &dataset,
+        recipe: &recipe,
+        limit: None,
+        timings: &timings,
+        stored: None,
     };
+    let enhancers = OpenEnhancers::load(files, &args.loading)?.take()?;
+    let mut pipeline = ImagePipeline::new(steps, enhancers, args.loading.probe.implausible());
     workers.install(|| pipeline.probe_sources(&sources))?;
     let frames: BTreeMap<&FrameId, &Source> = sources
         .iter()
