@@ -1,6 +1,7 @@
 //! The dark frames that an enhancer is tried on before a run: [`dark_frames`], made of [`DarkFrames`].
 
-use super::frame_work::{FrameWork, ImageSteps};
+use super::frame_work::FrameWork;
+use super::image_steps::ImageSteps;
 use super::plan::SourcePlan;
 use super::source::Source;
 use crate::enhance::{DARK, FRAMES, brightness};

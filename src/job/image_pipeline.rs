@@ -3,6 +3,7 @@
 //! The images of a frame are made condition by condition, those of a walk all at once. The channel is bounded. So memory holds only the
 //! images in flight, one or two more groups, and the frame of each worker.
 
+mod noted;
 mod opening;
 mod preparation;
 
@@ -17,13 +18,14 @@ use rayon::prelude::*;
 use tokio::sync::mpsc::Sender;
 
 use super::frame_work::pairs::{Resolved, paired};
-use super::frame_work::{FrameWork, ImageSteps, StagedFrame};
-use super::image_notes::{ImageNotes, MissingNotes, WantedNotes, fidelity, similarity};
+use super::frame_work::{FrameWork, StagedFrame};
+use super::image_notes::{ImageNotes, MissingNotes};
+use super::image_steps::ImageSteps;
 use super::plan::{SourcePlan, TrialGroup};
 use super::resting_enhancer::RestingEnhancer;
 use super::source::Source;
-use super::stored_images::{MadeNotes, Needed};
-use super::thumbnail::{ShownObjects, thumbnail, thumbnail_of_all};
+use super::stored_images::MadeNotes;
+use super::thumbnail::{ShownObjects, thumbnail_of_all};
 use super::timings::TimedStep;
 use super::trial::{Item, PreparedGroup, Stimulus};
 use super::workers::Workers;
@@ -225,81 +227,6 @@ impl<'a> ImagePipeline<'a> {
         }
     }
 
-    /// A frame in a condition as it is sent, with the notes that are wanted.
-    fn image_and_notes(
-        &mut self,
-        work: &mut FrameWork<'_>,
-        condition: &Condition,
-        (name, shown): (&FrameId, Option<ShownObjects<'_>>),
-        wanted: WantedNotes,
-    ) -> Result<(Arc<Payload>, ImageNotes)> {
-        let Resolved {
-            work,
-            condition: made,
-            pair,
-        } = work.resolved(condition)?;
-        let steps = work.steps;
-        let small_copy = |image: &Payload, encoded: Option<&Rgb>| {
-            let make = || {
-                let made = thumbnail(name, condition, image, encoded, shown);
-                or_warning(name, condition, made)
-            };
-            steps.timings.time(TimedStep::Encode, make)
-        };
-        let mut notes = ImageNotes::default();
-        if let Some(image) = work.unchanged_file(&made)? {
-            let image = paired(image, pair);
-            // The file is decoded only for its thumbnail.
-            if wanted.thumbnail {
-                notes.thumbnail = small_copy(&image, Some(work.clean()?));
-            }
-            return Ok((image, notes));
-        }
-        let (read, exposure) = (work.note()?, work.exposure(&made)?);
-        let place = work.stored_place(&made)?;
-        let needed = if wanted.fidelity {
-            Needed::Similarity
-        } else {
-            Needed::Image
-        };
-        let found = place
-            .as_ref()
-            .and_then(|place| steps.stored_image(place, needed));
-        if let Some(stored) = found {
-            self.note_stored(&stored.notes, &made, work.frame())?;
-            let image = steps.stored_payload(stored.payload, &read, exposure)?;
-            let image = paired(image, pair);
-            if wanted.thumbnail {
-                notes.thumbnail = small_copy(&image, None);
-            }
-            let similarity = stored.notes.similarity.filter(|_| wanted.fidelity);
-            notes.fidelity = similarity.map(|found| fidelity(name, condition, &image, found));
-            return Ok((image, notes));
-        }
-        let started = Instant::now();
-        let clean = wanted.fidelity.then(|| work.clean_as_sent()).transpose()?;
-        let (pixels, enhanced) = self.pixels_noted(work, &made)?;
-        let (image, encoded) = steps.payload(&pixels, &read, exposure)?;
-        let measure = |clean: Arc<Rgb>| {
-            let measure = || similarity([&*encoded, &*clean]);
-            steps.timings.time(TimedStep::Measure, measure)
-        };
-        let similarity = clean.map(measure).transpose()?;
-        if let Some(place) = place {
-            let notes = MadeNotes {
-                enhanced,
-                similarity,
-            };
-            steps.store(&place, &image, &notes, started.elapsed())?;
-        }
-        let image = paired(image, pair);
-        if wanted.thumbnail {
-            notes.thumbnail = small_copy(&image, Some(&encoded));
-        }
-        notes.fidelity = similarity.map(|found| fidelity(name, condition, &image, found));
-        Ok((image, notes))
-    }
-
     /// The images of a source in each of these conditions, in the order shown.
     ///
     /// # Errors
@@ -401,7 +328,7 @@ impl<'a> ImagePipeline<'a> {
                 enhancer,
                 notes,
             } => {
-                self.note_stored_by(&notes, &enhancer, [frame, condition])?;
+                self.note_stored(&notes, &enhancer, [frame, condition])?;
                 Ok(payload)
             }
             StagedFrame::ToEnhance {
@@ -444,35 +371,6 @@ impl<'a> ImagePipeline<'a> {
         let enhancer = self.enhancer(name)?;
         let enhance = || enhancer.enhance_noted(image, place, implausible);
         timings.time(TimedStep::Enhance, enhance)
-    }
-
-    /// Notes an image of the store as its enhancer would, if it has one.
-    fn note_stored(
-        &mut self,
-        notes: &MadeNotes,
-        condition: &Condition,
-        frame: &FrameId,
-    ) -> Result<()> {
-        match &condition.enhancer {
-            None => Ok(()),
-            Some(name) => self.note_stored_by(notes, name, [frame, condition]),
-        }
-    }
-
-    fn note_stored_by(
-        &mut self,
-        notes: &MadeNotes,
-        name: &EnhancerName,
-        place: [&dyn ToString; 2],
-    ) -> Result<()> {
-        let implausible = self.implausible;
-        let Some(used) = &notes.enhanced else {
-            return Ok(());
-        };
-        match self.resting(name) {
-            Some(resting) => used.note_in(resting.usage(), resting.path(), place, implausible),
-            None => self.enhancer(name)?.note_stored(used, place, implausible),
-        }
     }
 
     fn resting(&self, name: &EnhancerName) -> Option<&RestingEnhancer> {

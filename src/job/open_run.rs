@@ -10,10 +10,11 @@ use super::dark_already;
 use super::dispatch::{Dispatcher, TrialCounts};
 use super::enhancers::OpenEnhancers;
 use super::experiment::{DetailOf, Experiment};
+use super::first_source::first_source;
 use super::folder::now;
-use super::frame_work::ImageSteps;
 use super::image_notes::MissingNotes;
 use super::image_pipeline::ImagePipeline;
+use super::image_steps::ImageSteps;
 use super::manifest;
 use super::models::{self, ModelUnderTest};
 use super::other_parts::OtherParts;
@@ -157,7 +158,9 @@ impl<E: Experiment> OpenRun<'_, E> {
     }
 
     pub(super) fn ask_phase(&mut self, phase: usize, remaining: Remaining<E>) -> Result<EndReason> {
-        let Remaining { plan, stored, .. } = remaining;
+        let Remaining {
+            mut plan, stored, ..
+        } = remaining;
         let experiment = self.experiment;
         let settings = experiment.settings();
         let models = experiment.models(phase);
@@ -196,6 +199,11 @@ impl<E: Experiment> OpenRun<'_, E> {
         })?;
         let usages = pipeline.usages();
         pipeline.open_sets(sources, &plan.sources, &workers)?;
+        if self.images.is_some() {
+            let names = models.iter().map(|model| model.name.as_ref());
+            let first = first_source(names, settings.shard, plan.sources.len());
+            plan.sources.rotate_left(first);
+        }
         let stoppers = pipeline.stoppers();
         let dispatcher = Dispatcher {
             models,

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use clap::Args;
 
 use super::enhancers::{self, EnhancerRunArgs, OpenEnhancers};
-use super::frame_work::ImageSteps;
 use super::image_pipeline::ImagePipeline;
+use super::image_steps::ImageSteps;
 use super::image_words::ImageFlags;
 use super::photographs;
 use super::questions::ASK;

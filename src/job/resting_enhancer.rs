@@ -35,6 +35,10 @@ impl RestingEnhancer {
     /// The model in a file, of which this is known.
     pub(crate) fn new(file: ModelFile, settings: EnhancerRunArgs, findings: Findings) -> Self {
         findings.warn(file.name(), file.path());
+        tracing::debug!(
+            "{}: not opened, because the store has all its images",
+            file.name()
+        );
         Self {
             name: file.name().clone(),
             path: file.path().to_owned(),

@@ -36,11 +36,7 @@ impl<'a> StoredFindings<'a> {
         Self { store, maker }
     }
 
-    fn key(
-        self,
-        model: &Model,
-        frames: Option<Vec<Vec<ImageKeyFacts<'_>>>>,
-    ) -> Result<Key> {
+    fn key(self, model: &Model, frames: Option<Vec<Vec<ImageKeyFacts<'_>>>>) -> Result<Key> {
         Key::of(&FindingsRecipe {
             stated: model.stated()?,
             version: enhance::VERSION,

@@ -51,6 +51,9 @@ pub(crate) struct StoredImages<'a> {
 /// All that decides the file of an image.
 #[derive(Serialize)]
 struct StoredRecipe<'a> {
+    /// What is kept in place of the image; `None` if it is kept itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    content: Option<Content>,
     image: ImageKeyFacts<'a>,
     program: &'static str,
     /// `None` without an enhancer: neither machine nor runtime decides a degraded image.
@@ -82,15 +85,17 @@ impl<'a> StoredImages<'a> {
             return Ok(false);
         }
         for frame in &source.frames {
-            match self.place(recipe, (&source.name, frame), condition)? {
-                Some(place) if place.exists() => {}
-                _ => return Ok(false),
+            if !self
+                .place(recipe, (&source.name, frame), condition)?
+                .exists()
+            {
+                return Ok(false);
             }
         }
         Ok(true)
     }
 
-    /// The place of the image of a frame in a condition; `None` if the store keeps no such images. `source` is the name of what the
+    /// The place of a frame in a condition: of its image, or of the measures of one that is not kept. `source` is the name of what the
     /// frame is shown in.
     ///
     /// # Errors
@@ -100,42 +105,48 @@ impl<'a> StoredImages<'a> {
         recipe: &Recipe,
         (source, frame): (&FrameId, &SourceFrame),
         condition: &Condition,
-    ) -> Result<Option<StoredPlace<'a>>> {
-        let is_kept = match self.store.kinds() {
-            StoredKinds::All => true,
-            StoredKinds::Enhanced => condition.enhancer.is_some(),
+    ) -> Result<StoredPlace<'a>> {
+        let keeps = match (self.store.kinds(), &condition.enhancer) {
+            (StoredKinds::All, _) | (StoredKinds::Enhanced, Some(_)) => Content::Image,
+            (StoredKinds::Enhanced, None) => Content::Measures,
         };
-        if !is_kept {
-            return Ok(None);
-        }
-        let key = Key::of(&StoredRecipe {
-            image: recipe.facts(source, frame, condition)?,
-            program: self.maker.program,
-            enhanced_with: condition.enhancer.is_some().then_some(self.maker),
-        })?;
+        let key = |content: Content| {
+            Key::of(&StoredRecipe {
+                content: (content != Content::Image).then_some(content),
+                image: recipe.facts(source, frame, condition)?,
+                program: self.maker.program,
+                enhanced_with: condition.enhancer.is_some().then_some(self.maker),
+            })
+        };
         let light = Condition {
             enhancer: None,
             ..condition.clone()
         };
         let shown = Shown {
-            content: Content::Image,
+            content: keeps,
             enhancer: condition.enhancer.as_ref().map(ToString::to_string),
             light: light.to_string(),
             format: recipe.format.to_string(),
         };
-        Ok(Some(StoredPlace {
+        Ok(StoredPlace {
             store: self.store,
-            key,
+            image: key(Content::Image)?,
+            measures: match keeps {
+                Content::Image => None,
+                Content::Measures | Content::Probe => Some(key(Content::Measures)?),
+            },
             shown,
-        }))
+        })
     }
 }
 
-/// The place of one image in a store.
+/// The place of one image in a store, or of its measures.
 #[derive(Debug, Clone)]
 pub(crate) struct StoredPlace<'a> {
     store: &'a ImageStore,
-    key: Key,
+    image: Key,
+    /// Key of the measures; `None` if the image is kept, with them.
+    measures: Option<Key>,
     shown: Shown,
 }
 
@@ -174,13 +185,21 @@ pub(crate) struct StoredImage {
 }
 
 impl StoredPlace<'_> {
+    /// Whether the image itself is kept.
+    pub(crate) fn keeps_image(&self) -> bool {
+        self.measures.is_none()
+    }
+
     /// Whether there is a file of the image. It may be damaged.
     fn exists(&self) -> bool {
-        self.store.contains(&self.key)
+        self.store.contains(&self.image)
     }
 
     /// The image, if it is there with all that is needed. `format` is that of the recipe.
     pub(crate) fn read(&self, recipe: &Recipe, needed: Needed) -> Option<StoredImage> {
+        if self.measures.is_some() {
+            return None;
+        }
         let mut notes = None;
         let is_enough = |entry: &Entry| {
             let read: Option<MadeNotes> = serde_json::from_value(entry.facts.notes.clone()).ok();
@@ -191,7 +210,7 @@ impl StoredPlace<'_> {
             });
             notes.is_some()
         };
-        let entry = self.store.get(&self.key, Content::Image, is_enough)?;
+        let entry = self.store.get(&self.image, Content::Image, is_enough)?;
         let [width, height] = entry.size;
         Some(StoredImage {
             payload: Payload::of_file(&entry.image, width, height, recipe.format),
@@ -199,22 +218,42 @@ impl StoredPlace<'_> {
         })
     }
 
-    /// Adds an image that took this time to make.
+    /// How similar the image is to its clean frame, if that is kept without the image.
+    pub(crate) fn measures(&self) -> Option<Similarity> {
+        let mut measures = None;
+        let is_enough = |entry: &Entry| {
+            let notes: Option<MadeNotes> = serde_json::from_value(entry.facts.notes.clone()).ok();
+            measures = notes.and_then(|notes| notes.similarity);
+            measures.is_some()
+        };
+        let alone = self.measures.as_ref()?;
+        self.store.get(alone, Content::Measures, is_enough)?;
+        measures
+    }
+
+    /// Adds what is known of an image that took this time to make: with the image, if images like it are kept, else without it.
     ///
     /// # Errors
     /// None in practice: the image was encoded here.
     pub(crate) fn write(&self, image: &Payload, notes: &MadeNotes, took: Duration) -> Result<()> {
+        let facts = EntryFacts::new(
+            self.shown.clone(),
+            took.as_millis() as u64,
+            serde_json::json!(notes),
+        );
+        if let Some(measures) = &self.measures {
+            if notes.similarity.is_some() {
+                self.store.put(measures, &Entry::of_facts(facts));
+            }
+            return Ok(());
+        }
         let side = |pixels: usize| u32::try_from(pixels).unwrap_or(u32::MAX);
         let entry = Entry {
             image: image.file()?,
             size: [side(image.facts().width), side(image.facts().height)],
-            facts: EntryFacts::new(
-                self.shown.clone(),
-                took.as_millis() as u64,
-                serde_json::json!(notes),
-            ),
+            facts,
         };
-        self.store.put(&self.key, &entry);
+        self.store.put(&self.image, &entry);
         Ok(())
     }
 }

@@ -135,10 +135,7 @@ impl<'a> ImagePipeline<'a> {
         sources: &[Source],
         plan: &[SourcePlan<I>],
     ) -> Result<()> {
-        let dark = dark_frames(
-            self.steps,
-            &DarkFrames::of(sources, plan, enhancer.name()),
-        )?;
+        let dark = dark_frames(self.steps, &DarkFrames::of(sources, plan, enhancer.name()))?;
         if dark.is_empty() {
             return Ok(());
         }

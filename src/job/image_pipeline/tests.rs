@@ -81,9 +81,14 @@ fn thumbnails_show_what_was_sent() {
         for how in [("png", None), ("png", Some(50)), ("jpeg:60", Some(50))] {
             let (image, notes, _) = pipeline_output(condition, how, true);
             let thumbnail = notes.thumbnail.unwrap();
-            let of_file =
-                super::thumbnail(&thumbnail.frame, &thumbnail.condition, &image, None, None)
-                    .unwrap();
+            let of_file = crate::job::thumbnail::thumbnail(
+                &thumbnail.frame,
+                &thumbnail.condition,
+                &image,
+                None,
+                None,
+            )
+            .unwrap();
             assert_eq!(thumbnail, of_file, "{condition} {how:?}");
         }
     }
