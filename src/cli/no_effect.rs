@@ -213,7 +213,6 @@ impl NoEffect {
                 ids::<RequestArgs>(),
                 ids::<Sending>(),
                 ids::<JudgeArgs>(),
-                ids::<StoreArgs>(),
             ];
             self.because("--study asks no model", &asking.concat());
         }
@@ -279,18 +278,13 @@ impl NoEffect {
             self.because(
                 "--dry-run sends nothing",
                 &[
-                    [
-                        "grace",
-                        "timings",
-                        "max_failures",
-                        "fail_fast",
-                        "no_parquet",
-                    ]
-                    .map(String::from)
-                    .to_vec(),
-                    ids::<StoreArgs>(),
+                    "grace",
+                    "timings",
+                    "max_failures",
+                    "fail_fast",
+                    "no_parquet",
                 ]
-                .concat(),
+                .map(String::from),
             );
         }
         if args.stored.images_cache.is_none() {

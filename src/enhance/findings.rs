@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::enhancer::Enhancer;
+use super::size_search::TakenSizes;
 use super::usage::{Implausible, Usage};
 use crate::error::Result;
 use crate::types::EnhancerName;
@@ -69,7 +70,7 @@ impl Enhancer {
         Findings {
             convention: note.convention,
             probe: note.probe,
-            sizes: self.found_sizes().map(|found| found.words()),
+            sizes: self.found_sizes().map(TakenSizes::words),
         }
     }
 

@@ -13,6 +13,7 @@ mod access;
 mod counts;
 mod entry;
 mod folder;
+mod image_set;
 mod key;
 mod kinds;
 mod listing;

@@ -5,6 +5,7 @@ use std::num::NonZeroU32;
 use super::*;
 use crate::ask::PayloadFormat;
 use crate::dataset::Dataset;
+use crate::job::image_notes::WantedNotes;
 use crate::job::recipe::Recipe;
 use crate::job::scaling::Scaling;
 use crate::job::timings::Timings;

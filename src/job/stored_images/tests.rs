@@ -45,7 +45,7 @@ fn key(recipe: &Recipe, frame: &SourceFrame, condition: &str, maker: &Maker) -> 
     let condition = condition.parse().unwrap();
     let stored = StoredImages::new(&store, maker);
     let place = stored.place(recipe, (&source, frame), &condition).unwrap();
-    *place.unwrap().image.digest()
+    *place.image.digest()
 }
 
 const CONDITION: &str = "L3-noise+one";
