@@ -415,14 +415,6 @@ mod tests {
             "--images-cache-size: no effect: no --images-cache is named",
         ),
         (
-            "--model m --dry-run --images-cache d",
-            "--images-cache: no effect: --dry-run sends nothing",
-        ),
-        (
-            "openeqa --questions q --frames f --study s --images-cache d",
-            "--images-cache: no effect: --study asks no model",
-        ),
-        (
             "openeqa --questions q --frames f --model m --judge-temperature 1",
             "--judge-temperature: no effect: no judge is named",
         ),
@@ -501,6 +493,8 @@ mod tests {
         }
         for words in [
             "--model m",
+            "--model m --dry-run --images-cache d",
+            "openeqa --questions q --frames f --study s --images-cache d",
             "--model m --llie f.onnx --tile whole --profile eld --image jpeg:90 --rpm 9",
             "--model m --ask home --ask-per-image 3",
             "report a --no-parquet",

@@ -294,6 +294,17 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_store_gives_the_images_that_find_room() {
+        let of = |bytes| StoreForecast::new("enhanced images", bytes, 20e9);
+        assert!((of(80e9).hits - 0.25).abs() < 1e-12);
+        assert!((of(20e9).hits - 1.0).abs() < 1e-12);
+        assert_eq!(
+            of(80e9).line(),
+            "image store: enhanced images 80.0 GB, room 20.0 GB: the next model finds about 25 % of them\n"
+        );
+    }
+
+    #[test]
     fn several_readings_are_counted_apart() {
         let cost = |reading: Option<&str>, requests, dollars| ReadingCost {
             reading: reading.map(|name| ReadingName::new(name).unwrap()),

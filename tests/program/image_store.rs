@@ -207,6 +207,23 @@ fn an_enhancer_that_is_refused_is_refused_with_its_images_in_the_store() {
 }
 
 #[test]
+fn a_dry_run_says_how_many_images_find_room_and_makes_no_store() {
+    let bench = bench();
+    let line = "--model random --data rooms:frames=3,size=96x64 --levels L3,L5 --llie one.onnx --llie-anyway --dry-run --out run";
+    let without = bench.complete(&words(line));
+    assert!(!without.contains("image store"), "{without}");
+    let roomy = bench.complete(&words(&format!("{line} --images-cache images")));
+    let all = "the next model finds about 100 % of them";
+    assert!(roomy.contains(all), "{roomy}");
+    let narrow = bench.complete(&words(&format!(
+        "{line} --images-cache images --images-cache-size 0.00001"
+    )));
+    assert!(narrow.contains("image store: enhanced images"), "{narrow}");
+    assert!(!narrow.contains(all), "{narrow}");
+    assert!(!bench.path("images").exists());
+}
+
+#[test]
 fn two_processes_share_a_store_that_a_command_lists_and_empties() {
     let bench = bench();
     std::thread::scope(|scope| {
