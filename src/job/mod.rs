@@ -21,6 +21,7 @@ mod first_source;
 mod folder;
 pub(crate) mod frame_work;
 pub(crate) mod identity;
+pub(crate) mod image_maker;
 pub(crate) mod image_notes;
 pub(crate) mod image_pipeline;
 pub(crate) mod image_steps;

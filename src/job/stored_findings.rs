@@ -5,9 +5,9 @@ use std::time::Duration;
 use serde::Serialize;
 
 use super::enhancers::{Model, OpenEnhancers};
+use super::image_maker::Maker;
 use super::recipe::{ImageKeyFacts, Recipe};
 use super::source::Source;
-use super::stored_images::Maker;
 use crate::enhance::{self, Findings};
 use crate::error::Result;
 use crate::image_store::{Content, Entry, EntryFacts, ImageStore, Key, Shown};

@@ -4,42 +4,15 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
+use super::image_maker::Maker;
 use super::recipe::{ImageKeyFacts, Recipe};
 use super::source::{Source, SourceFrame};
 use super::stored_findings::StoredFindings;
 use crate::ask::Payload;
-use crate::enhance::{ImageUse, SizeArgs};
+use crate::enhance::ImageUse;
 use crate::error::Result;
 use crate::image_store::{Content, Entry, EntryFacts, ImageStore, Key, Shown, StoredKinds};
 use crate::types::{Condition, FrameId};
-
-/// What decides images besides their recipes: the program, the machine's kind, and how enhancers are run.
-#[derive(Debug, Serialize)]
-pub(crate) struct Maker {
-    /// Version of this program, because encoders may change with it.
-    program: &'static str,
-    /// Processor and operating system, because ONNX Runtime's results may differ between them.
-    machine: [&'static str; 2],
-    /// Name and version of ONNX Runtime; `None` if no enhancer is open.
-    runtime: Option<(String, String)>,
-    tile: String,
-    max_side: Option<usize>,
-    resize: bool,
-}
-
-impl Maker {
-    /// This program, with this version of ONNX Runtime and these sizes of enhanced images.
-    pub(crate) fn new(runtime: Option<(String, String)>, sizes: &SizeArgs) -> Self {
-        Self {
-            program: env!("CARGO_PKG_VERSION"),
-            machine: [std::env::consts::ARCH, std::env::consts::OS],
-            runtime,
-            tile: sizes.tile.to_string(),
-            max_side: sizes.llie_max_side.map(std::num::NonZeroUsize::get),
-            resize: sizes.llie_resize,
-        }
-    }
-}
 
 /// A store, with what decides images besides their recipes.
 #[derive(Debug, Clone, Copy)]
@@ -114,7 +87,7 @@ impl<'a> StoredImages<'a> {
             Key::of(&StoredRecipe {
                 content: (content != Content::Image).then_some(content),
                 image: recipe.facts(source, frame, condition)?,
-                program: self.maker.program,
+                program: self.maker.program(),
                 enhanced_with: condition.enhancer.is_some().then_some(self.maker),
             })
         };

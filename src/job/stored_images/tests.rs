@@ -1,6 +1,7 @@
 use std::num::NonZeroUsize;
 
 use super::*;
+use crate::enhance::SizeArgs;
 use crate::job::scaling::Scaling;
 use crate::job::source::SourceFrame;
 use crate::job::walk::{CameraOf, DegradedAt};
