@@ -133,7 +133,7 @@ impl ImageStore {
             }
         };
         self.with(|state| match (content, &entry) {
-            (Content::Measures | Content::Probe, found) => {
+            (Content::Measures | Content::Probe | Content::Thumbnail, found) => {
                 let found = found.as_ref();
                 state.counts.facts += usize::from(found.is_some());
                 state.counts.saved_ms += found.map_or(0, |entry| entry.facts.milliseconds);

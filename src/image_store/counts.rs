@@ -9,7 +9,7 @@ pub(crate) struct StoreCounts {
     pub(crate) hits: usize,
     /// Bytes of these images.
     pub(crate) hit_bytes: u64,
-    /// Measures of images, and results of tries, that were read without an image.
+    /// Measures and small copies of images, and results of tries, that were read.
     pub(crate) facts: usize,
     /// Time that all this took to make when it was made, in milliseconds.
     pub(crate) saved_ms: u64,
@@ -32,7 +32,7 @@ impl fmt::Display for StoreCounts {
         let megabytes = |bytes: u64| bytes as f64 / 1e6;
         write!(
             f,
-            "{} of {} images read ({:.1} MB), {} measures read alone; these took {:.1} s to make; {} written ({:.1} MB)",
+            "{} of {} images read ({:.1} MB), {} measures and small copies; these took {:.1} s to make; {} written ({:.1} MB)",
             self.hits,
             self.hits + self.misses,
             megabytes(self.hit_bytes),

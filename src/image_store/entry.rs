@@ -26,7 +26,7 @@ pub(super) const FOOTER: usize = 32 + 8 + 3 * 4 + 8;
 /// An image as it is in the store.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Entry {
-    /// The file of the image, as it is sent; empty if there are facts alone.
+    /// The file of the image, as it is sent, or of its small copy; empty if there are facts alone.
     pub(crate) image: Vec<u8>,
     /// Width and height in pixels; 0 without an image.
     pub(crate) size: [u32; 2],
@@ -59,6 +59,8 @@ pub(crate) enum Content {
     Measures,
     /// What the probe of an enhancer found.
     Probe,
+    /// A small copy of an image, for the report of a run.
+    Thumbnail,
 }
 
 /// What an entry of the store is about, in words.
@@ -83,6 +85,7 @@ impl fmt::Display for Shown {
                 return write!(f, "tries of {}", enhancer.unwrap_or("an enhancer"));
             }
             Content::Measures => f.write_str("measures of ")?,
+            Content::Thumbnail => f.write_str("small copies of ")?,
             Content::Image => {}
         }
         f.write_str(&self.light)?;

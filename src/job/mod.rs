@@ -64,6 +64,7 @@ pub(crate) mod source;
 pub(crate) mod stored;
 mod stored_findings;
 pub(crate) mod stored_images;
+mod stored_thumbnails;
 pub(crate) mod thumbnail;
 pub(crate) mod timings;
 pub(crate) mod trial;

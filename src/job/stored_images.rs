@@ -8,6 +8,8 @@ use super::image_maker::Maker;
 use super::recipe::{ImageKeyFacts, Recipe};
 use super::source::{Source, SourceFrame};
 use super::stored_findings::StoredFindings;
+use super::stored_thumbnails::ThumbnailPlace;
+use super::thumbnail::ShownObjects;
 use crate::ask::Payload;
 use crate::enhance::ImageUse;
 use crate::error::Result;
@@ -106,7 +108,9 @@ impl<'a> StoredImages<'a> {
             image: key(Content::Image)?,
             measures: match keeps {
                 Content::Image => None,
-                Content::Measures | Content::Probe => Some(key(Content::Measures)?),
+                Content::Measures | Content::Probe | Content::Thumbnail => {
+                    Some(key(Content::Measures)?)
+                }
             },
             shown,
         })
@@ -157,7 +161,7 @@ pub(crate) struct StoredImage {
     pub(crate) notes: MadeNotes,
 }
 
-impl StoredPlace<'_> {
+impl<'a> StoredPlace<'a> {
     /// Whether the image itself is kept.
     pub(crate) fn keeps_image(&self) -> bool {
         self.measures.is_none()
@@ -202,6 +206,15 @@ impl StoredPlace<'_> {
         let alone = self.measures.as_ref()?;
         self.store.get(alone, Content::Measures, is_enough)?;
         measures
+    }
+
+    /// The place of the small copy of the image of a frame in a condition, with these things.
+    pub(crate) fn thumbnail(
+        &self,
+        of: (&FrameId, &Condition),
+        objects: Option<ShownObjects<'_>>,
+    ) -> Option<ThumbnailPlace<'a>> {
+        ThumbnailPlace::of((self.store, &self.image), &self.shown, of, objects)
     }
 
     /// Adds what is known of an image that took this time to make: with the image, if images like it are kept, else without it.

@@ -11,6 +11,7 @@ use crate::job::frame_work::pairs::{Resolved, paired};
 use crate::job::image_notes::{ImageNotes, WantedNotes, fidelity, similarity};
 use crate::job::image_steps::ImageSteps;
 use crate::job::stored_images::{MadeNotes, Needed, Similarity, StoredPlace};
+use crate::job::stored_thumbnails::ThumbnailPlace;
 use crate::job::thumbnail::{ShownObjects, thumbnail};
 use crate::job::timings::TimedStep;
 use crate::types::{Condition, EnhancerName, FrameId, PairFacts, Rgb};
@@ -27,32 +28,45 @@ struct NoteWriter<'n> {
 }
 
 impl NoteWriter<'_> {
-    /// The image as it is sent, with the notes that are wanted. `encoded` is what was encoded, if it is known.
-    fn noted(
+    /// The place of the small copy in the store; `None` without a store, if none is wanted, and in the darkness of a pair.
+    fn thumbnail_place<'a>(&self, place: Option<&StoredPlace<'a>>) -> Option<ThumbnailPlace<'a>> {
+        let place = place.filter(|_| self.wanted.thumbnail && self.pair.is_none());
+        place?.thumbnail((self.name, self.condition), self.shown)
+    }
+
+    /// The image as it is sent, with the notes that are wanted. `encoded` gives what was encoded, if it is known; it is needed only if the
+    /// store has no small copy.
+    fn noted<P: AsRef<Rgb>>(
         self,
         steps: ImageSteps<'_>,
         image: Arc<Payload>,
-        encoded: Option<&Rgb>,
-        similarity: Option<Similarity>,
-    ) -> (Arc<Payload>, ImageNotes) {
+        (place, similarity): (Option<&StoredPlace<'_>>, Option<Similarity>),
+        encoded: impl FnOnce() -> Result<Option<P>>,
+    ) -> Result<(Arc<Payload>, ImageNotes)> {
         let image = paired(image, self.pair);
         let (name, condition) = (self.name, self.condition);
-        let small_copy = || {
-            let made = thumbnail(name, condition, &image, encoded, self.shown);
-            or_warning(name, condition, made)
-        };
-        let thumbnail = self
-            .wanted
-            .thumbnail
-            .then(|| steps.timings.time(TimedStep::Encode, small_copy))
-            .flatten();
+        let kept = self.thumbnail_place(place);
+        let read = |place: &ThumbnailPlace<'_>| place.read(image.facts().digest);
+        let known = kept.as_ref();
+        let mut small =
+            known.and_then(|place| steps.timings.time(TimedStep::Decode, || read(place)));
+        if small.is_none() && self.wanted.thumbnail {
+            let (started, encoded) = (Instant::now(), encoded()?);
+            let encoded = encoded.as_ref().map(AsRef::as_ref);
+            let make = || thumbnail(name, condition, &image, encoded, self.shown);
+            let made = steps.timings.time(TimedStep::Encode, make);
+            small = or_warning(name, condition, made);
+            if let (Some(place), Some(made)) = (kept, &small) {
+                place.write(made, started.elapsed().as_millis() as u64);
+            }
+        }
         let similarity = similarity.filter(|_| self.wanted.fidelity);
         let fidelity = similarity.map(|found| fidelity(name, condition, &image, found));
         let notes = ImageNotes {
-            thumbnail,
+            thumbnail: small,
             fidelity,
         };
-        (image, notes)
+        Ok((image, notes))
     }
 }
 
@@ -78,12 +92,12 @@ impl ImagePipeline<'_> {
             wanted,
             pair,
         };
+        let place = work.stored_place(&made)?;
         if let Some(image) = work.unchanged_file(&made)? {
             // The file is decoded only for its thumbnail.
-            let clean = wanted.thumbnail.then(|| work.clean()).transpose()?;
-            return Ok(writer.noted(steps, image, clean.map(AsRef::as_ref), None));
+            let clean = || work.clean().cloned().map(Some);
+            return writer.noted(steps, image, (place.as_ref(), None), clean);
         }
-        let place = work.stored_place(&made)?;
         let needed = if wanted.fidelity {
             Needed::Similarity
         } else {
@@ -100,7 +114,8 @@ impl ImagePipeline<'_> {
             self.note_stored(&stored.notes, enhancer, [work.frame(), &made])?;
         }
         let image = steps.stored_payload(stored.payload, &read, exposure)?;
-        Ok(writer.noted(steps, image, None, stored.notes.similarity))
+        let known = (place.as_ref(), stored.notes.similarity);
+        writer.noted(steps, image, known, || Ok(None::<Arc<Rgb>>))
     }
 
     /// The same, made now, and kept at its place in the store.
@@ -129,7 +144,7 @@ impl ImagePipeline<'_> {
             Some(known) => Some(known),
             None => clean.map(measure).transpose()?,
         };
-        if let Some(place) = place.filter(|_| measured.is_none()) {
+        if let Some(place) = place.as_ref().filter(|_| measured.is_none()) {
             let notes = MadeNotes {
                 enhanced,
                 similarity,
@@ -139,9 +154,11 @@ impl ImagePipeline<'_> {
             } else {
                 measuring
             };
-            steps.store(&place, &image, &notes, since.elapsed())?;
+            steps.store(place, &image, &notes, since.elapsed())?;
         }
-        Ok(writer.noted(steps, image, Some(&encoded), similarity))
+        writer.noted(steps, image, (place.as_ref(), similarity), || {
+            Ok(Some(&encoded))
+        })
     }
 
     /// Notes an image of the store as its enhancer would.
