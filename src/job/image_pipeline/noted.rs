@@ -107,7 +107,7 @@ impl ImagePipeline<'_> {
             .as_ref()
             .and_then(|place| steps.stored_image(place, needed));
         let Some(stored) = found else {
-            return self.made_and_noted(work, &made, place, writer);
+            return self.made_and_noted(work, &made, place.as_ref(), writer);
         };
         let (read, exposure) = (work.note()?, work.exposure(&made)?);
         if let Some(enhancer) = &made.enhancer {
@@ -123,13 +123,13 @@ impl ImagePipeline<'_> {
         &mut self,
         work: &mut FrameWork<'_>,
         made: &Condition,
-        place: Option<StoredPlace<'_>>,
+        place: Option<&StoredPlace<'_>>,
         writer: NoteWriter<'_>,
     ) -> Result<(Arc<Payload>, ImageNotes)> {
         let (steps, read, exposure) = (work.steps, work.note()?, work.exposure(made)?);
         let started = Instant::now();
         let is_wanted = writer.wanted.fidelity;
-        let measured = place.as_ref().filter(|_| is_wanted);
+        let measured = place.filter(|_| is_wanted);
         let measured = measured.and_then(|place| steps.stored_measures(place));
         let is_missing = is_wanted && measured.is_none();
         let clean = is_missing.then(|| work.clean_as_sent()).transpose()?;
@@ -144,7 +144,7 @@ impl ImagePipeline<'_> {
             Some(known) => Some(known),
             None => clean.map(measure).transpose()?,
         };
-        if let Some(place) = place.as_ref().filter(|_| measured.is_none()) {
+        if let Some(place) = place.filter(|_| measured.is_none()) {
             let notes = MadeNotes {
                 enhanced,
                 similarity,
@@ -156,9 +156,7 @@ impl ImagePipeline<'_> {
             };
             steps.store(place, &image, &notes, since.elapsed())?;
         }
-        writer.noted(steps, image, (place.as_ref(), similarity), || {
-            Ok(Some(&encoded))
-        })
+        writer.noted(steps, image, (place, similarity), || Ok(Some(&encoded)))
     }
 
     /// Notes an image of the store as its enhancer would.
