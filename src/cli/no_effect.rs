@@ -230,7 +230,6 @@ impl NoEffect {
                 ids::<RequestArgs>(),
                 ids::<Sending>(),
                 ids::<JudgeArgs>(),
-                ids::<StoreArgs>(),
             ];
             self.because("--study asks no model", &asking.concat());
         }
@@ -296,18 +295,13 @@ impl NoEffect {
             self.because(
                 "--dry-run sends nothing",
                 &[
-                    [
-                        "grace",
-                        "timings",
-                        "max_failures",
-                        "fail_fast",
-                        "no_parquet",
-                    ]
-                    .map(String::from)
-                    .to_vec(),
-                    ids::<StoreArgs>(),
+                    "grace",
+                    "timings",
+                    "max_failures",
+                    "fail_fast",
+                    "no_parquet",
                 ]
-                .concat(),
+                .map(String::from),
             );
         }
         if args.stored.images_cache.is_none() {
@@ -442,14 +436,6 @@ mod tests {
             "--images-cache-size: no effect: no --images-cache is named",
         ),
         (
-            "--model m --dry-run --images-cache d",
-            "--images-cache: no effect: --dry-run sends nothing",
-        ),
-        (
-            "openeqa --questions q --frames f --study s --images-cache d",
-            "--images-cache: no effect: --study asks no model",
-        ),
-        (
             "openeqa --questions q --frames f --model m --judge-temperature 1",
             "--judge-temperature: no effect: no judge is named",
         ),
@@ -528,6 +514,8 @@ mod tests {
         }
         for words in [
             "--model m",
+            "--model m --dry-run --images-cache d",
+            "openeqa --questions q --frames f --study s --images-cache d",
             "--model m --llie f.onnx --tile whole --profile eld --image jpeg:90 --rpm 9",
             "--model m --ask home --ask-per-image 3",
             "report a --no-parquet",

@@ -97,6 +97,22 @@ impl ModelFile {
         &self.name
     }
 
+    /// Path of the file; for an enhancer of the program, what messages call it.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Digest of all that decides what is found when the model is opened and tried: also which statements are from the sidecar and
+    /// which from the preset, which decides no image.
+    ///
+    /// # Errors
+    /// If a number of the sidecar is infinite or NaN.
+    pub(crate) fn stated(&self) -> Result<Digest> {
+        let preset = self.preset.as_ref().map(|preset| &preset.name);
+        let facts = (self.digest, &self.sidecar, preset);
+        Digest::canonical("darkqa.enhancer-stated/1", &facts)
+    }
+
     /// Digest of the model, its external data, and the convention of sidecar and preset.
     #[must_use]
     pub fn digest(&self) -> Digest {

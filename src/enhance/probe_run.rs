@@ -2,13 +2,14 @@
 
 use super::convention::{Rounding, ValueRange};
 use super::enhancer::Enhancer;
+use super::findings::warn_of_untried;
 use super::graph::{Graph, RunResult};
 use super::planes::Planes;
 use super::plausible::Codes;
 use super::probe::{Conclusion, PairTrial, Probe, RangePair, Ranges};
 use super::sidecar::ModelSidecar;
 use super::usage::{ImageUse, Implausible, Seen};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::types::Rgb;
 use crate::types::enhancer_note::{ProbeNote, ProbeOutcome};
 
@@ -36,10 +37,7 @@ impl Enhancer {
             trials = self.trials(dark, self.convention(), self.stated_ranges())?;
         }
         let Some(Trials { probe, .. }) = trials else {
-            tracing::warn!(
-                "{}: it takes none of the small sizes of the probe, so nothing is known of whether its images can be enhanced images",
-                self.name()
-            );
+            warn_of_untried(self.name());
             return Ok(());
         };
         let outcome = match probe.conclusion() {
@@ -98,8 +96,7 @@ impl Enhancer {
         place: [&dyn ToString; 2],
         implausible: Implausible,
     ) -> Result<()> {
-        self.usage().add_sizes_of_stored(&used.sizes);
-        self.judge(&used.seen, place, implausible)
+        used.note_in(&self.usage(), self.path(), place, implausible)
     }
 
     fn judge(
@@ -108,14 +105,7 @@ impl Enhancer {
         place: [&dyn ToString; 2],
         implausible: Implausible,
     ) -> Result<()> {
-        if implausible == Implausible::NotLookedFor {
-            return Ok(());
-        }
-        let judged = self.usage().judge(seen, place, implausible);
-        judged.map_err(|problem| Error::EnhancerEnded {
-            path: self.path().to_owned(),
-            problem,
-        })
+        seen.judge_in(&self.usage(), self.path(), place, implausible)
     }
 
     /// What the model makes of dark frames by a convention, with each pair of ranges that is not stated; `None` if it fails at all

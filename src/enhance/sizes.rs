@@ -30,9 +30,9 @@ pub struct SizeLog {
     pub multiple: Option<usize>,
     /// Pixels that filled images, as `reflect`; `None` if none was filled.
     pub pad: Option<String>,
-    /// Width and height of the last tiles; `None` if no image was cut.
+    /// Width and height of the largest tiles; `None` if no image was cut.
     pub tile: Option<[usize; 2]>,
-    /// Context of the last tiles in pixels; `None` if no image was cut.
+    /// Largest context of tiles in pixels; `None` if no image was cut.
     pub context: Option<usize>,
     /// Farthest pixels on which a pixel of the result was seen to depend; `None` if it was not measured.
     pub reach: Option<usize>,
@@ -84,8 +84,8 @@ impl SizeLog {
         if is_tiled {
             let [height, width] = plan.fed();
             self.tiled += 1;
-            self.tile = Some([width, height]);
-            self.context = Some(plan.cut.context);
+            self.tile = self.tile.max(Some([width, height]));
+            self.context = self.context.max(Some(plan.cut.context));
             self.seam.compared += seam.compared;
             self.seam.differing += seam.differing;
             self.seam.most = self.seam.most.max(seam.max_difference);
@@ -120,9 +120,10 @@ impl SizeLog {
         self.fixed = fixed.or(self.fixed);
         self.multiple = multiple.or(self.multiple);
         self.pad = pad.clone().or(self.pad.take());
-        self.tile = tile.or(self.tile);
-        self.context = context.or(self.context);
-        self.reach = reach.or(self.reach);
+        // The same whatever the order of the images.
+        self.tile = self.tile.max(*tile);
+        self.context = self.context.max(*context);
+        self.reach = self.reach.max(*reach);
         self.seam.compared += seam.compared;
         self.seam.differing += seam.differing;
         self.seam.most = self.seam.most.max(seam.most);

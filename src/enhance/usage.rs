@@ -1,12 +1,14 @@
 //! What an enhancer did in a run, shared by all threads that use it: [`Usage`]; and what follows if that is odd: [`Implausible`].
 
 use std::collections::{BTreeMap, HashSet};
+use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use serde::{Deserialize, Serialize};
 
 use super::plausible::{Codes, DARK, Gravity, Verdict, brightness, judge};
 use super::sizes::SizeLog;
+use crate::error::{Error, Result};
 use crate::types::enhancer_note::{EnhancerNote, FlawedImage};
 use crate::types::{Digest, Rgb};
 
@@ -54,6 +56,46 @@ pub(crate) struct ImageUse {
     pub(super) seen: Seen,
     /// What was done because of the size of the image.
     pub(super) sizes: SizeLog,
+}
+
+impl ImageUse {
+    /// Notes an image of a frame in a condition that was made in another run or process, as if the enhancer in this file made it now.
+    ///
+    /// # Errors
+    /// If most of its images of dark frames so far cannot be enhanced images.
+    pub(crate) fn note_in(
+        &self,
+        usage: &Usage,
+        model: &Path,
+        place: [&dyn ToString; 2],
+        implausible: Implausible,
+    ) -> Result<()> {
+        usage.add_sizes_of_stored(&self.sizes);
+        self.seen.judge_in(usage, model, place, implausible)
+    }
+}
+
+impl Seen {
+    /// Counts what was seen on the image of a frame in a condition, unless images are not looked at. The model is named by its file.
+    ///
+    /// # Errors
+    /// If most images of dark frames so far cannot be enhanced images.
+    pub(super) fn judge_in(
+        &self,
+        usage: &Usage,
+        model: &Path,
+        place: [&dyn ToString; 2],
+        implausible: Implausible,
+    ) -> Result<()> {
+        if implausible == Implausible::NotLookedFor {
+            return Ok(());
+        }
+        let judged = usage.judge(self, place, implausible);
+        judged.map_err(|problem| Error::EnhancerEnded {
+            path: model.to_owned(),
+            problem,
+        })
+    }
 }
 
 /// A handle to the note of an enhancer, which grows while it is used.

@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, SystemTime};
 
 use super::counts::StoreCounts;
-use super::entry::Entry;
+use super::entry::{Content, Entry};
 use super::folder::{StoreFolder, found};
 use super::key::Key;
 use super::kinds::StoredKinds;
@@ -101,9 +101,19 @@ impl ImageStore {
         self.with(|state| state.counts)
     }
 
-    /// The image of a key; `None` if the store has none. A damaged one is removed. `is_enough` says whether an image has all that is
-    /// needed, else it counts as missing.
-    pub(crate) fn get(&self, key: &Key, is_enough: impl FnOnce(&Entry) -> bool) -> Option<Entry> {
+    /// Whether the store has a file of this key. It may be damaged.
+    pub(crate) fn contains(&self, key: &Key) -> bool {
+        self.with(|state| state.health) != Health::Gone && self.folder.place(key.digest()).is_file()
+    }
+
+    /// The entry of a key; `None` if the store has none. A damaged one is removed. `is_enough` says whether an entry has all that is
+    /// needed, else it counts as missing. Only images are counted as read or missing.
+    pub(crate) fn get(
+        &self,
+        key: &Key,
+        content: Content,
+        is_enough: impl FnOnce(&Entry) -> bool,
+    ) -> Option<Entry> {
         if self.with(|state| state.health) == Health::Gone {
             return None;
         }
@@ -122,13 +132,18 @@ impl ImageStore {
                 None
             }
         };
-        self.with(|state| match &entry {
-            Some(entry) => {
+        self.with(|state| match (content, &entry) {
+            (Content::Measures | Content::Probe | Content::Thumbnail, found) => {
+                let found = found.as_ref();
+                state.counts.facts += usize::from(found.is_some());
+                state.counts.saved_ms += found.map_or(0, |entry| entry.facts.milliseconds);
+            }
+            (Content::Image, Some(entry)) => {
                 state.counts.hits += 1;
                 state.counts.hit_bytes += entry.image.len() as u64;
                 state.counts.saved_ms += entry.facts.milliseconds;
             }
-            None => state.counts.misses += 1,
+            (Content::Image, None) => state.counts.misses += 1,
         });
         entry
     }
@@ -149,7 +164,7 @@ impl ImageStore {
         }
     }
 
-    /// Adds the image of a key, if there is room.
+    /// Adds the entry of a key, if there is room.
     pub(crate) fn put(&self, key: &Key, entry: &Entry) {
         if self.with(|state| state.health) != Health::Whole {
             return;
@@ -172,9 +187,11 @@ impl ImageStore {
         }
         match self.folder.write(key.digest(), &file) {
             Ok(()) => self.with(|state| {
-                state.counts.written += 1;
-                state.counts.written_bytes += bytes;
                 state.bytes += bytes;
+                if entry.facts.shown.content == Content::Image {
+                    state.counts.written += 1;
+                    state.counts.written_bytes += bytes;
+                }
             }),
             Err(e) => self.fails(Health::ReadOnly, "write to", &e),
         }

@@ -9,7 +9,9 @@ pub(crate) struct StoreCounts {
     pub(crate) hits: usize,
     /// Bytes of these images.
     pub(crate) hit_bytes: u64,
-    /// Time that these images took to make when they were made, in milliseconds.
+    /// Measures and small copies of images, and results of tries, that were read.
+    pub(crate) facts: usize,
+    /// Time that all this took to make when it was made, in milliseconds.
     pub(crate) saved_ms: u64,
     /// Images that the store did not have.
     pub(crate) misses: usize,
@@ -30,10 +32,11 @@ impl fmt::Display for StoreCounts {
         let megabytes = |bytes: u64| bytes as f64 / 1e6;
         write!(
             f,
-            "{} of {} images read ({:.1} MB; they took {:.1} s to make), {} written ({:.1} MB)",
+            "{} of {} images read ({:.1} MB), {} measures and small copies; these took {:.1} s to make; {} written ({:.1} MB)",
             self.hits,
             self.hits + self.misses,
             megabytes(self.hit_bytes),
+            self.facts,
             self.saved_ms as f64 / 1e3,
             self.written,
             megabytes(self.written_bytes),

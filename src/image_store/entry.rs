@@ -11,6 +11,8 @@
 //!
 //! Numbers are little-endian. The key is in the digest, so that an entry in the place of another is noticed.
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -24,17 +26,17 @@ pub(super) const FOOTER: usize = 32 + 8 + 3 * 4 + 8;
 /// An image as it is in the store.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Entry {
-    /// The file of the image, as it is sent.
+    /// The file of the image, as it is sent, or of its small copy; empty if there are facts alone.
     pub(crate) image: Vec<u8>,
-    /// Width and height in pixels.
+    /// Width and height in pixels; 0 without an image.
     pub(crate) size: [u32; 2],
     pub(crate) facts: EntryFacts,
 }
 
-/// What is stored beside an image.
+/// What is stored beside an image, or alone.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct EntryFacts {
-    /// What it shows, for lists of the store.
+    /// What it is about, for lists of the store.
     pub(crate) shown: Shown,
     /// Time that it took to make, in milliseconds.
     pub(crate) milliseconds: u64,
@@ -46,16 +48,52 @@ pub(crate) struct EntryFacts {
     recipe: Value,
 }
 
-/// What an image of the store shows, in words.
+/// What an entry holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Content {
+    /// An image, with what was found out about it.
+    #[default]
+    Image,
+    /// What was found out about an image that is not kept.
+    Measures,
+    /// What the probe of an enhancer found.
+    Probe,
+    /// A small copy of an image, for the report of a run.
+    Thumbnail,
+}
+
+/// What an entry of the store is about, in words.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 pub(crate) struct Shown {
+    #[serde(default)]
+    pub(crate) content: Content,
     /// Name of the enhancer; `None` without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) enhancer: Option<String>,
-    /// What was done to the frame, as `L3-noise`.
+    /// What was done to the frame, as `L3-noise`; empty for a probe.
     pub(crate) light: String,
-    /// Format, as `png`.
+    /// Format, as `png`; empty for a probe.
     pub(crate) format: String,
+}
+
+impl fmt::Display for Shown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let enhancer = self.enhancer.as_deref();
+        match self.content {
+            Content::Probe => {
+                return write!(f, "tries of {}", enhancer.unwrap_or("an enhancer"));
+            }
+            Content::Measures => f.write_str("measures of ")?,
+            Content::Thumbnail => f.write_str("small copies of ")?,
+            Content::Image => {}
+        }
+        f.write_str(&self.light)?;
+        if let Some(enhancer) = enhancer {
+            write!(f, ", enhanced by {enhancer}")?;
+        }
+        write!(f, ", {}", self.format)
+    }
 }
 
 impl EntryFacts {
@@ -75,6 +113,15 @@ impl EntryFacts {
 pub(super) struct Damaged;
 
 impl Entry {
+    /// An entry without an image.
+    pub(crate) fn of_facts(facts: EntryFacts) -> Self {
+        Self {
+            image: Vec::new(),
+            size: [0, 0],
+            facts,
+        }
+    }
+
     /// The bytes of the file for a key.
     pub(super) fn file(&self, key: &Key) -> Vec<u8> {
         let facts = EntryFacts {

@@ -65,21 +65,11 @@ pub(crate) fn listing(folder: &Path) -> Result<String> {
         let place = AGES.iter().position(is_younger).unwrap_or(AGES.len());
         by_age[place].add(file.bytes, milliseconds);
     }
-    let mut text = String::from("   images          MB  s to make it\n");
+    let mut text = String::from("    files          MB  s to make it\n");
     for (shown, sum) in &by_shown {
         text += &sum.line(&shown.as_ref().map_or_else(
             || "damaged, or of another version of the program".to_owned(),
-            |shown| {
-                let Shown {
-                    enhancer,
-                    light,
-                    format,
-                } = shown;
-                let by = enhancer
-                    .as_ref()
-                    .map(|name| format!(", enhanced by {name}"));
-                format!("{light}{}, {format}", by.unwrap_or_default())
-            },
+            ToString::to_string,
         ));
     }
     for (place, sum) in by_age.iter().enumerate().filter(|(_, sum)| sum.images > 0) {

@@ -13,6 +13,7 @@ mod access;
 mod counts;
 mod entry;
 mod folder;
+mod image_set;
 mod key;
 mod kinds;
 mod listing;
@@ -20,7 +21,7 @@ mod settings;
 mod sweep;
 
 pub(crate) use access::ImageStore;
-pub(crate) use entry::{Entry, EntryFacts, Shown};
+pub(crate) use entry::{Content, Entry, EntryFacts, Shown};
 pub(crate) use key::Key;
 pub(crate) use kinds::StoredKinds;
 pub(crate) use listing::{clear, listing};

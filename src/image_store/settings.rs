@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::access::ImageStore;
+use super::image_set::ImageSet;
 use super::kinds::StoredKinds;
 use crate::error::Result;
 use crate::types::Decides;
@@ -28,6 +29,12 @@ pub(crate) struct StoreArgs {
 }
 
 impl StoreArgs {
+    /// The images that the store would keep, of which none is counted yet; `None` without a folder.
+    pub(crate) fn image_set(&self) -> Option<ImageSet> {
+        let set = ImageSet::new(self.images_cache_what, self.images_cache_size * 1e9);
+        self.images_cache.is_some().then_some(set)
+    }
+
     /// The store that the flags name; `None` without a folder.
     ///
     /// # Errors

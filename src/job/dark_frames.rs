@@ -1,6 +1,7 @@
-//! The dark frames that an enhancer is tried on before a run: [`dark_frames`].
+//! The dark frames that an enhancer is tried on before a run: [`dark_frames`], made of [`DarkFrames`].
 
-use super::frame_work::{FrameWork, ImageSteps};
+use super::frame_work::FrameWork;
+use super::image_steps::ImageSteps;
 use super::plan::SourcePlan;
 use super::source::Source;
 use crate::enhance::{DARK, FRAMES, brightness};
@@ -11,34 +12,51 @@ use crate::types::{Condition, EnhancerName, Rgb, Severity};
 /// Exposure drops, in EV, by which frames are darkened if the plan has too few dark ones: that of L3 first.
 const DROPS: [Severity; 3] = [Severity::L3, Severity::L2, Severity::L4];
 
-/// Dark images of a plan for an enhancer: at most [`FRAMES`], spread over its sources, in the conditions that it enhances. Where these
-/// are not dark, the frames are darkened by exposure.
+/// The frames of a plan on which an enhancer may be tried, at most [`FRAMES`], spread over its sources.
+pub(super) struct DarkFrames<'a>(Vec<(&'a Source, Vec<Condition>)>);
+
+impl<'a> DarkFrames<'a> {
+    /// Those for the enhancer of this name, with the conditions of the plan that it enhances.
+    pub(super) fn of<I>(
+        sources: &'a [Source],
+        plan: &[SourcePlan<I>],
+        name: &EnhancerName,
+    ) -> Self {
+        let enhanced = |part: &SourcePlan<I>| -> Vec<Condition> {
+            let conditions = part.conditions().cloned();
+            conditions
+                .filter(|condition| condition.enhancer.as_ref() == Some(name))
+                .collect()
+        };
+        let parts = plan
+            .iter()
+            .map(|part| (&sources[part.source], enhanced(part)));
+        let parts: Vec<(&Source, Vec<Condition>)> = parts
+            .filter(|(_, conditions)| !conditions.is_empty())
+            .collect();
+        let spread = evenly(parts.len(), FRAMES).into_iter();
+        Self(spread.map(|place| parts[place].clone()).collect())
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// The sources, of which the middle frame is taken, with their conditions.
+    pub(super) fn frames(&self) -> &[(&'a Source, Vec<Condition>)] {
+        &self.0
+    }
+}
+
+/// Dark images of these frames, at most [`FRAMES`], in the conditions that the enhancer enhances. Where these are not dark, the frames are
+/// darkened by exposure.
 ///
 /// # Errors
 /// If a frame cannot be read.
-pub(super) fn dark_frames<I>(
-    steps: ImageSteps<'_>,
-    sources: &[Source],
-    plan: &[SourcePlan<I>],
-    name: &EnhancerName,
-) -> Result<Vec<Rgb>> {
-    let enhanced = |part: &SourcePlan<I>| -> Vec<Condition> {
-        let conditions = part.conditions().cloned();
-        conditions
-            .filter(|condition| condition.enhancer.as_ref() == Some(name))
-            .collect()
-    };
-    let parts = plan
-        .iter()
-        .map(|part| (&sources[part.source], enhanced(part)));
-    let parts: Vec<(&Source, Vec<Condition>)> = parts
-        .filter(|(_, conditions)| !conditions.is_empty())
-        .collect();
-    let spread = evenly(parts.len(), FRAMES);
+pub(super) fn dark_frames(steps: ImageSteps<'_>, frames: &DarkFrames<'_>) -> Result<Vec<Rgb>> {
     let mut works: Vec<FrameWork<'_>> = Vec::new();
     let mut conditions = Vec::new();
-    for place in spread {
-        let (source, enhanced) = &parts[place];
+    for (source, enhanced) in &frames.0 {
         if let Some(frame) = source.middle() {
             works.push(FrameWork::planned(steps, source, frame));
             conditions.push(enhanced);

@@ -9,6 +9,7 @@ use tokio::task::{JoinError, JoinSet};
 
 use super::budget::{Budget, text_tokens};
 use super::circuit_breaker::{CircuitBreaker, EndReason};
+use super::image_pipeline::EnhancerStopper;
 use super::interrupt::Interrupt;
 use super::lanes::{Lanes, PreparedTrial};
 use super::measured_tokens::MeasuredTokens;
@@ -20,7 +21,6 @@ use super::trial::{Item, PreparedGroup};
 use super::truncation::TruncationCheck;
 use super::workers::unstarted;
 use crate::ask::{AskError, Call, Reach};
-use crate::enhance::Stopper;
 use crate::error::{Error, Result};
 use crate::store::Store;
 use crate::types::{Failure, FailureKind, Reply};
@@ -56,7 +56,7 @@ impl Dispatcher<'_> {
         counts: TrialCounts,
         budget: Budget,
         store: &mut Store<I::Detail>,
-        stoppers: Vec<Stopper>,
+        stoppers: Vec<EnhancerStopper>,
         make: impl FnOnce(&Sender<PreparedGroup<I>>) + Send,
     ) -> Result<EndReason> {
         let runtime = runtime::Builder::new_multi_thread()
@@ -101,7 +101,7 @@ struct ReplySink<'a, I: Item> {
     bar: StepBar,
     breaker: CircuitBreaker,
     budget: Budget,
-    stoppers: Vec<Stopper>,
+    stoppers: Vec<EnhancerStopper>,
     /// Number of trials with a reply, including those of earlier calls.
     answered: usize,
     truncation: TruncationCheck,
@@ -174,7 +174,7 @@ impl<I: Item> ReplySink<'_, I> {
         // The image pipeline ends as soon as this channel is closed.
         drop(groups);
         if self.breaker.stopped() {
-            self.stoppers.iter().for_each(Stopper::stop);
+            self.stoppers.iter().for_each(EnhancerStopper::stop);
             self.drain(in_flight, interrupt, grace).await?;
         }
         self.store.sync()?;

@@ -9,6 +9,7 @@ use super::enhancers::OpenEnhancers;
 use super::estimate;
 use super::experiment::{DetailOf, Experiment};
 use super::folder;
+use super::image_maker::Maker;
 use super::manifest;
 use super::measured_tokens::MeasuredTokens;
 use super::open_run::{OpenRun, answered, pipeline};
@@ -16,6 +17,7 @@ use super::outcome::{Outcome, StdoutFormat};
 use super::plan::Plan;
 use super::progress::Progress;
 use super::source::{input_summary, warn_of_inputs};
+use super::stored_findings::StoredFindings;
 use super::timings::Timings;
 use crate::enhance::ModelFile;
 use crate::error::Result;
@@ -122,8 +124,8 @@ impl<'a, E: Experiment> Job<'a, E> {
             dark_already::warn(experiment);
         }
         let timings = Timings::default();
-        let enhancers = OpenEnhancers::load(self.files, &settings.loading)?;
-        let mut pipeline = pipeline(experiment, enhancers.enhancers, None, &timings);
+        let enhancers = OpenEnhancers::load(self.files, &settings.loading)?.take()?;
+        let mut pipeline = pipeline(experiment, enhancers, None, &timings);
         for plan in &plans {
             pipeline.probe(experiment.sources(), &plan.sources)?;
         }
@@ -143,13 +145,18 @@ impl<'a, E: Experiment> Job<'a, E> {
         let complete = stored
             .as_ref()
             .is_some_and(|stored| stored.status == Status::Complete);
-        // Loaded before the folder is created, so that a broken enhancer leaves no folder.
-        let enhancers = if complete {
-            OpenEnhancers::deferred(files, &settings.loading)
-        } else {
-            OpenEnhancers::load(files, &settings.loading)?
-        };
         let images = settings.images.open()?;
+        let mut enhancers = OpenEnhancers::deferred(files, &settings.loading);
+        if !complete {
+            // Loaded before the folder is created, so that a broken enhancer leaves no folder; one that was loaded before is not broken.
+            enhancers.open_runtime()?;
+            let maker = Maker::new(enhancers.version(), &settings.loading.size);
+            let known = images.as_ref();
+            let known = known.map(|store| StoredFindings::new(store, &maker).know_all(&enhancers));
+            if !known.unwrap_or(Ok(false))? {
+                enhancers.open()?;
+            }
+        }
         let manifest = manifest::of(experiment, stored)?;
         let mut store = Store::open(&folder, &manifest, folder::address_change(&settings.place))?;
         store.add_questions(experiment.questions())?;

@@ -16,7 +16,7 @@ use super::source::Source;
 use super::trial::Item as _;
 use crate::ask::{ImageLimit, Price, Server};
 use crate::error::Result;
-use crate::report::forecast::{CostLine, Forecast, ReadingCost};
+use crate::report::forecast::{CostLine, Forecast, ReadingCost, StoreForecast};
 use crate::store::StoredTrial;
 use crate::types::{Condition, Degradation, ImageFacts, ReadingName, View};
 
@@ -62,6 +62,7 @@ pub(crate) fn estimate<E: Experiment>(
         None => SampledImages::default(),
     };
     let (mut bytes, mut largest_request, mut images, mut seconds) = (0.0, 0.0_f64, 0, 0.0);
+    let mut image_set = settings.images.image_set();
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     for (phase, plan) in plans.iter().enumerate() {
         let models = experiment.models(phase);
@@ -80,8 +81,15 @@ pub(crate) fn estimate<E: Experiment>(
                     largest_request = largest_request.max(request);
                 }
             }
-            if group.condition.is_some() {
+            if let Some(condition) = &group.condition {
                 images += source.order.len();
+                if let Some(set) = &mut image_set {
+                    let bytes = mean.map_or(0.0, |mean| mean.bytes);
+                    set.add(
+                        condition.enhancer.is_some(),
+                        bytes * source.frames.len() as f64,
+                    );
+                }
                 // The frames of a walk are made in parallel, one per core. A frame alone is made by all cores together.
                 let frames = source.frames.len() as f64;
                 let in_parallel = if source.frames.len() > 1 { cores } else { 1 };
@@ -117,6 +125,7 @@ pub(crate) fn estimate<E: Experiment>(
         pace,
         prices: format!("prices of {}", money.prices.as_of),
         batch: money.prices.batch,
+        image_store: image_set.map(|set| StoreForecast::new(set.words(), set.bytes(), set.room())),
         reply: E::REPLY,
         largest_request: sources
             .iter()

@@ -1,4 +1,4 @@
-//! The steps from one frame to its images: [`FrameWork`], with their shared settings [`ImageSteps`].
+//! The steps from one frame to its images: [`FrameWork`].
 
 pub(crate) mod pairs;
 
@@ -8,14 +8,15 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::bilinear::bilinear;
+use super::image_steps::ImageSteps;
 use super::photograph::SourcePhotograph;
 use super::recipe::Recipe;
 use super::scaling::Scaling;
-use super::source::{Frames, Source, SourceFrame};
-use super::stored_images::{MadeNotes, Needed, StoredImage, StoredImages, StoredPlace};
-use super::timings::{TimedStep, Timings};
+use super::source::{Source, SourceFrame};
+use super::stored_images::{MadeNotes, StoredPlace};
+use super::timings::TimedStep;
 use super::walk::DegradedAt;
-use crate::ask::{ImageLimit, Payload, PayloadFormat};
+use crate::ask::{Payload, PayloadFormat};
 use crate::dataset::Picture;
 use crate::error::{Error, Result};
 use crate::synthesis::{AppliedDegradation, Exposures, FrameView, NoiseKey};
@@ -23,92 +24,6 @@ use crate::types::{
     Condition, Degradation, Digest, EnhancerName, ExposureFacts, FrameId, InputNote, PairFacts,
     PhotoName, Pixels, Rgb,
 };
-
-/// Files, settings and timings that all images share.
-#[derive(Clone, Copy)]
-pub(crate) struct ImageSteps<'a> {
-    pub(crate) frames: &'a dyn Frames,
-    pub(crate) recipe: &'a Recipe,
-    /// Largest image that the endpoint takes; `None` if all models are built in.
-    pub(crate) limit: Option<ImageLimit>,
-    pub(crate) timings: &'a Timings,
-    /// The image store; `None` without one.
-    pub(crate) stored: Option<StoredImages<'a>>,
-}
-
-impl ImageSteps<'_> {
-    /// The image of a place in the store, if it is there with all that is needed.
-    pub(crate) fn stored_image(
-        &self,
-        place: &StoredPlace<'_>,
-        needed: Needed,
-    ) -> Option<StoredImage> {
-        let read = || place.read(self.recipe, needed);
-        self.timings.time(TimedStep::Decode, read)
-    }
-
-    /// Adds an image that took this time to make to the store.
-    pub(crate) fn store(
-        &self,
-        place: &StoredPlace<'_>,
-        image: &Payload,
-        notes: &MadeNotes,
-        took: Duration,
-    ) -> Result<()> {
-        let write = || place.write(image, notes, took);
-        self.timings.time(TimedStep::Encode, write)
-    }
-
-    /// An image from the store as it is sent, with what the camera did. `note` says how the file of its frame was read.
-    pub(crate) fn stored_payload(
-        &self,
-        payload: Payload,
-        note: &InputNote,
-        exposure: Option<ExposureFacts>,
-    ) -> Result<Arc<Payload>> {
-        let payload = payload.turned_by(note.orientation);
-        self.checked(payload.exposed_by(exposure))
-    }
-
-    /// The image as it is sent, with what the camera did, and the pixels that were encoded. `note` says how the file of its frame was
-    /// read.
-    pub(crate) fn payload<'p>(
-        &self,
-        image: &'p Rgb,
-        note: &InputNote,
-        exposure: Option<ExposureFacts>,
-    ) -> Result<(Arc<Payload>, Cow<'p, Rgb>)> {
-        let (payload, encoded) = self.timings.time(TimedStep::Encode, || {
-            let encoded = self.scaled(image)?;
-            let payload = Payload::encode(&encoded, self.recipe.format, None)?;
-            let payload = payload.turned_by(note.orientation);
-            Ok((payload.exposed_by(exposure), encoded))
-        })?;
-        Ok((self.checked(payload)?, encoded))
-    }
-
-    /// The image in the size sent.
-    fn scaled<'p>(&self, image: &'p Rgb) -> Result<Cow<'p, Rgb>> {
-        Ok(match self.recipe.scaling {
-            Scaling::MaxSide(side) => Payload::scaled(image, Some(side))?,
-            Scaling::LongerSide(side) if longer_side(image) != side => {
-                Cow::Owned(bilinear(image, side)?)
-            }
-            Scaling::Never | Scaling::LongerSide(_) => Cow::Borrowed(image),
-        })
-    }
-
-    fn checked(&self, payload: Payload) -> Result<Arc<Payload>> {
-        if let Some(limit) = &self.limit {
-            limit.check(payload.facts())?;
-        }
-        Ok(Arc::new(payload))
-    }
-}
-
-fn longer_side(image: &Rgb) -> usize {
-    image.height().max(image.width())
-}
 
 /// A frame in one condition, before enhancement.
 #[expect(clippy::large_enum_variant, reason = "few are alive at a time")]
@@ -214,7 +129,7 @@ impl<'a> FrameWork<'a> {
         &self.frame
     }
 
-    /// The place of the frame in a condition in the store; `None` if it is not kept there.
+    /// The place of the frame in a condition in the store; `None` without a store, and for photographs in the dark.
     ///
     /// # Errors
     /// If the condition cannot be made of this frame.
@@ -223,7 +138,8 @@ impl<'a> FrameWork<'a> {
             return Ok(None);
         };
         let (source, frame) = &**origin;
-        stored.place(self.steps.recipe, (source, frame), condition)
+        let place = stored.place(self.steps.recipe, (source, frame), condition)?;
+        Ok(Some(place))
     }
 
     /// How the file of the frame is read.

@@ -3,7 +3,11 @@
 //! The images of a frame are made condition by condition, those of a walk all at once. The channel is bounded. So memory holds only the
 //! images in flight, one or two more groups, and the frame of each worker.
 
+mod noted;
+mod opening;
 mod preparation;
+
+pub(crate) use opening::EnhancerStopper;
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -14,12 +18,14 @@ use rayon::prelude::*;
 use tokio::sync::mpsc::Sender;
 
 use super::frame_work::pairs::{Resolved, paired};
-use super::frame_work::{FrameWork, ImageSteps, StagedFrame};
-use super::image_notes::{ImageNotes, MissingNotes, WantedNotes, fidelity, similarity};
+use super::frame_work::{FrameWork, StagedFrame};
+use super::image_notes::{ImageNotes, MissingNotes};
+use super::image_steps::ImageSteps;
 use super::plan::{SourcePlan, TrialGroup};
+use super::resting_enhancer::RestingEnhancer;
 use super::source::Source;
-use super::stored_images::{MadeNotes, Needed};
-use super::thumbnail::{ShownObjects, thumbnail, thumbnail_of_all};
+use super::stored_images::MadeNotes;
+use super::thumbnail::{ShownObjects, thumbnail_of_all};
 use super::timings::TimedStep;
 use super::trial::{Item, PreparedGroup, Stimulus};
 use super::workers::Workers;
@@ -31,11 +37,14 @@ use crate::types::{Condition, EnhancerName, FrameId, Rgb};
 /// The steps from a frame to an image, with the enhancement models that they need.
 pub(crate) struct ImagePipeline<'a> {
     pub(crate) steps: ImageSteps<'a>,
+    /// Enhancers that are open.
     pub(crate) enhancers: Vec<Enhancer>,
+    /// Enhancers whose images are all in the store.
+    resting: Vec<Arc<RestingEnhancer>>,
     /// Further sets of the enhancers, each for a worker of its own; empty if one image is enhanced at a time.
-    pub(crate) sets: Vec<Vec<Enhancer>>,
+    sets: Vec<Vec<Enhancer>>,
     /// What happens to an enhancer whose images cannot be enhanced images.
-    pub(crate) implausible: Implausible,
+    implausible: Implausible,
 }
 
 /// A source in progress.
@@ -49,6 +58,21 @@ enum SourceWork<'a> {
 }
 
 impl<'a> ImagePipeline<'a> {
+    /// A pipeline with enhancers that are open.
+    pub(crate) fn new(
+        steps: ImageSteps<'a>,
+        enhancers: Vec<Enhancer>,
+        implausible: Implausible,
+    ) -> Self {
+        Self {
+            steps,
+            enhancers,
+            resting: Vec::new(),
+            sets: Vec::new(),
+            implausible,
+        }
+    }
+
     /// Makes the images of all sources, until they are done or the channel is closed.
     ///
     /// Normally each worker has one thread and works on one frame at a time, with a set of enhancers of its own. All workers share one
@@ -78,6 +102,7 @@ impl<'a> ImagePipeline<'a> {
                 let mut pipeline = ImagePipeline {
                     steps,
                     enhancers,
+                    resting: self.resting.clone(),
                     sets: Vec::new(),
                     implausible: self.implausible,
                 };
@@ -202,81 +227,6 @@ impl<'a> ImagePipeline<'a> {
         }
     }
 
-    /// A frame in a condition as it is sent, with the notes that are wanted.
-    fn image_and_notes(
-        &mut self,
-        work: &mut FrameWork<'_>,
-        condition: &Condition,
-        (name, shown): (&FrameId, Option<ShownObjects<'_>>),
-        wanted: WantedNotes,
-    ) -> Result<(Arc<Payload>, ImageNotes)> {
-        let Resolved {
-            work,
-            condition: made,
-            pair,
-        } = work.resolved(condition)?;
-        let steps = work.steps;
-        let small_copy = |image: &Payload, encoded: Option<&Rgb>| {
-            let make = || {
-                let made = thumbnail(name, condition, image, encoded, shown);
-                or_warning(name, condition, made)
-            };
-            steps.timings.time(TimedStep::Encode, make)
-        };
-        let mut notes = ImageNotes::default();
-        if let Some(image) = work.unchanged_file(&made)? {
-            let image = paired(image, pair);
-            // The file is decoded only for its thumbnail.
-            if wanted.thumbnail {
-                notes.thumbnail = small_copy(&image, Some(work.clean()?));
-            }
-            return Ok((image, notes));
-        }
-        let (read, exposure) = (work.note()?, work.exposure(&made)?);
-        let place = work.stored_place(&made)?;
-        let needed = if wanted.fidelity {
-            Needed::Similarity
-        } else {
-            Needed::Image
-        };
-        let found = place
-            .as_ref()
-            .and_then(|place| steps.stored_image(place, needed));
-        if let Some(stored) = found {
-            self.note_stored(&stored.notes, &made, work.frame())?;
-            let image = steps.stored_payload(stored.payload, &read, exposure)?;
-            let image = paired(image, pair);
-            if wanted.thumbnail {
-                notes.thumbnail = small_copy(&image, None);
-            }
-            let similarity = stored.notes.similarity.filter(|_| wanted.fidelity);
-            notes.fidelity = similarity.map(|found| fidelity(name, condition, &image, found));
-            return Ok((image, notes));
-        }
-        let started = Instant::now();
-        let clean = wanted.fidelity.then(|| work.clean_as_sent()).transpose()?;
-        let (pixels, enhanced) = self.pixels_noted(work, &made)?;
-        let (image, encoded) = steps.payload(&pixels, &read, exposure)?;
-        let measure = |clean: Arc<Rgb>| {
-            let measure = || similarity([&*encoded, &*clean]);
-            steps.timings.time(TimedStep::Measure, measure)
-        };
-        let similarity = clean.map(measure).transpose()?;
-        if let Some(place) = place {
-            let notes = MadeNotes {
-                enhanced,
-                similarity,
-            };
-            steps.store(&place, &image, &notes, started.elapsed())?;
-        }
-        let image = paired(image, pair);
-        if wanted.thumbnail {
-            notes.thumbnail = small_copy(&image, Some(&encoded));
-        }
-        notes.fidelity = similarity.map(|found| fidelity(name, condition, &image, found));
-        Ok((image, notes))
-    }
-
     /// The images of a source in each of these conditions, in the order shown.
     ///
     /// # Errors
@@ -378,7 +328,7 @@ impl<'a> ImagePipeline<'a> {
                 enhancer,
                 notes,
             } => {
-                self.note_stored_by(&notes, &enhancer, [frame, condition])?;
+                self.note_stored(&notes, &enhancer, [frame, condition])?;
                 Ok(payload)
             }
             StagedFrame::ToEnhance {
@@ -414,36 +364,18 @@ impl<'a> ImagePipeline<'a> {
         place: [&dyn ToString; 2],
     ) -> Result<(Rgb, ImageUse)> {
         let (timings, implausible) = (self.steps.timings, self.implausible);
+        if let Some(resting) = self.resting(name) {
+            let enhance = || resting.enhance_noted(image, place, implausible);
+            return timings.time(TimedStep::Enhance, enhance);
+        }
         let enhancer = self.enhancer(name)?;
         let enhance = || enhancer.enhance_noted(image, place, implausible);
         timings.time(TimedStep::Enhance, enhance)
     }
 
-    /// Notes an image of the store as its enhancer would, if it has one.
-    fn note_stored(
-        &mut self,
-        notes: &MadeNotes,
-        condition: &Condition,
-        frame: &FrameId,
-    ) -> Result<()> {
-        match &condition.enhancer {
-            None => Ok(()),
-            Some(name) => self.note_stored_by(notes, name, [frame, condition]),
-        }
-    }
-
-    fn note_stored_by(
-        &mut self,
-        notes: &MadeNotes,
-        name: &EnhancerName,
-        place: [&dyn ToString; 2],
-    ) -> Result<()> {
-        let implausible = self.implausible;
-        let enhancer = self.enhancer(name)?;
-        let used = notes.enhanced.as_ref();
-        used.map_or(Ok(()), |used| {
-            enhancer.note_stored(used, place, implausible)
-        })
+    fn resting(&self, name: &EnhancerName) -> Option<&RestingEnhancer> {
+        let mut resting = self.resting.iter().map(Arc::as_ref);
+        resting.find(|enhancer| enhancer.name() == name)
     }
 
     fn enhancer(&mut self, name: &EnhancerName) -> Result<&mut Enhancer> {

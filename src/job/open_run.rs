@@ -10,10 +10,12 @@ use super::dark_already;
 use super::dispatch::{Dispatcher, TrialCounts};
 use super::enhancers::OpenEnhancers;
 use super::experiment::{DetailOf, Experiment};
+use super::first_source::first_source;
 use super::folder::now;
-use super::frame_work::ImageSteps;
+use super::image_maker::Maker;
 use super::image_notes::MissingNotes;
 use super::image_pipeline::ImagePipeline;
+use super::image_steps::ImageSteps;
 use super::manifest;
 use super::models::{self, ModelUnderTest};
 use super::other_parts::OtherParts;
@@ -24,7 +26,7 @@ use super::progress::Progress;
 use super::record_table;
 use super::settings::JobSettings;
 use super::stored::StoredRun;
-use super::stored_images::{Maker, StoredImages};
+use super::stored_images::StoredImages;
 use super::thumbnail::MissingThumbnails;
 use super::timings::Timings;
 use super::workers::Workers;
@@ -35,7 +37,7 @@ use crate::image_store::ImageStore;
 use crate::report::forecast::money;
 use crate::store::{self, Store, StoredTrial};
 use crate::types::manifest::{Counts, RunManifest};
-use crate::types::{TrialKey, View};
+use crate::types::{EnhancerName, TrialKey, View};
 
 /// A run folder that no other process writes to, with all that asking needs.
 pub(crate) struct OpenRun<'a, E: Experiment> {
@@ -170,7 +172,9 @@ impl<E: Experiment> OpenRun<'_, E> {
     }
 
     pub(super) fn ask_phase(&mut self, phase: usize, remaining: Remaining<E>) -> Result<EndReason> {
-        let Remaining { plan, stored, .. } = remaining;
+        let Remaining {
+            mut plan, stored, ..
+        } = remaining;
         let experiment = self.experiment;
         let settings = experiment.settings();
         let models = experiment.models(phase);
@@ -186,7 +190,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         };
         let shows_images = !plan.conditions().is_empty();
         let enhancers = if shows_images {
-            self.enhancers.take()?
+            self.enhancers.take_models()?
         } else {
             Vec::new()
         };
@@ -195,18 +199,25 @@ impl<E: Experiment> OpenRun<'_, E> {
         let workers = Workers::start(settings.loading.threads.threads)?;
         let timings = Timings::default();
         let limit = limit(settings);
-        let (sources, usages) = (experiment.sources(), usages(&enhancers));
+        let sources = experiment.sources();
         let maker = Maker::new(self.enhancers.version(), &settings.loading.size);
         let images = self.images.as_ref();
-        let mut pipeline = pipeline(experiment, enhancers, limit, &timings);
+        let mut pipeline = pipeline(experiment, Vec::new(), limit, &timings);
         pipeline.steps.stored = images.map(|images| StoredImages::new(images, &maker));
         workers.all.install(|| {
             if shows_images {
                 dark_already::warn(experiment);
             }
+            pipeline.open_enhancers(enhancers, &settings.loading, sources, &plan.sources)?;
             pipeline.check(sources, &plan.sources)
         })?;
+        let usages = pipeline.usages();
         pipeline.open_sets(sources, &plan.sources, &workers)?;
+        if self.images.is_some() {
+            let names = models.iter().map(|model| model.name.as_ref());
+            let first = first_source(names, settings.shard, plan.sources.len());
+            plan.sources.rotate_left(first);
+        }
         let stoppers = pipeline.stoppers();
         let dispatcher = Dispatcher {
             models,
@@ -236,8 +247,9 @@ impl<E: Experiment> OpenRun<'_, E> {
     }
 
     /// Adds to the manifest how the enhancers were used.
-    pub(super) fn note_enhancers(&mut self, usages: Vec<(String, Usage)>) {
+    pub(super) fn note_enhancers(&mut self, usages: Vec<(EnhancerName, Usage)>) {
         for (name, usage) in usages {
+            let name = name.to_string();
             let earlier = self.manifest.enhancers.remove(&name);
             let note = usage.note().after(earlier);
             self.manifest.enhancers.insert(name, note);
@@ -321,14 +333,6 @@ pub(super) fn every_model<E: Experiment>(experiment: &E) -> Vec<&ModelUnderTest>
     phases.flat_map(|phase| experiment.models(phase)).collect()
 }
 
-/// The enhancers' notes, by name.
-pub(super) fn usages(enhancers: &[Enhancer]) -> Vec<(String, Usage)> {
-    let enhancers = enhancers.iter();
-    enhancers
-        .map(|enhancer| (enhancer.name().to_string(), enhancer.usage()))
-        .collect()
-}
-
 /// The image pipeline of an experiment, without an image store.
 pub(crate) fn pipeline<'a, E: Experiment>(
     experiment: &'a E,
@@ -336,18 +340,15 @@ pub(crate) fn pipeline<'a, E: Experiment>(
     limit: Option<ImageLimit>,
     timings: &'a Timings,
 ) -> ImagePipeline<'a> {
-    ImagePipeline {
-        steps: ImageSteps {
-            frames: experiment.frames(),
-            recipe: experiment.recipe(),
-            limit,
-            timings,
-            stored: None,
-        },
-        enhancers,
-        sets: Vec::new(),
-        implausible: experiment.settings().loading.probe.implausible(),
-    }
+    let steps = ImageSteps {
+        frames: experiment.frames(),
+        recipe: experiment.recipe(),
+        limit,
+        timings,
+        stored: None,
+    };
+    let implausible = experiment.settings().loading.probe.implausible();
+    ImagePipeline::new(steps, enhancers, implausible)
 }
 
 /// Largest image that all endpoints take; `None` if all models are built in. Each image is made once, for all of them.

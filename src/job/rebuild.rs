@@ -6,8 +6,8 @@ use std::sync::Arc;
 use clap::Args;
 
 use super::enhancers::{self, EnhancerRunArgs, OpenEnhancers};
-use super::frame_work::ImageSteps;
 use super::image_pipeline::ImagePipeline;
+use super::image_steps::ImageSteps;
 use super::image_words::ImageFlags;
 use super::photographs;
 use super::questions::ASK;
@@ -131,18 +131,16 @@ impl ImageRebuilder {
         {
             photographs::measure(frames, std::slice::from_mut(&mut source))?;
         }
-        let mut pipeline = ImagePipeline {
-            steps: ImageSteps {
-                frames,
-                recipe: &self.recipe,
-                limit: None,
-                timings: &Timings::default(),
-                stored: None,
-            },
-            enhancers: std::mem::take(&mut self.enhancers),
-            sets: Vec::new(),
-            implausible: Implausible::NotLookedFor,
+        let timings = Timings::default();
+        let steps = ImageSteps {
+            frames,
+            recipe: &self.recipe,
+            limit: None,
+            timings: &timings,
+            stored: None,
         };
+        let enhancers = std::mem::take(&mut self.enhancers);
+        let mut pipeline = ImagePipeline::new(steps, enhancers, Implausible::NotLookedFor);
         let conditions: Vec<&Condition> = conditions.iter().collect();
         let images = pipeline.images(&source, &conditions);
         self.enhancers = pipeline.enhancers;

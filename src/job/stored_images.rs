@@ -4,41 +4,17 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
+use super::image_maker::Maker;
 use super::recipe::{ImageKeyFacts, Recipe};
-use super::source::SourceFrame;
+use super::source::{Source, SourceFrame};
+use super::stored_findings::StoredFindings;
+use super::stored_thumbnails::ThumbnailPlace;
+use super::thumbnail::ShownObjects;
 use crate::ask::Payload;
-use crate::enhance::{ImageUse, SizeArgs};
+use crate::enhance::ImageUse;
 use crate::error::Result;
-use crate::image_store::{Entry, EntryFacts, ImageStore, Key, Shown, StoredKinds};
+use crate::image_store::{Content, Entry, EntryFacts, ImageStore, Key, Shown, StoredKinds};
 use crate::types::{Condition, FrameId};
-
-/// What decides images besides their recipes: the program, the machine's kind, and how enhancers are run.
-#[derive(Debug, Serialize)]
-pub(crate) struct Maker {
-    /// Version of this program, because encoders may change with it.
-    program: &'static str,
-    /// Processor and operating system, because ONNX Runtime's results may differ between them.
-    machine: [&'static str; 2],
-    /// Name and version of ONNX Runtime; `None` if no enhancer is open.
-    runtime: Option<(String, String)>,
-    tile: String,
-    max_side: Option<usize>,
-    resize: bool,
-}
-
-impl Maker {
-    /// This program, with this version of ONNX Runtime and these sizes of enhanced images.
-    pub(crate) fn new(runtime: Option<(String, String)>, sizes: &SizeArgs) -> Self {
-        Self {
-            program: env!("CARGO_PKG_VERSION"),
-            machine: [std::env::consts::ARCH, std::env::consts::OS],
-            runtime,
-            tile: sizes.tile.to_string(),
-            max_side: sizes.llie_max_side.map(std::num::NonZeroUsize::get),
-            resize: sizes.llie_resize,
-        }
-    }
-}
 
 /// A store, with what decides images besides their recipes.
 #[derive(Debug, Clone, Copy)]
@@ -50,6 +26,9 @@ pub(crate) struct StoredImages<'a> {
 /// All that decides the file of an image.
 #[derive(Serialize)]
 struct StoredRecipe<'a> {
+    /// What is kept in place of the image; `None` if it is kept itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    content: Option<Content>,
     image: ImageKeyFacts<'a>,
     program: &'static str,
     /// `None` without an enhancer: neither machine nor runtime decides a degraded image.
@@ -61,7 +40,37 @@ impl<'a> StoredImages<'a> {
         Self { store, maker }
     }
 
-    /// The place of the image of a frame in a condition; `None` if the store keeps no such images. `source` is the name of what the
+    /// What the store knows of enhancers.
+    pub(crate) fn findings(self) -> StoredFindings<'a> {
+        StoredFindings::new(self.store, self.maker)
+    }
+
+    /// Whether the store has the images of all frames of a source in a condition. They may be damaged.
+    ///
+    /// # Errors
+    /// If the condition cannot be made of a frame.
+    pub(crate) fn has_all(
+        self,
+        recipe: &Recipe,
+        source: &Source,
+        condition: &Condition,
+    ) -> Result<bool> {
+        if condition.photograph().is_some() {
+            // Photographs in the dark are not kept.
+            return Ok(false);
+        }
+        for frame in &source.frames {
+            if !self
+                .place(recipe, (&source.name, frame), condition)?
+                .exists()
+            {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// The place of a frame in a condition: of its image, or of the measures of one that is not kept. `source` is the name of what the
     /// frame is shown in.
     ///
     /// # Errors
@@ -71,41 +80,50 @@ impl<'a> StoredImages<'a> {
         recipe: &Recipe,
         (source, frame): (&FrameId, &SourceFrame),
         condition: &Condition,
-    ) -> Result<Option<StoredPlace<'a>>> {
-        let is_kept = match self.store.kinds() {
-            StoredKinds::All => true,
-            StoredKinds::Enhanced => condition.enhancer.is_some(),
+    ) -> Result<StoredPlace<'a>> {
+        let keeps = match (self.store.kinds(), &condition.enhancer) {
+            (StoredKinds::All, _) | (StoredKinds::Enhanced, Some(_)) => Content::Image,
+            (StoredKinds::Enhanced, None) => Content::Measures,
         };
-        if !is_kept {
-            return Ok(None);
-        }
-        let key = Key::of(&StoredRecipe {
-            image: recipe.facts(source, frame, condition)?,
-            program: self.maker.program,
-            enhanced_with: condition.enhancer.is_some().then_some(self.maker),
-        })?;
+        let key = |content: Content| {
+            Key::of(&StoredRecipe {
+                content: (content != Content::Image).then_some(content),
+                image: recipe.facts(source, frame, condition)?,
+                program: self.maker.program(),
+                enhanced_with: condition.enhancer.is_some().then_some(self.maker),
+            })
+        };
         let light = Condition {
             enhancer: None,
             ..condition.clone()
         };
         let shown = Shown {
+            content: keeps,
             enhancer: condition.enhancer.as_ref().map(ToString::to_string),
             light: light.to_string(),
             format: recipe.format.to_string(),
         };
-        Ok(Some(StoredPlace {
+        Ok(StoredPlace {
             store: self.store,
-            key,
+            image: key(Content::Image)?,
+            measures: match keeps {
+                Content::Image => None,
+                Content::Measures | Content::Probe | Content::Thumbnail => {
+                    Some(key(Content::Measures)?)
+                }
+            },
             shown,
-        }))
+        })
     }
 }
 
-/// The place of one image in a store.
+/// The place of one image in a store, or of its measures.
 #[derive(Debug, Clone)]
 pub(crate) struct StoredPlace<'a> {
     store: &'a ImageStore,
-    key: Key,
+    image: Key,
+    /// Key of the measures; `None` if the image is kept, with them.
+    measures: Option<Key>,
     shown: Shown,
 }
 
@@ -143,9 +161,22 @@ pub(crate) struct StoredImage {
     pub(crate) notes: MadeNotes,
 }
 
-impl StoredPlace<'_> {
+impl<'a> StoredPlace<'a> {
+    /// Whether the image itself is kept.
+    pub(crate) fn keeps_image(&self) -> bool {
+        self.measures.is_none()
+    }
+
+    /// Whether there is a file of the image. It may be damaged.
+    fn exists(&self) -> bool {
+        self.store.contains(&self.image)
+    }
+
     /// The image, if it is there with all that is needed. `format` is that of the recipe.
     pub(crate) fn read(&self, recipe: &Recipe, needed: Needed) -> Option<StoredImage> {
+        if self.measures.is_some() {
+            return None;
+        }
         let mut notes = None;
         let is_enough = |entry: &Entry| {
             let read: Option<MadeNotes> = serde_json::from_value(entry.facts.notes.clone()).ok();
@@ -156,7 +187,7 @@ impl StoredPlace<'_> {
             });
             notes.is_some()
         };
-        let entry = self.store.get(&self.key, is_enough)?;
+        let entry = self.store.get(&self.image, Content::Image, is_enough)?;
         let [width, height] = entry.size;
         Some(StoredImage {
             payload: Payload::of_file(&entry.image, width, height, recipe.format),
@@ -164,22 +195,51 @@ impl StoredPlace<'_> {
         })
     }
 
-    /// Adds an image that took this time to make.
+    /// How similar the image is to its clean frame, if that is kept without the image.
+    pub(crate) fn measures(&self) -> Option<Similarity> {
+        let mut measures = None;
+        let is_enough = |entry: &Entry| {
+            let notes: Option<MadeNotes> = serde_json::from_value(entry.facts.notes.clone()).ok();
+            measures = notes.and_then(|notes| notes.similarity);
+            measures.is_some()
+        };
+        let alone = self.measures.as_ref()?;
+        self.store.get(alone, Content::Measures, is_enough)?;
+        measures
+    }
+
+    /// The place of the small copy of the image of a frame in a condition, with these things.
+    pub(crate) fn thumbnail(
+        &self,
+        of: (&FrameId, &Condition),
+        objects: Option<ShownObjects<'_>>,
+    ) -> Option<ThumbnailPlace<'a>> {
+        ThumbnailPlace::of((self.store, &self.image), &self.shown, of, objects)
+    }
+
+    /// Adds what is known of an image that took this time to make: with the image, if images like it are kept, else without it.
     ///
     /// # Errors
     /// None in practice: the image was encoded here.
     pub(crate) fn write(&self, image: &Payload, notes: &MadeNotes, took: Duration) -> Result<()> {
+        let facts = EntryFacts::new(
+            self.shown.clone(),
+            took.as_millis() as u64,
+            serde_json::json!(notes),
+        );
+        if let Some(measures) = &self.measures {
+            if notes.similarity.is_some() {
+                self.store.put(measures, &Entry::of_facts(facts));
+            }
+            return Ok(());
+        }
         let side = |pixels: usize| u32::try_from(pixels).unwrap_or(u32::MAX);
         let entry = Entry {
             image: image.file()?,
             size: [side(image.facts().width), side(image.facts().height)],
-            facts: EntryFacts::new(
-                self.shown.clone(),
-                took.as_millis() as u64,
-                serde_json::json!(notes),
-            ),
+            facts,
         };
-        self.store.put(&self.key, &entry);
+        self.store.put(&self.image, &entry);
         Ok(())
     }
 }

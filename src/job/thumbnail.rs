@@ -11,6 +11,9 @@ use crate::error::{Error, Result};
 use crate::types::outlines::PixelBox;
 use crate::types::{Condition, Digest, FrameId, ObjectCrop, Rgb, RunQuestion, Thumbnail};
 
+/// Version of small copies, raised whenever a byte of one changes, so that older ones are not taken from an image store.
+pub(super) const VERSION: u32 = 1;
+
 /// Maximum number of frames with thumbnails, so that the report of a large run stays small; chosen.
 const MAX_FRAMES: usize = 48;
 /// Longest side of a small copy, in pixels; chosen.

@@ -84,6 +84,44 @@ pub(crate) struct Forecast {
     /// Size of the largest request in bytes, if requests hold many images.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub largest_request: Option<f64>,
+    /// What an image store gives the next model; `None` without one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub image_store: Option<StoreForecast>,
+}
+
+/// What an image store gives another model that is asked about the same images.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct StoreForecast {
+    /// Which images it keeps, in words.
+    pub kept: &'static str,
+    /// Number of bytes of all of them.
+    pub bytes: f64,
+    /// Number of bytes that it has room for.
+    pub room: f64,
+    /// Share of them that it can give, from 0 to 1.
+    pub hits: f64,
+}
+
+impl StoreForecast {
+    /// The forecast for images of this many bytes and a store with this room.
+    pub(crate) fn new(kept: &'static str, bytes: f64, room: f64) -> Self {
+        let hits = if bytes > room { room / bytes } else { 1.0 };
+        Self {
+            kept,
+            bytes,
+            room,
+            hits,
+        }
+    }
+
+    /// One line of text.
+    fn line(&self) -> String {
+        let (kept, set, room) = (self.kept, bytes(self.bytes), bytes(self.room));
+        let percent = 100.0 * self.hits;
+        format!(
+            "image store: {kept} {set}, room {room}: the next model finds about {percent:.0} % of them\n"
+        )
+    }
 }
 
 /// The forecast as JSON.
@@ -131,8 +169,10 @@ pub(crate) fn render(forecast: &Forecast) -> String {
     if let (Some(spent), true) = (forecast.spent, *answered > 0) {
         let _ = write!(text, "; the {answered} answered ones cost {}", money(spent));
     }
+    let store = forecast.image_store.as_ref();
+    let store = store.map(StoreForecast::line).unwrap_or_default();
     if forecast.lines.is_empty() {
-        return text + ".\n";
+        return text + ".\n" + &store;
     }
     let _ = write!(text, ".\n{table}");
     for line in &forecast.lines {
@@ -170,6 +210,7 @@ pub(crate) fn render(forecast: &Forecast) -> String {
         hours(forecast.asking_seconds),
         hours(forecast.making_seconds)
     );
+    text += &store;
     if let Some(problem) = &forecast.too_large {
         let _ = writeln!(text, "the run would not start: {problem}");
     }
@@ -251,6 +292,17 @@ fn hours(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_store_gives_the_images_that_find_room() {
+        let of = |bytes| StoreForecast::new("enhanced images", bytes, 20e9);
+        assert!((of(80e9).hits - 0.25).abs() < 1e-12);
+        assert!((of(20e9).hits - 1.0).abs() < 1e-12);
+        assert_eq!(
+            of(80e9).line(),
+            "image store: enhanced images 80.0 GB, room 20.0 GB: the next model finds about 25 % of them\n"
+        );
+    }
 
     #[test]
     fn several_readings_are_counted_apart() {

@@ -8,17 +8,23 @@ use serde_json::Value;
 
 use crate::support::house::House;
 use crate::support::onnx;
-use crate::support::run::{Bench, Called, assert_same_products, files, records, words};
+use crate::support::run::{Bench, Called, assert_same_products, called, files, records, words};
 
 /// Three frames in four enhanced images each.
 const IMAGES: usize = 3 * 4;
+
+/// What is said of an enhancer of which the store has all images.
+const NOT_OPENED: &str = "one: not opened, because the store has all its images";
+/// What is said when one of them is damaged.
+const OPENED: &str = "one: opened, because the store lacks an image";
 
 /// A run about small rooms with an enhancer; `--timings` says what the store gave.
 fn evaluate(bench: &Bench, model: &str, more: &str) -> Called {
     let line = format!(
         "--model {model} --data rooms:frames=3,size=96x64 --levels L3,L5 --variant both --llie one.onnx --llie-on both --llie-anyway --timings {more}"
     );
-    let called = bench.call(&words(&line));
+    let mut command = bench.command(&words(&line));
+    let called = called(command.env("RUST_LOG", "darkqa_eval=debug"));
     assert_eq!(called.code, Some(0), "{line}: {called:?}");
     called
 }
@@ -72,9 +78,16 @@ fn assert_same(bench: &Bench, [one, other]: [&str; 2]) {
     assert_eq!(notes(&one), notes(&other));
 }
 
+/// The files of the store that hold an image, not measures, small copies or tries.
 fn stored(bench: &Bench) -> Vec<PathBuf> {
     let mut entries = files(&bench.path("images"));
     entries.retain(|path| path.extension().is_some_and(|extension| extension == "img"));
+    entries.retain(|path| {
+        let file = fs::read(path).unwrap();
+        let wanted = b"\"content\":\"image\"";
+        // The facts stand at the end.
+        file.windows(wanted.len()).rev().any(|part| part == wanted)
+    });
     entries.sort_unstable();
     entries
 }
@@ -88,7 +101,13 @@ fn a_second_model_takes_the_images_of_the_first_and_all_is_as_without() {
     let none = format!("image store images: 0 of {IMAGES} images read");
     assert!(first.stderr.contains(&none), "{}", first.stderr);
     assert_eq!(stored(&bench).len(), IMAGES);
+    assert!(!first.stderr.contains(NOT_OPENED), "{}", first.stderr);
     let second = evaluate(&bench, "observer", "--images-cache images --out observer");
+    assert!(second.stderr.contains(NOT_OPENED), "{}", second.stderr);
+    assert!(!second.stderr.contains(OPENED), "{}", second.stderr);
+    // Measures of the degraded images, small copies of all, and what the enhancer was found to be.
+    let measures = format!("{} measures and small copies", 3 * IMAGES + 1);
+    assert!(second.stderr.contains(&measures), "{}", second.stderr);
     let all = format!("image store images: {IMAGES} of {IMAGES} images read");
     assert!(second.stderr.contains(&all), "{}", second.stderr);
     assert_same(&bench, ["random-alone", "random"]);
@@ -126,13 +145,83 @@ fn damaged_and_exchanged_images_are_made_again_and_counted() {
     fs::write(&entries[3], two).unwrap();
     let again = evaluate(&bench, "random", "--images-cache images --out again");
     let read = format!("{} of {IMAGES} images read", IMAGES - 4);
-    for said in [&read, "4 damaged and made again", "4 written", "is damaged"] {
+    for said in [
+        &read,
+        "4 damaged and made again",
+        "4 written",
+        "is damaged",
+        NOT_OPENED,
+        OPENED,
+    ] {
         assert!(again.stderr.contains(said), "{said}: {}", again.stderr);
     }
     assert_same(&bench, ["first", "again"]);
     let third = evaluate(&bench, "random", "--images-cache images --out third");
     let read = format!("{IMAGES} of {IMAGES} images read");
     assert!(third.stderr.contains(&read), "{}", third.stderr);
+}
+
+#[test]
+fn an_enhancer_is_opened_if_an_image_is_missing_and_tried_again_on_other_frames() {
+    let bench = bench();
+    evaluate(&bench, "random", "--images-cache images --out first");
+    fs::remove_file(&stored(&bench)[0]).unwrap();
+    let again = evaluate(&bench, "observer", "--images-cache images --out again");
+    assert!(!again.stderr.contains(NOT_OPENED), "{}", again.stderr);
+    evaluate(&bench, "observer", "--out again-alone");
+    assert_same(&bench, ["again-alone", "again"]);
+    // Less is asked, so the enhancer is tried on other frames, and its note says so.
+    let other = evaluate(
+        &bench,
+        "random",
+        "--images-cache images --limit 1 --out other",
+    );
+    assert!(!other.stderr.contains(NOT_OPENED), "{}", other.stderr);
+    evaluate(&bench, "random", "--limit 1 --out other-alone");
+    assert_same(&bench, ["other-alone", "other"]);
+    // Measures that are lost are measured again.
+    fs::remove_dir_all(bench.path("images")).unwrap();
+    let lost = evaluate(&bench, "random", "--images-cache images --out lost");
+    assert!(
+        lost.stderr.contains("0 measures and small copies"),
+        "{}",
+        lost.stderr
+    );
+    assert_same(&bench, ["first", "lost"]);
+}
+
+#[test]
+fn an_enhancer_that_is_refused_is_refused_with_its_images_in_the_store() {
+    let bench = Bench::new();
+    onnx::gamma(0.0).write(&bench.path(""), "one.onnx");
+    let line = "--model random --data rooms:frames=3,size=96x64 --levels L3 --llie one.onnx --images-cache images";
+    let overruled = bench.call(&words(&format!("{line} --llie-anyway --out anyway")));
+    assert_eq!(overruled.code, Some(0), "{overruled:?}");
+    let warned = bench.call(&words(&format!("{line} --llie-anyway --out warned")));
+    let problem = "dark frames its images";
+    for called in [overruled, warned] {
+        assert!(called.stderr.contains(problem), "{}", called.stderr);
+    }
+    let refused = bench.call(&words(&format!("{line} --out refused")));
+    assert_ne!(refused.code, Some(0), "{refused:?}");
+    assert!(refused.stderr.contains(problem), "{}", refused.stderr);
+}
+
+#[test]
+fn a_dry_run_says_how_many_images_find_room_and_makes_no_store() {
+    let bench = bench();
+    let line = "--model random --data rooms:frames=3,size=96x64 --levels L3,L5 --llie one.onnx --llie-anyway --dry-run --out run";
+    let without = bench.complete(&words(line));
+    assert!(!without.contains("image store"), "{without}");
+    let roomy = bench.complete(&words(&format!("{line} --images-cache images")));
+    let all = "the next model finds about 100 % of them";
+    assert!(roomy.contains(all), "{roomy}");
+    let narrow = bench.complete(&words(&format!(
+        "{line} --images-cache images --images-cache-size 0.00001"
+    )));
+    assert!(narrow.contains("image store: enhanced images"), "{narrow}");
+    assert!(!narrow.contains(all), "{narrow}");
+    assert!(!bench.path("images").exists());
 }
 
 #[test]

@@ -30,6 +30,13 @@ impl Enhancer {
         self.usage.clone()
     }
 
+    /// The same enhancer with another note, which it goes on with.
+    pub(in crate::enhance) fn with_usage(self, usage: Usage) -> Self {
+        let enhancer = Self { usage, ..self };
+        enhancer.note_convention();
+        enhancer
+    }
+
     pub(in crate::enhance) fn graph(&self) -> &Graph {
         &self.graph
     }

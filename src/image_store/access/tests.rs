@@ -1,5 +1,5 @@
 use super::*;
-use crate::image_store::{EntryFacts, Shown};
+use crate::image_store::{Content, EntryFacts, Shown};
 
 fn key(name: &str) -> Key {
     Key::of(&[name]).unwrap()
@@ -18,7 +18,9 @@ fn store(folder: &Path, most: u64) -> ImageStore {
 }
 
 fn image(store: &ImageStore, name: &str) -> Option<Vec<u8>> {
-    store.get(&key(name), |_| true).map(|entry| entry.image)
+    store
+        .get(&key(name), Content::Image, |_| true)
+        .map(|entry| entry.image)
 }
 
 #[test]
@@ -28,7 +30,7 @@ fn two_stores_of_one_folder_share_their_images() {
     assert_eq!(image(&one, "a"), None);
     one.put(&key("a"), &entry(9));
     assert_eq!(image(&other, "a"), Some(vec![7; 9]));
-    assert_eq!(other.get(&key("a"), |_| false), None);
+    assert_eq!(other.get(&key("a"), Content::Image, |_| false), None);
     let counts = other.counts();
     assert_eq!((counts.hits, counts.misses, counts.hit_bytes), (1, 1, 9));
     assert_eq!(counts.saved_ms, 30);
@@ -118,4 +120,24 @@ fn only_the_user_reads_the_files() {
     assert_eq!(mode(&file), 0o600);
     assert_eq!(mode(file.parent().unwrap()), 0o700);
     assert_eq!(mode(store.folder.root()), 0o700);
+}
+
+#[test]
+fn facts_alone_are_kept_beside_images_and_not_counted_as_images() {
+    let place = tempfile::tempdir().unwrap();
+    let store = store(place.path(), 1 << 20);
+    let shown = Shown {
+        content: Content::Probe,
+        ..Shown::default()
+    };
+    let facts = EntryFacts::new(shown, 500, serde_json::json!("found"));
+    assert!(!store.contains(&key("a")));
+    store.put(&key("a"), &Entry::of_facts(facts));
+    assert!(store.contains(&key("a")));
+    let read = store.get(&key("a"), Content::Probe, |_| true).unwrap();
+    assert_eq!(read.facts.notes, serde_json::json!("found"));
+    assert_eq!(store.get(&key("b"), Content::Measures, |_| true), None);
+    let counts = store.counts();
+    assert_eq!((counts.hits, counts.misses, counts.written), (0, 0, 0));
+    assert_eq!((counts.facts, counts.saved_ms), (1, 500));
 }

@@ -9,12 +9,11 @@ use super::requests::{CostOf, Requests, require_remote, summary};
 use crate::error::{Error, Result};
 use crate::job::dark_already;
 use crate::job::experiment::Experiment;
-use crate::job::open_run::{
-    OpenRun, Remaining, every_model, limit, missing_notes, pipeline, usages,
-};
+use crate::job::image_maker::Maker;
+use crate::job::open_run::{OpenRun, Remaining, every_model, limit, missing_notes, pipeline};
 use crate::job::outcome::Outcome;
 use crate::job::plan::Plan;
-use crate::job::stored_images::{Maker, StoredImages};
+use crate::job::stored_images::StoredImages;
 use crate::job::timings::Timings;
 use crate::job::trial::Item;
 use crate::job::workers::pool;
@@ -76,25 +75,25 @@ pub(super) fn write<E: Experiment>(
     let timings = Timings::default();
     let shows_images = !plan.conditions().is_empty();
     let enhancers = if shows_images {
-        run.enhancers.take()?
+        run.enhancers.take_models()?
     } else {
         Vec::new()
     };
     let limit = limit(settings);
-    let usages = usages(&enhancers);
     let maker = Maker::new(run.enhancers.version(), &settings.loading.size);
     let images = run.images.as_ref();
-    let mut pipeline = pipeline(experiment, enhancers, limit, &timings);
+    let mut pipeline = pipeline(experiment, Vec::new(), limit, &timings);
     pipeline.steps.stored = images.map(|images| StoredImages::new(images, &maker));
     let missing = missing_notes(experiment, run.store.folder())?;
     let sources = experiment.sources();
     workers.install(|| {
-        pipeline.probe(sources, &plan.sources)?;
+        pipeline.open_enhancers(enhancers, &settings.loading, sources, &plan.sources)?;
         if shows_images {
             dark_already::warn(experiment);
         }
         pipeline.largest(sources, &plan.sources)
     })?;
+    let usages = pipeline.usages();
     let bar = run.progress.bar("writing requests", plan.remaining());
     let register = Register {
         store: &mut run.store,

@@ -5,13 +5,12 @@ use std::num::NonZeroUsize;
 
 use super::{ImagePipeline, one_frame_each};
 use crate::ask::ImageLimit;
-use crate::enhance::{Enhancer, FRAMES, Stopper, sets_in_memory};
+use crate::enhance::{Enhancer, FRAMES, sets_in_memory};
 use crate::error::Result;
-use crate::job::dark_frames::{dark_frames, darkened, evenly};
+use crate::job::dark_frames::{darkened, evenly};
 use crate::job::frame_work::FrameWork;
 use crate::job::plan::SourcePlan;
 use crate::job::source::{Source, SourceFrame};
-use crate::job::timings::TimedStep;
 use crate::job::workers::Workers;
 use crate::types::{ImageFacts, Rgb};
 
@@ -19,17 +18,10 @@ use crate::types::{ImageFacts, Rgb};
 const LARGE_IMAGE: usize = 5_000_000;
 
 impl ImagePipeline<'_> {
-    /// Handles that stop each enhancer.
-    pub(crate) fn stoppers(&self) -> Vec<Stopper> {
-        let all = self.enhancers.iter().chain(self.sets.iter().flatten());
-        all.map(Enhancer::stopper).collect()
-    }
-
     /// Makes a few images before anything is paid for, to find errors that would stop a run later. These are the first image of each
     /// enhancer and, if an endpoint is asked, those of the largest frame without an enhancer. Warns if these are large and the limit
     /// of the endpoint is unknown.
     pub(crate) fn check<I>(&mut self, sources: &[Source], plan: &[SourcePlan<I>]) -> Result<()> {
-        self.probe(sources, plan)?;
         self.try_enhancers(sources, plan)?;
         // What was tried is not counted among the images of the run.
         self.enhancers.iter_mut().for_each(Enhancer::count_anew);
@@ -39,7 +31,7 @@ impl ImagePipeline<'_> {
         Ok(())
     }
 
-    /// Makes the first image of each enhancer, so that a broken one is found before anything is asked.
+    /// Makes the first image of each enhancer that is open, so that a broken one is found before anything is asked.
     fn try_enhancers<I>(&mut self, sources: &[Source], plan: &[SourcePlan<I>]) -> Result<()> {
         let mut tried = BTreeSet::new();
         for part in plan {
@@ -49,6 +41,7 @@ impl ImagePipeline<'_> {
             };
             for condition in part.conditions() {
                 if let Some(name) = &condition.enhancer
+                    && self.resting(name).is_none()
                     && tried.insert(name)
                 {
                     let mut work = FrameWork::planned(self.steps, source, frame);
@@ -59,20 +52,7 @@ impl ImagePipeline<'_> {
         Ok(())
     }
 
-    /// Tries each enhancer of the plan on a few of its own dark frames, so that one whose images cannot be enhanced images, or whose value
-    /// ranges are unknown, is found before anything is asked.
-    pub(crate) fn probe<I>(&mut self, sources: &[Source], plan: &[SourcePlan<I>]) -> Result<()> {
-        for enhancer in &mut self.enhancers {
-            let dark = dark_frames(self.steps, sources, plan, enhancer.name())?;
-            if !dark.is_empty() {
-                let probe = || enhancer.probe(&dark, self.implausible);
-                self.steps.timings.time(TimedStep::Enhance, probe)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// The same without a plan: on a few frames of these sources, darkened where they are not dark.
+    /// Tries each enhancer without a plan, on a few frames of these sources, darkened where they are not dark.
     pub(crate) fn probe_sources(&mut self, sources: &[Source]) -> Result<()> {
         if self.enhancers.is_empty() {
             return Ok(());

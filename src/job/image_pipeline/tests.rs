@@ -5,6 +5,7 @@ use std::num::NonZeroU32;
 use super::*;
 use crate::ask::PayloadFormat;
 use crate::dataset::Dataset;
+use crate::job::image_notes::WantedNotes;
 use crate::job::recipe::Recipe;
 use crate::job::scaling::Scaling;
 use crate::job::timings::Timings;
@@ -50,12 +51,7 @@ fn pipeline_output(
         timings: &Timings::default(),
         stored: None,
     };
-    let mut pipeline = ImagePipeline {
-        steps,
-        enhancers: Vec::new(),
-        sets: Vec::new(),
-        implausible: Implausible::default(),
-    };
+    let mut pipeline = ImagePipeline::new(steps, Vec::new(), Implausible::default());
     let mut work = FrameWork::planned(steps, &source, &source.frames[0]);
     let condition = condition.parse().unwrap();
     let wanted = WantedNotes {
@@ -86,9 +82,14 @@ fn thumbnails_show_what_was_sent() {
         for how in [("png", None), ("png", Some(50)), ("jpeg:60", Some(50))] {
             let (image, notes, _) = pipeline_output(condition, how, true);
             let thumbnail = notes.thumbnail.unwrap();
-            let of_file =
-                super::thumbnail(&thumbnail.frame, &thumbnail.condition, &image, None, None)
-                    .unwrap();
+            let of_file = crate::job::thumbnail::thumbnail(
+                &thumbnail.frame,
+                &thumbnail.condition,
+                &image,
+                None,
+                None,
+            )
+            .unwrap();
             assert_eq!(thumbnail, of_file, "{condition} {how:?}");
         }
     }

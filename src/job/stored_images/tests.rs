@@ -1,6 +1,7 @@
 use std::num::NonZeroUsize;
 
 use super::*;
+use crate::enhance::SizeArgs;
 use crate::job::scaling::Scaling;
 use crate::job::source::SourceFrame;
 use crate::job::walk::{CameraOf, DegradedAt};
@@ -45,7 +46,7 @@ fn key(recipe: &Recipe, frame: &SourceFrame, condition: &str, maker: &Maker) -> 
     let condition = condition.parse().unwrap();
     let stored = StoredImages::new(&store, maker);
     let place = stored.place(recipe, (&source, frame), &condition).unwrap();
-    *place.unwrap().key.digest()
+    *place.image.digest()
 }
 
 const CONDITION: &str = "L3-noise+one";

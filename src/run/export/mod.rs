@@ -17,8 +17,9 @@ use crate::error::{Error, Result};
 use crate::job::Outcome;
 use crate::job::conditions::{check_enhanced, check_used, conditions};
 use crate::job::enhancers::{self, EnhancerRunArgs, OpenEnhancers};
-use crate::job::frame_work::{FrameWork, ImageSteps};
+use crate::job::frame_work::FrameWork;
 use crate::job::image_pipeline::ImagePipeline;
+use crate::job::image_steps::ImageSteps;
 use crate::job::part_args::{PartArgs, keep_part};
 use crate::job::photographs;
 use crate::job::progress::Progress;
@@ -127,18 +128,16 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
     warn_of_inputs(&input_summary(&sources));
     recipe.check(&sources, &conditions)?;
     let mut sets = open_sets((args, shard), &dataset, &conditions, &questions)?;
-    let mut pipeline = ImagePipeline {
-        steps: ImageSteps {
-            frames: &dataset,
-            recipe: &recipe,
-            limit: None,
-            timings: &Timings::default(),
-            stored: None,
-        },
-        enhancers: OpenEnhancers::load(files, &args.loading)?.take()?,
-        sets: Vec::new(),
-        implausible: args.loading.probe.implausible(),
+    let timings = Timings::default();
+    let steps = ImageSteps {
+        frames: &dataset,
+        recipe: &recipe,
+        limit: None,
+        timings: &timings,
+        stored: None,
     };
+    let enhancers = OpenEnhancers::load(files, &args.loading)?.take()?;
+    let mut pipeline = ImagePipeline::new(steps, enhancers, args.loading.probe.implausible());
     workers.install(|| pipeline.probe_sources(&sources))?;
     let frames: BTreeMap<&FrameId, &Source> = sources
         .iter()

@@ -10,7 +10,9 @@ use crate::error::Result;
 use crate::files::write;
 use crate::job::enhancers::OpenEnhancers;
 use crate::job::experiment::Experiment as _;
+use crate::job::image_maker::Maker;
 use crate::job::progress::Progress;
+use crate::job::stored_images::StoredImages;
 use crate::job::timings::Timings;
 use crate::job::workers::pool;
 use crate::job::{Outcome, limit, pipeline};
@@ -32,11 +34,15 @@ pub(super) fn pack(
     let mut enhancers = OpenEnhancers::load(files, &settings.loading)?;
     let limit = limit(settings);
     let timings = Timings::default();
+    let images = settings.images.open()?;
     let mut pipeline = pipeline(setup, enhancers.take()?, limit, &timings);
+    let maker = Maker::new(enhancers.version(), &settings.loading.size);
+    let stored = images.as_ref();
+    pipeline.steps.stored = stored.map(|images| StoredImages::new(images, &maker));
     let workers = pool(settings.loading.threads.threads)?;
     let conditions: Vec<&Condition> = setup.conditions.iter().collect();
     let bar = progress.bar("walks", setup.sources.len());
-    let (mut asked, mut images, mut walks) = (Vec::new(), 0, 0);
+    let (mut asked, mut written, mut walks) = (Vec::new(), 0, 0);
     for (number, walk) in setup.sources.iter().enumerate() {
         if walk.problem.is_some() {
             continue;
@@ -52,7 +58,7 @@ pub(super) fn pack(
                 write(&folder.join(&name), &payload.file()?)?;
                 names.push(name);
             }
-            images += names.len();
+            written += names.len();
             shots.push(StudyImage {
                 condition: condition.to_string(),
                 images: names,
@@ -79,7 +85,7 @@ pub(super) fn pack(
         &path,
         Status::Complete,
         format!(
-            "{}: {} questions about {walks} walks, {images} images, {} conditions; a person sees each walk in one of them, and {} people \
+            "{}: {} questions about {walks} walks, {written} images, {} conditions; a person sees each walk in one of them, and {} people \
              see it in all\nwhat they save is marked by openeqa --answers NAME=FILE\n",
             path.display(),
             asked.len(),
