@@ -6,6 +6,7 @@
 
 mod messages;
 mod models_file;
+mod sent_secrets;
 mod value_text;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -90,13 +91,13 @@ pub(super) fn parse(
             .filter(|path| !path.is_empty())
             .map(PathBuf::from),
     };
-    let file = match file {
-        Some(file) => file_values(&file, &all, command, &path)?,
+    let of_file = match &file {
+        Some(file) => file_values(file, &all, command, &path)?,
         None => BTreeMap::new(),
     };
-    let models = models_values(own, command, [&environment, &file])?;
+    let models = models_values(own, command, [&environment, &of_file])?;
     let (mut words, mut origins) = (Vec::new(), BTreeMap::new());
-    for layer in [models, environment, file] {
+    for layer in [&models, &environment, &of_file] {
         let mut newly_set = Vec::new();
         for arg in settable_flags(command) {
             let hidden = || set.iter().any(|other| hides(command, other, arg));
@@ -108,6 +109,13 @@ pub(super) fn parse(
             }
         }
         set.extend(newly_set);
+    }
+    if let Some(file) = &file {
+        let in_effect = of_file.iter().filter_map(|(flag, value)| {
+            let is_in_effect = origins.get(flag) == Some(&value.origin);
+            is_in_effect.then(|| (flag.clone(), value))
+        });
+        sent_secrets::check(file, &in_effect.collect())?;
     }
     let mut typed = typed;
     let end = typed.iter().position(|word| word == "--");

@@ -27,6 +27,7 @@ use crate::run::evaluate::{check, evaluate, export_batch, plan, run_batch};
 use crate::run::openeqa::openeqa;
 use crate::run::{self, study};
 use crate::types::manifest::Status;
+use crate::types::shown_text::{shown, shown_in_colours};
 
 use command::{BatchCommand, Colours, Command, NAME, StudyCommand};
 use layers::one_line;
@@ -200,11 +201,11 @@ fn manual(folder: &Path) -> Result<Outcome> {
 fn finish(outcome: &Outcome, verbosity: Verbosity, colours: ColorChoice) -> ExitCode {
     let mut stdout = AutoStream::new(std::io::stdout().lock(), colours);
     let said = if verbosity == Verbosity::Normal || outcome.written.is_empty() {
-        stdout.write_all(outcome.output.as_bytes())
+        stdout.write_all(shown_in_colours(&outcome.output).as_bytes())
     } else {
         // What ended with a fault says so, where it takes no place from the paths.
         if outcome.status != Status::Complete {
-            let _ = std::io::stderr().write_all(outcome.output.as_bytes());
+            let _ = std::io::stderr().write_all(shown_in_colours(&outcome.output).as_bytes());
         }
         let mut paths = outcome.written.iter();
         paths.try_for_each(|path| writeln!(stdout, "{}", path.display()))
@@ -221,7 +222,7 @@ fn finish(outcome: &Outcome, verbosity: Verbosity, colours: ColorChoice) -> Exit
 
 /// The one place where an error reaches the user, if standard error is still read by somebody.
 fn fail(problem: &str) -> ExitCode {
-    let _ = writeln!(std::io::stderr(), "error: {problem}");
+    let _ = writeln!(std::io::stderr(), "error: {}", shown(problem));
     ExitCode::from(FATAL)
 }
 

@@ -372,10 +372,8 @@ impl ImageFile {
         };
         let decoder = guarded(open).map_err(|problem| self.wrong(problem))?;
         let (width, height) = decoder.dimensions();
-        if u64::from(width) * u64::from(height) > most_pixels {
-            let (width, height) = (width as usize, height as usize);
-            return Err(self.wrong(self.rule.too_large(width, height)));
-        }
+        let size = self.rule.check_size(width as usize, height as usize);
+        size.map_err(|problem| self.wrong(problem))?;
         Ok(decoder)
     }
 

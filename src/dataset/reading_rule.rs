@@ -10,6 +10,9 @@ use crate::types::{DepthNote, InputNote, Light};
 /// The default of the maximum number of pixels in an image (chosen).
 pub const MOST_PIXELS: u64 = 100_000_000;
 
+/// How many times as long as the other a side of an image may be (chosen).
+const MOST_ASPECT: usize = 1000;
+
 /// The settings that decide how image files are read.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReadingRule {
@@ -32,12 +35,27 @@ impl ReadingRule {
         exposure_ev: None,
     };
 
-    /// The problem with an image of this width and height.
-    pub(super) fn too_large(&self, width: usize, height: usize) -> String {
-        format!(
-            "{width} × {height} pixels are more than the {} that are read; shrink it first, or raise --max-pixels",
-            self.most_pixels
-        )
+    /// Checks the width and the height of an image. One whose sides differ too much makes others that take more memory than any image of
+    /// as many pixels.
+    ///
+    /// # Errors
+    /// If it has too many pixels, or without a limit of the user's own sides that differ too much.
+    pub(super) fn check_size(&self, width: usize, height: usize) -> Result<(), String> {
+        let pixels = (width as u64).saturating_mul(height as u64);
+        if pixels > self.most_pixels {
+            return Err(format!(
+                "{width} × {height} pixels are more than the {} that are read; shrink it first, or raise --max-pixels",
+                self.most_pixels
+            ));
+        }
+        let is_narrow = width.max(height) > MOST_ASPECT * width.min(height);
+        if is_narrow && self.most_pixels == MOST_PIXELS {
+            return Err(format!(
+                "{width} × {height} pixels: one side is more than {MOST_ASPECT} times the other; cut it, or set --max-pixels {}",
+                MOST_PIXELS - 1
+            ));
+        }
+        Ok(())
     }
 
     /// What reading does to an image besides its colours and its orientation: of light, or of codes of 8 bits.
@@ -107,5 +125,30 @@ impl Default for ReadingRule {
             transfer: Transfer::default(),
             exposure_ev: None,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_image_has_few_pixels_and_sides_that_fit_each_other() {
+        let rule = ReadingRule::default();
+        for (width, height, fits) in [
+            (10_000, 10_000, true),
+            (10_000, 10_001, false),
+            (1_000, 1, true),
+            (1, 1_001, false),
+            (4_000_000, 1, false),
+        ] {
+            let found = rule.check_size(width, height);
+            assert_eq!(found.is_ok(), fits, "{width} × {height}: {found:?}");
+        }
+        let own = ReadingRule {
+            most_pixels: MOST_PIXELS - 1,
+            ..rule
+        };
+        assert_eq!(own.check_size(1, 1_001), Ok(()));
     }
 }

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::io::ErrorKind;
+use std::fs::File;
+use std::io::{ErrorKind, Read as _};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
@@ -93,15 +94,39 @@ pub(super) fn path_for(model: &Path) -> PathBuf {
 /// Text of a model's sidecar; empty if there is none.
 pub(super) fn text_for(model: &Path) -> Result<String> {
     let path = path_for(model);
-    match std::fs::read_to_string(&path) {
+    let read = File::open(&path).and_then(|file| {
+        let mut text = String::new();
+        file.take(MOST_BYTES + 1).read_to_string(&mut text)?;
+        Ok(text)
+    });
+    match read {
+        Ok(text) if text.len() as u64 > MOST_BYTES => {
+            let problem = format!("larger than {MOST_BYTES} bytes, which no sidecar needs");
+            Err(Error::data(path.display(), problem))
+        }
         Ok(text) => Ok(text),
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(String::new()),
         Err(error) => Err(Error::file(path, "read", error)),
     }
 }
 
-/// Largest side and multiple, in pixels, that a sidecar may state; chosen: no image of this program is larger.
-const MOST_PIXELS: usize = 1 << 16;
+/// Largest sidecar, in bytes; chosen.
+const MOST_BYTES: u64 = 1 << 20;
+
+/// Largest side, in pixels, that a sidecar may state; chosen: no image of this program is larger.
+const MOST_SIDE: usize = 1 << 16;
+
+/// Most pixels of the size that a sidecar may state: the default of `--max-pixels`.
+const MOST_PIXELS: usize = 100_000_000;
+
+/// Largest multiple, in pixels; chosen: twice what any published model needs, and a small image filled up to it still fits anywhere.
+const MOST_MULTIPLE: usize = 1024;
+
+/// Most further inputs; chosen.
+const MOST_EXTRA: usize = 64;
+
+/// Largest mean and deviation, and the inverse of the smallest deviation; chosen.
+const MOST_SCALE: f32 = 1e6;
 
 impl ModelSidecar {
     /// Parses the text of the sidecar of `model`.
@@ -116,19 +141,7 @@ impl ModelSidecar {
             )
         };
         let sidecar: Self = toml::from_str(text).map_err(|e| wrong(e.message()))?;
-        let finite = |numbers: Option<[f32; 3]>| numbers.into_iter().flatten().all(f32::is_finite);
-        if !finite(sidecar.mean)
-            || !finite(sidecar.std)
-            || sidecar.std.is_some_and(|std| std.contains(&0.0))
-        {
-            return Err(wrong("mean and std must be three numbers each, std not 0"));
-        }
-        let stated = sidecar.fixed.into_iter().flatten().chain(sidecar.multiple);
-        if stated.max().is_some_and(|most| most.get() > MOST_PIXELS) {
-            return Err(wrong(&format!(
-                "multiple and the sides of fixed are at most {MOST_PIXELS} pixels"
-            )));
-        }
+        sidecar.check_bounds().map_err(|problem| wrong(&problem))?;
         if sidecar.output.is_some() && sidecar.image.is_some() {
             return Err(wrong(
                 "output and image are both stated; state image alone, which names its outputs",
@@ -143,6 +156,39 @@ impl ModelSidecar {
             .unwrap_or(input)
             .map_err(|problem| wrong(&problem))?;
         Ok(sidecar)
+    }
+
+    /// Checks that no number makes an image too large or a value unusable.
+    fn check_bounds(&self) -> Result<(), String> {
+        let means = self.mean.into_iter().flatten();
+        let deviations = self.std.into_iter().flatten();
+        let is_scale = |number: f32| (1.0 / MOST_SCALE..=MOST_SCALE).contains(&number);
+        if !means.map(f32::abs).all(|mean| mean <= MOST_SCALE)
+            || !deviations.map(is_scale).all(|is_so| is_so)
+        {
+            return Err(format!(
+                "mean is three numbers of at most {MOST_SCALE}, and std three from {} to {MOST_SCALE}",
+                1.0 / MOST_SCALE
+            ));
+        }
+        if self
+            .multiple
+            .is_some_and(|multiple| multiple.get() > MOST_MULTIPLE)
+        {
+            return Err(format!("multiple is at most {MOST_MULTIPLE} pixels"));
+        }
+        if let Some([width, height]) = self.fixed {
+            let is_too_long = width.max(height).get() > MOST_SIDE;
+            if is_too_long || width.get() * height.get() > MOST_PIXELS {
+                return Err(format!(
+                    "the sides of fixed are at most {MOST_SIDE} pixels, and their product at most {MOST_PIXELS}"
+                ));
+            }
+        }
+        if self.extra.len() > MOST_EXTRA {
+            return Err(format!("extra has at most {MOST_EXTRA} inputs"));
+        }
+        Ok(())
     }
 
     /// The sidecar without statements that equal the defaults, so that sidecars of the same meaning have the same digest.
@@ -255,12 +301,18 @@ mod tests {
             ("output = [1]", "index from 0"),
             ("output", "expected"),
             ("multiple = 0", "nonzero"),
-            ("multiple = 65537", "at most 65536"),
+            ("multiple = 1025", "at most 1024"),
+            ("multiple = 2147483648", "at most 1024"),
             ("fixed = [64, 0]", "nonzero"),
             ("fixed = [64]", "length"),
             ("fixed = [99999999999, 8]", "at most 65536"),
+            ("fixed = [60000, 60000]", "product at most 100000000"),
             ("pad_always = 1", "boolean"),
-            ("std = [1, 0, 1]", "std not 0"),
+            ("std = [1, 0, 1]", "std three from"),
+            ("std = [1, nan, 1]", "std three from"),
+            ("std = [1, -1, 1]", "std three from"),
+            ("mean = [inf, 0, 0]", "at most 1000000"),
+            ("mean = [nan, 0, 0]", "at most 1000000"),
             ("tile = \"exact\"", "exact:8"),
             ("[extra]\ngamma = nan", "extra.gamma"),
             ("[extra]\na = { from = \"image +\" }", "the end"),

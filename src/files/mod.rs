@@ -45,7 +45,7 @@ pub(crate) fn write_with(
     create_folder(path)?;
     let unfinished = unfinished(path);
     let unwritable = |e| Error::file(&unfinished, "write", e);
-    let mut file = BufWriter::new(File::create(&unfinished).map_err(unwritable)?);
+    let mut file = BufWriter::new(create_new(&unfinished).map_err(unwritable)?);
     write(&mut file)?;
     file.flush().map_err(unwritable)?;
     file.get_ref().sync_all().map_err(unwritable)?;
@@ -85,6 +85,15 @@ pub(crate) fn unfinished(path: &Path) -> PathBuf {
     path.with_file_name(format!(".{name}{UNFINISHED}"))
 }
 
+/// A new file in the place of what a killed process may have left there, or of a link that stands there.
+fn create_new(path: &Path) -> io::Result<File> {
+    match fs::remove_file(path) {
+        Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),
+        _ => {}
+    }
+    File::options().write(true).create_new(true).open(path)
+}
+
 fn create_folder(path: &Path) -> Result<()> {
     match path.parent() {
         Some(folder) => fs::create_dir_all(folder).map_err(|e| Error::file(folder, "create", e)),
@@ -97,7 +106,7 @@ fn create_folder(path: &Path) -> Result<()> {
 fn replace(path: &Path, content: &[u8], sync: impl FnOnce(&File) -> io::Result<()>) -> Result<()> {
     create_folder(path)?;
     let unfinished = unfinished(path);
-    let written = File::create(&unfinished).and_then(|mut file| {
+    let written = create_new(&unfinished).and_then(|mut file| {
         file.write_all(content)?;
         sync(&file)
     });

@@ -9,6 +9,7 @@ use serde::{Serialize, Serializer};
 use super::table::{Table, TableCell};
 use super::tables::SUMMARY;
 use crate::error::{Error, Result};
+use crate::types::shown_text::is_hidden;
 
 /// One field of a row. A number has as many digits as are needed to read it back without loss.
 #[derive(Debug, Clone, Copy, Serialize)]
@@ -74,7 +75,8 @@ pub(super) fn fields(cell: &TableCell, names: usize) -> impl Iterator<Item = Csv
 /// `⟨U+001B⟩`; line breaks stay.
 pub(super) fn safe(text: &str) -> Cow<'_, str> {
     let is_formula = begins_formula(text);
-    let hidden = |c: char| c != '\n' && c.is_control();
+    // A tab within a cell moves some readers to the next.
+    let hidden = |c: char| c == '\t' || is_hidden(c);
     if !is_formula && !text.contains(hidden) {
         return Cow::Borrowed(text);
     }

@@ -7,6 +7,7 @@ use super::table::{Column, ColumnKind, Table, TableCell, TableFormat};
 use super::words::{interval, percent, points, words};
 use crate::score::estimate::Estimate;
 use crate::score::significance::Significance;
+use crate::types::shown_text::shown;
 
 /// The findings as a list, then all tables that have a LaTeX caption; `head` names them in the first comment line.
 #[must_use]
@@ -41,8 +42,10 @@ pub(super) fn tables(head: &str, sentences: &[Sentence], tables: &[Table]) -> St
 /// Text with the special characters of LaTeX escaped.
 pub(super) fn escaped(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
-    for c in text.chars() {
+    for c in shown(text).chars() {
         match c {
+            '⟨' => escaped.push_str("$\\langle$"),
+            '⟩' => escaped.push_str("$\\rangle$"),
             '&' | '%' | '$' | '#' | '_' | '{' | '}' => {
                 escaped.push('\\');
                 escaped.push(c);

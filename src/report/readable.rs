@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use crate::types::shown_text::shown;
+
 /// Maximum number of characters of a text on a page.
 const MAX_CHARS: usize = 4_000;
 
@@ -9,28 +11,14 @@ const MAX_CHARS: usize = 4_000;
 /// more than [`MAX_CHARS`] characters is cut, with a note at its end.
 #[must_use]
 pub(super) fn readable(text: &str) -> String {
-    let mut visible = String::with_capacity(text.len().min(MAX_CHARS));
-    for c in text.chars().take(MAX_CHARS) {
-        if is_hidden(c) {
-            let _ = write!(visible, "⟨U+{:04X}⟩", u32::from(c));
-        } else {
-            visible.push(c);
-        }
-    }
+    let cut = text.char_indices().nth(MAX_CHARS);
+    let kept = cut.map_or(text, |(at, _)| &text[..at]);
+    let mut visible = shown(kept).into_owned();
     let all = text.chars().count();
     if all > MAX_CHARS {
         let _ = write!(visible, " … ({all} characters, cut here)");
     }
     visible
-}
-
-fn is_hidden(c: char) -> bool {
-    matches!(
-        c,
-        '\u{0}'..='\u{8}' | '\u{b}'..='\u{1f}' | '\u{7f}'..='\u{9f}' | '\u{ad}' | '\u{61c}' | '\u{115f}' | '\u{180e}'
-            | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}'
-            | '\u{fff9}'..='\u{fffb}'
-    )
 }
 
 #[cfg(test)]

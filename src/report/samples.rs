@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::words::light;
 use crate::types::degradation::Axis;
+use crate::types::shown_text::shown;
 use crate::types::{
     AxisLevel, Condition, EnhancerName, FrameId, KindReading, LightGroup, Thumbnail,
 };
@@ -172,7 +173,8 @@ pub(super) fn figure(samples: &SamplePage) -> String {
 
 /// Text with the special characters of XML escaped.
 fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
+    shown(text)
+        .replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")
 }

@@ -5,6 +5,7 @@ use minijinja::{AutoEscape, Environment};
 use serde::Serialize;
 
 use crate::error::{Error, Result};
+use crate::types::shown_text::shown;
 
 /// Parts that several pages share, each with its placeholder in the templates.
 const PARTS: [(&str, &str); 3] = [
@@ -14,7 +15,7 @@ const PARTS: [(&str, &str); 3] = [
     ("<!-- rows -->", include_str!("page/rows.html")),
 ];
 
-/// The HTML of a template with its values, which are escaped.
+/// The HTML of a template with its values, which are escaped, and without hidden characters.
 ///
 /// # Errors
 /// If the template cannot be filled.
@@ -31,5 +32,6 @@ pub(super) fn filled(template: &str, values: impl Serialize) -> Result<String> {
         .add_template("page", &whole)
         .map_err(|e| failed(&e))?;
     let template = environment.get_template("page").map_err(|e| failed(&e))?;
-    template.render(Serde(values)).map_err(|e| failed(&e))
+    let page = template.render(Serde(values)).map_err(|e| failed(&e))?;
+    Ok(shown(&page).into_owned())
 }

@@ -2,15 +2,16 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::chance::{OfferedChoices, chance};
 use super::choice::ReadingMode;
 use super::estimate::Estimate;
-use super::grid::{ClusterCount, Grid, TrialResult};
+use super::grid::{ClusterCount, Grid, GridItem, TrialResult};
 use super::health::Health;
 use super::subject::{CHANCE, Subject};
-use crate::types::{Family, KindReading, QuestionId, UnreadReason};
+use crate::types::{Family, KindReading, UnreadReason};
 
 /// Accuracy of one subject on one family in one reading.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -84,12 +85,13 @@ pub(crate) fn summarize(
 ) -> AccuracySummary {
     let questions: Vec<OfferedChoices> = questions.into_iter().collect();
     let families = grid.groups();
-    let mut cells = Vec::new();
-    for subject in 0..grid.subjects.len() {
-        for family in &families {
-            cells.extend(ReadingMode::ALL.map(|mode| cell(grid, subject, *family, mode)));
-        }
-    }
+    let subjects = (0..grid.subjects.len()).into_par_iter();
+    let cells = subjects.flat_map_iter(|subject| {
+        let families = families.iter();
+        families
+            .flat_map(move |family| ReadingMode::ALL.map(|mode| cell(grid, subject, *family, mode)))
+    });
+    let mut cells: Vec<AccuracyCell> = cells.collect();
     // A family that a subject was not asked about has no cell.
     cells.retain(|cell| cell.accuracy.is_some() || cell.failed > 0);
     cells.extend(chance_cells(&questions));
@@ -139,25 +141,33 @@ fn always(
     family: Option<&Family>,
     mode: ReadingMode,
 ) -> Option<Estimate> {
-    // Items of a question stand together.
-    let mut questions = BTreeMap::<(u32, &QuestionId), ClusterCount>::new();
-    for (item, result) in grid.of_family(subject, family) {
-        if let Some(chosen) = result.reading(mode) {
-            let count = questions
-                .entry((item.cluster, &*item.asked.question))
-                .or_default();
-            count.replies += 1;
-            count.right += u32::from(item.is_right(chosen));
-        }
-    }
-    if questions.values().all(|count| count.replies == 1) {
-        return None;
-    }
     let mut clusters = vec![ClusterCount::default(); grid.clusters];
-    for ((cluster, _), count) in questions {
-        let cluster = &mut clusters[cluster as usize];
-        cluster.replies += 1;
-        cluster.right += u32::from(count.right == count.replies);
+    let mut is_once = true;
+    let mut add = |cluster: u32, question: ClusterCount| {
+        is_once &= question.replies <= 1;
+        if question.replies > 0 {
+            let cluster = &mut clusters[cluster as usize];
+            cluster.replies += 1;
+            cluster.right += u32::from(question.right == question.replies);
+        }
+    };
+    // Items of a question stand together.
+    let mut last: Option<&GridItem<'_>> = None;
+    let mut count = ClusterCount::default();
+    for (item, result) in grid.of_family(subject, family) {
+        let Some(chosen) = result.reading(mode) else {
+            continue;
+        };
+        if let Some(last) = last.filter(|last| last.asked.question != item.asked.question) {
+            add(last.cluster, std::mem::take(&mut count));
+        }
+        count.replies += 1;
+        count.right += u32::from(item.is_right(chosen));
+        last = Some(item);
+    }
+    add(last?.cluster, count);
+    if is_once {
+        return None;
     }
     Estimate::clustered(&clusters)
 }

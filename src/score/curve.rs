@@ -1,5 +1,7 @@
 //! Summaries of accuracy over all levels: [`Curve`].
 
+use rayon::prelude::*;
+
 use super::bootstrap::Resamples;
 use super::choice::ReadingMode;
 use super::grid::{Grid, TrialResult};
@@ -85,9 +87,8 @@ impl CurvePoints {
 /// level.
 #[must_use]
 pub fn curves(grid: &Grid<'_>, draws: &Resamples, family: Option<&Family>) -> Vec<Curve> {
-    CurvePoints::all(grid)
-        .into_iter()
-        .filter_map(|points| curve(grid, draws, family, points))
+    let all = CurvePoints::all(grid).into_par_iter();
+    all.filter_map(|points| curve(grid, draws, family, points))
         .collect()
 }
 

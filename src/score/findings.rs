@@ -99,8 +99,7 @@ impl<'a> Findings<'a> {
         measured: &[ImageFidelity],
         listing: &ModelListing,
     ) -> Self {
-        let pairs = trials.iter().map(|trial| (trial.question(), trial.frame()));
-        let clusters = Clusters::new(pairs, ties);
+        let clusters = Clusters::new(trials.questions(), ties);
         let questions: Vec<OfferedChoices> = questions.into_iter().collect();
         let observer = ObserverSummary::of(trials, &clusters);
         let is_model = |model: &str| !is_control(model);

@@ -4,6 +4,7 @@ use std::convert::Infallible;
 
 use rand::TryRng;
 use rand::rand_core::utils::fill_bytes_via_next_word;
+use rand::seq::SliceRandom as _;
 
 /// The random generator SplitMix64 (Steele, Lea and Flood 2014, OOPSLA, figure 13), for the distributions of `rand_distr`.
 pub(super) struct SplitMix(pub(super) u64);
@@ -16,6 +17,11 @@ impl SplitMix {
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         z ^ (z >> 31)
+    }
+
+    /// Puts values in a random order, each as likely as any other.
+    pub(super) fn shuffle<T>(&mut self, values: &mut [T]) {
+        values.shuffle(self);
     }
 }
 

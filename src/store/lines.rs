@@ -9,7 +9,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::pieces::{FileLine, LinePlace, Pieces};
-use super::record_log::RereadRecord;
+use super::reread_record::RereadRecord;
 use super::stored_trial::StoredTrial;
 use super::trial_line::TrialLine;
 use crate::error::{Error, Result};
@@ -17,19 +17,18 @@ use crate::files::write_synced;
 use crate::types::{Detail, ImageFidelity, Record, RunQuestion, Thumbnail, Usage};
 
 /// Appends lines to a file, which is created if it does not exist.
-pub(super) fn append<T: Serialize>(path: &Path, values: &[T]) -> Result<File> {
+pub(super) fn append<T: Serialize + StoredLine>(path: &Path, values: &[T]) -> Result<File> {
     let lines = json_lines(path, values)?;
     let file = OpenOptions::new()
         .read(true)
         .append(true)
         .create(true)
         .open(path);
-    let written = file.and_then(|mut file| {
-        repair(path, &file).map_err(std::io::Error::other)?;
-        file.write_all(&lines)?;
-        Ok(file)
-    });
-    written.map_err(|e| Error::file(path, "write", e))
+    let mut file = file.map_err(|e| Error::file(path, "write", e))?;
+    repair::<T>(path, &file)?;
+    file.write_all(&lines)
+        .map_err(|e| Error::file(path, "write", e))?;
+    Ok(file)
 }
 
 pub(super) fn json_lines<T: Serialize>(path: &Path, values: &[T]) -> Result<Vec<u8>> {
@@ -222,8 +221,37 @@ impl StoredLine for ImageFidelity {
     const WHAT: &str = "the fidelity of an image";
 }
 
+/// Whether a file has lines of a kind: one of the whole lines in its first `complete` bytes does, or without any whole line it begins as
+/// an object.
+fn is_of<T: StoredLine>(path: &Path, complete: u64) -> Result<bool> {
+    let unreadable = |e| Error::file(path, "read", e);
+    if complete == 0 {
+        let mut first = [0];
+        let read = File::open(path).and_then(|mut file| file.read(&mut first));
+        return Ok(read.map_err(unreadable)? == 1 && first == *b"{");
+    }
+    let Some(mut pieces) = Pieces::open(path)? else {
+        return Ok(false);
+    };
+    let mut is_blank = true;
+    while let Some(piece) = pieces.next()? {
+        let lines = piece.lines();
+        is_blank &= lines.is_empty();
+        let mut lines = lines.iter();
+        if lines.any(|line| serde_json::from_slice::<T>(line.bytes).is_ok()) {
+            return Ok(true);
+        }
+    }
+    // All lines were set aside.
+    Ok(is_blank)
+}
+
 /// Cuts off an incomplete last line: everything after the last line end.
-pub(super) fn repair(path: &Path, mut file: &File) -> Result<()> {
+///
+/// # Errors
+/// If nothing in the file says that it has lines of this kind: no whole line does, or there is none and it does not begin as one. Such a
+/// file is left as it is.
+pub(super) fn repair<T: StoredLine>(path: &Path, mut file: &File) -> Result<()> {
     const STEP: u64 = 64 * 1024;
     let unreadable = |e| Error::file(path, "read", e);
     let length = file.metadata().map_err(unreadable)?.len();
@@ -241,6 +269,11 @@ pub(super) fn repair(path: &Path, mut file: &File) -> Result<()> {
     }
     if complete == length {
         return Ok(());
+    }
+    if !is_of::<T>(path, complete)? {
+        let problem = format!("not {}, and no other line is; {}", T::WHAT, T::MEND);
+        let lines = "its last line, which has no end";
+        return Err(Error::data(format!("{}, {lines}", path.display()), problem));
     }
     tracing::warn!(
         "{}: the last line was incomplete and has been removed; its trial is asked again",

@@ -10,8 +10,10 @@ mod folder;
 mod image_notes;
 mod lines;
 mod log_mark;
+mod own_files;
 mod pieces;
 mod record_log;
+mod reread_record;
 mod stored_trial;
 mod trial_line;
 
@@ -36,6 +38,8 @@ use folder::{
     FIDELITY, QUESTIONS, RECORDS, THUMBNAILS, check_same_run, create_run, write, write_manifest,
 };
 use lines::{append, each_line, json_lines, lines, repair, set_aside};
+
+use own_files::check_own;
 
 pub(crate) use column_file::{
     CREATED_BY, Cell, CellKind, Column, ColumnFile, FileMetadata, Presence,
@@ -103,6 +107,7 @@ impl<D: Detail> Store<D> {
             Some(stored) => check_same_run(folder, &stored, manifest, address_change)?,
             None => create_run(folder, manifest)?,
         }
+        check_own(folder)?;
         let path = folder.join(RECORDS);
         let records = OpenOptions::new()
             .read(true)
@@ -119,7 +124,7 @@ impl<D: Detail> Store<D> {
             },
             TryLockError::Error(e) => Error::file(&path, "lock", e),
         })?;
-        repair(&path, &records)?;
+        repair::<Record<D>>(&path, &records)?;
         Ok(Self {
             folder: folder.to_owned(),
             records,

@@ -4,12 +4,10 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use serde::de::Error as _;
-use serde::{Deserialize, Deserializer};
-
 use super::folder::{QUESTIONS, RECORDS};
 use super::lines::each_placed_line;
 use super::pieces::{LinePlace, open_if_there};
+use super::reread_record::RereadRecord;
 use super::trial_line::TrialLine;
 use crate::error::{Error, Result};
 use crate::types::{Detail, Record};
@@ -157,16 +155,6 @@ pub(crate) fn each_reread_record<D: Detail>(
     each_placed_line(&folder.join(RECORDS), |line: RereadRecord<D>, place| {
         take(line.0, place);
     })
-}
-
-/// A record whose reply is read again as its line is parsed.
-pub(super) struct RereadRecord<D>(Record<D>);
-
-impl<'de, D: Detail> Deserialize<'de> for RereadRecord<D> {
-    fn deserialize<S: Deserializer<'de>>(deserializer: S) -> std::result::Result<Self, S::Error> {
-        let record = Record::<D>::deserialize(deserializer)?;
-        record.reread().map(Self).map_err(S::Error::custom)
-    }
 }
 
 #[cfg(test)]

@@ -43,6 +43,7 @@ pub(crate) mod severity;
 pub(crate) mod shared;
 mod shell;
 mod shown_codes;
+pub(crate) mod shown_text;
 pub(crate) mod small_number;
 mod strict_group;
 pub(crate) mod treatment;

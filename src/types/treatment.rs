@@ -67,11 +67,13 @@ impl FromStr for Treatment {
             return Ok(Self::Untouched);
         }
         // A word in lower case is no level; where it is no pair either, the problem is told with the forms of levels.
-        let is_word = text.starts_with(|c: char| c.is_ascii_lowercase());
-        match text.parse::<PairDark>() {
-            Ok(dark) if is_word => Ok(Self::Paired(dark)),
-            Err(problem) if text.starts_with("match-") => Err(problem),
-            _ => text.parse().map(Self::Degraded),
+        if text.starts_with(|c: char| c.is_ascii_lowercase()) {
+            match text.parse::<PairDark>() {
+                Ok(dark) => return Ok(Self::Paired(dark)),
+                Err(problem) if text.starts_with("match-") => return Err(problem),
+                Err(_) => {}
+            }
         }
+        text.parse().map(Self::Degraded)
     }
 }

@@ -65,6 +65,8 @@ mod site;
 mod slurm;
 mod spreadsheets;
 mod statistics;
+mod strange_runs;
+mod strange_texts;
 mod synthesize;
 mod unlabelled;
 mod walks;

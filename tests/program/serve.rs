@@ -1,7 +1,8 @@
 //! The built-in models behind an endpoint, asked as a client asks them.
 
 use std::collections::BTreeMap;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
 use std::process::{Child, Stdio};
 
 use crate::support::run::{Bench, records, words};
@@ -33,8 +34,13 @@ impl Server {
     fn ask(&self, body: &Value) -> (u16, Value) {
         let runtime = tokio::runtime::Runtime::new().unwrap();
         runtime.block_on(async {
-            let client = reqwest::Client::builder().no_proxy().build().unwrap();
+            let client = reqwest::Client::builder()
+                .no_proxy()
+                .timeout(std::time::Duration::from_secs(60))
+                .build()
+                .unwrap();
             let request = client.post(format!("{}/chat/completions", self.url));
+            let request = request.header("content-type", "application/json");
             let reply = request.body(body.to_string()).send().await.unwrap();
             let status = reply.status().as_u16();
             let text = reply.text().await.unwrap();
@@ -43,6 +49,22 @@ impl Server {
                 serde_json::from_str(&text).unwrap_or(Value::String(text)),
             )
         })
+    }
+}
+
+impl Server {
+    /// The first line of the answer to bytes that are sent as they are; empty if the server closes the connection.
+    fn answer_to(&self, bytes: &str) -> String {
+        let mut stream = self.connection();
+        stream.write_all(bytes.as_bytes()).unwrap();
+        let mut line = String::new();
+        BufReader::new(stream).read_line(&mut line).unwrap();
+        line.trim_end().to_owned()
+    }
+
+    fn connection(&self) -> TcpStream {
+        let address = self.url.strip_prefix("http://").unwrap();
+        TcpStream::connect(address.strip_suffix("/v1").unwrap()).unwrap()
     }
 }
 
@@ -152,6 +174,71 @@ fn what_a_client_sends_is_answered_in_its_own_words() {
             "{body}: {found} {reply}"
         );
     });
+}
+
+#[test]
+fn pages_of_other_sites_are_not_answered() {
+    let bench = Bench::new();
+    let server = Server::start(&bench);
+    let host = server.url.strip_prefix("http://").unwrap();
+    let host = host.strip_suffix("/v1").unwrap();
+    let port = host.rsplit(':').next().unwrap();
+    let body = json!({"model": "darkqa-random", "messages": [{"role": "user", "content": WORDS}]});
+    let body = body.to_string();
+    let post = |host: &str, headers: &str| {
+        format!(
+            "POST /v1/chat/completions HTTP/1.1\r\nHost: {host}\r\n{headers}Connection: close\r\nContent-Length: {}\r\n\r\n{body}",
+            body.len()
+        )
+    };
+    let json = "Content-Type: application/json; charset=utf-8\r\n";
+    let rows = [
+        (post(host, json), "HTTP/1.1 200 OK"),
+        (post(&format!("localhost:{port}"), json), "HTTP/1.1 200 OK"),
+        (
+            post(host, &format!("{json}Origin: http://localhost:5173\r\n")),
+            "HTTP/1.1 200 OK",
+        ),
+        (
+            post(&format!("evil.example:{port}"), json),
+            "HTTP/1.1 421 Misdirected Request",
+        ),
+        (post("127.0.0.1", json), "HTTP/1.1 421 Misdirected Request"),
+        (
+            post(host, &format!("{json}Origin: http://evil.example\r\n")),
+            "HTTP/1.1 403 Forbidden",
+        ),
+        (
+            post(host, &format!("{json}Origin: null\r\n")),
+            "HTTP/1.1 403 Forbidden",
+        ),
+        (
+            post(host, "Content-Type: text/plain\r\n"),
+            "HTTP/1.1 415 Unsupported Media Type",
+        ),
+        (post(host, ""), "HTTP/1.1 415 Unsupported Media Type"),
+    ];
+    check_rows(rows, |(request, expected)| {
+        assert_eq!(server.answer_to(&request), expected, "{request}");
+    });
+}
+
+#[test]
+fn connections_that_send_nothing_keep_no_one_else_out() {
+    let bench = Bench::new();
+    let server = Server::start(&bench);
+    let mut idle: Vec<TcpStream> = (0..80).map(|_| server.connection()).collect();
+    for stream in &mut idle {
+        stream
+            .write_all(b"POST /v1/chat/completions HTTP/1.1\r\nHost: a")
+            .unwrap();
+    }
+    let words = json!([{"role": "user", "content": WORDS}]);
+    let (status, _) = server.ask(&json!({"model": "darkqa-random", "messages": words}));
+    assert_eq!(status, 200);
+    let mut rest = Vec::new();
+    // The server ends a connection that does not finish its headers; reading then ends, too.
+    let _ = idle[0].read_to_end(&mut rest);
 }
 
 #[test]

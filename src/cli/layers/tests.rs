@@ -377,3 +377,49 @@ fn a_place_of_data_with_commas_is_one_value_and_several_are_several() {
     let matches = parsed(&["check"], &[("DARKQA_MAP", map)], "").unwrap();
     assert_eq!(values(&matches, "map"), [map]);
 }
+
+#[test]
+fn a_file_sends_nothing_of_the_user_to_an_address_of_its_own() {
+    let own = "base-url = \"https://evil.example/v1\"\n";
+    for (words, line) in [
+        ("", "api-key-file = \"Cargo.toml\""),
+        ("", "api-key-env = \"OPENAI_API_KEY\""),
+        ("", "header-env = [\"X-A=AWS_SECRET_ACCESS_KEY\"]"),
+        ("", "system-file = \"Cargo.toml\""),
+        ("", "extra-body = \"@Cargo.toml\""),
+        ("", "prompts = \"prompts\""),
+    ] {
+        let words: Vec<&str> = words.split_whitespace().collect();
+        let flag = line.split(' ').next().unwrap();
+        let problem = parsed(&words, &[], &format!("{own}{line}\n")).unwrap_err();
+        let named = format!("name it on the command line with --{flag}");
+        assert!(
+            problem.contains(&named) && problem.contains("--base-url"),
+            "{line}: {problem}"
+        );
+    }
+    for (words, file) in [
+        // The user typed where it goes.
+        (
+            "--base-url https://mine.example/v1",
+            format!("{own}api-key-file = \"Cargo.toml\"\n"),
+        ),
+        // The user typed what goes there.
+        (
+            "--api-key-env MINE",
+            format!("{own}api-key-env = \"OPENAI_API_KEY\"\n"),
+        ),
+        ("", "api-key-file = \"Cargo.toml\"\n".to_owned()),
+        ("", format!("{own}api-key-env = \"none\"\n")),
+        (
+            "",
+            "base-url = \"https://api.openai.com/v1\"\napi-key-env = \"OPENAI_API_KEY\"\n"
+                .to_owned(),
+        ),
+        ("", format!("{own}extra-body = '{{\"a\": 1}}'\n")),
+    ] {
+        let words: Vec<&str> = words.split_whitespace().collect();
+        let found = parsed(&words, &[], &file);
+        assert!(found.is_ok(), "{words:?} {file}: {:?}", found.err());
+    }
+}

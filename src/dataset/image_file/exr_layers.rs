@@ -52,9 +52,7 @@ impl ExrFile {
         let (window, data) = (header.shared_attributes.display_window, header.layer_size);
         let size = (window.size.width(), window.size.height());
         for (width, height) in [size, (data.width(), data.height())] {
-            if width as u64 * height as u64 > rule.most_pixels {
-                return Err(rule.too_large(width, height));
-            }
+            rule.check_size(width, height)?;
         }
         check(header)?;
         let stated = header.shared_attributes.chromaticities.as_ref();

@@ -170,6 +170,7 @@ impl<D: Detail> Joined<D> {
         let replies = own.iter().filter(|trial| !trial.failed()).count();
         if known.trials.is_none() {
             let places = TrialPlaces::All(own.len());
+            own.drop_keys();
             self.trials = own;
             return (places, replies, replies);
         }
@@ -245,7 +246,11 @@ impl<D: Detail> Joined<D> {
             let place = (thumbnail.frame.clone(), thumbnail.condition.clone());
             known.thumbnails.insert(place)
         }));
-        self.fidelity.extend(run.fidelity);
+        if self.fidelity.is_empty() {
+            self.fidelity = run.fidelity;
+        } else {
+            self.fidelity.extend(run.fidelity);
+        }
         Ok(JoinedRun {
             folder: run.folder,
             layout: run.layout,

@@ -10,6 +10,7 @@ use super::sheet::{Colour, Mark, Place, Sheet, Stroke, Turn, Words};
 use crate::error::Result;
 use crate::report::chart::INK;
 use crate::types::Rgb;
+use crate::types::shown_text::shown;
 
 /// How a picture is written as PNG.
 pub(crate) type Png<'a> = &'a dyn Fn(&Rgb) -> Result<Vec<u8>>;
@@ -28,7 +29,8 @@ pub(crate) fn svg(sheet: &Sheet, png: Png) -> Result<String> {
         text += &element(mark, png)?;
         text.push('\n');
     }
-    Ok(text + "</svg>\n")
+    text += "</svg>\n";
+    Ok(shown(&text).into_owned())
 }
 
 /// A number with two decimals at most.

@@ -9,11 +9,12 @@ use super::foot::BELOW;
 use super::wrapped::wrapped;
 use crate::report::alert::Alert;
 use crate::report::sentences::{Sentence, Tone};
+use crate::types::shown_text::shown;
 
 /// An alert, wrapped.
 pub(in crate::report) fn alert(alert: &Alert) -> String {
     marked(
-        &wrapped("! ", &alert.text, "  "),
+        &wrapped("! ", &shown(&alert.text), "  "),
         1,
         colour(AnsiColor::Yellow),
     )
@@ -27,14 +28,14 @@ pub(in crate::report) fn sentence(sentence: &Sentence) -> String {
         Tone::Worse => colour(AnsiColor::Red),
         Tone::NotShown | Tone::Note => Style::new().bold(),
     };
-    let text = wrapped(&sign, &sentence.text, "    ");
-    marked(&text, 2, style) + &wrapped("    ", &sentence.detail, "    ")
+    let text = wrapped(&sign, &shown(&sentence.text), "    ");
+    marked(&text, 2, style) + &wrapped("    ", &shown(&sentence.detail), "    ")
 }
 
 /// A table with its marks of what is below the words alone in red.
 pub(super) fn table(text: &str) -> String {
     let style = colour(AnsiColor::Red);
-    text.replace(BELOW, &format!("{style}{BELOW}{style:#}"))
+    shown(text).replace(BELOW, &format!("{style}{BELOW}{style:#}"))
 }
 
 fn colour(colour: AnsiColor) -> Style {

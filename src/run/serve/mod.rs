@@ -2,9 +2,12 @@
 //!
 //! `POST /v1/chat/completions` takes a multiple-choice question with or without an image and answers with a letter; `GET
 //! /v1/models` lists the models. The observer must know which frame an image shows, and finds it by the image alone
-//! (`recognise`). Only requests from this machine are answered. Any key is accepted, and nothing is charged or stored.
+//! (`recognise`). Only requests of programs on this machine are answered, and of no page of another site (`admission`). Any key is
+//! accepted, and nothing is charged or stored.
 
+mod admission;
 mod completion;
+mod connections;
 mod puzzle;
 mod recognise;
 mod request;
@@ -14,13 +17,14 @@ use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
 
 use axum::Router;
-use axum::body::Bytes;
-use axum::extract::{DefaultBodyLimit, State};
+use axum::extract::{Request, State};
 use axum::http::StatusCode;
+use axum::middleware::{self, Next};
 use axum::response::{IntoResponse as _, Response};
 use axum::routing::{get, post};
 use clap::Args;
 use tokio::runtime;
+use tokio::sync::Semaphore;
 
 use crate::ask::{Call, Message, Model, Query, Random};
 use crate::dataset::{self, DataPlace, Dataset, RootArgs};
@@ -33,13 +37,14 @@ use crate::questions::rules::Rules;
 use crate::types::manifest::Status;
 use crate::types::{Choices, Decides, Digest, Family, FrameId, Question, QuestionId};
 
+use admission::{admit, body};
 use completion::{Completion, RequestFault};
 use puzzle::Puzzle;
 use recognise::Likenesses;
 use request::ServedQuestion;
 
-/// The maximum size of a request in bytes (chosen).
-const LARGEST: usize = 64 << 20;
+/// The requests that are answered at once; further ones wait. Chosen.
+const AT_ONCE: usize = 16;
 
 /// The flags of `serve`.
 #[derive(Debug, Args)]
@@ -63,6 +68,8 @@ struct ServerState {
     likenesses: Likenesses,
     /// The models by their names at this endpoint. They differ from `--model observer`, which runs without an endpoint.
     models: [(&'static str, Model); 2],
+    /// Places for requests that are read and answered.
+    places: Semaphore,
 }
 
 /// Answers requests until the process is interrupted.
@@ -81,7 +88,11 @@ pub(crate) fn serve(args: &ServeArgs, progress: &Progress) -> Result<Outcome> {
         ("darkqa-random", Model::Random(prior)),
     ];
     let likenesses = Likenesses::of(&dataset, progress)?;
-    let state = Arc::new(ServerState { likenesses, models });
+    let state = Arc::new(ServerState {
+        likenesses,
+        models,
+        places: Semaphore::new(AT_ONCE),
+    });
     let runtime = runtime::Builder::new_multi_thread()
         .enable_all()
         .build()
@@ -111,13 +122,21 @@ async fn listen(args: &ServeArgs, state: Arc<ServerState>, progress: &Progress) 
         .route("/v1/models", get(models))
         .route("/v1/chat/completions", post(complete))
         .fallback(not_found)
-        .layer(DefaultBodyLimit::max(LARGEST))
+        .layer(middleware::from_fn(move |request, next| {
+            admitted(request, next, address.port())
+        }))
         .with_state(state);
     let mut interrupt = Interrupt::listen()?;
-    axum::serve(listener, app)
-        .with_graceful_shutdown(async move { interrupt.next().await })
-        .await
-        .map_err(|e| Error::usage("serve", e))
+    connections::answer_until(listener, app, interrupt.next()).await;
+    Ok(())
+}
+
+/// Answers a request if it may be answered.
+async fn admitted(request: Request, next: Next, port: u16) -> Response {
+    match admit(&request, port) {
+        Ok(()) => next.run(request).await,
+        Err(fault) => fault.into_response(),
+    }
 }
 
 async fn not_found() -> Response {
@@ -129,8 +148,10 @@ async fn models(State(state): State<Arc<ServerState>>) -> Response {
     completion::models(state.names())
 }
 
-async fn complete(State(state): State<Arc<ServerState>>, body: Bytes) -> Response {
-    match state.answer(&body).await {
+async fn complete(State(state): State<Arc<ServerState>>, request: Request) -> Response {
+    let _place = state.places.acquire().await;
+    let answer = async { state.answer(&body(request.into_body()).await?).await };
+    match answer.await {
         Ok(completion) => completion.into_response(),
         Err(fault) => fault.into_response(),
     }

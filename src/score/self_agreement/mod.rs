@@ -78,8 +78,7 @@ impl<'a> SelfAgreement<'a> {
         questions: &'a [RunQuestion],
         listing: &ModelListing,
     ) -> Self {
-        let pairs = trials.iter().map(|trial| (trial.question(), trial.frame()));
-        let clusters = Clusters::new(pairs, ties);
+        let clusters = Clusters::new(trials.questions(), ties);
         let draws = Resamples::new(clusters.count());
         let bank = BankIndex::new(questions);
         let grid = Grid::without_truths(trials, &clusters, listing);

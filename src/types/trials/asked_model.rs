@@ -1,7 +1,7 @@
-//! Who was asked, and what was shown: [`AskedModel`], [`Server`].
+//! Who was asked and what was shown: [`AskedModel`]; and how that ended: [`Ending`].
 
 use crate::types::Condition;
-use crate::types::record::{Via, View};
+use crate::types::record::{FailureKind, Via, View};
 
 /// A model, and the condition of the images that it was shown.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -12,12 +12,16 @@ pub(super) struct AskedModel {
     pub(super) condition: Option<Condition>,
 }
 
-/// The way in which a reply came.
+/// How a trial ended, as many trials do.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(super) struct Server {
+pub(super) struct Ending {
     /// The model's name in the server's reply.
-    pub(super) model: Option<String>,
+    pub(super) served_model: Option<String>,
     /// The provider that a router passed the request on to.
     pub(super) provider: Option<String>,
     pub(super) via: Via,
+    /// The reason why no reply came, with the HTTP status; `None` if a reply came.
+    pub(super) failure: Option<(FailureKind, Option<u16>)>,
+    /// Number of requests that were sent.
+    pub(super) attempts: u32,
 }

@@ -76,8 +76,12 @@ impl ChoiceTables {
         let images = SentImages::of(detail);
         let images = images.map_or(NONE, |images| self.images.number(images));
         let observed = detail.observed.as_ref().map(|observed| Observed {
+            from: observed.from,
+            things: observed.things,
+            seen: observed.seen,
+            detected: observed.detected,
+            explained_ppm: observed.explained_ppm,
             outlines: BTreeMap::new(),
-            ..observed.clone()
         });
         let observed = observed.map_or(NONE, |observed| self.observed.number(observed));
         let options = detail.options.clone();

@@ -1,7 +1,7 @@
 //! The trials of runs as reports need them: [`Trials`], and one of them ([`TrialRef`]).
 //!
 //! What many trials have in common is held once, and the texts of replies stay in the file of the run. So a trial with choices takes
-//! 80 bytes, and sixteen million of them less than 2 GB with all that a report makes of them.
+//! 60 bytes, and 16 more as long as its key is needed.
 
 mod asked_item;
 mod asked_model;
@@ -19,25 +19,29 @@ pub use text_place::TextPlace;
 pub use trial_ref::TrialRef;
 
 use std::collections::BTreeMap;
+use std::hash::BuildHasher;
 
-use asked_model::{AskedModel, Server};
+use asked_model::{AskedModel, Ending};
+use hashbrown::hash_table::Entry;
+use hashbrown::{DefaultHashBuilder, HashTable};
 use rayon::slice::ParallelSliceMut;
 use trial_facts::{TrialFacts, reply_digest};
 use values::Values;
 
 use crate::error::Error;
 
-use super::record::{Detail, FailureKind, Record};
-use super::{ChoiceDetail, Condition, Distinct, Family, FrameId, QuestionId};
+use super::record::{Detail, Record};
+use super::{ChoiceDetail, Condition, Distinct, Family, FrameId, QuestionId, TrialKey};
 
 /// Trials with what they refer to.
 #[derive(Debug, Clone)]
 pub struct Trials<D: Detail> {
     facts: Vec<TrialFacts<D::Facts>>,
+    /// The key of each trial; empty if the keys were dropped.
+    keys: Vec<TrialKey>,
     items: Values<AskedItem>,
     asked: Values<AskedModel>,
-    servers: Values<Server>,
-    failures: Values<(FailureKind, Option<u16>)>,
+    endings: Values<Ending>,
     tables: D::Tables,
     /// Number of files of runs that the places of texts refer to.
     logs: usize,
@@ -66,10 +70,10 @@ impl<D: Detail> Default for Trials<D> {
     fn default() -> Self {
         Self {
             facts: Vec::new(),
+            keys: Vec::new(),
             items: Values::default(),
             asked: Values::default(),
-            servers: Values::default(),
-            failures: Values::default(),
+            endings: Values::default(),
             tables: D::Tables::default(),
             logs: 1,
             texts: Texts::default(),
@@ -82,31 +86,30 @@ impl<D: Detail> Trials<D> {
     pub fn add(&mut self, record: Record<D>, text: TextPlace) {
         let facts = D::keep(&record, &mut self.tables);
         let reply = reply_digest(record.reply.as_deref(), record.refusal.as_deref());
-        let failure = record.failure.map(|failure| (failure.kind, failure.status));
-        let failure = failure.map(|failure| self.failures.number(failure) as u16);
         let item = self.item_of(&record.question, &record.detail.asked());
         let asked = self.asked.number(AskedModel {
             model: record.model,
             view: record.view,
             condition: record.condition,
         });
-        let server = self.servers.number(Server {
-            model: record.served_model,
+        let failure = record.failure.map(|failure| (failure.kind, failure.status));
+        let ending = self.endings.number(Ending {
+            served_model: record.served_model,
             provider: record.provider,
             via: record.via,
+            failure,
+            attempts: record.attempts,
         });
+        self.keys.push(record.key);
         self.logs = self.logs.max(text.log() + 1);
         self.facts.push(TrialFacts {
-            key: record.key,
             text,
             reply,
             item,
             asked,
-            server,
+            ending,
             tokens: record.usage.into(),
             latency: record.latency_ms.into(),
-            attempts: record.attempts.min(u32::from(u16::MAX)) as u16,
-            failure: failure.unwrap_or(u16::MAX),
             facts,
         });
     }
@@ -219,8 +222,20 @@ impl<D: Detail> Trials<D> {
     /// Keeps some of the trials.
     pub fn retain(&mut self, is_kept: impl FnMut(TrialRef<'_, D>) -> bool) {
         let kept: Vec<bool> = self.iter().map(is_kept).collect();
-        let mut kept = kept.into_iter();
-        self.facts.retain(|_| kept.next() == Some(true));
+        self.keep(&kept);
+    }
+
+    /// Keeps the trials that have `true` at their place.
+    fn keep(&mut self, kept: &[bool]) {
+        let mut of_facts = kept.iter();
+        self.facts.retain(|_| of_facts.next() == Some(&true));
+        let mut of_keys = kept.iter();
+        self.keys.retain(|_| of_keys.next() == Some(&true));
+    }
+
+    /// Drops the keys of all trials, which take a fifth of their memory. They are needed to join trials with others.
+    pub fn drop_keys(&mut self) {
+        self.keys = Vec::new();
     }
 
     /// Takes some of the trials out.
@@ -248,14 +263,11 @@ impl<D: Detail> Trials<D> {
             text: facts.text.after(logs),
             item: self.items.number(item),
             asked: self.asked.number(other.asked.get(facts.asked).clone()),
-            server: self.servers.number(other.servers.get(facts.server).clone()),
-            failure: match trial.failure() {
-                None => u16::MAX,
-                Some(failure) => self.failures.number(failure) as u16,
-            },
+            ending: self.endings.number(other.endings.get(facts.ending).clone()),
             facts: D::move_facts(&facts.facts, &other.tables, &mut self.tables),
             ..facts.clone()
         };
+        self.keys.extend(trial.key_if_there());
         self.facts.push(new);
         self.logs = self.logs.max(other.logs + logs);
     }
@@ -282,7 +294,7 @@ impl<D: Detail> Trials<D> {
         item
     }
 
-    /// Keeps one trial of each key. `choose` is asked about each two in the order of the places of their texts.
+    /// Keeps one trial of each key. `choose` is asked about each two in the order in which they were added.
     ///
     /// # Errors
     /// What `choose` returns.
@@ -290,24 +302,30 @@ impl<D: Detail> Trials<D> {
         &mut self,
         mut choose: impl FnMut(TrialRef<'_, D>, TrialRef<'_, D>) -> Result<KeptTrial, Error>,
     ) -> Result<(), Error> {
-        self.facts
-            .par_sort_unstable_by_key(|facts| (facts.key, facts.text));
-        let mut is_kept = vec![true; self.facts.len()];
-        let mut first = 0;
-        for later in 1..self.facts.len() {
-            if self.facts[first].key == self.facts[later].key {
-                match choose(self.at(first), self.at(later))? {
-                    KeptTrial::First => {
-                        is_kept[later] = false;
-                        continue;
+        let hashes = DefaultHashBuilder::default();
+        let mut kept_of_key = HashTable::<u32>::with_capacity(self.keys.len());
+        let mut kept = vec![true; self.facts.len()];
+        for (later, key) in self.keys.iter().enumerate() {
+            let is_same = |place: &u32| self.keys[*place as usize] == *key;
+            let rehash = |place: &u32| hashes.hash_one(self.keys[*place as usize]);
+            match kept_of_key.entry(hashes.hash_one(key), is_same, rehash) {
+                Entry::Vacant(first) => {
+                    first.insert(later as u32);
+                }
+                Entry::Occupied(mut known) => {
+                    let first = *known.get() as usize;
+                    match choose(self.at(first), self.at(later))? {
+                        KeptTrial::First => kept[later] = false,
+                        KeptTrial::Later => {
+                            kept[first] = false;
+                            *known.get_mut() = later as u32;
+                        }
                     }
-                    KeptTrial::Later => is_kept[first] = false,
                 }
             }
-            first = later;
         }
-        let mut is_kept = is_kept.into_iter();
-        self.facts.retain(|_| is_kept.next() == Some(true));
+        drop(kept_of_key);
+        self.keep(&kept);
         Ok(())
     }
 
@@ -319,9 +337,9 @@ impl<D: Detail> Trials<D> {
         model: impl Fn(&str) -> (usize, usize),
     ) {
         let (items, asked) = (self.items.all(), self.asked.all());
-        let questions: Vec<(Option<usize>, u32)> = items
+        let questions: Vec<u32> = items
             .iter()
-            .map(|item| (question(&item.question), item.repeat))
+            .map(|item| question(&item.question).map_or(0, |place| place as u32 + 1))
             .collect();
         let places: Vec<_> = asked
             .iter()
@@ -332,10 +350,39 @@ impl<D: Detail> Trials<D> {
         distinct.dedup();
         let ranks: BTreeMap<_, u32> = distinct.into_iter().zip(0..).collect();
         let places: Vec<u32> = places.iter().map(|place| ranks[place]).collect();
-        self.facts.par_sort_unstable_by_key(|facts| {
-            let (question, repeat) = questions[facts.item as usize];
-            (question, places[facts.asked as usize], repeat, facts.key)
+        let rank = |facts: &TrialFacts<D::Facts>| {
+            let question = u64::from(questions[facts.item as usize]);
+            question << 32 | u64::from(places[facts.asked as usize])
+        };
+        let mut order: Vec<(u64, u32)> = self.facts.iter().map(rank).zip(0..).collect();
+        let rest = |place: u32| {
+            let facts = &self.facts[place as usize];
+            let repeat = self.items.get(facts.item).repeat;
+            (repeat, self.keys.get(place as usize))
+        };
+        order.par_sort_unstable_by(|(one_rank, one), (other_rank, other)| {
+            let ranks = one_rank.cmp(other_rank);
+            ranks.then_with(|| rest(*one).cmp(&rest(*other)))
         });
+        self.put_in(order.into_iter().map(|(_, place)| place).collect());
+    }
+
+    /// Puts the trial of each place in `order` there where its place stands.
+    fn put_in(&mut self, mut order: Vec<u32>) {
+        for start in 0..order.len() {
+            let mut to = start;
+            // The trials that take each other's places are a circle: each but the last is exchanged with the one that belongs there.
+            while order[to] as usize != start {
+                let from = order[to] as usize;
+                self.facts.swap(to, from);
+                if !self.keys.is_empty() {
+                    self.keys.swap(to, from);
+                }
+                order[to] = to as u32;
+                to = from;
+            }
+            order[to] = to as u32;
+        }
     }
 }
 
@@ -357,18 +404,16 @@ impl Trials<ChoiceDetail> {
         let new = TrialFacts {
             item: self.items.number(item),
             asked: self.asked.number(other.asked.get(facts.asked).clone()),
-            server: self.servers.number(Server {
-                model: None,
+            ending: self.endings.number(Ending {
+                served_model: None,
                 provider: None,
                 via: super::record::Via::Direct,
+                ..other.endings.get(facts.ending).clone()
             }),
-            failure: match trial.failure() {
-                None => u16::MAX,
-                Some(failure) => self.failures.number(failure) as u16,
-            },
             facts: facts.facts.held_against(reference),
             ..facts.clone()
         };
+        self.keys.extend(trial.key_if_there());
         self.facts.push(new);
     }
 }

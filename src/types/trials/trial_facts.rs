@@ -1,25 +1,20 @@
 //! What is held of one trial: [`TrialFacts`].
 
 use super::TextPlace;
-use crate::types::TrialKey;
 use crate::types::small_number::{SmallNumber, Tokens};
 
-/// What is held of one trial. Numbers are those of the tables of its [`Trials`](super::Trials).
+/// What is held of one trial beside its key. Numbers are those of the tables of its [`Trials`](super::Trials).
 #[derive(Debug, Clone)]
 pub(super) struct TrialFacts<F> {
-    pub(super) key: TrialKey,
     pub(super) text: TextPlace,
     /// What tells replies apart; see [`reply_digest`].
     pub(super) reply: [u32; 2],
     pub(super) item: u32,
     pub(super) asked: u32,
-    pub(super) server: u32,
+    pub(super) ending: u32,
     pub(super) tokens: Tokens,
     /// In milliseconds.
     pub(super) latency: SmallNumber,
-    pub(super) attempts: u16,
-    /// The number of the failure; the largest number if a reply came.
-    pub(super) failure: u16,
     pub(super) facts: F,
 }
 
@@ -45,8 +40,8 @@ mod tests {
     use crate::types::trials::ChoiceFacts;
 
     #[test]
-    fn a_trial_with_choices_takes_80_bytes() {
-        assert_eq!(size_of::<TrialFacts<ChoiceFacts>>(), 80);
+    fn a_trial_with_choices_takes_60_bytes() {
+        assert_eq!(size_of::<TrialFacts<ChoiceFacts>>(), 60);
     }
 
     #[test]

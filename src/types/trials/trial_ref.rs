@@ -1,5 +1,6 @@
 //! One trial of several: [`TrialRef`].
 
+use super::asked_model::Ending;
 use super::trial_facts::TrialFacts;
 use super::{AskedItem, SentImages, TextPlace, Trials};
 use crate::types::record::{Detail, FailureKind, Via, View};
@@ -40,10 +41,22 @@ impl<'t, D: Detail> TrialRef<'t, D> {
         &self.trials.facts[self.place]
     }
 
+    fn ending(self) -> &'t Ending {
+        self.trials.endings.get(self.facts().ending)
+    }
+
     /// The digest of everything that decides the reply.
+    ///
+    /// # Panics
+    /// If the keys of the trials were dropped.
     #[must_use]
     pub fn key(self) -> TrialKey {
-        self.facts().key
+        self.trials.keys[self.place]
+    }
+
+    /// The key; `None` if the keys of the trials were dropped.
+    pub(super) fn key_if_there(self) -> Option<TrialKey> {
+        self.trials.keys.get(self.place).copied()
     }
 
     /// Where the texts of the trial are.
@@ -107,14 +120,13 @@ impl<'t, D: Detail> TrialRef<'t, D> {
     /// Whether no reply came.
     #[must_use]
     pub fn failed(self) -> bool {
-        self.facts().failure != u16::MAX
+        self.failure().is_some()
     }
 
     /// The reason why no reply came, with the HTTP status if the server sent one; `None` if a reply came.
     #[must_use]
     pub fn failure(self) -> Option<(FailureKind, Option<u16>)> {
-        let number = self.facts().failure;
-        (number != u16::MAX).then(|| *self.trials.failures.get(u32::from(number)))
+        self.ending().failure
     }
 
     /// Whether a reply or a refusal came.
@@ -131,24 +143,19 @@ impl<'t, D: Detail> TrialRef<'t, D> {
     /// The way in which the model was asked.
     #[must_use]
     pub fn via(self) -> Via {
-        self.trials.servers.get(self.facts().server).via
+        self.ending().via
     }
 
     /// The model's name in the server's reply.
     #[must_use]
     pub fn served_model(self) -> Option<&'t str> {
-        self.trials
-            .servers
-            .get(self.facts().server)
-            .model
-            .as_deref()
+        self.ending().served_model.as_deref()
     }
 
     /// The provider that a router passed the request on to.
     #[must_use]
     pub fn provider(self) -> Option<&'t str> {
-        let server = self.trials.servers.get(self.facts().server);
-        server.provider.as_deref()
+        self.ending().provider.as_deref()
     }
 
     /// The tokens that the server charged; `None` if it did not say.
@@ -166,7 +173,7 @@ impl<'t, D: Detail> TrialRef<'t, D> {
     /// The number of requests that were sent.
     #[must_use]
     pub fn attempts(self) -> u32 {
-        u32::from(self.facts().attempts)
+        self.ending().attempts
     }
 
     /// The name of what was shown: the frame or the walk.

@@ -1,0 +1,92 @@
+//! What a file of flags may not have sent to an address of its own: [`check`].
+//!
+//! Such a file may come from a repository beside a paper. It may name an address, or what is sent to one; with both it could take any
+//! file or variable of the user to a stranger. So what is sent must then be the file's own, or belong to the address.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::LayeredValue;
+use crate::ask::{BaseUrl, own_variables};
+use crate::error::{Error, Result};
+
+/// The flags that say where requests go, or who may read them on their way.
+const ADDRESSES: [&str; 3] = ["base-url", "judge-base-url", "ca-file"];
+
+/// The flags that name a variable whose value is sent; of a header after `=`.
+const VARIABLES: [&str; 3] = ["api-key-env", "judge-api-key-env", "header-env"];
+
+/// The flags that name a file whose text is sent, after `@` in a body.
+const FILES: [&str; 5] = [
+    "api-key-file",
+    "judge-api-key-file",
+    "system-file",
+    "extra-body",
+    "prompts",
+];
+
+/// Refuses a file of flags that sets an address, and to be sent there a variable of another host or a file outside its own folder.
+/// `values` are those of the file that are in effect.
+///
+/// # Errors
+/// Names the key of the file, and the flag to type instead.
+pub(super) fn check(file: &Path, values: &BTreeMap<String, &LayeredValue>) -> Result<()> {
+    let address = ADDRESSES.iter().find(|flag| values.contains_key(**flag));
+    let Some(address) = address else {
+        return Ok(());
+    };
+    let refuse = |flag: &str, value: &LayeredValue, what: &str| {
+        let problem = format!(
+            "the file sets --{address}, too, and could have {what} sent to a stranger; name it on the command line with --{flag}, or take \
+             --{address} out of the file"
+        );
+        Err(Error::usage(&value.origin, problem))
+    };
+    for (flag, value) in VARIABLES.iter().filter_map(|flag| entry(values, flag)) {
+        for text in value.values.iter().filter_map(|value| value.to_str()) {
+            let name = text.split_once('=').map_or(text, |(_, name)| name).trim();
+            if name != "none" && !hosts(values).any(|own| own.contains(&name)) {
+                return refuse(flag, value, "a variable of yours");
+            }
+        }
+    }
+    for (flag, value) in FILES.iter().filter_map(|flag| entry(values, flag)) {
+        for named in value.values.iter().map(Path::new) {
+            let text = named.to_str().unwrap_or_default();
+            let named = match flag {
+                "extra-body" => text.strip_prefix('@').map(Path::new),
+                _ => Some(named),
+            };
+            if named.is_some_and(|named| !is_beside(file, named)) {
+                return refuse(flag, value, "a file of yours");
+            }
+        }
+    }
+    Ok(())
+}
+
+fn entry<'a>(
+    values: &BTreeMap<String, &'a LayeredValue>,
+    flag: &'static str,
+) -> Option<(&'static str, &'a LayeredValue)> {
+    Some((flag, *values.get(flag)?))
+}
+
+/// The variables of the own tools of each host that the file names.
+fn hosts(values: &BTreeMap<String, &LayeredValue>) -> impl Iterator<Item = Vec<&'static str>> {
+    let addresses = ["base-url", "judge-base-url"].into_iter();
+    let addresses = addresses.filter_map(|flag| values.get(flag));
+    let addresses = addresses.flat_map(|value| &value.values);
+    let urls = addresses.filter_map(|text| text.to_str()?.parse::<BaseUrl>().ok());
+    urls.map(|url| own_variables(url.host()))
+}
+
+/// Whether a file lies in the folder of the file of flags or below it, links followed. One that is not there is refused later.
+fn is_beside(file: &Path, named: &Path) -> bool {
+    let folder = file.canonicalize().ok();
+    let folder = folder.as_deref().and_then(Path::parent);
+    match (folder, named.canonicalize()) {
+        (Some(folder), Ok(named)) => named.starts_with(folder),
+        (_, found) => found.is_err(),
+    }
+}

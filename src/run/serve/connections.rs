@@ -1,0 +1,60 @@
+//! The connections of the server, with bounds on their number and on how long a client may take: [`answer_until`].
+
+use std::future::Future;
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::Router;
+use hyper::server::conn::http1;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::server::graceful::GracefulShutdown;
+use hyper_util::service::TowerToHyperService;
+use tokio::net::TcpListener;
+use tokio::sync::Semaphore;
+
+/// The connections that are open at once; further ones wait. Chosen.
+const CONNECTIONS: usize = 64;
+/// How long a client may take for the headers of a request, and how long a connection may stay open without one. Chosen.
+const HEADER_TIME: Duration = Duration::from_secs(10);
+/// How long requests may still take after the end. Chosen.
+const LAST_TIME: Duration = Duration::from_secs(10);
+/// The pause after a connection could not be taken, as when no file is left. Chosen.
+const PAUSE: Duration = Duration::from_millis(100);
+
+/// Answers requests until `end`, and then those that have begun.
+pub(super) async fn answer_until(
+    listener: TcpListener,
+    app: Router,
+    end: impl Future<Output = ()>,
+) {
+    let free = Arc::new(Semaphore::new(CONNECTIONS));
+    let open = GracefulShutdown::new();
+    let mut end = std::pin::pin!(end);
+    loop {
+        let taken = async {
+            let place = Arc::clone(&free).acquire_owned().await;
+            (place, listener.accept().await)
+        };
+        let (place, stream) = tokio::select! {
+            () = &mut end => break,
+            (place, accepted) = taken => match accepted {
+                Ok((stream, _)) => (place, stream),
+                Err(_) => {
+                    tokio::time::sleep(PAUSE).await;
+                    continue;
+                }
+            },
+        };
+        let connection = http1::Builder::new()
+            .timer(TokioTimer::new())
+            .header_read_timeout(HEADER_TIME)
+            .serve_connection(TokioIo::new(stream), TowerToHyperService::new(app.clone()));
+        let connection = open.watch(connection);
+        tokio::spawn(async move {
+            // A client that breaks off or sends no HTTP has itself alone to tell.
+            let _ = connection.await;
+            drop(place);
+        });
+    }
+    let _ = tokio::time::timeout(LAST_TIME, open.shutdown()).await;
+}

@@ -1,0 +1,74 @@
+//! Whether the files of a run folder are its own, so that what is written goes nowhere else: [`check_own`].
+//!
+//! A run folder may come from a stranger. A link in it would have this program write into a file or a folder outside of it.
+
+use std::fs::{self, DirEntry, Metadata};
+use std::path::Path;
+
+use super::BATCH;
+use super::folder::{FIDELITY, RECORDS, THUMBNAILS};
+use crate::error::{Error, Result};
+
+/// The subfolders of a run that lines are appended in.
+const INNER: [&str; 1] = [BATCH];
+/// The files that are appended to. All others are replaced by new files, which leaves what they link to as it is.
+const APPENDED: [&str; 3] = [RECORDS, THUMBNAILS, FIDELITY];
+
+/// Refuses a run folder in which a folder or a file that is appended to is a link. The folder itself may be reached by one.
+///
+/// # Errors
+/// Names the link.
+pub(super) fn check_own(folder: &Path) -> Result<()> {
+    check_entries(folder)?;
+    for inner in INNER {
+        let inner = folder.join(inner);
+        if inner.is_dir() {
+            check_entries(&inner)?;
+        }
+    }
+    Ok(())
+}
+
+fn check_entries(folder: &Path) -> Result<()> {
+    let unreadable = |e| Error::file(folder, "read", e);
+    for entry in fs::read_dir(folder).map_err(unreadable)? {
+        let entry = entry.map_err(unreadable)?;
+        if let Some(what) = foreign(&entry) {
+            return Err(Error::Run {
+                path: entry.path(),
+                problem: format!(
+                    "this is {what}, and what is written into the run would go there; put a file or folder of its own in its place, or use a \
+                     copy of the run"
+                ),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// What an entry is, if what is written to it would go elsewhere.
+fn foreign(entry: &DirEntry) -> Option<&'static str> {
+    let name = entry.file_name();
+    let name = name.to_str().unwrap_or_default();
+    // Without following links.
+    let own = entry.metadata().ok()?;
+    let is_list = name.ends_with(".jsonl");
+    if own.is_symlink() {
+        let leads_to_folder = entry.path().is_dir();
+        return (is_list || leads_to_folder).then_some("a link");
+    }
+    (APPENDED.contains(&name) && names(&own) > 1)
+        .then_some("a file with a second name (a hard link)")
+}
+
+/// The number of names of a file.
+#[cfg(unix)]
+fn names(file: &Metadata) -> u64 {
+    std::os::unix::fs::MetadataExt::nlink(file)
+}
+
+/// The number of names of a file; not known here.
+#[cfg(not(unix))]
+fn names(_: &Metadata) -> u64 {
+    1
+}

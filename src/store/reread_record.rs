@@ -1,0 +1,16 @@
+//! A record as the rules of this version read its reply: [`RereadRecord`].
+
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
+
+use crate::types::{Detail, Record};
+
+/// A record whose reply is read again as its line is parsed.
+pub(super) struct RereadRecord<D>(pub(super) Record<D>);
+
+impl<'de, D: Detail> Deserialize<'de> for RereadRecord<D> {
+    fn deserialize<S: Deserializer<'de>>(deserializer: S) -> std::result::Result<Self, S::Error> {
+        let record = Record::<D>::deserialize(deserializer)?;
+        record.reread().map(Self).map_err(S::Error::custom)
+    }
+}

@@ -1,0 +1,109 @@
+//! A run folder of a stranger: links in it lead nothing that is written out of it, and no file is cut before it is known.
+
+#![cfg(unix)]
+
+use std::fs;
+use std::os::unix::fs::symlink;
+
+use crate::support::run::{Bench, words};
+use crate::support::table::check_rows;
+
+const COMMAND: &str = "--model random --data set.jsonl --levels L0,L3 --out run";
+/// A file of the user whose last line has no end.
+const PRIVATE: &str = "first line\nlast line of the user";
+
+/// A finished run with a file `private` and an empty folder `elsewhere` beside it.
+fn bench() -> Bench {
+    let bench = Bench::with_questions(6);
+    bench.complete(&words(COMMAND));
+    bench.file("private", PRIVATE);
+    fs::create_dir(bench.path("elsewhere")).unwrap();
+    bench
+}
+
+#[test]
+fn nothing_is_written_through_a_link() {
+    let rows = [
+        ("records.jsonl", "../private"),
+        ("thumbnails.jsonl", "../private"),
+        ("figures", "../elsewhere"),
+        ("batch", "../elsewhere"),
+    ];
+    check_rows(rows, |(name, target)| {
+        let bench = bench();
+        let place = bench.path("run").join(name);
+        let _ = fs::remove_file(&place);
+        let _ = fs::remove_dir_all(&place);
+        symlink(target, &place).unwrap();
+        for line in [COMMAND, "report run", "report run --rescore"] {
+            let called = bench.call(&words(line));
+            let is_named = called.stderr.contains(&format!("run/{name}"));
+            assert!(is_named, "{line}: {called:?}");
+            assert!(
+                called.code == Some(2) || line == "report run",
+                "{line}: {called:?}"
+            );
+        }
+        assert_eq!(fs::read_to_string(bench.path("private")).unwrap(), PRIVATE);
+        let inside = fs::read_dir(bench.path("elsewhere")).unwrap().count();
+        assert_eq!(inside, 0);
+    });
+}
+
+#[test]
+fn records_with_a_second_name_are_not_written_to() {
+    let bench = bench();
+    fs::hard_link(bench.path("run/records.jsonl"), bench.path("second")).unwrap();
+    let before = fs::read(bench.path("second")).unwrap();
+    let called = bench.call(&words(COMMAND));
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert!(called.stderr.contains("hard link"), "{called:?}");
+    assert_eq!(fs::read(bench.path("second")).unwrap(), before);
+}
+
+#[test]
+fn links_in_the_place_of_products_are_replaced() {
+    let bench = bench();
+    let page = fs::read(bench.path("run/report.html")).unwrap();
+    for name in ["report.html", ".report.html.part", ".summary.csv.part"] {
+        let place = bench.path("run").join(name);
+        let _ = fs::remove_file(&place);
+        symlink("../private", &place).unwrap();
+    }
+    fs::remove_file(bench.path("run/summary.csv")).unwrap();
+    bench.complete(&words("report run"));
+    assert_eq!(fs::read_to_string(bench.path("private")).unwrap(), PRIVATE);
+    assert_eq!(fs::read(bench.path("run/report.html")).unwrap(), page);
+    assert!(bench.path("run/summary.csv").is_file());
+}
+
+#[test]
+fn a_file_is_not_cut_before_it_is_known_to_hold_records() {
+    let bench = bench();
+    let path = bench.path("run/records.jsonl");
+    let records = fs::read_to_string(&path).unwrap();
+    let rows = [
+        (PRIVATE.to_owned(), false),
+        ("no line at all".to_owned(), false),
+        ("{\"key\":\"0123".to_owned(), true),
+        (format!("{records}{{\"key\":\"0123"), true),
+    ];
+    check_rows(rows, |(text, is_cut)| {
+        fs::write(&path, &text).unwrap();
+        let called = bench.call(&words(COMMAND));
+        let now = fs::read_to_string(&path).unwrap();
+        if is_cut {
+            assert_eq!(called.code, Some(0), "{text}: {called:?}");
+            assert_eq!(now.lines().count(), records.lines().count(), "{text}");
+        } else {
+            assert_eq!((called.code, &now), (Some(2), &text), "{called:?}");
+        }
+    });
+}
+
+#[test]
+fn a_run_may_be_reached_by_a_link() {
+    let bench = bench();
+    symlink("run", bench.path("alias")).unwrap();
+    bench.complete(&words("report alias"));
+}
