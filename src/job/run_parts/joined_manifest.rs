@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::coverage::Coverage;
-use super::no_part;
-use super::part::StoredPart;
+use super::part::{StoredPart, no_part};
 use crate::error::{Error, Result};
 use crate::job::part_cost::PartCost;
 use crate::types::InputSummary;

@@ -65,3 +65,8 @@ impl StoredPart {
         })
     }
 }
+
+/// The error about a command that names no part.
+pub(super) fn no_part() -> Error {
+    Error::usage("RUN", "no shard is named")
+}

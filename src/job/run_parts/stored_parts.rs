@@ -3,7 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::{MissingParts, RunParts, one_kind, runs_in};
+use super::joined::RunParts;
+use super::missing::MissingParts;
+use super::part_folders::{one_kind, runs_in};
 use crate::error::Result;
 use crate::job::run_texts::RunTexts;
 use crate::job::stored::{AnyRun, ExperimentKind, RunLayout, StoredRun, manifest, open_questions};
