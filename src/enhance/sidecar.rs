@@ -161,11 +161,9 @@ impl ModelSidecar {
     /// Checks that no number makes an image too large or a value unusable.
     fn check_bounds(&self) -> Result<(), String> {
         let means = self.mean.into_iter().flatten();
-        let deviations = self.std.into_iter().flatten();
+        let mut deviations = self.std.into_iter().flatten();
         let is_scale = |number: f32| (1.0 / MOST_SCALE..=MOST_SCALE).contains(&number);
-        if !means.map(f32::abs).all(|mean| mean <= MOST_SCALE)
-            || !deviations.map(is_scale).all(|is_so| is_so)
-        {
+        if !means.map(f32::abs).all(|mean| mean <= MOST_SCALE) || !deviations.all(is_scale) {
             return Err(format!(
                 "mean is three numbers of at most {MOST_SCALE}, and std three from {} to {MOST_SCALE}",
                 1.0 / MOST_SCALE

@@ -2,6 +2,7 @@
 //!
 //! A run folder may come from a stranger. A link in it would have this program write into a file or a folder outside of it.
 
+use std::ffi::OsStr;
 use std::fs::{self, DirEntry, Metadata};
 use std::path::Path;
 
@@ -49,16 +50,14 @@ fn check_entries(folder: &Path) -> Result<()> {
 /// What an entry is, if what is written to it would go elsewhere.
 fn foreign(entry: &DirEntry) -> Option<&'static str> {
     let name = entry.file_name();
-    let name = name.to_str().unwrap_or_default();
     // Without following links.
     let own = entry.metadata().ok()?;
-    let is_list = name.ends_with(".jsonl");
     if own.is_symlink() {
-        let leads_to_folder = entry.path().is_dir();
-        return (is_list || leads_to_folder).then_some("a link");
+        let is_list = Path::new(&name).extension() == Some(OsStr::new("jsonl"));
+        return (is_list || entry.path().is_dir()).then_some("a link");
     }
-    (APPENDED.contains(&name) && names(&own) > 1)
-        .then_some("a file with a second name (a hard link)")
+    let is_appended = APPENDED.iter().any(|appended| name == *appended);
+    (is_appended && names(&own) > 1).then_some("a file with a second name (a hard link)")
 }
 
 /// The number of names of a file.

@@ -50,17 +50,13 @@ pub(crate) fn shown_in_colours(text: &str) -> Cow<'_, str> {
     let mut rest = text;
     while let Some(c) = rest.chars().next() {
         let style = STYLES.iter().find(|style| rest.starts_with(**style));
-        let length = match style {
-            Some(style) => {
-                shown.push_str(style);
-                style.len()
-            }
-            None => {
-                push(&mut shown, c);
-                c.len_utf8()
-            }
-        };
-        rest = &rest[length..];
+        if let Some(style) = style {
+            shown.push_str(style);
+            rest = &rest[style.len()..];
+        } else {
+            push(&mut shown, c);
+            rest = &rest[c.len_utf8()..];
+        }
     }
     Cow::Owned(shown)
 }

@@ -1,6 +1,7 @@
 //! Commands on files in parts: all parts together write what one call writes, and no two write the same file.
 
 use std::collections::BTreeMap;
+use std::ffi::OsStr;
 use std::fs;
 use std::path::Path;
 
@@ -14,7 +15,7 @@ fn with_frames() -> Bench {
 }
 
 /// The files below a folder, by their paths in it; none if there is no folder.
-fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+fn files(folder: &Path) -> Files {
     let mut found = BTreeMap::new();
     let mut folders = vec![folder.to_owned()];
     while let Some(inner) = folders.pop() {
@@ -31,12 +32,12 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     found
 }
 
+/// The content of files by name.
+type Files = BTreeMap<String, Vec<u8>>;
+
 /// Calls a command whole into `whole`, and each of three parts into a folder of its own; returns the files of the whole, and those of
 /// each part.
-fn in_parts(
-    bench: &Bench,
-    command: &str,
-) -> (BTreeMap<String, Vec<u8>>, Vec<BTreeMap<String, Vec<u8>>>) {
+fn in_parts(bench: &Bench, command: &str) -> (Files, Vec<Files>) {
     bench.complete(&words(&format!("{command} --out whole")));
     let parts = [1, 2, 3].map(|part| {
         bench.complete(&words(&format!(
@@ -49,7 +50,7 @@ fn in_parts(
 
 /// Checks that the files of parts are disjoint, about as many in each, and together those of the whole.
 #[track_caller]
-fn assert_together(whole: &BTreeMap<String, Vec<u8>>, parts: &[BTreeMap<String, Vec<u8>>]) {
+fn assert_together(whole: &Files, parts: &[Files]) {
     let mut all = BTreeMap::new();
     for part in parts {
         assert!(
@@ -100,15 +101,15 @@ fn sets_are_exported_in_parts() {
     let bench = with_frames();
     for kind in ["imagefolder", "llava", "vlmevalkit"] {
         let (whole, parts) = in_parts(&bench, &format!("export {kind} frames --levels L0,L3"));
-        let is_image = |name: &str| name.ends_with(".png");
-        let images = |files: &BTreeMap<String, Vec<u8>>| {
+        let is_image = |name: &str| Path::new(name).extension() == Some(OsStr::new("png"));
+        let images = |files: &Files| {
             let files = files.iter().filter(|(name, _)| is_image(name));
             files
                 .map(|(name, image)| (name.clone(), image.clone()))
                 .collect()
         };
         if kind != "vlmevalkit" {
-            let parts: Vec<BTreeMap<String, Vec<u8>>> = parts.iter().map(images).collect();
+            let parts: Vec<Files> = parts.iter().map(images).collect();
             assert_together(&images(&whole), &parts);
         }
         let mut joined = 0;

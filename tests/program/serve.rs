@@ -36,7 +36,7 @@ impl Server {
         runtime.block_on(async {
             let client = reqwest::Client::builder()
                 .no_proxy()
-                .timeout(std::time::Duration::from_secs(60))
+                .timeout(std::time::Duration::from_mins(1))
                 .build()
                 .unwrap();
             let request = client.post(format!("{}/chat/completions", self.url));

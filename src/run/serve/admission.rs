@@ -11,7 +11,7 @@ use super::completion::RequestFault;
 /// The maximum size of a request in bytes (chosen).
 const LARGEST: usize = 64 << 20;
 /// How long a client may take for the body of a request. Chosen.
-const BODY_TIME: Duration = Duration::from_secs(60);
+const BODY_TIME: Duration = Duration::from_mins(1);
 /// The names of this machine for itself.
 const LOOPBACK: [&str; 3] = ["127.0.0.1", "localhost", "[::1]"];
 

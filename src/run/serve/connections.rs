@@ -35,15 +35,13 @@ pub(super) async fn answer_until(
             let place = Arc::clone(&free).acquire_owned().await;
             (place, listener.accept().await)
         };
-        let (place, stream) = tokio::select! {
+        let (place, accepted) = tokio::select! {
             () = &mut end => break,
-            (place, accepted) = taken => match accepted {
-                Ok((stream, _)) => (place, stream),
-                Err(_) => {
-                    tokio::time::sleep(PAUSE).await;
-                    continue;
-                }
-            },
+            taken = taken => taken,
+        };
+        let Ok((stream, _)) = accepted else {
+            tokio::time::sleep(PAUSE).await;
+            continue;
         };
         let connection = http1::Builder::new()
             .timer(TokioTimer::new())
