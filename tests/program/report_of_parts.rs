@@ -89,6 +89,19 @@ fn parts_report_what_the_merged_run_does() {
     let shown =
         ["a", "whole/a"].map(|run| bench.complete(&["show", run, &question, "--out", "shown"]));
     assert_eq!(shown[0], shown[1]);
+    // A folder of figures that is a link is not written through.
+    #[cfg(unix)]
+    {
+        fs::remove_dir_all(bench.path("a/figures")).unwrap();
+        fs::create_dir(bench.path("elsewhere")).unwrap();
+        std::os::unix::fs::symlink(bench.path("elsewhere"), bench.path("a/figures")).unwrap();
+        let said = bench.call(&words("report a"));
+        assert!(
+            said.stderr.contains("the report is not written"),
+            "{said:?}"
+        );
+        assert_eq!(fs::read_dir(bench.path("elsewhere")).unwrap().count(), 0);
+    }
     let refused = bench.call(&words("report a --rescore"));
     assert_eq!(refused.code, Some(2), "{refused:?}");
     assert!(

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::files;
 use crate::job::stored::RunLayout;
 use crate::store::{AddressChange, Store};
@@ -38,13 +38,28 @@ impl<D: Detail> ReportFolder<'_, D> {
         for (name, content) in contents {
             match self {
                 Self::Run(store) => store.write(name, content)?,
-                Self::Parts(folder) => files::write(&folder.join(name), content)?,
+                Self::Parts(folder) => {
+                    let path = folder.join(name);
+                    refuse_link(folder, &path)?;
+                    files::write(&path, content)?;
+                }
             }
         }
         match self {
             Self::Run(store) => store.write_manifest(manifest),
             Self::Parts(_) => Ok(()),
         }
+    }
+}
+
+/// Refuses to write into a subfolder that is a link: a folder of parts may come from a stranger, and the link may lead anywhere.
+fn refuse_link(folder: &Path, path: &Path) -> Result<()> {
+    match path.parent() {
+        Some(inner) if inner != folder && inner.is_symlink() => Err(Error::data(
+            inner.display(),
+            "a link; the report would be written to where it leads. Delete the link, or name --out",
+        )),
+        _ => Ok(()),
     }
 }
 
