@@ -4,6 +4,7 @@
 //! them are parsed together, once. So a value is read in the same way wherever it comes from. ripgrep does so with its configuration
 //! file (`crates/core/flags/parse.rs`).
 
+mod layered_value;
 mod messages;
 mod models_file;
 mod sent_secrets;
@@ -18,6 +19,7 @@ use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command};
 use toml::{Table, Value};
 
+use self::layered_value::LayeredValue;
 use self::messages::{invalid_toml, suggestion};
 use self::value_text::text_of;
 use crate::error::{Error, Result};
@@ -50,13 +52,6 @@ pub(super) struct Parsed {
     pub(super) matches: ArgMatches,
     /// Flags by long name, without those of variables and files.
     pub(super) typed: BTreeSet<String>,
-}
-
-/// Value of one flag from the environment or a file.
-struct LayeredValue {
-    /// Source of the value for messages: a variable, or a file and a key in it.
-    origin: String,
-    values: Vec<OsString>,
 }
 
 /// The matches of the typed words, with values from the file of models, the environment and the `--config` file for flags that were

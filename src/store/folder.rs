@@ -23,6 +23,8 @@ pub(super) const THUMBNAILS: &str = "thumbnails.jsonl";
 /// The similarity of images to their clean frames.
 pub(super) const FIDELITY: &str = "fidelity.jsonl";
 
+/// The subfolder of a run for Batch API files.
+pub(crate) const BATCH: &str = "batch";
 /// The subfolder of a run for its plan, which is written before the run.
 pub(crate) const PLAN: &str = "plan";
 

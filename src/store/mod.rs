@@ -51,12 +51,11 @@ pub(crate) use record_log::{QuestionFile, RecordLog, each_record, each_reread_re
 pub(crate) use stored_trial::StoredTrial;
 
 pub(crate) use folder::{
-    AddressChange, PLAN, each_placed_question, each_question, find, is_locked, read_fidelity,
-    read_manifest, read_questions, read_records, read_thumbnails, read_trials, schema,
+    AddressChange, BATCH, PLAN, each_placed_question, each_question, find, is_locked,
+    read_fidelity, read_manifest, read_questions, read_records, read_thumbnails, read_trials,
+    schema,
 };
 
-/// The subfolder of a run for Batch API files.
-pub(crate) const BATCH: &str = "batch";
 /// The trials that were sent in batches.
 const TRIALS: &str = "trials.jsonl";
 

@@ -6,8 +6,7 @@ use std::ffi::OsStr;
 use std::fs::{self, DirEntry, Metadata};
 use std::path::Path;
 
-use super::BATCH;
-use super::folder::{FIDELITY, RECORDS, THUMBNAILS};
+use super::folder::{BATCH, FIDELITY, RECORDS, THUMBNAILS};
 use crate::error::{Error, Result};
 
 /// The subfolders of a run that lines are appended in.

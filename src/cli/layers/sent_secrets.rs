@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::LayeredValue;
+use super::layered_value::LayeredValue;
 use crate::ask::{BaseUrl, own_variables};
 use crate::error::{Error, Result};
 
