@@ -1,9 +1,9 @@
 //! Models of one size, stated by their graph or frozen by tracing: filled, cut, resized or refused.
 
-use darkqa_eval::enhance::{Enhancer, Fitting, SizeLog};
+use darkqa_eval::enhance::{Fitting, SizeLog};
 use darkqa_eval::types::Rgb;
 
-use super::{image, loaded, stated};
+use super::{image, loaded, open, stated};
 use crate::support::onnx;
 use crate::support::table::check_rows;
 
@@ -128,11 +128,17 @@ fn a_batch_gets_the_image_several_times() {
 
 #[test]
 fn wrong_sizes_of_a_sidecar_do_not_take_all_memory() {
-    let rows = ["fixed = [65536, 65536]", "multiple = 65536"];
-    check_rows(rows, |sidecar| {
-        let (_folder, mut enhancer): (_, Enhancer) = stated(&onnx::identity(), sidecar);
-        let message = enhancer.enhance(&image(40, 50)).unwrap_err().to_string();
-        assert!(message.contains("GB"), "{message}");
-        assert!(message.contains("65536 × 65536"), "{message}");
+    let rows = [
+        ("fixed = [65536, 65536]", "at most 100000000"),
+        ("multiple = 65536", "at most 1024"),
+        ("multiple = 20000", "at most 1024"),
+    ];
+    check_rows(rows, |(sidecar, bound)| {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("model.onnx.toml"), sidecar).unwrap();
+        let model = onnx::identity().write(folder.path(), "model.onnx");
+        let message = open(&model).err().unwrap().to_string();
+        assert!(message.contains(bound), "{message}");
+        assert!(message.contains("model.onnx.toml"), "{message}");
     });
 }
