@@ -17,7 +17,7 @@ type Image16 = ImageBuffer<Rgb<u16>, Vec<u16>>;
 /// Every 16-bit code once, and two more.
 fn all_codes() -> Image16 {
     let codes = (0..=u16::MAX).chain([7, 9]);
-    Image16::from_raw(1, 65_538 / 3, codes.collect()).unwrap()
+    Image16::from_raw(66, 65_538 / 3 / 66, codes.collect()).unwrap()
 }
 
 fn png(image: &Image16) -> Vec<u8> {
