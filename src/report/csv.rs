@@ -1,7 +1,6 @@
 //! Tables as CSV: [`files`], and [`safe`] texts in them. Numbers are written with all their digits.
 
 use std::borrow::{Borrow, Cow};
-use std::fmt::Write as _;
 use std::io::Write;
 
 use serde::{Serialize, Serializer};
@@ -9,7 +8,7 @@ use serde::{Serialize, Serializer};
 use super::table::{Table, TableCell};
 use super::tables::SUMMARY;
 use crate::error::{Error, Result};
-use crate::types::shown_text::is_hidden;
+use crate::types::shown_text::{is_hidden, written_out};
 
 /// One field of a row. A number has as many digits as are needed to read it back without loss.
 #[derive(Debug, Clone, Copy, Serialize)]
@@ -71,27 +70,16 @@ pub(super) fn fields(cell: &TableCell, names: usize) -> impl Iterator<Item = Csv
 ///
 /// A spreadsheet takes what begins with `=`, `+`, `-`, `@`, a tab or a carriage return for a formula, also after spaces, and also where the
 /// cell is quoted (OWASP, “CSV Injection”). Such a text gets an apostrophe in front, and so does one that begins with apostrophes and such a
-/// letter, so that taking one apostrophe away gives the text back. A number is no formula and stays. Control characters are written as
-/// `⟨U+001B⟩`; line breaks stay.
+/// letter, so that taking one apostrophe away gives the text back. A number is no formula and stays. Tabs and hidden characters are
+/// written as `⟨U+001B⟩`; line breaks stay.
 pub(super) fn safe(text: &str) -> Cow<'_, str> {
-    let is_formula = begins_formula(text);
     // A tab within a cell moves some readers to the next.
-    let hidden = |c: char| c == '\t' || is_hidden(c);
-    if !is_formula && !text.contains(hidden) {
-        return Cow::Borrowed(text);
+    let shown = written_out(text, |c| c == '\t' || is_hidden(c));
+    if begins_formula(text) {
+        Cow::Owned(format!("'{shown}"))
+    } else {
+        shown
     }
-    let mut safe = String::with_capacity(text.len() + 1);
-    if is_formula {
-        safe.push('\'');
-    }
-    for c in text.chars() {
-        if hidden(c) {
-            let _ = write!(safe, "⟨U+{:04X}⟩", u32::from(c));
-        } else {
-            safe.push(c);
-        }
-    }
-    Cow::Owned(safe)
 }
 
 /// Whether a spreadsheet may run a text as a formula, with or without apostrophes before it.

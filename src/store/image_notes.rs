@@ -17,9 +17,7 @@ pub(crate) fn more_thumbnails(
     is_wanted: impl Fn(&FrameId) -> bool,
 ) -> Result<Vec<Thumbnail>> {
     let place = |thumbnail: &Thumbnail| (thumbnail.frame.clone(), thumbnail.condition.clone());
-    let more = more(present, folders, read_thumbnails, place)?;
-    let wanted = more.into_iter();
-    Ok(wanted.filter(|one| is_wanted(&one.frame)).collect())
+    more(present, folders, read_thumbnails, (place, is_wanted))
 }
 
 /// The similarities of images in these folders that are not `present`, each once, of the frames that are wanted.
@@ -32,22 +30,27 @@ pub(crate) fn more_fidelity(
     is_wanted: impl Fn(&FrameId) -> bool,
 ) -> Result<Vec<ImageFidelity>> {
     let place = |image: &ImageFidelity| (image.frame.clone(), image.condition.clone());
-    let more = more(present, folders, read_fidelity, place)?;
-    let wanted = more.into_iter();
-    Ok(wanted.filter(|one| is_wanted(&one.frame)).collect())
+    more(present, folders, read_fidelity, (place, is_wanted))
 }
 
+/// What these folders hold and `present` does not, each place once, of the frames that are wanted.
 fn more<T>(
     present: &[T],
     folders: &[&Path],
     read: impl Fn(&Path) -> Result<Vec<T>>,
-    place: impl Fn(&T) -> (FrameId, Condition),
+    (place, is_wanted): (
+        impl Fn(&T) -> (FrameId, Condition),
+        impl Fn(&FrameId) -> bool,
+    ),
 ) -> Result<Vec<T>> {
     let mut known: HashSet<_> = present.iter().map(&place).collect();
     let mut more = Vec::new();
     for folder in folders {
         let read = read(folder)?.into_iter();
-        more.extend(read.filter(|one| known.insert(place(one))));
+        more.extend(read.filter(|one| {
+            let place = place(one);
+            is_wanted(&place.0) && known.insert(place)
+        }));
     }
     Ok(more)
 }

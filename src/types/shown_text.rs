@@ -29,13 +29,23 @@ pub(crate) fn is_hidden(c: char) -> bool {
 /// A text with each hidden character as `⟨U+202E⟩`.
 #[must_use]
 pub(crate) fn shown(text: &str) -> Cow<'_, str> {
-    let Some(first) = text.find(is_hidden) else {
+    written_out(text, is_hidden)
+}
+
+/// A text with each character that is to be written out as `⟨U+0009⟩`.
+#[must_use]
+pub(crate) fn written_out(text: &str, is_written_out: impl Fn(char) -> bool) -> Cow<'_, str> {
+    let Some(first) = text.find(&is_written_out) else {
         return Cow::Borrowed(text);
     };
     let mut shown = String::with_capacity(text.len() + 8);
     shown.push_str(&text[..first]);
     for c in text[first..].chars() {
-        push(&mut shown, c);
+        if is_written_out(c) {
+            push_code(&mut shown, c);
+        } else {
+            shown.push(c);
+        }
     }
     Cow::Owned(shown)
 }
@@ -53,20 +63,21 @@ pub(crate) fn shown_in_colours(text: &str) -> Cow<'_, str> {
         if let Some(style) = style {
             shown.push_str(style);
             rest = &rest[style.len()..];
-        } else {
-            push(&mut shown, c);
-            rest = &rest[c.len_utf8()..];
+            continue;
         }
+        if is_hidden(c) {
+            push_code(&mut shown, c);
+        } else {
+            shown.push(c);
+        }
+        rest = &rest[c.len_utf8()..];
     }
     Cow::Owned(shown)
 }
 
-fn push(shown: &mut String, c: char) {
-    if is_hidden(c) {
-        let _ = write!(shown, "⟨U+{:04X}⟩", u32::from(c));
-    } else {
-        shown.push(c);
-    }
+/// Adds the code of a character, as `⟨U+202E⟩`.
+fn push_code(shown: &mut String, c: char) {
+    let _ = write!(shown, "⟨U+{:04X}⟩", u32::from(c));
 }
 
 #[cfg(test)]

@@ -34,6 +34,7 @@ impl StoredPart {
             manifest,
         })
     }
+
     /// Whether each source of the part is in one of the others with as many trials, and with the same models, enhancers and other columns.
     pub(super) fn is_covered_by(&self, others: &[&Self]) -> bool {
         let Some(own) = &self.manifest.part else {
