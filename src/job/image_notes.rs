@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::score::realism::{psnr, ssim::ssim};
 use crate::store::Store;
 use crate::types::outlines::PixelBox;
-use crate::types::{Condition, Detail, FrameId, ImageFidelity, Rgb, Thumbnail};
+use crate::types::{Condition, Detail, FrameId, ImageFidelity, Rgb, Shared, Thumbnail};
 
 /// The notes about one image; `None` for what is not wanted or exists already.
 #[derive(Debug, Default)]
@@ -35,7 +35,7 @@ impl ImageNotes {
 #[derive(Debug, Default)]
 pub(crate) struct MissingNotes {
     thumbnails: MissingThumbnails,
-    measured: BTreeSet<(FrameId, Condition)>,
+    measured: BTreeSet<(Shared<FrameId>, Shared<Condition>)>,
 }
 
 /// Which notes about an image are wanted.
@@ -65,7 +65,7 @@ impl MissingNotes {
     /// The notes that are wanted about a frame in a condition. The clean frame is not compared with itself.
     pub(crate) fn of(&self, frame: &FrameId, condition: &Condition) -> WantedNotes {
         let is_measured = || {
-            let image = (frame.clone(), condition.clone());
+            let image = (Shared::from(frame.clone()), Shared::from(condition.clone()));
             self.measured.contains(&image)
         };
         // An untouched frame may be dark itself, so that it is no reference for its enhanced image; a photograph in the dark need not
@@ -99,8 +99,8 @@ pub(crate) fn fidelity(
     similarity: Similarity,
 ) -> ImageFidelity {
     ImageFidelity {
-        frame: frame.clone(),
-        condition: condition.clone(),
+        frame: Shared::from(frame.clone()),
+        condition: Shared::from(condition.clone()),
         image: sent.facts().digest,
         psnr: similarity.psnr,
         ssim: similarity.ssim,

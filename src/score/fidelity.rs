@@ -75,7 +75,7 @@ impl FidelityFindings {
             .iter()
             .map(|image| {
                 (
-                    (&image.frame, image.image),
+                    (&*image.frame, image.image),
                     [Some(image.psnr.unwrap_or(f64::INFINITY)), image.ssim],
                 )
             })

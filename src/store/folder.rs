@@ -122,9 +122,17 @@ pub(crate) fn read_thumbnails(folder: &Path) -> Result<Vec<Thumbnail>> {
     lines(&folder.join(THUMBNAILS))
 }
 
-/// The similarity of the images of a run to their clean frames; none if the run has no such file.
+/// The similarity of the images of a run to their clean frames, equal frames and conditions kept once; none if the run has no
+/// such file.
 pub(crate) fn read_fidelity(folder: &Path) -> Result<Vec<ImageFidelity>> {
-    lines(&folder.join(FIDELITY))
+    let (mut frames, mut conditions) = (Distinct::default(), Distinct::default());
+    let mut all: Vec<ImageFidelity> = Vec::new();
+    each_line(&folder.join(FIDELITY), |mut image: ImageFidelity| {
+        frames.share(&mut image.frame);
+        conditions.share(&mut image.condition);
+        all.push(image);
+    })?;
+    Ok(all)
 }
 
 /// The newest run folder in `base` whose name ends in `-<hash>`.

@@ -1,11 +1,12 @@
 //! What several run folders say about images, each once: [`more_thumbnails`], [`more_fidelity`].
 
 use std::collections::HashSet;
+use std::hash::Hash;
 use std::path::Path;
 
 use super::folder::{read_fidelity, read_thumbnails};
 use crate::error::Result;
-use crate::types::{Condition, FrameId, ImageFidelity, Thumbnail};
+use crate::types::{FrameId, ImageFidelity, Thumbnail};
 
 /// The small copies of images in these folders that are not `present`, each once, of the frames that are wanted.
 ///
@@ -17,6 +18,7 @@ pub(crate) fn more_thumbnails(
     is_wanted: impl Fn(&FrameId) -> bool,
 ) -> Result<Vec<Thumbnail>> {
     let place = |thumbnail: &Thumbnail| (thumbnail.frame.clone(), thumbnail.condition.clone());
+    let is_wanted = |thumbnail: &Thumbnail| is_wanted(&thumbnail.frame);
     more(present, folders, read_thumbnails, (place, is_wanted))
 }
 
@@ -30,27 +32,22 @@ pub(crate) fn more_fidelity(
     is_wanted: impl Fn(&FrameId) -> bool,
 ) -> Result<Vec<ImageFidelity>> {
     let place = |image: &ImageFidelity| (image.frame.clone(), image.condition.clone());
+    let is_wanted = |image: &ImageFidelity| is_wanted(&image.frame);
     more(present, folders, read_fidelity, (place, is_wanted))
 }
 
 /// What these folders hold and `present` does not, each place once, of the frames that are wanted.
-fn more<T>(
+fn more<T, P: Eq + Hash>(
     present: &[T],
     folders: &[&Path],
     read: impl Fn(&Path) -> Result<Vec<T>>,
-    (place, is_wanted): (
-        impl Fn(&T) -> (FrameId, Condition),
-        impl Fn(&FrameId) -> bool,
-    ),
+    (place, is_wanted): (impl Fn(&T) -> P, impl Fn(&T) -> bool),
 ) -> Result<Vec<T>> {
     let mut known: HashSet<_> = present.iter().map(&place).collect();
     let mut more = Vec::new();
     for folder in folders {
         let read = read(folder)?.into_iter();
-        more.extend(read.filter(|one| {
-            let place = place(one);
-            is_wanted(&place.0) && known.insert(place)
-        }));
+        more.extend(read.filter(|one| is_wanted(one) && known.insert(place(one))));
     }
     Ok(more)
 }

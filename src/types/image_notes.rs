@@ -7,6 +7,7 @@ use super::condition::Condition;
 use super::digest::Digest;
 use super::frame::FrameId;
 use super::outlines::PixelBox;
+use super::shared::Shared;
 
 /// One line of a run's `thumbnails.jsonl`: a small copy of an image as it was sent.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -44,9 +45,9 @@ pub struct ObjectCrop {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ImageFidelity {
     /// The name of the frame.
-    pub frame: FrameId,
+    pub frame: Shared<FrameId>,
     /// The condition in which the frame was sent.
-    pub condition: Condition,
+    pub condition: Shared<Condition>,
     /// The digest of the file that was sent.
     pub image: Digest,
     /// Peak signal-to-noise ratio in dB, peak 255, over all samples; `None` if the image equals the clean frame.

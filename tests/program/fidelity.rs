@@ -31,8 +31,8 @@ fn findings(
             records.push(reply);
         }
         measured.push(ImageFidelity {
-            frame: records[records.len() - 1].detail.frame.clone(),
-            condition: condition.clone(),
+            frame: records[records.len() - 1].detail.frame.clone().into(),
+            condition: condition.clone().into(),
             image,
             psnr: Some(20.0 + slope * (rate - 0.6) + noise.sample(random)),
             ssim: None,
@@ -85,8 +85,8 @@ fn two_frames_with_the_same_dark_image_have_their_own_fidelity() {
         let mut reply: Record = record("m", &condition, (frame, frame), true);
         reply.detail.image = Some(facts(black));
         measured.push(ImageFidelity {
-            frame: reply.detail.frame.clone(),
-            condition: condition.clone(),
+            frame: reply.detail.frame.clone().into(),
+            condition: condition.clone().into(),
             image: black,
             psnr: Some(psnr),
             ssim: None,

@@ -137,8 +137,8 @@ impl MadeRun {
                     records.push(reply);
                 }
                 measured.push(ImageFidelity {
-                    frame: records[records.len() - 1].detail.frame.clone(),
-                    condition: condition.clone(),
+                    frame: records[records.len() - 1].detail.frame.clone().into(),
+                    condition: condition.clone().into(),
                     image,
                     psnr: None,
                     ssim: None,
@@ -147,7 +147,7 @@ impl MadeRun {
         }
         let scenes = measured.iter().enumerate().map(|(index, image)| {
             let scene = index / FRAMES % design.scenes;
-            (image.frame.clone(), format!("s{scene:03}"))
+            ((*image.frame).clone(), format!("s{scene:03}"))
         });
         let ties = FrameTies {
             scenes: scenes.collect(),
