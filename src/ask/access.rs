@@ -14,6 +14,7 @@ use super::url::BaseUrl;
 use super::vendor::Vendor;
 use super::wire_kind::Wire;
 use crate::error::{Error, Result};
+use crate::files::reading;
 
 /// The maximum time to open a connection; chosen.
 const CONNECT: Duration = Duration::from_secs(10);
@@ -140,8 +141,8 @@ impl Authorities {
     /// # Errors
     /// If it cannot be read or has no certificate.
     pub fn load(path: &Path) -> Result<Self> {
-        let pem = std::fs::read(path).map_err(|e| Error::file(path, "read", e))?;
-        let found = Certificate::from_pem_bundle(&pem).unwrap_or_default();
+        let pem = reading::settings(path)?;
+        let found = Certificate::from_pem_bundle(pem.as_bytes()).unwrap_or_default();
         if found.is_empty() {
             return Err(Error::usage(
                 "--ca-file",

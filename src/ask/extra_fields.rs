@@ -1,7 +1,6 @@
 //! Fields of a request that the user adds or leaves out: their flags ([`RequestArgs`]) and what they come to ([`ExtraFields`]).
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -10,6 +9,7 @@ use serde_json::{Map, Value};
 
 use super::body_secrets::refuse_secrets;
 use crate::error::{Error, Result};
+use crate::files::reading;
 use crate::types::Decides;
 
 /// Flags that add words and fields to every request, or leave fields out.
@@ -101,7 +101,7 @@ impl RequestArgs {
     pub(crate) fn resolve(&self) -> Result<ExtraFields> {
         let system = match (&self.system, &self.system_file) {
             (Some(words), _) => Some(words.clone()),
-            (None, Some(path)) => Some(text(path)?),
+            (None, Some(path)) => Some(reading::settings(path)?),
             (None, None) => None,
         };
         let system = system.map(|words| words.trim().to_owned());
@@ -132,14 +132,12 @@ impl RequestArgs {
     }
 }
 
-fn text(path: &Path) -> Result<String> {
-    fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))
-}
-
 /// Reads the fields of a body: JSON, or `@` with a file that holds it.
 fn body(value: &str) -> Result<Map<String, Value>> {
     let wrong = |problem: String| Error::usage("--extra-body", problem);
-    let read = value.strip_prefix('@').map(|path| text(Path::new(path)));
+    let read = value
+        .strip_prefix('@')
+        .map(|path| reading::settings(Path::new(path)));
     let read = read.transpose()?;
     let json = read.as_deref().unwrap_or(value);
     // The words of the error of serde_json name a line and column and none of the values.

@@ -27,6 +27,7 @@ mod image_limit;
 mod image_tokens;
 mod key_form;
 mod key_header;
+mod key_owner;
 mod local;
 mod model;
 pub(crate) mod openeqa;

@@ -6,6 +6,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use crate::error::{Error, Result};
+use crate::files::reading;
 use crate::types::Usage;
 
 /// The price of a model, in dollars per million tokens.
@@ -66,7 +67,7 @@ impl Prices {
     /// # Errors
     /// If it cannot be read, or a price is negative or not finite.
     pub(crate) fn load(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))?;
+        let text = reading::settings(path)?;
         let wrong = |problem: String| {
             let expected = "expected as-of = \"2026-11-20\", batch = 0.5 and [models] with lines like \
                             gpt-4o = { input = 2.5, output = 10 }";

@@ -1,7 +1,6 @@
 //! A model whose replies come from a file: [`Script`].
 
 use std::collections::HashMap;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -9,6 +8,7 @@ use serde_json::{Value, json};
 
 use super::failure::AskError;
 use crate::error::{Error, Result};
+use crate::files::reading;
 use crate::types::{Condition, Digest, FailureKind, QuestionId, Reply};
 
 /// Replies from a JSONL file, one a line:
@@ -58,7 +58,7 @@ impl Script {
     /// # Errors
     /// If a line is broken, or has the same question and condition as an earlier line.
     pub fn load(path: &Path) -> Result<Self> {
-        let text = fs::read_to_string(path).map_err(|error| Error::file(path, "read", error))?;
+        let text = reading::text(path)?;
         let text = text.trim_start_matches('\u{feff}');
         let mut replies = HashMap::new();
         let mut lines: HashMap<Cue, usize> = HashMap::new();
@@ -125,6 +125,8 @@ impl Script {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     fn load(text: &str) -> Result<Script> {

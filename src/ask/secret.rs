@@ -1,8 +1,13 @@
 //! API keys that are never printed ([`Secret`]), and removal of keys from text that a server sent ([`Scrub`]).
 
 use std::fmt;
+use std::path::Path;
 
 use crate::error::{Error, Result};
+use crate::files::reading;
+
+/// The most bytes of a file that holds a key. Chosen: the longest tokens have half of it.
+const MOST_BYTES: u64 = 4096;
 
 /// An API key that is never printed.
 #[derive(Clone, PartialEq, Eq)]
@@ -29,6 +34,23 @@ impl Secret {
             ));
         }
         Ok(Self(key.to_owned()))
+    }
+
+    /// The key in a file.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or holds anything but one line of visible ASCII, as a file does that was named by mistake. The error
+    /// shows nothing of it.
+    pub(super) fn read(path: &Path) -> Result<Self> {
+        let bytes = reading::at_most(path, MOST_BYTES)?;
+        let origin = format!("--api-key-file {}", path.display());
+        let text = String::from_utf8(bytes).unwrap_or_else(|_| "\0".to_owned());
+        if text.contains("-----BEGIN") {
+            let problem =
+                "this is a private key or a certificate, no API key; nothing of it was sent";
+            return Err(Error::usage(origin, problem));
+        }
+        Self::new(&text, &origin)
     }
 
     /// The key as plain text, for HTTP headers.
@@ -130,6 +152,32 @@ mod tests {
             let error = Secret::new(wrong, "KEY").unwrap_err().to_string();
             assert!(error.starts_with("KEY: "), "{error}");
             assert!(!error.contains("sk-"), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_file_that_holds_no_key_is_refused_unseen() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let read = |text: &[u8]| {
+            std::fs::write(file.path(), text).unwrap();
+            Secret::read(file.path()).map_err(|e| e.to_string())
+        };
+        assert_eq!(read(b"sk-abc\n").unwrap().expose(), "sk-abc");
+        for wrong in [
+            &b"sk-abc\nsk-def\n"[..],
+            b"-----BEGIN OPENSSH PRIVATE KEY-----\nabc\n",
+            b"-----BEGIN-abc",
+            &[b'a'; 4097],
+            b"sk-\xff",
+        ] {
+            let error = read(wrong).unwrap_err();
+            assert!(error.contains(&*file.path().to_string_lossy()), "{error}");
+            assert!(
+                !["sk-", "abc", "aaa"]
+                    .iter()
+                    .any(|part| error.contains(part)),
+                "{error}"
+            );
         }
     }
 

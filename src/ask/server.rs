@@ -1,6 +1,5 @@
 //! The server at which models are asked: its flags ([`AccessArgs`]), and its settings with the key ([`Server`]).
 
-use std::fs;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -8,6 +7,7 @@ use clap::Args;
 use super::access::{Access, Authorities};
 use super::key_form::looks_like_key;
 use super::key_header::KeyHeader;
+use super::key_owner::check_owner;
 use super::own_headers::OwnHeaders;
 use super::secret::Secret;
 use super::sending::Sending;
@@ -51,6 +51,9 @@ pub(crate) struct AccessArgs {
     /// A TOML file of vendors above the built-in table, in its form; default: the built-in table alone
     #[arg(long, value_name = "FILE", add = Decides::Nothing)]
     pub vendor: Option<PathBuf>,
+    /// Send a key to an address although it looks like a key of another vendor
+    #[arg(long, add = Decides::Nothing)]
+    pub key_anyway: bool,
     /// The header that carries the key; auto is what is known of the vendor (api-key at Azure), else bearer
     #[arg(long, value_name = "HEADER", value_enum, default_value_t, add = Decides::Nothing)]
     pub key_header: KeyHeader,
@@ -110,6 +113,7 @@ impl AccessArgs {
             base_url: vec![base_url],
             ca_file: self.ca_file.clone(),
             allow_http: self.allow_http,
+            key_anyway: self.key_anyway,
             vendor: self.vendor.clone(),
             ..Self::default()
         }
@@ -131,9 +135,14 @@ impl AccessArgs {
             }
             let vendor = vendors.of(base.host());
             vendor.map_or(Ok(()), |vendor| vendor.check_address(&base))?;
+            let key = self.key(&base, vendor)?;
+            match &key {
+                Some(key) if !self.key_anyway => check_owner(key, &base)?,
+                _ => {}
+            }
             replicas.push(Access {
                 vendor,
-                key: self.key(&base, vendor)?,
+                key,
                 key_header: self.key_header,
                 account: account_headers(vendor),
                 headers: OwnHeaders::read(&self.header, &self.header_env)?,
@@ -182,8 +191,7 @@ impl AccessArgs {
     /// The key from a file or a variable. For an endpoint on another machine a key is required, except with `none`.
     fn key(&self, base: &BaseUrl, vendor: Option<&'static Vendor>) -> Result<Option<Secret>> {
         if let Some(path) = &self.api_key_file {
-            let text = fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))?;
-            return Secret::new(&text, "--api-key-file").map(Some);
+            return Secret::read(path).map(Some);
         }
         if let Some(name) = self.api_key_env.as_deref() {
             let wrong = |problem: String| Error::usage("--api-key-env", problem);

@@ -21,6 +21,9 @@ pub struct Vendor {
     hosts: Vec<String>,
     /// The variables in which the vendor's own tools look for a key, in order.
     pub(super) key: Vec<String>,
+    /// How the vendor's keys look, if no other vendor's do; else empty.
+    #[serde(default)]
+    key_form: Vec<String>,
     /// The header that carries the key.
     #[serde(default)]
     header: Header,
@@ -103,6 +106,12 @@ impl Vendor {
         vendors.find(|vendor| vendor.is_of(host))
     }
 
+    /// The vendor whose keys look like this one; `None` if keys of several do, or that is not known.
+    pub(super) fn of_key(key: &str) -> Option<&'static Self> {
+        let mut vendors = VENDORS.vendor.iter();
+        vendors.find(|vendor| vendor.key_form.iter().any(|form| has_form(key, form)))
+    }
+
     /// Whether a host is one of the vendor's.
     pub(super) fn is_of(&self, host: &str) -> bool {
         self.hosts.iter().any(|end| is_below(host, end))
@@ -177,6 +186,13 @@ impl Vendor {
     }
 }
 
+/// Whether a text begins as a form says, in which `*` is for any text between two parts.
+fn has_form(text: &str, form: &str) -> bool {
+    let (begin, inside) = form.split_once('*').unwrap_or((form, ""));
+    let rest = text.strip_prefix(begin);
+    rest.is_some_and(|rest| rest.contains(inside))
+}
+
 /// Whether a host name is this one or one below it: a name that merely ends with the same letters is another host.
 fn is_below(host: &str, end: &str) -> bool {
     match host.strip_suffix(end) {
@@ -209,6 +225,18 @@ mod tests {
         hosts.sort();
         hosts.dedup();
         assert_eq!(hosts.len(), count, "a host stands twice");
+    }
+
+    #[test]
+    fn a_key_tells_its_vendor() {
+        let of = |key: &str| Vendor::of_key(key).map(|vendor| &*vendor.name);
+        assert_eq!(of("sk-ant-api03-x"), Some("Anthropic"));
+        assert_eq!(of("sk-proj-x"), Some("OpenAI"));
+        assert_eq!(of("sk-abcT3BlbkFJdef"), Some("OpenAI"));
+        assert_eq!(of("sk-or-v1-x"), Some("OpenRouter"));
+        for of_nobody in ["sk-1234", "", "x-sk-ant-", "T3BlbkFJ"] {
+            assert_eq!(of(of_nobody), None, "{of_nobody}");
+        }
     }
 
     #[test]

@@ -7,6 +7,7 @@ use serde::Deserialize;
 use super::key_form::looks_like_key;
 use super::vendor::Vendor;
 use crate::error::{Error, Result};
+use crate::files::reading;
 
 /// The vendors of a file, above those of the built-in table. The default has none.
 #[derive(Debug, Clone, Copy, Default)]
@@ -28,7 +29,7 @@ impl VendorTable {
     /// # Errors
     /// If it cannot be read, has no vendor or unknown fields, or names a key in place of a variable, which is not shown.
     pub(super) fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))?;
+        let text = reading::settings(path)?;
         let wrong = |problem: String| {
             let expected =
                 "expected tables [[vendor]] with name, hosts and key, as in src/ask/vendors.toml";

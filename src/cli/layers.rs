@@ -22,6 +22,7 @@ use toml::{Table, Value};
 use self::layered_value::LayeredValue;
 use self::messages::{invalid_toml, suggestion};
 use self::value_text::text_of;
+use crate::ask::OPENAI_KEY;
 use crate::error::{Error, Result};
 use crate::files::reading;
 
@@ -110,7 +111,9 @@ pub(super) fn parse(
             let is_in_effect = origins.get(flag) == Some(&value.origin);
             is_in_effect.then(|| (flag.clone(), value))
         });
-        sent_secrets::check(file, &in_effect.collect())?;
+        let is_set = |flag: &str| set.iter().any(|arg| key(arg) == flag);
+        let has_key = variable(OPENAI_KEY).is_some_and(|text| !text.is_empty());
+        sent_secrets::check(file, &in_effect.collect(), is_set, has_key)?;
     }
     let mut typed = typed;
     let end = typed.iter().position(|word| word == "--");
@@ -225,7 +228,7 @@ fn file_values(
     command: &Command,
     called: &[String],
 ) -> Result<BTreeMap<String, LayeredValue>> {
-    let text = reading::text(path)?;
+    let text = reading::settings(path)?;
     let table: Table = text.parse().map_err(|e| invalid_toml(path, &text, &e))?;
     let mut values = BTreeMap::new();
     let flags: Vec<String> = settable_flags(command).map(key).collect();

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::fs::File;
-use std::io::{ErrorKind, Read as _};
+use std::fs;
+use std::io::ErrorKind;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
@@ -15,6 +15,7 @@ use super::convention::{
 use super::expression::Expression;
 use super::extra::ExtraValue;
 use crate::error::{Error, Result};
+use crate::files::reading;
 
 /// Statements of a sidecar. Every key may be missing; an unknown key is an error.
 #[derive(Debug, Default, Clone, PartialEq, Serialize, Deserialize)]
@@ -94,24 +95,11 @@ pub(super) fn path_for(model: &Path) -> PathBuf {
 /// Text of a model's sidecar; empty if there is none.
 pub(super) fn text_for(model: &Path) -> Result<String> {
     let path = path_for(model);
-    let read = File::open(&path).and_then(|file| {
-        let mut text = String::new();
-        file.take(MOST_BYTES + 1).read_to_string(&mut text)?;
-        Ok(text)
-    });
-    match read {
-        Ok(text) if text.len() as u64 > MOST_BYTES => {
-            let problem = format!("larger than {MOST_BYTES} bytes, which no sidecar needs");
-            Err(Error::data(path.display(), problem))
-        }
-        Ok(text) => Ok(text),
+    match fs::symlink_metadata(&path) {
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(String::new()),
-        Err(error) => Err(Error::file(path, "read", error)),
+        _ => reading::settings(&path),
     }
 }
-
-/// Largest sidecar, in bytes; chosen.
-const MOST_BYTES: u64 = 1 << 20;
 
 /// Largest side, in pixels, that a sidecar may state; chosen: no image of this program is larger.
 const MOST_SIDE: usize = 1 << 16;

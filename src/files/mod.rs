@@ -1,5 +1,6 @@
 //! Files that are written completely or not at all, by [`write()`] and [`write_synced`]; and helpers to read files, in [`reading`].
 
+pub(crate) mod folder_access;
 pub(crate) mod guarded;
 pub(crate) mod reading;
 

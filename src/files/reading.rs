@@ -1,11 +1,23 @@
-//! Readers of folders ([`entries`]), text files ([`text`]) and files of one JSON object a line ([`json_lines`]).
+//! Readers of folders ([`entries`]), text files ([`text`], [`settings`]) and files of one JSON object a line ([`json_lines`]).
+//!
+//! Each has a bound, so that no file takes memory without end: a stranger's file may be a link to `/dev/zero`.
 
-use std::fs;
+use std::fs::{self, File};
+use std::io::{self, BufRead as _, BufReader, Read as _};
 use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
 use crate::error::{Error, Result};
+
+/// The most bytes of a file of settings. Chosen: people write a few kilobytes.
+const MOST_SETTINGS: u64 = 1 << 20;
+
+/// The most bytes of a line of text. Chosen: a question with its choices has less than a kilobyte.
+const MOST_LINE: u64 = 4 << 20;
+
+/// The most bytes of any other file that is read at once. Chosen: the largest published lists of questions have a tenth.
+const MOST_BYTES: u64 = 1 << 30;
 
 /// The paths in a folder, sorted by name.
 ///
@@ -24,17 +36,47 @@ pub(crate) fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
 /// The bytes of a file.
 ///
 /// # Errors
-/// If the file cannot be read.
+/// If the file cannot be read, or is larger than 1 GB.
 pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>> {
-    fs::read(path).map_err(|e| Error::file(path, "read", e))
+    at_most(path, MOST_BYTES)
 }
 
 /// The text of a file.
 ///
 /// # Errors
-/// If the file cannot be read or is not UTF-8.
+/// If the file cannot be read, is larger than 1 GB, or is not UTF-8.
 pub(crate) fn text(path: &Path) -> Result<String> {
-    fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))
+    utf8(path, bytes(path)?)
+}
+
+/// The text of a file of settings.
+///
+/// # Errors
+/// If the file cannot be read, is larger than 1 MB, or is not UTF-8.
+pub(crate) fn settings(path: &Path) -> Result<String> {
+    utf8(path, at_most(path, MOST_SETTINGS)?)
+}
+
+/// The bytes of a file that has no more than so many.
+///
+/// # Errors
+/// If the file cannot be read or is larger.
+pub(crate) fn at_most(path: &Path, most: u64) -> Result<Vec<u8>> {
+    let unreadable = |e| Error::file(path, "read", e);
+    let file = File::open(path).map_err(unreadable)?;
+    let length = file.metadata().map_err(unreadable)?.len();
+    let mut bytes = Vec::with_capacity(length.min(most) as usize);
+    let read = file.take(most + 1).read_to_end(&mut bytes);
+    if read.map_err(unreadable)? as u64 > most {
+        let problem = format!("larger than {most} bytes, which no file of its kind needs");
+        return Err(Error::data(path.display(), problem));
+    }
+    Ok(bytes)
+}
+
+fn utf8(path: &Path, bytes: Vec<u8>) -> Result<String> {
+    let text = String::from_utf8(bytes);
+    text.map_err(|e| Error::file(path, "read", io::Error::new(io::ErrorKind::InvalidData, e)))
 }
 
 /// The value in a JSON file.
@@ -48,16 +90,68 @@ pub(crate) fn json<T: DeserializeOwned>(path: &Path) -> Result<T> {
 /// The objects of a file with their line numbers, counted from 1; empty lines and a byte order mark are skipped.
 ///
 /// # Errors
-/// If the file cannot be read or a line does not hold such an object; the error names the line.
+/// If the file cannot be read, or a line is longer than 4 MB or does not hold such an object; the error names the line.
 pub(crate) fn json_lines<T: DeserializeOwned>(path: &Path) -> Result<Vec<(usize, T)>> {
-    let text = text(path)?;
-    let lines = (1..).zip(text.trim_start_matches('\u{feff}').lines());
-    lines
-        .filter(|(_, line)| !line.trim().is_empty())
-        .map(|(number, line)| {
-            let value = serde_json::from_str(line);
-            let value = value.map_err(|e| Error::json_line(path, number, &e))?;
-            Ok((number, value))
-        })
-        .collect()
+    let unreadable = |e| Error::file(path, "read", e);
+    let mut file = BufReader::new(File::open(path).map_err(unreadable)?);
+    let (mut values, mut line) = (Vec::new(), Vec::new());
+    for number in 1.. {
+        line.clear();
+        let read = (&mut file).take(MOST_LINE + 1).read_until(b'\n', &mut line);
+        if read.map_err(unreadable)? == 0 {
+            break;
+        }
+        if line.len() as u64 > MOST_LINE {
+            let problem = format!("longer than {MOST_LINE} bytes, which no line of its kind needs");
+            return Err(Error::line(path, number, problem));
+        }
+        let text = match number {
+            1 => line.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&line),
+            _ => &line[..],
+        };
+        if !text.trim_ascii().is_empty() {
+            let value = serde_json::from_slice(text.trim_ascii_end());
+            values.push((
+                number,
+                value.map_err(|e| Error::json_line(path, number, &e))?,
+            ));
+        }
+    }
+    Ok(values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_too_large_is_refused_by_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("list.jsonl");
+        let text = format!("\u{feff}1\n\n  2 \r\n{}3\n", " ".repeat(MOST_LINE as usize));
+        fs::write(&path, &text).unwrap();
+        let error = json_lines::<u8>(&path).unwrap_err().to_string();
+        assert!(
+            error.contains("line 4: longer than 4194304 bytes"),
+            "{error}"
+        );
+        fs::write(&path, text.trim_end_matches(['3', '\n', ' '])).unwrap();
+        assert_eq!(json_lines::<u8>(&path).unwrap(), [(1, 1), (3, 2)]);
+        assert!(settings(&path).is_ok());
+        fs::write(&path, vec![b' '; 1 + MOST_SETTINGS as usize]).unwrap();
+        let error = settings(&path).unwrap_err().to_string();
+        assert!(
+            error.contains("list.jsonl") && error.contains("larger than 1048576 bytes"),
+            "{error}"
+        );
+        assert!(text_of_bytes(&path, b"\xff").contains("UTF-8"));
+    }
+
+    fn text_of_bytes(path: &Path, bytes: &[u8]) -> String {
+        fs::write(path, bytes).unwrap();
+        text(path)
+            .unwrap_err()
+            .to_string()
+            .replace("utf-8", "UTF-8")
+    }
 }

@@ -13,6 +13,7 @@ use super::key::Key;
 use super::kinds::StoredKinds;
 use super::sweep::sweep;
 use crate::error::{Error, Result};
+use crate::files::folder_access::FolderAccess;
 
 /// Bytes after which the store is counted and swept again, at most; chosen.
 const SWEEP_AFTER: u64 = 1_000_000_000;
@@ -55,11 +56,16 @@ enum Health {
 }
 
 impl ImageStore {
-    /// A store in a folder, which is made if it is not there. It holds such images, `most` bytes of them.
+    /// A store in a folder, which is made with such access if it is not there. It holds such images, `most` bytes of them.
     ///
     /// # Errors
     /// If the folder cannot be made or read.
-    pub(crate) fn open(folder: &Path, kinds: StoredKinds, most: u64) -> Result<Self> {
+    pub(crate) fn open(
+        folder: &Path,
+        access: FolderAccess,
+        kinds: StoredKinds,
+        most: u64,
+    ) -> Result<Self> {
         let store = Self {
             named: folder.to_owned(),
             folder: StoreFolder::new(folder),
@@ -67,15 +73,16 @@ impl ImageStore {
             most,
             state: Mutex::default(),
         };
-        let unusable = |e: io::Error| {
+        let unusable = |e: &dyn std::fmt::Display| {
             let folder = folder.display();
             let problem = format_args!(
                 "cannot use the folder {folder}: {e}; name a folder that can be written to, or leave the flag out"
             );
             Error::usage("--images-cache", problem)
         };
-        store.folder.make().map_err(unusable)?;
-        let swept = sweep(&store.folder, most, SystemTime::now()).map_err(unusable)?;
+        store.folder.make(access).map_err(|e| unusable(&e))?;
+        let swept = sweep(&store.folder, most, SystemTime::now());
+        let swept = swept.map_err(|e| unusable(&e))?;
         store.with(|state| {
             state.bytes = swept.bytes;
             state.counts.evicted = swept.evicted;

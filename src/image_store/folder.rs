@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::SystemTime;
 
+use crate::error::Result;
+use crate::files::folder_access::FolderAccess;
 use crate::types::Digest;
 
 /// Version of the layout, a folder of its own.
@@ -60,9 +62,9 @@ impl StoreFolder {
         &self.root
     }
 
-    /// Makes the folder, for this user alone.
-    pub(super) fn make(&self) -> io::Result<()> {
-        private_folder(&self.root)
+    /// Makes the folder.
+    pub(super) fn make(&self, access: FolderAccess) -> Result<()> {
+        access.create(&self.root)
     }
 
     /// The file of a key.
@@ -76,10 +78,10 @@ impl StoreFolder {
     pub(super) fn write(&self, key: &Digest, content: &[u8]) -> io::Result<()> {
         let place = self.place(key);
         let folder = place.parent().unwrap_or(&self.root);
-        private_folder(folder)?;
+        fs::create_dir_all(folder)?;
         let number = self.count.fetch_add(1, Ordering::Relaxed);
         let unfinished = folder.join(format!("{}{number}", self.unfinished));
-        let written = private_file(&unfinished)
+        let written = File::create_new(&unfinished)
             .and_then(|mut file| file.write_all(content))
             .and_then(|()| fs::rename(&unfinished, &place));
         if written.is_err() {
@@ -117,10 +119,10 @@ impl StoreFolder {
 
     /// The file that is locked while files are removed.
     pub(super) fn lock_file(&self) -> io::Result<File> {
-        self.make()?;
+        fs::create_dir_all(&self.root)?;
         let mut options = OpenOptions::new();
         options.write(true).create(true).truncate(false);
-        private(&mut options).open(self.root.join(".lock"))
+        options.open(self.root.join(".lock"))
     }
 }
 
@@ -156,23 +158,4 @@ pub(super) fn found<T>(result: io::Result<T>) -> io::Result<Option<T>> {
         Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(None),
         Err(e) => Err(e),
     }
-}
-
-fn private_folder(path: &Path) -> io::Result<()> {
-    let mut builder = fs::DirBuilder::new();
-    builder.recursive(true);
-    #[cfg(unix)]
-    std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
-    builder.create(path)
-}
-
-fn private_file(path: &Path) -> io::Result<File> {
-    let mut options = OpenOptions::new();
-    private(options.write(true).create_new(true)).open(path)
-}
-
-fn private(options: &mut OpenOptions) -> &mut OpenOptions {
-    #[cfg(unix)]
-    std::os::unix::fs::OpenOptionsExt::mode(options, 0o600);
-    options
 }

@@ -8,6 +8,7 @@ use super::access::ImageStore;
 use super::image_set::ImageSet;
 use super::kinds::StoredKinds;
 use crate::error::Result;
+use crate::files::folder_access::FolderAccess;
 use crate::types::Decides;
 use crate::types::flag::positive;
 
@@ -39,11 +40,11 @@ impl StoreArgs {
     ///
     /// # Errors
     /// If its folder cannot be made or written to.
-    pub(crate) fn open(&self) -> Result<Option<ImageStore>> {
+    pub(crate) fn open(&self, access: FolderAccess) -> Result<Option<ImageStore>> {
         let bytes = (self.images_cache_size * 1e9) as u64;
         let folder = self.images_cache.as_deref();
         folder
-            .map(|folder| ImageStore::open(folder, self.images_cache_what, bytes))
+            .map(|folder| ImageStore::open(folder, access, self.images_cache_what, bytes))
             .transpose()
     }
 }

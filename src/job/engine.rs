@@ -145,7 +145,7 @@ impl<'a, E: Experiment> Job<'a, E> {
         let complete = stored
             .as_ref()
             .is_some_and(|stored| stored.status == Status::Complete);
-        let images = settings.images.open()?;
+        let images = settings.images.open(settings.access)?;
         let mut enhancers = OpenEnhancers::deferred(files, &settings.loading);
         if !complete {
             // Loaded before the folder is created, so that a broken enhancer leaves no folder; one that was loaded before is not broken.
@@ -158,6 +158,7 @@ impl<'a, E: Experiment> Job<'a, E> {
             }
         }
         let manifest = manifest::of(experiment, stored)?;
+        folder::make(&folder, settings)?;
         let mut store = Store::open(&folder, &manifest, folder::address_change(&settings.place))?;
         store.add_questions(experiment.questions())?;
         let present: HashSet<TrialKey> = if experiment.imported_records().is_empty() {

@@ -8,7 +8,7 @@ use serde_json::json;
 use super::experiment::{DetailOf, Experiment};
 use super::models::{AskSettings, ModelName};
 use super::plan::Plan;
-use super::settings::{RESULTS, RunPlace};
+use super::settings::{JobSettings, RESULTS, RunPlace};
 use crate::error::{Error, Result};
 use crate::store::{self, AddressChange};
 use crate::types::{Detail as _, Digest};
@@ -30,6 +30,17 @@ pub(crate) fn find<E: Experiment>(experiment: &E) -> Result<PathBuf> {
         },
         RunPlace::Automatic => automatic(experiment),
     }
+}
+
+/// Makes the folder of a run, and of a part also the folder of all parts.
+///
+/// # Errors
+/// If it cannot be created.
+pub(crate) fn make(folder: &Path, settings: &JobSettings) -> Result<()> {
+    if let RunPlace::Named(outer) = &settings.place {
+        settings.access.create(outer)?;
+    }
+    settings.access.create(folder)
 }
 
 fn automatic<E: Experiment>(experiment: &E) -> Result<PathBuf> {

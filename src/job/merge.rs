@@ -12,6 +12,7 @@ use super::stored::{ExperimentKind, StoredRun};
 use super::thumbnail::MissingThumbnails;
 use super::{Outcome, ShowArgs, StdoutFormat};
 use crate::error::{Error, Result};
+use crate::files::folder_access::FolderAccess;
 use crate::store::{self, AddressChange, Store};
 use crate::types::{ChoiceDetail, Decides, Detail, OpenDetail};
 
@@ -24,6 +25,9 @@ pub(crate) struct MergeArgs {
     /// The folder of the whole run
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: PathBuf,
+    /// Let other users of this machine read the new folder, as the system's umask says; else it is for you alone
+    #[arg(long, add = Decides::Nothing)]
+    pub shared: bool,
     /// Merge the shards that there are, even if others are missing
     #[arg(long, add = Decides::Nothing)]
     pub partial: bool,
@@ -55,6 +59,7 @@ fn merge_all<D: Detail>(
         MissingParts::Refused
     };
     let parts = RunParts::<D>::read(folders, missing)?;
+    FolderAccess::new(args.shared).create(&args.out)?;
     let mut store = Store::<D>::open(&args.out, &parts.manifest, AddressChange::Refused)?;
     let folders = parts.folders();
     parts.questions.write(&store, &folders)?;

@@ -23,7 +23,7 @@ pub(crate) fn rules(path: Option<&Path>) -> Result<Rules> {
     let Some(path) = path else {
         return Rules::built_in();
     };
-    Rules::parse(&reading::text(path)?).map_err(|e| e.at(path.display().to_string()))
+    Rules::parse(&reading::settings(path)?).map_err(|e| e.at(path.display().to_string()))
 }
 
 /// The opened data. If they have no questions, these are made by rule.

@@ -20,6 +20,7 @@ use crate::ask::{
 };
 use crate::enhance::{EnhancerArgs, ModelFile};
 use crate::error::{Error, Result};
+use crate::files::folder_access::FolderAccess;
 use crate::image_store::StoreArgs;
 use crate::synthesis::{LightArgs, LightSettings};
 use crate::types::flag::seconds;
@@ -109,6 +110,10 @@ pub(crate) struct OutputArgs {
     /// Continue the run in this folder; takes the same flags as the run had; default: none
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub resume: Option<PathBuf>,
+    /// Let other users of this machine read new folders of runs and of --images-cache, as the system's umask says; else they are for
+    /// you alone, as replies and pictures of homes are in them
+    #[arg(long, add = Decides::Nothing)]
+    pub shared: bool,
     /// How the report is printed.
     #[command(flatten)]
     pub show: ShowArgs,
@@ -144,6 +149,8 @@ pub(crate) struct JobSettings {
     pub images: StoreArgs,
     /// Folder of the run.
     pub place: RunPlace,
+    /// Who may enter new folders.
+    pub access: FolderAccess,
     /// Format of the results on standard output.
     pub show: StdoutFormat,
     /// Whether the table of records is written.
@@ -276,6 +283,7 @@ impl JobArgs {
             images: self.stored,
             show: self.output.show.format(),
             table: self.output.show.table(),
+            access: FolderAccess::new(self.output.shared),
             place: RunPlace::from(self.output).checked()?,
             image_flags: self.image_flags,
         })

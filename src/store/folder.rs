@@ -2,6 +2,7 @@
 
 use std::ffi::OsStr;
 use std::fs::{self, TryLockError};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use rayon::slice::ParallelSliceMut;
@@ -10,7 +11,8 @@ use super::lines::{StoredLine, each_line, each_placed_line, lines};
 use super::pieces::{LinePlace, open_if_there};
 use super::stored_trial::StoredTrial;
 use crate::error::{Error, Result};
-use crate::files::{self, is_unfinished};
+use crate::files::folder_access::FolderAccess;
+use crate::files::{self, is_unfinished, reading};
 use crate::types::manifest::{ColumnDifference, RunManifest, differences};
 use crate::types::{Detail, Distinct, ImageFidelity, Record, RunQuestion, Thumbnail, TrialKey};
 
@@ -214,20 +216,18 @@ fn schema_problem(found: &str, expected: &str, version: &str) -> String {
 /// The kinds of runs, by the names of their schemas.
 const KINDS: [&str; 2] = ["darkqa.run", "darkqa.openeqa"];
 
+/// The most bytes of a manifest. Chosen: one of thousands of frames and models has a hundredth.
+const MOST_MANIFEST: u64 = 64 << 20;
+
 fn any_manifest(folder: &Path) -> Result<Option<RunManifest>> {
     let path = folder.join(MANIFEST);
-    let text = match fs::read(&path) {
-        Ok(text) => text,
-        Err(e)
-            if matches!(
-                e.kind(),
-                std::io::ErrorKind::NotFound | std::io::ErrorKind::NotADirectory
-            ) =>
-        {
-            return Ok(None);
-        }
-        Err(e) => return Err(Error::file(path, "read", e)),
-    };
+    // What is named as a folder may be a file.
+    if let Err(e) = fs::symlink_metadata(&path)
+        && matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory)
+    {
+        return Ok(None);
+    }
+    let text = reading::at_most(&path, MOST_MANIFEST)?;
     serde_json::from_slice(&text)
         .map(Some)
         .map_err(|e| Error::Run {
@@ -298,9 +298,9 @@ pub(super) fn check_same_run(
     Ok(())
 }
 
-/// Creates a run in a new or empty folder: writes the manifest before any other file.
+/// Creates a run in a new or empty folder: writes the manifest before any other file. A new folder is for this user alone.
 pub(super) fn create_run(folder: &Path, manifest: &RunManifest) -> Result<()> {
-    fs::create_dir_all(folder).map_err(|e| Error::file(folder, "create", e))?;
+    FolderAccess::Private.create(folder)?;
     let mut inside = fs::read_dir(folder).map_err(|e| Error::file(folder, "read", e))?;
     // Unfinished files of a killed process do not count, nor does the plan of the run.
     let counts = |name: &OsStr| !is_unfinished(name) && name != PLAN;

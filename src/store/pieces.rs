@@ -9,6 +9,9 @@ use crate::error::{Error, Result};
 /// The bytes that are read at once. A piece is longer only if one line is. Chosen: enough lines for all cores.
 const PIECE_BYTES: u64 = 4 << 20;
 
+/// The most bytes of a line. Chosen: the copies of an image with all things in it take a hundredth.
+const MOST_LINE: usize = 64 << 20;
+
 /// The complete lines of a file, some at a time.
 pub(super) struct Pieces<'p> {
     path: &'p Path,
@@ -77,6 +80,9 @@ impl<'p> Pieces<'p> {
     }
 
     /// The next complete lines; `None` after the last. An incomplete last line is left out.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or a line is longer than any line of a run.
     pub(super) fn next(&mut self) -> Result<Option<Piece>> {
         let mut bytes = std::mem::take(&mut self.unread);
         loop {
@@ -89,6 +95,12 @@ impl<'p> Pieces<'p> {
             if let Some(end) = end {
                 self.unread = bytes.split_off(searched + end + 1);
                 break;
+            }
+            if bytes.len() > MOST_LINE {
+                let problem = format!(
+                    "longer than {MOST_LINE} bytes, which no line of a run is; restore the file"
+                );
+                return Err(Error::line(self.path, self.lines + 1, problem));
             }
         }
         let piece = Piece {
@@ -124,6 +136,21 @@ impl Piece {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_line_has_a_largest_length() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lines");
+        let text = format!("one\n{}", "x".repeat(MOST_LINE + 1 + PIECE_BYTES as usize));
+        std::fs::write(&path, text).unwrap();
+        let mut pieces = Pieces::open(&path).unwrap().unwrap();
+        assert!(pieces.next().unwrap().is_some());
+        let error = pieces.next().err().unwrap().to_string();
+        assert!(
+            error.contains("line 2: longer than 67108864 bytes"),
+            "{error}"
+        );
+    }
 
     #[test]
     fn all_complete_lines_are_read_with_their_places() {

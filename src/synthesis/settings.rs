@@ -1,7 +1,6 @@
 //! Levels, kinds and noise of degradations: as flags ([`LightArgs`], [`SensorArgs`]) and resolved ([`LightSettings`],
 //! [`SensorSettings`]).
 
-use std::fs;
 use std::path::Path;
 
 use clap::{Args, ValueEnum};
@@ -15,6 +14,7 @@ use super::random::NoiseKey;
 use super::reading::{Amplify, Coupling, Draws, LightReading, Readings, Synthesis, Tone};
 use super::{Calibration, CameraModel, Sampling};
 use crate::error::{Error, Result};
+use crate::files::reading;
 use crate::types::degradation::Kind;
 use crate::types::{AxisLevel, Decides, Degradation, KindSet, PairDark, ReadingName, SetLight};
 
@@ -355,7 +355,7 @@ fn synthesis(args: &SensorArgs, reading: Synthesis) -> Result<Synthesis> {
 fn camera(args: &SensorArgs) -> Result<CameraModel> {
     let path = Path::new(&args.camera);
     let mut camera = if is_file(path) {
-        let text = fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))?;
+        let text = reading::settings(path)?;
         CameraModel::new(Calibration::parse(&text, path.display())?)
     } else {
         CameraModel::preset(&args.camera)?

@@ -376,7 +376,7 @@ const OPEN_ADDITIONS: [Addition; 10] = [
 ];
 
 /// What changes no answer: given on the folder of a run, it asks nothing.
-const NOTHING: [&str; 38] = [
+const NOTHING: [&str; 40] = [
     "--max-pixels 1000000",
     "--threads 1",
     "--offline",
@@ -385,6 +385,7 @@ const NOTHING: [&str; 38] = [
     "--api-key-file key.txt",
     "--vendor vendors.toml",
     "--trust-models",
+    "--key-anyway",
     "--key-header api-key",
     "--header X-Team:vision",
     "--header-env X-Auth=PATH",
@@ -408,6 +409,7 @@ const NOTHING: [&str; 38] = [
     "--images-cache images",
     "--images-cache-what all --images-cache images",
     "--images-cache-size 1 --images-cache images",
+    "--shared",
     "--full",
     "--findings",
     "--json",

@@ -61,6 +61,8 @@ mod sentences;
 mod serve;
 mod several_images;
 mod shards;
+#[cfg(unix)]
+mod shared_machines;
 mod site;
 mod slurm;
 mod spreadsheets;

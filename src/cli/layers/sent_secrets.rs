@@ -7,11 +7,20 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::layered_value::LayeredValue;
-use crate::ask::{BaseUrl, own_variables};
+use crate::ask::{BaseUrl, OPENAI_KEY, own_variables};
 use crate::error::{Error, Result};
 
 /// The flags that say where requests go, or who may read them on their way.
 const ADDRESSES: [&str; 3] = ["base-url", "judge-base-url", "ca-file"];
+
+/// The flags that name an address, each with those that say which key goes there.
+const KEYS: [(&str, [&str; 2]); 2] = [
+    ("base-url", ["api-key-env", "api-key-file"]),
+    (
+        "judge-base-url",
+        ["judge-api-key-env", "judge-api-key-file"],
+    ),
+];
 
 /// The flags that name a variable whose value is sent; of a header after `=`.
 const VARIABLES: [&str; 3] = ["api-key-env", "judge-api-key-env", "header-env"];
@@ -26,11 +35,17 @@ const FILES: [&str; 5] = [
 ];
 
 /// Refuses a file of flags that sets an address, and to be sent there a variable of another host or a file outside its own folder.
-/// `values` are those of the file that are in effect.
+/// `values` are those of the file that are in effect; `is_set` says whether any layer sets a flag, and `has_key` whether there is a key
+/// for addresses that no table has.
 ///
 /// # Errors
 /// Names the key of the file, and the flag to type instead.
-pub(super) fn check(file: &Path, values: &BTreeMap<String, &LayeredValue>) -> Result<()> {
+pub(super) fn check(
+    file: &Path,
+    values: &BTreeMap<String, &LayeredValue>,
+    is_set: impl Fn(&str) -> bool,
+    has_key: bool,
+) -> Result<()> {
     let address = ADDRESSES.iter().find(|flag| values.contains_key(**flag));
     let Some(address) = address else {
         return Ok(());
@@ -42,6 +57,24 @@ pub(super) fn check(file: &Path, values: &BTreeMap<String, &LayeredValue>) -> Re
         );
         Err(Error::usage(&value.origin, problem))
     };
+    if let Some((flag, value)) = entry(values, "key-anyway") {
+        return refuse(flag, value, "a key of yours");
+    }
+    let unnamed = KEYS
+        .iter()
+        .filter(|(_, keys)| !keys.iter().any(|flag| is_set(flag)));
+    for (address, [key, _]) in unnamed {
+        let value = values
+            .get(*address)
+            .filter(|value| has_key && goes_elsewhere(value));
+        if let Some(value) = value {
+            let problem = format!(
+                "{OPENAI_KEY} would be sent to this address, which the table of vendors does not have; say so with --{key} {OPENAI_KEY} on the \
+                 command line, or name another key there, or none"
+            );
+            return Err(Error::usage(&value.origin, problem));
+        }
+    }
     for (flag, value) in VARIABLES.iter().filter_map(|flag| entry(values, flag)) {
         for text in value.values.iter().filter_map(|value| value.to_str()) {
             let name = text.split_once('=').map_or(text, |(_, name)| name).trim();
@@ -79,6 +112,13 @@ fn hosts(values: &BTreeMap<String, &LayeredValue>) -> impl Iterator<Item = Vec<&
     let addresses = addresses.flat_map(|value| &value.values);
     let urls = addresses.filter_map(|text| text.to_str()?.parse::<BaseUrl>().ok());
     urls.map(|url| own_variables(url.host()))
+}
+
+/// Whether one of these addresses is of another machine, and of no known vendor.
+fn goes_elsewhere(addresses: &LayeredValue) -> bool {
+    let urls = addresses.values.iter();
+    let mut urls = urls.filter_map(|text| text.to_str()?.parse::<BaseUrl>().ok());
+    urls.any(|url| !url.is_loopback() && own_variables(url.host()).is_empty())
 }
 
 /// Whether a file lies in the folder of the file of flags or below it, links followed. One that is not there is refused later.

@@ -388,6 +388,7 @@ fn a_file_sends_nothing_of_the_user_to_an_address_of_its_own() {
         ("", "system-file = \"Cargo.toml\""),
         ("", "extra-body = \"@Cargo.toml\""),
         ("", "prompts = \"prompts\""),
+        ("", "key-anyway = true"),
     ] {
         let words: Vec<&str> = words.split_whitespace().collect();
         let flag = line.split(' ').next().unwrap();
@@ -421,5 +422,36 @@ fn a_file_sends_nothing_of_the_user_to_an_address_of_its_own() {
         let words: Vec<&str> = words.split_whitespace().collect();
         let found = parsed(&words, &[], &file);
         assert!(found.is_ok(), "{words:?} {file}: {:?}", found.err());
+    }
+}
+
+#[test]
+fn the_default_key_goes_to_no_address_that_only_a_file_names() {
+    let set = [("OPENAI_API_KEY", "sk-1")];
+    let own = "base-url = \"https://evil.example/v1\"\n";
+    let refused = |words: &str, variables: &[(&str, &str)], file: &str| {
+        let words: Vec<&str> = words.split_whitespace().collect();
+        parsed(&words, variables, file).err()
+    };
+    for (words, file, flag) in [
+        ("", own, "--api-key-env OPENAI_API_KEY"),
+        (
+            "openeqa --questions q.json --frames f",
+            "judge-base-url = \"https://evil.example/v1\"\n",
+            "--judge-api-key-env OPENAI_API_KEY",
+        ),
+    ] {
+        let problem = refused(words, &set, file).unwrap();
+        assert!(problem.contains(flag), "{problem}");
+        assert!(problem.contains("c.toml, "), "{problem}");
+        assert_eq!(refused(words, &[], file), None, "{file}");
+    }
+    for (words, file) in [
+        ("--api-key-env OPENAI_API_KEY", own),
+        ("--base-url https://mine.example/v1", own),
+        ("", "base-url = \"http://127.0.0.1:8000/v1\"\n"),
+        ("", "base-url = \"https://api.openai.com/v1\"\n"),
+    ] {
+        assert_eq!(refused(words, &set, file), None, "{words} {file}");
     }
 }

@@ -14,7 +14,7 @@ fn entry(bytes: usize) -> Entry {
 }
 
 fn store(folder: &Path, most: u64) -> ImageStore {
-    ImageStore::open(folder, StoredKinds::Enhanced, most).unwrap()
+    ImageStore::open(folder, FolderAccess::Private, StoredKinds::Enhanced, most).unwrap()
 }
 
 fn image(store: &ImageStore, name: &str) -> Option<Vec<u8>> {

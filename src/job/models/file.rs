@@ -47,7 +47,7 @@ impl ModelsFile {
     /// If it cannot be read, is no TOML, has other tables than `[defaults]` and `[[model]]`, or holds a secret. The error names the
     /// line, and shows no secret.
     pub(super) fn read(path: &Path) -> Result<Self> {
-        let text = reading::text(path)?;
+        let text = reading::settings(path)?;
         let at = |start: usize| {
             let line = text.get(..start).unwrap_or_default().matches('\n').count() + 1;
             format!("{}, line {line}", path.display())

@@ -2,6 +2,7 @@ use std::num::NonZeroUsize;
 
 use super::*;
 use crate::enhance::SizeArgs;
+use crate::files::folder_access::FolderAccess;
 use crate::job::scaling::Scaling;
 use crate::job::source::SourceFrame;
 use crate::job::walk::{CameraOf, DegradedAt};
@@ -41,7 +42,13 @@ fn runtime(version: &str) -> (String, String) {
 /// The digest of the key of a frame in a condition.
 fn key(recipe: &Recipe, frame: &SourceFrame, condition: &str, maker: &Maker) -> Digest {
     let folder = tempfile::tempdir().unwrap();
-    let store = ImageStore::open(folder.path(), StoredKinds::All, 1 << 20).unwrap();
+    let store = ImageStore::open(
+        folder.path(),
+        FolderAccess::Private,
+        StoredKinds::All,
+        1 << 20,
+    )
+    .unwrap();
     let source = FrameId("walk".to_owned());
     let condition = condition.parse().unwrap();
     let stored = StoredImages::new(&store, maker);

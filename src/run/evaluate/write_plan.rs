@@ -4,6 +4,7 @@ use super::plan_identity::plan_identity;
 use super::settings::EvaluateArgs;
 use super::setup::ChoiceSetup;
 use crate::error::{Error, Result};
+use crate::files::folder_access::FolderAccess;
 use crate::job::experiment::Experiment as _;
 use crate::job::plan::Plan;
 use crate::job::progress::Progress;
@@ -22,6 +23,7 @@ pub(crate) fn plan(mut args: EvaluateArgs, progress: &Progress) -> Result<Outcom
     };
     args.job.scale.shard = Some("none".to_owned());
     args.job.money.dry_run = true;
+    let is_shared = args.job.output.shared;
     let command = recorded_command(&args.job.words);
     let mut config = args.resolve()?;
     // A plan is made from the data, also where there is one.
@@ -49,6 +51,7 @@ pub(crate) fn plan(mut args: EvaluateArgs, progress: &Progress) -> Result<Outcom
     };
     let (questions, count) = (new.questions.len(), new.frames.len());
     let forecast = Job::new(&setup, files, progress)?.forecast()?;
+    FolderAccess::new(is_shared).create(&run)?;
     let folder = new.write(&run, &forecast)?;
     let output = format!(
         "{}: {questions} questions about {count} frames, {} trials\n",

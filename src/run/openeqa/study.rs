@@ -34,7 +34,7 @@ pub(super) fn pack(
     let mut enhancers = OpenEnhancers::load(files, &settings.loading)?;
     let limit = limit(settings);
     let timings = Timings::default();
-    let images = settings.images.open()?;
+    let images = settings.images.open(settings.access)?;
     let mut pipeline = pipeline(setup, enhancers.take()?, limit, &timings);
     let maker = Maker::new(enhancers.version(), &settings.loading.size);
     let stored = images.as_ref();

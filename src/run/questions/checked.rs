@@ -83,11 +83,7 @@ pub(super) fn verdicts(files: &[PathBuf]) -> Result<Verdicts> {
     let mut rejections: BTreeSet<(QuestionId, String)> = BTreeSet::new();
     let mut verdicts = Verdicts::default();
     for path in files {
-        let text = reading::text(path)?;
-        let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
-        for (i, line) in lines.filter(|(_, line)| !line.trim().is_empty()) {
-            let verdict_line: CheckedLine =
-                serde_json::from_str(line).map_err(|e| Error::json_line(path, i + 1, &e))?;
+        for (_, verdict_line) in reading::json_lines::<CheckedLine>(path)? {
             if let Some(check) = verdict_line.check() {
                 let key = (verdict_line.person.clone(), verdict_line.id.clone());
                 verdicts.checks.insert(key, check);

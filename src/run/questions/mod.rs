@@ -168,7 +168,7 @@ fn read<T>(path: Option<&Path>, parse: fn(&str) -> Result<T>) -> Result<Option<T
     let Some(path) = path else {
         return Ok(None);
     };
-    let text = reading::text(path)?;
+    let text = reading::settings(path)?;
     parse(&text)
         .map(Some)
         .map_err(|e| e.at(path.display().to_string()))

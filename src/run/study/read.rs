@@ -138,19 +138,13 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
 }
 
 fn answers(path: &Path) -> Result<Vec<PlacedAnswer<'_>>> {
-    let text = reading::text(path)?;
-    let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
-    lines
-        .filter(|(_, line)| !line.trim().is_empty())
-        .map(|(i, line)| {
-            let answer = serde_json::from_str(line);
-            Ok(PlacedAnswer {
-                file: path,
-                line: i + 1,
-                answer: answer.map_err(|e| Error::json_line(path, i + 1, &e))?,
-            })
-        })
-        .collect()
+    let lines = reading::json_lines(path)?.into_iter();
+    let placed = |(line, answer)| PlacedAnswer {
+        file: path,
+        line,
+        answer,
+    };
+    Ok(lines.map(placed).collect())
 }
 
 /// An answer that is no choice of its question, in words; `None` if it is one, or if the person could not answer.
