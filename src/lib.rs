@@ -132,8 +132,8 @@
 //! | `files` | `error` |
 //! | `questions` | `types`, `error` |
 //! | `synthesis` | `types`, `error` |
-//! | `enhance` | `synthesis`, `types`, `error` |
-//! | `ask` | `types`, `error` |
+//! | `enhance` | `synthesis`, `files`, `types`, `error` |
+//! | `ask` | `files`, `types`, `error` |
 //! | `score` | `types`, `error` |
 //! | `labels` | `files`, `types`, `error` |
 //! | `rooms` | `labels`, `types`, `error` |
@@ -141,7 +141,7 @@
 //! | `import` | `dataset`, `labels`, `files`, `types`, `error` |
 //! | `calibrate` | `dataset`, `synthesis`, `files`, `types`, `error` |
 //! | `store` | `files`, `types`, `error` |
-//! | `image_store` | `types`, `error` |
+//! | `image_store` | `files`, `types`, `error` |
 //! | `report` | `types`, `error`, `score`, `questions`, `calibrate` |
 //! | `job` | `files`, `types`, `error`, `rooms`, `labels`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `image_store`, `report` |
 //! | `run` | `job`, `files`, `types`, `error`, `rooms`, `labels`, `import`, `dataset`, `calibrate`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `image_store`, `report` |

@@ -6,6 +6,7 @@ use std::path::Path;
 use minijinja::{AutoEscape, Environment, UndefinedBehavior, Value, context};
 
 use crate::error::{Error, Result};
+use crate::files::reading;
 use crate::types::question::letter;
 use crate::types::{Choices, Digest, Family, FrameId, Question, QuestionId, View};
 
@@ -51,7 +52,7 @@ impl Prompts {
                     ));
                 }
             };
-            let bytes = fs::read(&path).map_err(|error| Error::file(&path, "read", error))?;
+            let bytes = reading::read(&path).map_err(|error| Error::file(&path, "read", error))?;
             let text = String::from_utf8(bytes)
                 .map_err(|_| wrong(&path.display().to_string(), "the file is not UTF-8 text"))?;
             *source = text.trim_start_matches('\u{FEFF}').replace("\r\n", "\n");

@@ -9,7 +9,6 @@ mod tiff_tags;
 mod webp_chunks;
 
 use std::borrow::Cow;
-use std::fs;
 use std::io::Cursor;
 use std::path::Path;
 use std::sync::Arc;
@@ -25,6 +24,7 @@ use super::maps::MapPaths;
 use super::reading_rule::{ColourRule, ReadingRule, Transfer};
 use crate::error::{Error, Result};
 use crate::files::guarded::guarded;
+use crate::files::reading;
 use crate::types::{
     Codes16, ColourHandling, ColourNote, DepthNote, Digest, InputNote, Light, Pixels, Rgb,
 };
@@ -63,7 +63,7 @@ impl ImageFile {
     /// # Errors
     /// If it cannot be read.
     pub(crate) fn open(path: &Path, rule: ReadingRule) -> Result<Self> {
-        let bytes = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
+        let bytes = reading::read(path).map_err(|e| Error::file(path, "read", e))?;
         Ok(Self::new(bytes, path.display().to_string(), rule))
     }
 

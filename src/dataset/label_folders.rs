@@ -1,14 +1,13 @@
 //! Folders of images by class as a data set with one question: [`dataset`].
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use super::image_names::ImageNames;
 use super::{Dataset, ImageSource};
 use crate::error::{Error, Result};
-use crate::files::reading::entries;
+use crate::files::reading::{self, entries};
 use crate::types::{Choices, Digest, Family, FrameId, Question, QuestionId};
 
 /// A question about each image of the folders in a folder. A frame is named `CLASS/FILE`, and so is its question. The choices are the
@@ -37,7 +36,7 @@ pub(super) fn dataset(
             let offered = if count == names.len() {
                 names.clone()
             } else {
-                let bytes = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
+                let bytes = reading::read(path).map_err(|e| Error::file(path, "read", e))?;
                 drawn(&names, class, count, &Digest::of(&bytes))
             };
             let truth = offered.iter().position(|name| name == class);

@@ -3,7 +3,6 @@
 //! A map has one number for each pixel of its image, so both have the same size. A map of another size is refused and
 //! not scaled, because ids cannot be interpolated.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use ndarray::Array2;
@@ -12,6 +11,7 @@ use super::npy::Npy;
 use super::raw_png::{RawPng, SampleForm};
 use super::reading_rule::MOST_PIXELS;
 use crate::error::{Error, Result};
+use crate::files::reading;
 use crate::types::Digest;
 
 /// The maximum depth of a pixel in millimetres: a kilometre (chosen). No room is as deep. A larger value means a wrong
@@ -122,7 +122,7 @@ impl MapPaths {
         let depth = self.depth.as_ref().map(DepthFile::path);
         let files = [depth, self.semantic.as_deref(), self.segments.as_deref()];
         let sizes = files.into_iter().flatten().map(|path| {
-            let bytes = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
+            let bytes = reading::read(path).map_err(|e| Error::file(path, "read", e))?;
             let size = if is_npy(path) {
                 Npy::parse(&bytes).map(|npy| npy.size)
             } else {
@@ -139,7 +139,7 @@ impl MapPaths {
     /// # Errors
     /// If a file cannot be read; the error names it.
     pub(crate) fn read(&self) -> Result<MapFiles<'_>> {
-        let read = |path| fs::read(path).map_err(|e| Error::file(path, "read", e));
+        let read = |path| reading::read(path).map_err(|e| Error::file(path, "read", e));
         let depth = self.depth.as_ref().map(DepthFile::path);
         Ok(MapFiles {
             maps: self,

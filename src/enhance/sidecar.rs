@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::fs::File;
 use std::io::{ErrorKind, Read as _};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -15,6 +14,7 @@ use super::convention::{
 use super::expression::Expression;
 use super::extra::ExtraValue;
 use crate::error::{Error, Result};
+use crate::files::reading;
 
 /// Statements of a sidecar. Every key may be missing; an unknown key is an error.
 #[derive(Debug, Default, Clone, PartialEq, Serialize, Deserialize)]
@@ -94,7 +94,7 @@ pub(super) fn path_for(model: &Path) -> PathBuf {
 /// Text of a model's sidecar; empty if there is none.
 pub(super) fn text_for(model: &Path) -> Result<String> {
     let path = path_for(model);
-    let read = File::open(&path).and_then(|file| {
+    let read = reading::open(&path).and_then(|file| {
         let mut text = String::new();
         file.take(MOST_BYTES + 1).read_to_string(&mut text)?;
         Ok(text)

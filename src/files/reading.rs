@@ -1,6 +1,7 @@
-//! Readers of folders ([`entries`]), text files ([`text`]) and files of one JSON object a line ([`json_lines`]).
+//! Readers of folders ([`entries`]), files ([`open`]), text files ([`text`]) and files of one JSON object a line ([`json_lines`]).
 
-use std::fs;
+use std::fs::{self, File};
+use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
@@ -21,12 +22,46 @@ pub(crate) fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
+/// Opens a file to read it. A pipe or a device in the place of a file is refused: it may have no end, or wait for ever. It is opened
+/// where the path itself lies in `/dev` or `/proc`, as `/dev/stdin` and what a shell writes for `<(command)`.
+///
+/// # Errors
+/// If the file cannot be opened.
+pub(crate) fn open(path: &Path) -> io::Result<File> {
+    let kind = fs::metadata(path)?.file_type();
+    let is_named = path.starts_with("/dev") || path.starts_with("/proc");
+    if kind.is_file() || kind.is_dir() || is_named {
+        return File::open(path);
+    }
+    let problem = "a pipe or a device stands in the place of a file; put a file there";
+    Err(io::Error::new(io::ErrorKind::InvalidInput, problem))
+}
+
+/// The bytes of a file that [`open`] opens.
+///
+/// # Errors
+/// If the file cannot be read.
+pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    // The standard library reserves the length of the file.
+    open(path)?.read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// The text of a file that [`open`] opens.
+///
+/// # Errors
+/// If the file cannot be read or is not UTF-8.
+pub(crate) fn read_to_string(path: &Path) -> io::Result<String> {
+    io::read_to_string(open(path)?)
+}
+
 /// The bytes of a file.
 ///
 /// # Errors
 /// If the file cannot be read.
 pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>> {
-    fs::read(path).map_err(|e| Error::file(path, "read", e))
+    read(path).map_err(|e| Error::file(path, "read", e))
 }
 
 /// The text of a file.
@@ -34,7 +69,7 @@ pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>> {
 /// # Errors
 /// If the file cannot be read or is not UTF-8.
 pub(crate) fn text(path: &Path) -> Result<String> {
-    fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))
+    read_to_string(path).map_err(|e| Error::file(path, "read", e))
 }
 
 /// The value in a JSON file.

@@ -10,6 +10,7 @@ use super::lines::{StoredLine, each_line, each_placed_line, lines};
 use super::pieces::{LinePlace, open_if_there};
 use super::stored_trial::StoredTrial;
 use crate::error::{Error, Result};
+use crate::files::reading;
 use crate::files::{self, is_unfinished};
 use crate::types::manifest::{ColumnDifference, RunManifest, differences};
 use crate::types::{Detail, Distinct, ImageFidelity, Record, RunQuestion, Thumbnail, TrialKey};
@@ -45,7 +46,7 @@ const ADDRESS: &str = "--base-url";
 
 /// Writes a file into a folder, completely or not at all; a file with the same content is left untouched.
 pub(super) fn write(folder: &Path, name: &str, content: &[u8]) -> Result<()> {
-    if fs::read(folder.join(name)).is_ok_and(|existing| existing == content) {
+    if reading::read(&folder.join(name)).is_ok_and(|existing| existing == content) {
         return Ok(());
     }
     files::write_synced(&folder.join(name), content)
@@ -208,7 +209,7 @@ const KINDS: [&str; 2] = ["darkqa.run", "darkqa.openeqa"];
 
 fn any_manifest(folder: &Path) -> Result<Option<RunManifest>> {
     let path = folder.join(MANIFEST);
-    let text = match fs::read(&path) {
+    let text = match reading::read(&path) {
         Ok(text) => text,
         Err(e)
             if matches!(

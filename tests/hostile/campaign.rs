@@ -124,6 +124,7 @@ fn one(seed: u64, number: usize, seeds: &Seeds, folder: &Path, summary: &Mutex<S
     if let Some(fault) = verdict.faults.first() {
         let trial = reduced(&trial, fault.kind(), seeds, folder);
         let kept = keep(&trial, seed, number, seeds, folder);
+        eprintln!("{fault}: {}", kept.display());
         summary.lock().unwrap().failures.push(kept);
     }
 }

@@ -38,9 +38,10 @@ impl Case {
         self.line.starts_with("serve ")
     }
 
-    /// Whether it waits for as long as an endpoint says: it is then asked to end.
+    /// Whether it goes on for as long as an endpoint or a number of the user says: it is then asked to end.
     pub(crate) fn waits(&self) -> bool {
-        self.line.starts_with("batch run") || self.serves()
+        let begins = ["batch run", "rooms", "serve"];
+        begins.iter().any(|begin| self.line.starts_with(begin))
     }
 }
 

@@ -16,6 +16,7 @@ mod campaign;
 mod canary;
 mod cases;
 mod coverage;
+mod found;
 mod judge;
 mod mutators;
 mod place;

@@ -21,6 +21,16 @@ pub(crate) enum Place {
     Closed,
 }
 
+/// What a user may not have in the place of a file that the command line names. A pipe, a device and a link of the user's own are
+/// read there.
+const OF_TYPED: [Place; 5] = [
+    Place::LinkTo("loop"),
+    Place::Folder,
+    Place::Nothing,
+    Place::Empty,
+    Place::Closed,
+];
+
 const ALL: [Place; 15] = [
     Place::LinkTo("CANARY/private.txt"),
     Place::LinkTo("CANARY/picture.png"),
@@ -40,8 +50,9 @@ const ALL: [Place; 15] = [
 ];
 
 impl Place {
-    pub(crate) fn draw(random: &mut Random) -> Self {
-        *random.pick(&ALL)
+    /// One of them; `is_typed` says whether the command line names the file.
+    pub(crate) fn draw(random: &mut Random, is_typed: bool) -> Self {
+        *random.pick(if is_typed { &OF_TYPED[..] } else { &ALL })
     }
 
     /// Puts it in the place of a file; `canary` is the canary folder.

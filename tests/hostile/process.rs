@@ -9,6 +9,26 @@ use std::time::{Duration, Instant};
 /// The most bytes of a stream that are looked at.
 const MOST_BYTES: usize = 16 << 20;
 
+/// The program in a folder, with the few variables that it needs.
+pub(crate) fn program(work: &Path) -> Command {
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin("darkqa-eval"));
+    command.current_dir(work).env_clear();
+    let kept = [
+        "PATH",
+        "HOME",
+        "XDG_CACHE_HOME",
+        "ORT_DYLIB_PATH",
+        "LD_LIBRARY_PATH",
+    ];
+    for name in kept {
+        if let Some(value) = std::env::var_os(name) {
+            command.env(name, value);
+        }
+    }
+    command.env("DARKQA_DATA", "rooms:frames=2,size=32x32");
+    command
+}
+
 /// What a process gave.
 #[derive(Debug)]
 pub(crate) struct Finished {

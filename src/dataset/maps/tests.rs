@@ -1,3 +1,5 @@
+use std::fs;
+
 use ndarray::array;
 use png::{BitDepth, ColorType};
 use proptest::prelude::*;

@@ -1,7 +1,6 @@
 //! Files with answers of people or other programs, in the form of upstream's result files: [`read`].
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -13,6 +12,7 @@ use super::record::detail;
 use super::settings::AnswersFile;
 use crate::dataset::openeqa::OpenQuestion;
 use crate::error::{Error, Result};
+use crate::files::reading;
 use crate::types::degradation::Kind;
 use crate::types::{
     Condition, Degradation, Digest, KindSet, OpenDetail, Record, Step, TrialKey, Via,
@@ -43,7 +43,7 @@ pub(super) fn read(
     variants: KindSet,
 ) -> Result<Vec<Record<OpenDetail>>> {
     let path = &config.path;
-    let text = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
+    let text = reading::read(path).map_err(|e| Error::file(path, "read", e))?;
     let wrong = |problem: String| Error::data(path.display(), problem);
     let entries: Vec<AnswerEntry> = serde_json::from_slice(&text).map_err(|e| {
         wrong(format!(

@@ -1,7 +1,6 @@
 //! The selection of questions from a file: [`select`].
 
 use std::collections::BTreeSet;
-use std::fs;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
@@ -9,6 +8,7 @@ use clap::Args;
 
 use crate::dataset::openeqa::OpenQuestion;
 use crate::error::{Error, Result};
+use crate::files::reading;
 use crate::types::Decides;
 
 /// The flags that select questions.
@@ -102,7 +102,7 @@ fn check_known<'a>(
 
 /// The ids in a file, a JSON array.
 fn ids(path: &Path) -> Result<BTreeSet<String>> {
-    let text = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
+    let text = reading::read(path).map_err(|e| Error::file(path, "read", e))?;
     serde_json::from_slice(&text).map_err(|e| {
         let problem = format!("{e}; a JSON array of question ids expected");
         Error::data(path.display(), problem)

@@ -81,7 +81,7 @@ fn fault(file: &Path) -> Result<Option<()>> {
         return wrong("names an image outside of its folder");
     }
     let image = file.with_file_name(&output.file);
-    let bytes = fs::read(&image).map_err(|e| Error::file(&image, "read", e))?;
+    let bytes = reading::read(&image).map_err(|e| Error::file(&image, "read", e))?;
     match output.fault(&bytes) {
         None => Ok(Some(())),
         Some(fault) => Err(Error::data(image.display(), fault)),

@@ -4,7 +4,6 @@
 //! order: bytes, then pixels, then refusal. An image is in its place before its JSON file is, so that no JSON file vouches for an
 //! image that is not there.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
@@ -172,7 +171,7 @@ impl Placed {
                     return Err(self.refusal(&problem));
                 }
                 let bytes =
-                    fs::read(&self.image).map_err(|e| Error::file(&self.image, "read", e))?;
+                    reading::read(&self.image).map_err(|e| Error::file(&self.image, "read", e))?;
                 Sidecar::new(recipe.clone(), &self.image, &bytes).write(&self.json)?;
                 Ok(ImageOutcome::Unchanged)
             }
@@ -189,7 +188,7 @@ impl Placed {
         if self.is_forced || !self.image.exists() {
             return Ok(Verdict::Make(None));
         }
-        let bytes = fs::read(&self.image).map_err(|e| Error::file(&self.image, "read", e))?;
+        let bytes = reading::read(&self.image).map_err(|e| Error::file(&self.image, "read", e))?;
         if !self.json.exists() {
             let problem = "no JSON file vouches for it, and its pixels are others";
             let there = decoded(&self.image, &bytes).ok_or_else(|| self.refusal(problem))?;

@@ -43,6 +43,10 @@ impl Seeds {
         inside.map(Path::to_owned).collect()
     }
 
+    pub(crate) fn bench(&self) -> &Bench {
+        &self.0
+    }
+
     pub(crate) fn path(&self, name: &Path) -> PathBuf {
         self.0.path("").join(name)
     }

@@ -5,6 +5,7 @@ use std::process::Stdio;
 
 use serde_json::{Value, json};
 
+use crate::process::program;
 use crate::support::batches::{Course, MockBatches};
 use crate::support::process::{signal, wait_until};
 use crate::support::run::{Bench, files, records, words};
@@ -85,7 +86,10 @@ fn submitted(bench: &Bench) {
     let mock = MockBatches::start([Course::of("in_progress")]);
     let url = mock.base_url();
     let line = "batch run --data set.jsonl --model m --levels L0 --out submitted --poll 0.02 --no-scout --base-url";
-    let mut process = bench.spawn(&[words(line), vec![&url]].concat(), Stdio::null());
+    let mut command = program(&bench.path(""));
+    command.args(words(line)).arg(&url);
+    command.stdout(Stdio::null()).stderr(Stdio::null());
+    let mut process = command.spawn().unwrap();
     wait_until(|| mock.count("GET batches/id") > 1);
     signal(&process, "-TERM");
     process.wait().unwrap();
