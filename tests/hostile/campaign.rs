@@ -116,6 +116,10 @@ pub(crate) fn run(seed: u64, runs: usize) -> Summary {
     summary.into_inner().unwrap()
 }
 
+#[expect(
+    clippy::print_stderr,
+    reason = "a long campaign says what it finds at once"
+)]
 fn one(seed: u64, number: usize, seeds: &Seeds, folder: &Path, summary: &Mutex<Summary>) {
     let case: &Case = &CASES[number % CASES.len()];
     let trial = Trial::draw(case, seeds, &mut Random::of_run(seed, number));

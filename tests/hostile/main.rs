@@ -16,6 +16,7 @@ mod campaign;
 mod canary;
 mod cases;
 mod coverage;
+mod doors;
 mod found;
 mod judge;
 mod mutators;

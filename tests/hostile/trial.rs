@@ -16,6 +16,7 @@ use crate::random::Random;
 use crate::replies::endpoint;
 use crate::requests;
 use crate::seeds::Seeds;
+use crate::support::endpoint::MockEndpoint;
 use crate::support::run::files;
 
 /// What is done to a file.
@@ -104,7 +105,7 @@ impl<'a> Trial<'a> {
         let canary = self.write(seeds, folder);
         let work = folder.join("work");
         let mock = self.case.asks().then(|| endpoint(&work));
-        let url = mock.as_ref().map_or(String::new(), |mock| mock.base_url());
+        let url = mock.as_ref().map_or(String::new(), MockEndpoint::base_url);
         let address = url.trim_start_matches("http://").trim_end_matches("/v1");
         if mock.is_some() {
             name_port(&work, address.rsplit(':').next().unwrap_or_default());
@@ -117,7 +118,7 @@ impl<'a> Trial<'a> {
             patience = Some(Duration::ZERO);
         }
         let finished = running.end(Limits::PROGRAM.time, patience);
-        for request in mock.iter().flat_map(|mock| mock.requests()) {
+        for request in mock.iter().flat_map(MockEndpoint::requests) {
             sent.extend(request.body);
         }
         self.judged(&finished, &canary, &sent, folder)

@@ -1,6 +1,6 @@
 //! Damage to bytes, whatever they mean.
 
-use super::words::{MAGIC, NUMBERS, ODD_CHARACTERS};
+use super::words;
 use crate::random::Random;
 
 /// The most bytes of a damaged file.
@@ -9,7 +9,7 @@ const MOST_BYTES: usize = 1 << 20;
 /// Damages a file in one place.
 pub(super) fn mutate(file: &mut Vec<u8>, random: &mut Random) {
     if file.is_empty() {
-        file.extend_from_slice(*random.pick(&MAGIC));
+        file.extend_from_slice(words::magic(random));
         return;
     }
     let at = random.below(file.len());
@@ -18,9 +18,9 @@ pub(super) fn mutate(file: &mut Vec<u8>, random: &mut Random) {
         1 => file[at] = random.next() as u8,
         2 => file[at] = *random.pick(&[0, 1, 0x7F, 0x80, 0xFF]),
         3 => drop(file.drain(random.part(file.len(), 64))),
-        4 => insert(file, at, *random.pick(&MAGIC)),
-        5 => insert(file, at, *random.pick(&ODD_CHARACTERS)),
-        6 => overwrite(file, at, *random.pick(&MAGIC)),
+        4 => insert(file, at, words::magic(random)),
+        5 => insert(file, at, words::odd_character(random)),
+        6 => overwrite(file, at, words::magic(random)),
         7 => repeat(file, random),
         8 => file.truncate(at),
         9 => splice(file, random),
@@ -77,6 +77,6 @@ pub(super) fn change_number(file: &mut Vec<u8>, random: &mut Random) -> bool {
         .iter()
         .take_while(|byte| byte.is_ascii_digit());
     let end = start + digits.count();
-    file.splice(start..end, random.pick(&NUMBERS).bytes());
+    file.splice(start..end, words::number(random).bytes());
     true
 }

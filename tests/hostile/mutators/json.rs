@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
-use super::words::{NUMBERS, TEXTS};
+use super::words::{self, TEXTS};
 use crate::random::Random;
 
 /// Damages one value in a file of JSON or of lines of JSON; false if no value can be read where it looks.
@@ -31,7 +31,7 @@ pub(super) fn mutate(file: &mut Vec<u8>, random: &mut Random) -> bool {
     change_at(&mut value, &mut left, random);
     let text = value.to_string();
     // No value of JSON is written so, but files hold it.
-    let text = text.replacen("\"RAW NUMBER\"", *random.pick(&NUMBERS), 1);
+    let text = text.replacen("\"RAW NUMBER\"", words::number(random), 1);
     let depth = *random.pick(&[1, 3, 100, 5000]);
     let deep = "[".repeat(depth) + &"]".repeat(depth);
     let text = text.replacen("\"RAW DEPTH\"", &deep, 1);
@@ -93,7 +93,7 @@ fn change(value: &mut Value, random: &mut Random) {
                 random
                     .pick(&["a", "\u{0}", "é", "1", "\u{1b}", "[["])
                     .repeat(20_000)
-            )
+            );
         }
     }
 }

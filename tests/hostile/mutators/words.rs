@@ -1,7 +1,23 @@
 //! Words that programs have stumbled over.
 
-/// Words that are put into files as they are.
-pub(super) const MAGIC: [&[u8]; 42] = [
+use crate::random::Random;
+
+/// One of the words that are put into files as they are.
+pub(super) fn magic(random: &mut Random) -> &'static [u8] {
+    MAGIC[random.below(MAGIC.len())]
+}
+
+/// One of the characters that are no UTF-8, or that hide or turn a line.
+pub(super) fn odd_character(random: &mut Random) -> &'static [u8] {
+    ODD_CHARACTERS[random.below(ODD_CHARACTERS.len())]
+}
+
+/// One of the numbers at the ends of what a number may be.
+pub(super) fn number(random: &mut Random) -> &'static str {
+    NUMBERS[random.below(NUMBERS.len())]
+}
+
+const MAGIC: [&[u8]; 42] = [
     b"\0",
     b"\n",
     b"\r\n",
@@ -46,8 +62,7 @@ pub(super) const MAGIC: [&[u8]; 42] = [
     b"\xff\xd8\xff\xd9",
 ];
 
-/// Bytes that are no UTF-8, or characters that hide or turn a line.
-pub(super) const ODD_CHARACTERS: [&[u8]; 12] = [
+const ODD_CHARACTERS: [&[u8]; 12] = [
     b"\xc0\xaf",
     b"\xe0\x80\xaf",
     b"\xed\xa0\x80",
@@ -62,8 +77,7 @@ pub(super) const ODD_CHARACTERS: [&[u8]; 12] = [
     b"\xf3\xa0\x81\x81",
 ];
 
-/// Numbers at the ends of what a number may be.
-pub(super) const NUMBERS: [&str; 22] = [
+const NUMBERS: [&str; 22] = [
     "0",
     "-0",
     "-1",

@@ -55,10 +55,8 @@ pub(super) fn make(bench: &Bench) {
 }
 
 fn lines(values: impl IntoIterator<Item = Value>) -> String {
-    values
-        .into_iter()
-        .map(|value| format!("{value}\n"))
-        .collect()
+    let lines = values.into_iter().map(|value| value.to_string() + "\n");
+    lines.collect()
 }
 
 /// A file of two rows with an image in each.
