@@ -38,9 +38,9 @@ impl Case {
         self.line.starts_with("serve ")
     }
 
-    /// Whether it goes on for as long as an endpoint or a number of the user says: it is then asked to end.
+    /// Whether it goes on for as long as an endpoint, retries or a number of the user say: it is then asked to end.
     pub(crate) fn waits(&self) -> bool {
-        let begins = ["batch run", "rooms", "serve"];
+        let begins = ["batch run", "models", "rooms", "serve"];
         begins.iter().any(|begin| self.line.starts_with(begin))
     }
 }
