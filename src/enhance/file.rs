@@ -7,6 +7,7 @@ use std::path::{Component, Path, PathBuf};
 use serde::Serialize;
 
 use crate::error::{Error, Result};
+use crate::files::reading;
 use crate::types::{Digest, EnhancerName};
 
 use super::built_in::BuiltIn;
@@ -143,7 +144,7 @@ fn digest(
     let mut external = BTreeMap::new();
     for location in &weights.external {
         let file = external_path(path, location)?;
-        let content = std::fs::read(&file).map_err(|e| Error::file(file, "read", e))?;
+        let content = reading::read(&file).map_err(|e| Error::file(file, "read", e))?;
         external.insert(location.as_ref(), Digest::of(&content));
     }
     let sidecar = sidecar.clone();
@@ -209,7 +210,7 @@ fn read_model(path: &Path) -> Result<Vec<u8>> {
             ),
         });
     }
-    std::fs::read(path).map_err(unreadable)
+    reading::read(path).map_err(unreadable)
 }
 
 fn not_onnx(path: &Path, bytes: &[u8]) -> Error {

@@ -1,6 +1,7 @@
-//! Readers of folders ([`entries`]), text files ([`text`], [`settings`]) and files of one JSON object a line ([`json_lines`]).
+//! Readers of folders ([`entries`]), files ([`open`]), text files ([`text`], [`settings`]) and files of one JSON object a line ([`json_lines`]).
 //!
-//! Each has a bound, so that no file takes memory without end: a stranger's file may be a link to `/dev/zero`.
+//! Each has a bound, so that no file takes memory without end, and none waits for ever: a stranger's file may be a link to `/dev/zero`,
+//! or a pipe.
 
 use std::fs::{self, File};
 use std::io::{self, BufRead as _, BufReader, Read as _};
@@ -33,6 +34,52 @@ pub(crate) fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
+/// Opens a file to read it. A pipe or a device in the place of a file is refused: it may have no end, or wait for ever. It is opened
+/// where the path itself lies in `/dev` or `/proc`, as `/dev/stdin` and what a shell writes for `<(command)`.
+///
+/// # Errors
+/// If the file cannot be opened.
+pub(crate) fn open(path: &Path) -> io::Result<File> {
+    let kind = fs::metadata(path)?.file_type();
+    let is_named = path.starts_with("/dev") || path.starts_with("/proc");
+    if kind.is_file() || kind.is_dir() || is_named {
+        return File::open(path);
+    }
+    let problem = "a pipe or a device stands in the place of a file; put a file there";
+    Err(io::Error::new(io::ErrorKind::InvalidInput, problem))
+}
+
+/// The bytes of a file that [`open`] opens.
+///
+/// # Errors
+/// If the file cannot be read, or is larger than 1 GB.
+pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
+    read_at_most(path, MOST_BYTES)
+}
+
+/// The text of a file that [`open`] opens.
+///
+/// # Errors
+/// If the file cannot be read, is larger than 1 GB, or is not UTF-8.
+pub(crate) fn read_to_string(path: &Path) -> io::Result<String> {
+    read(path).and_then(utf8)
+}
+
+fn read_at_most(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    let file = open(path)?;
+    let length = file.metadata()?.len();
+    let mut bytes = Vec::with_capacity(length.min(most) as usize);
+    if file.take(most + 1).read_to_end(&mut bytes)? as u64 > most {
+        let problem = format!("larger than {most} bytes, which no file of its kind needs");
+        return Err(io::Error::new(io::ErrorKind::InvalidData, problem));
+    }
+    Ok(bytes)
+}
+
+fn utf8(bytes: Vec<u8>) -> io::Result<String> {
+    String::from_utf8(bytes).map_err(|e| io::Error::new(io::ErrorKind::InvalidData, e))
+}
+
 /// The bytes of a file.
 ///
 /// # Errors
@@ -46,7 +93,7 @@ pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>> {
 /// # Errors
 /// If the file cannot be read, is larger than 1 GB, or is not UTF-8.
 pub(crate) fn text(path: &Path) -> Result<String> {
-    utf8(path, bytes(path)?)
+    read_to_string(path).map_err(|e| Error::file(path, "read", e))
 }
 
 /// The text of a file of settings.
@@ -54,7 +101,8 @@ pub(crate) fn text(path: &Path) -> Result<String> {
 /// # Errors
 /// If the file cannot be read, is larger than 1 MB, or is not UTF-8.
 pub(crate) fn settings(path: &Path) -> Result<String> {
-    utf8(path, at_most(path, MOST_SETTINGS)?)
+    let text = read_at_most(path, MOST_SETTINGS).and_then(utf8);
+    text.map_err(|e| Error::file(path, "read", e))
 }
 
 /// The bytes of a file that has no more than so many.
@@ -62,21 +110,7 @@ pub(crate) fn settings(path: &Path) -> Result<String> {
 /// # Errors
 /// If the file cannot be read or is larger.
 pub(crate) fn at_most(path: &Path, most: u64) -> Result<Vec<u8>> {
-    let unreadable = |e| Error::file(path, "read", e);
-    let file = File::open(path).map_err(unreadable)?;
-    let length = file.metadata().map_err(unreadable)?.len();
-    let mut bytes = Vec::with_capacity(length.min(most) as usize);
-    let read = file.take(most + 1).read_to_end(&mut bytes);
-    if read.map_err(unreadable)? as u64 > most {
-        let problem = format!("larger than {most} bytes, which no file of its kind needs");
-        return Err(Error::data(path.display(), problem));
-    }
-    Ok(bytes)
-}
-
-fn utf8(path: &Path, bytes: Vec<u8>) -> Result<String> {
-    let text = String::from_utf8(bytes);
-    text.map_err(|e| Error::file(path, "read", io::Error::new(io::ErrorKind::InvalidData, e)))
+    read_at_most(path, most).map_err(|e| Error::file(path, "read", e))
 }
 
 /// The value in a JSON file.
@@ -93,7 +127,7 @@ pub(crate) fn json<T: DeserializeOwned>(path: &Path) -> Result<T> {
 /// If the file cannot be read, or a line is longer than 4 MB or does not hold such an object; the error names the line.
 pub(crate) fn json_lines<T: DeserializeOwned>(path: &Path) -> Result<Vec<(usize, T)>> {
     let unreadable = |e| Error::file(path, "read", e);
-    let mut file = BufReader::new(File::open(path).map_err(unreadable)?);
+    let mut file = BufReader::new(open(path).map_err(unreadable)?);
     let (mut values, mut line) = (Vec::new(), Vec::new());
     for number in 1.. {
         line.clear();

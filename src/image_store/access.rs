@@ -1,6 +1,6 @@
 //! Reading and writing images of a store: [`ImageStore`].
 
-use std::fs::{self, File};
+use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -14,6 +14,7 @@ use super::kinds::StoredKinds;
 use super::sweep::sweep;
 use crate::error::{Error, Result};
 use crate::files::folder_access::FolderAccess;
+use crate::files::reading;
 
 /// Bytes after which the store is counted and swept again, at most; chosen.
 const SWEEP_AFTER: u64 = 1_000_000_000;
@@ -252,7 +253,7 @@ impl ImageStore {
 
 /// The content of a file, whose use is noted.
 fn read(path: &Path) -> io::Result<Vec<u8>> {
-    let mut file = File::open(path)?;
+    let mut file = reading::open(path)?;
     let data = file.metadata()?;
     let mut content = Vec::with_capacity(data.len() as usize);
     io::Read::read_to_end(&mut file, &mut content)?;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::fs::{self, File};
+use std::fs;
 use std::io::{self, Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 use std::time::{Duration, SystemTime};
@@ -10,6 +10,7 @@ use std::time::{Duration, SystemTime};
 use super::entry::{Shown, facts_at_end};
 use super::folder::{FileKind, StoreFolder, StoredFile};
 use crate::error::{Error, Result};
+use crate::files::reading;
 
 /// Bytes at the end of a file that are read for its facts; chosen: facts have less than 4 kB.
 const TAIL: u64 = 16 << 10;
@@ -124,7 +125,7 @@ fn files(folder: &Path) -> Result<Vec<StoredFile>> {
 
 /// The facts of an entry; `None` if it is damaged. Its image is not read.
 fn facts(file: &StoredFile) -> Option<super::EntryFacts> {
-    let mut content = File::open(&file.path).ok()?;
+    let mut content = reading::open(&file.path).ok()?;
     let start = file.bytes.saturating_sub(TAIL);
     content.seek(SeekFrom::Start(start)).ok()?;
     let mut tail = Vec::new();

@@ -8,6 +8,7 @@ use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressState, P
 use tracing_subscriber::fmt::MakeWriter;
 
 use crate::report::forecast::money;
+use crate::types::shown_text::shown;
 
 /// Progress bars on standard error, or nowhere if it is not a terminal.
 #[derive(Debug, Clone)]
@@ -113,9 +114,12 @@ impl Drop for StepBar {
 pub(crate) struct LogWriter(MultiProgress);
 
 impl Write for LogWriter {
-    /// A terminal that was closed, or a reader that has gone, is no reason to stop: what cannot be written is dropped.
+    /// Hidden characters are written out, because a line may quote a file. A terminal that was closed, or a reader that has gone, is
+    /// no reason to stop: what cannot be written is dropped.
     fn write(&mut self, line: &[u8]) -> io::Result<usize> {
-        let _ = self.0.suspend(|| io::stderr().write_all(line));
+        let text = String::from_utf8_lossy(line);
+        let shown = shown(&text);
+        let _ = self.0.suspend(|| io::stderr().write_all(shown.as_bytes()));
         Ok(line.len())
     }
 

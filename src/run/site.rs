@@ -11,6 +11,7 @@ use serde_json::Value;
 
 use crate::error::{Error, Result};
 use crate::files;
+use crate::files::reading;
 use crate::job::Outcome;
 use crate::job::report::site as collected;
 use crate::job::run_parts::any_run;
@@ -88,7 +89,7 @@ fn check_target(out: &Path) -> Result<()> {
     if is_empty {
         return Ok(());
     }
-    let data = fs::read(out.join(DATA)).ok();
+    let data = reading::read(&out.join(DATA)).ok();
     let data = data.and_then(|text| serde_json::from_slice::<Value>(&text).ok());
     let is_site =
         data.is_some_and(|data| data.get("schema").and_then(Value::as_str) == Some(SCHEMA));

@@ -47,7 +47,7 @@ const ADDRESS: &str = "--base-url";
 
 /// Writes a file into a folder, completely or not at all; a file with the same content is left untouched.
 pub(super) fn write(folder: &Path, name: &str, content: &[u8]) -> Result<()> {
-    if fs::read(folder.join(name)).is_ok_and(|existing| existing == content) {
+    if reading::read(&folder.join(name)).is_ok_and(|existing| existing == content) {
         return Ok(());
     }
     files::write_synced(&folder.join(name), content)

@@ -13,6 +13,7 @@ use super::reread_record::RereadRecord;
 use super::stored_trial::StoredTrial;
 use super::trial_line::TrialLine;
 use crate::error::{Error, Result};
+use crate::files::reading;
 use crate::files::write_synced;
 use crate::types::{Detail, ImageFidelity, Record, RunQuestion, Thumbnail, Usage};
 
@@ -115,7 +116,7 @@ pub(super) fn set_aside<T: StoredLine>(path: &Path, aside: &Path) -> Result<()> 
         let problem = format!("not {}: {}; {}", T::WHAT, first.problem, T::MEND);
         return Err(Error::line(path, first.number, problem));
     }
-    let mut lines = std::fs::read(aside).unwrap_or_default();
+    let mut lines = reading::read(aside).unwrap_or_default();
     lines.extend(bad.iter().flat_map(|bad| &bad.line));
     write_synced(aside, &lines)?;
     let mut file = OpenOptions::new()
@@ -227,7 +228,7 @@ fn is_of<T: StoredLine>(path: &Path, complete: u64) -> Result<bool> {
     let unreadable = |e| Error::file(path, "read", e);
     if complete == 0 {
         let mut first = [0];
-        let read = File::open(path).and_then(|mut file| file.read(&mut first));
+        let read = reading::open(path).and_then(|mut file| file.read(&mut first));
         return Ok(read.map_err(unreadable)? == 1 && first == *b"{");
     }
     let Some(mut pieces) = Pieces::open(path)? else {

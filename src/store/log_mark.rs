@@ -1,11 +1,11 @@
 //! What the records of a run were when something was made from them: [`LogMark`].
 
-use std::fs::File;
 use std::io::{ErrorKind, Read, Seek, SeekFrom};
 use std::path::Path;
 
 use super::folder::{MANIFEST, QUESTIONS, RECORDS};
 use crate::error::{Error, Result};
+use crate::files::reading;
 use crate::types::Digest;
 
 /// How much of the end of the records is looked at, in bytes. Records are appended: whatever changes them changes their end.
@@ -32,7 +32,7 @@ impl LogMark {
     pub(crate) fn of(folder: &Path) -> Result<Self> {
         let whole = |name: &str| {
             let path = folder.join(name);
-            match std::fs::read(&path) {
+            match reading::read(&path) {
                 Ok(content) => Ok(Digest::of(&content)),
                 Err(e) if e.kind() == ErrorKind::NotFound => Ok(Digest::of(&[])),
                 Err(e) => Err(Error::file(path, "read", e)),
@@ -40,7 +40,7 @@ impl LogMark {
         };
         let path = folder.join(RECORDS);
         let unreadable = |e| Error::file(&path, "read", e);
-        let mut log = File::open(&path).map_err(unreadable)?;
+        let mut log = reading::open(&path).map_err(unreadable)?;
         let log_bytes = log.metadata().map_err(unreadable)?.len();
         let mut tail = Vec::new();
         let start = log_bytes.saturating_sub(TAIL);

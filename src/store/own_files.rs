@@ -14,7 +14,7 @@ const INNER: [&str; 1] = [BATCH];
 /// The files that are appended to. All others are replaced by new files, which leaves what they link to as it is.
 const APPENDED: [&str; 3] = [RECORDS, THUMBNAILS, FIDELITY];
 
-/// Refuses a run folder in which a folder or a file that is appended to is a link. The folder itself may be reached by one.
+/// Refuses a run folder in which a folder or a file that is appended to is a link, or anything a pipe. The folder itself may be reached by one.
 ///
 /// # Errors
 /// Names the link.
@@ -54,6 +54,9 @@ fn foreign(entry: &DirEntry) -> Option<&'static str> {
     if own.is_symlink() {
         let is_list = Path::new(&name).extension() == Some(OsStr::new("jsonl"));
         return (is_list || entry.path().is_dir()).then_some("a link");
+    }
+    if !own.is_file() && !own.is_dir() {
+        return Some("a pipe or a device");
     }
     let is_appended = APPENDED.iter().any(|appended| name == *appended);
     (is_appended && names(&own) > 1).then_some("a file with a second name (a hard link)")

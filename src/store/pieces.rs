@@ -5,6 +5,7 @@ use std::io::{ErrorKind, Read};
 use std::path::Path;
 
 use crate::error::{Error, Result};
+use crate::files::reading;
 
 /// The bytes that are read at once. A piece is longer only if one line is. Chosen: enough lines for all cores.
 const PIECE_BYTES: u64 = 4 << 20;
@@ -60,7 +61,7 @@ pub(super) struct FileLine<'p> {
 /// # Errors
 /// If it cannot be opened.
 pub(super) fn open_if_there(path: &Path) -> Result<Option<File>> {
-    match File::open(path) {
+    match reading::open(path) {
         Ok(file) => Ok(Some(file)),
         Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
         Err(e) => Err(Error::file(path, "open", e)),

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::event::{Event, PartFacts};
 use super::part::{Part, Stage};
 use crate::error::{Error, Result};
+use crate::files::reading;
 use crate::job::now;
 use crate::store::BATCH;
 use crate::types::Digest;
@@ -61,7 +62,7 @@ impl Journal {
             limits: BTreeMap::new(),
         };
         let path = journal.path();
-        let text = match fs::read(&path) {
+        let text = match reading::read(&path) {
             Ok(text) => text,
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(journal),
             Err(e) => return Err(Error::file(path, "read", e)),
@@ -177,7 +178,7 @@ fn append(path: &Path, text: &[u8]) -> std::io::Result<()> {
 
 /// Cuts off what follows the last line end.
 fn cut_incomplete_line(path: &Path) -> std::io::Result<()> {
-    let text = match fs::read(path) {
+    let text = match reading::read(path) {
         Ok(text) => text,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()),
         Err(e) => return Err(e),

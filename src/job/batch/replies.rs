@@ -2,13 +2,13 @@
 
 use std::collections::{BTreeSet, HashMap};
 use std::fmt::Write;
-use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
 use crate::ask::Constrain;
 use crate::ask::batch::{BatchLine, with_letter};
 use crate::error::{Error, Result};
+use crate::files::reading;
 use crate::store::Store;
 use crate::types::flag::read_word;
 use crate::types::manifest::RunManifest;
@@ -130,7 +130,7 @@ pub(crate) fn import<D: Detail>(
         });
     }
     for path in files {
-        let file = File::open(path).map_err(|e| Error::file(path, "read", e))?;
+        let file = reading::open(path).map_err(|e| Error::file(path, "read", e))?;
         for (i, line) in BufReader::new(file).lines().enumerate() {
             let line = line.map_err(|e| Error::file(path, "read", e))?;
             if line.trim().is_empty() {

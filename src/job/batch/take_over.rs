@@ -1,7 +1,6 @@
 //! The last steps of a part: its replies are taken over, or its requests are freed.
 
 use std::collections::BTreeSet;
-use std::fs::File;
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 
@@ -11,6 +10,7 @@ use super::part::Stage;
 use super::replies::{Imported, ReplyImport};
 use crate::ask::Model;
 use crate::error::{Error, Result};
+use crate::files::reading;
 use crate::types::{Detail, Failure, FailureKind, TrialKey};
 
 impl<'a, D: Detail> Driver<'a, D> {
@@ -154,7 +154,7 @@ pub(super) fn key_of(line: &str) -> Option<TrialKey> {
 /// Calls `take` with each line of a file that is not empty. Bytes that are not UTF-8 are replaced.
 pub(super) fn for_each_line(path: &Path, mut take: impl FnMut(&str) -> Result<()>) -> Result<()> {
     let unreadable = |e| Error::file(path, "read", e);
-    let mut file = BufReader::new(File::open(path).map_err(unreadable)?);
+    let mut file = BufReader::new(reading::open(path).map_err(unreadable)?);
     let mut line = Vec::new();
     loop {
         line.clear();

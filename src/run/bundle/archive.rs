@@ -1,7 +1,6 @@
 //! The ZIP file of a bundle: [`zipped`], and [`is_bundle`].
 
 use std::fmt::Write as _;
-use std::fs::File;
 use std::io::{Cursor, Write as _};
 use std::path::Path;
 
@@ -10,6 +9,7 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
 use crate::error::{Error, Result};
+use crate::files::reading;
 
 /// The comment of the archive, by which a bundle is known again.
 const MARK: &[u8] = b"darkqa.bundle/1";
@@ -22,7 +22,7 @@ const LEVEL: i64 = 6;
 
 /// Whether a file is a bundle.
 pub(super) fn is_bundle(path: &Path) -> bool {
-    let archive = File::open(path).ok().map(ZipArchive::new);
+    let archive = reading::open(path).ok().map(ZipArchive::new);
     archive.is_some_and(|archive| archive.is_ok_and(|archive| archive.comment() == MARK))
 }
 

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use crate::error::{Error, Result};
+use crate::files::reading;
 use crate::files::write;
 use crate::questions::statistics::FrameStatistics;
 use crate::types::Digest;
@@ -79,7 +80,7 @@ enum FileEnd {
 
 /// Adds the statistics in a file, if it exists, to those that are known.
 fn read(path: &Path, known: &mut HashMap<Digest, FrameStatistics>) -> Result<FileEnd> {
-    let file = match File::open(path) {
+    let file = match reading::open(path) {
         Ok(file) => file,
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(FileEnd::Complete),
         Err(e) => return Err(Error::file(path, "read", e)),

@@ -1,7 +1,6 @@
 //! What a Parquet file says of itself: [`FileMetadata`].
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -9,6 +8,7 @@ use parquet::file::metadata::ParquetMetaDataReader;
 
 use crate::error::{Error, Result};
 use crate::files::guarded::guarded;
+use crate::files::reading;
 
 /// What the program writes of itself into its Parquet files.
 pub(crate) const CREATED_BY: &str = concat!("darkqa-eval version ", env!("CARGO_PKG_VERSION"));
@@ -28,7 +28,7 @@ impl FileMetadata {
     /// # Errors
     /// If it cannot be read.
     pub(crate) fn of(path: &Path) -> Result<Option<Self>> {
-        let file = match File::open(path) {
+        let file = match reading::open(path) {
             Ok(file) => file,
             Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
             Err(e) => return Err(Error::file(path, "read", e)),

@@ -11,6 +11,7 @@ use zip::ZipArchive;
 
 use super::packed::most_unpacked;
 use crate::error::{Error, Result};
+use crate::files::reading;
 use crate::types::FrameId;
 
 /// The maximum number of entries.
@@ -40,7 +41,7 @@ impl Archive {
     /// If it is no ZIP file, or a name in it is absolute, leads out of it or is a link.
     pub(super) fn open(path: &Path) -> Result<Self> {
         let wrong = |problem: String| Error::data(path.display(), problem);
-        let file = File::open(path).map_err(|e| Error::file(path, "read", e))?;
+        let file = reading::open(path).map_err(|e| Error::file(path, "read", e))?;
         let mut zip = ZipArchive::new(BufReader::new(file))
             .map_err(|e| wrong(format!("not a whole ZIP file: {e}")))?;
         if zip.len() > MOST_ENTRIES {

@@ -11,12 +11,13 @@ use super::super::cell::Cell;
 use super::super::row::{JsonUnit, RowPlace, Table};
 use super::json_scan::{Found, JsonScan, Kind, LONGEST_ROW};
 use crate::error::{Error, Result};
+use crate::files::reading;
 use crate::types::shell_word;
 
 type Scan = JsonScan<BufReader<File>>;
 
 fn open(path: &Path) -> Result<BufReader<File>> {
-    let file = File::open(path).map_err(|e| Error::file(path, "read", e))?;
+    let file = reading::open(path).map_err(|e| Error::file(path, "read", e))?;
     Ok(BufReader::with_capacity(1 << 16, file))
 }
 
@@ -258,7 +259,7 @@ pub(super) fn cell(
     column: &str,
 ) -> Result<Cell> {
     let unreadable = |e| Error::file(path, "read", e);
-    let mut file = File::open(path).map_err(unreadable)?;
+    let mut file = reading::open(path).map_err(unreadable)?;
     file.seek(SeekFrom::Start(offset)).map_err(unreadable)?;
     let mut bytes = vec![0; length];
     file.read_exact(&mut bytes).map_err(unreadable)?;

@@ -14,7 +14,6 @@ mod table;
 mod tree;
 mod yaml;
 
-use std::fs::File;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
@@ -24,6 +23,7 @@ use super::step::Step;
 use tempfile::NamedTempFile;
 
 use crate::error::{Error, Result};
+use crate::files::reading;
 
 pub(in crate::dataset) use archive::Archive;
 pub(in crate::dataset) use find::holds_files;
@@ -181,7 +181,7 @@ fn ending(path: &Path) -> String {
 /// Refuses a pointer of Git LFS, which stands where a file was not downloaded.
 fn check_content(path: &Path) -> Result<()> {
     const POINTER: &[u8] = b"version https://git-lfs.github.com/spec";
-    let mut file = File::open(path).map_err(|e| Error::file(path, "read", e))?;
+    let mut file = reading::open(path).map_err(|e| Error::file(path, "read", e))?;
     let mut head = [0; POINTER.len()];
     if file.read_exact(&mut head).is_ok() && head == POINTER {
         let problem =

@@ -1,6 +1,5 @@
 //! How far packed files are unpacked: [`unpacked`], [`most_unpacked`].
 
-use std::fs::File;
 use std::io::{BufReader, Read as _};
 use std::path::Path;
 
@@ -8,6 +7,7 @@ use flate2::read::MultiGzDecoder;
 use tempfile::NamedTempFile;
 
 use crate::error::{Error, Result};
+use crate::files::reading;
 
 /// The longest content of a packed file of so many bytes: no table is packed to less than a two-hundredth, but what is meant to fill a
 /// disk is.
@@ -24,7 +24,7 @@ fn too_long(most: u64) -> String {
 
 /// An unpacked copy of a compressed file. Images are read at their places in it, which a compressed file does not have.
 pub(super) fn unpacked(path: &Path) -> Result<NamedTempFile> {
-    let file = File::open(path).map_err(|e| Error::file(path, "read", e))?;
+    let file = reading::open(path).map_err(|e| Error::file(path, "read", e))?;
     let mut copy =
         NamedTempFile::new().map_err(|e| Error::file(std::env::temp_dir(), "write", e))?;
     let most = most_unpacked(file.metadata().map_or(0, |facts| facts.len()));

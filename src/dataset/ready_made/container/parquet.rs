@@ -24,12 +24,13 @@ use super::super::text_list::list;
 use super::json_scan::LONGEST_ROW;
 use crate::error::{Error, Result};
 use crate::files::guarded::guarded;
+use crate::files::reading;
 
 /// How many rows are decoded at a time. Each holds its image until the next.
 const ROWS_AT_A_TIME: usize = 8;
 
 fn open(path: &Path) -> Result<File> {
-    File::open(path).map_err(|e| Error::file(path, "read", e))
+    reading::open(path).map_err(|e| Error::file(path, "read", e))
 }
 
 /// The footer of a file, parsed once while the file is open.
@@ -223,7 +224,7 @@ impl Cursor {
         group: usize,
         leaf: usize,
     ) -> Result<Self, String> {
-        let file = File::open(path).map_err(|e| e.to_string())?;
+        let file = reading::open(path).map_err(|e| e.to_string())?;
         let of_group = &footer.row_groups()[group];
         let chunk = &of_group.columns()[leaf];
         let rows = usize::try_from(of_group.num_rows()).unwrap_or(0);

@@ -9,13 +9,14 @@ use csv::{ByteRecord, Position, Reader, ReaderBuilder};
 use super::super::cell::Cell;
 use super::super::row::{RowPlace, Table};
 use crate::error::{Error, Result};
+use crate::files::reading;
 
 /// The ending decides the delimiter; a CSV file without a comma in its header has semicolons, as spreadsheets write it in many countries.
 pub(super) fn delimiter(path: &Path, ending: &str) -> Result<u8> {
     if ending == "tsv" {
         return Ok(b'\t');
     }
-    let file = File::open(path).map_err(|e| Error::file(path, "read", e))?;
+    let file = reading::open(path).map_err(|e| Error::file(path, "read", e))?;
     let mut header = Vec::new();
     let mut file = BufReader::new(file.take(LONGEST_RECORD));
     file.read_until(b'\n', &mut header)
@@ -61,7 +62,7 @@ impl Seek for Bounded {
 const TOO_LONG: &str = "more than 64 MB; is a quote missing before it or in it?";
 
 fn reader(path: &Path, delimiter: u8) -> Result<Reader<Bounded>> {
-    let file = File::open(path).map_err(|e| Error::file(path, "read", e))?;
+    let file = reading::open(path).map_err(|e| Error::file(path, "read", e))?;
     let left = LONGEST_RECORD;
     Ok(ReaderBuilder::new()
         .delimiter(delimiter)

@@ -1,0 +1,133 @@
+//! A process that a campaign waits for, with the memory that it took at most.
+
+use std::fs::{self, File};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// The most bytes of a stream that are looked at.
+const MOST_BYTES: usize = 16 << 20;
+
+/// The program in a folder, with the few variables that it needs.
+pub(crate) fn program(work: &Path) -> Command {
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin("darkqa-eval"));
+    command.current_dir(work).env_clear();
+    let kept = [
+        "PATH",
+        "HOME",
+        "XDG_CACHE_HOME",
+        "ORT_DYLIB_PATH",
+        "LD_LIBRARY_PATH",
+    ];
+    for name in kept {
+        if let Some(value) = std::env::var_os(name) {
+            command.env(name, value);
+        }
+    }
+    command.env("DARKQA_DATA", "rooms:frames=2,size=32x32");
+    command
+}
+
+/// What a process gave.
+#[derive(Debug)]
+pub(crate) struct Finished {
+    pub(crate) code: Option<i32>,
+    pub(crate) signal: Option<i32>,
+    pub(crate) took: Duration,
+    /// Whether it had to be killed.
+    pub(crate) is_late: bool,
+    /// The largest resident memory in bytes, of it or of one of its children. A process begins with that of its parent.
+    pub(crate) memory: u64,
+    pub(crate) stdout: Vec<u8>,
+    pub(crate) stderr: Vec<u8>,
+}
+
+/// A process whose streams go into two files of a folder.
+pub(crate) struct Running<'a> {
+    child: Child,
+    folder: &'a Path,
+    start: Instant,
+}
+
+impl<'a> Running<'a> {
+    pub(crate) fn start(command: &mut Command, folder: &'a Path) -> Self {
+        let stream = |name: &str| File::create(folder.join(name)).unwrap();
+        command.stdin(Stdio::null());
+        command.stdout(stream("stdout")).stderr(stream("stderr"));
+        Self {
+            child: command.spawn().unwrap(),
+            folder,
+            start: Instant::now(),
+        }
+    }
+
+    /// What it wrote so far.
+    pub(crate) fn stdout(&self) -> String {
+        let bytes = fs::read(self.folder.join("stdout")).unwrap_or_default();
+        String::from_utf8_lossy(&bytes).into_owned()
+    }
+
+    /// Whether it wrote to standard error.
+    pub(crate) fn has_complained(&self) -> bool {
+        let file = fs::metadata(self.folder.join("stderr"));
+        file.is_ok_and(|file| file.len() > 0)
+    }
+
+    /// Waits for its end; after the `limit` it is killed. After `patience` it is asked to end by a signal, if that is given.
+    pub(crate) fn end(self, limit: Duration, patience: Option<Duration>) -> Finished {
+        let id = self.child.id() as libc::pid_t;
+        let (mut is_late, mut is_asked) = (false, patience.is_none());
+        let (status, usage) = loop {
+            if let Some(ended) = ended(id) {
+                break ended;
+            }
+            let took = self.start.elapsed();
+            if !is_asked && Some(took) > patience {
+                is_asked = true;
+                crate::support::process::signal(&self.child, "-TERM");
+            }
+            if !is_late && took > limit {
+                is_late = true;
+                crate::support::process::signal(&self.child, "-9");
+            }
+            thread::sleep(Duration::from_millis(if took.as_millis() < 500 {
+                1
+            } else {
+                10
+            }));
+        };
+        let stream = |name: &str| {
+            let mut bytes = fs::read(self.folder.join(name)).unwrap_or_default();
+            bytes.truncate(MOST_BYTES);
+            bytes
+        };
+        Finished {
+            code: libc::WIFEXITED(status).then(|| libc::WEXITSTATUS(status)),
+            signal: libc::WIFSIGNALED(status).then(|| libc::WTERMSIG(status)),
+            took: self.start.elapsed(),
+            is_late,
+            memory: usage.ru_maxrss as u64 * 1024,
+            stdout: stream("stdout"),
+            stderr: stream("stderr"),
+        }
+    }
+}
+
+/// The status of a child that has ended, and what it used.
+#[expect(
+    unsafe_code,
+    reason = "the standard library tells no memory of a child"
+)]
+fn ended(id: libc::pid_t) -> Option<(libc::c_int, libc::rusage)> {
+    let mut status = 0;
+    // SAFETY: both places are owned, and a structure of numbers may be all zeros. The child is this process's own, and nobody
+    // else waits for it: `Running::end` owns it.
+    let (found, usage) = unsafe {
+        let mut usage = std::mem::zeroed();
+        let found = libc::wait4(id, &raw mut status, libc::WNOHANG, &raw mut usage);
+        (found, usage)
+    };
+    assert!(found >= 0, "the child {id} cannot be waited for");
+    (found == id).then_some((status, usage))
+}
