@@ -17,6 +17,7 @@ use super::file::ModelFile;
 use super::frozen::traced_sizes;
 use super::graph::{Graph, RunResult};
 use super::memory_check::{MemoryCheck, no_memory};
+use super::memory_limit::MemoryLimit;
 use super::planes::Planes;
 use super::reach::Context;
 use super::reading::OutOfRange;
@@ -26,7 +27,7 @@ use super::size_plan::{NoPlan, SeamRule, SizePlan, SizeRule, global, seams_diffe
 use super::size_search::{MULTIPLES, SizeSearch, TakenSizes, not_found};
 use super::sizes::SizeLog;
 use super::tiles::{TileWindow, TiledImage, Tiling};
-use super::time_limit::{MOST_SLOW, TimeLimit};
+use super::time_limit::{MOST_ENDED, TimeLimit};
 use super::usage::Usage;
 
 /// How an image of another size reaches a model of a fixed size.
@@ -59,8 +60,8 @@ pub struct Enhancer {
     context: Context,
     memory: MemoryCheck,
     log: SizeLog,
-    /// Images in a row that took too long.
-    slow: usize,
+    /// Images in a row that took too much time or memory.
+    ended: usize,
     description: Description,
     usage: Usage,
     /// Number of this enhancer among those that share the usage.
@@ -111,7 +112,7 @@ impl Enhancer {
             context: Context::default(),
             memory: MemoryCheck::new(),
             log: SizeLog::default(),
-            slow: 0,
+            ended: 0,
             description: Description {
                 sidecar: file.sidecar,
                 preset: file.preset,
@@ -141,6 +142,13 @@ impl Enhancer {
     #[must_use]
     pub fn with_time_limit(mut self, limit: TimeLimit) -> Self {
         self.graph.limit_time(limit);
+        self
+    }
+
+    /// Sets the memory that the process may take while the model runs; the default of this call is any.
+    #[must_use]
+    pub fn with_memory_limit(mut self, limit: MemoryLimit) -> Self {
+        self.graph.limit_memory(limit);
         self
     }
 
@@ -184,9 +192,9 @@ impl Enhancer {
     /// If the model fails on this image, gives another size than it was given, or values that are not numbers or not in the
     /// expected range; if tiles differ where they overlap; if memory or time do not suffice.
     pub fn enhance(&mut self, image: &Rgb) -> Result<Rgb> {
-        if self.slow >= MOST_SLOW {
+        if self.ended >= MOST_ENDED {
             return Err(self.fault(format!(
-                "is not run any more, because {MOST_SLOW} images in a row took longer than --llie-timeout allows"
+                "is not run any more, because {MOST_ENDED} images in a row took longer than --llie-timeout or more memory than --llie-max-memory allows"
             )));
         }
         self.graph.restart_clock();
@@ -195,11 +203,13 @@ impl Enhancer {
             Err(failure) if failure.is_of_size() => self.in_another_size(image, failure)?,
             attempt => attempt,
         };
-        if let Err(RunFailure::TooLong(_)) = attempt {
-            self.slow += 1;
-            self.log.too_long += 1;
-        } else {
-            self.slow = 0;
+        match attempt {
+            Err(RunFailure::TooLong(_)) => {
+                self.ended += 1;
+                self.log.too_long += 1;
+            }
+            Err(RunFailure::TooLarge(_)) => self.ended += 1,
+            _ => self.ended = 0,
         }
         self.usage.set_sizes(self.twin, &self.log);
         attempt.map_err(|failure| self.failed(&failure, size))
@@ -367,7 +377,7 @@ impl Enhancer {
         let rule = self.rule(size);
         self.fault(match failure {
             RunFailure::NoMemory { .. } => no_memory(failure, rule, size),
-            RunFailure::TooLong(_) => failure.words(),
+            RunFailure::TooLong(_) | RunFailure::TooLarge(_) => failure.words(),
             _ if !rule.takes_any_size() => format!(
                 "{}; its graph or its sidecar states the size {}",
                 failure.words(),

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use super::convention::ValueRange;
 use super::library::PINNED;
+use super::memory_limit::MemoryLimit;
 use super::reading::OutOfRange;
 
 /// Newest IR version of ONNX that ONNX Runtime 1.31.1 reads; measured with models of each version.
@@ -44,6 +45,8 @@ pub(super) enum RunFailure {
     },
     /// The image took longer than the limit.
     TooLong(Duration),
+    /// The process took more memory than the limit.
+    TooLarge(MemoryLimit),
     /// A further input cannot be cut into tiles; the message follows the file's name.
     NotCut(String),
 }
@@ -69,7 +72,7 @@ impl RunFailure {
         match self {
             Self::OtherSize { .. } => self.enlarges_by().is_none(),
             Self::Refused { .. } => true,
-            Self::NoMemory { .. } | Self::TooLong(_) | Self::NotCut(_) => false,
+            Self::NoMemory { .. } | Self::TooLong(_) | Self::TooLarge(_) | Self::NotCut(_) => false,
         }
     }
 
@@ -109,6 +112,10 @@ impl RunFailure {
             Self::TooLong(limit) => format!(
                 "took longer than {} s for an image; --llie-timeout allows more, and 0 any time",
                 limit.as_secs_f64()
+            ),
+            Self::TooLarge(limit) => format!(
+                "took more than {limit} GB of memory together with the program and was ended; --llie-max-memory allows more, and --tile or \
+                 --llie-max-side need less"
             ),
             Self::NotCut(problem) => problem.clone(),
         }

@@ -10,13 +10,14 @@ use super::composition::{Composition, ImageTensor};
 use super::failure::{RunFailure, load_problem};
 use super::fed_image::{DarkImage, FedImage};
 use super::feeding::Feeding;
+use super::memory_limit::MemoryLimit;
 use super::planes::Planes;
 use super::plausible::Codes;
 use super::port::Port;
 use super::preset::Preset;
 use super::reading::OutOfRange;
 use super::runtime::Runtime;
-use super::runtime_thread::Ended;
+use super::runtime_thread::{Ended, JobLimits};
 use super::session::{
     GraphSource, SessionOptions, Stopper, builder, one_line, ports, run, take_batch,
 };
@@ -44,6 +45,8 @@ pub(super) struct Graph {
     /// Options that give back memory after a run.
     releasing: Arc<SessionOptions>,
     clock: Mutex<ImageClock>,
+    /// Memory that the process may take during a run.
+    memory: MemoryLimit,
 }
 
 /// All inputs and outputs of a graph, by name, type and dimensions; those of its first image if it takes several.
@@ -140,6 +143,7 @@ impl Graph {
             releasing: Arc::new(releasing),
             ports,
             clock: Mutex::default(),
+            memory: MemoryLimit::NONE,
         })
     }
 
@@ -154,6 +158,7 @@ impl Graph {
         let (session, ports) = (Arc::clone(&self.session), Arc::clone(&self.ports));
         let mut graph = Self::of_session(session, ports, convention, &self.runtime)?;
         graph.clock = Mutex::new(*self.clock());
+        graph.memory = self.memory;
         graph.differing.clone_from(&self.differing);
         Ok(graph)
     }
@@ -176,6 +181,16 @@ impl Graph {
     /// The time that the runs of one image may take together.
     pub(super) fn time_limit(&self) -> TimeLimit {
         self.clock().time_limit()
+    }
+
+    /// Sets the memory that the process may take while the model runs.
+    pub(super) fn limit_memory(&mut self, limit: MemoryLimit) {
+        self.memory = limit;
+    }
+
+    /// The memory that the process may take while the model runs.
+    pub(super) fn memory_limit(&self) -> MemoryLimit {
+        self.memory
     }
 
     /// Begins the time of another image, or of a trial.
@@ -310,16 +325,24 @@ impl Graph {
             );
             result.unwrap_or_else(|e| RunResult::Failed(RunFailure::of_message(size, one_line(&e))))
         };
+        let limits = JobLimits {
+            time: clock.left(),
+            memory: self.memory,
+        };
         let ended = self
             .runtime
             .thread()
-            .run_within(clock.left(), || options.end_run(), job)?;
+            .run_within(limits, || options.end_run(), job)?;
         self.clock().add(start.elapsed());
         Ok(match (ended, clock.limit()) {
             (Ended::InTime(result), _) => result,
             (Ended::Late, limit) => {
                 options.allow_runs();
                 RunResult::Failed(RunFailure::TooLong(limit.unwrap_or_default()))
+            }
+            (Ended::TooLarge, _) => {
+                options.allow_runs();
+                RunResult::Failed(RunFailure::TooLarge(self.memory))
             }
         })
     }

@@ -6,8 +6,9 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
+use super::memory_limit::MemoryLimit;
 use super::time_limit::PATIENCE;
 use crate::error::{Error, Result};
 
@@ -26,6 +27,17 @@ pub(super) enum Ended<T> {
     InTime(T),
     /// It took longer, and ended when it was told to.
     Late,
+    /// It took more memory, and ended when it was told to.
+    TooLarge,
+}
+
+/// What a job may take.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct JobLimits {
+    /// Time from its start; `None` for any.
+    pub(super) time: Option<Duration>,
+    /// Memory of the process.
+    pub(super) memory: MemoryLimit,
 }
 
 /// Message of a job to its caller.
@@ -33,6 +45,9 @@ enum Event<T> {
     Started,
     Ended(T),
 }
+
+/// Time in which a job must end that was told to because of its memory; chosen.
+const GRACE: Duration = Duration::from_secs(10);
 
 /// Time between two looks at whether the thread is stuck in the job of another caller; chosen.
 const LOOK: Duration = Duration::from_millis(500);
@@ -55,20 +70,20 @@ impl RuntimeThread {
         &self,
         job: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T> {
-        match self.run_within(None, || {}, job)? {
+        match self.run_within(JobLimits::default(), || {}, job)? {
             Ended::InTime(result) => Ok(result),
-            Ended::Late => Err(thread_ended()),
+            Ended::Late | Ended::TooLarge => Err(thread_ended()),
         }
     }
 
-    /// Runs a job. If it takes longer than `limit` from its start, `stop` is called and must make it end.
+    /// Runs a job. If it takes more than its `limits`, `stop` is called and must make it end.
     ///
     /// # Errors
-    /// If the job does not end within [`PATIENCE`] times the limit: the thread is then stuck in it, and every later job is
-    /// refused.
+    /// If the job does not end within [`PATIENCE`] times the limit of time, or 10 s after it took too much memory: the thread is
+    /// then stuck in it, and every later job is refused.
     pub(super) fn run_within<T: Send + 'static>(
         &self,
-        limit: Option<Duration>,
+        limits: JobLimits,
         stop: impl FnOnce(),
         job: impl FnOnce() -> T + Send + 'static,
     ) -> Result<Ended<T>> {
@@ -83,18 +98,17 @@ impl RuntimeThread {
         }
         self.jobs.send(job).map_err(|_| thread_ended())?;
         self.wait_for_start(&events)?;
-        let result = match limit {
-            None => events.recv().map_err(|_| RecvTimeoutError::Disconnected),
-            Some(limit) => events.recv_timeout(limit),
+        let (ended, patience) = match wait_for_end(&events, limits)? {
+            Ended::Late => {
+                let time = limits.time.unwrap_or_default();
+                (Ended::Late, time.saturating_mul(PATIENCE - 1).max(LOOK))
+            }
+            Ended::TooLarge => (Ended::TooLarge, GRACE),
+            in_time @ Ended::InTime(_) => return Ok(in_time),
         };
-        match result {
-            Ok(Event::Ended(result)) => return Ok(Ended::InTime(result)),
-            Err(RecvTimeoutError::Timeout) => stop(),
-            Ok(Event::Started) | Err(RecvTimeoutError::Disconnected) => return Err(thread_ended()),
-        }
-        let patience = limit.unwrap_or_default().saturating_mul(PATIENCE - 1);
-        match events.recv_timeout(patience.max(LOOK)) {
-            Ok(_) => Ok(Ended::Late),
+        stop();
+        match events.recv_timeout(patience) {
+            Ok(_) => Ok(ended),
             Err(RecvTimeoutError::Disconnected) => Err(thread_ended()),
             Err(RecvTimeoutError::Timeout) => {
                 self.stuck.store(true, Ordering::SeqCst);
@@ -118,6 +132,29 @@ impl RuntimeThread {
     }
 }
 
+/// Waits until a job ends or takes more than its limits.
+fn wait_for_end<T>(events: &Receiver<Event<T>>, limits: JobLimits) -> Result<Ended<T>> {
+    let start = Instant::now();
+    loop {
+        let left = limits.time.map(|time| time.saturating_sub(start.elapsed()));
+        let event = match [left, limits.memory.look()].into_iter().flatten().min() {
+            None => events.recv().map_err(|_| RecvTimeoutError::Disconnected),
+            Some(time) => events.recv_timeout(time),
+        };
+        match event {
+            Ok(Event::Ended(result)) => return Ok(Ended::InTime(result)),
+            Ok(Event::Started) | Err(RecvTimeoutError::Disconnected) => return Err(thread_ended()),
+            Err(RecvTimeoutError::Timeout) => {}
+        }
+        if limits.time.is_some_and(|time| start.elapsed() >= time) {
+            return Ok(Ended::Late);
+        }
+        if limits.memory.is_exceeded() {
+            return Ok(Ended::TooLarge);
+        }
+    }
+}
+
 fn thread_ended() -> Error {
     Error::Runtime("its thread ended, which is a bug of this program".into())
 }
@@ -134,10 +171,39 @@ mod tests {
 
     use super::*;
 
+    /// Limits of time alone.
+    fn within(time: Duration) -> JobLimits {
+        JobLimits {
+            time: Some(time),
+            memory: MemoryLimit::NONE,
+        }
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_job_that_takes_too_much_memory_is_told_to_end() {
+        let thread = RuntimeThread::start().unwrap();
+        let limits = |gigabytes: &str| JobLimits {
+            time: None,
+            memory: gigabytes.parse().unwrap(),
+        };
+        let told = Arc::new(AtomicBool::new(false));
+        let seen = Arc::clone(&told);
+        let ended = thread.run_within(
+            limits("0.001"),
+            || told.store(true, Ordering::SeqCst),
+            move || while !seen.load(Ordering::SeqCst) {},
+        );
+        assert_eq!(ended.unwrap(), Ended::TooLarge);
+        let slow = || std::thread::sleep(Duration::from_millis(250));
+        let small = thread.run_within(limits("1000000"), || {}, slow);
+        assert_eq!(small.unwrap(), Ended::InTime(()));
+    }
+
     #[test]
     fn jobs_that_end_when_they_are_told_to_leave_the_thread_free() {
         let thread = RuntimeThread::start().unwrap();
-        let limit = Some(Duration::from_millis(20));
+        let limit = within(Duration::from_millis(20));
         let told = Arc::new(AtomicBool::new(false));
         let seen = Arc::clone(&told);
         let ended = thread.run_within(
@@ -146,7 +212,7 @@ mod tests {
             move || while !seen.load(Ordering::SeqCst) {},
         );
         assert_eq!(ended.unwrap(), Ended::Late);
-        let quick = thread.run_within(Some(Duration::from_mins(1)), || {}, || 7);
+        let quick = thread.run_within(within(Duration::from_mins(1)), || {}, || 7);
         assert_eq!(quick.unwrap(), Ended::InTime(7));
         assert_eq!(thread.run(|| 8).unwrap(), 8);
     }
@@ -158,7 +224,7 @@ mod tests {
         let job = move || {
             let _ended = blocked.recv();
         };
-        let stuck = thread.run_within(Some(Duration::from_millis(1)), || {}, job);
+        let stuck = thread.run_within(within(Duration::from_millis(1)), || {}, job);
         let message = stuck.unwrap_err().to_string();
         assert!(message.contains("--llie-timeout"), "{message}");
         assert!(thread.run(|| 1).is_err());

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::enhancer::Fitting;
+use super::memory_limit::MemoryLimit;
 use super::runtime::{Install, RuntimeSearch};
 use super::tiles::Tiling;
 use super::time_limit::TimeLimit;
@@ -114,9 +115,18 @@ pub(crate) struct RuntimeArgs {
     /// enhancer is not run any more; 0 is no limit
     #[arg(long, value_name = "SECONDS", default_value_t, add = Decides::Nothing)]
     pub llie_timeout: TimeLimit,
+    /// GB (10⁹ bytes) of memory that the program may take while an enhancer runs, on Linux; what takes more is an error of its image,
+    /// and after three in a row the enhancer is not run any more; 0 is no limit; default: 80 % of what is free at the start
+    #[arg(long, value_name = "GB", add = Decides::Nothing)]
+    pub llie_max_memory: Option<MemoryLimit>,
 }
 
 impl RuntimeArgs {
+    /// The memory that an enhancer may take.
+    pub(crate) fn memory_limit(&self) -> MemoryLimit {
+        self.llie_max_memory.unwrap_or_else(MemoryLimit::automatic)
+    }
+
     /// The search that the flags and `ORT_DYLIB_PATH`, the variable of the `ort` crate, define.
     #[must_use]
     pub(crate) fn search(&self) -> RuntimeSearch {

@@ -92,7 +92,7 @@ impl SizeSearch {
             match trial(graph, *size)? {
                 Trial::Runs => return Ok(Some(*size)),
                 Trial::Fails => {}
-                Trial::TooLong => return Ok(None),
+                Trial::Ended => return Ok(None),
             }
         }
         Ok(None)
@@ -107,7 +107,7 @@ fn multiple(graph: &Graph) -> Result<Option<usize>> {
         match trial(graph, trial_size(multiple))? {
             Trial::Runs => return Ok(Some(multiple)),
             Trial::Fails => {}
-            Trial::TooLong => return Ok(None),
+            Trial::Ended => return Ok(None),
         }
     }
     Ok(None)
@@ -127,8 +127,8 @@ enum Trial {
     /// The model gave an image of the input's size, whatever its values.
     Runs,
     Fails,
-    /// It took longer than the limit of an image, so that no further trial makes sense.
-    TooLong,
+    /// It took more time or memory than an image may, so that no further trial makes sense.
+    Ended,
 }
 
 fn trial(graph: &Graph, size: [usize; 2]) -> Result<Trial> {
@@ -142,7 +142,7 @@ fn trial(graph: &Graph, size: [usize; 2]) -> Result<Trial> {
     let result = graph.probe(&texture(size, &CODES[1]), window)?;
     Ok(match result {
         RunResult::Output(()) | RunResult::Unusable(_) => Trial::Runs,
-        RunResult::Failed(RunFailure::TooLong(_)) => Trial::TooLong,
+        RunResult::Failed(RunFailure::TooLong(_) | RunFailure::TooLarge(_)) => Trial::Ended,
         RunResult::Failed(_) => Trial::Fails,
     })
 }

@@ -10,8 +10,8 @@ use crate::types::flag::seconds;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TimeLimit(Option<Duration>);
 
-/// Images in a row that may take too long before the enhancer is not run any more; chosen.
-pub(super) const MOST_SLOW: usize = 3;
+/// Images in a row that may take too much time or memory before the enhancer is not run any more; chosen.
+pub(super) const MOST_ENDED: usize = 3;
 
 /// Time, as a multiple of the limit, after which a run that was told to end counts as stuck; chosen. ONNX Runtime ends a run
 /// only between two nodes of its graph.

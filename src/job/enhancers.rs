@@ -37,7 +37,8 @@ impl EnhancerRunArgs {
             .with_tiling(self.size.tile)
             .with_max_side(self.size.llie_max_side)
             .with_fitting(self.size.fitting())
-            .with_time_limit(self.runtime.llie_timeout);
+            .with_time_limit(self.runtime.llie_timeout)
+            .with_memory_limit(self.runtime.memory_limit());
         Ok(enhancer)
     }
 }

@@ -376,11 +376,12 @@ const OPEN_ADDITIONS: [Addition; 10] = [
 ];
 
 /// What changes no answer: given on the folder of a run, it asks nothing.
-const NOTHING: [&str; 40] = [
+const NOTHING: [&str; 41] = [
     "--max-pixels 1000000",
     "--threads 1",
     "--offline",
     "--llie-timeout 60",
+    "--llie-max-memory 9",
     "--api-key-env none",
     "--api-key-file key.txt",
     "--vendor vendors.toml",

@@ -71,7 +71,7 @@ fn sample(arg: &Arg) -> String {
         "width" => "neurips",
         "columns" => "2",
         "label" => "abc=name",
-        "font_size" | "images_cache_size" => "9",
+        "font_size" | "images_cache_size" | "llie_max_memory" => "9",
         "top_p" => "0.9",
         "data" | "model" | "judge" => "abc",
         _ => match arg.get_value_names() {

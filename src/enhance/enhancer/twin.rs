@@ -29,6 +29,7 @@ impl Enhancer {
             .with_convention(self.convention().clone())
             .map_err(|problem| self.fault(problem))?;
         twin.graph.limit_time(self.graph.time_limit());
+        twin.graph.limit_memory(self.graph.memory_limit());
         Ok(Self {
             tiling: self.tiling,
             fitting: self.fitting,

@@ -55,6 +55,24 @@ fn an_image_that_takes_too_long_is_an_error_and_others_go_on() {
     assert_eq!(enhancer.sizes().too_long, 5);
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn an_image_that_takes_too_much_memory_is_an_error_and_others_go_on() {
+    let (_folder, enhancer) = loaded(&onnx::endless_if_bright());
+    let mut enhancer = enhancer.with_memory_limit("0.01".parse().unwrap());
+    let [dark, bright] = [50, 200].map(|value| Rgb::new(4, 4, vec![value; 48]).unwrap());
+    // It ends before anybody looks.
+    assert_eq!(enhancer.enhance(&dark).unwrap(), dark);
+    for _ in 0..3 {
+        let message = enhancer.enhance(&bright).unwrap_err().to_string();
+        assert!(message.contains("more than 0.01 GB"), "{message}");
+        assert!(message.contains("--llie-max-memory"), "{message}");
+    }
+    let message = enhancer.enhance(&dark).unwrap_err().to_string();
+    assert!(message.contains("is not run any more"), "{message}");
+    assert_eq!(enhancer.sizes().too_long, 0);
+}
+
 #[test]
 fn a_file_that_is_too_new_for_the_library_says_so() {
     let folder = tempfile::tempdir().unwrap();
