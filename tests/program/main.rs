@@ -34,6 +34,7 @@ mod image_store;
 mod import;
 mod inputs;
 mod levels;
+mod machine_faults;
 mod markdown;
 mod models_changed;
 mod models_file;
