@@ -28,7 +28,9 @@ mod image_files;
 use exr::prelude::Compression;
 use exr_files::compressed;
 use icc_files::{DISPLAY_P3, rgb_profile, srgb_curve};
-use image_files::{png_with_profile, turned_png, webp_with_profile};
+use image_files::{
+    packed_chunk, png, png_with_profile, turned_png, webp_with_profile, with_chunks,
+};
 
 /// The system's allocator, with the largest single request remembered.
 struct Watched;
@@ -224,6 +226,24 @@ fn a_profile_that_grows_without_bound_takes_no_memory() {
     assert_eq!(digest, file.digest());
     assert!(error.to_string().contains("ICC profile"), "{error}");
     assert!(LARGEST.load(Ordering::Relaxed) <= 16 << 20);
+}
+
+#[test]
+fn texts_that_grow_without_bound_take_no_memory() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let pixels = image::RgbImage::new(4, 4);
+    let bomb = vec![b'a'; 256 << 20];
+    for (kind, head) in [
+        (*b"zTXt", &b"Comment\0\0"[..]),
+        (*b"iTXt", b"Comment\0\x01\0\0\0"),
+    ] {
+        let chunks = [packed_chunk(kind, head, &bomb)];
+        let bytes = with_chunks(&png(&pixels), &chunks);
+        let file = ImageFile::new(bytes, "a bomb".to_owned(), ReadingRule::default());
+        LARGEST.store(0, Ordering::Relaxed);
+        assert_eq!(file.decode().unwrap().width(), 4);
+        assert!(LARGEST.load(Ordering::Relaxed) <= 16 << 20);
+    }
 }
 
 #[test]

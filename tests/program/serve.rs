@@ -224,6 +224,32 @@ fn pages_of_other_sites_are_not_answered() {
 }
 
 #[test]
+fn bodies_without_end_or_bottom_are_refused() {
+    let bench = Bench::new();
+    let server = Server::start(&bench);
+    let host = server.url.strip_prefix("http://").unwrap();
+    let host = host.strip_suffix("/v1").unwrap();
+    let head = |length: usize| {
+        format!(
+            "POST /v1/chat/completions HTTP/1.1\r\nHost: {host}\r\nContent-Type: application/json\r\nConnection: close\r\n\
+             Content-Length: {length}\r\n\r\n"
+        )
+    };
+    let deep = format!("{}{}", "[".repeat(200_000), "]".repeat(200_000));
+    let rows = [
+        (head(300_000_000), "HTTP/1.1 413"),
+        (head(deep.len()) + &deep, "HTTP/1.1 400"),
+    ];
+    check_rows(rows, |(request, expected)| {
+        let answer = server.answer_to(&request);
+        assert!(answer.starts_with(expected), "{answer}");
+    });
+    let words = json!([{"role": "user", "content": WORDS}]);
+    let (status, _) = server.ask(&json!({"model": "darkqa-random", "messages": words}));
+    assert_eq!(status, 200);
+}
+
+#[test]
 fn connections_that_send_nothing_keep_no_one_else_out() {
     let bench = Bench::new();
     let server = Server::start(&bench);

@@ -175,11 +175,16 @@ pub fn animated_webp(frames: &[RgbImage]) -> Vec<u8> {
 
 /// The PNG chunk of an ICC profile.
 pub fn profile_chunk(profile: &[u8]) -> Vec<u8> {
-    let mut data = b"a name\0\0".to_vec();
-    let mut deflate = flate2::write::ZlibEncoder::new(&mut data, flate2::Compression::fast());
-    std::io::Write::write_all(&mut deflate, profile).unwrap();
+    packed_chunk(*b"iCCP", b"a name\0\0", profile)
+}
+
+/// A chunk that holds data packed by zlib behind a head.
+pub fn packed_chunk(kind: [u8; 4], head: &[u8], data: &[u8]) -> Vec<u8> {
+    let mut packed = head.to_vec();
+    let mut deflate = flate2::write::ZlibEncoder::new(&mut packed, flate2::Compression::fast());
+    std::io::Write::write_all(&mut deflate, data).unwrap();
     deflate.finish().unwrap();
-    chunk(*b"iCCP", &data)
+    chunk(kind, &packed)
 }
 
 /// A PNG file with an ICC profile.

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use axum::body::{Body, Bytes};
+use axum::body::{Body, Bytes, HttpBody as _};
 use axum::extract::Request;
 use axum::http::{HeaderMap, Method, StatusCode, Uri, header};
 
@@ -56,15 +56,20 @@ pub(super) fn admit(request: &Request, port: u16) -> Result<(), RequestFault> {
 /// # Errors
 /// If it is too large, does not arrive in time, or breaks off.
 pub(super) async fn body(body: Body) -> Result<Bytes, RequestFault> {
+    let too_large = || {
+        let message = format!("the body broke off, or has more than {} MiB", LARGEST >> 20);
+        RequestFault::new(StatusCode::PAYLOAD_TOO_LARGE, message)
+    };
+    // What the client says of its length.
+    if body.size_hint().lower() > LARGEST as u64 {
+        return Err(too_large());
+    }
     let read = tokio::time::timeout(BODY_TIME, axum::body::to_bytes(body, LARGEST)).await;
     let read = read.map_err(|_| {
         let message = format!("the body did not arrive within {} s", BODY_TIME.as_secs());
         RequestFault::new(StatusCode::REQUEST_TIMEOUT, message)
     })?;
-    read.map_err(|_| {
-        let message = format!("the body broke off, or has more than {} MiB", LARGEST >> 20);
-        RequestFault::new(StatusCode::PAYLOAD_TOO_LARGE, message)
-    })
+    read.map_err(|_| too_large())
 }
 
 fn text(headers: &HeaderMap, name: header::HeaderName) -> Option<String> {
