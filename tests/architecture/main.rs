@@ -9,6 +9,7 @@ mod files;
 mod map;
 mod rules;
 mod source;
+mod unsafe_code;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -131,6 +132,19 @@ fn libraries_stand_in_their_places() {
 #[test]
 fn futures_are_awaited_in_their_places() {
     assert_none(&rules::awaits(&FILES, &AWAITS));
+}
+
+/// Each stands there with its number and its reason, so that a new one is seen by who reads the page.
+#[test]
+fn unsafe_code_is_listed_in_the_security_page() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join(".github/SECURITY.md");
+    let listed = unsafe_code::listed(&fs::read_to_string(page).unwrap());
+    let counts = FILES.iter().filter_map(|source| {
+        let text = fs::read_to_string(src().join(&source.path)).unwrap();
+        let count = unsafe_code::count(&text).unwrap();
+        (count > 0).then(|| (source.path.clone(), count))
+    });
+    assert_eq!(listed, counts.collect());
 }
 
 #[test]
