@@ -84,7 +84,7 @@ impl Scene {
 
     fn stored(&self, out: &str) -> usize {
         let text = fs::read(self.bench.path(out).join("records.jsonl")).unwrap_or_default();
-        text.iter().filter(|byte| **byte == b'\n').count()
+        String::from_utf8_lossy(&text).matches('\n').count()
     }
 
     /// Completes the run in a folder, and asserts that it is what a run without faults is, for which so many requests were sent
