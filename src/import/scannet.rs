@@ -17,7 +17,7 @@ use super::files::{
 };
 use crate::dataset::raw_png::SampleForm;
 use crate::error::{Error, Result};
-use crate::files::reading::{json, text};
+use crate::files::reading::{bytes, json, text};
 use crate::labels::names::{UNKNOWN, overridden};
 use crate::labels::{canonical, space};
 use crate::types::{Intrinsics, Label, Labels, Rgb};
@@ -171,11 +171,11 @@ fn check_overflow(folder: &Path, scene: &str) -> Result<()> {
 
 /// The label space of ScanNet's label numbers.
 fn table(path: &Path) -> Result<Labels> {
+    let bytes = bytes(path)?;
     let mut reader = csv::ReaderBuilder::new()
         .delimiter(b'\t')
         .flexible(true)
-        .from_path(path)
-        .map_err(|e| Error::data(path.display(), e))?;
+        .from_reader(&*bytes);
     let header = reader
         .headers()
         .map_err(|e| Error::data(path.display(), e))?

@@ -39,6 +39,10 @@ fn pipes_and_devices_in_the_place_of_files_are_refused() {
             "calibrate recording --white 16383 --out out.toml",
         ),
         (
+            "scannet/scannetv2-labels.combined.tsv",
+            "import scannet --src scannet --out out",
+        ),
+        (
             "models/two.onnx.toml",
             "enhance models/two.onnx a.png --offline --out out",
         ),

@@ -6,6 +6,7 @@ use serde::Deserialize;
 
 use super::files::{Recording, SettingFiles};
 use crate::error::{Error, Result};
+use crate::files::reading;
 
 /// A line of the list.
 #[derive(Deserialize)]
@@ -30,9 +31,9 @@ enum FrameKind {
 
 /// Reads the list of a folder.
 pub(super) fn read(folder: &Path, list: &Path) -> Result<Recording> {
+    let bytes = reading::bytes(list)?;
     let mut reader = csv::ReaderBuilder::new();
-    let reader = reader.trim(csv::Trim::All).from_path(list);
-    let mut reader = reader.map_err(|e| Error::data(list.display(), e))?;
+    let mut reader = reader.trim(csv::Trim::All).from_reader(&*bytes);
     let mut settings: Vec<SettingFiles> = Vec::new();
     // The heads are line 1.
     for (number, line) in (2..).zip(reader.deserialize::<Line>()) {

@@ -112,16 +112,12 @@ fn a_store_that_cannot_be_written_to_is_left_alone() {
 
 #[cfg(unix)]
 #[test]
-fn only_the_user_reads_the_files() {
+fn only_the_user_can_enter_the_folder() {
     use std::os::unix::fs::PermissionsExt as _;
     let place = tempfile::tempdir().unwrap();
     let store = store(&place.path().join("store"), 1 << 20);
-    store.put(&key("a"), &entry(9));
-    let file = store.folder.place(key("a").digest());
-    let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
-    assert_eq!(mode(&file), 0o600);
-    assert_eq!(mode(file.parent().unwrap()), 0o700);
-    assert_eq!(mode(store.folder.root()), 0o700);
+    let mode = fs::metadata(store.folder.root()).unwrap().permissions();
+    assert_eq!(mode.mode() & 0o777, 0o700);
 }
 
 #[test]
