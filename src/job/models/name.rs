@@ -87,6 +87,9 @@ impl ModelName {
     }
 }
 
+/// The most bytes of a model's name. Chosen: the longest paths of published models have half of it.
+const LONGEST: usize = 200;
+
 impl FromStr for ModelName {
     type Err = String;
 
@@ -100,10 +103,13 @@ impl FromStr for ModelName {
             "random" => Ok(Self::Random),
             "observer" => Ok(Self::Observer(None)),
             "script" => Err("script:FILE expected, a file of replies".to_owned()),
-            name => Ok(match name.strip_prefix("script:") {
-                Some(path) => Self::Script(path.into()),
-                None => Self::Remote(name.to_owned()),
-            }),
+            name => match name.strip_prefix("script:") {
+                Some(path) => Ok(Self::Script(path.into())),
+                None if name.len() > LONGEST || name.contains(char::is_control) => Err(format!(
+                    "the name of a model has at most {LONGEST} bytes and no control characters"
+                )),
+                None => Ok(Self::Remote(name.to_owned())),
+            },
         }
     }
 }
@@ -131,6 +137,17 @@ mod tests {
             "random", "observer", "script:a", "gpt-4o", "qwen:7b", "rando-vl", "o3",
         ] {
             assert!(near(name).is_ok(), "{name}");
+        }
+    }
+
+    #[test]
+    fn names_are_short_and_can_be_shown() {
+        for name in ["m".repeat(200), "org/Qwen3-VL-8B é".to_owned()] {
+            assert_eq!(name.parse(), Ok(ModelName::Remote(name.clone())));
+        }
+        for name in ["m".repeat(201), "a\u{1b}[31m".to_owned(), "a\nb".to_owned()] {
+            let error = name.parse::<ModelName>().unwrap_err();
+            assert!(error.contains("at most 200 bytes"), "{error}");
         }
     }
 }
