@@ -5,6 +5,7 @@
 //! where no data are named, and the folder `models` at `$MODELS`. A comment `<!-- test: … -->` is a command that readers do not
 //! see. A block with the fence `text` shows what commands of its page print; `text no-run` shows what others print.
 
+mod faq;
 mod page;
 mod shell;
 
