@@ -18,6 +18,9 @@ pub(super) const LONGEST_NAME: usize = 64;
 /// The length from which on a text of the base64 alphabet is not kept: its file is read again when it is shown.
 const LONGEST_KEPT: usize = 1024;
 
+/// The shortest line of base64 that is wrapped: PEM has 64 characters, MIME 76. Shorter words are those of a sentence.
+const SHORTEST_LINE: usize = 60;
+
 /// A value in a row. The bytes of files are not kept. Sets have millions of cells, so that a cell is no larger than a text.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Cell {
@@ -249,10 +252,12 @@ pub(super) fn decoded(text: &str) -> Option<Vec<u8>> {
     if text.bytes().all(is_base64) {
         return STANDARD.decode(text).ok();
     }
-    if !text
-        .bytes()
-        .all(|byte| is_base64(byte) || byte.is_ascii_whitespace())
-    {
+    let is_wrapped = text
+        .split_ascii_whitespace()
+        .next()
+        .is_some_and(|line| line.len() >= SHORTEST_LINE);
+    let mut bytes = text.bytes();
+    if !is_wrapped || !bytes.all(|byte| is_base64(byte) || byte.is_ascii_whitespace()) {
         return None;
     }
     let dense: Vec<u8> = text
@@ -268,6 +273,7 @@ mod tests {
 
     #[test]
     fn a_long_text_of_base64_is_a_file_and_a_sentence_is_none() {
+        assert_eq!(decoded(&"what is this on a table ".repeat(60)), None);
         let file = vec![7; 90];
         let text = STANDARD.encode(&file);
         let wrapped = format!("{}\n{}", &text[..76], &text[76..]);
