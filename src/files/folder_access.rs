@@ -1,7 +1,7 @@
 //! Who may enter a folder that the program makes: [`FolderAccess`].
 
-use std::fs;
 use std::path::Path;
+use std::{fs, io};
 
 use crate::error::{Error, Result};
 
@@ -31,9 +31,16 @@ impl FolderAccess {
     /// # Errors
     /// If it cannot be created.
     pub(crate) fn create(self, path: &Path) -> Result<()> {
-        let unmade = |e| Error::file(path, "create", e);
+        self.make(path).map_err(|e| Error::file(path, "create", e))
+    }
+
+    /// Creates a folder as [`create`](Self::create), with the error of the system.
+    ///
+    /// # Errors
+    /// If it cannot be created.
+    pub(crate) fn make(self, path: &Path) -> io::Result<()> {
         if let Some(above) = path.parent() {
-            fs::create_dir_all(above).map_err(unmade)?;
+            fs::create_dir_all(above)?;
         }
         let mut builder = fs::DirBuilder::new();
         #[cfg(unix)]
@@ -41,7 +48,7 @@ impl FolderAccess {
             std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
         }
         match builder.create(path) {
-            Err(e) if !path.is_dir() => Err(unmade(e)),
+            Err(e) if !path.is_dir() => Err(e),
             _ => Ok(()),
         }
     }

@@ -69,21 +69,20 @@ impl ImageStore {
     ) -> Result<Self> {
         let store = Self {
             named: folder.to_owned(),
-            folder: StoreFolder::new(folder),
+            folder: StoreFolder::new(folder, access),
             kinds,
             most,
             state: Mutex::default(),
         };
-        let unusable = |e: &dyn std::fmt::Display| {
+        let unusable = |e: io::Error| {
             let folder = folder.display();
             let problem = format_args!(
                 "cannot use the folder {folder}: {e}; name a folder that can be written to, or leave the flag out"
             );
             Error::usage("--images-cache", problem)
         };
-        store.folder.make(access).map_err(|e| unusable(&e))?;
-        let swept = sweep(&store.folder, most, SystemTime::now());
-        let swept = swept.map_err(|e| unusable(&e))?;
+        store.folder.make().map_err(unusable)?;
+        let swept = sweep(&store.folder, most, SystemTime::now()).map_err(unusable)?;
         store.with(|state| {
             state.bytes = swept.bytes;
             state.counts.evicted = swept.evicted;

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::SystemTime;
 
-use crate::error::Result;
 use crate::files::folder_access::FolderAccess;
 use crate::types::Digest;
 
@@ -22,6 +21,8 @@ const UNFINISHED: &str = ".tmp-";
 pub(super) struct StoreFolder {
     /// Folder of this version's files.
     root: PathBuf,
+    /// Who may enter it. It is made anew where somebody deletes it.
+    access: FolderAccess,
     /// Beginning of the names of this process's unfinished files: no other process, on this machine or another, has it.
     unfinished: String,
     /// Number of unfinished files so far.
@@ -46,12 +47,13 @@ pub(super) enum FileKind {
 }
 
 impl StoreFolder {
-    pub(super) fn new(folder: &Path) -> Self {
+    pub(super) fn new(folder: &Path, access: FolderAccess) -> Self {
         let host = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
         let plain = |letter: &char| letter.is_ascii_alphanumeric() || *letter == '-';
         let host: String = host.chars().filter(plain).take(64).collect();
         Self {
             root: folder.join(VERSION),
+            access,
             unfinished: format!("{UNFINISHED}{host}-{}-", std::process::id()),
             count: AtomicUsize::new(0),
         }
@@ -63,8 +65,8 @@ impl StoreFolder {
     }
 
     /// Makes the folder.
-    pub(super) fn make(&self, access: FolderAccess) -> Result<()> {
-        access.create(&self.root)
+    pub(super) fn make(&self) -> io::Result<()> {
+        self.access.make(&self.root)
     }
 
     /// The file of a key.
@@ -78,7 +80,8 @@ impl StoreFolder {
     pub(super) fn write(&self, key: &Digest, content: &[u8]) -> io::Result<()> {
         let place = self.place(key);
         let folder = place.parent().unwrap_or(&self.root);
-        fs::create_dir_all(folder)?;
+        self.make()?;
+        self.access.make(folder)?;
         let number = self.count.fetch_add(1, Ordering::Relaxed);
         let unfinished = folder.join(format!("{}{number}", self.unfinished));
         let written = File::create_new(&unfinished)
@@ -119,7 +122,7 @@ impl StoreFolder {
 
     /// The file that is locked while files are removed.
     pub(super) fn lock_file(&self) -> io::Result<File> {
-        fs::create_dir_all(&self.root)?;
+        self.make()?;
         let mut options = OpenOptions::new();
         options.write(true).create(true).truncate(false);
         options.open(self.root.join(".lock"))

@@ -10,6 +10,7 @@ use std::time::{Duration, SystemTime};
 use super::entry::{Shown, facts_at_end};
 use super::folder::{FileKind, StoreFolder, StoredFile};
 use crate::error::{Error, Result};
+use crate::files::folder_access::FolderAccess;
 use crate::files::reading;
 
 /// Bytes at the end of a file that are read for its facts; chosen: facts have less than 4 kB.
@@ -113,7 +114,7 @@ pub(crate) fn clear(folder: &Path) -> Result<String> {
 
 /// The files of the store of a folder.
 fn files(folder: &Path) -> Result<Vec<StoredFile>> {
-    let store = StoreFolder::new(folder);
+    let store = StoreFolder::new(folder, FolderAccess::Private);
     if !store.root().is_dir() {
         let problem = "no image store: the folder that --images-cache named is expected";
         return Err(Error::data(folder.display(), problem));

@@ -62,12 +62,13 @@ fn remove(file: &StoredFile) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::files::folder_access::FolderAccess;
     use crate::types::Digest;
 
     /// A store with files of 100 bytes that were last used so many days ago, and their number after a sweep.
     fn left(days: &[u64], most: u64) -> Vec<u64> {
         let place = tempfile::tempdir().unwrap();
-        let folder = StoreFolder::new(place.path());
+        let folder = StoreFolder::new(place.path(), FolderAccess::Private);
         let now = SystemTime::now();
         let key = |day: &u64| Digest::of(&day.to_le_bytes());
         for day in days {
@@ -100,7 +101,7 @@ mod tests {
     #[test]
     fn abandoned_files_leave_and_foreign_ones_stay() {
         let place = tempfile::tempdir().unwrap();
-        let folder = StoreFolder::new(place.path());
+        let folder = StoreFolder::new(place.path(), FolderAccess::Private);
         folder.write(&Digest::of(b"a"), &[0; 9]).unwrap();
         let inside = folder.place(&Digest::of(b"a"));
         let inside = inside.parent().unwrap();
@@ -122,7 +123,7 @@ mod tests {
     #[test]
     fn while_another_process_removes_files_none_is_removed() {
         let place = tempfile::tempdir().unwrap();
-        let folder = StoreFolder::new(place.path());
+        let folder = StoreFolder::new(place.path(), FolderAccess::Private);
         folder.write(&Digest::of(b"a"), &[0; 9]).unwrap();
         let later = SystemTime::now() + UNUSED + ABANDONED;
         let lock = folder.lock_file().unwrap();

@@ -116,8 +116,16 @@ fn only_the_user_can_enter_the_folder() {
     use std::os::unix::fs::PermissionsExt as _;
     let place = tempfile::tempdir().unwrap();
     let store = store(&place.path().join("store"), 1 << 20);
-    let mode = fs::metadata(store.folder.root()).unwrap().permissions();
-    assert_eq!(mode.mode() & 0o777, 0o700);
+    let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
+    assert_eq!(mode(store.folder.root()), 0o700);
+    // Also where it was deleted meanwhile.
+    fs::remove_dir_all(place.path().join("store")).unwrap();
+    store.put(&key("a"), &entry(9));
+    assert_eq!(mode(store.folder.root()), 0o700);
+    assert_eq!(
+        mode(store.folder.place(key("a").digest()).parent().unwrap()),
+        0o700
+    );
 }
 
 #[test]
