@@ -1,7 +1,7 @@
 //! Files of one JSON object a line. A killed process may leave the last line incomplete.
 
 use std::fs::{File, OpenOptions};
-use std::io::{Read, Seek, SeekFrom, Write};
+use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use rayon::prelude::*;
@@ -116,7 +116,10 @@ pub(super) fn set_aside<T: StoredLine>(path: &Path, aside: &Path) -> Result<()> 
         let problem = format!("not {}: {}; {}", T::WHAT, first.problem, T::MEND);
         return Err(Error::line(path, first.number, problem));
     }
-    let mut lines = reading::read(aside).unwrap_or_default();
+    let mut lines = match reading::read(aside) {
+        Err(e) if e.kind() == ErrorKind::NotFound => Vec::new(),
+        read => read.map_err(|e| Error::file(aside, "read", e))?,
+    };
     lines.extend(bad.iter().flat_map(|bad| &bad.line));
     write_synced(aside, &lines)?;
     let mut file = OpenOptions::new()
