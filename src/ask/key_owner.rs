@@ -5,11 +5,11 @@ use super::url::BaseUrl;
 use super::vendor::Vendor;
 use crate::error::{Error, Result};
 
-/// Refuses to send a key to an address of nobody that it looks made for: a wrong variable, or an address that a stranger wrote, would
+/// Refuses a key that looks like one of a vendor at an address of another: a wrong variable, or an address that a stranger wrote, would
 /// give it away. An address of this machine may be a gateway that passes it on.
 ///
 /// # Errors
-/// Names the two vendors, and never the key.
+/// Names the vendor of the key and the address, and never the key.
 pub(super) fn check_owner(key: &Secret, base: &BaseUrl) -> Result<()> {
     match Vendor::of_key(key.expose()) {
         Some(owner) if !base.is_loopback() && !owner.is_of(base.host()) => Err(Error::usage(

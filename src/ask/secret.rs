@@ -44,7 +44,7 @@ impl Secret {
     pub(super) fn read(path: &Path) -> Result<Self> {
         let bytes = reading::at_most(path, MOST_BYTES)?;
         let origin = format!("--api-key-file {}", path.display());
-        let text = String::from_utf8(bytes).unwrap_or_else(|_| "\0".to_owned());
+        let text = String::from_utf8_lossy(&bytes);
         if text.contains("-----BEGIN") {
             let problem =
                 "this is a private key or a certificate, no API key; nothing of it was sent";

@@ -14,7 +14,8 @@ const INNER: [&str; 1] = [BATCH];
 /// The files that are appended to. All others are replaced by new files, which leaves what they link to as it is.
 const APPENDED: [&str; 3] = [RECORDS, THUMBNAILS, FIDELITY];
 
-/// Refuses a run folder in which a folder or a file that is appended to is a link, or anything a pipe. The folder itself may be reached by one.
+/// Refuses a run folder in which a folder or a file that is appended to is a link, or an entry is a pipe or a device. The folder itself
+/// may be reached by a link.
 ///
 /// # Errors
 /// Names the link.

@@ -5,13 +5,13 @@
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, SystemTime};
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::house::{House, flags};
 use crate::support::process::{signal, wait_until};
-use crate::support::run::{Bench, assert_same_products, files, records, words};
+use crate::support::run::{Bench, Called, assert_same_products, files, records, words};
 use crate::support::table::check_rows;
 
 /// An experiment with all that one run of it needs.
@@ -69,6 +69,35 @@ impl Scene {
         words.into_iter().map(str::to_owned).collect()
     }
 
+    /// The run in a folder, to its end.
+    fn call(&self, out: &str) -> Called {
+        let args = self.words(out);
+        self.bench
+            .call(&args.iter().map(String::as_str).collect::<Vec<_>>())
+    }
+
+    /// The run in a folder, to its end, with everything scored.
+    fn complete(&self, out: &str) {
+        let called = self.call(out);
+        assert_eq!(called.code, Some(0), "{called:?}");
+    }
+
+    /// The run in a folder as a process, once there are so many records.
+    fn spawned(&self, out: &str, records: usize) -> Child {
+        let args = self.words(out);
+        let args: Vec<&str> = args.iter().map(String::as_str).collect();
+        let child = self.bench.spawn(&args, Stdio::null());
+        wait_until(|| self.stored(out) >= records);
+        child
+    }
+
+    /// Kills the run in a folder once there are so many records.
+    fn kill_at(&self, out: &str, records: usize) {
+        let mut child = self.spawned(out, records);
+        signal(&child, "-9");
+        child.wait().unwrap();
+    }
+
     /// The run as a command of a shell, after other commands.
     fn shell(&self, before: &str, out: &str) -> Output {
         let program = assert_cmd::cargo::cargo_bin("darkqa-eval");
@@ -90,9 +119,7 @@ impl Scene {
     /// Completes the run in a folder, and asserts that it is what a run without faults is, for which so many requests were sent
     /// beyond those of its trials.
     fn assert_whole(&self, out: &str, beyond: usize) {
-        let args = self.words(out);
-        let args: Vec<&str> = args.iter().map(String::as_str).collect();
-        self.bench.complete(&args);
+        self.complete(out);
         let run = self.bench.path(out);
         let keys = records(&run)
             .into_iter()
@@ -106,9 +133,7 @@ impl Scene {
             "{sent} requests for {} trials",
             self.trials
         );
-        let whole = self.words("whole");
-        let whole: Vec<&str> = whole.iter().map(String::as_str).collect();
-        self.bench.complete(&whole);
+        self.complete("whole");
         assert!(assert_same_products(&self.bench.path("whole"), &run) > 5);
     }
 }
@@ -119,13 +144,8 @@ const BOTH: [bool; 2] = [false, true];
 fn kills_cost_what_was_in_flight() {
     check_rows(BOTH, |is_open| {
         let scene = Scene::new(is_open, Duration::from_millis(40));
-        let args = scene.words("run");
-        let args: Vec<&str> = args.iter().map(String::as_str).collect();
         for records in [4, 11, 19] {
-            let mut child = scene.bench.spawn(&args, Stdio::null());
-            wait_until(|| scene.stored("run") >= records);
-            signal(&child, "-9");
-            child.wait().unwrap();
+            scene.kill_at("run", records);
         }
         assert!(
             scene.stored("run") < scene.trials,
@@ -160,11 +180,8 @@ fn a_full_disk_stops_a_run_that_goes_on_when_there_is_room() {
 fn a_second_process_is_refused_and_asks_nothing() {
     check_rows(BOTH, |is_open| {
         let scene = Scene::new(is_open, Duration::from_millis(40));
-        let args = scene.words("run");
-        let args: Vec<&str> = args.iter().map(String::as_str).collect();
-        let mut first = scene.bench.spawn(&args, Stdio::null());
-        wait_until(|| scene.stored("run") >= 2);
-        let second = scene.bench.call(&args);
+        let mut first = scene.spawned("run", 2);
+        let second = scene.call("run");
         assert_eq!(second.code, Some(2), "{second:?}");
         assert!(
             second
@@ -181,22 +198,17 @@ fn a_second_process_is_refused_and_asks_nothing() {
 fn the_time_of_files_decides_nothing() {
     check_rows(BOTH, |is_open| {
         let scene = Scene::new(is_open, Duration::from_millis(20));
-        let args = scene.words("run");
-        let args: Vec<&str> = args.iter().map(String::as_str).collect();
         let before = SystemTime::UNIX_EPOCH + Duration::from_secs(1);
         let after = SystemTime::now() + Duration::from_hours(24 * 365 * 50);
         for (time, records) in [(after, 5), (before, 12)] {
-            let mut child = scene.bench.spawn(&args, Stdio::null());
-            wait_until(|| scene.stored("run") >= records);
-            signal(&child, "-9");
-            child.wait().unwrap();
+            scene.kill_at("run", records);
             set_times(&scene.bench.path("run"), time);
         }
         scene.assert_whole("run", 2 * AT_ONCE);
         let sent = scene.endpoint.requests().len();
         for time in [before, after] {
             set_times(&scene.bench.path("run"), time);
-            scene.bench.complete(&args);
+            scene.complete("run");
             assert!(assert_same_products(&scene.bench.path("whole"), &scene.bench.path("run")) > 5);
         }
         assert_eq!(scene.endpoint.requests().len(), sent);

@@ -93,18 +93,18 @@ fn deep(left: u16, right: u16) -> Vec<u8> {
     let map = ImageBuffer::from_fn(WIDTH, HEIGHT, |x, _| {
         Luma([if x < WIDTH / 2 { left } else { right }])
     });
-    let mut file = std::io::Cursor::new(Vec::new());
-    let map = image::DynamicImage::ImageLuma16(map);
-    map.write_to(&mut file, ImageFormat::Png).unwrap();
-    file.into_inner()
+    map_file(&image::DynamicImage::ImageLuma16(map))
 }
 
 fn shallow(left: u8, right: u8) -> Vec<u8> {
     let map = GrayImage::from_fn(WIDTH, HEIGHT, |x, _| {
         Luma([if x < WIDTH / 2 { left } else { right }])
     });
+    map_file(&image::DynamicImage::ImageLuma8(map))
+}
+
+fn map_file(map: &image::DynamicImage) -> Vec<u8> {
     let mut file = std::io::Cursor::new(Vec::new());
-    let map = image::DynamicImage::ImageLuma8(map);
     map.write_to(&mut file, ImageFormat::Png).unwrap();
     file.into_inner()
 }
