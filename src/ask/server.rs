@@ -137,7 +137,7 @@ impl AccessArgs {
             vendor.map_or(Ok(()), |vendor| vendor.check_address(&base))?;
             let key = self.key(&base, vendor)?;
             match &key {
-                Some(key) if !self.key_anyway => check_owner(key, &base)?,
+                Some(key) if !self.key_anyway => check_owner(key, &base, vendors)?,
                 _ => {}
             }
             replicas.push(Access {

@@ -106,10 +106,15 @@ impl Vendor {
         vendors.find(|vendor| vendor.is_of(host))
     }
 
-    /// The vendor whose keys look like this one; `None` if keys of several do, or that is not known.
+    /// The vendor of the built-in table whose keys look like this one; `None` if keys of several do, or that is not known.
     pub(super) fn of_key(key: &str) -> Option<&'static Self> {
         let mut vendors = VENDORS.vendor.iter();
-        vendors.find(|vendor| vendor.key_form.iter().any(|form| has_form(key, form)))
+        vendors.find(|vendor| vendor.has_key(key))
+    }
+
+    /// Whether a key looks like this vendor's.
+    pub(super) fn has_key(&self, key: &str) -> bool {
+        self.key_form.iter().any(|form| has_form(key, form))
     }
 
     /// Whether a host is one of the vendor's.

@@ -67,6 +67,13 @@ impl VendorTable {
         own.find(|vendor| vendor.is_of(host))
             .or_else(|| Vendor::of(host))
     }
+
+    /// The vendor whose keys look like this one, in the same order as [`Self::of`].
+    pub(super) fn of_key(self, key: &str) -> Option<&'static Vendor> {
+        let mut own = self.0.iter();
+        own.find(|vendor| vendor.has_key(key))
+            .or_else(|| Vendor::of_key(key))
+    }
 }
 
 #[cfg(test)]

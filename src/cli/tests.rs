@@ -16,7 +16,8 @@ fn the_command_line_is_valid() {
 fn reference() -> String {
     let mut command = Cli::command();
     command.build();
-    let mut text = "# All flags\n\nWritten by `UPDATE=1 cargo test --lib cli::`, from what `--help` shows. A variable is `DARKQA_` and the name of the \
+    let mut text = "# All flags\n\nAt the end of this page you know each flag, its default and what it decides. `UPDATE=1 cargo test --lib cli::` writes the page from \
+                    what `--help` shows. A variable is `DARKQA_` and the name of the \
                     flag in capitals; a key of a `--config` file is the name of the flag; both have another name where one is given. What a flag \
                     decides: which *trials* there are, what a model is sent besides the image (*reply*), the content of images (*pixels*), or *nothing* of these: \
                     then a run is the same run with any value of it.\n"
@@ -105,7 +106,7 @@ fn row(text: &mut String, arg: &Arg) {
 
 #[test]
 fn the_flag_reference_is_up_to_date() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/cli/README.md");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/docs/flags.md");
     let reference = reference();
     if std::env::var_os("UPDATE").is_some() {
         fs::write(&path, &reference).unwrap();
@@ -113,7 +114,7 @@ fn the_flag_reference_is_up_to_date() {
     let written = fs::read_to_string(&path).unwrap_or_default();
     assert!(
         written == reference,
-        "src/cli/README.md is out of date: UPDATE=1 cargo test --lib cli:: writes it"
+        "src/docs/flags.md is out of date: UPDATE=1 cargo test --lib cli:: writes it"
     );
 }
 

@@ -281,6 +281,17 @@ mod tests {
     }
 
     #[test]
+    fn the_page_has_the_codes_of_each_level() {
+        let page = include_str!("../docs/method.md");
+        for (index, case) in (1..).zip(CASES) {
+            let [.., white] = case.entries;
+            let (distinct, first) = (case.distinct, case.first_nonzero);
+            let row = format!("| L{index} | {white} | {distinct} | {first} |");
+            assert!(page.contains(&row), "not on the page: {row}");
+        }
+    }
+
+    #[test]
     fn every_sample_goes_through_the_table() {
         let clean = Rgb::new(16, 16, (0..768).map(|i| i as u8).collect()).unwrap();
         for level in Severity::LADDER

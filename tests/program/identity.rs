@@ -514,7 +514,7 @@ const ELSEWHERE: [(&str, &str); 50] = [
 
 /// The flags of a command with what each decides, from the list that is written from the program.
 fn classes(command: &str) -> Vec<(&'static str, &'static str)> {
-    let all = include_str!("../../src/cli/README.md");
+    let all = include_str!("../../src/docs/flags.md");
     let title = format!("## darkqa-eval{command}\n");
     let (_, section) = all.split_once(&title).unwrap();
     let section = section.split("\n## ").next().unwrap();

@@ -5,6 +5,7 @@ use std::io::{self, BufRead as _, BufReader, BufWriter, Write as _};
 use std::path::Path;
 
 use crate::ask::secret::Scrub;
+use crate::files::reading;
 
 /// Removes keys from the lines of a file. A file without any of them is not written again.
 pub(super) fn remove_secrets(path: &Path, scrub: &Scrub) -> io::Result<()> {
@@ -33,7 +34,7 @@ fn has_secrets(path: &Path, scrub: &Scrub) -> io::Result<bool> {
 
 /// Calls `take` with each line of a file and its line end.
 fn for_each_line(path: &Path, mut take: impl FnMut(&[u8]) -> io::Result<()>) -> io::Result<()> {
-    let mut file = BufReader::new(File::open(path)?);
+    let mut file = BufReader::new(reading::open(path)?);
     let mut line = Vec::new();
     while file.read_until(b'\n', &mut line)? > 0 {
         take(&line)?;

@@ -9,6 +9,8 @@ use std::task::{Context, Poll};
 use bytes::Bytes;
 use http_body::{Body, Frame, SizeHint};
 
+use crate::files::reading;
+
 /// The number of bytes that are read at once; chosen.
 const CHUNK: usize = 256 * 1024;
 
@@ -27,7 +29,7 @@ impl FileForm {
     /// # Errors
     /// If the file cannot be opened.
     pub(super) fn open(path: &Path, name: &str, purpose: &str, boundary: &str) -> io::Result<Self> {
-        let file = File::open(path)?;
+        let file = reading::open(path)?;
         let field =
             |name: &str| format!("--{boundary}\r\nContent-Disposition: form-data; name=\"{name}\"");
         let head = format!(

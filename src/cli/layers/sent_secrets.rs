@@ -22,6 +22,9 @@ const KEYS: [(&str, [&str; 2]); 2] = [
     ),
 ];
 
+/// The flags that change which keys go where: a table of vendors names the variable of a host's key.
+const KEY_RULES: [&str; 2] = ["key-anyway", "vendor"];
+
 /// The flags that name a variable whose value is sent; of a header after `=`.
 const VARIABLES: [&str; 3] = ["api-key-env", "judge-api-key-env", "header-env"];
 
@@ -57,7 +60,7 @@ pub(super) fn check(
         );
         Err(Error::usage(&value.origin, problem))
     };
-    if let Some((flag, value)) = entry(values, "key-anyway") {
+    if let Some((flag, value)) = KEY_RULES.iter().find_map(|flag| entry(values, flag)) {
         return refuse(flag, value, "a key of yours");
     }
     let unnamed = KEYS

@@ -389,6 +389,8 @@ fn a_file_sends_nothing_of_the_user_to_an_address_of_its_own() {
         ("", "extra-body = \"@Cargo.toml\""),
         ("", "prompts = \"prompts\""),
         ("", "key-anyway = true"),
+        // A row of such a table names the variable whose value goes to the host.
+        ("", "vendor = \"vendors.toml\""),
     ] {
         let words: Vec<&str> = words.split_whitespace().collect();
         let flag = line.split(' ').next().unwrap();
