@@ -74,7 +74,7 @@ class Choices(RunTest):
             "string": ["key", "question", "text", "scene", "predicted", "failure_message", "image_digest"],
             "category": ["model", "condition", "level", "variant", "enhancer", "family", "outcome"],
             "Int16": ["truth", "strict", "lenient", "repeat", "choice_count", "failure_status"],
-            "Int64": ["prompt_tokens", "completion_tokens", "latency_ms", "image_bytes", "image_width"],
+            "Int64": ["prompt_tokens", "completion_tokens", "cached_tokens", "latency_ms", "image_bytes", "image_width"],
             "boolean": ["right", "right_lenient"],
             "float64": ["ev"],
         }
@@ -84,6 +84,18 @@ class Choices(RunTest):
         (self.folder / "empty" / "records.jsonl").write_text("")
         empty = load_run(self.folder / "empty")
         self.assertEqual((len(empty), {name: str(kind) for name, kind in empty.dtypes.items()}), (0, types))
+
+    def test_what_few_servers_state(self):
+        """Cached tokens, the provider and the replica are columns, missing where the record has none."""
+        shutil.copytree(REFERENCE, self.folder / "run", ignore=shutil.ignore_patterns("figures"))
+        records = read_lines(REFERENCE / "records.jsonl")[:2]
+        records[0] |= {"provider": "a", "endpoint": 1}
+        records[0]["usage"] = {"prompt_tokens": 9, "completion_tokens": 1, "cached_tokens": 4}
+        self.write_lines("run/records.jsonl", records)
+        table = load_run(self.folder / "run").set_index("key")
+        stated = table.loc[records[0]["key"]]
+        self.assertEqual((stated["cached_tokens"], stated["provider"], stated["endpoint"]), (4, "a", 1))
+        self.assertTrue(table.loc[records[1]["key"], ["cached_tokens", "provider", "endpoint"]].isna().all())
 
     def test_repeats_failures_and_blind_models(self):
         self.call("rooms --out rooms --frames 3 --size 96x64")

@@ -30,8 +30,8 @@ def load_run(path: str | os.PathLike[str], questions: bool = True) -> pandas.Dat
     - ``right``, ``right_lenient``: whether the choice is the true one; missing if the trial failed. A reply in which no
       choice was read is wrong.
 
-    Leave out the rows of the model ``observer:other-room`` when you compare models: they are the control of ``observer``, whose
-    image is that of another frame (``shown_frame``).
+    Leave out the rows of the models ``observer:other-room`` and ``observer:tiles`` when you compare models: they are the controls
+    of ``observer``, which see the image of another frame (``shown_frame``) or the tiles of their own in another order.
 
     In a run of ``openeqa`` a row is an answer. Instead of the readings it has ``predicted`` (the answer as the judge gets
     it), ``judge``, ``mark`` and ``score`` (0 to 1), and ``outcome`` says whether there is a mark. ``scene`` is the walk and

@@ -68,8 +68,11 @@ _REPLY = {
     "failure_message": "string",
     "prompt_tokens": "Int64",
     "completion_tokens": "Int64",
+    "cached_tokens": "Int64",
     "latency_ms": "Int64",
     "attempts": "Int64",
+    "provider": "category",
+    "endpoint": "Int16",
 }
 _IMAGE = {
     "image_digest": "string",
@@ -193,7 +196,10 @@ def add_reply(record: Record) -> None:
     record.setdefault("via", "direct")
     failure = record["failure"] or {"kind": None, "status": None, "message": None}
     record.update((f"failure_{name}", value) for name, value in failure.items())
-    record.update(record["usage"] or {"prompt_tokens": None, "completion_tokens": None})
+    usage = record["usage"] or {}
+    record.update((name, usage.get(name)) for name in ("prompt_tokens", "completion_tokens", "cached_tokens"))
+    record.setdefault("provider", None)
+    record.setdefault("endpoint", None)
     sent = record["images"] if "images" in record else record["image"]
     for name in ("digest", "bytes", "width", "height", "format"):
         record[f"image_{name}"] = sent and sent[name]
