@@ -22,8 +22,8 @@ use darkqa_eval::cli;
 use page::{Block, BlockKind, Page, files, pages, root};
 use regex::Regex;
 
-/// Flags of other programs that pages name: `sbatch`, `pip`, `cargo`, and `inspect eval`.
-const OF_OTHERS: [&str; 11] = [
+/// Flags of other programs that pages name: `sbatch`, `pip`, `cargo`, `inspect eval`, and servers of models.
+const OF_OTHERS: [&str; 17] = [
     "--array",
     "--no-deps",
     "--path",
@@ -35,6 +35,12 @@ const OF_OTHERS: [&str; 11] = [
     "--hm3d",
     "--walks",
     "--cover",
+    "--generation-config",
+    "--limit-mm-per-prompt",
+    "--model-path",
+    "--mmproj",
+    "--parallel",
+    "--model-id",
 ];
 
 /// The words that follow the name of the program in a command; `None` for other commands.
