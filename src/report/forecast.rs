@@ -16,6 +16,8 @@ use crate::types::ReadingName;
 pub(crate) struct CostLine {
     /// The model, with a remark if it is asked without images.
     pub model: String,
+    /// The addresses at which it would be asked, without secrets.
+    pub endpoints: Vec<String>,
     /// Number of requests left.
     pub requests: usize,
     /// Text tokens of all prompts.
@@ -185,10 +187,11 @@ pub(crate) fn render(forecast: &Forecast) -> String {
             );
         }
     }
+    text += &by_endpoint(&forecast.lines);
     text += &by_reading(&forecast.lines);
     let _ = writeln!(
         text,
-        "dollars: from {} a reply to every reply as long as --max-tokens allows; {prices}; by the Batch API {:.0} % of it",
+        "dollars: from {} a reply to every reply as long as --max-tokens allows; {prices}; by a Batch API, if there is one, {:.0} % of it",
         forecast.reply,
         100.0 * forecast.batch
     );
@@ -215,6 +218,27 @@ pub(crate) fn render(forecast: &Forecast) -> String {
         let _ = writeln!(text, "the run would not start: {problem}");
     }
     text
+}
+
+/// Where the models would be asked: a line for each address, with its models if there are several addresses.
+fn by_endpoint(lines: &[CostLine]) -> String {
+    let mut at: Vec<(String, Vec<&str>)> = Vec::new();
+    for line in lines {
+        let endpoints = line.endpoints.join(", ");
+        match at.iter_mut().find(|(other, _)| *other == endpoints) {
+            Some((_, models)) => models.push(&line.model),
+            None => at.push((endpoints, vec![&line.model])),
+        }
+    }
+    let several = at.len() > 1;
+    let lines = at.into_iter().map(|(endpoints, models)| {
+        if several {
+            format!("asked at {endpoints}: {}\n", models.join(", "))
+        } else {
+            format!("asked at {endpoints}\n")
+        }
+    });
+    lines.collect()
 }
 
 /// The requests of all models by light reading; empty with fewer than two readings.
@@ -313,6 +337,7 @@ mod tests {
         };
         let line = |readings| CostLine {
             model: "m".to_owned(),
+            endpoints: Vec::new(),
             requests: 0,
             text_tokens: 0.0,
             image_tokens: None,

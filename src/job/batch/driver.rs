@@ -101,6 +101,8 @@ pub(super) struct Notes {
     pub(super) holds: BTreeMap<(String, String), (Instant, u32)>,
     /// How often the batch of a part was refused because too many tokens wait.
     pub(super) refused_parts: BTreeMap<usize, u32>,
+    /// Uploads and creations in a row at which the server failed, by part.
+    pub(super) failed_calls: BTreeMap<usize, u32>,
     /// Refused looks in a row, by part.
     pub(super) refused_looks: BTreeMap<usize, u32>,
     /// Parts that have been looked at since the last wait.

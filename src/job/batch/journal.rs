@@ -107,6 +107,12 @@ impl Journal {
         self.parts.iter().any(|part| part.stage != Stage::Ended)
     }
 
+    /// Whether a batch may be at work at a server.
+    pub(super) fn has_batches(&self) -> bool {
+        let at_work = |stage: &Stage| matches!(stage, Stage::Creating | Stage::Created);
+        self.parts.iter().any(|part| at_work(&part.stage))
+    }
+
     /// Number of requests of parts whose replies are not taken over.
     pub(super) fn open_requests(&self) -> usize {
         let open = |part: &&Part| !matches!(part.stage, Stage::TakenOver | Stage::Ended);

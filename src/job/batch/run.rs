@@ -332,10 +332,14 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
 
     fn finish(self, end: EndReason) -> Result<Outcome> {
         if let EndReason::Interrupted = end {
-            let line = format!(
-                "interrupted: the batches go on working; the same command goes on, and batch cancel {} ends them",
-                self.run.store.folder().display()
-            );
+            let folder = self.run.store.folder().display();
+            let line = if self.journal.has_batches() {
+                format!(
+                    "interrupted: the batches go on working; the same command goes on, and batch cancel {folder} ends them"
+                )
+            } else {
+                "interrupted: no batch is at work; the same command goes on".to_owned()
+            };
             self.run.progress.note(&line);
         }
         self.run.finish(end)

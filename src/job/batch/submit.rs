@@ -7,6 +7,10 @@ use crate::ask::batch_api::{ApiFailure, BatchState, Effect, NewBatch, Readiness,
 use crate::error::{Error, Result};
 use crate::types::Detail;
 
+/// How many uploads or creations in a row at which the server fails end the work for a model; chosen: 15 minutes by
+/// [`hold`](Driver::hold) with the default of `--poll`.
+const MOST_FAILED: u32 = 5;
+
 impl<D: Detail> Driver<'_, D> {
     /// Uploads the file of a part, if its batch may be made.
     pub(super) async fn upload(&mut self, part: usize) -> Result<Step> {
@@ -40,6 +44,7 @@ impl<D: Detail> Driver<'_, D> {
                     self.notes.ready.insert(file.id.clone());
                 }
                 self.journal.record(part, Event::Uploaded { id: file.id })?;
+                self.notes.failed_calls.remove(&part);
                 Ok(Step::Moved)
             }
             Err(failure) => self.not_made(part, &failure),
@@ -185,8 +190,14 @@ impl<D: Detail> Driver<'_, D> {
             if failure.is_permanent() {
                 return Err(self.fatal(part, failure));
             }
-            self.hold(part, failure.wait);
+        } else {
+            let failed = self.notes.failed_calls.entry(part).or_default();
+            *failed += 1;
+            if *failed >= MOST_FAILED {
+                return Err(self.fatal(part, failure));
+            }
         }
+        self.hold(part, failure.wait);
         let name = self.part(part).name.clone();
         self.warn_once(format!("{name}: {failure}; tried again"));
         Ok(Step::Waiting)

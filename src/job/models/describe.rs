@@ -14,7 +14,7 @@ use crate::job::workers::unstarted;
 use crate::types::{QuestionId, View};
 
 /// The words of the request that [`check`] sends.
-const WORDS: &str = "Reply with the word OK.";
+const WORDS: &str = "Is snow cold?\nA. yes\nB. no\nAnswer with the letter of one choice.";
 
 /// A few lines about each model: what it is called, where it is asked, where its key comes from, its request, and the digest that
 /// enters the keys of its trials.

@@ -191,6 +191,25 @@ fn a_refusal_stops_the_run_and_the_same_command_goes_on() {
     }
 }
 
+/// A gateway without storage for files answers each upload so.
+#[test]
+fn a_server_that_fails_at_every_upload_or_batch_ends_the_run() {
+    for kind in ["POST files", "POST batches"] {
+        let bench = Bench::with_questions(QUESTIONS);
+        let mock = MockBatches::start([Course::of("completed")]);
+        for _ in 0..5 {
+            mock.fault(kind, Fault::Instead(Answer::error(500, "oops", "no files")));
+        }
+        let called = call_with(BLIND, &bench, &mock, "");
+        assert_eq!(called.code, Some(2), "{called:?}");
+        assert_eq!(mock.count(kind), 5, "{called:?}");
+        assert!(called.stderr.contains("the same command goes on"), "{called:?}");
+        let called = call_with(BLIND, &bench, &mock, "");
+        assert_eq!(called.code, Some(0), "{called:?}");
+        assert_each_once(&bench, &mock, QUESTIONS);
+    }
+}
+
 #[test]
 fn a_batch_that_never_ends_is_cancelled_if_asked_for() {
     let course = Course::of(&"in_progress ".repeat(1000)).lines(|_| Line::Absent);

@@ -76,7 +76,7 @@ fn of_set(set: PhotographedSet) -> Option<Alert> {
 fn of_clusters(clusters: usize, unit: ClusterUnit) -> Option<Alert> {
     (clusters < MIN_SCENES).then(|| {
         let text = format!(
-            "There are only {} ({MIN_SCENES} are needed): intervals and tests are rough.",
+            "Only {} ({MIN_SCENES} are needed): intervals and tests are rough.",
             counted(clusters, &unit.to_string())
         );
         Alert::new(AlertKind::Clusters, text)
