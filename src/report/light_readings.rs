@@ -29,8 +29,8 @@ impl LightReadings {
             return None;
         };
         Some(format!(
-            "One reading of the paper was run ({only}). Whether the findings hold under another is not known: `--profile all \
-             --resume DIR`, with the flags of the run, asks the missing trials."
+            "One reading of the paper was run ({only}). Whether the findings hold under another is not known: --profile all \
+             --resume DIR, with the flags of the run, asks the missing trials."
         ))
     }
 }

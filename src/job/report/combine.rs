@@ -15,6 +15,7 @@ use crate::score::cluster::{ClusterUnit, Clusters, FrameTies};
 use crate::score::findings::Findings;
 use crate::score::grid::Grid;
 use crate::score::photographed_set::PhotographedSet;
+use crate::score::subject::without_run;
 use crate::types::manifest::RunManifest;
 use crate::types::{
     ChoiceDetail, QuestionId, RunQuestion, SetLight, TextPlace, Trials, Truths, shell_word,
@@ -87,7 +88,9 @@ impl Combined {
             folder: typed(&run.folder),
             name: run.name.clone(),
             manifest: &run.manifest,
-            usage: page::RunUsage::of(self.of(run)),
+            usage: page::RunUsage::of(self.of(run), |model| {
+                run.manifest.is_built_in(without_run(model))
+            }),
             cost: run.cost.clone(),
         });
         PageInputs {

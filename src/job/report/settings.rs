@@ -215,7 +215,7 @@ pub(super) fn without_repeated(mut settings: Vec<Setting>) -> Vec<Setting> {
 pub(super) fn parameters(run: &RunManifest, model: &str) -> Option<Settings> {
     let content = run.columns.get("model")?.get(model)?;
     // A model of this program answers by rules, and reads no prompt.
-    let asked_by = if content.get("local").is_some() {
+    let asked_by = if run.is_built_in(model) {
         "--rules"
     } else {
         "--prompts"

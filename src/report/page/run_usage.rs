@@ -4,10 +4,14 @@ use std::collections::BTreeSet;
 
 use crate::types::{ChoiceDetail, TrialRef, Usage};
 
-/// What the trials of a run took: requests, tokens, bytes of images, waiting, and the models that the servers named.
+/// What the trials of a run took at endpoints: requests, tokens, bytes of images, waiting, and the models that the servers named.
+/// Built-in models take none of these.
 #[derive(Debug, Clone, Default)]
 pub struct RunUsage {
+    /// Number of trials of models at endpoints.
     trials: usize,
+    /// Number of trials of built-in models.
+    built_in: usize,
     requests: u64,
     prompt_tokens: u64,
     completion_tokens: u64,
@@ -18,10 +22,17 @@ pub struct RunUsage {
 }
 
 impl RunUsage {
-    /// The sums over some trials.
-    pub(crate) fn of<'t>(trials: impl Iterator<Item = TrialRef<'t, ChoiceDetail>>) -> Self {
+    /// The sums over some trials; `is_built_in` says of a model's name whether it is asked at no endpoint.
+    pub(crate) fn of<'t>(
+        trials: impl Iterator<Item = TrialRef<'t, ChoiceDetail>>,
+        is_built_in: impl Fn(&str) -> bool,
+    ) -> Self {
         let (mut usage, mut waits) = (Self::default(), Vec::new());
         for trial in trials {
+            if is_built_in(trial.model()) {
+                usage.built_in += 1;
+                continue;
+            }
             let tokens: Usage = trial.usage().unwrap_or_default();
             usage.trials += 1;
             usage.requests += u64::from(trial.attempts());
@@ -49,7 +60,13 @@ impl RunUsage {
         let rows = [
             (
                 "requests",
-                format!("{} for {} trials", self.requests, self.trials),
+                match self.built_in {
+                    0 => format!("{} for {} trials", self.requests, self.trials),
+                    own => format!(
+                        "{} for {} trials; {own} trials of built-in models took none",
+                        self.requests, self.trials
+                    ),
+                },
             ),
             (
                 "tokens",
