@@ -1,6 +1,7 @@
 //! A server, at one or several addresses, and the way questions are put to it: [`Endpoint`].
 
 use std::collections::HashMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -44,6 +45,8 @@ pub struct Endpoint {
     /// Whether what the replicas say of a model was compared, by its id.
     compared: Mutex<HashMap<String, Arc<OnceCell<()>>>>,
     closing: watch::Sender<bool>,
+    /// Whether a request had a reply, or it was said that there is no connection.
+    is_known: AtomicBool,
 }
 
 impl Endpoint {
@@ -84,6 +87,7 @@ impl Endpoint {
             sending,
             compared: Mutex::default(),
             closing: watch::Sender::new(false),
+            is_known: AtomicBool::new(false),
         })
     }
 
@@ -194,7 +198,10 @@ impl Endpoint {
             let turn = turn.map_err(|e| last.take().unwrap_or(e).after(attempts))?;
             attempts += 1;
             let (failed, effect) = match self.send(request, turn).await {
-                Ok(reply) => return Ok(Reply { attempts, ..reply }),
+                Ok(reply) => {
+                    self.is_known.store(true, Ordering::Relaxed);
+                    return Ok(Reply { attempts, ..reply });
+                }
                 Err(failed) => failed,
             };
             avoided.push(turn.replica);
@@ -208,7 +215,16 @@ impl Endpoint {
             };
             avoided.clear();
             let base = self.replicas[turn.replica].base();
-            debug!(endpoint = %base, ?delay, problem = failed.failure.message, "trying again");
+            let problem = &failed.failure.message;
+            // Retries take a minute: who mistyped an address knows it at once.
+            if failed.failure.kind == FailureKind::Connection
+                && !self.is_known.swap(true, Ordering::Relaxed)
+            {
+                warn!(
+                    "{base}: {problem}; tried again. Is a server running there? --base-url names the address"
+                );
+            }
+            debug!(endpoint = %base, ?delay, problem, "trying again");
             self.rest(delay).await;
         }
     }

@@ -43,7 +43,11 @@ mod tests {
             ("sk-ant-123", "http://127.0.0.1:4000/v1"),
             ("sk-123", "https://api.example.org/v1"),
         ] {
-            assert_eq!(check(VendorTable::default(), key, address), Ok(()), "{address}");
+            assert_eq!(
+                check(VendorTable::default(), key, address),
+                Ok(()),
+                "{address}"
+            );
         }
         for address in ["https://api.openai.com/v1", "https://api.example.org/v1"] {
             let error = check(own, "sk-ant-123", address).unwrap_err();

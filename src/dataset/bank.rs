@@ -48,7 +48,7 @@ impl FromStr for BankPlace {
     fn from_str(text: &str) -> Result<Self, Infallible> {
         let path = PathBuf::from(text);
         Ok(match text {
-            "home" if !path.exists() => Self::Home(WayOut::None),
+            "home" if !path.is_file() => Self::Home(WayOut::None),
             "home:uncertain" => Self::Home(WayOut::CannotTell),
             _ => Self::File(path),
         })

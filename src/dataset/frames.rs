@@ -212,7 +212,7 @@ pub(super) fn open(folder: &Path, questions: Option<&Path>, set: &SetArgs) -> Re
             return frames(folder, &set.root.data_root);
         }
         let problem = format_args!(
-            "no {QUESTIONS} in this folder, and no {FRAMES} with {CLASSES} to make questions of; --questions FILE names some"
+            "no {QUESTIONS} in this folder, and no {FRAMES} with {CLASSES} to make questions of; --questions FILE names some, and --ask home asks about photographs without any"
         );
         return Err(Error::data(folder.display(), problem));
     }

@@ -99,10 +99,12 @@ impl Enhancer {
         let other = self.trials(dark, &swapped, [None; 2])?;
         let other = other.map(|trials| trials.probe);
         let others = self.other_outputs(&frames, probe.best())?;
-        let mut found = match (image, self.stated_pair(&probe)) {
+        let stated = self.stated_pair();
+        let is_plausible = |pair: &RangePair| probe.plausible().contains(pair);
+        let mut found = match (image, stated) {
             (ImageOutput::Unknown, _) => Found::no_output(&self.output_title(), &probe, &others),
-            (ImageOutput::Known, Some(pair)) => Found::stated(pair),
-            (ImageOutput::Known, None) => propose(&probe, other.as_ref(), order),
+            (ImageOutput::Known, Some(pair)) if is_plausible(&pair) => Found::stated(pair),
+            (ImageOutput::Known, _) => propose(&probe, stated, other.as_ref(), order),
         };
         if !found.lines.is_empty() {
             found.lines.extend(self.found_size());
@@ -143,14 +145,13 @@ impl Enhancer {
         format!("output {:?}", self.graph().signature.outputs[0].port.name)
     }
 
-    /// The ranges that are stated, if the images are plausible with them.
-    fn stated_pair(&self, probe: &Probe) -> Option<RangePair> {
+    /// The ranges that are stated; `None` if one is not.
+    fn stated_pair(&self) -> Option<RangePair> {
         let [input, output] = self.stated_ranges();
-        let pair = RangePair {
+        Some(RangePair {
             input: input?,
             output: output?,
-        };
-        probe.plausible().contains(&pair).then_some(pair)
+        })
     }
 
     /// Runs the model on a frame of each size, which shows what it takes. What is wrong with its images is not looked at here.
@@ -289,8 +290,14 @@ impl Found {
 }
 
 /// What follows from the pairs of ranges: the only plausible one is proposed. `swapped` is the probe with the other order of the
-/// output's colours, which is considered if the colours are why nothing else is plausible.
-fn propose(probe: &Probe, swapped: Option<&Probe>, order: ChannelOrder) -> Found {
+/// output's colours, which is considered if the colours are why nothing else is plausible; of several pairs that are plausible
+/// with it, that which is `stated` is taken.
+fn propose(
+    probe: &Probe,
+    stated: Option<RangePair>,
+    swapped: Option<&Probe>,
+    order: ChannelOrder,
+) -> Found {
     match probe.plausible().as_slice() {
         [pair] => {
             let conclusion = format!(
@@ -311,12 +318,18 @@ fn propose(probe: &Probe, swapped: Option<&Probe>, order: ChannelOrder) -> Found
         let seen = pair.verdict();
         pair.ranges == probe.usual && seen.is_some_and(|seen| seen.example.flaw == Flaw::Hue)
     });
-    if let Some(swapped) = swapped.filter(|_| is_hue)
-        && let [pair] = swapped.plausible().as_slice()
-    {
+    let plausible = swapped.map_or_else(Vec::new, Probe::plausible);
+    let pair = match &plausible[..] {
+        [pair] => Some(*pair),
+        several => stated.filter(|pair| several.contains(pair)),
+    };
+    if let Some(pair) = pair.filter(|_| is_hue) {
         let conclusion =
             format!("With {pair} and {order} in the output its images can be enhanced images.");
-        let mut found = Found::ranges(*pair, conclusion);
+        let mut found = Found::ranges(pair, conclusion);
+        if stated == Some(pair) {
+            found.lines.clear();
+        }
         found.lines.push(ProposedLine {
             line: format!("color_out = \"{}\"", order.to_string().to_lowercase()),
             reason: "with the other order, its images are blue where the frames are red".to_owned(),

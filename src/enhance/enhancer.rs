@@ -8,7 +8,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use crate::error::{Error, Result};
-use crate::types::{Digest, EnhancerName, Rgb};
+use crate::types::{Digest, EnhancerName, Rgb, SizeLog};
 
 use super::describe::Description;
 use super::failure::{RunFailure, by, unusable};
@@ -25,7 +25,6 @@ use super::runtime::Runtime;
 use super::session::{GraphSource, Stopper};
 use super::size_plan::{NoPlan, SeamRule, SizePlan, SizeRule, global, seams_differ};
 use super::size_search::{MULTIPLES, SizeSearch, TakenSizes, not_found};
-use super::sizes::SizeLog;
 use super::tiles::{TileWindow, TiledImage, Tiling};
 use super::time_limit::{MOST_ENDED, TimeLimit};
 use super::usage::Usage;

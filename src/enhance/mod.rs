@@ -94,7 +94,6 @@ pub(crate) use probe::FRAMES;
 pub use runtime::{Install, Runtime, RuntimeSearch, forbid_telemetry};
 pub(crate) use session::Stopper;
 pub(crate) use settings::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
-pub use sizes::{SeamCounts, SizeLog};
 pub use tiles::Tiling;
 pub use time_limit::TimeLimit;
 pub(crate) use usage::{ImageUse, Implausible, Usage};

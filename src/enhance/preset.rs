@@ -151,9 +151,22 @@ impl Preset {
         // The shell needs no quotes for zero-dce-pp.
         let known = name.replace("-pp", "++");
         let Some(content) = all.remove(&known) else {
-            let names = all.into_keys().collect::<Vec<_>>().join(", ");
-            let problem =
-                format_args!("{name:?} before the colon is not a preset; the presets are {names}");
+            let names: Vec<String> = all.into_keys().collect();
+            let letters = |name: &str| name.to_lowercase().replace(['-', '_', '+'], "");
+            let typed = letters(&known);
+            let is_near = |preset: &&String| {
+                letters(preset).starts_with(&typed)
+                    || strsim::damerau_levenshtein(&letters(preset), &typed) <= 2
+            };
+            let near: Vec<&str> = names.iter().filter(is_near).map(|name| &**name).collect();
+            let near = match &near[..] {
+                [] => ".".to_owned(),
+                near => format!("; did you mean {}?", near.join(" or ")),
+            };
+            let names = names.join(", ");
+            let problem = format_args!(
+                "{name:?} before the colon is not a preset{near} The presets are {names}"
+            );
             return Err(Error::usage("--llie", problem));
         };
         let name = name.to_owned();

@@ -110,10 +110,14 @@ impl fmt::Display for FlawedFrames {
     }
 }
 
-/// Whether the user, a preset or the element types state both ranges.
+/// Which ranges the user, a preset or the element types state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Ranges {
+    /// Both.
     Stated,
+    /// That of the input or that of the output.
+    OneStated,
+    /// None.
     Open,
 }
 
@@ -153,13 +157,13 @@ impl Probe {
         let usual = self.pairs.iter().find(|pair| pair.ranges == self.usual);
         let seen = usual.and_then(PairTrial::verdict);
         match (self.ranges, seen, self.plausible().as_slice()) {
-            (Ranges::Stated, None, _) | (Ranges::Open, None, [] | [_]) => Conclusion::Plausible,
+            (Ranges::Stated, None, _) | (_, None, [] | [_]) => Conclusion::Plausible,
             (Ranges::Stated, Some(seen), _) if seen.gravity == Gravity::Doubtful => {
                 Conclusion::Doubtful(seen)
             }
             (_, Some(seen), []) | (Ranges::Stated, Some(seen), _) => Conclusion::Implausible(seen),
-            (Ranges::Open, Some(seen), [other]) => Conclusion::Other(*other, seen),
-            (Ranges::Open, _, several) => Conclusion::Several(several.to_vec()),
+            (_, Some(seen), [other]) => Conclusion::Other(*other, seen),
+            (_, _, several) => Conclusion::Several(several.to_vec()),
         }
     }
 
@@ -168,7 +172,7 @@ impl Probe {
         self.plausible().first().copied().unwrap_or(self.usual)
     }
 
-    /// What was seen and the lines of the sidecar that would mend it, as it follows the file's name; `None` if the images are
+    /// What was seen and the lines of the sidecar that would repair it, as it follows the file's name; `None` if the images are
     /// plausible.
     pub(super) fn problem(&self) -> Option<String> {
         let stated = |pair: &RangePair| {
@@ -181,7 +185,7 @@ impl Probe {
             Conclusion::Plausible => return None,
             Conclusion::Doubtful(seen) => format!("{seen}"),
             Conclusion::Implausible(seen) => {
-                format!("{seen}. {}", mend(seen.example.flaw, self.ranges))
+                format!("{seen}. {}", remedy(seen.example.flaw, self.ranges))
             }
             Conclusion::Other(pair, seen) => format!(
                 "{seen}. With {pair} they can be enhanced images; if its authors use these ranges, state both in MODEL.onnx.toml beside it: {}",
@@ -215,8 +219,8 @@ fn bytes_of_units(pairs: &[RangePair]) -> Option<RangePair> {
     (pairs == [unit, bytes]).then_some(bytes)
 }
 
-/// What may mend a flaw that no other range explains.
-fn mend(flaw: Flaw, ranges: Ranges) -> &'static str {
+/// What may repair a flaw that no other range explains.
+fn remedy(flaw: Flaw, ranges: Ranges) -> &'static str {
     match (flaw, ranges) {
         (Flaw::Hue, _) => {
             "If its output has blue first, state in MODEL.onnx.toml beside it: `color_out = \"bgr\"` (or \"rgb\", if that is stated)"
@@ -227,12 +231,18 @@ fn mend(flaw: Flaw, ranges: Ranges) -> &'static str {
         (Flaw::Shuffled, _) => {
             "Perhaps another output is the image, or the dimensions have another order: `layout_in`, `layout_out` and `output` in MODEL.onnx.toml beside it"
         }
-        (Flaw::Unlit | Flaw::White | Flaw::Haze, Ranges::Open) => {
+        (Flaw::Unlit | Flaw::White | Flaw::Haze, Ranges::Open | Ranges::OneStated) => {
             "If it is meant to do that, state its ranges in MODEL.onnx.toml beside it: `range_in = \"0..1\"` and `range_out = \"0..1\"`, or those that its authors use"
         }
-        (Flaw::Nan, _) => "Check its weights and its divisions by zero",
+        (Flaw::Nan, Ranges::Open) => "Check its weights and its divisions by zero",
+        (Flaw::Nan, _) => {
+            "Check `range_in` in its sidecar: values that are too large can do that; else its weights and its divisions by zero"
+        }
         (_, Ranges::Stated) => {
             "Check `range_in`, `range_out` and `output` in its sidecar, and the preset"
+        }
+        (_, Ranges::OneStated) => {
+            "Beside the one range that its sidecar states, no other explains that: take it out of the sidecar, and all are tried"
         }
         (_, Ranges::Open) => {
             "No value range explains that; perhaps another output is the image, or the export has lost its weights"

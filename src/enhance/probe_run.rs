@@ -27,7 +27,7 @@ impl Enhancer {
     /// Tries the model on dark frames, and decides in which value ranges it is fed and read where they are not stated.
     ///
     /// # Errors
-    /// If its images cannot be enhanced images, or several ranges would do, with the lines of a sidecar that would mend it; not if
+    /// If its images cannot be enhanced images, or several ranges would do, with the lines of a sidecar that would repair it; not if
     /// implausible images are used.
     pub(crate) fn probe(&mut self, dark: &[Rgb], implausible: Implausible) -> Result<()> {
         let mut trials = self.trials(dark, self.convention(), self.stated_ranges())?;
@@ -119,7 +119,8 @@ impl Enhancer {
         let usual = self.ranges();
         let ranges = match (input, output) {
             (Some(_), Some(_)) => Ranges::Stated,
-            _ => Ranges::Open,
+            (None, None) => Ranges::Open,
+            _ => Ranges::OneStated,
         };
         for size in SIZES {
             let frames: Vec<Rgb> = dark

@@ -7,10 +7,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use serde::{Deserialize, Serialize};
 
 use super::plausible::{Codes, DARK, Gravity, Verdict, brightness, judge};
-use super::sizes::SizeLog;
 use crate::error::{Error, Result};
 use crate::types::enhancer_note::{EnhancerNote, FlawedImage};
-use crate::types::{Digest, Rgb};
+use crate::types::{Digest, Rgb, SizeLog};
 
 /// Number of dark images from which on a verdict on the enhancer is possible; chosen as the number of frames of the probe.
 const ENOUGH: usize = super::probe::FRAMES;
@@ -131,6 +130,7 @@ impl Usage {
             state.sizes.values().for_each(|log| all.add(log));
             state.note.sizes = all.summary();
             state.note.resized = all.resized + all.reduced > 0;
+            state.note.size_counts = all;
         });
     }
 

@@ -21,7 +21,7 @@ const UNFINISHED: &str = ".tmp-";
 pub(super) struct StoreFolder {
     /// Folder of this version's files.
     root: PathBuf,
-    /// Who may enter it. It is made anew where somebody deletes it.
+    /// Who may enter it. It is made again if somebody deletes it.
     access: FolderAccess,
     /// Beginning of the names of this process's unfinished files: no other process, on this machine or another, has it.
     unfinished: String,

@@ -217,8 +217,7 @@ impl CircuitBreaker {
         self.stopped |= self.fails_fast && newly;
         self.stopped |= too_many.is_some() || self.models.iter().all(|model| model.health.stopped);
         if let Some(problem) = problem.or(too_many) {
-            let problem =
-                format!("{problem} (every reply is stored; the same command continues)");
+            let problem = format!("{problem} (every reply is stored; the same command continues)");
             if newly {
                 let (endpoint, problem) = (endpoint.clone(), problem.clone());
                 self.model_errors

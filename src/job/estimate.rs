@@ -288,7 +288,10 @@ fn line(
     let readings = by_reading.iter().filter(|(_, part)| part.requests > 0);
     CostLine {
         model: format!("{}{role}", model.name),
-        endpoints: model.server.as_deref().map_or_else(Vec::new, Server::addresses),
+        endpoints: model
+            .server
+            .as_deref()
+            .map_or_else(Vec::new, Server::addresses),
         requests: tokens.requests,
         text_tokens: tokens.text,
         image_tokens: tokens.image,

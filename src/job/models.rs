@@ -136,8 +136,13 @@ fn refuse_same_trials(models: &[ModelUnderTest]) -> Result<()> {
             (model.view, name, Arc::clone(&model.digest))
         };
         if let Some(other) = before.find(|other| facts(other) == facts(model)) {
+            let how = match model.view {
+                View::Image => "",
+                View::Blind => " without images",
+            };
             let problem = format_args!(
-                "{} and {} differ in nothing that decides the reply; in a file of models, set deployment",
+                "{} and {} differ in nothing that decides the reply{how}: leave one of them out, with its flag or its view in a file of models; \
+                 if they are two deployments, set deployment there",
                 other.name, model.name
             );
             return Err(Error::usage("--model", problem));

@@ -46,7 +46,7 @@ questions.csv   one question a line; a spreadsheet can edit it
   A B C D       the choices; leave cells empty for fewer than four, add E, F, ... for more
   answer        the letter of the true choice
   category      the kind of question, by which the report groups
-images/         the images: PNG, JPEG, WebP, TIFF, BMP or OpenEXR
+the images      PNG, JPEG, WebP, TIFF, BMP or OpenEXR; --data-root DIR allows a folder outside of this one
 dataset.json    the name of the data set
 
 Replace the images and the lines by your own, then run the check again.

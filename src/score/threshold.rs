@@ -45,6 +45,15 @@ impl ThinLevel {
     fn is_small(&self) -> bool {
         self.replies < MIN_REPLIES || self.clusters < MIN_CLUSTERS
     }
+
+    /// What a threshold needs of this level, in words.
+    pub(crate) fn needed(&self) -> String {
+        if self.is_small() {
+            format!("{MIN_REPLIES} in {MIN_CLUSTERS} are needed")
+        } else {
+            format!("{:.0} % of those at L0 are needed", 100.0 * MIN_SHARE)
+        }
+    }
 }
 
 /// Why a threshold is not known.

@@ -72,7 +72,7 @@ pub(super) fn each_placed_line<T: StoredLine>(
         let parsed: Vec<serde_json::Result<T>> = parsed.collect();
         for (line, value) in lines.iter().zip(parsed) {
             let value = value.map_err(|e| {
-                let problem = format!("not {}: {e}; {}", T::WHAT, T::MEND);
+                let problem = format!("not {}: {e}; {}", T::WHAT, T::REMEDY);
                 Error::line(path, line.number, problem)
             })?;
             let (start, length) = (line.start, line.bytes.len());
@@ -113,7 +113,7 @@ pub(super) fn set_aside<T: StoredLine>(path: &Path, aside: &Path) -> Result<()> 
         return Ok(());
     };
     if good == 0 {
-        let problem = format!("not {}: {}; {}", T::WHAT, first.problem, T::MEND);
+        let problem = format!("not {}: {}; {}", T::WHAT, first.problem, T::REMEDY);
         return Err(Error::line(path, first.number, problem));
     }
     let mut lines = match reading::read(aside) {
@@ -182,7 +182,7 @@ fn paid(bad: &[BadLine]) -> String {
 }
 
 const A_RECORD: &str = "a record";
-const MEND_A_RECORD: &str = "the command that made the run, called again, sets single such lines aside and asks their trials again; \
+const REMEDY_OF_A_RECORD: &str = "the command that made the run, called again, sets single such lines aside and asks their trials again; \
                              or restore the file";
 
 /// The content of one line in a file of a run.
@@ -190,27 +190,27 @@ pub(super) trait StoredLine: DeserializeOwned + Send {
     /// The name in error messages, with its article.
     const WHAT: &str;
     /// What a user can do about a line that is none.
-    const MEND: &str = "restore the file, or use another --out";
+    const REMEDY: &str = "restore the file, or use another --out";
 }
 
 impl<D: Detail> StoredLine for Record<D> {
     const WHAT: &str = A_RECORD;
-    const MEND: &str = MEND_A_RECORD;
+    const REMEDY: &str = REMEDY_OF_A_RECORD;
 }
 
 impl<D: Detail> StoredLine for RereadRecord<D> {
     const WHAT: &str = A_RECORD;
-    const MEND: &str = MEND_A_RECORD;
+    const REMEDY: &str = REMEDY_OF_A_RECORD;
 }
 
 impl StoredLine for StoredTrial {
     const WHAT: &str = A_RECORD;
-    const MEND: &str = MEND_A_RECORD;
+    const REMEDY: &str = REMEDY_OF_A_RECORD;
 }
 
 impl StoredLine for TrialLine {
     const WHAT: &str = A_RECORD;
-    const MEND: &str = MEND_A_RECORD;
+    const REMEDY: &str = REMEDY_OF_A_RECORD;
 }
 
 impl StoredLine for RunQuestion {
@@ -275,7 +275,7 @@ pub(super) fn repair<T: StoredLine>(path: &Path, mut file: &File) -> Result<()> 
         return Ok(());
     }
     if !is_of::<T>(path, complete)? {
-        let problem = format!("not {}, and no other line is; {}", T::WHAT, T::MEND);
+        let problem = format!("not {}, and no other line is; {}", T::WHAT, T::REMEDY);
         let lines = "its last line, which has no end";
         return Err(Error::data(format!("{}, {lines}", path.display()), problem));
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::Flaw;
+use super::{Flaw, SizeLog};
 
 /// How a run used an enhancer, and whether its images can be enhanced images.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -12,9 +12,12 @@ pub struct EnhancerNote {
     /// How the model is fed and read.
     #[serde(default)]
     pub convention: Vec<ConventionLine>,
-    /// What was done to the images because of their sizes; empty before the first image.
+    /// What was done to the images because of their sizes, in words; empty before the first image.
     #[serde(default)]
     pub sizes: String,
+    /// The counts behind these words. An image that was enhanced again, after an interruption, counts again.
+    #[serde(default)]
+    pub size_counts: SizeLog,
     /// Whether an image was resized for the model, so that its results are not those of the model at the image's own size.
     #[serde(default)]
     pub resized: bool,
@@ -97,6 +100,10 @@ impl EnhancerNote {
         self.probe = self.probe.or(earlier.probe);
         if self.sizes.is_empty() {
             self.sizes = earlier.sizes;
+            self.size_counts = earlier.size_counts;
+        } else if earlier.size_counts != SizeLog::default() {
+            self.size_counts.add(&earlier.size_counts);
+            self.sizes = self.size_counts.summary();
         }
         self
     }

@@ -93,7 +93,10 @@ impl RunManifest {
     /// Whether a model is one of this program's own, which is asked at no endpoint.
     #[must_use]
     pub fn is_built_in(&self, model: &str) -> bool {
-        let content = self.columns.get("model").and_then(|models| models.get(model));
+        let content = self
+            .columns
+            .get("model")
+            .and_then(|models| models.get(model));
         content.is_some_and(|content| content.get("local").is_some())
     }
 

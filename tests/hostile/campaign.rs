@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 use std::fs;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -90,10 +91,10 @@ impl fmt::Display for Summary {
     }
 }
 
-/// Runs so many trials; the calls take turns.
-pub(crate) fn run(seed: u64, runs: usize) -> Summary {
+/// Runs the trials with these numbers; the calls take turns.
+pub(crate) fn run(seed: u64, numbers: Range<usize>) -> Summary {
     let seeds = Seeds::make();
-    let next = AtomicUsize::new(0);
+    let next = AtomicUsize::new(numbers.start);
     let summary = Mutex::new(Summary {
         seed,
         ..Summary::default()
@@ -105,7 +106,7 @@ pub(crate) fn run(seed: u64, runs: usize) -> Summary {
                 let folder = folder.path().join("case");
                 loop {
                     let number = next.fetch_add(1, Ordering::Relaxed);
-                    if number >= runs {
+                    if number >= numbers.end {
                         break;
                     }
                     one(seed, number, &seeds, &folder, &summary);

@@ -4,7 +4,8 @@
 //!
 //! The short form runs with the other tests. The long form is
 //! `DARKQA_HOSTILE_RUNS=100000 DARKQA_HOSTILE_SEED=7 cargo test --test hostile -- --ignored --nocapture`; it writes each failure as a
-//! folder into `target/tmp/hostile`.
+//! folder into `target/tmp/hostile`, named by its seed and number. `DARKQA_HOSTILE_FIRST` is the number of its first run (default: 0),
+//! so that one run is done again by its number.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
@@ -33,7 +34,7 @@ const SHORT: usize = 900;
 
 #[test]
 fn damaged_files_are_read_or_refused() {
-    let summary = campaign::run(20, SHORT);
+    let summary = campaign::run(20, 0..SHORT);
     assert!(summary.faults.is_empty(), "{summary}");
     let count = |code: i32| summary.codes.get(&code).copied().unwrap_or_default();
     assert!(count(0) > SHORT / 10 && count(2) > SHORT / 10, "{summary}");
@@ -50,8 +51,9 @@ fn many_damaged_files_are_read_or_refused() {
     };
     let seed = number("DARKQA_HOSTILE_SEED", 1);
     let runs = number("DARKQA_HOSTILE_RUNS", 100_000);
-    println!("seed {seed}, {runs} runs");
-    let summary = campaign::run(seed, runs as usize);
+    let first = number("DARKQA_HOSTILE_FIRST", 0);
+    println!("seed {seed}, {runs} runs from number {first}");
+    let summary = campaign::run(seed, first as usize..(first + runs) as usize);
     println!("{summary}");
     for (count, example) in summary.unnamed.values() {
         println!("{count} errors without the file, as\n{example}");

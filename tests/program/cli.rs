@@ -144,7 +144,10 @@ fn a_dry_run_needs_no_key() {
     let args = words("--data set.jsonl --model gpt-4o --dry-run");
     let run = bench.complete(&args);
     assert!(run.starts_with("Nothing was sent. 33 of 33"), "{run}");
-    assert!(run.contains("asked at https://api.openai.com/v1\n"), "{run}");
+    assert!(
+        run.contains("asked at https://api.openai.com/v1\n"),
+        "{run}"
+    );
     bench.file(
         "two.toml",
         "[[model]]\nid = \"a\"\n[[model]]\nid = \"b\"\nendpoints = [\"http://127.0.0.1:9/v1\"]\n",

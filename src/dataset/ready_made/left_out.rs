@@ -89,7 +89,12 @@ impl LeftOut {
                 Why::SeveralTruths => format!("{head} have several true options, e.g. {first}"),
                 Why::Bad | Why::Rotation => format!("{head} are broken; the first: {first}"),
             };
-            if !why.is_left_out(args) {
+            let is_too_bad = why == Why::Bad && *count as f64 > MOST_BAD * rows as f64;
+            if is_too_bad {
+                problems.push(format!(
+                    "{head}; --bad skip leaves out at most 5 %: repair the file"
+                ));
+            } else if !why.is_left_out(args) {
                 let verb = match count {
                     1 => "leaves it out",
                     _ => "leaves them out",
@@ -99,10 +104,6 @@ impl LeftOut {
                     _ => "",
                 };
                 problems.push(format!("{head}; {} {verb}{other}", why.flag()));
-            } else if why == Why::Bad && *count as f64 > MOST_BAD * rows as f64 {
-                problems.push(format!(
-                    "{head}; --bad skip leaves out at most 5 %: mend the file"
-                ));
             }
         }
         if problems.is_empty() {

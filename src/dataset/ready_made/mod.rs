@@ -75,7 +75,7 @@ use truths::{Answered, is_own, truths};
 /// The set at a place: a file, a pattern of files, a folder, or several files.
 ///
 /// # Errors
-/// If it cannot be read without guessing. The error shows the columns, what was taken for what, and a flag that mends it.
+/// If it cannot be read without guessing. The error shows the columns, what was taken for what, and a flag that repairs it.
 pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<ReadySet> {
     let place = places.first().map_or(Path::new(""), PathBuf::as_path);
     let preset = preset::named(args.preset.as_deref());

@@ -8,9 +8,9 @@ use crate::enhance::graph::Graph;
 use crate::enhance::probe::RangePair;
 use crate::enhance::sidecar::{self, ModelSidecar};
 use crate::enhance::size_search::TakenSizes;
-use crate::enhance::sizes::SizeLog;
 use crate::enhance::usage::Usage;
 use crate::error::Result;
+use crate::types::SizeLog;
 use crate::types::enhancer_note::{ProbeNote, ProbeOutcome};
 
 impl Enhancer {

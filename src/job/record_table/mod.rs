@@ -52,7 +52,7 @@ fn update_of<D: Tabled>(folder: &Path, table: RecordTable) -> Result<()> {
     if table == RecordTable::LeftOut {
         if path.exists() {
             tracing::warn!(
-                "{}: not made from the records as they are now, and left as it is (--no-parquet); report without --no-parquet writes it anew",
+                "{}: not made from the records as they are now, and left as it is (--no-parquet); report without --no-parquet writes it again",
                 path.display()
             );
         }

@@ -70,7 +70,7 @@ type Gain<'f> = (
     &'f PooledFinding,
 );
 
-/// The enhancer and level with the largest gain of mean PSNR.
+/// The enhancer and level with the largest gain of mean PSNR; `None` if no enhancer raises it.
 fn largest_gain<'f>(
     findings: &'f Findings<'_>,
     fidelity: &'f FidelityFindings,
@@ -93,6 +93,7 @@ fn largest_gain<'f>(
         Some((row.means[0]? - raw.means[0]?, (row, raw, answers)))
     });
     gains
+        .filter(|(gain, _)| *gain > 0.0)
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, gain)| gain)
 }

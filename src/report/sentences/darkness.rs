@@ -2,6 +2,7 @@
 
 use super::lights::{Topic, of_set};
 use super::pooled::{detail, of_verdict, runs};
+use super::sample::WIDE;
 use super::sentence::{Numbers, Sentence, Tone, capitalised};
 use crate::report::words::light;
 use crate::score::cluster::ClusterUnit;
@@ -100,7 +101,10 @@ pub(super) fn with_variant(
             format!("; at {}", darkest.level),
         ),
         _ => (
-            format!("it is not shown that {cause} costs anything at any level."),
+            format!(
+                "it is not shown that {cause} costs anything at any level{}.",
+                not_ruled_out(&found, &mut numbers)
+            ),
             format!("; at {}", darkest.level),
         ),
     };
@@ -110,4 +114,15 @@ pub(super) fn with_variant(
     };
     let detail = detail(darkest, &mut numbers, &more);
     Some(numbers.sentence("darkness", Tone::from(verdict), text, detail))
+}
+
+/// The largest loss that the intervals leave open, if it is large: so that nobody takes too few images for eyes that see in the dark.
+fn not_ruled_out(levels: &[&PooledFinding], numbers: &mut Numbers) -> String {
+    let losses = levels.iter().map(|finding| -finding.difference.low);
+    let largest = losses.fold(0.0, f64::max);
+    if largest <= WIDE {
+        return String::new();
+    }
+    let points = numbers.number("possible loss", 100.0 * largest, 0);
+    format!(", and a loss of {points} points is not ruled out")
 }

@@ -54,6 +54,7 @@ pub(crate) fn sentences(findings: &Findings<'_>) -> Vec<Sentence> {
     sentences.extend(darkness::darkness(findings));
     sentences.extend(real::real(findings));
     sentences.extend(in_each_light(findings, about_light));
+    sentences.extend(words_alone::untouched(findings));
     sentences.extend(about_clean(findings));
     sentences.extend(models::best(findings));
     sentences.extend(in_each_light(findings, about_answers));

@@ -9,7 +9,7 @@ use crate::score::pooled_kind::PooledKind;
 use crate::types::{EnhancerName, KindReading};
 
 /// Half-width of an interval in points above which the sample is called small.
-const WIDE: f64 = 0.05;
+pub(super) const WIDE: f64 = 0.05;
 
 /// Largest number of models that a sentence names.
 const MAX_NAMED: usize = 3;

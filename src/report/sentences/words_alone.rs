@@ -9,6 +9,7 @@ use crate::score::cluster::ClusterUnit;
 use crate::score::comparison::{Comparison, ComparisonKind};
 use crate::score::findings::Findings;
 use crate::score::pooled::{PooledFinding, pool};
+use crate::score::pooled_kind::PooledKind;
 use crate::score::significance::Significance;
 use crate::types::{Axis, AxisLevel, KindReading};
 
@@ -21,20 +22,51 @@ pub(super) fn pooled(levels: &[&PooledFinding], unit: ClusterUnit) -> Option<Sen
         [one] => format!("{one} falls"),
         _ => "the models fall".to_owned(),
     };
-    let is_own = largest
-        .blind_models
-        .iter()
-        .all(|model| largest.models.contains(model));
-    let below = match &largest.blind_models[..] {
-        _ if is_own => "the words alone".to_owned(),
-        [other] => format!("{other} without images"),
-        _ => "the models without images".to_owned(),
-    };
+    let below = second_side(largest);
     let at = runs(&shown, levels);
     let place = capitalised(largest.level.axis().unwrap_or(Axis::LIGHT).place);
     let text = format!("{place} {who} below {below} at {at}.");
     let detail = detail(largest, &mut numbers, &format!("; at {}", largest.level));
     Some(numbers.sentence("below blind", Tone::Worse, text, detail))
+}
+
+/// What a finding compares images with.
+fn second_side(finding: &PooledFinding) -> String {
+    let mut models = finding.blind_models.iter();
+    match &finding.blind_models[..] {
+        _ if models.all(|model| finding.models.contains(model)) => "the words alone".to_owned(),
+        [other] => format!("{other} without images"),
+        _ => "the models without images".to_owned(),
+    }
+}
+
+/// What the untouched images give over the words alone, of all models together.
+pub(super) fn untouched(findings: &Findings<'_>) -> Option<Sentence> {
+    let of = findings.pooled.iter().find(|finding| {
+        finding.kind == PooledKind::Blind
+            && finding.family.is_none()
+            && finding.enhancer.is_none()
+            && finding.level == AxisLevel::L0
+    })?;
+    let mut numbers = Numbers::of(findings.unit);
+    let (with, without) = (
+        numbers.percent("with", of.first),
+        numbers.percent("without", of.second),
+    );
+    let text = match of.verdict {
+        Significance::Better => format!(
+            "At L0 images give {} points over {}: {with} % with them, {without} % without.",
+            numbers.size("gain", of.difference.value),
+            second_side(of)
+        ),
+        Significance::NotShown => format!(
+            "It is not shown that images help at L0: {with} % with them, {without} % without."
+        ),
+        // That the models fall below the words alone is said elsewhere, and that no verdict is possible.
+        _ => return None,
+    };
+    let detail = detail(of, &mut numbers, "");
+    Some(numbers.sentence("images", Tone::from(of.verdict), text, detail))
 }
 
 /// The comparisons by family of raw images of a variant with no images, of the models over which findings are pooled.

@@ -122,9 +122,10 @@ fn thin(level: &ThinLevel) -> String {
         replies => format!("{replies} replies"),
     };
     format!(
-        "{} has {replies} in {}",
+        "{} has {replies} in {} ({})",
         level.level,
-        counted(level.clusters, "cluster")
+        counted(level.clusters, "cluster"),
+        level.needed()
     )
 }
 

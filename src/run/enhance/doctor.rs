@@ -23,7 +23,7 @@ const PICTURE: &str = "doctor.png";
 #[derive(Debug, Args)]
 pub(crate) struct DoctorArgs {
     /// Run the model on dark versions of the images with each convention that could be meant, and write doctor.html and doctor.png
-    /// into the folder of --out, with the sidecar that would mend it; ends with 0 if there is one plausible convention, else with 1
+    /// into the folder of --out, with the sidecar that would repair it; ends with 0 if there is one plausible convention, else with 1
     #[arg(long, conflicts_with_all = ["describe", "shard"], requires = "out", add = Decides::Nothing)]
     pub doctor: bool,
     /// Write the sidecar that --doctor proposes beside the model; an existing one is never replaced

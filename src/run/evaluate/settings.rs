@@ -148,6 +148,11 @@ impl EvaluateArgs {
         }
         if truths == Truths::Unknown {
             check_without_truths(&job)?;
+            if self.scene.pairs.is_some() {
+                let problem = "the photographs in the dark would not be asked about with --ask: write questions with answers about the files in \
+                               normal light (--questions), or ask about the dark ones alone with --data DIR --light dark";
+                return Err(Error::usage("--pairs", problem));
+            }
         }
         Ok(Evaluation {
             rules: rules(self.selection.rules.as_deref())?,

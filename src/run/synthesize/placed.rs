@@ -215,8 +215,8 @@ impl Placed {
     }
 
     fn refusal(&self, problem: &str) -> Error {
-        let mend = "--force writes over it, another --out keeps both";
-        Error::data(self.image.display(), format_args!("{problem}; {mend}"))
+        let remedy = "--force writes over it, another --out keeps both";
+        Error::data(self.image.display(), format_args!("{problem}; {remedy}"))
     }
 }
 

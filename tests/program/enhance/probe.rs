@@ -1,6 +1,7 @@
 //! Models whose images cannot be enhanced images: in an evaluation, and examined by `enhance --doctor`.
 
 use std::fs;
+use std::path::Path;
 
 use serde_json::Value;
 
@@ -115,7 +116,10 @@ fn images_that_cannot_be_enhanced_ones_stop_the_run_with_what_was_seen() {
             "{called:?}"
         );
         let page = fs::read_to_string(bench.path("run/report.html")).unwrap();
-        assert!(page.contains("because of --llie-anyway"));
+        let words = page
+            .replace("<span class=\"flag\">", "")
+            .replace("</span>", "");
+        assert!(words.contains("because of --llie-anyway"));
         assert_eq!(
             manifest(&bench)["enhancers"]["model"]["probe"]["outcome"],
             "overruled"
@@ -149,6 +153,19 @@ fn a_wrong_statement_is_found_too() {
         let called = ask(&bench, "");
         assert_eq!(called.code, Some(2), "{wrong}: {called:?}");
     }
+    // One range alone: the other is looked for, and cannot explain the images.
+    let bench = bench(
+        &onnx::enhancer_in_ranges(UNIT, UNIT),
+        "range_out = \"0..255\"",
+    );
+    let called = ask(&bench, "");
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert!(
+        called
+            .stderr
+            .contains("the one range that its sidecar states"),
+        "{called:?}"
+    );
 }
 
 #[test]
@@ -164,6 +181,23 @@ fn a_model_that_does_nothing_is_used_only_if_its_ranges_are_stated() {
     let called = ask(&stated, "");
     assert_eq!(called.code, Some(0), "{called:?}");
     assert!(called.stdout.contains("not brighter"), "{called:?}");
+}
+
+/// With red and blue swapped, several ranges are plausible: the stated ones are kept.
+#[test]
+fn the_doctor_finds_a_wrong_order_of_colours_beside_stated_ranges() {
+    let bench = Bench::new();
+    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("models");
+    fs::copy(models.join("lift.onnx"), bench.path("model.onnx")).unwrap();
+    let right = fs::read_to_string(models.join("lift.onnx.toml")).unwrap();
+    bench.file("model.onnx.toml", right + "\ncolor_out = \"bgr\"\n");
+    bench.complete(&words("rooms --out rooms --frames 6 --size 144x96"));
+    let called = bench.call(&words("enhance --doctor model.onnx rooms --out doctor"));
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert!(
+        called.stdout.contains("color_out = \"rgb\"") && !called.stdout.contains("range_in = "),
+        "{called:?}"
+    );
 }
 
 #[test]

@@ -128,8 +128,8 @@ fn each_kind_and_verdict_has_its_words() {
     assert_eq!(
         said,
         [
-            "· It is not shown that darkness costs anything at any level. (mean of these 2 models: −1.0 [−5.0, +3.0], p = 0.062; at L2; \
-          n = 1,237 in 30 scenes)"
+            "· It is not shown that darkness costs anything at any level, and a loss of 6 points is not ruled out. (mean of these 2 \
+          models: −1.0 [−5.0, +3.0], p = 0.062; at L2; n = 1,237 in 30 scenes)"
         ]
     );
     let said = say(Darkness, &[(0.1, Better)]);
