@@ -46,13 +46,12 @@ impl ThinLevel {
         self.replies < MIN_REPLIES || self.clusters < MIN_CLUSTERS
     }
 
-    /// What a threshold needs of this level, in words.
-    pub(crate) fn needed(&self) -> String {
-        if self.is_small() {
-            format!("{MIN_REPLIES} in {MIN_CLUSTERS} are needed")
-        } else {
-            format!("{:.0} % of those at L0 are needed", 100.0 * MIN_SHARE)
-        }
+    /// What a threshold needs of each level up to the crossing, in words.
+    pub(crate) fn needed() -> String {
+        format!(
+            "{MIN_REPLIES} replies in {MIN_CLUSTERS} clusters, and {:.0} % of those at L0, at each level up to the crossing",
+            100.0 * MIN_SHARE
+        )
     }
 }
 

@@ -156,8 +156,7 @@ impl SizeLog {
             format!("{differing} of {compared} samples at seams differ, by up to {most}")
         };
         format!(
-            "in tiles of {} with {} px context ({seam})",
-            format!("{width} × {height}"),
+            "in tiles of {width} × {height} with {} px context ({seam})",
             self.context.unwrap_or(0)
         )
     }

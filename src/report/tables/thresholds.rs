@@ -122,10 +122,9 @@ fn thin(level: &ThinLevel) -> String {
         replies => format!("{replies} replies"),
     };
     format!(
-        "{} has {replies} in {} ({})",
+        "{} has {replies} in {}",
         level.level,
-        counted(level.clusters, "cluster"),
-        level.needed()
+        counted(level.clusters, "cluster")
     )
 }
 
@@ -138,11 +137,17 @@ fn reason(curve: &Curve) -> String {
     reasons.join("; ")
 }
 
-/// A line for each curve of all families together of which levels are left out.
+/// What a threshold needs, if one is not known for lack of it, and a line for each curve of all families together of which levels are
+/// left out.
 fn notes(curves: &[&Curve]) -> Vec<String> {
     let curves = curves.iter().filter(|curve| curve.family.is_none());
-    let thinned = curves.filter(|curve| !curve.summary.left_out.is_empty());
-    let notes = thinned.map(|curve| {
+    let thinned = curves
+        .clone()
+        .filter(|curve| !curve.summary.left_out.is_empty());
+    let is_thin = |curve: &Curve| matches!(curve.summary.threshold, Err(NoThreshold::Thin(_)));
+    let is_needed = curves.clone().any(|curve| is_thin(curve));
+    let needed = is_needed.then(|| format!("a threshold needs {}", ThinLevel::needed()));
+    let left_out = thinned.map(|curve| {
         let light = light(&curve.variant, curve.enhancer.as_ref());
         let left_out: Vec<String> = curve.summary.left_out.iter().map(thin).collect();
         format!(
@@ -151,7 +156,7 @@ fn notes(curves: &[&Curve]) -> Vec<String> {
             left_out.join(", ")
         )
     });
-    notes.collect()
+    needed.into_iter().chain(left_out).collect()
 }
 
 /// Number of levels that [`finer`] proposes.
