@@ -221,7 +221,7 @@ impl Endpoint {
                 && !self.is_known.swap(true, Ordering::Relaxed)
             {
                 warn!(
-                    "{base}: {problem}; trying again. Is a server running there? --base-url names the address"
+                    "{problem}; trying again. Is a server running there? --base-url names the address"
                 );
             }
             debug!(endpoint = %base, ?delay, problem, "trying again");

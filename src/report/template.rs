@@ -1,7 +1,7 @@
 //! HTML pages from templates: [`filled`].
 
 use minijinja::value::Serde;
-use minijinja::{AutoEscape, Environment, HtmlEscape, Value};
+use minijinja::{AutoEscape, Environment};
 use serde::Serialize;
 
 use crate::error::{Error, Result};
@@ -14,19 +14,6 @@ const PARTS: [(&str, &str); 3] = [
     // The rows of a table, which stand in that part.
     ("<!-- rows -->", include_str!("page/rows.html")),
 ];
-
-/// A sentence as HTML in which no line ends within the name of a flag, as after the dashes of `--profile`.
-fn unbroken_flags(sentence: &str) -> Value {
-    let words = sentence.split(' ').map(|word| {
-        let word = HtmlEscape(word).to_string();
-        if word.contains("--") {
-            format!("<span class=\"flag\">{word}</span>")
-        } else {
-            word
-        }
-    });
-    Value::from_safe_string(words.collect::<Vec<_>>().join(" "))
-}
 
 /// The HTML of a template with its values, which are escaped, and without hidden characters.
 ///
@@ -41,7 +28,6 @@ pub(super) fn filled(template: &str, values: impl Serialize) -> Result<String> {
         });
     let mut environment = Environment::new();
     environment.set_auto_escape_callback(|_| AutoEscape::Html);
-    environment.add_filter("flags", unbroken_flags);
     environment
         .add_template("page", &whole)
         .map_err(|e| failed(&e))?;

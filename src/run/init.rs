@@ -63,6 +63,8 @@ pub(crate) fn init(args: &InitArgs, progress: &Progress) -> Result<Outcome> {
         "questions.csv",
         "dataset.json",
         "images/room1.png",
+        "images/room2.png",
+        "images/room3.png",
     ];
     if let Some(exists) = files.iter().map(|name| at(name)).find(|path| path.exists()) {
         let problem = "there already; init overwrites nothing: name another folder";

@@ -205,6 +205,10 @@ fn the_template_can_be_checked_and_run_as_it_is() {
         "{}",
         again.stderr
     );
+    bench.file("pictures/images/room2.png", "mine");
+    let third = bench.call(&words("init pictures"));
+    assert_eq!(third.code, Some(2), "{third:?}");
+    assert!(third.stderr.contains("room2.png"), "{third:?}");
     let own = bench.call(&words("init own --frames my-data/images"));
     assert_eq!(own.code, Some(0), "{own:?}");
     let check = own

@@ -116,10 +116,7 @@ fn images_that_cannot_be_enhanced_ones_stop_the_run_with_what_was_seen() {
             "{called:?}"
         );
         let page = fs::read_to_string(bench.path("run/report.html")).unwrap();
-        let words = page
-            .replace("<span class=\"flag\">", "")
-            .replace("</span>", "");
-        assert!(words.contains("because of --llie-anyway"));
+        assert!(page.contains("because of --llie-anyway"));
         assert_eq!(
             manifest(&bench)["enhancers"]["model"]["probe"]["outcome"],
             "overruled"
