@@ -242,7 +242,7 @@ fn remedy(flaw: Flaw, ranges: Ranges) -> &'static str {
             "Check `range_in`, `range_out` and `output` in its sidecar, and the preset"
         }
         (_, Ranges::OneStated) => {
-            "Beside the one range that its sidecar states, no other explains that: take it out of the sidecar, and all are tried"
+            "Beside the one range that its sidecar states, or its element type, no other explains that: without a line in the sidecar all are tried"
         }
         (_, Ranges::Open) => {
             "No value range explains that; perhaps another output is the image, or the export has lost its weights"

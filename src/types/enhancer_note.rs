@@ -156,6 +156,35 @@ mod tests {
     }
 
     #[test]
+    fn sizes_of_all_sessions_are_counted() {
+        let note = |whole: usize, reduced: usize| {
+            let counts = SizeLog {
+                images: whole + reduced,
+                whole,
+                reduced,
+                ..SizeLog::default()
+            };
+            EnhancerNote {
+                sizes: counts.summary(),
+                size_counts: counts,
+                ..EnhancerNote::default()
+            }
+        };
+        let earlier = || Some(note(9, 0));
+        let both = note(31, 2).after(earlier());
+        assert_eq!(both.size_counts, note(40, 2).size_counts);
+        assert_eq!(both.sizes, note(40, 2).sizes);
+        // A session that enhances nothing leaves what was counted.
+        assert_eq!(EnhancerNote::default().after(earlier()), note(9, 0));
+        // A manifest of an earlier version has the words alone.
+        let words = EnhancerNote {
+            sizes: "9 images: as they are".to_owned(),
+            ..EnhancerNote::default()
+        };
+        assert_eq!(note(31, 0).after(Some(words)), note(31, 0));
+    }
+
+    #[test]
     fn examples_do_not_depend_on_the_order() {
         let names: Vec<String> = (0..9).map(|i| format!("f{i}")).collect();
         let [mut one, mut other] = [JudgedImages::default(), JudgedImages::default()];

@@ -79,6 +79,29 @@ fn number(row: &Value, column: &str) -> f64 {
     row[column].as_str().unwrap().parse().unwrap()
 }
 
+/// The photographs in the dark would be left aside without a word.
+#[test]
+fn pairs_are_not_asked_without_true_answers() {
+    let bench = photographs();
+    for (folder, name) in [("light", "a.png"), ("dark", "a.png")] {
+        fs::create_dir_all(bench.path(folder)).unwrap();
+        fs::copy(
+            bench.path("photos/hall/00.png"),
+            bench.path(folder).join(name),
+        )
+        .unwrap();
+    }
+    let called = bench.call(&words(
+        "--pairs light,dark --ask home --model random --levels L0 --out run",
+    ));
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert!(
+        called.stderr.contains("--pairs: ") && called.stderr.contains("--light dark"),
+        "{called:?}"
+    );
+    assert!(!bench.path("run").exists());
+}
+
 #[test]
 fn a_folder_of_photographs_is_asked_and_no_reply_is_right_or_wrong() {
     let bench = photographs();

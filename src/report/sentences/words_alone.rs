@@ -62,7 +62,12 @@ pub(super) fn untouched(findings: &Findings<'_>) -> Option<Sentence> {
         Significance::NotShown => format!(
             "It is not shown that images help at L0: {with} % with them, {without} % without."
         ),
-        // That the models fall below the words alone is said elsewhere, and that no verdict is possible.
+        Significance::Worse => format!(
+            "At L0 images cost {} points against {}: {with} % with them, {without} % without.",
+            numbers.size("cost", of.difference.value),
+            second_side(of)
+        ),
+        // That no verdict is possible is said for all topics together.
         _ => return None,
     };
     let detail = detail(of, &mut numbers, "");

@@ -96,6 +96,39 @@ fn references_are_neither_ranked_nor_mixed() {
 }
 
 #[test]
+fn what_images_give_over_the_words_alone_is_said_at_l0() {
+    let say = |with: f64, without: f64| {
+        let all = asked("m", FRAMES, &[("blind", without), ("L0", with)]);
+        let images = of_kind(&said(&all), "images");
+        assert_eq!(images.len(), 1, "{images:?}");
+        images[0].clone()
+    };
+    for (with, without, start) in [
+        (
+            1.0,
+            0.0,
+            "+ At L0 images give 100.0 points over the words alone: 100.0 % with them, 0.0 % without. (",
+        ),
+        (
+            0.0,
+            1.0,
+            "− At L0 images cost 100.0 points against the words alone: 0.0 % with them, 100.0 % without. (",
+        ),
+        (
+            0.5,
+            0.5,
+            "· It is not shown that images help at L0: 50.0 % with them, 50.0 % without. (",
+        ),
+    ] {
+        let said = say(with, without);
+        assert!(said.starts_with(start), "{said}");
+    }
+    // Without a model that was asked without images, there is nothing to say.
+    let seen = said(&asked("m", FRAMES, &[("L0", 1.0)]));
+    assert!(of_kind(&seen, "images").is_empty());
+}
+
+#[test]
 fn darkness_names_the_variant_that_shows_it() {
     let say = |ev: f64, noise: f64| {
         let all = asked(
