@@ -18,6 +18,8 @@ use support::run::{Bench, words};
 
 /// The model that says what it is told.
 const SAID: &str = "script:said.jsonl";
+const WIDEST_CHART: &str =
+    "Math.max(...[...document.querySelectorAll('.panel svg')].map((s) => s.clientWidth))";
 
 /// Replies that would break a page which trusted them.
 fn hostile() -> String {
@@ -311,16 +313,16 @@ fn narrow(browser: &mut Browser, url: &str) {
     assert!(wide.as_u64().unwrap() <= 390, "nothing sticks out: {wide}");
     browser.shot("narrow.png", true);
     browser.window(1400, 900, "light");
+    // The page draws its charts again only after it has seen the new width.
+    browser.wait(&format!("{WIDEST_CHART} > 390"));
 }
 
 /// On paper charts have its width, and what is not drawn is said; afterwards they have that of the window again.
 fn paper(browser: &mut Browser) {
-    let widest =
-        "Math.max(...[...document.querySelectorAll('.panel svg')].map((s) => s.clientWidth))";
     let noted = "document.querySelector('figure.chart .paper-only').textContent";
-    let before = browser.evaluate(widest);
+    let before = browser.evaluate(WIDEST_CHART);
     browser.evaluate("dispatchEvent(new Event('beforeprint'))");
-    let printed = browser.evaluate(widest).as_f64().unwrap();
+    let printed = browser.evaluate(WIDEST_CHART).as_f64().unwrap();
     // A4 has 718 pixels between margins of 10 mm.
     assert!(
         printed <= 718.0 && printed < before.as_f64().unwrap(),
@@ -329,7 +331,7 @@ fn paper(browser: &mut Browser) {
     let note = browser.evaluate(noted);
     assert_eq!(note, "Not drawn, as they are switched off: random. ");
     browser.evaluate("dispatchEvent(new Event('afterprint'))");
-    assert_eq!(browser.evaluate(widest), before);
+    assert_eq!(browser.evaluate(WIDEST_CHART), before);
     browser.call("Emulation.setEmulatedMedia", &json!({"media": "print"}));
     let is_shown = |browser: &mut Browser, of: &str| {
         browser.evaluate(&format!("document.querySelector('{of}').checkVisibility()"))
