@@ -110,6 +110,12 @@ impl Enhancer {
             found.lines.extend(self.found_size());
         }
         let mut columns = columns(&probe, "");
+        let is_stated = |column: &ExaminedConvention| column.title.ends_with(STATED);
+        if let Some(own) = stated.map(|pair| pair.to_string())
+            && let Some(column) = columns.iter_mut().find(|column| column.title == own)
+        {
+            column.title += STATED;
+        }
         if let Some(other) = &other {
             let swapped = self::columns(other, ", red and blue swapped in the output");
             // Nine more pictures of what cannot be would only distract.
@@ -126,9 +132,9 @@ impl Enhancer {
             }
         }
         columns.extend(others);
-        // Where something is plausible, the rest would only distract.
+        // If something is plausible, the rest would only distract, except what is stated: that is what a run would use.
         if columns.iter().any(|column| column.problem.is_none()) {
-            columns.retain(|column| column.problem.is_none());
+            columns.retain(|column| column.problem.is_none() || is_stated(column));
         }
         Ok(Examination {
             settled: found.settled,
@@ -201,6 +207,9 @@ impl Enhancer {
         Ok(columns)
     }
 }
+
+/// What is added to the title of the convention that is stated.
+const STATED: &str = ", as stated";
 
 fn swapped(order: ChannelOrder) -> ChannelOrder {
     match order {
@@ -308,8 +317,11 @@ fn propose(
         [] => {}
         several => {
             let list: Vec<String> = several.iter().map(ToString::to_string).collect();
+            let stated = stated.map_or_else(String::new, |pair| {
+                format!(" {pair}, which is stated, is not one of them.")
+            });
             return Found::nothing(format!(
-                "Its images can be enhanced images with several value ranges: {}. Compare them below with the model's own examples, and state those that its authors use.",
+                "Its images can be enhanced images with several value ranges: {}.{stated} Compare them below with the model's own examples, and state those that its authors use.",
                 list.join("; ")
             ));
         }

@@ -2,12 +2,14 @@
 
 mod foot;
 pub(super) mod marked;
+mod name_column;
 pub(super) mod wrapped;
 
 use std::fmt::Write;
 use std::path::Path;
 
 use self::foot::BELOW;
+use self::name_column::{LEVEL, NameColumn};
 use self::wrapped::WIDTH;
 pub(super) use self::wrapped::wrapped;
 use super::alert::lines;
@@ -17,15 +19,14 @@ use super::ladder::{Ladder, SeriesByLevel};
 use super::light_readings::LightReadings;
 use super::sentences::{FIRST, HOW_TO_READ, Sentence};
 use super::terminal::{line as line_of, render};
-use super::words::{counted, percent, reach_of, shortened};
+use super::words::{counted, percent, reach_of};
 use crate::score::accuracy::AccuracyCell;
 use crate::score::choice::ReadingMode;
 use crate::score::health::Health;
 use crate::types::manifest::RunManifest;
 use crate::types::{Axis, AxisLevel};
 
-/// Width of the column of a level, and of the column of intervals, in characters.
-const LEVEL: usize = 7;
+/// Width of the column of intervals, in characters.
 const REACH: usize = 15;
 
 /// Width of a name in the table, in characters: no name is longer.
@@ -181,6 +182,8 @@ fn table(report: &ChoiceReport<'_>) -> String {
         .saturating_sub(1 + most.min(MAX_LEVELS) * LEVEL + REACH)
         .max(12);
     let name_width = longest.max(titles).unwrap_or(0).min(room.min(MAX_NAME));
+    let texts = rows.iter().flat_map(|row| [&*row.block, &*row.name]);
+    let names = NameColumn::new(texts, name_width);
     let shared = common.map(|common| {
         let questions = counted(common.shared_questions, "question");
         format!(" on the {questions} that all models with images answered")
@@ -196,7 +199,7 @@ fn table(report: &ChoiceReport<'_>) -> String {
             let block: Vec<TableLine<'_>> = block.iter().filter(has_level).cloned().collect();
             let levels: Vec<AxisLevel> = levels.iter().copied().filter(is_on).collect();
             for levels in levels.chunks(MAX_LEVELS) {
-                text += &block_lines(report, &block, levels, name_width);
+                text += &block_lines(report, &block, levels, &names);
             }
         }
     }
@@ -212,7 +215,7 @@ fn block_lines(
     report: &ChoiceReport<'_>,
     block: &[TableLine<'_>],
     levels: &[AxisLevel],
-    width: usize,
+    names: &NameColumn,
 ) -> String {
     let mut text = String::new();
     let mut above = None;
@@ -223,19 +226,14 @@ fn block_lines(
         }
         if text.is_empty() {
             let heads = levels.iter().map(|level| format!("{level} "));
-            text += &line(&row.block, width, heads, "95 %");
+            text += &names.line(&row.block, heads, "95 %");
         }
         if row.group != above {
             above = row.group;
             let _ = writeln!(text, " — {}", above.unwrap_or_default());
         }
         let reach = reach_of(here().flatten().filter_map(|cell| cell.accuracy));
-        text += &line(
-            &row.name,
-            width,
-            here().map(|cell| value(report, cell)),
-            &reach,
-        );
+        text += &names.line(&row.name, here().map(|cell| value(report, cell)), &reach);
     }
     text
 }
@@ -247,14 +245,6 @@ fn block_and_name(light: &str, model: &str, is_single: bool) -> (String, String)
     } else {
         (light.to_owned(), model.to_owned())
     }
-}
-
-fn line(name: &str, width: usize, values: impl Iterator<Item = String>, reach: &str) -> String {
-    let name = shortened(name, width);
-    let values = values.map(|value| format!("{value:>LEVEL$}"));
-    let values = values.collect::<Vec<_>>().concat();
-    let line = format!(" {name:<width$}{values}  {reach}");
-    line.trim_end().to_owned() + "\n"
 }
 
 /// An accuracy in percent, with a mark if it is below that without images.

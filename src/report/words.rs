@@ -152,9 +152,10 @@ pub(super) fn words(kind: ColumnKind, cell: &TableCell) -> String {
         TableCell::Text(text) | TableCell::Unknown(text) => text.clone(),
         TableCell::Count(count) => count.to_string(),
         TableCell::Number(value) => number(kind, *value),
-        TableCell::Guess(share) => number(ColumnKind::Number, 100.0 * share.value),
         TableCell::Estimate(number) | TableCell::Below(number) => estimate(kind, *number),
-        TableCell::Strict(share, _) | TableCell::Changed(share, None) => percent(share.value),
+        TableCell::Guess(share) | TableCell::Strict(share, _) | TableCell::Changed(share, None) => {
+            percent(share.value)
+        }
         TableCell::Changed(share, Some(change)) => {
             format!("{} ({})", percent(share.value), points(*change))
         }

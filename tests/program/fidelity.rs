@@ -158,7 +158,7 @@ fn the_page_draws_the_numbers_of_the_file(bench: &Bench, table: &str) {
         .split_once(r#"<script type="application/json">"#)
         .unwrap();
     let data: Value = serde_json::from_str(data.split_once("</script>").unwrap().0).unwrap();
-    for (panel, column) in [("SSIM of the images × 100", 6), ("right answers in %", 8)] {
+    for (panel, column) in [("SSIM of the images", 6), ("share of right answers", 8)] {
         let panels = data["panels"].as_array().unwrap();
         let panel = panels.iter().find(|one| one["title"] == panel).unwrap();
         let points = panel["lines"][0]["points"].as_array().unwrap();

@@ -51,7 +51,10 @@ fn data<'a>(
     let questions = report.questions.iter().map(|question| Question {
         id: &question.id.0,
         frame: frames.index_of(&*question.frame.0),
-        family: families.index_of(question.family.name()),
+        family: families.index_of([
+            question.family.name(),
+            words::family(Some(&question.family)),
+        ]),
         text: &question.text,
         evidence: None,
         outlines: Vec::new(),

@@ -65,7 +65,8 @@ pub(in crate::report) struct PageData<'a> {
     /// The folder of each run.
     pub(in crate::report) folders: Vec<String>,
     pub(in crate::report) levels: Vec<[String; 2]>,
-    pub(in crate::report) families: Vec<&'a str>,
+    /// Each family: its name in the run, and in words.
+    pub(in crate::report) families: Vec<[&'a str; 2]>,
     pub(in crate::report) frames: Vec<&'a str>,
     /// Width and height of each frame of which there are small copies, in pixels.
     pub(in crate::report) sizes: Vec<Option<[u32; 2]>>,

@@ -10,6 +10,7 @@ use super::inputs::PageInputs;
 use super::sample::sample;
 use crate::error::Result;
 use crate::report::outcome_words;
+use crate::report::words::family;
 use crate::score::choice::ReadingMode;
 use crate::score::confusion;
 use crate::score::grid::{Grid, TrialResult};
@@ -50,7 +51,7 @@ fn data<'a>(
             questions.push(Question {
                 id: &asked.question.0,
                 frame: frames.index_of(&*asked.frame.0),
-                family: families.index_of(asked.family.name()),
+                family: families.index_of([asked.family.name(), family(Some(&asked.family))]),
                 text: run_question.map_or("", |run_question| &run_question.text),
                 outlines: run_question.map_or_else(Vec::new, RunQuestion::outlines),
                 object: run_question.and_then(RunQuestion::object),

@@ -248,6 +248,7 @@ fn settings(manifest: &RunManifest) -> Vec<(String, String)> {
     let texts = |map: &std::collections::BTreeMap<String, serde_json::Value>| {
         let rows = map.iter().map(|(name, value)| match value {
             serde_json::Value::String(text) => (name.clone(), text.clone()),
+            serde_json::Value::Null => (name.clone(), "not set".to_owned()),
             other => (name.clone(), other.to_string()),
         });
         rows.collect::<Vec<_>>()

@@ -70,6 +70,11 @@ fn conditions(observer: &ObserverSummary) -> Table {
             cell.chance
         })
         .column(
+            Share,
+            "terminal control | page control in % [95 %] | latex Control",
+            |cell| observer.control_of(cell).map(|control| control.score),
+        )
+        .column(
             Percent,
             "csv from_evidence | terminal from evidence | page answers from evidence in % | latex From evidence",
             |cell| cell.evidence,
@@ -84,11 +89,6 @@ fn conditions(observer: &ObserverSummary) -> Table {
             cell.explained
         })
         .column(Count, "csv n | terminal n | page n | latex $n$", |cell| cell.score.n)
-        .column(
-            Share,
-            "terminal control | page control in % [95 %] | latex Control",
-            |cell| observer.control_of(cell).map(|control| control.score),
-        )
         .build()
 }
 

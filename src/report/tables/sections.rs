@@ -46,14 +46,15 @@ pub(in crate::report) const SECTIONS: [Section; 15] = [
         "Known-signal observer",
         "Which answers one could still read from the pixels who is given the untouched frame, and must only confirm each thing piece by \
          piece. It is no model, no bound for models, and no part of any ranking. A lower line after an enhancer says that less of the \
-         outlines agrees with a global tone curve, not that evidence was destroyed. The control is the same observer with the image of \
+         outlines agrees with a global tone curve, not that evidence was destroyed. A thing is seen if at least half of its outline is \
+         confirmed, and detected if its whole outline, taken together, stands out of the noise. The control is the same observer with the image of \
          another scene: its score must be that of chance.",
         &[],
     ),
     (
         "families",
         "Families of questions",
-        "Underlined: shown to be below a model without images (its own, if it was asked so). There images in the dark do more harm than none.",
+        "Underlined: shown to be below a model without images (its own, if it was asked so). There the model answers better without an image than with the image.",
         &["families"],
     ),
     (

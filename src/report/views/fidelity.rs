@@ -9,6 +9,7 @@ use crate::report::words::light;
 use crate::score::estimate::Estimate;
 use crate::score::fidelity::ConditionFidelity;
 use crate::score::findings::Findings;
+use crate::types::degradation::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, KindReading};
 
 /// A light: a variant, raw or with an enhancer.
@@ -22,16 +23,17 @@ const CHANCE: LineStyle = LineStyle::REFERENCE;
 
 /// The panels: title, number, and the share that chance has.
 const PANELS: [(&str, Quantity, Option<f64>); 3] = [
-    ("SSIM of the images × 100", |row| known(row.means[1]?), None),
-    ("right answers in %", |row| known(row.accuracy), None),
+    ("SSIM of the images", |row| known(row.means[1]?), None),
+    ("share of right answers", |row| known(row.accuracy), None),
     (
-        "AUC of PSNR × 100",
+        "AUC of PSNR",
         |row| Some(row.predicts[0]?.auc.estimate),
         Some(0.5),
     ),
 ];
 
-/// Similarity of the images, accuracy, and how well similarity tells right from wrong answers, by level: a line for each light.
+/// Similarity of the images, accuracy, and how well similarity tells right from wrong answers, by level: a row of panels for each
+/// axis, a line for each light.
 /// `None` where no image was measured.
 pub(super) fn drawing(findings: &Findings<'_>) -> Option<Drawing> {
     let fidelity = findings.fidelity.as_ref()?;
@@ -42,7 +44,8 @@ pub(super) fn drawing(findings: &Findings<'_>) -> Option<Drawing> {
         let light = (&row.variant, row.enhancer.as_ref());
         lights.entry(light).or_default().push(row);
     }
-    let panels = PANELS.iter().map(|panel| self::panel(&lights, *panel));
+    let axes = Axis::ALL.into_iter();
+    let panels = axes.flat_map(|axis| PANELS.map(|panel| self::panel(&lights, axis, panel)));
     let panels: Vec<Panel> = panels
         .filter(|panel| panel.lines.iter().any(is_curve))
         .collect();
@@ -54,7 +57,7 @@ pub(super) fn drawing(findings: &Findings<'_>) -> Option<Drawing> {
         several => format!("answers of {several} models together"),
     };
     let chart = Chart {
-        measure: "in %",
+        measure: "× 100",
         panels,
         columns: 3,
         note: format!(
@@ -77,10 +80,13 @@ fn is_curve(line: &PlotLine) -> bool {
 
 fn panel(
     lights: &BTreeMap<Light<'_>, Vec<&ConditionFidelity>>,
+    axis: Axis,
     (title, quantity, chance): (&str, Quantity, Option<f64>),
 ) -> Panel {
     let curves = lights.iter().enumerate();
-    let curves = curves.filter_map(|(style, ((variant, enhancer), rows))| {
+    let of_axis =
+        curves.filter(|(_, ((variant, _), _))| variant.kind.map(Kind::axis) == Some(axis));
+    let curves = of_axis.filter_map(|(style, ((variant, enhancer), rows))| {
         let points = rows.iter();
         let points: Vec<_> = points
             .filter_map(|row| Some((row.level, quantity(row)?)))

@@ -220,6 +220,16 @@ fn the_doctor_proposes_a_sidecar_that_mends_the_model() {
             settled,
             "{called:?}"
         );
+        if settled && page.contains("range_out = ") {
+            // What a run would use stays on the page, beside what is plausible.
+            let wrong = "range_in = \"0..255\"\nrange_out = \"-1..1\"\n";
+            let proposed = fs::read_to_string(bench.path("model.onnx.toml")).unwrap();
+            bench.file("model.onnx.toml", wrong);
+            bench.call(&words("enhance --doctor model.onnx rooms --out wrong"));
+            let page = fs::read_to_string(bench.path("wrong/doctor.html")).unwrap();
+            assert!(page.contains("0..255 in and -1..1 out, as stated"));
+            bench.file("model.onnx.toml", proposed);
+        }
         if settled {
             let called = ask(&bench, "");
             assert_eq!(called.code, Some(0), "{called:?}");

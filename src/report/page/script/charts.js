@@ -66,7 +66,9 @@ class Chart {
     const levels = new Map();
     for (const panel of data.panels) for (const level of panel.levels) levels.set(level.name, { ...level, unit: panel.unit });
     this.levels = [...levels.values()].sort((a, b) => a.value - b.value);
-    this.at = this.levels.length - 1;
+    // The last level of the first panel that has levels: later panels may have levels in another unit.
+    const last = data.panels.find((panel) => panel.levels.length)?.levels.at(-1).name;
+    this.at = this.levels.findIndex((level) => level.name === last);
     this.build();
   }
 

@@ -123,12 +123,14 @@ const withoutTruth = () => {
   Object.assign(STATES, Object.fromEntries(states));
 };
 
-const fill = (select, values, value) => {
-  select.replaceChildren(...values.map((v) => { const o = make("option", v); o.value = v; return o; }));
+// Fills a select box with values, of which a reader sees the words.
+const fill = (select, values, value, wordsOf = (v) => v) => {
+  select.replaceChildren(...values.map((v) => { const o = make("option", wordsOf(v)); o.value = v; return o; }));
   select.value = values.includes(value) ? value : values[0];
   return select.value;
 };
 
+const familyWords = (name) => data.families.find(([own]) => own === name)?.[1] ?? name;
 const everyLevel = () => data.levels.map(([name]) => name);
 const severity = (level) => data.levels.find(([name]) => name === level)[1];
 const lights = (model) => unique(data.subjects.filter((s) => s.model === model).map((s) => s.light));
@@ -140,7 +142,7 @@ const levels = (model, light) => {
 const subjectNow = () => state.light === "blind" ? find(state.model, "blind", null) : at(state.model, state.light, state.level);
 
 const choices = () => {
-  state.family = fill($("f-family"), ["all", ...data.families], state.family);
+  state.family = fill($("f-family"), ["all", ...data.families.map(([name]) => name)], state.family, familyWords);
   state.model = fill($("f-model"), unique(data.subjects.map((s) => s.model)), state.model);
   state.light = fill($("f-light"), lights(state.model), state.light);
   const there = levels(state.model, state.light);
@@ -156,7 +158,7 @@ const select = () => {
   shown = [];
   for (let i = 0; i < data.items.length; i++) {
     const item = data.items[i], question = data.questions[item.question];
-    if (state.family !== "all" && data.families[question.family] !== state.family) continue;
+    if (state.family !== "all" && data.families[question.family][0] !== state.family) continue;
     if (subject < 0 || chosen(subject, i) === ABSENT || !test(subject, i)) continue;
     if (words) {
       const replies = isOpen() ? data.replies.map((row) => row[i]) : [data.replies[subject][i]];
@@ -332,7 +334,7 @@ const draw = () => {
   const i = state.item, item = data.items[i], question = data.questions[item.question];
   const subject = subjectNow();
   reveal($("i-question"), question.text || question.id);
-  $("i-id").textContent = item.name + " · " + data.frames[question.frame] + " · " + data.families[question.family];
+  $("i-id").textContent = item.name + " · " + data.frames[question.frame] + " · " + data.families[question.family][1];
   $("i-link").href = link();
   if (hasActed) history.replaceState(null, "", link());
   const list = data.choices[item.choices].map((choice, index) => {
@@ -368,7 +370,7 @@ const confusion = () => {
   const conditions = unique(all.filter((c) => of(c).model === model).map((c) => of(c).condition));
   const condition = fill($("c-condition"), conditions, $("c-condition").value);
   const families = unique(all.filter((c) => of(c).model === model && of(c).condition === condition).map((c) => c.family));
-  const family = fill($("c-family"), families, $("c-family").value);
+  const family = fill($("c-family"), families, $("c-family").value, familyWords);
   const one = all.find((c) => of(c).model === model && of(c).condition === condition && c.family === family);
   const table = $("c-table"), head = make("tr");
   const columns = [hasTruth() ? "true ↓ given →" : "at L0 ↓ given →", ...one.labels, "not readable"];
