@@ -48,7 +48,7 @@ pub(crate) struct AccessArgs {
     /// A file that holds the API key; default: none, a variable holds it
     #[arg(long, value_name = "FILE", add = Decides::Nothing)]
     pub api_key_file: Option<PathBuf>,
-    /// A TOML file of vendors above the built-in table, in its form; default: the built-in table alone
+    /// A TOML file of vendors that adds to the built-in table or overrides it, in the same form; default: the built-in table alone
     #[arg(long, value_name = "FILE", add = Decides::Nothing)]
     pub vendor: Option<PathBuf>,
     /// Send a key to an address although it looks like a key of another vendor

@@ -32,7 +32,7 @@ pub(crate) struct BundleArgs {
     /// The folder of a run
     #[arg(value_name = "RUN", add = Decides::Nothing)]
     pub run: PathBuf,
-    /// Where the ZIP file goes; a bundle that is there is replaced, any other file is not
+    /// Where the ZIP file goes; an existing bundle is replaced, any other file is not
     #[arg(long, value_name = "FILE.zip", add = Decides::Nothing)]
     pub out: PathBuf,
     /// The small images in it

@@ -53,11 +53,11 @@ pub(crate) struct FiguresArgs {
     /// How many columns a figure is wide, 1 or 2; default: 1, and for the sheet `paper` the whole text
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=2), add = Decides::Nothing)]
     pub columns: Option<u8>,
-    /// Another name for a model, an enhancer or a family of questions; can be given several times;
+    /// Another name for a model, an enhancer or a family of questions; repeatable;
     /// default: none
     #[arg(long, value_name = "OLD=NEW", value_parser = label, add = Decides::Nothing)]
     pub label: Vec<(String, String)>,
-    /// The models and enhancers that come first, separated by commas, by their names in the runs, and the others follow;
+    /// The models and enhancers that come first, by their names in the runs, separated by commas; the others follow;
     /// default: none
     #[arg(long, value_name = "NAMES", value_delimiter = ',', add = Decides::Nothing)]
     pub order: Vec<String>,
