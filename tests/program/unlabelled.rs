@@ -392,7 +392,7 @@ fn what_needs_a_truth_is_refused() {
         ("report run known".to_owned(), "accuracy and agreement are different measures"),
         ("report known --baseline run".to_owned(), "accuracy and agreement are different measures"),
         ("report run --baseline run".to_owned(), "--baseline: it compares accuracies"),
-        ("report run --common".to_owned(), "--common: each model is held against its own answers"),
+        ("report run --common".to_owned(), "--common: each model is compared with its own answers"),
         ("study pack run --out page".to_owned(), "nobody knows the true answers"),
         ("show run lamp@hall/00.png --data photos --sheet story.png".to_owned(), "nobody knows the true answers"),
         ("--data photos --questions open.jsonl --model random --out other".to_owned(), "--ask FILE asks questions without answers"),

@@ -146,7 +146,7 @@ fn models_in_light(pairs: &[ModelsInLight]) -> Table {
         .column(Count, "page n", |pair| pair.same.n)
         .build();
     if !pairs.is_empty() {
-        table.heading = Some("Two models at L0: each has its own answers as reference, so that their agreements compare only as far as these".to_owned());
+        table.heading = Some("Two models at L0: each has its own answers as reference, so that their agreements can be compared only as far as these".to_owned());
     }
     table
 }

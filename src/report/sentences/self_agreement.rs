@@ -43,7 +43,7 @@ pub(in crate::report) fn self_agreement(found: &SelfAgreement<'_>) -> Vec<Senten
 /// The sentence in place of a verdict: no reply at L0 could be read.
 fn unread(found: &SelfAgreement<'_>, model: &str) -> Sentence {
     let text = format!(
-        "Nothing can be told about {model}: no answer could be read in any of its replies at L0, so that there is nothing to hold it against."
+        "Nothing can be told about {model}: no answer could be read in any of its replies at L0, so that there is nothing to compare it with."
     );
     let detail = "--constrain choice makes a server allow letters alone; --max-tokens may be too low for a model that thinks first";
     let numbers = Numbers::of(found.unit);
@@ -102,7 +102,7 @@ fn between(found: &SelfAgreement<'_>) -> Vec<Sentence> {
         };
         let n = numbers.count("n", pair.same.n);
         let detail = format!(
-            "[{low}, {high}] %, {kappa}, n = {n}; each is held against itself, so that their agreements in the dark compare only as far as this"
+            "[{low}, {high}] %, {kappa}, n = {n}; each is compared with itself, so that their agreements in the dark can be compared only as far as this"
         );
         numbers.sentence("models_in_light", Tone::Note, text, detail)
     });

@@ -216,14 +216,14 @@ fn check_without_truths(job: &JobSettings) -> Result<()> {
     };
     if let Some(blind) = models.iter().find(|model| !sees(&model.name)) {
         let problem = format_args!(
-            "{} is shown no image, and --ask holds a model against its own answers in the light: name it with --model and leave --blind out; it is \
+            "{} is shown no image, and --ask compares a model with its own answers in the light: name it with --model and leave --blind out; it is \
              asked without images, too",
             blind.name
         );
         return Err(Error::usage("--ask", problem));
     }
     if !job.light.degradations().contains(&None) {
-        let problem = "--ask holds a model against its own answers at L0: add L0 to --levels; what a run has is not asked again";
+        let problem = "--ask compares a model with its own answers at L0: add L0 to --levels; what a run has is not asked again";
         return Err(Error::usage("--levels", problem));
     }
     Ok(())
