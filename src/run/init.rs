@@ -67,7 +67,7 @@ pub(crate) fn init(args: &InitArgs, progress: &Progress) -> Result<Outcome> {
         "images/room3.png",
     ];
     if let Some(exists) = files.iter().map(|name| at(name)).find(|path| path.exists()) {
-        let problem = "there already; init overwrites nothing: name another folder";
+        let problem = "exists already; init overwrites nothing: name another folder";
         return Err(Error::data(exists.display(), problem));
     }
     let lines = match &args.frames {

@@ -47,7 +47,7 @@ pub(crate) struct BundleArgs {
 pub(crate) fn bundle(args: &BundleArgs) -> Result<Outcome> {
     let replaces = args.out.symlink_metadata().is_ok();
     if replaces && !is_bundle(&args.out) {
-        let problem = "there already, and no bundle: name another file";
+        let problem = "exists already and is not a bundle; name another file";
         return Err(Error::data(args.out.display(), problem));
     }
     let folder_name = file_name(&name(&args.run));

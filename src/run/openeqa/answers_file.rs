@@ -129,7 +129,7 @@ fn condition(entry: &AnswerEntry, variants: KindSet) -> std::result::Result<Cond
     match (degradations.pop(), degradations.is_empty()) {
         (Some(degradation), true) => Ok(Condition::raw(Some(degradation))),
         _ => Err(format!(
-            "\"level\" does not tell which variant was shown; write \"condition\": \"{}\" instead",
+            "\"level\" does not state which variant was shown; write \"condition\": \"{}\" instead",
             example.unwrap_or_default()
         )),
     }

@@ -150,7 +150,7 @@ impl ImageCounts {
         } = self;
         let unchanged = match unchanged {
             0 => String::new(),
-            n => format!(", {n} kept as they were (--force makes them again)"),
+            n => format!(", {n} left as they were (--force makes them again)"),
         };
         let failures = match failed {
             0 => String::new(),
