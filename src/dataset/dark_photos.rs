@@ -80,7 +80,7 @@ impl DarkField {
             };
             if let Some(ev) = ev.filter(|ev| !(ev.is_finite() && *ev > 0.0 && *ev <= 30.0)) {
                 return Err(format!(
-                    "dark {name}: an ev of {ev}; a number above 0 expected, how many stops darker than rgb it was exposed"
+                    "dark {name}: an ev of {ev}; a number above 0 expected, the stops by which it was exposed darker than rgb"
                 ));
             }
             if !names.insert(name.clone()) {

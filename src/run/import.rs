@@ -151,11 +151,15 @@ fn import_frames(
     }
     let lines = written.iter().map(|written| &written.line);
     frame_folder::finish(out, &listing.labels, &info, lines)?;
+    let counted = |number: usize, noun: &str| {
+        let ending = if number == 1 { "" } else { "s" };
+        format!("{number} {noun}{ending}")
+    };
     let mut output = format!(
-        "{}: {} frames of {} scenes{}\n{note}",
+        "{}: {} of {}{}\n{note}",
         out.display(),
-        written.len(),
-        scenes.len(),
+        counted(written.len(), "frame"),
+        counted(scenes.len(), "scene"),
         if failed == 0 {
             String::new()
         } else {

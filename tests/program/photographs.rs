@@ -406,7 +406,9 @@ fn pairs_in_two_folders_are_frames_named_by_their_files() {
     )));
     assert_eq!(called.code, Some(0), "{called:?}");
     assert!(
-        called.stderr.contains("1 images have no partner"),
+        called
+            .stderr
+            .contains("images without a partner in the other light, which are not asked: 1"),
         "{called:?}"
     );
     assert!(called.stdout.contains("dark (real, 3.0 EV)"), "{called:?}");
@@ -503,7 +505,7 @@ fn folders_of_classes_have_one_question() {
         called.stderr.contains("may show things of several"),
         "{called:?}"
     );
-    assert!(called.stderr.contains("it is no class"), "{called:?}");
+    assert!(called.stderr.contains("it is not a class"), "{called:?}");
     let all = records(&bench.path("all"));
     assert_eq!(all.len(), 12);
     for record in &all {

@@ -127,7 +127,7 @@ fn runs_that_cannot_be_compared_are_named() {
     assert!(
         foreign
             .stderr
-            .contains("has other choices or another truth in one"),
+            .contains("has other choices or another true choice in one"),
         "{foreign:?}"
     );
     let none = refused(["one", "nowhere"]);

@@ -416,7 +416,7 @@ fn images_of_rooms_and_of_sets_are_asked_too() {
         assert_eq!(called.code, Some(0), "{called:?}");
         called.stderr
     };
-    assert!(call("set.jsonl", "one").contains("its 1 questions are left aside"));
+    assert!(call("set.jsonl", "one").contains("its own questions (1) are ignored"));
     assert_eq!(records(&bench.path("one")).len(), 2 * 4);
     call("rooms:frames=6,size=64x48", "two");
     assert_eq!(records(&bench.path("two")).len(), 12 * 4);

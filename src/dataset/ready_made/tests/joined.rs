@@ -214,7 +214,12 @@ fn two_rows_that_differ_in_their_answers_alone_contradict_each_other() {
     let (_folder, path) = set("set.jsonl", &rows(["x", "x"]));
     let dataset = open(&path, &SetArgs::default()).unwrap();
     assert_eq!(dataset.questions().len(), 40);
-    assert!(dataset.reading().join("\n").contains("1 questions repeat"));
+    assert!(
+        dataset
+            .reading()
+            .join("\n")
+            .contains("that repeat an earlier one, with its image and options: 1;")
+    );
 }
 
 #[test]

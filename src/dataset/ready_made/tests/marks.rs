@@ -51,7 +51,7 @@ fn a_line_behind_the_last_option_is_no_part_of_it() {
     )]);
     let problem = refusal(&path, &SetArgs::default());
     assert!(
-        problem.contains("object 1: it cannot be told where the last option ends"),
+        problem.contains("object 1: it is not clear where the last option ends"),
         "{problem}"
     );
 }
