@@ -149,7 +149,7 @@ mod tests {
             ),
             (
                 r#"{"path":"low/0.png","name":"L3-ev"}"#,
-                "no name of a dark photograph",
+                "not a valid name of a dark photograph",
             ),
             (
                 r#"[{"path":"low/0.png","name":"dark-2"},"low/1.png"]"#,

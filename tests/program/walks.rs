@@ -120,7 +120,7 @@ fn several_runs_are_compared_if_one_judge_marked_them() {
     assert!(
         refused
             .stderr
-            .contains("marks of two judges or protocols do not compare"),
+            .contains("marks of two judges or protocols cannot be compared"),
         "{}",
         refused.stderr
     );

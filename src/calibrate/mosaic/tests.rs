@@ -210,7 +210,7 @@ fn broken_files_are_refused() {
             b"P2 5 3 65535 1 2 3".to_vec(),
             "a PGM of text (P2)",
         ),
-        ("a.pgm", b"P4 5 3 ".to_vec(), "no binary PGM"),
+        ("a.pgm", b"P4 5 3 ".to_vec(), "not a binary PGM"),
         (
             "a.pgm",
             pgm("P5 50 30 65535 ", &samples()),

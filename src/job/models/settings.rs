@@ -221,7 +221,7 @@ fn of_file(
     if !overridden.is_empty() {
         let keys: Vec<String> = overridden.into_iter().collect();
         tracing::warn!(
-            "{}: models with {} of their own keep it; the flag holds for the others (--set NAME.KEY=VALUE is above both)",
+            "{}: models with their own {} are not changed; the flag applies to the others (--set NAME.KEY=VALUE overrides both)",
             file.path.display(),
             keys.join(", ")
         );
