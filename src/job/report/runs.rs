@@ -74,7 +74,7 @@ pub(crate) struct ReportShowArgs {
 /// The flags of a comparison with an old run.
 #[derive(Debug, Args)]
 pub(crate) struct BaselineArgs {
-    /// Compare each model and condition with the same ones of an old run: new minus old, on the items and images that both have;
+    /// Compare each model and condition with the same ones of an old run: new less old, on the items and images that both have;
     /// default: no comparison
     #[arg(long, value_name = "OLD", add = Decides::Nothing)]
     pub baseline: Option<PathBuf>,

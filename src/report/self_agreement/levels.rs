@@ -217,7 +217,7 @@ pub(super) fn notes(found: &SelfAgreement<'_>) -> Vec<String> {
             });
             let (informative, all) = found.informative(model);
             notes.push(format!(
-                "{model} at L0: an answer to {read} of {} questions; {informative} of {all} questions of the bank can tell something",
+                "{model} at L0: an answer to {read} of {} questions; {informative} of {all} questions of the bank are informative",
                 light.asked
             ));
         }

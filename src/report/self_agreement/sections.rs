@@ -23,8 +23,8 @@ pub(super) const SECTIONS: [Section; 8] = [
     (
         "questions",
         "The questions",
-        "What each model answers at L0. A question with one answer about 95 % of the images or more tells nothing: agreement is given \
-         with and without such questions.",
+        "What each model answers at L0. A question with one answer about 95 % of the images or more is not informative: agreement is \
+         given with and without such questions.",
         &[],
     ),
     (

@@ -248,7 +248,7 @@ fn questions(found: &SelfAgreement<'_>) -> Table {
             .filter(|question| without(question))
             .count();
         table.heading = Some(format!(
-            "{} of which nothing can be told, because one answer is that about 95 % of the images or more",
+            "{} without information, because one answer is given about 95 % of the images or more",
             counted(count, "question")
         ));
         for (row, question) in table.rows.iter_mut().zip(&found.questions) {
@@ -265,7 +265,7 @@ fn tells(question: &QuestionInLight) -> &'static str {
     if question.is_informative() {
         ""
     } else {
-        "tells nothing"
+        "not informative"
     }
 }
 
