@@ -20,7 +20,7 @@ pub(super) fn decode(bytes: &[u8], most_pixels: u64) -> Result<Decoded, String> 
         header.number("maximum")?,
     ];
     if width == 0 || height == 0 {
-        return Err(format!("{width} × {height} pixels are no image"));
+        return Err(format!("{width} × {height} pixels are not an image"));
     }
     if let Some(problem) = too_large(width, height, most_pixels) {
         return Err(problem);

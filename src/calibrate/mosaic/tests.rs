@@ -200,7 +200,7 @@ fn broken_files_are_refused() {
         (
             "a.pgm",
             pgm("P5 0 3 65535 ", &[]),
-            "0 × 3 pixels are no image",
+            "0 × 3 pixels are not an image",
         ),
         ("a.pgm", b"P5 5".to_vec(), "no width in its header"),
         ("a.pgm", b"P5 5 x ".to_vec(), "no height in its header"),

@@ -373,7 +373,7 @@ fn refuse_same_names(models: &[ModelSettings]) -> Result<()> {
         let mut before = models[..i].iter();
         if before.any(|other| other.view == model.view && other.name == model.name) {
             let problem = format_args!(
-                "{} is named twice; in a file of models, name tells them apart",
+                "{} is named twice; in a file of models, give each its own name",
                 model.name
             );
             return Err(Error::usage("--model", problem));

@@ -179,7 +179,8 @@ fn of_axis(found: &SelfAgreement<'_>, axis: Axis, ladder: &Ladder<'_, AgreementC
     } else {
         format!("{} of {}", axis.title, axis.cause)
     };
-    let caption = format!("Agreement with its own answer at L0 by {by}, and what keeps it honest");
+    let caption =
+        format!("Agreement with its own answer at L0 by {by}, and the measures to read with it");
     let mut table = TableBuilder::new(AGREEMENT, rows)
         .page("agreement", &caption)
         .group(|row| Some(row.series.clone()))
@@ -235,7 +236,7 @@ pub(super) fn notes(found: &SelfAgreement<'_>) -> Vec<String> {
         }
         let reason = cells.find_map(|cell| cell.evidence?.err());
         notes.extend(
-            reason.map(|reason| format!("{model}: no evidence kept is given: {}", why(reason))),
+            reason.map(|reason| format!("{model}: evidence kept is not given: {}", why(reason))),
         );
     }
     notes

@@ -71,7 +71,7 @@ pub(super) fn read(
         });
         if !seen.insert((index, condition.clone(), person.clone())) {
             return Err(wrong(format!(
-                "question {} is answered twice at {condition}; \"annotator\" tells people apart",
+                "question {} is answered twice at {condition}; state in \"annotator\" who answered",
                 entry.question_id
             )));
         }

@@ -193,7 +193,7 @@ impl<R: BufRead> JsonScan<R> {
         while let Some(byte) = self.peek()? {
             if !byte.is_ascii_whitespace() {
                 return Err(format!(
-                    "{:?} at byte {}, after the end of the JSON value; a file of one object a line is named .jsonl",
+                    "{:?} at byte {}, after the end of the JSON value; the name of a file with one object per line ends in .jsonl",
                     char::from(byte),
                     self.offset + 1
                 ));

@@ -38,7 +38,7 @@ fn the_names_of_rows_are_their_ids() {
     assert_eq!(ids, ["q2", "q7"]);
     let said = dataset.reading().join("\n");
     assert!(
-        said.contains("id = id") && said.contains("the names under which the rows stand"),
+        said.contains("id = id") && said.contains("the names of the rows"),
         "{said}"
     );
     // Their own ids go first.
@@ -52,7 +52,7 @@ fn the_names_of_rows_are_their_ids() {
         !dataset
             .reading()
             .join("\n")
-            .contains("the names under which")
+            .contains("the names of the rows")
     );
 }
 
@@ -351,7 +351,7 @@ fn several_files_of_one_set_are_joined_in_their_order() {
     let problem = joined(&[&path, &other]).unwrap_err().to_string();
     assert!(
         problem.contains("other.csv")
-            && problem.contains("\"hint\" stands in")
+            && problem.contains("\"hint\" is in")
             && problem.contains("have the same columns"),
         "{problem}"
     );
