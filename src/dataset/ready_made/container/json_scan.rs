@@ -299,7 +299,7 @@ mod tests {
             (r#"{"items": ["abc"#, "inside a value"),
             (r#"{"items" 1}"#, "':' is expected"),
             (r"{items: 1}", "not the name of a field"),
-            (r#"{"items": []} {"items": []}"#, "named .jsonl"),
+            (r#"{"items": []} {"items": []}"#, "ends in .jsonl"),
             (r#"{"items": [1 2]}"#, "']' is expected"),
             (
                 r#"{"items": ["0123456789012345678901234567890123456789"]}"#,

@@ -356,7 +356,7 @@ fn several_files_of_one_set_are_joined_in_their_order() {
         "{problem}"
     );
     let problem = refusal(&folder.path().join("b/*.csv"), &SetArgs::default());
-    assert!(problem.contains("\"hint\" stands in"), "{problem}");
+    assert!(problem.contains("\"hint\" is in"), "{problem}");
     for wrong in [&folder.path().to_owned(), &path] {
         let problem = joined(&[&path, wrong]).unwrap_err().to_string();
         assert!(problem.contains("--data"), "{problem}");
