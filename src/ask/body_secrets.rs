@@ -35,7 +35,7 @@ pub(super) fn refuse_secrets(fields: &Map<String, Value>) -> Result<()> {
 fn refuse_in_field(name: &str, value: &Value) -> Result<()> {
     let refused = |name: &str| {
         let problem = format_args!(
-            "{name} looks like a secret, which is not shown here and must not stand in a body, because bodies are written to files: \
+            "{name} looks like a secret, which is not shown here and must not be in a body, because bodies are written to files: \
              put it into a variable, and name that with --header-env or --api-key-env"
         );
         Err(Error::usage("--extra-body", problem))

@@ -235,7 +235,7 @@ impl Connection {
         }
         let timeout = self.timeout.as_secs_f64();
         let message = format!(
-            "{} sent nothing for {timeout} s; allow more by --timeout",
+            "{} sent nothing for {timeout} s; allow more with --timeout",
             self.base
         );
         Err(FailedTry {
@@ -251,7 +251,7 @@ impl Connection {
             (
                 FailureKind::Timeout,
                 format!(
-                    "{} did not answer within {timeout} s; allow more by --timeout",
+                    "{} did not answer within {timeout} s; allow more with --timeout",
                     self.base
                 ),
             )
@@ -259,7 +259,7 @@ impl Connection {
             let text = self.scrub.line(&with_causes(&error.without_url()));
             // Companies and universities often sign their certificates with a private CA.
             let hint = if text.contains("UnknownIssuer") {
-                "; name the authority that signed it by --ca-file"
+                "; name the authority that signed it with --ca-file"
             } else {
                 ""
             };

@@ -266,7 +266,7 @@ impl Endpoint {
             .choose(request.model, request.affinity, avoided, ready);
         let Choice::Replica(replica) = chosen else {
             let id = &request.sent.parameters.model;
-            let message = format!("no replica of this endpoint can be asked any further for {id}");
+            let message = format!("no replica of this endpoint can be asked for {id} any more");
             return Err(FailedTry {
                 reach: Reach::Endpoint,
                 ..FailedTry::new(FailureKind::Connection, message)
@@ -371,7 +371,7 @@ impl Endpoint {
     fn out_of_patience(&self, model: ModelNumber, mut failed: FailedTry) -> FailedTry {
         failed.reach = Reach::Endpoint;
         failed.failure.message = format!(
-            "{} (nothing was taken for {:.0} s, beyond --patience; go on later with --resume)",
+            "{} (no request was accepted for {:.0} s, longer than --patience; continue later with --resume)",
             failed.failure.message,
             self.refused_for(model).as_secs_f64()
         );

@@ -79,10 +79,11 @@ const TOO_LARGE: [&str; 2] = ["request too large", "request is too large"];
 const SMALLER: &str = "send smaller images: --max-side, or --image jpeg:95";
 
 /// The remedy for a limit that resets once a day.
-const NEXT_DAY: &str = "a limit for the day is reached: go on with --resume when it is over";
+const NEXT_DAY: &str =
+    "a limit for the day is reached: continue with --resume when the day is over";
 
 /// The remedy for an account without credit.
-const ADD_CREDIT: &str = "the account has no credit left: add some, then go on with --resume";
+const ADD_CREDIT: &str = "the account has no credit left: add some, then continue with --resume";
 
 impl FailureClass {
     /// The class of a refused request, from its status and the server's error.
@@ -106,7 +107,7 @@ impl FailureClass {
             },
             _ if no_credit => Self::permanent(ADD_CREDIT),
             _ if sent.has_image && complaint.mentions_any(&NO_IMAGES) => Self::permanent(
-                "the model takes no images: choose another --model, or ask it without them by --blind",
+                "the model takes no images: choose another --model, or ask it without images with --blind",
             ),
             300..400 => {
                 Self::permanent("redirects are not followed: give the final address as --base-url")
@@ -216,7 +217,7 @@ impl FailureClass {
         let (reach, field) = match by_param.next().or_else(|| named.next()) {
             Some(field) => (Reach::Endpoint, field),
             None if withdrawn.any(|field| field.is_named(complaint)) => {
-                return Self::permanent("the server refuses a field that is not sent any more");
+                return Self::permanent("the server refuses a field that is no longer sent");
             }
             None => match with(FieldState::Sent).find(|field| field.is_mentioned(complaint)) {
                 Some(field) => (Reach::Trial, field),

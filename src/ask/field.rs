@@ -181,7 +181,7 @@ impl RequestFields {
             field => format!("the token limit is sent as {field}"),
         });
         let temperature = (self.temperature != first.temperature)
-            .then(|| "no temperature is sent: the server's own holds".to_owned());
+            .then(|| "no temperature is sent: the server's own is used".to_owned());
         let usage = (self.stream_usage != first.stream_usage)
             .then(|| "a stream is not asked for the number of its tokens".to_owned());
         let logprobs = (self.top_logprobs != first.top_logprobs).then(|| match self.top_logprobs {

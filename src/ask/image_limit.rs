@@ -100,8 +100,8 @@ impl ImageLimit {
             None => Ok(()),
             Some(Known { most, origin }) => {
                 let problem = format!(
-                    "a side of {long} pixels is more than the {most} of {origin} for requests with more than {MANY} images; make \
-                     images smaller by --max-side {most}"
+                    "a side of {long} pixels is more than the {most} of {origin} for requests with more than {MANY} images; make images \
+                     smaller with --max-side {most}"
                 );
                 Err(Error::data("request", problem))
             }
@@ -116,8 +116,8 @@ impl ImageLimit {
         let Known { most, origin } = self.request.bytes.filter(|known| bytes > known.most)?;
         let megabytes = |bytes: usize| bytes as f64 / 1e6;
         Some(format!(
-            "a request may have up to {:.1} MB, with {images} images, and {origin} takes {} MB; make images smaller by --max-side, or \
-             by --image jpeg:95",
+            "a request may have up to {:.1} MB, with {images} images, and {origin} takes {} MB; make images smaller with --max-side, or \
+             with --image jpeg:95",
             megabytes(bytes),
             megabytes(most)
         ))
@@ -129,12 +129,12 @@ impl ImageLimit {
     /// [`Error::Data`] about the image, with the flags that make it smaller.
     pub(crate) fn check(&self, image: &ImageFacts) -> Result<()> {
         let long = image.width.max(image.height);
-        let remedy = "make it smaller by --max-side, or by --image jpeg:95";
+        let remedy = "make it smaller with --max-side, or with --image jpeg:95";
         let wrong = |problem: String| Err(Error::data("image", problem));
         let megabytes = |bytes: usize| bytes as f64 / 1e6;
         if image.bytes > self.bytes {
             return wrong(format!(
-                "{} × {} pixels are {:.1} MB as {}, more than the {} MB of {}; {remedy}, or take another limit by --max-image",
+                "{} × {} pixels are {:.1} MB as {}, more than the {} MB of {}; {remedy}, or set another limit with --max-image",
                 image.width,
                 image.height,
                 megabytes(image.bytes),

@@ -12,7 +12,7 @@ pub enum KeyHeader {
     Auto,
     /// `Authorization: Bearer …`; at Azure for tokens of Microsoft Entra.
     Bearer,
-    /// `api-key: …`, as Azure and gateways before it want it.
+    /// `api-key: …`, as Azure and gateways before it require it.
     ApiKey,
 }
 

@@ -62,7 +62,7 @@ impl OwnHeaders {
             let (name, variable_name) = (name.trim(), variable_name.trim());
             if super::key_form::looks_like_key(variable_name) {
                 return Err(wrong(format!(
-                    "what stands behind {name}= looks like a secret, which is not shown here; put it into a variable and name that"
+                    "the value after {name}= looks like a secret, which is not shown here; put it into a variable and name that"
                 )));
             }
             let value = variable(variable_name)

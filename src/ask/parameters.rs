@@ -27,27 +27,27 @@ pub struct Parameters {
     /// The model, by the endpoint's name.
     #[arg(skip)]
     pub model: String,
-    /// Sampling temperature; default for the server's own; auto for 0, or the server's own where the model refuses any other
+    /// Sampling temperature; default for the server's own; auto for 0, or the server's own if the model refuses any other
     #[arg(long, value_name = "T|auto|default", default_value_t = Temperature::Auto, add = Decides::Reply)]
     pub temperature: Temperature,
     /// Draw only from the likeliest tokens that together have this probability; default: not sent
     #[arg(long, value_name = "P", value_parser = probability, add = Decides::Reply)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub top_p: Option<f64>,
-    /// The most tokens of a reply, hidden reasoning included
+    /// The maximum number of tokens of a reply, hidden reasoning included
     ///
-    /// A letter needs 16; a reasoning model burns hundreds before it.
+    /// A letter needs 16; a reasoning model uses hundreds before it.
     #[arg(long, value_name = "N", default_value_t = Self::MAX_TOKENS, add = Decides::Reply)]
     pub max_tokens: NonZeroU32,
-    /// The field that carries that limit; auto is what is known of the endpoint, else max_tokens, and the other one where the
-    /// server asks for it
+    /// The field that carries that limit; auto is what is known of the endpoint, else max_tokens, and the other one if the server asks for
+    /// it
     #[arg(long, value_name = "FIELD", value_enum, default_value_t = TokenField::Auto, add = Decides::Reply)]
     #[serde(skip)]
     pub token_field: TokenField,
     /// How long a reasoning model thinks, in the server's words (none, minimal, low, medium, high …); default: not sent
     #[arg(long, value_name = "EFFORT", add = Decides::Reply)]
     pub reasoning_effort: Option<String>,
-    /// Whether the model thinks before it answers, said in the server's own field (src/ask/thinking.toml); default: not sent
+    /// Whether the model thinks before it answers, sent in the server's own field (src/ask/thinking.toml); default: not sent
     #[arg(long, value_name = "THINKING", value_enum, add = Decides::Reply)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub thinking: Option<Thinking>,
@@ -171,7 +171,7 @@ impl FromStr for Temperature {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum ImageDetail {
-    /// As the server thinks best
+    /// As the server decides
     Auto,
     /// Small: what little can be seen in the dark is lost
     Low,
@@ -186,7 +186,7 @@ pub enum ImageDetail {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Constrain {
-    /// Whatever it likes
+    /// Anything
     #[default]
     None,
     /// A JSON object with the letter of a choice, by response_format (OpenAI, vLLM, SGLang, llama.cpp, Ollama, Gemini)

@@ -47,7 +47,7 @@ impl Secret {
         let text = String::from_utf8_lossy(&bytes);
         if text.contains("-----BEGIN") {
             let problem =
-                "this is a private key or a certificate, no API key; nothing of it was sent";
+                "this is a private key or a certificate, not an API key; nothing of it was sent";
             return Err(Error::usage(origin, problem));
         }
         Self::new(&text, &origin)

@@ -12,7 +12,7 @@ use crate::types::flag::{positive, seconds};
 #[derive(Debug, Clone, Copy, PartialEq, Args)]
 #[command(next_help_heading = "Sending")]
 pub struct Sending {
-    /// Requests in flight at once: N, fewer where the server is overloaded; MIN-MAX, from MIN up as far as replies come no
+    /// Requests in flight at once: N, fewer if the server is overloaded; MIN-MAX, from MIN up as far as replies come no
     /// slower; or auto, from 8 up to 32, down to 1
     #[arg(long, value_name = "N|MIN-MAX|auto", default_value = "auto", add = Decides::Nothing)]
     pub concurrency: Bounds,
@@ -29,7 +29,7 @@ pub struct Sending {
     /// by up to its length.
     #[arg(skip = FIRST_DELAY)]
     pub first_delay: Duration,
-    /// Seconds for which an endpoint may turn all requests away (status 429) before the run stops; none of them spends a retry
+    /// Seconds for which an endpoint may turn all requests away (status 429) before the run stops; these refusals do not count as retries
     #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "1800", add = Decides::Nothing)]
     pub patience: Duration,
     /// The longest wait, in seconds, that a server may ask for; beyond it the request is given up

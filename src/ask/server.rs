@@ -48,7 +48,7 @@ pub(crate) struct AccessArgs {
     /// A file that holds the API key; default: none, a variable holds it
     #[arg(long, value_name = "FILE", add = Decides::Nothing)]
     pub api_key_file: Option<PathBuf>,
-    /// A TOML file of vendors above the built-in table, in its form; default: the built-in table alone
+    /// A TOML file of vendors that adds to the built-in table or overrides it, in the same form; default: the built-in table alone
     #[arg(long, value_name = "FILE", add = Decides::Nothing)]
     pub vendor: Option<PathBuf>,
     /// Send a key to an address although it looks like a key of another vendor
@@ -200,8 +200,8 @@ impl AccessArgs {
             }
             if looks_like_key(name) {
                 return Err(wrong(
-                    "the name of a variable expected; what stands there looks like a key and is not shown here: put it into a \
-                     variable, and name that variable"
+                    "the name of a variable expected; this value looks like a key and is not shown here: put it into a variable, and name \
+                     that variable"
                         .to_owned(),
                 ));
             }
@@ -262,7 +262,7 @@ fn no_key(base: &BaseUrl, names: &[&str]) -> Error {
         names.join(", "),
         format_args!(
             "no key for {base}: set {these}{foreign}, or name another with --api-key-env NAME or a file with --api-key-file FILE; \
-             a server of your own is named by --base-url URL, and --api-key-env none sends no key"
+             name your own server with --base-url URL; --api-key-env none sends no key"
         ),
     )
 }

@@ -247,7 +247,7 @@ impl Services {
         }
         if served.gone.insert(index) {
             warn!(
-                "{}: it replies as the model {name}, and the others as {known}: it is asked nothing more for {}",
+                "{}: it replies as the model {name}, and the others as {known}: it gets no more requests for {}",
                 replica.address, served.id
             );
         }
@@ -272,7 +272,7 @@ impl Services {
             let served = &mut models[model.0];
             if served.gone.insert(index) {
                 warn!(
-                    "{}: it is asked nothing more for {}: {}",
+                    "{}: it gets no more requests for {}: {}",
                     replicas[index].address, served.id, failed.failure.message
                 );
             }

@@ -79,7 +79,7 @@ impl Thinking {
         });
         switch.ok_or_else(|| {
             let problem = format_args!(
-                "how to turn thinking {self} at {base} is not known; --reasoning-effort says it in the server's words"
+                "how to turn thinking {self} at {base} is not known; set it with --reasoning-effort, in the server's words"
             );
             Error::usage("--thinking", problem)
         })

@@ -8,11 +8,11 @@ use crate::types::flag::flag_words;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 #[value(rename_all = "snake_case")]
 pub enum TokenField {
-    /// What is known of the endpoint, else max_tokens; the other one where the server asks for it
+    /// What is known of the endpoint, else max_tokens; the other one if the server asks for it
     Auto,
     /// What every other server understands
     MaxTokens,
-    /// What reasoning models of OpenAI demand
+    /// What reasoning models of OpenAI require
     MaxCompletionTokens,
     /// No limit is sent
     #[value(name = "none")]

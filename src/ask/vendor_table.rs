@@ -49,12 +49,12 @@ impl VendorTable {
                 .check()
                 .map_err(|problem| wrong(format!("{}: {problem}", vendor.name)))?;
             if vendor.batch.is_some() {
-                let problem = "batch: what a Batch API takes is not read from a file; --file-size, --file-requests, --url and \
-                               --purpose say it";
+                let problem = "batch: what a Batch API takes is not read from a file; set it with --file-size, --file-requests, --url and \
+                               --purpose";
                 return Err(wrong(format!("{}: {problem}", vendor.name)));
             }
             if vendor.key.iter().any(|name| looks_like_key(name)) {
-                let problem = "what stands in key looks like a key, which is not shown here: name the variable that holds it";
+                let problem = "the value of key looks like a key, which is not shown here: name the variable that holds it";
                 return Err(wrong(format!("{}: {problem}", vendor.name)));
             }
         }

@@ -47,7 +47,7 @@ Results go to standard output, progress and logs to standard error (RUST_LOG=dar
 /// with sensor noise), enhances them with any enhancement model given as ONNX, asks OpenAI-compatible endpoints
 /// multiple-choice questions about each image, and scores the replies by exact match.
 ///
-/// The same command run again goes on where it stopped: what was answered is never asked again.
+/// The same command run again continues where it stopped: what was answered is never asked again.
 #[derive(Debug, Parser)]
 #[command(
     name = NAME, version, about, long_about, max_term_width = 110, after_help = AFTER_HELP,
@@ -77,13 +77,14 @@ pub(crate) enum Colours {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Output")]
 pub(crate) struct CommonArgs {
-    /// Show no progress bars, and of the results only where they were written; a table or JSON that was asked for is printed
+    /// Show no progress bars, and print where results were written, not the results themselves; a table or JSON that a flag requests is
+    /// printed
     #[arg(long, global = true, add = Decides::Nothing)]
     pub quiet: bool,
     /// Colours of results; auto: on a terminal, without NO_COLOR, CLICOLOR=0 and TERM=dumb
     #[arg(long, global = true, value_name = "WHEN", value_enum, default_value = "auto", add = Decides::Nothing)]
     pub color: Colours,
-    /// A TOML file of flags by their long names; those of one command alone stand in a table of its name; default:
+    /// A TOML file of flags by their long names; flags of one command alone are in a table with the name of the command; default:
     /// DARKQA_CONFIG, else none
     #[arg(long, global = true, value_name = "FILE", add = Decides::Nothing)]
     pub config: Option<PathBuf>,
@@ -117,14 +118,14 @@ pub(crate) enum Command {
     Rooms(RoomsArgs),
     /// Enhance images with an ONNX model, as an evaluation would; or describe its inputs and outputs
     Enhance(Box<EnhanceArgs>),
-    /// Show what each model of a file comes to: endpoint, key, request and digest; sends nothing without --check
+    /// Show the settings of each model of a file: endpoint, key, request and digest; sends nothing without --check
     Models(ModelsArgs),
     /// Ask through a Batch API, at half the price: submit batches and wait for them, or write and import their files
     #[command(subcommand)]
     Batch(BatchCommand),
     /// Ask OpenEQA's open questions about walks through dark houses, the answers marked by a judge (LLM-Match)
     ///
-    /// The frames of each walk are darkened, scaled and sent with upstream's prompts, byte for byte; so are the answers to the
+    /// The frames of each walk are degraded, scaled and sent with upstream's prompts, byte for byte; so are the answers to the
     /// judge. The same answer to the same question is judged once. What was answered or marked is never asked again.
     #[command(name = "openeqa", mut_args(OpenEqaArgs::own))]
     OpenEqa(Box<OpenEqaArgs>),
@@ -134,7 +135,7 @@ pub(crate) enum Command {
     Report(ReportArgs),
     /// Draw the figures of runs for a paper, at the width of its columns: PDF, SVG, pgfplots, and their captions
     Figures(FiguresArgs),
-    /// Pack a run as one ZIP file to pass on: records, tables, page and findings, without keys and places on this machine
+    /// Pack a run as one ZIP file to pass on: records, tables, page and findings, without keys and paths of this machine
     Bundle(BundleArgs),
     /// Write a site of many runs: a leaderboard and the page of each run, to open from a folder or put on any web server
     Site(SiteArgs),
@@ -166,14 +167,14 @@ pub(crate) enum Command {
 pub(crate) enum BatchCommand {
     /// Ask what an evaluation has left to ask in batches, and wait for their replies; takes the flags of the evaluation
     ///
-    /// Writes the requests as files, uploads them, makes batches of them, waits until they end, and takes the replies over. Ctrl-C leaves
-    /// the batches working, and the same command goes on. What expires is asked again, up to three times.
+    /// Writes the requests as files, uploads them, makes batches of them, waits until they end, and imports the replies. Ctrl-C leaves the
+    /// batches running, and the same command continues. What expires is asked again, up to three times.
     Run(Box<BatchRun>),
     /// Show how far the batches of a run are; changes nothing
     Status(BatchStatusArgs),
-    /// Look at the batches of a run once, and take over the replies of those that have ended; exit code 0 when everything is answered
+    /// Check the batches of a run once, and import the replies of those that have ended; exit code 0 if everything is answered
     Fetch(BatchFolderArgs),
-    /// Cancel the batches of a run, and take over the replies that there are
+    /// Cancel the batches of a run, and import the replies that there are
     Cancel(BatchFolderArgs),
     /// Write what an evaluation has left to ask as files of a Batch API; takes the flags of the evaluation
     Export(Box<BatchExportArgs>),
@@ -220,7 +221,7 @@ pub(crate) struct BatchExportArgs {
 /// The commands for people's answers.
 #[derive(Debug, Subcommand)]
 pub(crate) enum StudyCommand {
-    /// Write a page on which people answer the questions of a run about the very images that its models were sent
+    /// Write a page on which people answer the questions of a run about the same images that its models were sent
     Pack(study::PackArgs),
     /// Import people's answers as the run of a model, to compare with `report`
     Read(study::ReadArgs),

@@ -202,7 +202,7 @@ impl NoEffect {
             self.because("--pairs names the data", &["data".to_owned()]);
         }
         if args.scene.pairs.is_none() && args.data.place().path().is_none() {
-            self.because("the built-in rooms are no files", &ids::<SetArgs>());
+            self.because("the built-in rooms are not files", &ids::<SetArgs>());
         }
         self.job(&args.job, &images, &replies, None);
     }
@@ -217,7 +217,7 @@ impl NoEffect {
             let why = "the data are named without it";
             self.because(why, &["data".to_owned()]);
             if place.path().is_none() {
-                self.because("the built-in rooms are no files", &ids::<SetArgs>());
+                self.because("the built-in rooms are not files", &ids::<SetArgs>());
             }
         }
     }

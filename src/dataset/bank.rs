@@ -120,7 +120,9 @@ impl Bank {
                 (&mut texts, "question", question.text.clone()),
             ] {
                 if let Some(first) = known.insert(value.clone(), number) {
-                    let problem = format_args!("the {name} {value:?} is that of line {first}, too");
+                    let problem = format_args!(
+                        "line {first} has the same {name}, {value:?}; each needs its own"
+                    );
                     return Err(Error::line(path, number, problem));
                 }
             }
@@ -363,11 +365,11 @@ mod tests {
             ),
             (
                 r#"{"id":"2","question":"?","choices":["x","y"]}"#,
-                "line 4: the id \"2\" is that of line 3, too",
+                "line 4: line 3 has the same id, \"2\"; each needs its own",
             ),
             (
                 r#"{"id":3,"question":"What color?","choices":["x","y"]}"#,
-                "line 4: the question \"What color?\" is that of line 3, too",
+                "line 4: line 3 has the same question, \"What color?\"; each needs its own",
             ),
             (
                 r#"{"id":3,"question":"?","choices":["x","y"],"family":"all"}"#,

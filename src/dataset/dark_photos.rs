@@ -80,7 +80,7 @@ impl DarkField {
             };
             if let Some(ev) = ev.filter(|ev| !(ev.is_finite() && *ev > 0.0 && *ev <= 30.0)) {
                 return Err(format!(
-                    "dark {name}: an ev of {ev}; a number above 0 expected, how many stops darker than rgb it was exposed"
+                    "dark {name}: an ev of {ev}; a number above 0 expected, the stops by which it was exposed darker than rgb"
                 ));
             }
             if !names.insert(name.clone()) {
@@ -149,7 +149,7 @@ mod tests {
             ),
             (
                 r#"{"path":"low/0.png","name":"L3-ev"}"#,
-                "no name of a dark photograph",
+                "not a valid name of a dark photograph",
             ),
             (
                 r#"[{"path":"low/0.png","name":"dark-2"},"low/1.png"]"#,

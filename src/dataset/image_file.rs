@@ -408,7 +408,8 @@ impl Depth {
 
 fn contradiction(colour: &ColourTag<'_>) -> String {
     format!(
-        "the file states what its codes mean ({}), and --transfer linear states something else; leave the flag out, or take the flag's word with --colour ignore",
+        "the file states what its codes mean ({}), and --transfer linear states something else; leave the flag out, or make the flag \
+         decide with --colour ignore",
         colour.kind()
     )
 }

@@ -24,7 +24,8 @@ pub(super) fn dataset(
     let names: Vec<&str> = classes.keys().map(String::as_str).collect();
     let count = count(folder, names.len(), choices)?;
     tracing::warn!(
-        "a photograph may show things of several of the {} classes, and the folder names one of them: the truth is that name; with boxes or tags, make questions instead",
+        "a photograph may show things of several of the {} classes, and the folder names one of them: that name is the true choice; with \
+         boxes or tags, make questions instead",
         names.len()
     );
     let mut sources = BTreeMap::new();
@@ -72,7 +73,7 @@ fn classes(folder: &Path) -> Result<BTreeMap<String, Vec<PathBuf>>> {
         let images = ImageNames::of(entries(&inner)?);
         images.warn_of_unread(&inner);
         if images.images.is_empty() {
-            tracing::warn!("{}: no images in it, so it is no class", inner.display());
+            tracing::warn!("{}: no images in it, so it is not a class", inner.display());
             continue;
         }
         classes.insert(name, images.images);

@@ -20,7 +20,7 @@ use crate::types::{FrameId, PhotoName};
 pub(super) fn dataset(folder: &Path, pairs: Pairs) -> Result<Dataset> {
     if let Some(first) = pairs.unmatched.first() {
         tracing::warn!(
-            "{} images have no partner in the other light and are not asked, first {}",
+            "images without a partner in the other light, which are not asked: {}, first {}",
             pairs.unmatched.len(),
             first.display()
         );

@@ -40,7 +40,7 @@ impl Photographs {
                 let set = Dataset::open(place, None, set)?;
                 let count = set.questions().len();
                 let note = format!(
-                    "{place}: its {count} questions are left aside, and --ask is asked about its images"
+                    "{place}: its own questions ({count}) are ignored, and those of --ask are asked about its images"
                 );
                 return Ok(Self {
                     dataset: set.with_questions(Vec::new()),
@@ -56,7 +56,7 @@ impl Photographs {
         let mut notes = Vec::new();
         if folder.join(frames::QUESTIONS).exists() {
             notes.push(format!(
-                "{} is left aside: --ask brings the questions",
+                "{} is ignored: the questions are those of --ask",
                 folder.join(frames::QUESTIONS).display()
             ));
         }
@@ -209,9 +209,6 @@ mod tests {
         fs::write(folder.path().join("questions.jsonl"), "not read").unwrap();
         let (names, notes) = found(folder.path()).unwrap();
         assert_eq!(names, ["a.png"]);
-        assert!(
-            notes[0].contains("questions.jsonl is left aside"),
-            "{notes:?}"
-        );
+        assert!(notes[0].contains("questions.jsonl is ignored"), "{notes:?}");
     }
 }

@@ -187,7 +187,7 @@ fn check_name(spelled: &Path) -> Result<(), String> {
     let lower = text.trim().to_ascii_lowercase();
     if SCHEMES.iter().any(|scheme| lower.starts_with(scheme)) {
         return Err(format!(
-            "{text:?} is no file of this machine; images are read from disk, so download them first"
+            "{text:?} is not a file on this machine; images are read from disk, so download them first"
         ));
     }
     let is_device = cfg!(windows)

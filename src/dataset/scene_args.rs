@@ -14,8 +14,8 @@ use crate::types::{Decides, SetLight};
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct SceneArgs {
-    /// The light in which the photographs of the data were taken; of dark ones L0 alone is asked, as photographed, and enhanced, if
-    /// --levels and --llie-on do not say otherwise; default: as dataset.json says, else lit
+    /// The light in which the photographs of the data were taken; photographs in the dark are asked at L0 alone, as photographed and
+    /// enhanced, unless --levels and --llie-on state otherwise; default: as dataset.json says, else lit
     #[arg(long, value_enum, value_name = "LIGHT", add = Decides::Trials)]
     pub light: Option<SetLight>,
     /// Photographs of the same scenes in normal and in low light: two folders, or one with folders normal and low; the low ones are
@@ -23,8 +23,8 @@ pub(crate) struct SceneArgs {
     /// default: none
     #[arg(long, value_name = "NORMAL,LOW|DIR", conflicts_with = "label_folders", add = Decides::Reply)]
     pub pairs: Option<PairFolders>,
-    /// The question about each image of a folder that has a folder for each class: the choices are the names of these folders, and
-    /// the truth is that of its own; default: none
+    /// The question about each image of a folder that has a folder for each class: the choices are the names of these folders, and the
+    /// answer is the name of the image's own folder; default: none
     #[arg(long, value_name = "QUESTION", add = Decides::Reply)]
     pub label_folders: Option<String>,
     /// How many choices a question of --label-folders has: its own class and others drawn by content, at most 26; default: all classes

@@ -69,8 +69,8 @@ pub(crate) struct SelectionArgs {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct BankArgs {
-    /// Ask these questions about every image of --data; nobody knows the answers, and the report says how far each model agrees with its
-    /// own answer in the light: home, home:uncertain (built in), or a file of lines with id, question, choices; default: none
+    /// Ask these questions about every image of --data; nobody knows the answers, and the report states how often each model agrees with
+    /// its own answer in the light: home, home:uncertain (built in), or a file of lines with id, question, choices; default: none
     #[arg(long, value_name = "home|home:uncertain|FILE", conflicts_with_all = ["questions", "rules"], add = Decides::Reply)]
     pub ask: Option<BankPlace>,
     /// Only N of the questions of --ask about each image, drawn by the image's name; default: all
@@ -94,7 +94,7 @@ pub(crate) struct CodesArgs {
     /// What is done about images whose file states other colours than sRGB (an ICC profile, cICP, gAMA)
     #[arg(long, value_enum, default_value_t, add = Decides::Pixels)]
     pub colour: ColourRule,
-    /// What the samples of 16-bit PNG and TIFF images are; OpenEXR images are always linear light, 8 bits never
+    /// What the samples of 16-bit PNG and TIFF images are; OpenEXR images are always linear light, 8-bit images never
     #[arg(long, value_enum, default_value_t, add = Decides::Pixels)]
     pub transfer: Transfer,
     /// Scale linear light by this many EV before everything else, -20 to 20; default: not at all

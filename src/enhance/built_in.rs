@@ -50,7 +50,8 @@ impl BuiltIn {
             let near = near.map_or_else(String::new, |name| format!("did you mean {name}? "));
             let names = names.join(", ");
             let problem = format_args!(
-                "{near}{text:?} is not an enhancer in the program ({names}); name a file with its extension or its folder: {text}.onnx, ./{text}; a preset stands before its file: zero-dce:FILE.onnx"
+                "{near}{text:?} is not a built-in enhancer ({names}); name a file with its extension or its folder: {text}.onnx, \
+                 ./{text}; a preset is written before its file: zero-dce:FILE.onnx"
             );
             Error::usage("--llie", problem)
         })

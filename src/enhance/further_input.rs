@@ -108,7 +108,7 @@ impl FurtherInput {
                 TensorData::filled(&self.port.element, *number, 1).map(drop)
             }
             (ExtraValue::Number(number), Some(_)) => Err(format!(
-                "it is no single number; `{key} = {{ map = {number} }}` gives each of its samples this value"
+                "it is not a single number; `{key} = {{ map = {number} }}` gives each of its samples this value"
             )),
             (_, None) => Err(format!("it is a single number: `{key} = NUMBER`")),
             (ExtraValue::Noise(_) | ExtraValue::From(_), Some(_)) if !floats() => Err(format!(

@@ -110,7 +110,7 @@ impl Output {
             .map(|port| {
                 if !channels.iter().any(|count| fits(port, *count)) {
                     return Err(format!(
-                        "gives {port}, which image = \"{image}\" names, but which is no image of {}",
+                        "gives {port}, which image = \"{image}\" names, but which is not an image of {}",
                         if channels == [1] { "one channel (channels = \"y\")" } else { "one or three channels" }
                     ));
                 }

@@ -161,7 +161,8 @@ fn thread_ended() -> Error {
 
 fn stuck() -> Error {
     Error::Runtime(format!(
-        "an enhancer did not end within {PATIENCE} times --llie-timeout, although it was told to, because one of its operators takes that long; no image is enhanced any more, and what was done is saved. Allow more time with --llie-timeout, or enhance smaller images"
+        "an enhancer did not end within {PATIENCE} times --llie-timeout, although it was stopped, because one of its operators takes that \
+         long; no further image is enhanced, and finished trials are saved. Allow more time with --llie-timeout, or enhance smaller images"
     ))
 }
 

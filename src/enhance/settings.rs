@@ -23,8 +23,8 @@ pub(crate) struct EnhancerArgs {
     /// restormer, mirnet, kind); repeatable: each is shown beside raw; default: none
     #[arg(long, value_name = "NAME|FILE", add = Decides::Trials)]
     pub llie: Vec<PathBuf>,
-    /// Which images are enhanced: the dark ones of a variant, l0, the untouched ones, for photographs that are dark already, or dark,
-    /// photographs in the dark beside their frames; several with commas; both is ev,noise; default: noise, of sets in the dark l0
+    /// Which images are enhanced: a variant (as noise), its dark images; l0, the untouched images, for photographs that are dark already;
+    /// dark, the photographs in the dark beside their frames; several with commas; both is ev,noise; default: noise, of sets in the dark l0
     #[arg(long, value_name = "l0|noise|ev|both|dark|all", add = Decides::Trials)]
     pub llie_on: Option<TreatmentSet>,
 }
@@ -54,12 +54,12 @@ impl EnhancerArgs {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Enhancement")]
 pub(crate) struct SizeArgs {
-    /// Enhance in tiles of N × N pixels, their seams checked, or whole; auto is 256 for images above 1280 × 720 where
-    /// sidecar or preset say that tiles are exact, else whole
+    /// Enhance in tiles of N × N pixels, their seams checked, or whole; auto is 256 for images above 1280 × 720 if sidecar or preset state
+    /// that tiles are exact, else whole
     #[arg(long, value_name = "N|whole|auto", default_value_t, add = Decides::Pixels)]
     pub tile: Tiling,
-    /// Largest longer side in pixels: larger images are reduced to it, enhanced and scaled back (bilinear); for models that
-    /// need the whole image and too much memory for it; default: no limit
+    /// Largest longer side in pixels: larger images are reduced to it, enhanced and scaled back (bilinear); for models that must see the
+    /// whole image and need too much memory for it; default: no limit
     #[arg(long, value_name = "PIXELS", add = Decides::Pixels)]
     pub llie_max_side: Option<NonZeroUsize>,
     /// Resize images to the fixed size of an enhancer, and the results back (bilinear), instead of filling and cutting them;
@@ -84,8 +84,8 @@ impl SizeArgs {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Enhancement")]
 pub(crate) struct ProbeArgs {
-    /// Use an enhancer even if its images of dark frames cannot be enhanced images: flat, inverted, in swapped colours, or in
-    /// another value range than it is read in; the report marks it
+    /// Use an enhancer even if its images of dark frames cannot be enhanced images: flat, inverted, in swapped colours, or in another value
+    /// range than the one in which they are read; the report marks it
     #[arg(long, add = Decides::Nothing)]
     pub llie_anyway: bool,
 }

@@ -51,7 +51,7 @@ impl Signature {
         let not_one = |key: &str, numbers: Option<[f32; 3]>| {
             let numbers = numbers
                 .filter(|[a, b, c]| a.to_bits() != b.to_bits() || b.to_bits() != c.to_bits());
-            numbers.map(|numbers| format!("has one channel (channels = \"y\"), but {key} = {numbers:?} in its sidecar or preset has three different numbers; state the same one thrice"))
+            numbers.map(|numbers| format!("has one channel (channels = \"y\"), but {key} = {numbers:?} in its sidecar or preset has three different numbers; state the same one three times"))
         };
         let mismatch = not_one("mean", convention.mean).or(not_one("std", convention.std));
         if let (Channels::Y, Some(problem)) = (channels, mismatch) {

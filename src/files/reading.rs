@@ -45,7 +45,7 @@ pub(crate) fn open(path: &Path) -> io::Result<File> {
     if kind.is_file() || kind.is_dir() || is_named {
         return File::open(path);
     }
-    let problem = "a pipe or a device stands in the place of a file; put a file there";
+    let problem = "this is a pipe or a device, not a file; put a file there";
     Err(io::Error::new(io::ErrorKind::InvalidInput, problem))
 }
 

@@ -186,7 +186,7 @@ impl ImageStore {
             if count == 1 {
                 let (folder, most) = (self.named.display(), self.most as f64 / 1e9);
                 tracing::warn!(
-                    "--images-cache: {folder} is full, and no image in it is unused for 14 days; further ones are not kept; a larger \
+                    "--images-cache: {folder} is full, and no image in it is unused for 14 days; further ones are not stored; a larger \
                      --images-cache-size than {most} makes room"
                 );
             }
@@ -239,7 +239,7 @@ impl ImageStore {
             let folder = self.named.display();
             let goes_on = match health {
                 Health::Gone => "all images are made here",
-                Health::ReadOnly | Health::Whole => "no more images are kept there",
+                Health::ReadOnly | Health::Whole => "no more images are stored there",
             };
             tracing::warn!("--images-cache: cannot {action} {folder}: {problem}; {goes_on}");
         }

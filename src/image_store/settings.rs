@@ -17,14 +17,15 @@ use crate::types::flag::positive;
 #[command(next_help_heading = "Scale")]
 #[expect(clippy::struct_field_names, reason = "the names of the flags")]
 pub(crate) struct StoreArgs {
-    /// A folder in which images are kept, so that other runs, models, shards and processes need not make them again; it may be deleted
-    /// at any time, and holds what `darkqa-eval cache DIR` lists; default: no image is kept
+    /// A folder in which images are stored, so that other runs, models, shards and processes need not make them again; it may be deleted
+    /// at any time, and holds what `darkqa-eval cache DIR` lists; default: no image is stored
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub images_cache: Option<PathBuf>,
-    /// Which images are kept there
+    /// Which images are stored there
     #[arg(long, value_name = "WHAT", value_enum, default_value_t = StoredKinds::Enhanced, add = Decides::Nothing)]
     pub images_cache_what: StoredKinds,
-    /// Room for them in GB (10⁹ bytes); if it is full, images that nobody used for 14 days leave, else none is added
+    /// The maximum size of these images in GB (10⁹ bytes); if it is reached, images not used for 14 days are removed; if there are none, no
+    /// image is added
     #[arg(long, value_name = "GB", value_parser = positive, default_value = "20", add = Decides::Nothing)]
     pub images_cache_size: f64,
 }

@@ -28,7 +28,7 @@ pub(crate) struct StatedArgs {
     /// What depth is measured along; default: planar
     #[arg(long, value_enum, add = Decides::Pixels)]
     pub depth_kind: Option<DepthKind>,
-    /// The horizontal field of view in degrees, where the data set does not say how its camera projects; default: not known
+    /// The horizontal field of view in degrees, if the data set does not state it; default: not known
     #[arg(long, value_name = "DEGREES", value_parser = degrees, add = Decides::Pixels)]
     pub hfov: Option<f64>,
 }

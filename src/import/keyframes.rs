@@ -19,7 +19,7 @@ pub(crate) struct KeyFrameArgs {
     /// This many frames of each scene, evenly spread; default: every frame
     #[arg(long, value_name = "N", add = Decides::Trials)]
     pub count: Option<NonZeroUsize>,
-    /// Frames a second, where frames have no time of their own; default: not known
+    /// Frames per second, if frames have no time of their own; default: not known
     #[arg(long, value_name = "N", value_parser = positive, add = Decides::Trials)]
     pub fps: Option<f64>,
 }

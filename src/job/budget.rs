@@ -87,7 +87,8 @@ impl Budget {
             return Err(Error::usage(
                 "--max-cost",
                 format_args!(
-                    "the price of {} is not in the table of {}; add it to a table of your own and name that with --prices FILE, or set price in a file of models",
+                    "the price of {} is not in the table of {}; add it to your own table and name that with --prices FILE, or set price \
+                     in a file of models",
                     model.name, money.prices.as_of
                 ),
             ));

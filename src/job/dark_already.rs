@@ -39,7 +39,7 @@ pub(crate) fn tell(job: &JobSettings, progress: &Progress) {
     } else {
         tracing::warn!(
             "the photographs were taken in the dark, and --levels darkens them further: their own noise is in them already, so a level is \
-             darker and noisier than its name says, and L0 is no image in the light"
+             darker and noisier than its name says, and L0 is not an image in the light"
         );
     }
 }

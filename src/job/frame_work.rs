@@ -182,7 +182,7 @@ impl<'a> FrameWork<'a> {
             if planned.is_none_or(|planned| planned == picture.digest()) {
                 return Ok(picture);
             }
-            let problem = "the image was changed while the run was under way; put it back, or begin a new run";
+            let problem = "the image was changed during the run; restore it, or begin a new run";
             Err(Error::data(frame, problem))
         })
     }

@@ -18,10 +18,10 @@ pub(crate) struct MoneyArgs {
     /// Stop when this many trials have failed; default: never
     #[arg(long, value_name = "N", add = Decides::Nothing)]
     pub max_failures: Option<NonZeroUsize>,
-    /// End the whole run when one of its models cannot be asked any further; else the others are asked on
+    /// Stop the whole run when one of its models can no longer be asked; else the run continues with the others
     #[arg(long, add = Decides::Nothing)]
     pub fail_fast: bool,
-    /// Stop before the run has cost more than this; the same command with more goes on; default: never
+    /// Stop before the run has cost more than this; the same command with a higher limit continues; default: never
     #[arg(long, value_name = "DOLLARS", value_parser = positive, add = Decides::Nothing)]
     pub max_cost: Option<f64>,
     /// A TOML file of prices in place of the built-in table; default: the built-in table

@@ -163,7 +163,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         if in_batch > 0 {
             let verb = if in_batch == 1 { " is" } else { "s are" };
             tracing::warn!(
-                "{in_batch} trial{verb} waiting for a batch and not asked here; take the replies over with batch run, batch fetch or batch \
+                "{in_batch} trial{verb} waiting for a batch and not asked here; import the replies with batch run, batch fetch or batch \
                  import; batch cancel {} ends what batch run has submitted, and frees it; or delete {} to ask here",
                 self.store.folder().display(),
                 self.store.folder().join(store::BATCH).display()

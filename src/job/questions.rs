@@ -122,8 +122,7 @@ impl QuestionBank {
         let questions = self.bank.about(found.dataset.frames(), self.per_image);
         let images = found.dataset.frames().count();
         progress.note(&format!(
-            "--ask {}: {} questions about {images} images without answers ({} each); each model is held against its own answers at L0, and is \
-             asked without images, too",
+            "--ask {}: {} questions about {images} images without answers ({} each); each model is compared with its own answers at L0, and is asked without images, too",
             self.place,
             questions.len(),
             self.each()

@@ -83,7 +83,7 @@ pub(crate) struct JobArgs {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Scale")]
 pub(crate) struct ScaleArgs {
-    /// Do one of N parts, by frames or walks: I/N; auto/N or auto as the batch system says (Slurm arrays, indexed Kubernetes jobs);
+    /// Do one of N parts, by frames or walks: I/N; auto/N or auto as the batch system states (Slurm arrays, indexed Kubernetes jobs);
     /// none for everything. --rpm, --tpm and --max-cost are for all parts together; default: auto in a Slurm array, else none. With
     /// another N, replies that parts of the first N have are copied
     #[arg(long, value_name = "I/N|auto/N|auto|none", add = Decides::Trials)]

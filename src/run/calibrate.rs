@@ -68,7 +68,7 @@ pub(crate) fn calibrate(args: &CalibrateArgs, progress: &Progress) -> Result<Out
         .is_none_or(|ending| !ending.eq_ignore_ascii_case("toml"))
     {
         let problem = format!(
-            "{} has not the ending .toml, by which --camera knows a camera file; its figure gets the ending .svg",
+            "{} does not end in .toml, by which --camera recognises a camera file; its figure gets the ending .svg",
             args.out.display()
         );
         return Err(Error::usage("--out", problem));

@@ -36,10 +36,10 @@ pub(crate) struct ImportArgs {
     /// The kind of data set in --src
     #[arg(value_name = "KIND", value_enum, add = Decides::Pixels)]
     pub kind: DataSetKind,
-    /// The data set, laid out as src/import/README.md shows; default: none, it is needed but for --script
+    /// The data set, laid out as src/import/README.md shows; default: none; required without --script
     #[arg(long, value_name = "DIR", required_unless_present = "script", add = Decides::Pixels)]
     pub src: Option<PathBuf>,
-    /// Where the frames go, in the common interface; default: none, it is needed but for --script
+    /// Where the frames go, in the common interface; default: none; required without --script
     #[arg(long, value_name = "DIR", required_unless_present = "script", add = Decides::Nothing)]
     pub out: Option<PathBuf>,
     /// Print the Python script that renders HM3D with habitat-sim for --src, and import nothing (kind habitat)
@@ -151,11 +151,15 @@ fn import_frames(
     }
     let lines = written.iter().map(|written| &written.line);
     frame_folder::finish(out, &listing.labels, &info, lines)?;
+    let counted = |number: usize, noun: &str| {
+        let ending = if number == 1 { "" } else { "s" };
+        format!("{number} {noun}{ending}")
+    };
     let mut output = format!(
-        "{}: {} frames of {} scenes{}\n{note}",
+        "{}: {} of {}{}\n{note}",
         out.display(),
-        written.len(),
-        scenes.len(),
+        counted(written.len(), "frame"),
+        counted(scenes.len(), "scene"),
         if failed == 0 {
             String::new()
         } else {

@@ -40,7 +40,7 @@ const COLUMNS: usize = 4;
 const README: &str = "\
 This folder is a data set of darkqa-eval: images, and questions about them.
 
-questions.csv   one question a line; a spreadsheet can edit it
+questions.csv   one question per line; a spreadsheet can edit it
   image         the image, as a path from this folder
   question      the text, without the choices
   A B C D       the choices; leave cells empty for fewer than four, add E, F, ... for more
@@ -49,7 +49,7 @@ questions.csv   one question a line; a spreadsheet can edit it
 the images      PNG, JPEG, WebP, TIFF, BMP or OpenEXR; --data-root DIR allows a folder outside of this one
 dataset.json    the name of the data set
 
-Replace the images and the lines by your own, then run the check again.
+Replace the images and the lines with your own, then run the check again.
 ";
 
 /// Writes the folder. Nothing is overwritten.
@@ -67,7 +67,7 @@ pub(crate) fn init(args: &InitArgs, progress: &Progress) -> Result<Outcome> {
         "images/room3.png",
     ];
     if let Some(exists) = files.iter().map(|name| at(name)).find(|path| path.exists()) {
-        let problem = "there already; init overwrites nothing: name another folder";
+        let problem = "exists already; init overwrites nothing: name another folder";
         return Err(Error::data(exists.display(), problem));
     }
     let lines = match &args.frames {

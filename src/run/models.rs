@@ -25,14 +25,13 @@ pub(crate) struct ModelsArgs {
     /// Show only these of the models, by their names, separated by commas; default: all
     #[arg(long, value_name = "NAMES", value_delimiter = ',', help_heading = "Model", add = Decides::Trials)]
     pub only: Vec<String>,
-    /// One key of one model, above the file; repeatable; default: none
+    /// One key of one model, which overrides the file; repeatable; default: none
     #[arg(long, value_name = "NAME.KEY=VALUE", help_heading = "Model", add = Decides::Reply)]
     pub set: Vec<String>,
-    /// Take the file of models as your own although the working directory is not in its folder: with --check it may name any variable
-    /// and file
+    /// Trust the file of models although the working directory is not in its folder: with --check it may then name any variable and file
     #[arg(long, help_heading = "Model", add = Decides::Nothing)]
     pub trust_models: bool,
-    /// Send one tiny request to each model, and print what came of it
+    /// Send one tiny request to each model, and print the result
     #[arg(long, help_heading = "Model", add = Decides::Nothing)]
     pub check: bool,
 }

@@ -52,7 +52,7 @@ pub(crate) fn site(args: &SiteArgs) -> Result<Outcome> {
     for page in stale(&args.out, &names)? {
         let _ = writeln!(
             output,
-            "{page}: a page of no run of this site; delete it, or keep it"
+            "{page}: this page belongs to no run of this site; it can be deleted"
         );
     }
     let index = args.out.join("index.html");

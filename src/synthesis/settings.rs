@@ -23,7 +23,7 @@ use crate::types::{AxisLevel, Decides, Degradation, KindSet, PairDark, ReadingNa
 #[command(next_help_heading = "Light")]
 pub(crate) struct LightArgs {
     /// Levels, as L0-L5 or L0,L3, exposure drops in EV up to 16, as L0,3.3, and ranges of them, as 0..10:0.5; of motion,
-    /// exposure times in ms, as T33.33 or T8.33-T133.33; match is as dark as the photograph of each frame in the dark; default: L0-L5,
+    /// exposure times in ms, as T33.33 or T8.33-T133.33; match is as dark as the photograph in the dark of each frame; default: L0-L5,
     /// of photographs in the dark L0
     ///
     /// L0-L5 is also the ladder of motion, T8.33-T133.33, unless exposure times are named.
@@ -57,16 +57,17 @@ impl LightArgs {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Light")]
 pub(crate) struct CameraArgs {
-    /// How the automatic exposure of the variant auto meets a drop: at most so many stops of longer exposure, then of gain, from a
-    /// system gain K in ADU per electron and an exposure time in seconds at L0; what is left stays dark
+    /// How the automatic exposure of the variant auto meets a drop: the maximum number of stops of longer exposure, then of stops of gain,
+    /// starting at L0 from a system gain K in ADU per electron and an exposure time in seconds; the rest of the drop stays dark
     ///
-    /// What is not named is as by default. The noise is that of the light reading physical at this gain, in the sensor of --camera.
+    /// Settings that are not named have their defaults. The noise is that of the light reading physical at this gain, in the sensor of
+    /// --camera.
     #[arg(long, value_name = "KEY=VALUE,…", default_value_t = AutoExposure::default(), add = Decides::Pixels)]
     pub auto: AutoExposure,
-    /// How the camera turns during an exposure, in the variants motion and auto: speed in degrees per second, horizontal field of view
-    /// in degrees where the data do not state the camera, angle in degrees (0: to the side, 90: up or down) or random for each image
+    /// How the camera turns during an exposure, in the variants motion and auto: speed in degrees per second, horizontal field of view in
+    /// degrees if the data do not state the camera, angle in degrees (0: to the side, 90: up or down) or random for each image
     ///
-    /// What is not named is as by default.
+    /// Settings that are not named have their defaults.
     #[arg(long, value_name = "KEY=VALUE,…", default_value_t = Motion::default(), add = Decides::Pixels)]
     pub motion: Motion,
 }
@@ -84,7 +85,7 @@ pub(crate) struct SensorArgs {
     /// By default the noise variant has the same signal-to-noise ratio at every level: the levels are one noisy image at five
     /// brightnesses. `--profile physical` loses photons with the light; `--profile all` asks under every reading of the paper.
     ///
-    /// Conditions with noise carry the reading's name, as L3-noise@physical; that of paper is bare, L3-noise.
+    /// Conditions with noise carry the reading's name, as L3-noise@physical; that of paper is left out: L3-noise.
     #[arg(
         long,
         value_name = "LIST",
@@ -99,7 +100,7 @@ pub(crate) struct SensorArgs {
     /// what the paper says, and because the paper's comparison with real images fits the weaker noise.
     #[arg(long, value_enum, add = Decides::Pixels)]
     pub amplify: Option<Amplify>,
-    /// Where a forward tone curve stands; default: as --profile says, none in paper
+    /// Where a forward tone curve is applied; default: as --profile says, none in paper
     #[arg(long, value_enum, add = Decides::Pixels)]
     pub tone: Option<Tone>,
     /// Whether the levels of a frame are developed from one noisy RAW image or each from its own; default: as --profile says, shared
@@ -128,7 +129,7 @@ pub(crate) struct SensorArgs {
 /// Word of `--profile`: a light reading or all of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Profile {
-    /// DarkQA to the letter
+    /// As the DarkQA paper states it
     Paper,
     /// --amplify all
     Eld,

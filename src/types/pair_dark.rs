@@ -33,7 +33,7 @@ impl PhotoName {
     /// of them, or is a word of another condition.
     pub fn new(name: &str) -> Result<Self, Error> {
         let wrong = |problem: &str| {
-            let problem = format!("{name:?} is no name of a dark photograph: {problem}");
+            let problem = format!("{name:?} is not a valid name of a dark photograph: {problem}");
             Err(Error::usage("dark", problem))
         };
         let fits = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "_-.".contains(c);
@@ -43,7 +43,7 @@ impl PhotoName {
             );
         }
         if name.len() > 40 {
-            return wrong("it has more than 40 letters");
+            return wrong("it has more than 40 characters");
         }
         let mut letters = name.chars();
         let has_label = "let".contains(letters.next().unwrap_or_default())

@@ -143,7 +143,7 @@ fn only_a_bundle_is_replaced() {
         let refused = bench.call(&words("bundle run --out mine.zip"));
         assert_eq!(refused.code, Some(2), "{refused:?}");
         assert!(
-            refused.stderr.contains("mine.zip") && refused.stderr.contains("no bundle"),
+            refused.stderr.contains("mine.zip") && refused.stderr.contains("not a bundle"),
             "{refused:?}"
         );
         assert_eq!(fs::read_to_string(bench.path("mine.zip")).unwrap(), mine);

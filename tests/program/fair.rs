@@ -142,7 +142,7 @@ fn a_constraint_is_sent_and_its_object_is_read() {
         );
     }
     let of = |run: &str| bench.complete(&["report", run, "--full"]);
-    assert!(!of("run").contains("Constraint not kept"));
+    assert!(!of("run").contains("Constraint not followed"));
     // It measures something else, so it is another run.
     let other = [args("--out run"), words(&model)].concat();
     assert!(bench.call(&other).stderr.contains("--constrain"));
@@ -163,7 +163,7 @@ fn a_constraint_is_sent_and_its_object_is_read() {
     let report = of("free");
     let report = report.split_whitespace().collect::<Vec<_>>().join(" ");
     let counted = records(&bench.path("free")).len();
-    let expected = format!("Constraint not kept: {counted} of {counted} replies of m");
+    let expected = format!("Constraint not followed: {counted} of {counted} replies of m");
     assert!(report.contains(&expected), "{report}");
 }
 

@@ -158,7 +158,7 @@ fn habitat_renders_of_hm3d() {
     let out = scene.run("habitat", &["--every", "2"]).success();
     let message = String::from_utf8(out.get_output().stdout.clone()).unwrap();
     assert!(
-        message.contains("2 frames of 1 scenes") && message.contains("\"bed, made\" 1"),
+        message.contains("2 frames of 1 scene") && message.contains("\"bed, made\" 1"),
         "{message}"
     );
     let set = Dataset::of_frames(&scene.out(), &[]).unwrap();

@@ -220,7 +220,7 @@ fn what_is_wrong_in_a_file_is_named_by_line() {
         assert!(error.contains("models.toml, line"), "{line}: {error}");
     }
     let error = refusal("[defaults]\nid = \"m\"\n[[model]]\nid = \"random\"", "");
-    assert!(error.contains("line 2: id is of one model"), "{error}");
+    assert!(error.contains("line 2: id belongs to one model"), "{error}");
     let error = refusal("[[model]]\nname = \"m\"", "");
     assert!(error.contains("a model without id"), "{error}");
     let secret = refusal(&table("key-env = \"sk-0123456789\""), "");

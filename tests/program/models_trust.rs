@@ -44,14 +44,18 @@ fn a_file_that_came_with_the_data_takes_nothing_that_is_not_its_own() {
         (
             ELSEWHERE,
             "key-env = \"OPENAI_API_KEY\"",
-            "line 3: key-env: OPENAI_API_KEY is no variable of evil.example's own tools",
+            "line 3: key-env: OPENAI_API_KEY is not a variable of evil.example's own tools",
         ),
         (
             OPENAI,
             "key-env = \"AWS_SECRET\"",
-            "line 3: key-env: AWS_SECRET is no variable of api.openai.com's",
+            "line 3: key-env: AWS_SECRET is not a variable of api.openai.com's",
         ),
-        (ELSEWHERE, header, "line 3: headers: GATEWAY is no variable"),
+        (
+            ELSEWHERE,
+            header,
+            "line 3: headers: GATEWAY is not a variable",
+        ),
         (
             ELSEWHERE,
             "",
@@ -75,7 +79,7 @@ fn a_file_that_came_with_the_data_takes_nothing_that_is_not_its_own() {
         (
             OPENAI,
             "vendor = \"../data/inside.txt\"",
-            "line 3: vendor: such a table says",
+            "line 3: vendor: such a table decides",
         ),
     ];
     for (url, more, part) in cases {
@@ -87,7 +91,7 @@ fn a_file_that_came_with_the_data_takes_nothing_that_is_not_its_own() {
         assert!(
             refused
                 .stderr
-                .contains("--trust-models says that it is yours"),
+                .contains("--trust-models states that you trust it"),
             "{refused:?}"
         );
     }
@@ -132,7 +136,7 @@ fn what_a_table_leaves_of_the_defaults_is_held_against_its_own_address() {
             format!("{secret}\n{none}"),
             String::new(),
             "",
-            "line 2: headers: AWS_SECRET_ACCESS_KEY is no variable of evil.example's own tools",
+            "line 2: headers: AWS_SECRET_ACCESS_KEY is not a variable of evil.example's own tools",
         ),
         // A key of a flag is not sent to the address of a table, which leaves the default.
         (
@@ -260,7 +264,8 @@ fn a_file_of_another_folder_is_not_checked_with_any_key() {
     for (folder, file) in [(".", "data/models.toml"), ("work", "../data/models.toml")] {
         let refused = call(folder, &format!("{file} --check"));
         assert_eq!(refused.code, Some(2), "{refused:?}");
-        let part = "line 4: key-env: AWS_SECRET_ACCESS_KEY is no variable of 127.0.0.1's own tools";
+        let part =
+            "line 4: key-env: AWS_SECRET_ACCESS_KEY is not a variable of 127.0.0.1's own tools";
         assert!(refused.stderr.contains(part), "{}", refused.stderr);
         // Nothing is sent without --check.
         assert_eq!(call(folder, file).code, Some(0));
@@ -399,9 +404,9 @@ fn settings_of_the_run_may_stand_in_the_defaults() {
         (
             "",
             "max-side = 3",
-            "max-side holds for all models, because each image is made once: set it in [defaults], or use --max-side",
+            "max-side applies to all models, because each image is made once: set it in [defaults], or use --max-side",
         ),
-        ("", "image = \"png\"", "image holds for all models"),
+        ("", "image = \"png\"", "image applies to all models"),
     ] {
         bench.file("models.toml", models(defaults) + more);
         let refused = bench.call(&words(&format!("{line} wrong")));

@@ -236,7 +236,7 @@ fn the_bytes_of_a_photograph_are_sent_as_they_lie() {
     assert_eq!(endpoint.requests().len(), asked);
     let shown = bench.complete(&words("show run q3 --condition dark --out shown"));
     assert!(
-        shown.contains("dark: the very bytes that were sent"),
+        shown.contains("dark: the same bytes as were sent"),
         "{shown}"
     );
     // A photograph that was changed since is told.
@@ -304,7 +304,7 @@ fn match_is_as_dark_as_the_photograph_of_each_frame() {
     // Synthesis at the same exposure gives the same pixels as a level of that number would.
     let shown = bench.complete(&words("show run q4 --condition match-noise --out shown"));
     assert!(
-        shown.contains("match-noise: the very bytes that were sent"),
+        shown.contains("match-noise: the same bytes as were sent"),
         "{shown}"
     );
 }
@@ -406,12 +406,14 @@ fn pairs_in_two_folders_are_frames_named_by_their_files() {
     )));
     assert_eq!(called.code, Some(0), "{called:?}");
     assert!(
-        called.stderr.contains("1 images have no partner"),
+        called
+            .stderr
+            .contains("images without a partner in the other light, which are not asked: 1"),
         "{called:?}"
     );
     assert!(called.stdout.contains("dark (real, 3.0 EV)"), "{called:?}");
     let shown = bench.complete(&words("show run q2 --condition dark --out shown"));
-    assert!(shown.contains("the very bytes that were sent"), "{shown}");
+    assert!(shown.contains("the same bytes as were sent"), "{shown}");
     let bare = bench.call(&words("--pairs normal,low --model random --out other"));
     assert!(
         bare.stderr.contains("--questions FILE names some"),
@@ -503,7 +505,7 @@ fn folders_of_classes_have_one_question() {
         called.stderr.contains("may show things of several"),
         "{called:?}"
     );
-    assert!(called.stderr.contains("it is no class"), "{called:?}");
+    assert!(called.stderr.contains("it is not a class"), "{called:?}");
     let all = records(&bench.path("all"));
     assert_eq!(all.len(), 12);
     for record in &all {
@@ -519,5 +521,5 @@ fn folders_of_classes_have_one_question() {
     let many = asked("--choices 9", "nine");
     assert!(many.stderr.contains("has only 4 classes"), "{many:?}");
     let shown = bench.complete(&words("show all Cup/1.png --out shown"));
-    assert!(shown.contains("the very bytes that were sent"), "{shown}");
+    assert!(shown.contains("the same bytes as were sent"), "{shown}");
 }

@@ -212,8 +212,9 @@ fn failures_refusals_and_odd_texts_are_as_in_the_records() {
     ));
     assert_eq!(call.code, Some(1), "{call:?}");
     assert!(
-        call.stderr
-            .contains("1 numbers are too large for the column prompt_tokens"),
+        call.stderr.contains(
+            "numbers that are too large for the column prompt_tokens, and are null in it: 1;"
+        ),
         "{}",
         call.stderr
     );

@@ -109,7 +109,7 @@ fn a_replica_that_refuses_the_key_is_left_out_and_the_last_one_stops_the_model()
     assert_eq!(called.code, Some(0), "{called:?}");
     assert_eq!(asked(&open), 20);
     assert_eq!(
-        called.stderr.matches("asked nothing more").count(),
+        called.stderr.matches("gets no more requests").count(),
         usize::from(asked(&locked) > 0)
     );
     let other = MockEndpoint::start([Answer::error(401, "invalid_api_key", "no such key")]);
@@ -144,7 +144,7 @@ fn a_replica_of_another_model_gives_no_reply() {
             });
     assert_eq!(served.len(), 1, "{served:?}");
     assert_eq!(
-        called.stderr.matches("it is asked nothing more").count(),
+        called.stderr.matches("it gets no more requests").count(),
         1,
         "{called:?}"
     );
@@ -191,7 +191,10 @@ fn two_models_at_the_same_replicas_do_not_take_them_from_each_other() {
         "",
     );
     assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(!called.stderr.contains("asked nothing more"), "{called:?}");
+    assert!(
+        !called.stderr.contains("gets no more requests"),
+        "{called:?}"
+    );
     for model in ["qwen", "internvl"] {
         let (answered, failed, shares) = outcomes(&bench, model);
         assert_eq!((answered, failed), (40, 0), "{model}");
@@ -222,7 +225,7 @@ fn a_model_that_no_replica_has_leaves_them_to_the_others() {
     assert_eq!(
         called
             .stderr
-            .matches("asked nothing more for mistyped")
+            .matches("gets no more requests for mistyped")
             .count(),
         2,
         "{called:?}"
@@ -264,7 +267,10 @@ fn a_refused_api_takes_no_replica_from_a_model() {
     let mocks = [responses_alone(), responses_alone()];
     let called = run(&bench, &mocks.each_ref(), "", "");
     assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(!called.stderr.contains("asked nothing more"), "{called:?}");
+    assert!(
+        !called.stderr.contains("gets no more requests"),
+        "{called:?}"
+    );
 }
 
 #[test]

@@ -127,7 +127,7 @@ fn runs_that_cannot_be_compared_are_named() {
     assert!(
         foreign
             .stderr
-            .contains("has other choices or another truth in one"),
+            .contains("has other choices or another true choice in one"),
         "{foreign:?}"
     );
     let none = refused(["one", "nowhere"]);
@@ -230,10 +230,7 @@ fn what_was_sent_is_made_again() {
     let called = bench.call(&["show", "run", id]);
     assert_eq!(called.code, Some(0), "{called:?}");
     assert_eq!(
-        called
-            .stdout
-            .matches("the very bytes that were sent")
-            .count(),
+        called.stdout.matches("the same bytes as were sent").count(),
         3,
         "{called:?}"
     );
@@ -401,14 +398,15 @@ fn people_enter_as_a_model() {
     let read = bench.call(&words("study read run odd.jsonl --out odd"));
     assert_eq!(read.code, Some(0), "{read:?}");
     let rows = [
-        "2 answers are no choices of their questions and count as wrong",
-        "odd.jsonl, line 1: \"castle\" is no choice of q0: red, blue, brown",
-        "odd.jsonl, line 2: \"F\" is no choice of q1: red, blue, brown",
+        "2 answers are not choices of their questions and count as wrong",
+        "odd.jsonl, line 1: \"castle\" is not a choice of q0: red, blue, brown",
+        "odd.jsonl, line 2: \"F\" is not a choice of q1: red, blue, brown",
     ];
     check_rows(rows, |text| {
         assert!(read.stderr.contains(text), "{text}: {read:?}");
     });
-    let counted = "! 2 of 3 answers of people are no choice of their question, and count as wrong.";
+    let counted =
+        "! 2 of 3 answers of people are not choices of their questions, and count as wrong.";
     assert!(read.stdout.contains(counted), "{read:?}");
     bench.file("answers.jsonl", "{\"question\": 1}\n");
     let broken = bench.call(&args);

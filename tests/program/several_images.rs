@@ -148,7 +148,7 @@ fn images_are_made_again(bench: &Bench) {
         "{shown}"
     );
     assert_eq!(
-        shown.matches("the very bytes that were sent").count(),
+        shown.matches("the same bytes as were sent").count(),
         3,
         "{shown}"
     );

@@ -337,7 +337,7 @@ fn runs_that_cannot_be_read_and_folders_of_others_are_refused() {
     bench.complete(&words("site one two --out site"));
     let said = bench.complete(&words("site one --out site"));
     assert!(
-        said.contains("runs/two.html: a page of no run of this site"),
+        said.contains("runs/two.html: this page belongs to no run of this site"),
         "{said}"
     );
     assert!(bench.path("site/runs/two.html").exists());

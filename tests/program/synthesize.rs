@@ -89,13 +89,13 @@ fn what_is_there_is_kept_unless_it_is_another() {
     assert_eq!(call(&[]).stdout, "out: 2 made of 1 frame\n");
     assert_eq!(
         call(&[]).stdout,
-        "out: 0 made of 1 frame, 2 kept as they were (--force makes them again)\n"
+        "out: 0 made of 1 frame, 2 left as they were (--force makes them again)\n"
     );
     let other = call(&["--seed", "1"]);
     assert_eq!(other.code, Some(1));
     assert_eq!(
         other.stdout,
-        "out: 0 made of 1 frame, 1 kept as they were (--force makes them again), 1 failed\n"
+        "out: 0 made of 1 frame, 1 left as they were (--force makes them again), 1 failed\n"
     );
     assert!(other.stderr.contains("a_L2-noise.png") && other.stderr.contains("--force"));
     let before = fs::read(bench.path("out/a_L2-noise.png")).unwrap();
@@ -142,7 +142,7 @@ fn a_json_file_vouches_for_the_bytes_of_its_image() {
     assert_eq!(output["file"], "a_L2-ev.png");
     assert_eq!(output["bytes"], written.len());
     assert_eq!(output["digest"], blake3::hash(&written).to_hex().as_str());
-    let kept = "out: 0 made of 1 frame, 1 kept as they were (--force makes them again)\n";
+    let kept = "out: 0 made of 1 frame, 1 left as they were (--force makes them again)\n";
 
     // Cut: made again, and said.
     fs::write(&image, &written[..written.len() / 2]).unwrap();
@@ -184,7 +184,7 @@ fn a_json_file_vouches_for_the_bytes_of_its_image() {
     fs::write(&image, fs::read(bench.path("frames/a.png")).unwrap()).unwrap();
     let refused = call("");
     assert!(
-        refused.stderr.contains("no JSON file vouches for it"),
+        refused.stderr.contains("no JSON file describes it"),
         "{}",
         refused.stderr
     );
@@ -212,7 +212,7 @@ fn a_json_file_vouches_for_the_bytes_of_its_image() {
     let checked = bench.call(&words("synthesize --check out"));
     assert_eq!(
         checked.stdout,
-        "out: 1 images are as they were written, 0 are not\n"
+        "out: images as they were written: 1; not as they were written: 0\n"
     );
 }
 
@@ -317,7 +317,7 @@ fn sheets_are_drawn_for_each_frame() {
         let line = format!("synthesize frames --out out --sheet levels {more}");
         bench.call(&words(&line))
     };
-    let kept = "out: 0 made of 1 frame, 1 kept as they were (--force makes them again)\n";
+    let kept = "out: 0 made of 1 frame, 1 left as they were (--force makes them again)\n";
     assert_eq!(call("").stdout, kept);
     // Another recipe: an intact figure is made again, an edited one is not.
     let first = image::open(bench.path("out/a_levels.png")).unwrap();

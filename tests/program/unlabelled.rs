@@ -178,7 +178,7 @@ fn the_report_says_how_far_the_answers_are_those_in_the_light() {
         "entropy",
         "κ",
         "without images, the floor",
-        "2 of 3 questions of the bank can tell something",
+        "2 of 3 questions of the bank are informative",
     ] {
         assert!(on_one_line(&shown).contains(said), "{said}: {shown}");
     }
@@ -244,7 +244,7 @@ fn a_bank_to_which_all_is_no_gives_no_verdict() {
     bench.file("no.jsonl", json!({"default": "B"}).to_string());
     let shown = bench.complete(&words(&ASKED.replace("eyes.jsonl", "no.jsonl")));
     assert!(
-        on_one_line(&shown).contains("This bank cannot tell what script:no.jsonl sees"),
+        on_one_line(&shown).contains("This bank does not show what script:no.jsonl sees"),
         "{shown}"
     );
     assert!(!shown.contains("gives its answer at L0 to"), "{shown}");
@@ -262,7 +262,7 @@ fn a_model_that_cannot_be_read_in_the_light_is_held_against_nothing() {
     let shown = bench.complete(&words(&ASKED.replace("eyes.jsonl", "mute.jsonl")));
     let shown = on_one_line(&shown);
     assert!(
-        shown.contains("Nothing can be told about script:mute.jsonl"),
+        shown.contains("Nothing is known about script:mute.jsonl"),
         "{shown}"
     );
     assert!(
@@ -271,7 +271,7 @@ fn a_model_that_cannot_be_read_in_the_light_is_held_against_nothing() {
         ),
         "{shown}"
     );
-    assert!(!shown.contains("This bank cannot tell"), "{shown}");
+    assert!(!shown.contains("This bank does not show"), "{shown}");
 }
 
 #[test]
@@ -392,7 +392,7 @@ fn what_needs_a_truth_is_refused() {
         ("report run known".to_owned(), "accuracy and agreement are different measures"),
         ("report known --baseline run".to_owned(), "accuracy and agreement are different measures"),
         ("report run --baseline run".to_owned(), "--baseline: it compares accuracies"),
-        ("report run --common".to_owned(), "--common: each model is held against its own answers"),
+        ("report run --common".to_owned(), "--common: each model is compared with its own answers"),
         ("study pack run --out page".to_owned(), "nobody knows the true answers"),
         ("show run lamp@hall/00.png --data photos --sheet story.png".to_owned(), "nobody knows the true answers"),
         ("--data photos --questions open.jsonl --model random --out other".to_owned(), "--ask FILE asks questions without answers"),
@@ -416,7 +416,7 @@ fn images_of_rooms_and_of_sets_are_asked_too() {
         assert_eq!(called.code, Some(0), "{called:?}");
         called.stderr
     };
-    assert!(call("set.jsonl", "one").contains("its 1 questions are left aside"));
+    assert!(call("set.jsonl", "one").contains("its own questions (1) are ignored"));
     assert_eq!(records(&bench.path("one")).len(), 2 * 4);
     call("rooms:frames=6,size=64x48", "two");
     assert_eq!(records(&bench.path("two")).len(), 12 * 4);

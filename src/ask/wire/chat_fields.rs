@@ -42,13 +42,13 @@ fn sampling(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
             name: "max_tokens",
             state: limit(TokenField::MaxTokens),
             adaptable: Some(AdaptableField::TokenField),
-            hint: "send the limit otherwise: --token-field max_completion_tokens (or none), or another --max-tokens",
+            hint: "send the limit in another field: --token-field max_completion_tokens (or none), or another --max-tokens",
         },
         RequestField {
             name: "max_completion_tokens",
             state: limit(TokenField::MaxCompletionTokens),
             adaptable: Some(AdaptableField::TokenField),
-            hint: "send the limit otherwise: --token-field max_tokens (or none), or another --max-tokens",
+            hint: "send the limit in another field: --token-field max_tokens (or none), or another --max-tokens",
         },
         RequestField {
             name: "reasoning_effort",

@@ -74,7 +74,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
 fn parsed(text: &str, content_type: &str) -> Result<Value, UnreadableReply> {
     if stream::is_stream(text, content_type) {
         return stream::assemble(text)
-            .ok_or_else(|| other("an event stream that holds no whole chat completion"));
+            .ok_or_else(|| other("an event stream without a complete chat completion"));
     }
     json_body::parsed(text, content_type)
 }
@@ -250,7 +250,7 @@ mod tests {
         let deep = "[".repeat(1000);
         for (body, content_type, expected) in [
             ("", "application/json", "empty"),
-            ("{\"choices\":[", "application/json", "no whole JSON"),
+            ("{\"choices\":[", "application/json", "not complete JSON"),
             ("{\"choices\":null}", "application/json", "without choices"),
             (
                 "{\"choices\":null,\"message\":\"x\"}",
@@ -272,7 +272,7 @@ mod tests {
             ("data: {}\n\n", "text/plain", "event stream"),
             (": ping", "text/event-stream; charset=utf-8", "event stream"),
             ("<html><title>Welcome</title>", "text/html", "Welcome"),
-            (&deep, "application/json", "no whole JSON"),
+            (&deep, "application/json", "not complete JSON"),
         ] {
             let Err(UnreadableReply::Other(what)) = read(body.as_bytes(), content_type) else {
                 panic!("{body}");

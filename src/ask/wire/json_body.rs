@@ -34,7 +34,8 @@ fn unreadable(text: &str, content_type: &str, error: &serde_json::Error) -> Unre
         return other("an empty body");
     }
     UnreadableReply::Other(
-        page_title(text)
-            .unwrap_or_else(|| format!("{content_type:?} that is no whole JSON ({error}): {text}")),
+        page_title(text).unwrap_or_else(|| {
+            format!("{content_type:?} that is not complete JSON ({error}): {text}")
+        }),
     )
 }

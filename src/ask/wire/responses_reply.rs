@@ -15,7 +15,7 @@ use crate::types::{Finish, Reply, Thought, TokenChances, Usage};
 pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableReply> {
     let text = json_body::text(body);
     let response = if stream::is_stream(&text, content_type) {
-        ended(&text).ok_or_else(|| other("an event stream that holds no whole response"))?
+        ended(&text).ok_or_else(|| other("an event stream without a complete response"))?
     } else {
         json_body::parsed(&text, content_type)?
     };
@@ -209,7 +209,7 @@ mod tests {
             ("", "empty"),
             (
                 r#"data: {"type":"response.created","response":{}}"#,
-                "no whole response",
+                "without a complete response",
             ),
         ] {
             let Err(UnreadableReply::Other(what)) = json(body) else {

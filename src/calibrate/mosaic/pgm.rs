@@ -8,7 +8,7 @@ pub(super) fn decode(bytes: &[u8], most_pixels: u64) -> Result<Decoded, String> 
         b'5' => None,
         b'2' => Some("a PGM of text (P2); a binary one (P5) is read".to_owned()),
         b'3' | b'6' => Some(developed("a PPM of three channels")),
-        _ => Some("a Netpbm file that is no binary PGM (P5)".to_owned()),
+        _ => Some("a Netpbm file that is not a binary PGM (P5)".to_owned()),
     };
     if let Some(problem) = kind {
         return Err(problem);
@@ -20,7 +20,7 @@ pub(super) fn decode(bytes: &[u8], most_pixels: u64) -> Result<Decoded, String> 
         header.number("maximum")?,
     ];
     if width == 0 || height == 0 {
-        return Err(format!("{width} × {height} pixels are no image"));
+        return Err(format!("{width} × {height} pixels are not an image"));
     }
     if let Some(problem) = too_large(width, height, most_pixels) {
         return Err(problem);

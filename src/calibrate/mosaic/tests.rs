@@ -200,7 +200,7 @@ fn broken_files_are_refused() {
         (
             "a.pgm",
             pgm("P5 0 3 65535 ", &[]),
-            "0 × 3 pixels are no image",
+            "0 × 3 pixels are not an image",
         ),
         ("a.pgm", b"P5 5".to_vec(), "no width in its header"),
         ("a.pgm", b"P5 5 x ".to_vec(), "no height in its header"),
@@ -210,7 +210,7 @@ fn broken_files_are_refused() {
             b"P2 5 3 65535 1 2 3".to_vec(),
             "a PGM of text (P2)",
         ),
-        ("a.pgm", b"P4 5 3 ".to_vec(), "no binary PGM"),
+        ("a.pgm", b"P4 5 3 ".to_vec(), "not a binary PGM"),
         (
             "a.pgm",
             pgm("P5 50 30 65535 ", &samples()),

@@ -40,7 +40,7 @@ impl ReadNoise {
         let [shape, log_scale] = likelihood.greatest()?;
         let curvature = likelihood.curvature([shape, log_scale]);
         let inverse = inverse(curvature)
-            .ok_or("the shape and the scale of the read noise cannot be told apart")?;
+            .ok_or("the shape and the scale of the read noise cannot be separated")?;
         let scores = groups.iter().map(Folded::of);
         let scores = scores.map(|group| likelihood.score(&group, [shape, log_scale]));
         Ok(Self {

@@ -55,8 +55,8 @@ pub(super) fn check(
     };
     let refuse = |flag: &str, value: &LayeredValue, what: &str| {
         let problem = format!(
-            "the file sets --{address}, too, and could have {what} sent to a stranger; name it on the command line with --{flag}, or take \
-             --{address} out of the file"
+            "the file sets --{address}, too, so that {what} could be sent to an unknown server; name it on the command line with \
+             --{flag}, or remove --{address} from the file"
         );
         Err(Error::usage(&value.origin, problem))
     };
@@ -72,8 +72,8 @@ pub(super) fn check(
             .filter(|value| has_key && goes_elsewhere(value));
         if let Some(value) = value {
             let problem = format!(
-                "{OPENAI_KEY} would be sent to this address, which the table of vendors does not have; say so with --{key} {OPENAI_KEY} on the \
-                 command line, or name another key there, or none"
+                "{OPENAI_KEY} would be sent to this address, which the table of vendors does not have; to allow that, add --{key} \
+                 {OPENAI_KEY} to the command line, or name another key there, or none"
             );
             return Err(Error::usage(&value.origin, problem));
         }

@@ -43,7 +43,7 @@ impl Profile {
             return Err(problem.to_owned());
         }
         if &header.connection != b"XYZ " {
-            return Err("the ICC profile has another connection space than XYZ".to_owned());
+            return Err("the connection space of the ICC profile is not XYZ".to_owned());
         }
         let profile = ColorProfile::new_from_slice(bytes)
             .map_err(|e| format!("the ICC profile is broken: {}", readable(&e.to_string())))?;

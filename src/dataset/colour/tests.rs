@@ -134,7 +134,7 @@ fn profiles_that_cannot_be_read_are_refused_by_name() {
         (header(b"RGB ", b"XYZ ", b"A2B1"), "by tables (A2B)"),
         (
             header(b"RGB ", b"Lab ", b"rXYZ"),
-            "another connection space",
+            "connection space of the ICC profile",
         ),
         (header(b"RGB ", b"XYZ ", b"rXYZ"), "broken"),
         (vec![0; 100], "ends too early"),

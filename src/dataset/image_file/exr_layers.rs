@@ -108,7 +108,8 @@ impl ExrFile {
             if !sample.is_finite() || *sample < LEAST {
                 let (x, y) = (place / 3 % width, place / 3 / width);
                 return Err(format!(
-                    "{sample} at the pixel ({x}, {y}), channel {}, is no amount of light; finite numbers from 0 expected, correct them in the program that wrote the file",
+                    "{sample} at the pixel ({x}, {y}), channel {}, is not an amount of light; finite numbers from 0 expected, correct \
+                     them in the program that wrote the file",
                     CHANNELS[place % 3]
                 ));
             }

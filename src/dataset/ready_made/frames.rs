@@ -317,7 +317,7 @@ fn member(archive: &Archive, folder: &Path, path: &str) -> Result<FrameId, Strin
     let top = archive.find(Path::new(""), path);
     match (archive.find(folder, path), top) {
         (Ok(near), Ok(top)) if near != top => Err(format!(
-            "{path:?} may be {:?} or {:?} in {}; write the one that is meant as it stands from the top, and remove or rename the other",
+            "{path:?} may be {:?} or {:?} in {}; write the one that is meant as its path from the top folder, and remove or rename the other",
             near.0,
             top.0,
             archive.path().display()

@@ -87,7 +87,7 @@ impl Frames<'_> {
             [column, ..] => format!("content ({} does not tell all rows apart)", column.name),
         };
         let note = (repeats > 0).then(|| {
-            format!("{repeats} questions repeat an earlier one, with its image and options; each is asked again")
+            format!("questions that repeat an earlier one, with its image and options: {repeats}; each is asked again")
         });
         Ok(Ids {
             texts,

@@ -54,7 +54,7 @@ impl ImageMarks {
                     Some("of the marks <image …> some have numbers and some have none".to_owned());
             } else if number == 0 || number > self.images {
                 problem = Some(format!(
-                    "{:?} is no image of the row, which shows {}",
+                    "{:?} is not an image of the row, which shows {}",
                     found[0].trim(),
                     self.images
                 ));
@@ -109,18 +109,18 @@ mod tests {
             (
                 2,
                 ["<image 3>", ""],
-                Err("\"<image 3>\" is no image of the row, which shows 2"),
+                Err("\"<image 3>\" is not an image of the row, which shows 2"),
             ),
-            (2, ["<image 0>", ""], Err("no image of the row")),
+            (2, ["<image 0>", ""], Err("not an image of the row")),
             (
                 2,
                 ["<image> <image>", "<image>"],
-                Err("no image of the row"),
+                Err("not an image of the row"),
             ),
             (
                 2,
                 ["<image 99999999999999999999>", ""],
-                Err("no image of the row"),
+                Err("not an image of the row"),
             ),
             (2, ["<image 1>", "<image>"], Err("some have none")),
         ] {

@@ -79,7 +79,8 @@ pub(super) fn in_question(text: &str) -> Lettered {
             }
             Some(_) if are_lines => {
                 return Lettered::Unclear(
-                    "letters of options stand twice in the question, and it cannot be told which are meant; write the options in columns of their own".to_owned(),
+                    "letters of options occur twice in the question, and it is not clear which are meant; write the options in columns of \
+                     their own".to_owned(),
                 );
             }
             Some(_) => {}
@@ -121,7 +122,7 @@ fn split<'a>(text: &'a str, run: &[&Mark]) -> Result<(Vec<String>, &'a str), Str
     };
     let unclear = || {
         format!(
-            "it cannot be told where the last option ends: {:?}; write a line break behind it, or the options in columns of their own",
+            "it is not clear where the last option ends: {:?}; write a line break behind it, or the options in columns of their own",
             shortened(&last, 80)
         )
     };

@@ -92,7 +92,7 @@ impl FromStr for Map {
         for (start, end) in parts {
             let entry = entry(&text[*start..end])?;
             if entries.iter().any(|known| known.role == entry.role) {
-                return Err(format!("{} stands twice", entry.role.name()));
+                return Err(format!("{} occurs twice", entry.role.name()));
             }
             entries.push(entry);
         }
@@ -196,7 +196,7 @@ mod tests {
         for (text, says) in [
             ("frage", "one of the roles question, image"),
             ("colour=frage", "one of the roles question, image"),
-            ("id=a,id=b", "id stands twice"),
+            ("id=a,id=b", "id occurs twice"),
             ("answer=a:second", "one of letter, text, index0, index1"),
             ("options=a:split()", "split(|) expected"),
         ] {

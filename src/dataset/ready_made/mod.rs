@@ -169,7 +169,7 @@ fn rows(files: &[Arc<SetFile>], joined: Joined, args: &SetArgs) -> Result<Table>
                 &files[0]
             };
             let problem = format!(
-                "not the columns of {}: {name:?} stands in {} alone; files that are joined have the same columns, in any order",
+                "not the columns of {}: {name:?} is in {} alone; files that are joined have the same columns, in any order",
                 files[0].label.path.display(),
                 holder.label.path.display()
             );

@@ -310,7 +310,8 @@ fn refuse_wide(table: &Table, map: &Map) -> Result<(), String> {
     }
     let names: Vec<&str> = wide.iter().map(|column| column.name.as_str()).collect();
     Err(format!(
-        "several questions a row, in the columns {}; one question a row is read: write a row for each, or take the ones in a column with {}",
+        "several questions per row, in the columns {}; one question per row is read: write a row for each, or take the ones in a column \
+         with {}",
         names.join(", "),
         flag(Role::Question, names[0], None)
     ))

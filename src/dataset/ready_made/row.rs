@@ -194,7 +194,7 @@ impl Table {
             cells[at] = Cell::Text(id);
             row.cells = cells.into();
         }
-        let note = "the names under which the rows stand in the file are the column id";
+        let note = "the names of the rows in the file are the column id";
         self.notes.push(note.to_owned());
         Ok(())
     }

@@ -55,7 +55,7 @@ pub struct SetArgs {
 /// What is done about rows that show several images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum SeveralImages {
-    /// Leave them out, and say how many
+    /// Leave them out, and state how many
     Skip,
     /// Send all images of a row in one request, in order, each in the same condition; <image 2> in a text is the place of the second
     Send,
@@ -64,6 +64,6 @@ pub enum SeveralImages {
 /// What is done about rows that cannot be asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum LeaveOut {
-    /// Leave them out, and say how many
+    /// Leave them out, and state how many
     Skip,
 }

@@ -248,7 +248,7 @@ impl<'h> ColumnReading<'h> {
         };
         match items.first() {
             Some((item, answer)) if read.fit == 0 => Err(format!(
-                "{}: the answer {answer:?} (column {:?}) is none of the options {:?}, neither by letter nor by text nor by number",
+                "{}: the answer {answer:?} (column {:?}) is not one of the options {:?}, neither by letter nor by text nor by number",
                 table.place(item.row),
                 column.name,
                 rows[0].1.texts
@@ -274,7 +274,7 @@ impl<'h> ColumnReading<'h> {
             Some(truth) => Choices::known_by(Arc::clone(&options.texts), Some(truth))
                 .map_err(|e| e.to_string()),
             None => Err(format!(
-                "the answer {answer:?} is none of the options {:?} (read as {}, which fits {} rows)",
+                "the answer {answer:?} is not one of the options {:?} (read as {}, which fits {} rows)",
                 options.texts,
                 self.reading.name(),
                 self.fit

@@ -18,8 +18,7 @@ impl Enhancer {
         if file.digest() != self.digest {
             return Err(Error::Enhancer {
                 path: self.path.clone(),
-                problem: "was changed while the run was under way; put it back, or begin a new run"
-                    .to_owned(),
+                problem: "was changed during the run; restore it, or begin a new run".to_owned(),
             });
         }
         let runtime = self.graph.runtime().beside()?;

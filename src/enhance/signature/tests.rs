@@ -324,7 +324,7 @@ fn an_expression_of_the_image_names_outputs() {
     assert_eq!(read("R + 0 * input"), Ok(vec!["R".into()]));
     for (text, part) in [
         ("L * Q", "names `Q`, which is not there"),
-        ("c * R", "no image of one or three channels"),
+        ("c * R", "not an image of one or three channels"),
         ("input * 2", "names none of its outputs"),
     ] {
         let message = read(text).unwrap_err();

@@ -50,7 +50,8 @@ impl<D: Detail> Driver<'_, D> {
             BatchState::Unknown(word) => {
                 let name = self.part(part).name.clone();
                 self.warn_once(format!(
-                    "{name}: the server says {word:?} of its batch {id}, which is not a known state; looked at again until it has ended"
+                    "{name}: the server states {word:?} for its batch {id}, which is not a known state; it is checked again until it has \
+                     ended"
                 ));
                 Ok(Step::Waiting)
             }
@@ -104,7 +105,7 @@ impl<D: Detail> Driver<'_, D> {
         let of = self.part(part);
         Err(Error::Endpoint {
             endpoint: of.facts.base.clone(),
-            problem: format!("{}: {why}; nothing of it was asked", of.name),
+            problem: format!("{}: {why}; none of its requests was asked", of.name),
         })
     }
 

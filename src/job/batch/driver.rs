@@ -256,7 +256,7 @@ impl<D: Detail> Driver<'_, D> {
         Error::Endpoint {
             endpoint: part.facts.base.clone(),
             problem: format!(
-                "{}: {failure}; the batches of this run stay as they are, and the same command goes on",
+                "{}: {failure}; the batches of this run stay as they are, and the same command continues",
                 part.name
             ),
         }

@@ -115,7 +115,7 @@ impl<'a> FolderBatches<'a> {
         let accounts: Vec<&str> = accounts.into_iter().collect();
         let problem = format_args!(
             "the batches of this run were made with several keys or headers, among them those of {}, and these flags have one key; batch \
-             run with the file of models takes the replies of all over, and the server's own page cancels them",
+             run with the file of models imports the replies of all, and the server's own page cancels them",
             accounts.join(" and ")
         );
         Err(Error::usage("--api-key-env", problem))

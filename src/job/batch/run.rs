@@ -318,7 +318,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         let folder = self.run.store.folder().display().to_string();
         let parts = summary::lines(&self.journal, &BTreeMap::new());
         let output = format!(
-            "{parts}the same command, or batch fetch {folder}, takes the replies over; the same command also submits what waits\n"
+            "{parts}the same command, or batch fetch {folder}, imports the replies; the same command also submits what waits\n"
         );
         for error in self.stopped.errors() {
             tracing::warn!("not asked any further: {error}");
@@ -335,10 +335,12 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
             let folder = self.run.store.folder().display();
             let line = if self.journal.has_batches() {
                 format!(
-                    "interrupted: the batches go on working; the same command goes on, and batch cancel {folder} ends them"
+                    "interrupted: the batches continue at the server; the same command continues the run, and batch cancel {folder} ends \
+                     them"
                 )
             } else {
-                "interrupted: no batch is at work; the same command goes on".to_owned()
+                "interrupted: no batch is at the server; the same command continues the run"
+                    .to_owned()
             };
             self.run.progress.note(&line);
         }

@@ -12,10 +12,10 @@ use crate::types::flag::{positive, seconds};
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Batch")]
 pub(crate) struct CollectArgs {
-    /// Seconds between two looks at the batches; up to 30 times as long while nothing changes
+    /// Seconds between two checks of the batches; up to 30 times as long while nothing changes
     #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "10", add = Decides::Nothing)]
     pub poll: Duration,
-    /// Keep the files at the server after their replies are taken over; default: delete them, as they hold the images
+    /// Leave the files at the server after their replies are imported; default: delete them, as they hold the images
     #[arg(long, add = Decides::Nothing)]
     pub keep_files: bool,
 }
@@ -27,10 +27,10 @@ pub(crate) struct BatchRunArgs {
     /// Flags for looking after batches.
     #[command(flatten)]
     pub collect: CollectArgs,
-    /// Submit the batches and return; batch fetch, or the same command, takes the replies over
+    /// Submit the batches and return; batch fetch, or the same command, imports the replies
     #[arg(long, add = Decides::Nothing)]
     pub detach: bool,
-    /// Send no request of each model directly before its batches; such a request finds out what the server refuses
+    /// Send no single request of each model before its batches; such a request finds out what the server refuses
     #[arg(long, add = Decides::Nothing)]
     pub no_scout: bool,
     /// The tokens that the server lets wait for batches of a model; parts have at most 45 % of it; default: what the server states when

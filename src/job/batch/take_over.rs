@@ -80,13 +80,13 @@ impl<'a, D: Detail> Driver<'a, D> {
         let name = &self.part(part).name;
         if unread > 0 {
             tracing::warn!(
-                "{name}: lines of its output that are not those of a Batch API: {unread}; what they were about is asked again"
+                "{name}: lines of its output that are not those of a Batch API: {unread}; their requests are asked again"
             );
         }
         if is_file_gone {
             tracing::warn!(
                 "{name} is gone from the batch folder, so that requests without a line in the output are not known; delete the batch \
-                 folder when no batch is out, to ask them again"
+                 folder when no batch is waiting at the server, to ask them again"
             );
         }
     }

@@ -27,10 +27,10 @@ pub(crate) struct ModelArgs {
     /// Ask only these of the models, by their names, separated by commas; default: all
     #[arg(long, value_name = "NAMES", value_delimiter = ',', add = Decides::Trials)]
     pub only: Vec<String>,
-    /// Take the file of models as your own although it lies in the folder of the data: it may name any variable and file
+    /// Trust the file of models although it lies in the folder of the data: it may then name any variable and file
     #[arg(long, add = Decides::Nothing)]
     pub trust_models: bool,
-    /// One key of one model, above the file of models; repeatable; default: none
+    /// One key of one model, which overrides the file of models; repeatable; default: none
     #[arg(long, value_name = "NAME.KEY=VALUE", add = Decides::Reply)]
     pub set: Vec<String>,
 }

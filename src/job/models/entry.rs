@@ -162,7 +162,7 @@ pub(super) fn check_keys(keys: &Keys, is_defaults: bool) -> Result<()> {
     for (key, located) in keys {
         if is_defaults && NOT_IN_DEFAULTS.contains(&&**key) {
             return Err(located.error(format_args!(
-                "{key} is of one model: it cannot stand in [defaults]"
+                "{key} belongs to one model: it cannot be in [defaults]"
             )));
         }
         if is_of_the_run(key) {
@@ -170,7 +170,7 @@ pub(super) fn check_keys(keys: &Keys, is_defaults: bool) -> Result<()> {
                 continue;
             }
             let problem = format_args!(
-                "{key} holds for all models, because each image is made once: set it in [defaults], or use --{key}"
+                "{key} applies to all models, because each image is made once: set it in [defaults], or use --{key}"
             );
             return Err(located.error(problem));
         }

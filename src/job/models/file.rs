@@ -132,7 +132,7 @@ fn refuse_secrets(
             let named = matches!(key, "key-env" | "key_env" | "env") && looks_like_key(text);
             if is_secret_value(text) || named || (in_headers && long) {
                 let problem = format_args!(
-                    "{key} looks like a secret, which is not shown here and must not stand in a file of models: name a variable \
+                    "{key} looks like a secret, which is not shown here and must not be in a file of models: name a variable \
                      that holds it (key-env = \"NAME\", or {{ env = \"NAME\" }} for a header)"
                 );
                 return Err(Error::usage(at(value.span().start), problem));

@@ -39,7 +39,7 @@ pub(super) fn set(entries: &mut [Entry], text: &str) -> Result<()> {
     let key = place[name.len() + 1..].replace('_', "-");
     if matches!(&*key, "name" | "id") {
         return Err(wrong(format!(
-            "{key} is what a model is, and cannot be set"
+            "{key} identifies the model, and cannot be set"
         )));
     }
     let located = Located {

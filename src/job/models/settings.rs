@@ -221,7 +221,7 @@ fn of_file(
     if !overridden.is_empty() {
         let keys: Vec<String> = overridden.into_iter().collect();
         tracing::warn!(
-            "{}: models with {} of their own keep it; the flag holds for the others (--set NAME.KEY=VALUE is above both)",
+            "{}: models with their own {} are not changed; the flag applies to the others (--set NAME.KEY=VALUE overrides both)",
             file.path.display(),
             keys.join(", ")
         );
@@ -373,7 +373,7 @@ fn refuse_same_names(models: &[ModelSettings]) -> Result<()> {
         let mut before = models[..i].iter();
         if before.any(|other| other.view == model.view && other.name == model.name) {
             let problem = format_args!(
-                "{} is named twice; in a file of models, name tells them apart",
+                "{} is named twice; in a file of models, give each its own name",
                 model.name
             );
             return Err(Error::usage("--model", problem));

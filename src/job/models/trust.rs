@@ -136,7 +136,7 @@ impl Suspect<'_> {
     fn check_connection(&self) -> Result<()> {
         let (access, flags) = (&self.entry.asking.access, &self.flags.access);
         if access.vendor != flags.vendor {
-            let problem = "vendor: such a table says which variables are sent";
+            let problem = "vendor: such a table decides which variables are sent";
             return Err(self.strange("vendor", format_args!("{problem}")));
         }
         if access.ca_file != flags.ca_file {
@@ -188,7 +188,7 @@ impl Suspect<'_> {
     fn foreign(&self, key: &str, variable: &str, base: &BaseUrl) -> Error {
         let host = base.host();
         if self.stated(key, variable).is_some() && key != "endpoints" {
-            let problem = format_args!("{key}: {variable} is no variable of {host}'s own tools");
+            let problem = format_args!("{key}: {variable} is not a variable of {host}'s own tools");
             return self.strange_at(self.stated(key, variable), problem);
         }
         let problem = if key == "endpoints" {
@@ -229,7 +229,7 @@ impl Suspect<'_> {
 
     fn strange_at(&self, located: Option<&Located>, problem: std::fmt::Arguments<'_>) -> Error {
         let problem = format!(
-            "{problem}, and the file may have come with the data and be a stranger's; --trust-models says that it is yours"
+            "{problem}, and the file may have come with the data from someone else; --trust-models states that you trust it"
         );
         match (located, &self.entry.place) {
             (Some(located), _) => located.error(problem),

@@ -87,7 +87,7 @@ fn write<D: Tabled>(folder: &Path, path: &Path, metadata: &FileMetadata) -> Resu
     }
     for (column, count) in file.finish()? {
         tracing::warn!(
-            "{}: {count} numbers are too large for the column {column}, and are null in it; records.jsonl has them",
+            "{}: numbers that are too large for the column {column}, and are null in it: {count}; records.jsonl has them",
             path.display()
         );
     }

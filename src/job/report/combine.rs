@@ -242,7 +242,7 @@ pub(super) fn check_comparable(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
             shared |= *first != index;
             if (&*known, *known_truth) != (&choices, truth) {
                 let problem = format!(
-                    "the question {} has other choices or another truth in {}; report each run alone",
+                    "the question {} has other choices or another true choice in {}; report each run alone",
                     item.question,
                     runs[*first].folder.display()
                 );

@@ -221,7 +221,8 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
         match &marked {
             Some((other, other_by)) if *other_by != by => {
                 return wrong(format!(
-                    "its answers were marked by {} and those of {} by {}: marks of two judges or protocols do not compare; report each run alone, or run openeqa on its folder again with the other's --judge and --protocol: only marks are asked",
+                    "its answers were marked by {} and those of {} by {}: marks of two judges or protocols cannot be compared; report \
+                     each run alone, or run openeqa on its folder again with the other's --judge and --protocol: only marks are asked",
                     judged(&by),
                     other.display(),
                     judged(other_by)

@@ -239,7 +239,7 @@ fn refuse_without_truths(args: &ReportArgs) -> Result<()> {
         (
             "--common",
             args.common,
-            "each model is held against its own answers, on the questions that it answered at L0",
+            "each model is compared with its own answers, on the questions that it answered at L0",
         ),
         (
             "--baseline",

@@ -56,7 +56,7 @@ fn alerts(report: &OpenReport<'_>) -> Vec<String> {
     }
     if counts.answered < counts.trials {
         alerts.push(format!(
-            "{status}: {} of {} answers and marks there, {} failed; what is not there is not scored.",
+            "{status}: {} of {} answers and marks are stored, {} failed; those that are missing are not scored.",
             counts.answered, counts.trials, counts.failed
         ));
     }

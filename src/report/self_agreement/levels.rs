@@ -179,7 +179,8 @@ fn of_axis(found: &SelfAgreement<'_>, axis: Axis, ladder: &Ladder<'_, AgreementC
     } else {
         format!("{} of {}", axis.title, axis.cause)
     };
-    let caption = format!("Agreement with its own answer at L0 by {by}, and what keeps it honest");
+    let caption =
+        format!("Agreement with its own answer at L0 by {by}, and the measures to read with it");
     let mut table = TableBuilder::new(AGREEMENT, rows)
         .page("agreement", &caption)
         .group(|row| Some(row.series.clone()))
@@ -217,7 +218,7 @@ pub(super) fn notes(found: &SelfAgreement<'_>) -> Vec<String> {
             });
             let (informative, all) = found.informative(model);
             notes.push(format!(
-                "{model} at L0: an answer to {read} of {} questions; {informative} of {all} questions of the bank can tell something",
+                "{model} at L0: an answer to {read} of {} questions; {informative} of {all} questions of the bank are informative",
                 light.asked
             ));
         }
@@ -235,7 +236,7 @@ pub(super) fn notes(found: &SelfAgreement<'_>) -> Vec<String> {
         }
         let reason = cells.find_map(|cell| cell.evidence?.err());
         notes.extend(
-            reason.map(|reason| format!("{model}: no evidence kept is given: {}", why(reason))),
+            reason.map(|reason| format!("{model}: evidence kept is not given: {}", why(reason))),
         );
     }
     notes

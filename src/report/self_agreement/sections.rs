@@ -23,20 +23,20 @@ pub(super) const SECTIONS: [Section; 8] = [
     (
         "questions",
         "The questions",
-        "What each model answers at L0. A question with one answer about 95 % of the images or more tells nothing: agreement is given \
-         with and without such questions.",
+        "What each model answers at L0. A question with one answer about 95 % of the images or more is not informative: agreement is \
+         given with and without such questions.",
         &[],
     ),
     (
         "models",
         "The models at L0",
-        "How far two models agree with each other at L0. Each is held against itself, so that their agreements compare only as far as that.",
+        "How far two models agree with each other at L0. Each is compared with itself, so that their agreements can be compared only as far as that.",
         &[],
     ),
     (
         ENHANCERS,
         "Images and enhancement",
-        "Enhanced less raw, in percentage points of agreement. At L0 an enhancer is held against the same image asked again: less \
+        "Enhanced less raw, in percentage points of agreement. At L0 an enhancer is compared with the same image asked again: less \
          agreement there is harm, unless the photographs were taken in the dark.",
         &[],
     ),

@@ -146,7 +146,7 @@ fn models_in_light(pairs: &[ModelsInLight]) -> Table {
         .column(Count, "page n", |pair| pair.same.n)
         .build();
     if !pairs.is_empty() {
-        table.heading = Some("Two models at L0: each has its own answers as reference, so that their agreements compare only as far as these".to_owned());
+        table.heading = Some("Two models at L0: each has its own answers as reference, so that their agreements can be compared only as far as these".to_owned());
     }
     table
 }
@@ -248,7 +248,7 @@ fn questions(found: &SelfAgreement<'_>) -> Table {
             .filter(|question| without(question))
             .count();
         table.heading = Some(format!(
-            "{} of which nothing can be told, because one answer is that about 95 % of the images or more",
+            "{} without information, because one answer is given about 95 % of the images or more",
             counted(count, "question")
         ));
         for (row, question) in table.rows.iter_mut().zip(&found.questions) {
@@ -265,7 +265,7 @@ fn tells(question: &QuestionInLight) -> &'static str {
     if question.is_informative() {
         ""
     } else {
-        "tells nothing"
+        "not informative"
     }
 }
 

@@ -59,7 +59,7 @@ fn too_few(rows: &[&BaselineRow], numbers: &mut Numbers) -> String {
     } else {
         let clusters = rows.iter().map(|row| row.paired.clusters).max();
         format!(
-            "with {} and so many conditions no corrected p-value can be small enough",
+            "with {} and this number of conditions, no corrected p-value can be small enough",
             numbers.clusters(clusters.unwrap_or(0))
         )
     }

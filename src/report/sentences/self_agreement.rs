@@ -43,7 +43,7 @@ pub(in crate::report) fn self_agreement(found: &SelfAgreement<'_>) -> Vec<Senten
 /// The sentence in place of a verdict: no reply at L0 could be read.
 fn unread(found: &SelfAgreement<'_>, model: &str) -> Sentence {
     let text = format!(
-        "Nothing can be told about {model}: no answer could be read in any of its replies at L0, so that there is nothing to hold it against."
+        "Nothing is known about {model}: no answer could be read in any of its replies at L0, so that there is nothing to compare it with."
     );
     let detail = "--constrain choice makes a server allow letters alone; --max-tokens may be too low for a model that thinks first";
     let numbers = Numbers::of(found.unit);
@@ -61,7 +61,8 @@ fn cannot_tell(found: &SelfAgreement<'_>, model: &str) -> Sentence {
     let (_, all) = found.informative(model);
     let all = numbers.count("questions", all);
     let text = format!(
-        "This bank cannot tell what {model} sees: at L0 its answer to each of the {all} questions is the same about 95 % of the images or more."
+        "This bank does not show what {model} sees: at L0 its answer to each of the {all} questions is the same about 95 % of the images \
+         or more."
     );
     let own = found.questions.iter();
     let images = own.filter(|question| question.model == model);
@@ -102,7 +103,7 @@ fn between(found: &SelfAgreement<'_>) -> Vec<Sentence> {
         };
         let n = numbers.count("n", pair.same.n);
         let detail = format!(
-            "[{low}, {high}] %, {kappa}, n = {n}; each is held against itself, so that their agreements in the dark compare only as far as this"
+            "[{low}, {high}] %, {kappa}, n = {n}; each is compared with itself, so that their agreements in the dark can be compared only as far as this"
         );
         numbers.sentence("models_in_light", Tone::Note, text, detail)
     });
@@ -232,9 +233,7 @@ fn darkness_detail(
             numbers.count("informative", informative),
             numbers.count("questions", all),
         );
-        parts.push(format!(
-            "{informative} of {all} questions can tell something"
-        ));
+        parts.push(format!("{informative} of {all} questions are informative"));
     }
     parts.join(", ")
 }

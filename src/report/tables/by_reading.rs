@@ -296,7 +296,7 @@ fn notes(found: &[FindingByReading]) -> Vec<String> {
     let dropped = found.iter().map(|finding| finding.dropped).max();
     if let Some(dropped) = dropped.filter(|dropped| *dropped > 0) {
         notes.push(format!(
-            "left out where a side has no reply: up to {}",
+            "left out because a side has no reply: up to {}",
             words::counted(dropped, "item")
         ));
     }

@@ -140,7 +140,7 @@ fn notes(findings: &[&PooledFinding], unit: &str) -> Vec<String> {
     let most = findings.iter().max_by_key(|finding| finding.dropped);
     if let Some(most) = most.filter(|finding| finding.dropped > 0) {
         notes.push(format!(
-            "left out where a model has no reply: up to {} of {}",
+            "left out because a model has no reply: up to {} of {}",
             most.dropped,
             counted(most.items + most.dropped, "item")
         ));
@@ -176,7 +176,7 @@ pub(super) fn too_few_clusters(
     let impossible = least.filter(|(least, _)| *least >= 0.05);
     let (least, clusters) = impossible.min_by(|a, b| a.0.total_cmp(&b.0))?;
     Some(format!(
-        "no verdict where p cannot be below 0.05: with {}, p (Holm) is {} at least",
+        "no verdict if p cannot be below 0.05: with {}, p (Holm) is {} at least",
         counted(clusters, unit),
         p(least)
     ))

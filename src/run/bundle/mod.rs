@@ -32,7 +32,7 @@ pub(crate) struct BundleArgs {
     /// The folder of a run
     #[arg(value_name = "RUN", add = Decides::Nothing)]
     pub run: PathBuf,
-    /// Where the ZIP file goes; a bundle that is there is replaced, any other file is not
+    /// Where the ZIP file goes; an existing bundle is replaced, any other file is not
     #[arg(long, value_name = "FILE.zip", add = Decides::Nothing)]
     pub out: PathBuf,
     /// The small images in it
@@ -47,7 +47,7 @@ pub(crate) struct BundleArgs {
 pub(crate) fn bundle(args: &BundleArgs) -> Result<Outcome> {
     let replaces = args.out.symlink_metadata().is_ok();
     if replaces && !is_bundle(&args.out) {
-        let problem = "there already, and no bundle: name another file";
+        let problem = "exists already and is not a bundle; name another file";
         return Err(Error::data(args.out.display(), problem));
     }
     let folder_name = file_name(&name(&args.run));

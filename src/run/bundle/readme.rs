@@ -32,7 +32,7 @@ pub(super) fn readme(inputs: &ReadmeInputs<'_>) -> String {
     text += "\nIn the folder, to check that nothing changed on the way:\n\n";
     text += &fenced("sha256sum --check SHA256SUMS");
     text += "\n## Ask again\n\n";
-    text += "The command that asks the same, as far as the manifest tells; `DIR/` stands for a folder of your own:\n\n";
+    text += "The command that asks the same, as far as the manifest states it; replace `DIR/` by a folder of yours:\n\n";
     text += &fenced(inputs.command);
     text += "\n## Changed, or left out\n\n";
     if inputs.changes.is_empty() {

@@ -61,7 +61,7 @@ pub(super) fn doctor(
         let _ = writeln!(output, "\n{sidecar}");
         if args.write {
             if !model.is_file() {
-                let problem = "the enhancers of the program are no files, so they have no sidecar";
+                let problem = "the built-in enhancers are not files, so they have no sidecar";
                 return Err(Error::usage("--write", problem));
             }
             let path = enhancer.sidecar_path();

@@ -133,7 +133,7 @@ pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome
             "{}: {written} made by {}{}{}\n",
             out.display(),
             enhancer.name(),
-            count(unchanged, "kept as they were (--force makes them again)"),
+            count(unchanged, "left as they were (--force makes them again)"),
             count(failed, "failed")
         ),
     ))

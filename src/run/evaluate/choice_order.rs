@@ -14,7 +14,7 @@ pub(crate) struct ChoiceOrder {
     /// Show the choices of each question in an order drawn from --seed, the same in every condition
     #[arg(long, add = Decides::Reply)]
     pub shuffle_options: bool,
-    /// Ask each question once for every rotation of its choices: what a model answers by position averages out
+    /// Ask each question once for every rotation of its choices, so that a model's preference for a position averages out
     #[arg(long, add = Decides::Reply)]
     pub circular: bool,
     /// Ask everything N times; default: once, and with --ask the untouched images twice

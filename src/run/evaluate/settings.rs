@@ -58,14 +58,14 @@ pub(crate) struct EvaluateArgs {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Model")]
 pub(crate) struct ChoiceArgs {
-    /// What the server lets the model say; other numbers than unconstrained ones
+    /// What the server lets the model write; constrained replies give other numbers than free ones
     #[arg(long, value_enum, default_value_t, add = Decides::Reply)]
     pub constrain: Constrain,
     /// Ask how likely each choice is, by the probabilities of tokens (logprobs): the report then has the model's confidence against
     /// its accuracy; needs temperature 0
     #[arg(long, add = Decides::Reply)]
     pub probabilities: bool,
-    /// Show the image before the words, as Anthropic advises, and so that servers can keep it for all questions about a frame
+    /// Show the image before the words, as Anthropic advises, and so that servers can cache it for all questions about a frame
     #[arg(long, add = Decides::Reply)]
     pub image_first: bool,
     /// A folder with custom prompts (choice.txt, blind.txt); default: built in
@@ -216,14 +216,14 @@ fn check_without_truths(job: &JobSettings) -> Result<()> {
     };
     if let Some(blind) = models.iter().find(|model| !sees(&model.name)) {
         let problem = format_args!(
-            "{} is shown no image, and --ask holds a model against its own answers in the light: name it with --model and leave --blind out; it is \
+            "{} is shown no image, and --ask compares a model with its own answers in the light: name it with --model and leave --blind out; it is \
              asked without images, too",
             blind.name
         );
         return Err(Error::usage("--ask", problem));
     }
     if !job.light.degradations().contains(&None) {
-        let problem = "--ask holds a model against its own answers at L0: add L0 to --levels; what a run has is not asked again";
+        let problem = "--ask compares a model with its own answers at L0: add L0 to --levels; what a run has is not asked again";
         return Err(Error::usage("--levels", problem));
     }
     Ok(())

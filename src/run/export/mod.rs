@@ -215,7 +215,8 @@ fn refuse_several_images(dataset: &Dataset, questions: &[Question]) -> Result<()
         Some(first) => Err(Error::usage(
             "--multi-image",
             format_args!(
-                "the question {:?} shows {} images, and an exported set has one image a question; --multi-image skip leaves such rows out",
+                "the question {:?} shows {} images, and an exported set has one image per question; --multi-image skip leaves such rows \
+                 out",
                 first.id.0,
                 dataset.several(&first.frame).len()
             ),

@@ -53,11 +53,11 @@ pub(crate) struct FiguresArgs {
     /// How many columns a figure is wide, 1 or 2; default: 1, and for the sheet `paper` the whole text
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=2), add = Decides::Nothing)]
     pub columns: Option<u8>,
-    /// Another name for a model, an enhancer or a family of questions; can be given several times;
+    /// Another name for a model, an enhancer or a family of questions; repeatable;
     /// default: none
     #[arg(long, value_name = "OLD=NEW", value_parser = label, add = Decides::Nothing)]
     pub label: Vec<(String, String)>,
-    /// The models and enhancers that come first, separated by commas, by their names in the runs, and the others follow;
+    /// The models and enhancers that come first, by their names in the runs, separated by commas; the others follow;
     /// default: none
     #[arg(long, value_name = "NAMES", value_delimiter = ',', add = Decides::Nothing)]
     pub order: Vec<String>,
@@ -91,13 +91,19 @@ fn label(text: &str) -> std::result::Result<(String, String), String> {
         Some((old, new)) if !old.is_empty() && !new.trim().is_empty() => {
             Ok((old.to_owned(), new.trim().to_owned()))
         }
-        _ => Err("is OLD=NEW: a name in the runs, and the one to show".to_owned()),
+        _ => Err("OLD=NEW expected: a name in the runs, and the one to show".to_owned()),
     }
 }
 
 fn letters(text: &str) -> std::result::Result<f64, String> {
     let size = text.parse().ok().filter(|size| LETTERS.contains(size));
-    size.ok_or_else(|| format!("is from {} to {} points", LETTERS.start(), LETTERS.end()))
+    size.ok_or_else(|| {
+        format!(
+            "a size from {} to {} points expected",
+            LETTERS.start(),
+            LETTERS.end()
+        )
+    })
 }
 
 /// Draws the figures of the runs, from the numbers of their report.
@@ -206,7 +212,7 @@ impl Files {
             match &drawing.chart {
                 Drawn::Lines(chart) => self.made.extend(tex(name, chart, &in_tex(look))),
                 Drawn::Bars(_) | Drawn::Thresholds(_) | Drawn::Reliability(_) => {
-                    self.leave_out(&format!("{name}.tex"), "it is no chart of lines");
+                    self.leave_out(&format!("{name}.tex"), "it is not a chart of lines");
                 }
             }
         }

@@ -71,7 +71,7 @@ impl FromStr for Width {
                 Ok(Self::Own(millimetres * POINTS))
             }
             _ => Err(format!(
-                "is ieee, cvpr, acl, neurips, or a width from {} to {} in millimetres",
+                "ieee, cvpr, acl, neurips, or a width from {} to {} in millimetres expected",
                 MILLIMETRES.start(),
                 MILLIMETRES.end()
             )),

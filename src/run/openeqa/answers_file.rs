@@ -71,7 +71,7 @@ pub(super) fn read(
         });
         if !seen.insert((index, condition.clone(), person.clone())) {
             return Err(wrong(format!(
-                "question {} is answered twice at {condition}; \"annotator\" tells people apart",
+                "question {} is answered twice at {condition}; state in \"annotator\" who answered",
                 entry.question_id
             )));
         }
@@ -129,7 +129,7 @@ fn condition(entry: &AnswerEntry, variants: KindSet) -> std::result::Result<Cond
     match (degradations.pop(), degradations.is_empty()) {
         (Some(degradation), true) => Ok(Condition::raw(Some(degradation))),
         _ => Err(format!(
-            "\"level\" does not tell which variant was shown; write \"condition\": \"{}\" instead",
+            "\"level\" does not state which variant was shown; write \"condition\": \"{}\" instead",
             example.unwrap_or_default()
         )),
     }

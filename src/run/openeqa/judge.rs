@@ -17,7 +17,7 @@ use crate::types::Decides;
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Judge")]
 pub(crate) struct JudgeArgs {
-    /// The model that marks the answers; default: none, answers are gathered and not marked
+    /// The model that marks the answers; default: none, answers are stored and not marked
     #[arg(long, value_name = "NAME", add = Decides::Trials)]
     pub judge: Option<ModelName>,
     /// How answers are judged and marks read
@@ -36,7 +36,7 @@ pub(crate) struct JudgeArgs {
     /// The judge's sampling temperature
     #[arg(long, value_name = "T|auto|default", default_value = "0.2", add = Decides::Reply)]
     pub judge_temperature: Temperature,
-    /// The most tokens of a judge's reply
+    /// The maximum number of tokens of a judge's reply
     #[arg(long, value_name = "N", default_value = "32", add = Decides::Reply)]
     pub judge_max_tokens: NonZeroU32,
 }

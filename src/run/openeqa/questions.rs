@@ -21,7 +21,7 @@ pub(crate) struct OpenSelectionArgs {
     /// Only questions of these categories, as "object localization,world knowledge"; default: all
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = trimmed, add = Decides::Trials)]
     pub categories: Vec<String>,
-    /// Only the questions whose ids stand in this file, a JSON array, as open-eqa-v0-184-questions.json; default: all
+    /// Only the questions whose ids are in this file, a JSON array, as open-eqa-v0-184-questions.json; default: all
     #[arg(long, value_name = "FILE", add = Decides::Trials)]
     pub subset: Option<PathBuf>,
     /// Only the first N questions; default: all

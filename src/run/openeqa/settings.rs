@@ -34,7 +34,7 @@ pub(crate) struct OpenEqaArgs {
     /// What the codes of images mean.
     #[command(flatten)]
     pub codes: CodesArgs,
-    /// What the servers' sampling starts from, or none
+    /// The seed of the servers' sampling, or none
     #[arg(
         long,
         value_name = "N|none",
@@ -131,7 +131,7 @@ impl OpenEqaArgs {
                  again by the same command",
             ),
             "resume" => arg.help(
-                "Go on with the run in this folder, also at another address of the same models; default: none",
+                "Continue the run in this folder, also at another address of the same models; default: none",
             ),
             _ => arg,
         }

@@ -86,7 +86,7 @@ pub(super) fn pack(
         Status::Complete,
         format!(
             "{}: {} questions about {walks} walks, {written} images, {} conditions; a person sees each walk in one of them, and {} people \
-             see it in all\nwhat they save is marked by openeqa --answers NAME=FILE\n",
+             see it in all\nto mark what they save: openeqa --answers NAME=FILE\n",
             path.display(),
             asked.len(),
             conditions.len(),

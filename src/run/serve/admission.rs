@@ -31,12 +31,12 @@ pub(super) fn admit(request: &Request, port: u16) -> Result<(), RequestFault> {
         .or_else(|| text(headers, header::HOST));
     let is_here = host.as_deref().is_some_and(|host| is_here(host, port));
     if !is_here {
-        let message = format!("the host is another than 127.0.0.1:{port} or localhost:{port}");
+        let message = format!("the host is neither 127.0.0.1:{port} nor localhost:{port}");
         return Err(RequestFault::new(StatusCode::MISDIRECTED_REQUEST, message));
     }
     let origin = headers.get(header::ORIGIN);
     if origin.is_some_and(|origin| !origin.to_str().is_ok_and(is_local_page)) {
-        let message = "requests of pages of other sites are not answered";
+        let message = "requests from pages of other sites are not answered";
         return Err(RequestFault::new(StatusCode::FORBIDDEN, message));
     }
     let kind = text(headers, header::CONTENT_TYPE).unwrap_or_default();
@@ -57,7 +57,10 @@ pub(super) fn admit(request: &Request, port: u16) -> Result<(), RequestFault> {
 /// If it is too large, does not arrive in time, or breaks off.
 pub(super) async fn body(body: Body) -> Result<Bytes, RequestFault> {
     let too_large = || {
-        let message = format!("the body broke off, or has more than {} MiB", LARGEST >> 20);
+        let message = format!(
+            "the body is incomplete, or has more than {} MiB",
+            LARGEST >> 20
+        );
         RequestFault::new(StatusCode::PAYLOAD_TOO_LARGE, message)
     };
     // What the client says of its length.

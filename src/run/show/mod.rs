@@ -71,7 +71,7 @@ pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
             let comparison = if sent.is_empty() {
                 format!("the digest of what was sent is not stored; {digest} now")
             } else if sent.iter().all(|sent| *sent == digest) {
-                format!("the very bytes that were sent ({digest})")
+                format!("the same bytes as were sent ({digest})")
             } else {
                 all_same = false;
                 format!("NOT the bytes that were sent: {digest} now")

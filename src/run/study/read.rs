@@ -153,8 +153,9 @@ fn no_choice(line: &PlacedAnswer<'_>, record: &Record) -> Option<String> {
     let found = line.answer.answer.as_deref().unwrap_or_default();
     let choices = record.detail.choices.join(", ");
     let (file, number, question) = (line.file.display(), line.line, &record.question);
-    (why != UnreadReason::Empty)
-        .then(|| format!("{file}, line {number}: {found:?} is no choice of {question}: {choices}"))
+    (why != UnreadReason::Empty).then(|| {
+        format!("{file}, line {number}: {found:?} is not a choice of {question}: {choices}")
+    })
 }
 
 /// Warns about answers that are no choice. They count as wrong, as those of a model do.
@@ -164,8 +165,8 @@ fn warn_about(answers: &[String]) {
         return;
     }
     let mut text = match count {
-        1 => "1 answer is no choice of its question and counts as wrong".to_owned(),
-        _ => format!("{count} answers are no choices of their questions and count as wrong"),
+        1 => "1 answer is not a choice of its question and counts as wrong".to_owned(),
+        _ => format!("{count} answers are not choices of their questions and count as wrong"),
     };
     for answer in answers.iter().take(MAX_LISTED) {
         let _ = write!(text, "\n  {answer}");

@@ -46,7 +46,7 @@ pub(super) fn check(folder: &Path) -> Result<Outcome> {
             _ => Status::Incomplete,
         },
         format!(
-            "{}: {intact} images are as they were written, {wrong} are not\n",
+            "{}: images as they were written: {intact}; not as they were written: {wrong}\n",
             folder.display()
         ),
     ))

@@ -40,7 +40,7 @@ pub(crate) struct SynthesizeArgs {
     /// Images, folders of images, or folders of frames (frames.jsonl)
     #[arg(required_unless_present = "check", value_name = "INPUT", add = Decides::Pixels)]
     pub inputs: Vec<PathBuf>,
-    /// Where the images go, each with a JSON file of all settings that made it; default: none, it is needed but for --check
+    /// Where the images go, each with a JSON file of all settings that made it; default: none; required without --check
     #[arg(long, value_name = "DIR", required_unless_present = "check", add = Decides::Nothing)]
     pub out: Option<PathBuf>,
     /// The flags for the degradations.
@@ -52,11 +52,11 @@ pub(crate) struct SynthesizeArgs {
     /// One figure per input instead; default: images
     #[arg(long, value_enum, help_heading = "Synthesis", conflicts_with = "from", add = Decides::Nothing)]
     pub sheet: Option<Sheet>,
-    /// Hold the images of a folder to the digests in their JSON files; nothing is made or changed; default: make images
+    /// Compare the images of a folder with the digests in their JSON files; nothing is made or changed; default: make images
     #[arg(long, value_name = "DIR", help_heading = "Synthesis",
         conflicts_with_all = ["inputs", "out", "from", "sheet", "force", "shard"], add = Decides::Nothing)]
     pub check: Option<PathBuf>,
-    /// Write over whatever is in the place of an image
+    /// Overwrite any file that has the name of an image
     #[arg(long, help_heading = "Synthesis", add = Decides::Nothing)]
     pub force: bool,
     /// The maximum size of an image.
@@ -150,7 +150,7 @@ impl ImageCounts {
         } = self;
         let unchanged = match unchanged {
             0 => String::new(),
-            n => format!(", {n} kept as they were (--force makes them again)"),
+            n => format!(", {n} left as they were (--force makes them again)"),
         };
         let failures = match failed {
             0 => String::new(),

@@ -189,7 +189,7 @@ impl Placed {
         }
         let bytes = reading::bytes(&self.image)?;
         if !self.json.exists() {
-            let problem = "no JSON file vouches for it, and its pixels are others";
+            let problem = "no JSON file describes it, and its pixels differ";
             let there = decoded(&self.image, &bytes).ok_or_else(|| self.refusal(problem))?;
             return Ok(Verdict::Compare(there, problem.to_owned()));
         }
@@ -209,13 +209,13 @@ impl Placed {
             (fault, Some(there)) => {
                 let fault = fault.flatten();
                 let fault = fault.unwrap_or_else(|| "its JSON file has no digest".to_owned());
-                Verdict::Compare(there, format!("{fault}, and its pixels are others"))
+                Verdict::Compare(there, format!("{fault}, and its pixels differ"))
             }
         })
     }
 
     fn refusal(&self, problem: &str) -> Error {
-        let remedy = "--force writes over it, another --out keeps both";
+        let remedy = "--force overwrites it, another --out keeps both";
         Error::data(self.image.display(), format_args!("{problem}; {remedy}"))
     }
 }

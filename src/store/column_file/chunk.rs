@@ -114,7 +114,7 @@ fn write<R, T: DataType>(
             Cell::Null => None,
             cell => read(cell).map_err(|other| {
                 let name = column.name;
-                ParquetError::General(format!("{other:?} is no value of the column {name}"))
+                ParquetError::General(format!("{other:?} is not a value of the column {name}"))
             })?,
         };
         if value.is_none() && column.presence == Presence::Always {

@@ -208,7 +208,10 @@ fn what_does_not_fit_is_null_or_an_error() {
     }];
     let mut file = ColumnFile::create(&path, &wrong, &metadata()).unwrap();
     let problem = file.append(&[row(0)]).unwrap_err().to_string();
-    assert!(problem.contains("no value of the column ev"), "{problem}");
+    assert!(
+        problem.contains("not a value of the column ev"),
+        "{problem}"
+    );
 }
 
 #[test]

@@ -204,7 +204,7 @@ fn a_server_that_fails_at_every_upload_or_batch_ends_the_run() {
         assert_eq!(called.code, Some(2), "{called:?}");
         assert_eq!(mock.count(kind), 5, "{called:?}");
         assert!(
-            called.stderr.contains("the same command goes on"),
+            called.stderr.contains("the same command continues"),
             "{called:?}"
         );
         let called = call_with(BLIND, &bench, &mock, "");

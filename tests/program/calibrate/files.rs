@@ -248,12 +248,12 @@ fn wrong_flags_are_named() {
             ("cam --white 9999 --max-pixels 100", "raise --max-pixels"),
             (
                 "cam --out camera.svg",
-                "--out: camera.svg has not the ending .toml",
+                "--out: camera.svg does not end in .toml",
             ),
-            ("cam --out mycam", "--out: mycam has not the ending .toml"),
+            ("cam --out mycam", "--out: mycam does not end in .toml"),
             (
                 "cam --out out/my.cam",
-                "--out: out/my.cam has not the ending .toml",
+                "--out: out/my.cam does not end in .toml",
             ),
         ],
         |(line, part)| {

@@ -49,7 +49,7 @@ fn the_command_enhances_files_and_folders() {
         assert_eq!(enhanced, map(&dark, |x| 2.0 * x).samples(), "{name}");
     });
     let (_, out, _) = call(&["c.png", "--out", "mended", "--llie-anyway"]);
-    assert!(out.contains("1 kept as they were"), "{out}");
+    assert!(out.contains("1 left as they were"), "{out}");
     let (code, out, _) = call(&["--describe"]);
     assert!(
         code == 0 && out.contains("NCHW") && out.contains("usual"),

@@ -30,7 +30,7 @@ fn a_refused_field_costs_one_request_and_is_said_in_the_report() {
     let args = "--data set.jsonl --levels L0 --out run";
     let printed = bench.complete(&model_args(&base, args));
     assert_eq!(mock.requests().len(), 31);
-    let noted = json!(["no temperature is sent: the server's own holds"]);
+    let noted = json!(["no temperature is sent: the server's own is used"]);
     assert_eq!(manifest(&bench)["settings"]["adapted for m"], noted);
     assert!(printed.contains("Requests to m were changed"), "{printed}");
     // A run in which nothing was refused says nothing of it.
@@ -136,6 +136,6 @@ fn a_field_that_is_refused_later_costs_no_trial() {
     assert!((1..=8).contains(&refused), "{refused}");
     assert_eq!(
         manifest(&bench)["settings"]["adapted for m"],
-        json!(["no temperature is sent: the server's own holds"])
+        json!(["no temperature is sent: the server's own is used"])
     );
 }

@@ -119,7 +119,7 @@ fn an_image_that_changes_under_way_is_not_taken_for_the_old_one() {
     assert_eq!(of_b.len(), 11);
     assert!(
         of_b.iter()
-            .all(|record| text(&record["failure"], "message").contains("changed while the run")),
+            .all(|record| text(&record["failure"], "message").contains("changed during the run")),
         "{of_b:?}"
     );
 }

@@ -105,7 +105,7 @@ fn dark_photographs_are_asked_as_they_are_and_enhanced() {
     assert!(
         shown
             .stdout
-            .contains("L0+lift: the very bytes that were sent"),
+            .contains("L0+lift: the same bytes as were sent"),
         "{shown:?}"
     );
     let open = |path: &str| image::open(bench.path(path)).unwrap().to_rgb8();

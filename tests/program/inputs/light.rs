@@ -181,7 +181,7 @@ fn what_is_no_light_is_refused_by_name() {
     for (bytes, says) in [
         (
             with(f32::NAN),
-            "NaN at the pixel (0, 1), channel G, is no amount of light",
+            "NaN at the pixel (0, 1), channel G, is not an amount of light",
         ),
         (with(f32::INFINITY), "inf at the pixel (0, 1)"),
         (with(-2e-3), "-0.002 at the pixel (0, 1)"),

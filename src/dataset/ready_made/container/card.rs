@@ -37,7 +37,7 @@ pub(super) fn configs(card: &str) -> Result<Vec<Config>, String> {
     match configs.field("configs") {
         None | Some(Yaml::Nothing) => Ok(Vec::new()),
         Some(Yaml::List(configs)) => configs.iter().map(config).collect(),
-        Some(_) => Err("configs is no list".to_owned()),
+        Some(_) => Err("configs is not a list".to_owned()),
     }
 }
 
@@ -50,12 +50,12 @@ fn key(line: &str) -> Option<&str> {
 
 fn config(config: &Yaml) -> Result<Config, String> {
     if !matches!(config, Yaml::Fields(_)) {
-        return Err("configs holds something else than mappings".to_owned());
+        return Err("configs holds something other than mappings".to_owned());
     }
     let text = |name: &str| match config.field(name) {
         None | Some(Yaml::Nothing) => Ok(String::new()),
         Some(Yaml::Text(text)) => Ok(text.clone()),
-        Some(_) => Err(format!("{name} is no text")),
+        Some(_) => Err(format!("{name} is not a text")),
     };
     let name = match text("config_name")? {
         name if name.is_empty() => "default".to_owned(),
@@ -97,7 +97,7 @@ fn data_files(files: &Yaml) -> Result<Vec<(String, String)>, String> {
                     match entry.field("split") {
                         Some(Yaml::Text(split)) => of_split(split, path),
                         None => of_split("", path),
-                        Some(_) => Err("a split of data_files is no text".to_owned()),
+                        Some(_) => Err("a split of data_files is not a text".to_owned()),
                     }
                 }
                 entry => of_split("", entry),
@@ -116,7 +116,7 @@ fn patterns(files: &Yaml) -> Result<Vec<String>, String> {
             .iter()
             .map(|pattern| match pattern {
                 Yaml::Text(pattern) => Ok(pattern.clone()),
-                _ => Err("a pattern of data_files is no text".to_owned()),
+                _ => Err("a pattern of data_files is not a text".to_owned()),
             })
             .collect(),
         Yaml::Nothing | Yaml::Fields(_) => Err("data_files names no patterns".to_owned()),

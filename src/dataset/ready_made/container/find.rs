@@ -105,7 +105,8 @@ fn refuse_choice(text: &str, args: &SetArgs) -> Result<()> {
         ("--split", &args.split),
     ] {
         if let Some(value) = value {
-            let problem = format_args!("{text} is no folder that {value:?} could be chosen from");
+            let problem =
+                format_args!("{text} is not a folder from which {value:?} could be chosen");
             return Err(Error::usage(flag, problem));
         }
     }
@@ -178,7 +179,7 @@ fn of_tree(tree: &Tree, args: &SetArgs) -> Result<FoundFiles> {
     let files = files.collect::<Result<_>>()?;
     let notes = outside.first().map(|first| {
         format!(
-            "{} links lead out of the folder or nowhere, as {}, and were passed over",
+            "links that lead out of the folder or nowhere, and were skipped: {}, as {}",
             outside.len(),
             first.display()
         )

@@ -160,7 +160,9 @@ fn add(found: &Found, number: u64, inner: Option<&str>, table: &mut Table) -> Re
     };
     for (at, row) in rows.into_iter().enumerate() {
         let Value::Object(row) = row else {
-            return Err(format!("object {number}: {list:?} is no list of objects"));
+            return Err(format!(
+                "object {number}: {list:?} is not a list of objects"
+            ));
         };
         push(
             table,

@@ -193,7 +193,7 @@ impl<R: BufRead> JsonScan<R> {
         while let Some(byte) = self.peek()? {
             if !byte.is_ascii_whitespace() {
                 return Err(format!(
-                    "{:?} at byte {}, after the end of the JSON value; a file of one object a line is named .jsonl",
+                    "{:?} at byte {}, after the end of the JSON value; the name of a file with one object per line ends in .jsonl",
                     char::from(byte),
                     self.offset + 1
                 ));
@@ -299,7 +299,7 @@ mod tests {
             (r#"{"items": ["abc"#, "inside a value"),
             (r#"{"items" 1}"#, "':' is expected"),
             (r"{items: 1}", "not the name of a field"),
-            (r#"{"items": []} {"items": []}"#, "named .jsonl"),
+            (r#"{"items": []} {"items": []}"#, "ends in .jsonl"),
             (r#"{"items": [1 2]}"#, "']' is expected"),
             (
                 r#"{"items": ["0123456789012345678901234567890123456789"]}"#,

@@ -121,7 +121,7 @@ impl SetFile {
     pub(super) fn read(&self, rows: Option<&str>, table: &mut Table) -> Result<()> {
         if let Some(rows) = rows.filter(|_| self.kind != FileKind::Json) {
             let problem = format_args!(
-                "{} is no JSON file of one object that could hold {rows:?}",
+                "{} is not a JSON file of one object that could hold {rows:?}",
                 self.label.path.display()
             );
             return Err(Error::usage("--rows", problem));

@@ -73,7 +73,7 @@ pub(super) fn chosen(
     Ok(of_split.collect())
 }
 
-/// The splits with their rows where these are cheap to know, as `test (1000 rows)`.
+/// The splits with their rows where these are cheap to know, as `test (rows: 1000)`.
 fn listed(tree: &Tree, splits: &BTreeMap<&str, Vec<&Path>>) -> String {
     let rows = |file: &&Path| match (tree, &*ending(file)) {
         (Tree::Folder { .. }, "parquet") => parquet::count(&tree.whole(file)).ok(),
@@ -87,8 +87,8 @@ fn listed(tree: &Tree, splits: &BTreeMap<&str, Vec<&Path>>) -> String {
         };
         let counts: Option<u64> = files.iter().map(rows).sum();
         match counts {
-            Some(rows) => format!("{name} ({rows} rows)"),
-            None => format!("{name} ({} files)", files.len()),
+            Some(rows) => format!("{name} (rows: {rows})"),
+            None => format!("{name} (files: {})", files.len()),
         }
     });
     splits.collect::<Vec<String>>().join(", ")
@@ -139,7 +139,7 @@ mod tests {
         assert_eq!(choose(&["dev", "train"], Some("all")).unwrap().len(), 2);
         let problem = choose(&["dev", "train"], None).unwrap_err().to_string();
         assert!(
-            problem.contains("dev (1 files), train (1 files); --split"),
+            problem.contains("dev (files: 1), train (files: 1); --split"),
             "{problem}"
         );
         let problem = choose(&["dev"], Some("tset")).unwrap_err().to_string();

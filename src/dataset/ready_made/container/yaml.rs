@@ -70,7 +70,7 @@ impl<'a> Block<'a> {
             return Ok(Yaml::Nothing);
         };
         if depth > DEEPEST {
-            return Err(format!("the line {line:?} lies too deep"));
+            return Err(format!("the line {line:?} is nested too deep"));
         }
         if is_item(line) {
             return self.list(indent, depth);

@@ -38,7 +38,7 @@ fn the_names_of_rows_are_their_ids() {
     assert_eq!(ids, ["q2", "q7"]);
     let said = dataset.reading().join("\n");
     assert!(
-        said.contains("id = id") && said.contains("the names under which the rows stand"),
+        said.contains("id = id") && said.contains("the names of the rows"),
         "{said}"
     );
     // Their own ids go first.
@@ -52,7 +52,7 @@ fn the_names_of_rows_are_their_ids() {
         !dataset
             .reading()
             .join("\n")
-            .contains("the names under which")
+            .contains("the names of the rows")
     );
 }
 
@@ -214,7 +214,12 @@ fn two_rows_that_differ_in_their_answers_alone_contradict_each_other() {
     let (_folder, path) = set("set.jsonl", &rows(["x", "x"]));
     let dataset = open(&path, &SetArgs::default()).unwrap();
     assert_eq!(dataset.questions().len(), 40);
-    assert!(dataset.reading().join("\n").contains("1 questions repeat"));
+    assert!(
+        dataset
+            .reading()
+            .join("\n")
+            .contains("that repeat an earlier one, with its image and options: 1;")
+    );
 }
 
 #[test]
@@ -346,12 +351,12 @@ fn several_files_of_one_set_are_joined_in_their_order() {
     let problem = joined(&[&path, &other]).unwrap_err().to_string();
     assert!(
         problem.contains("other.csv")
-            && problem.contains("\"hint\" stands in")
+            && problem.contains("\"hint\" is in")
             && problem.contains("have the same columns"),
         "{problem}"
     );
     let problem = refusal(&folder.path().join("b/*.csv"), &SetArgs::default());
-    assert!(problem.contains("\"hint\" stands in"), "{problem}");
+    assert!(problem.contains("\"hint\" is in"), "{problem}");
     for wrong in [&folder.path().to_owned(), &path] {
         let problem = joined(&[&path, wrong]).unwrap_err().to_string();
         assert!(problem.contains("--data"), "{problem}");

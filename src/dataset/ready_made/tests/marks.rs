@@ -51,7 +51,7 @@ fn a_line_behind_the_last_option_is_no_part_of_it() {
     )]);
     let problem = refusal(&path, &SetArgs::default());
     assert!(
-        problem.contains("object 1: it cannot be told where the last option ends"),
+        problem.contains("object 1: it is not clear where the last option ends"),
         "{problem}"
     );
 }
@@ -89,7 +89,7 @@ fn letters_that_name_things_are_no_options() {
 fn numbers_say_nothing_of_lettered_options() {
     let (_folder, path) = with(vec![asked("Which? (A) red (B) blue (C) pink", json!(0))]);
     let problem = refusal(&path, &SetArgs::default());
-    assert!(problem.contains("none of the options"), "{problem}");
+    assert!(problem.contains("not one of the options"), "{problem}");
     assert_eq!(
         read(&open(&path, &map("answer=answer:index0")).unwrap())[0].4,
         "red"

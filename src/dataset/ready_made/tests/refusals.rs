@@ -111,7 +111,8 @@ fn what_cannot_be_found_is_said_with_the_columns() {
     let wide = row(json!({"Question_0": "?", "Question_1": "?", "Image_0": base64(1)}));
     let (_folder, path) = set("set.json", &[wide]);
     assert!(
-        refusal(&path, &SetArgs::default()).contains("Question_0, Question_1; one question a row")
+        refusal(&path, &SetArgs::default())
+            .contains("Question_0, Question_1; one question per row")
     );
     let (_folder, path) = set(
         "set.json",

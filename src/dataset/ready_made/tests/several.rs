@@ -123,7 +123,7 @@ fn a_mark_without_an_image_makes_a_bad_row() {
     let problem = refusal(&path, &send());
     assert!(
         problem.contains("1 of 64 rows are broken")
-            && problem.contains("\"<image 3>\" is no image of the row, which shows 2"),
+            && problem.contains("\"<image 3>\" is not an image of the row, which shows 2"),
         "{problem}"
     );
     let args = SetArgs {

@@ -214,7 +214,7 @@ fn ids_that_are_not_unique_are_passed_over() {
         "{reading}"
     );
     assert!(
-        reading.contains("1 questions repeat an earlier one"),
+        reading.contains("questions that repeat an earlier one, with its image and options: 1;"),
         "{reading}"
     );
 }
@@ -392,7 +392,7 @@ fn a_repository_has_configurations_splits_and_shards() {
     assert!(
         texts(Some("two"), None)
             .unwrap_err()
-            .contains("the splits train (1 files), val (1 rows); --split NAME")
+            .contains("the splits train (files: 1), val (rows: 1); --split NAME")
     );
     assert_eq!(
         texts(Some("two"), Some("train")).unwrap(),

@@ -28,7 +28,7 @@ pub(super) fn of_constraints(runs: &[JoinedRun], trials: &Trials<ChoiceDetail>) 
         (other > 0).then(|| {
             let replies = plural(all, "reply", "replies");
             let text = format!(
-                "Constraint not kept: {other} of {replies} of {model} have another form than --constrain {constraint} asks for, \
+                "Constraint not followed: {other} of {replies} of {model} have another form than --constrain {constraint} asks for, \
                  and are read as any reply."
             );
             Alert::new(AlertKind::Constrain, text)

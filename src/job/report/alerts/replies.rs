@@ -49,7 +49,7 @@ pub(super) fn of_people(combined: &Combined) -> Vec<Alert> {
         let unread = combined.of(run).filter_map(|trial| trial.strict()?.why);
         let count = unread.filter(|why| *why != UnreadReason::Empty).count();
         let text = format!(
-            "{} of {} of people are no choice of their question, and count as wrong.",
+            "{} of {} of people are not choices of their questions, and count as wrong.",
             count,
             counted(run.trials.len(), "answer")
         );

@@ -184,7 +184,7 @@ impl GroupKey {
         match differing.count() {
             0 => None,
             count => Some(format!(
-                "{count} questions have other choices or another truth"
+                "questions with other choices or another true choice: {count}"
             )),
         }
     }
@@ -294,7 +294,7 @@ mod tests {
         assert_eq!(lines(2), ["1 of 1 images differ"]);
         assert_eq!(
             lines(3),
-            ["1 questions have other choices or another truth"]
+            ["questions with other choices or another true choice: 1"]
         );
         assert!(lines(4).is_empty());
         let numbered = keys.into_iter().enumerate().collect();

@@ -78,10 +78,10 @@ pub(super) fn images(
                 }
                 if let Some(first) = by_digest.insert(digest, id) {
                     let text = format!(
-                        "{:?} and {:?} are the same image under two names: each gets noise of its own",
+                        "{:?} and {:?} are the same image under two names: each gets its own noise",
                         first.0, id.0
                     );
-                    findings.one_of("images that stand there twice", Mark::Warning, text);
+                    findings.one_of("images that occur twice", Mark::Warning, text);
                 }
             }
         }

@@ -75,7 +75,7 @@ fn commonest(questions: &[Question], findings: &mut Findings) {
     }
 }
 
-/// Warns of questions that stand there twice.
+/// Warns of questions that occur twice.
 fn repeats(questions: &[Question], findings: &mut Findings) {
     let mut seen = HashMap::new();
     for question in questions {
@@ -85,7 +85,7 @@ fn repeats(questions: &[Question], findings: &mut Findings) {
                 "the questions {:?} and {:?} are the same",
                 first.0, question.id.0
             );
-            findings.one_of("questions that stand there twice", Mark::Warning, text);
+            findings.one_of("questions that occur twice", Mark::Warning, text);
         }
     }
 }
