@@ -23,9 +23,10 @@ pub(crate) struct EnhancerArgs {
     /// restormer, mirnet, kind); repeatable: each is shown beside raw; default: none
     #[arg(long, value_name = "NAME|FILE", add = Decides::Trials)]
     pub llie: Vec<PathBuf>,
-    /// Which images are enhanced: a variant (as noise), its dark images; l0, the untouched images, for photographs that are dark already;
-    /// dark, the photographs in the dark beside their frames; several with commas; both is ev,noise; default: noise, of sets in the dark l0
-    #[arg(long, value_name = "l0|noise|ev|both|dark|all", add = Decides::Trials)]
+    /// Which images are enhanced, several with commas: those of a variant (ev, noise, auto, motion); l0, the untouched images, for
+    /// photographs that are dark already; dark, the photographs in the dark beside their frames; both is ev,noise; all is all of these;
+    /// default: noise, or l0 for photographs that are dark already
+    #[arg(long, value_name = "l0|noise|ev|auto|motion|both|dark|all", add = Decides::Trials)]
     pub llie_on: Option<TreatmentSet>,
 }
 

@@ -18,11 +18,11 @@ use crate::types::{Decides, DepthKind, Intrinsics, Labels, Rgb, SegmentName, Seg
 #[command(next_help_heading = "Maps")]
 pub(crate) struct StatedArgs {
     /// The label space of the class maps: nyu40, nyu40-1 (from 0, 255 for void; kind nyu), nyu13, mpcat40, ade150, or a
-    /// classes.json; default: what the kind has
+    /// classes.json; default: that of the kind of data set
     #[arg(long, value_name = "NAME|FILE", add = Decides::Pixels)]
     pub labels: Option<String>,
     /// The metres in one unit of depth PNG files: 0.001 for millimetres, 0.0002 for 1/5000 m; .npy files are in metres; default:
-    /// what the kind has
+    /// that of the kind of data set
     #[arg(long, value_name = "METRES", value_parser = positive, add = Decides::Pixels)]
     pub depth_scale: Option<f64>,
     /// What depth is measured along; default: planar

@@ -84,8 +84,8 @@ pub(crate) struct JobArgs {
 #[command(next_help_heading = "Scale")]
 pub(crate) struct ScaleArgs {
     /// Do one of N parts, by frames or walks: I/N; auto/N or auto as the batch system states (Slurm arrays, indexed Kubernetes jobs);
-    /// none for everything. --rpm, --tpm and --max-cost are for all parts together; default: auto in a Slurm array, else none. With
-    /// another N, replies that parts of the first N have are copied
+    /// none for everything. --rpm, --tpm and --max-cost are for all parts together. With another N, replies that parts of the first N have
+    /// are copied; default: auto in a Slurm array, else none
     #[arg(long, value_name = "I/N|auto/N|auto|none", add = Decides::Trials)]
     pub shard: Option<String>,
     /// How many parts run at once, so that each may send that share of --rpm and --tpm; default: all of them

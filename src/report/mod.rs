@@ -37,4 +37,4 @@ mod template;
 pub(crate) mod terminal;
 mod views;
 mod width;
-mod words;
+pub(crate) mod words;

@@ -38,9 +38,13 @@ pub(super) fn name(subject: &Subject) -> String {
 }
 
 /// A number of things: `1 pair`, `2 pairs`.
-pub(super) fn counted(number: usize, noun: &str) -> String {
-    let ending = if number == 1 { "" } else { "s" };
-    format!("{number} {noun}{ending}")
+pub(crate) fn counted(number: usize, noun: &str) -> String {
+    plural(number, noun, &format!("{noun}s"))
+}
+
+/// A number of things by its two words: `1 reply`, `2 replies`.
+pub(crate) fn plural(number: usize, one: &str, several: &str) -> String {
+    format!("{number} {}", if number == 1 { one } else { several })
 }
 
 /// A name with its middle left out, if it is longer than `width`.

@@ -14,6 +14,7 @@ use crate::job::Outcome;
 use crate::job::progress::Progress;
 use crate::job::questions::open_data;
 use crate::questions::rules::Rules;
+use crate::report::words::counted;
 use crate::types::manifest::Status;
 use crate::types::question::letter;
 use crate::types::{Choices, Decides, Question, shell_word};
@@ -100,9 +101,9 @@ pub(crate) fn init(args: &InitArgs, progress: &Progress) -> Result<Outcome> {
         &args.folder,
         Status::Complete,
         format!(
-            "{}: {} questions\n\nnext:\n  darkqa-eval check {data}\n  darkqa-eval --data {data} --model gpt-4o --dry-run\n  darkqa-eval --data {data} --model gpt-4o\n",
+            "{}: {}\n\nnext:\n  darkqa-eval check {data}\n  darkqa-eval --data {data} --model gpt-4o --dry-run\n  darkqa-eval --data {data} --model gpt-4o\n",
             args.folder.display(),
-            lines.len()
+            counted(lines.len(), "question")
         ),
     ))
 }

@@ -110,7 +110,7 @@ fn remedy(parts: &[StoredPart], plan: Option<&RunPlan>, shards: &[Shard]) -> Str
     let command = command.unwrap_or_else(|| "the command of the parts with".to_owned());
     match shards {
         [] => format!(
-            "{command} --shard I/N, for all I of one N, asks only what no part beside it has"
+            "{command} --shard I/N, for all I of one N, asks only what no other part in the same folder has"
         ),
         [only] => format!("{command} --shard {only} asks what is left"),
         [first, ..] => {

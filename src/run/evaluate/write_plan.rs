@@ -10,6 +10,7 @@ use crate::job::plan::Plan;
 use crate::job::progress::Progress;
 use crate::job::run_plan::{NewPlan, PlannedFrame, costs, recorded_command};
 use crate::job::{Job, Outcome};
+use crate::report::words::counted;
 use crate::types::manifest::Status;
 
 /// Writes the plan of a run into its folder. Nothing is asked.
@@ -54,9 +55,11 @@ pub(crate) fn plan(mut args: EvaluateArgs, progress: &Progress) -> Result<Outcom
     FolderAccess::new(is_shared).create(&run)?;
     let folder = new.write(&run, &forecast)?;
     let output = format!(
-        "{}: {questions} questions about {count} frames, {} trials\n",
+        "{}: {} about {}, {}\n",
         folder.display(),
-        forecast.trials
+        counted(questions, "question"),
+        counted(count, "frame"),
+        counted(forecast.trials, "trial")
     );
     Ok(Outcome::wrote(folder, Status::Complete, output))
 }

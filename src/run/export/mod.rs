@@ -29,6 +29,7 @@ use crate::job::shard::Shard;
 use crate::job::source::{Source, input_summary, inspect_all, warn_of_inputs};
 use crate::job::timings::Timings;
 use crate::job::workers::pool;
+use crate::report::words::counted;
 use crate::synthesis::{LightArgs, LightSettings};
 use crate::types::manifest::Status;
 use crate::types::{Condition, Decides, FrameId, Question};
@@ -171,10 +172,10 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
         paths.extend(set.finish()?);
     }
     let output = format!(
-        "{} questions about {} images in {} conditions:\n",
-        own_questions.len(),
-        sources.len(),
-        conditions.len()
+        "{} about {} in {}:\n",
+        counted(own_questions.len(), "question"),
+        counted(sources.len(), "image"),
+        counted(conditions.len(), "condition")
     );
     Ok(wrote(output, paths))
 }

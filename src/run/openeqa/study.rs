@@ -17,6 +17,7 @@ use crate::job::timings::Timings;
 use crate::job::workers::pool;
 use crate::job::{Outcome, limit, pipeline};
 use crate::report::study::{StudyImage, StudyQuestion, page};
+use crate::report::words::counted;
 use crate::types::manifest::Status;
 use crate::types::{Condition, Digest};
 
@@ -85,11 +86,13 @@ pub(super) fn pack(
         &path,
         Status::Complete,
         format!(
-            "{}: {} questions about {walks} walks, {written} images, {} conditions; a person sees each walk in one of them, and {} people \
+            "{}: {} about {}, {}, {}; a person sees each walk in one of them, and {} people \
              see it in all\nto mark what they save: openeqa --answers NAME=FILE\n",
             path.display(),
-            asked.len(),
-            conditions.len(),
+            counted(asked.len(), "question"),
+            counted(walks, "walk"),
+            counted(written, "image"),
+            counted(conditions.len(), "condition"),
             conditions.len()
         ),
     ))

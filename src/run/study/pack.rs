@@ -14,6 +14,7 @@ use crate::job::progress::Progress;
 use crate::job::rebuild::{ImageRebuilder, RebuildArgs};
 use crate::job::stored::StoredRun;
 use crate::report::study::{StudyImage, StudyQuestion, page};
+use crate::report::words::counted;
 use crate::types::manifest::Status;
 use crate::types::{
     ChoiceDetail, Condition, Decides, Digest, FrameId, QuestionId, RunQuestion, Trials,
@@ -119,10 +120,11 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
         &path,
         Status::Complete,
         format!(
-            "{}: {} questions, {images} images, {} conditions; with {} people each image is seen by one of them\n",
+            "{}: {}, {}, {}; with {} people each image is seen by one of them\n",
             path.display(),
-            asked.len(),
-            conditions.len(),
+            counted(asked.len(), "question"),
+            counted(images, "image"),
+            counted(conditions.len(), "condition"),
             conditions.len()
         ),
     ))

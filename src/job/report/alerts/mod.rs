@@ -15,11 +15,11 @@ mod words;
 
 use std::collections::BTreeMap;
 
-use self::words::{counted, plural};
 use super::combine::Combined;
 use super::enhancers::of_enhancers;
 use super::join::{Joined, JoinedRun};
 use crate::report::alert::{Alert, AlertKind};
+use crate::report::words::{counted, plural};
 use crate::score::cluster::{ClusterUnit, MIN_SCENES};
 use crate::score::findings::Findings;
 use crate::score::pair_darkness::PairDarkness;

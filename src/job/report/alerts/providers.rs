@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::words::plural;
 use crate::report::alert::{Alert, AlertKind};
+use crate::report::words::plural;
 use crate::types::{Detail, Trials};
 
 /// One alert for each model whose replies name several providers, with the number of replies of each.

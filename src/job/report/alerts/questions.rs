@@ -2,11 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
-use super::words::counted;
 use crate::job::report::combine::Combined;
 use crate::job::report::join::{Joined, JoinedRun};
 use crate::job::report::settings::{is_of_people, listed};
 use crate::report::alert::{Alert, AlertKind};
+use crate::report::words::counted;
 use crate::score::findings::Findings;
 use crate::score::subject::is_control;
 use crate::types::{Detail, QuestionId, RunQuestion, TrialRef};

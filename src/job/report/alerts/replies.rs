@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use super::words::counted;
 use crate::job::report::combine::Combined;
 use crate::job::report::settings::is_of_people;
 use crate::report::alert::{Alert, AlertKind, MAX_UNREAD};
+use crate::report::words::counted;
 use crate::score::health::Health;
 use crate::types::UnreadReason;
 

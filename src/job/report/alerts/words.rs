@@ -16,13 +16,3 @@ pub(super) fn sentence(what: &str, settings: &[Setting], names: &[String]) -> St
         .collect();
     format!("{what}: {}.", settings.join("; "))
 }
-
-/// A number of things: `1 trial`, `2 trials`.
-pub(super) fn counted(number: usize, noun: &str) -> String {
-    plural(number, noun, &format!("{noun}s"))
-}
-
-/// A number of things by its two words: `1 reply`, `2 replies`.
-pub(super) fn plural(number: usize, one: &str, several: &str) -> String {
-    format!("{number} {}", if number == 1 { one } else { several })
-}

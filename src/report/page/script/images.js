@@ -57,7 +57,7 @@ const pictures = (question) => {
   $("i-level-name").textContent = level ? level + " (" + severity(level) + ")" : "";
   $("i-pictures").hidden = !kept;
   const remake = "darkqa-eval show " + data.folders[0] + " " + question.id;
-  $("i-remake").textContent = (kept ? "Small copies. " : "No small copy of this frame is kept. ") + "The images as they were sent, proved by digest: " + remake;
+  $("i-remake").textContent = (kept ? "Small copies. " : "No small copy of this frame is stored. ") + "The images as they were sent, proved by digest: " + remake;
   if (!kept) return;
   const outlines = boxes(question);
   $("i-object").hidden = !outlines.length;
