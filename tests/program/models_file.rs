@@ -183,7 +183,7 @@ fn a_flag_that_a_model_overrides_is_said_once() {
     let bench = bench(1, &(table("m") + &table("n")));
     let stderr = call(&bench, "--max-tokens 13").stderr;
     assert_eq!(
-        stderr.matches("max-tokens of their own").count(),
+        stderr.matches("models with their own max-tokens").count(),
         1,
         "{stderr}"
     );

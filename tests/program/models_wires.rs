@@ -167,7 +167,7 @@ fn a_model_is_above_the_flag_for_probabilities() {
     let run = call(&bench, "--probabilities");
     assert_eq!(run.code, Some(0), "{run:?}");
     assert!(
-        run.stderr.contains("probabilities of their own"),
+        run.stderr.contains("models with their own probabilities"),
         "{}",
         run.stderr
     );

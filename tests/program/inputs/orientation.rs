@@ -99,7 +99,7 @@ fn dark_images_are_those_of_the_copy_that_was_turned_by_hand() {
         "synthesize stated --out dark-stated --levels L0,L3 --profile paper,physical",
     ));
     assert!(again.stderr.contains(said), "{again:?}");
-    assert!(again.stdout.contains("8 kept"), "{again:?}");
+    assert!(again.stdout.contains("8 left as they were"), "{again:?}");
     for condition in ["L0", "L3-ev", "L3-noise", "L3-noise@physical"] {
         let read = |set: &str, end: &str| {
             let path = format!("dark-{set}/a_{condition}.{end}");
