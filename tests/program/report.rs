@@ -282,7 +282,7 @@ fn an_item_is_drawn_as_one_picture() {
     let bench = Bench::new();
     let rooms = "rooms:frames=3,size=96x64";
     bench.complete(&words(&format!(
-        "--model random --levels L0,L4 --limit 3 --llie gray-gain --data {rooms} --out run"
+        "--model random --levels L0,L4 --limit 3 --llie gray-gain --llie lift --data {rooms} --out run"
     )));
     let item = records(&bench.path("run")).remove(0);
     let id = item["question"].as_str().unwrap();
@@ -300,7 +300,7 @@ fn an_item_is_drawn_as_one_picture() {
     // Other rooms are other images.
     let other = draw(&["--data", "rooms:frames=3,size=96x64,seed=8"]);
     assert_eq!(other.code, Some(1), "{other:?}");
-    let changed = "NOT the bytes that were sent: L0, L4-noise, L4-noise+gray-gain;";
+    let changed = "NOT the bytes that were sent: L0, L4-noise, L4-noise+gray-gain, L4-noise+lift;";
     assert!(other.stdout.contains(changed), "{other:?}");
     bench.complete(&words(&format!(
         "--model random --levels L0 --limit 3 --data {rooms} --out light"
@@ -406,7 +406,7 @@ fn people_enter_as_a_model() {
         assert!(read.stderr.contains(text), "{text}: {read:?}");
     });
     let counted =
-        "! 2 of 3 answers of people are not choices of their questions, and count as wrong.";
+        "! 2 of 3 answers of people are not choices of their questions, and count as\n  wrong.";
     assert!(read.stdout.contains(counted), "{read:?}");
     bench.file("answers.jsonl", "{\"question\": 1}\n");
     let broken = bench.call(&args);

@@ -7,15 +7,15 @@ use crate::score::findings::Findings;
 use crate::score::subject::CHANCE;
 use crate::types::{EnhancerName, KindReading};
 
-/// Accuracy over the levels in one variant: each model raw, and each with one enhancer.
+/// Accuracy over the levels in one variant: each model raw, and each with each enhancer.
 #[derive(Debug, Clone)]
 pub(crate) struct StoryCurves {
     /// The last kind that was asked, in its first light reading.
     pub variant: KindReading,
     /// The variant in words.
     pub light: String,
-    /// The first enhancer of the run; `None` if there is none.
-    pub enhancer: Option<EnhancerName>,
+    /// The enhancers of the run.
+    pub enhancers: Vec<EnhancerName>,
     /// Curves, models without images, and chance.
     pub lines: Vec<PlotLine>,
     /// Number of items and kind of intervals.
@@ -26,17 +26,17 @@ pub(crate) struct StoryCurves {
 pub(crate) fn story_curves(findings: &Findings<'_>) -> Option<StoryCurves> {
     let overview = Overview::new(findings, &Names::default());
     let variant = overview.main_variant()?;
-    let enhancer = overview.enhancers.first().copied();
     let mut lines = Vec::new();
     for model in &overview.models {
-        for enhancer in [None, enhancer] {
+        let enhancers = overview.enhancers.iter().copied().map(Some);
+        for enhancer in std::iter::once(None).chain(enhancers) {
             let points = overview.points(model, &variant, enhancer, |subject| {
                 overview.accuracy_of(subject, None)
             });
             let name =
                 enhancer.map_or_else(|| (*model).to_owned(), |name| format!("{model} + {name}"));
-            // One level is not a line, and without an enhancer the second line is the first.
-            if points.len() > 1 && lines.iter().all(|line: &PlotLine| line.name != name) {
+            // One level is not a line.
+            if points.len() > 1 {
                 lines.push(PlotLine {
                     name,
                     style: LineStyle(lines.len()),
@@ -57,7 +57,7 @@ pub(crate) fn story_curves(findings: &Findings<'_>) -> Option<StoryCurves> {
     Some(StoryCurves {
         light: light(&variant, None),
         variant,
-        enhancer: enhancer.cloned(),
+        enhancers: overview.enhancers.iter().copied().cloned().collect(),
         lines,
         note: overview.note(),
     })

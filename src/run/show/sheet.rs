@@ -156,9 +156,8 @@ impl SheetItem {
             .filter_map(|record| record.condition.as_ref())
     }
 
-    /// The rows of the picture: raw, and enhanced if the run has an enhancer.
+    /// The rows of the picture: raw, and with each enhancer with which the item was asked.
     fn rows(&self) -> SheetRows {
-        let enhancer = self.curves.enhancer.as_ref();
         let row = |name: String, enhancer: Option<_>| {
             let levels = self.levels.iter();
             let conditions = levels.map(|level| {
@@ -173,7 +172,12 @@ impl SheetItem {
             (name, conditions.collect())
         };
         let raw = row(self.curves.light.clone(), None);
-        let enhanced = enhancer.map(|name| row(format!("+ {name}"), Some(name)));
+        let enhancers = self.curves.enhancers.iter();
+        let enhanced = enhancers.map(|name| row(format!("+ {name}"), Some(name)));
+        let is_asked = |(_, conditions): &(String, Vec<Option<Condition>>)| {
+            conditions.iter().any(Option::is_some)
+        };
+        let enhanced = enhanced.filter(is_asked);
         std::iter::once(raw).chain(enhanced).collect()
     }
 
