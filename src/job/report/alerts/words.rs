@@ -1,4 +1,4 @@
-//! Words of alerts: [`names`], [`sentence`], [`counted`], [`plural`].
+//! Words of alerts: [`names`] and [`sentence`].
 
 use crate::job::report::join::JoinedRun;
 use crate::job::report::settings::Setting;
