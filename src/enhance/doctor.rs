@@ -109,15 +109,15 @@ impl Enhancer {
         if !found.lines.is_empty() {
             found.lines.extend(self.found_size());
         }
-        let mut columns = columns(&probe, "");
-        let is_stated = |column: &ExaminedConvention| column.title.ends_with(STATED);
-        if let Some(own) = stated.map(|pair| pair.to_string())
-            && let Some(column) = columns.iter_mut().find(|column| column.title == own)
-        {
-            column.title += STATED;
-        }
+        let stated_title = stated.map(|pair| format!("{pair}, as stated"));
+        let mut columns = columns(&probe, |ranges| match &stated_title {
+            Some(title) if stated == Some(ranges) => title.clone(),
+            _ => ranges.to_string(),
+        });
         if let Some(other) = &other {
-            let swapped = self::columns(other, ", red and blue swapped in the output");
+            let swapped = self::columns(other, |ranges| {
+                format!("{ranges}, red and blue swapped in the output")
+            });
             // Nine more pictures of what cannot be would only distract.
             columns.extend(
                 swapped
@@ -134,7 +134,9 @@ impl Enhancer {
         columns.extend(others);
         // If something is plausible, the rest would only distract, except what is stated: that is what a run would use.
         if columns.iter().any(|column| column.problem.is_none()) {
-            columns.retain(|column| column.problem.is_none() || is_stated(column));
+            columns.retain(|column| {
+                column.problem.is_none() || stated_title.as_ref() == Some(&column.title)
+            });
         }
         Ok(Examination {
             settled: found.settled,
@@ -208,9 +210,6 @@ impl Enhancer {
     }
 }
 
-/// What is added to the title of the convention that is stated.
-const STATED: &str = ", as stated";
-
 fn swapped(order: ChannelOrder) -> ChannelOrder {
     match order {
         ChannelOrder::Rgb => ChannelOrder::Bgr,
@@ -218,11 +217,9 @@ fn swapped(order: ChannelOrder) -> ChannelOrder {
     }
 }
 
-fn columns(probe: &Probe, suffix: &str) -> Vec<ExaminedConvention> {
+fn columns(probe: &Probe, title: impl Fn(RangePair) -> String) -> Vec<ExaminedConvention> {
     let pairs = probe.pairs.iter();
-    pairs
-        .map(|pair| column(pair, format!("{}{suffix}", pair.ranges)))
-        .collect()
+    pairs.map(|pair| column(pair, title(pair.ranges))).collect()
 }
 
 fn column(pair: &PairTrial, title: String) -> ExaminedConvention {

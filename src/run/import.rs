@@ -18,6 +18,7 @@ use crate::job::Outcome;
 use crate::job::input_tally::InputTally;
 use crate::job::progress::Progress;
 use crate::job::workers::{ThreadArgs, pool};
+use crate::report::words::counted;
 use crate::types::manifest::Status;
 use crate::types::{Decides, FrameId, InputNote, Rgb};
 
@@ -151,10 +152,6 @@ fn import_frames(
     }
     let lines = written.iter().map(|written| &written.line);
     frame_folder::finish(out, &listing.labels, &info, lines)?;
-    let counted = |number: usize, noun: &str| {
-        let ending = if number == 1 { "" } else { "s" };
-        format!("{number} {noun}{ending}")
-    };
     let mut output = format!(
         "{}: {} of {}{}\n{note}",
         out.display(),

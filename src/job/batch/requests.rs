@@ -11,6 +11,7 @@ use crate::ask::BatchInterface;
 use crate::error::{Error, Result};
 use crate::job::models::ModelUnderTest;
 use crate::job::trial::{Item, PreparedGroup, Stimulus, Trial};
+use crate::report::words::counted;
 use crate::store::BATCH;
 
 /// The share of the tokens that may wait for batches that one part takes, so that one part can wait while another is worked on; chosen.
@@ -169,17 +170,15 @@ pub(crate) fn summary(
     in_batch: usize,
     run: &Path,
 ) -> String {
-    let ending = |count: usize| if count == 1 { "" } else { "s" };
-    let (files, requests) = (written.len(), written.iter().map(|(_, requests)| requests));
-    let requests: usize = requests.sum();
+    let requests: usize = written.iter().map(|(_, requests)| requests).sum();
     let mut text = format!(
-        "{requests} request{} in {files} file{}; {answered} already answered, {in_batch} waiting for an earlier batch\n",
-        ending(requests),
-        ending(files)
+        "{} in {}; {answered} already answered, {in_batch} waiting for an earlier batch\n",
+        counted(requests, "request"),
+        counted(written.len(), "file")
     );
     for (path, requests) in written {
-        let ending = ending(*requests);
-        let _ = writeln!(text, "{} ({requests} request{ending})", path.display());
+        let requests = counted(*requests, "request");
+        let _ = writeln!(text, "{} ({requests})", path.display());
     }
     let _ = writeln!(
         text,

@@ -137,6 +137,11 @@ impl<'a> Overview<'a> {
         points.map(|(_, level, number)| (level, number)).collect()
     }
 
+    /// Raw (`None`), and then each enhancer.
+    fn raw_and_enhanced(&self) -> impl Iterator<Item = Option<&EnhancerName>> {
+        std::iter::once(None).chain(self.enhancers.iter().copied().map(Some))
+    }
+
     /// Whether some untouched frames were enhanced.
     fn has_enhanced_clean(&self) -> bool {
         let mut subjects = self.findings.grid.subjects.iter();
@@ -382,8 +387,8 @@ impl<'a> Overview<'a> {
                         model: Some((*model).to_owned()),
                     })
                 };
-                let all = std::iter::once(None).chain(self.enhancers.iter().copied().map(Some));
-                let lines: Vec<PlotLine> = all.enumerate().filter_map(line).collect();
+                let lines = self.raw_and_enhanced().enumerate().filter_map(line);
+                let lines: Vec<PlotLine> = lines.collect();
                 if lines.len() > 1 {
                     let (name, light) = (self.names.of(model), self.light(&variant, None));
                     let title = format!("{name}, {light}, n {}", self.n(None));

@@ -119,7 +119,6 @@ impl Overview<'_> {
 
     /// The mean over the models, raw and with each enhancer; `None` without an enhancer that has a line.
     fn mean_by_enhancer(&self, variant: &KindReading, models: &[&str]) -> Option<(String, Chart)> {
-        let all = std::iter::once(None).chain(self.enhancers.iter().copied().map(Some));
         let line = |(index, enhancer): (usize, Option<&EnhancerName>)| {
             let curves = models.iter().map(|model| {
                 self.points(model, variant, enhancer, |subject| {
@@ -135,7 +134,8 @@ impl Overview<'_> {
                 model: None,
             })
         };
-        let mut lines: Vec<PlotLine> = all.enumerate().filter_map(line).collect();
+        let lines = self.raw_and_enhanced().enumerate().filter_map(line);
+        let mut lines: Vec<PlotLine> = lines.collect();
         if lines.len() < 2 {
             return None;
         }

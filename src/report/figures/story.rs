@@ -28,8 +28,7 @@ pub(crate) fn story_curves(findings: &Findings<'_>) -> Option<StoryCurves> {
     let variant = overview.main_variant()?;
     let mut lines = Vec::new();
     for model in &overview.models {
-        let enhancers = overview.enhancers.iter().copied().map(Some);
-        for enhancer in std::iter::once(None).chain(enhancers) {
+        for enhancer in overview.raw_and_enhanced() {
             let points = overview.points(model, &variant, enhancer, |subject| {
                 overview.accuracy_of(subject, None)
             });

@@ -25,6 +25,7 @@ use crate::job::recipe::Recipe;
 use crate::job::source::Frames;
 use crate::job::timings::Timings;
 use crate::job::workers::{ThreadArgs, pool};
+use crate::report::words::counted;
 use crate::synthesis::{LightArgs, LightSettings, NoiseKey};
 use crate::types::manifest::Status;
 use crate::types::{Condition, Decides, Degradation, FrameId, SetLight};
@@ -164,9 +165,9 @@ impl ImageCounts {
                 Status::Incomplete
             },
             format!(
-                "{}: {written} made of {frames} frame{}{unchanged}{failures}\n",
+                "{}: {written} made of {}{unchanged}{failures}\n",
                 out.display(),
-                if frames == 1 { "" } else { "s" }
+                counted(frames, "frame")
             ),
         )
     }
