@@ -62,6 +62,8 @@ pub mod score {
     pub use crate::score::paired::{PairedComparison, difference};
     pub use crate::score::pooled::{PooledFinding, pooled};
     pub use crate::score::pooled_kind::PooledKind;
+    pub use crate::score::realism::psnr;
+    pub use crate::score::realism::ssim::ssim;
     pub use crate::score::significance::Significance;
     pub use crate::score::subject::Subject;
     pub use crate::score::threshold::{LevelCounts, NoThreshold};

@@ -9,8 +9,9 @@ use rayon::prelude::*;
 use super::clean::Clean;
 use super::codes::{encode, shown_light};
 use super::curve;
-use super::lanes::{Isa, Kernel, LANES, Lanes};
+use super::lanes::{LANES, Lanes};
 use super::streak::{Streak, Tap};
+use crate::types::isa::{Isa, Kernel};
 use crate::types::{Light, Rgb};
 
 /// Version of motion blur, raised whenever a pixel changes.

@@ -6,12 +6,12 @@ use super::bayer::Bayer;
 use super::camera::CameraState;
 use super::clean::Clean;
 use super::isp::Developer;
-use super::lanes::Isa;
 use super::negative::Negative;
 use super::noise::{Noise, Term};
 use super::random::NoiseKey;
 use super::reading::{Amplify, Tone};
 use super::unprocess::unprocess_up_to;
+use crate::types::isa::Isa;
 
 /// Noise-free RAW image of a frame, by one camera.
 ///

@@ -3,7 +3,7 @@
 use std::sync::LazyLock;
 
 use super::curve;
-use super::lanes::{Isa, Kernel};
+use crate::types::isa::{Isa, Kernel};
 
 /// Light of each 8-bit code, as a display shows it (DarkQA, eq. 1).
 static SHOWN: LazyLock<[f32; 256]> =

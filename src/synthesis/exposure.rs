@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::clean::Clean;
 use super::curve;
-use super::lanes::{Isa, Kernel};
+use crate::types::isa::{Isa, Kernel};
 use crate::types::{Codes16, Light, Rgb, Severity};
 
 /// Version of the exposure branch, raised whenever a pixel changes.

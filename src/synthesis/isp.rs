@@ -9,9 +9,10 @@ use std::sync::LazyLock;
 use super::bayer::{self, Bayer, Plane, RawRow, Sites};
 use super::camera::CameraState;
 use super::curve;
-use super::lanes::{Isa, Kernel, LANES, Lanes};
+use super::lanes::{LANES, Lanes};
 use super::piecewise::Piecewise;
 use super::reading::Tone;
+use crate::types::isa::{Isa, Kernel};
 
 /// Gamma compression of light from 2⁻³¹ up; light below 10⁻⁸ is treated as 10⁻⁸.
 static GAMMA: LazyLock<Piecewise> = LazyLock::new(|| Piecewise::new(-31, curve::gamma_compress));

@@ -6,11 +6,11 @@ use super::bayer::Bayer;
 use super::camera::CameraState;
 use super::clean::Clean;
 use super::isp::Developer;
-use super::lanes::Isa;
 use super::noise::{Noise, Term};
 use super::random::NoiseKey;
 use super::reading::{Amplify, Coupling, Draws, Synthesis, Tone};
 use super::unprocess::Unprocess;
+use crate::types::isa::Isa;
 use crate::types::{Rgb, Severity};
 
 /// Rows of a band, which is processed from RAW to codes within a core's cache; chosen.

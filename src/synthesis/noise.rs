@@ -10,11 +10,12 @@ use rayon::prelude::*;
 
 use super::bayer::{Bayer, Plane, RawRow};
 use super::camera::CameraState;
-use super::lanes::{Isa, Kernel, LANES, Lanes};
+use super::lanes::{LANES, Lanes};
 use super::poisson;
 use super::quantile::Quantile;
 use super::random::{Component, NoiseKey, Site, Stream};
 use super::reading::Amplify;
+use crate::types::isa::{Isa, Kernel};
 
 /// One term of the noise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

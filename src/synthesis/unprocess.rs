@@ -8,8 +8,9 @@ use super::bayer::{Bayer, Plane, RawRow};
 use super::camera::CameraState;
 use super::clean::Clean;
 use super::curve;
-use super::lanes::{Isa, Kernel, LANES, Lanes};
+use super::lanes::{LANES, Lanes};
 use super::piecewise::Piecewise;
+use crate::types::isa::{Isa, Kernel};
 
 /// The noise-free RAW image from which a camera in this state would make `clean`.
 ///

@@ -1,4 +1,5 @@
-//! The types that all rooms share, without input or output. The only arithmetic on pixels is how more than 8 bits are shown.
+//! The types that all rooms share, without input or output. The only arithmetic on pixels is how more than 8 bits are shown;
+//! [`isa`] names the instruction sets that loops over pixels are compiled for.
 
 pub(crate) mod axis_level;
 mod canonical;
@@ -18,6 +19,7 @@ pub(crate) mod frame;
 pub(crate) mod image_mark;
 pub(crate) mod image_notes;
 mod input_note;
+pub(crate) mod isa;
 pub(crate) mod key_values;
 pub(crate) mod kind_set;
 pub(crate) mod labels;

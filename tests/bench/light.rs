@@ -1,5 +1,5 @@
 //! What an image costs: one 2560×1440 frame through the ladder of both branches and through each part of it, a 1000×1000 frame
-//! blurred by the motion of its camera, and a 1280×720 frame from pixels to request.
+//! blurred by the motion of its camera, a 1280×720 frame from pixels to request, and a dark image compared with its clean frame.
 //!
 //! `cargo bench --bench light` runs it; `RAYON_NUM_THREADS=1 cargo bench --bench light` on one core.
 
@@ -8,6 +8,7 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use darkqa_eval::internals::ask::{Payload, PayloadFormat};
 use darkqa_eval::internals::job::bilinear;
+use darkqa_eval::internals::score::{psnr, ssim};
 use darkqa_eval::internals::synthesis::{
     Negative, Term, add_noise, blur, blurred_codes, expose, expose_into, ladder as develop_ladder,
     unprocess,
@@ -206,5 +207,16 @@ fn walk(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, ladder, parts, motion, request, walk);
+/// The fidelity of an image.
+fn fidelity(c: &mut Criterion) {
+    let clean = frame(1440, 2560);
+    let dark = expose(&clean, Severity::L3);
+    let mut group = c.benchmark_group("fidelity, 2560x1440");
+    group.sample_size(10);
+    group.bench_function("PSNR", |b| b.iter(|| psnr(black_box(&dark), &clean)));
+    group.bench_function("SSIM", |b| b.iter(|| ssim(black_box(&dark), &clean)));
+    group.finish();
+}
+
+criterion_group!(benches, ladder, parts, motion, request, walk, fidelity);
 criterion_main!(benches);

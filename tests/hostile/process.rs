@@ -9,6 +9,10 @@ use std::time::{Duration, Instant};
 /// The most bytes of a stream that are looked at.
 const MOST_BYTES: usize = 16 << 20;
 
+/// The time that counts between two looks at a process at most. A longer one means that the machine stood still, and the process
+/// with it.
+const LONGEST_LOOK: Duration = Duration::from_secs(1);
+
 /// The program in a folder, with the few variables that it needs.
 pub(crate) fn program(work: &Path) -> Command {
     let mut command = Command::new(assert_cmd::cargo::cargo_bin("darkqa-eval"));
@@ -47,7 +51,6 @@ pub(crate) struct Finished {
 pub(crate) struct Running<'a> {
     child: Child,
     folder: &'a Path,
-    start: Instant,
 }
 
 impl<'a> Running<'a> {
@@ -58,7 +61,6 @@ impl<'a> Running<'a> {
         Self {
             child: command.spawn().unwrap(),
             folder,
-            start: Instant::now(),
         }
     }
 
@@ -78,11 +80,13 @@ impl<'a> Running<'a> {
     pub(crate) fn end(self, limit: Duration, patience: Option<Duration>) -> Finished {
         let id = self.child.id() as libc::pid_t;
         let (mut is_late, mut is_asked) = (false, patience.is_none());
+        let (mut took, mut look) = (Duration::ZERO, Instant::now());
         let (status, usage) = loop {
+            took += look.elapsed().min(LONGEST_LOOK);
+            look = Instant::now();
             if let Some(ended) = ended(id) {
                 break ended;
             }
-            let took = self.start.elapsed();
             if !is_asked && Some(took) > patience {
                 is_asked = true;
                 crate::support::process::signal(&self.child, "-TERM");
@@ -105,7 +109,7 @@ impl<'a> Running<'a> {
         Finished {
             code: libc::WIFEXITED(status).then(|| libc::WEXITSTATUS(status)),
             signal: libc::WIFSIGNALED(status).then(|| libc::WTERMSIG(status)),
-            took: self.start.elapsed(),
+            took,
             is_late,
             memory: usage.ru_maxrss as u64 * 1024,
             stdout: stream("stdout"),

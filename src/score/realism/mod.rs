@@ -122,13 +122,18 @@ impl fmt::Display for NoiseMethod {
 ///
 /// # Errors
 /// If the sizes differ.
-pub(crate) fn psnr(a: &Rgb, b: &Rgb) -> Result<f64> {
+pub fn psnr(a: &Rgb, b: &Rgb) -> Result<f64> {
     same_size(a, b)?;
-    let squares = a.samples().iter().zip(b.samples()).map(|(a, b)| {
-        let difference = u64::from(a.abs_diff(*b));
-        difference * difference
+    // 2¹⁶ squares of 255 and more fit a `u32`, which takes a third of the time of a `u64`.
+    let pieces = a.samples().chunks(1 << 16).zip(b.samples().chunks(1 << 16));
+    let sums = pieces.map(|(a, b)| {
+        let squares = a
+            .iter()
+            .zip(b)
+            .map(|(a, b)| u32::from(a.abs_diff(*b)).pow(2));
+        u64::from(squares.sum::<u32>())
     });
-    let mean = squares.sum::<u64>() as f64 / a.samples().len() as f64;
+    let mean = sums.sum::<u64>() as f64 / a.samples().len() as f64;
     Ok(10.0 * libm::log10(255.0 * 255.0 / mean))
 }
 

@@ -4,19 +4,29 @@ use rayon::prelude::*;
 
 use crate::error::{Error, Result};
 use crate::types::Rgb;
+use crate::types::isa::{Isa, Kernel};
 
 /// Half-width of the window in pixels: 3.5 deviations of 1.5 pixels, rounded down.
 const RADIUS: usize = 5;
 const TAPS: usize = 2 * RADIUS + 1;
 
+/// Weights of a window along one side.
+type Window = [f32; TAPS];
+
 /// Number of local means: of x, y, x² + y² and xy.
 const MOMENTS: usize = 4;
 
-/// Number of samples that are computed together; a multiple of the width of common vector registers.
-const LANES: usize = 8;
+/// Samples of a row that are computed together; a power of two, so that the last rows of all moments stay in the nearest cache.
+const TILE: usize = 128;
+
+/// Samples of the three channels that the windows of a tile cover.
+const COVERED: usize = TILE + 3 * (TAPS - 1);
+
+/// Rows of windows that are computed one after the other.
+const BAND: usize = 64;
 
 /// Code that is subtracted from every sample, so that its square keeps more digits in `f32`.
-const MIDDLE: f32 = 128.0;
+const MIDDLE: u8 = 128;
 
 /// Checks that two images have the same size; the error names both sizes.
 pub(crate) fn same_size(a: &Rgb, b: &Rgb) -> Result<()> {
@@ -40,7 +50,7 @@ pub(crate) fn same_size(a: &Rgb, b: &Rgb) -> Result<()> {
 ///
 /// # Errors
 /// If the sizes differ, or if a side is shorter than the window.
-pub(crate) fn ssim(a: &Rgb, b: &Rgb) -> Result<f64> {
+pub fn ssim(a: &Rgb, b: &Rgb) -> Result<f64> {
     same_size(a, b)?;
     let (height, width) = (a.height(), a.width());
     if height < TAPS || width < TAPS {
@@ -48,15 +58,27 @@ pub(crate) fn ssim(a: &Rgb, b: &Rgb) -> Result<f64> {
             format_args!("{width} × {height} pixels are fewer than the window's {TAPS} × {TAPS}");
         return Err(Error::data("pair", problem));
     }
-    let window = window();
-    let rows = (0..height - TAPS + 1).into_par_iter();
-    // The rows are collected before they are summed, so that the result does not depend on the threads.
-    let sums: Vec<f64> = rows.map(|row| row_sum(a, b, row, &window)).collect();
-    let n = 3 * (height - TAPS + 1) * (width - TAPS + 1);
-    Ok(sums.iter().sum::<f64>() / n as f64)
+    Ok(mean(a, b, Isa::best()))
 }
 
-fn window() -> [f32; TAPS] {
+/// The mean over all windows. The sums of the rows are added in their order, so that the result does not depend on the threads.
+fn mean(a: &Rgb, b: &Rgb, isa: Isa) -> f64 {
+    let [height, width] = [a.height(), a.width()].map(|side| side - (TAPS - 1));
+    let window = window();
+    let mut sums = vec![0.0; height];
+    let bands = sums.par_chunks_mut(BAND).enumerate();
+    bands.for_each(|(band, sums)| {
+        isa.run(Band {
+            images: [a, b],
+            first: band * BAND,
+            window: &window,
+            sums,
+        });
+    });
+    sums.iter().sum::<f64>() / (3 * height * width) as f64
+}
+
+fn window() -> Window {
     let weights: [f64; TAPS] = std::array::from_fn(|tap| {
         let distance = tap as f64 - RADIUS as f64;
         libm::exp(-0.5 * distance * distance / (1.5 * 1.5))
@@ -65,76 +87,109 @@ fn window() -> [f32; TAPS] {
     weights.map(|weight| (weight / sum) as f32)
 }
 
-/// The sum over the windows whose first row is `row`.
-fn row_sum(a: &Rgb, b: &Rgb, row: usize, window: &[f32; TAPS]) -> f64 {
-    let stride = 3 * a.width();
-    let columns = column_means(a, b, row, window);
-    let windows = stride - 3 * (TAPS - 1);
-    let mut total = 0.0;
-    for begin in (0..windows).step_by(LANES) {
-        let [x, y, squares, product] = std::array::from_fn(|moment| {
-            let mut means = [0.0; LANES];
-            for (tap, weight) in window.iter().enumerate() {
-                let columns = &columns[moment][begin + 3 * tap..][..LANES];
-                for (mean, column) in means.iter_mut().zip(columns) {
-                    *mean += weight * column;
+/// Adjacent rows of windows.
+struct Band<'a> {
+    images: [&'a Rgb; 2],
+    /// Row of the first windows.
+    first: usize,
+    window: &'a Window,
+    /// The sum over each row of windows.
+    sums: &'a mut [f64],
+}
+
+impl Kernel for Band<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let stride = 3 * self.images[0].width();
+        let windows = stride - 3 * (TAPS - 1);
+        // The means over each of the last rows, by its number modulo the taps.
+        let mut rows = [[[0.0; TILE]; MOMENTS]; TAPS];
+        for begin in (0..windows).step_by(TILE) {
+            let tile = begin..windows.min(begin + TILE);
+            for line in 0..self.sums.len() + TAPS - 1 {
+                let at = (self.first + line) * stride;
+                let covered = at + tile.start..at + tile.end + 3 * (TAPS - 1);
+                let samples = self.images.map(|image| &image.samples()[covered.clone()]);
+                let moments = moments(samples);
+                for (row, moment) in rows[line % TAPS].iter_mut().zip(&moments) {
+                    *row = along_row(self.window, moment);
+                }
+                if let Some(first) = (line + 1).checked_sub(TAPS) {
+                    let [x, y, squares, product] = std::array::from_fn(|moment| {
+                        let rows = std::array::from_fn(|tap| &rows[(first + tap) % TAPS][moment]);
+                        over_rows(self.window, rows)
+                    });
+                    let similarities: [f32; TILE] =
+                        std::array::from_fn(|i| similarity(x[i], y[i], squares[i], product[i]));
+                    self.sums[first] += sum(&similarities[..tile.len()]);
                 }
             }
-            means
-        });
-        let lanes = (windows - begin).min(LANES);
-        let similarities: [f32; LANES] =
-            std::array::from_fn(|lane| similarity(x[lane], y[lane], squares[lane], product[lane]));
-        total += similarities[..lanes]
-            .iter()
-            .copied()
-            .map(f64::from)
-            .sum::<f64>();
-    }
-    total
-}
-
-/// Weighted means over the columns of the windows whose first row is `row`, by moment; padded, so that all lanes can be read.
-fn column_means(a: &Rgb, b: &Rgb, row: usize, window: &[f32; TAPS]) -> [Vec<f32>; MOMENTS] {
-    let stride = 3 * a.width();
-    let mut columns = [(); MOMENTS].map(|()| vec![0.0; stride + 2 * LANES]);
-    for begin in (0..stride).step_by(LANES) {
-        let mut means = [[0.0; LANES]; MOMENTS];
-        for (tap, weight) in window.iter().enumerate() {
-            let line = (row + tap) * stride;
-            let samples = |image: &Rgb| centered(&image.samples()[line + begin..line + stride]);
-            let (x, y) = (samples(a), samples(b));
-            for lane in 0..LANES {
-                let (x, y) = (x[lane], y[lane]);
-                means[0][lane] += weight * x;
-                means[1][lane] += weight * y;
-                means[2][lane] += weight * (x * x + y * y);
-                means[3][lane] += weight * (x * y);
-            }
-        }
-        for (columns, means) in columns.iter_mut().zip(&means) {
-            columns[begin..begin + LANES].copy_from_slice(means);
         }
     }
-    columns
 }
 
-/// The first samples less the middle code; 0 beyond the end of the line.
-fn centered(line: &[u8]) -> [f32; LANES] {
-    let codes = line.first_chunk::<LANES>().copied().unwrap_or_else(|| {
-        let mut codes = [MIDDLE as u8; LANES];
-        codes[..line.len()].copy_from_slice(line);
+/// x, y, x² + y² and xy of centered samples; 0 beyond the end of the line.
+#[inline(always)]
+fn moments(samples: [&[u8]; 2]) -> [[f32; COVERED]; MOMENTS] {
+    let [x, y] = samples.map(|samples| {
+        let mut codes = [MIDDLE; COVERED];
+        codes[..samples.len()].copy_from_slice(samples);
         codes
     });
-    codes.map(|code| f32::from(code) - MIDDLE)
+    let mut moments = [[0.0; COVERED]; MOMENTS];
+    for i in 0..COVERED {
+        let [x, y] = [x[i], y[i]].map(|code| f32::from(code) - f32::from(MIDDLE));
+        moments[0][i] = x;
+        moments[1][i] = y;
+        moments[2][i] = x * x + y * y;
+        moments[3][i] = x * y;
+    }
+    moments
+}
+
+/// The weighted mean of a row's samples in each window. The window is symmetric: two samples share a product.
+#[inline(always)]
+fn along_row(window: &Window, samples: &[f32; COVERED]) -> [f32; TILE] {
+    std::array::from_fn(|i| {
+        let mut mean = window[RADIUS] * samples[i + 3 * RADIUS];
+        for tap in 0..RADIUS {
+            mean += window[tap] * (samples[i + 3 * tap] + samples[i + 3 * (TAPS - 1 - tap)]);
+        }
+        mean
+    })
+}
+
+/// The weighted mean over the rows of each window.
+#[inline(always)]
+fn over_rows(window: &Window, rows: [&[f32; TILE]; TAPS]) -> [f32; TILE] {
+    std::array::from_fn(|i| {
+        let mut mean = window[RADIUS] * rows[RADIUS][i];
+        for tap in 0..RADIUS {
+            mean += window[tap] * (rows[tap][i] + rows[TAPS - 1 - tap][i]);
+        }
+        mean
+    })
+}
+
+/// The sum in `f64`, in an order that vector instructions can keep.
+#[inline(always)]
+fn sum(numbers: &[f32]) -> f64 {
+    let mut sums = [0.0; 8];
+    for numbers in numbers.chunks(sums.len()) {
+        for (sum, number) in sums.iter_mut().zip(numbers) {
+            *sum += f64::from(*number);
+        }
+    }
+    sums.iter().sum()
 }
 
 /// Similarity of a window, from the means of x, y, x² + y² and xy of centered samples.
+#[inline(always)]
 fn similarity(x: f32, y: f32, squares: f32, product: f32) -> f32 {
     const C1: f32 = (0.01 * 255.0) * (0.01 * 255.0);
     const C2: f32 = (0.03 * 255.0) * (0.03 * 255.0);
     let (variances, covariance) = (squares - x * x - y * y, product - x * y);
-    let (x, y) = (x + MIDDLE, y + MIDDLE);
+    let [x, y] = [x, y].map(|mean| mean + f32::from(MIDDLE));
     (2.0 * x * y + C1) * (2.0 * covariance + C2) / ((x * x + y * y + C1) * (variances + C2))
 }
 
@@ -148,10 +203,12 @@ mod tests {
         Rgb::new(height, width, (0..height * width * 3).map(sample).collect()).unwrap()
     }
 
-    const SKIMAGE: [(usize, usize, usize, f64); 3] = [
+    const SKIMAGE: [(usize, usize, usize, f64); 4] = [
         (11, 11, 2, 0.046_313_122_302_007_72),
         (24, 40, 3, 0.008_024_444_085_244_848),
         (37, 50, 5, 0.011_143_454_653_654_81),
+        // More rows than a band and more samples than a tile, and a part of each at the end.
+        (150, 101, 5, 0.019_581_441_542_294_38),
     ];
 
     #[test]
@@ -163,6 +220,26 @@ mod tests {
                 "{height} × {width}: {found}"
             );
         }
+    }
+
+    #[test]
+    fn an_image_is_most_similar_to_itself() {
+        let [clean, other] = [1, 5].map(|salt| image(150, 101, salt));
+        assert!((ssim(&clean, &clean).unwrap() - 1.0).abs() < 1e-6);
+        assert!(ssim(&clean, &other).unwrap() < 0.1);
+    }
+
+    #[test]
+    fn every_instruction_set_gives_the_same_bits() {
+        let images = [1, 5].map(|salt| image(150, 101, salt));
+        let [first, rest @ ..] = &Isa::available()
+            .into_iter()
+            .map(|isa| mean(&images[0], &images[1], isa).to_bits())
+            .collect::<Vec<_>>()[..]
+        else {
+            unreachable!("every machine has the baseline");
+        };
+        assert!(rest.iter().all(|bits| bits == first));
     }
 
     #[test]
