@@ -20,11 +20,12 @@ use clap::{Arg, ArgAction, ArgMatches, Command};
 use toml::{Table, Value};
 
 use self::layered_value::LayeredValue;
-use self::messages::{invalid_toml, suggestion};
+use self::messages::invalid_toml;
 use self::value_text::text_of;
 use crate::ask::OPENAI_KEY;
 use crate::error::{Error, Result};
 use crate::files::reading;
+use crate::types::near_name::{nearest, suggestion};
 
 /// Prefix of this program's environment variables.
 const PREFIX: &str = "DARKQA_";
@@ -187,7 +188,7 @@ fn environment_values(
     known.push(variable_name(CONFIG));
     for name in ours {
         if !known.contains(&name) {
-            let problem = format_args!("no flag of this name{}", suggestion(&name, &known, ""));
+            let problem = format_args!("no flag of this name{}", suggestion(&name, &known));
             return Err(Error::usage(name.clone(), problem));
         }
     }
@@ -255,10 +256,9 @@ fn read_table(
             return Err(Error::usage(origin, problem));
         }
         if !flags.contains(&flag) {
-            let problem = format_args!(
-                "there is no flag --{flag} here{}",
-                suggestion(&flag, flags, "--")
-            );
+            let near = nearest(&flag, flags).map(|near| format!("; did you mean --{near}?"));
+            let near = near.unwrap_or_default();
+            let problem = format_args!("there is no flag --{flag} here{near}");
             return Err(Error::usage(origin, problem));
         }
         let values = match value {
@@ -281,8 +281,7 @@ fn read_table(
                 .map(|c| c.get_name().to_owned())
                 .collect();
             let origin = format!("{}, [{name}]", path.display());
-            let problem =
-                format_args!("there is no command {name}{}", suggestion(name, &names, ""));
+            let problem = format_args!("there is no command {name}{}", suggestion(name, &names));
             return Err(Error::usage(origin, problem));
         };
         let within = [within, &[name]].concat();

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::error::{Error, Result};
+use crate::types::near_name::nearest;
 
 /// A model inside the program. `models/README.md` tells what each one does.
 pub(super) struct BuiltIn {
@@ -44,9 +45,7 @@ impl BuiltIn {
         let found = ALL.iter().find(|enhancer| enhancer.name == text);
         found.map(Some).ok_or_else(|| {
             let names = ALL.map(|enhancer| enhancer.name);
-            let near = names.into_iter().find(|name| {
-                strsim::damerau_levenshtein(name, &text.to_lowercase()) <= 2
-            });
+            let near = nearest(text, &names);
             let near = near.map_or_else(String::new, |name| format!("did you mean {name}? "));
             let names = names.join(", ");
             let problem = format_args!(

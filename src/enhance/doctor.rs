@@ -109,35 +109,10 @@ impl Enhancer {
         if !found.lines.is_empty() {
             found.lines.extend(self.found_size());
         }
-        let stated_title = stated.map(|pair| format!("{pair}, as stated"));
-        let mut columns = columns(&probe, |ranges| match &stated_title {
-            Some(title) if stated == Some(ranges) => title.clone(),
-            _ => ranges.to_string(),
-        });
-        if let Some(other) = &other {
-            let swapped = self::columns(other, |ranges| {
-                format!("{ranges}, red and blue swapped in the output")
-            });
-            // Nine more pictures of what cannot be would only distract.
-            columns.extend(
-                swapped
-                    .into_iter()
-                    .filter(|column| column.problem.is_none()),
-            );
+        if image == ImageOutput::Known {
+            found.mention(&others);
         }
-        for output in others.iter().filter(|output| output.problem.is_none()) {
-            if image == ImageOutput::Known {
-                let also = " gives plausible images, too, so check which output its authors use.";
-                found.conclusion += &[" The ", &*output.title, also].concat();
-            }
-        }
-        columns.extend(others);
-        // If something is plausible, the rest would only distract, except what is stated: that is what a run would use.
-        if columns.iter().any(|column| column.problem.is_none()) {
-            columns.retain(|column| {
-                column.problem.is_none() || stated_title.as_ref() == Some(&column.title)
-            });
-        }
+        let columns = shown(&probe, stated, other.as_ref(), others);
         Ok(Examination {
             settled: found.settled,
             frames,
@@ -217,6 +192,37 @@ fn swapped(order: ChannelOrder) -> ChannelOrder {
     }
 }
 
+/// The conventions that are drawn: the plausible ones, and the stated one, which a run would use. All without a plausible one.
+fn shown(
+    probe: &Probe,
+    stated: Option<RangePair>,
+    swapped: Option<&Probe>,
+    others: Vec<ExaminedConvention>,
+) -> Vec<ExaminedConvention> {
+    let stated_title = stated.map(|pair| format!("{pair}, as stated"));
+    let mut shown = columns(probe, |ranges| match &stated_title {
+        Some(title) if stated == Some(ranges) => title.clone(),
+        _ => ranges.to_string(),
+    });
+    if let Some(swapped) = swapped {
+        let swapped = columns(swapped, |ranges| {
+            format!("{ranges}, red and blue swapped in the output")
+        });
+        // Nine more pictures of what cannot be would only distract.
+        let plausible = swapped
+            .into_iter()
+            .filter(|column| column.problem.is_none());
+        shown.extend(plausible);
+    }
+    shown.extend(others);
+    if shown.iter().any(|column| column.problem.is_none()) {
+        shown.retain(|column| {
+            column.problem.is_none() || stated_title.as_ref() == Some(&column.title)
+        });
+    }
+    shown
+}
+
 fn columns(probe: &Probe, title: impl Fn(RangePair) -> String) -> Vec<ExaminedConvention> {
     let pairs = probe.pairs.iter();
     pairs.map(|pair| column(pair, title(pair.ranges))).collect()
@@ -279,6 +285,14 @@ impl Found {
                 plausible.join("; ")
             }
         ))
+    }
+
+    /// Names the other outputs whose images could be enhanced ones.
+    fn mention(&mut self, others: &[ExaminedConvention]) {
+        for output in others.iter().filter(|output| output.problem.is_none()) {
+            let also = " gives plausible images, too, so check which output its authors use.";
+            self.conclusion += &[" The ", &*output.title, also].concat();
+        }
     }
 
     fn ranges(pair: RangePair, conclusion: String) -> Self {

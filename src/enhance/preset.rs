@@ -11,6 +11,7 @@ use super::extra::{ExtraValue, Number};
 use super::port::{Port, list};
 use super::sidecar::{ModelSidecar, OutputChoice};
 use crate::error::{Error, Result};
+use crate::types::near_name::suggestion;
 
 /// TOML file of all presets.
 const PRESETS: &str = include_str!("presets.toml");
@@ -152,20 +153,10 @@ impl Preset {
         let known = name.replace("-pp", "++");
         let Some(content) = all.remove(&known) else {
             let names: Vec<String> = all.into_keys().collect();
-            let letters = |name: &str| name.to_lowercase().replace(['-', '_', '+'], "");
-            let typed = letters(&known);
-            let is_near = |preset: &&String| {
-                letters(preset).starts_with(&typed)
-                    || strsim::damerau_levenshtein(&letters(preset), &typed) <= 2
-            };
-            let near: Vec<&str> = names.iter().filter(is_near).map(|name| &**name).collect();
-            let near = match &near[..] {
-                [] => ".".to_owned(),
-                near => format!("; did you mean {}?", near.join(" or ")),
-            };
+            let near = suggestion(&known, &names);
             let names = names.join(", ");
             let problem = format_args!(
-                "{name:?} before the colon is not a preset{near} The presets are {names}"
+                "{name:?} before the colon is not a preset; the presets are {names}{near}"
             );
             return Err(Error::usage("--llie", problem));
         };

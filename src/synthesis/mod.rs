@@ -16,11 +16,11 @@
 //! The result depends only on the arguments and on [`VERSION`], not on threads, order or machine. Random numbers are
 //! addressed by where they are used (see [`random`]). Powers and logarithms come from `libm` and are tabulated (see
 //! [`piecewise`]). All else is IEEE sums, products, quotients and square roots in a fixed order. The camera's state is
-//! computed in double precision, samples in single precision, many at once (see [`lanes`]).
+//! computed in double precision, samples in single precision, many at once (see [`lanes`] and [`isa`](crate::types::isa)).
 
 #![expect(
     clippy::inline_always,
-    reason = "only inlined code is compiled for a kernel's instruction set, see lanes"
+    reason = "only inlined code is compiled for a kernel's instruction set, see isa"
 )]
 
 mod applied;

@@ -4,6 +4,8 @@
 
 use std::ops::RangeInclusive;
 
+use super::near_name::suggestion;
+
 /// The settings in a text, each with its value. A setting that is not named keeps its default.
 ///
 /// # Errors
@@ -31,13 +33,10 @@ pub(crate) fn pairs<'a>(
 }
 
 fn unknown(name: &str, keys: &[&str]) -> String {
-    let alike = |key: &&&str| strsim::damerau_levenshtein(name, key);
-    let near = keys.iter().min_by_key(alike);
-    let near = near.filter(|key| alike(key) <= 3 && alike(key) < name.len());
-    let near = near.map_or_else(String::new, |key| format!("; did you mean {key}?"));
     format!(
-        "there is no setting {name:?}; the settings are {}{near}",
-        keys.join(", ")
+        "there is no setting {name:?}; the settings are {}{}",
+        keys.join(", "),
+        suggestion(name, keys)
     )
 }
 

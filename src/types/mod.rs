@@ -28,6 +28,7 @@ pub(crate) mod light_group;
 pub(crate) mod manifest;
 pub(crate) mod model_listing;
 pub(crate) mod model_views;
+pub(crate) mod near_name;
 pub(crate) mod observed;
 pub(crate) mod option_probabilities;
 pub(crate) mod outlines;

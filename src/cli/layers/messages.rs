@@ -1,18 +1,8 @@
-//! Parts of messages about variables and files of flags: [`suggestion`], [`invalid_toml`].
+//! Messages about files of flags: [`invalid_toml`].
 
 use std::path::Path;
 
 use crate::error::Error;
-
-/// The most similar of the known names, as a question; empty if none is similar.
-pub(super) fn suggestion(name: &str, known: &[String], prefix: &str) -> String {
-    let alike = |other: &&String| strsim::jaro_winkler(name, other);
-    let nearest = known.iter().max_by(|a, b| alike(a).total_cmp(&alike(b)));
-    let nearest = nearest.filter(|other| alike(other) > 0.8);
-    nearest.map_or_else(String::new, |other| {
-        format!("; did you mean {prefix}{other}?")
-    })
-}
 
 /// The error about invalid TOML, on one line and with its line number.
 pub(super) fn invalid_toml(path: &Path, text: &str, error: &toml::de::Error) -> Error {

@@ -12,6 +12,7 @@ use super::name::ModelName;
 use crate::ask::Price;
 use crate::error::{Error, Result};
 use crate::types::View;
+use crate::types::near_name::suggestion;
 
 /// Keys of a model that are no flags, or have another form than the flag.
 const OWN: [&str; 10] = [
@@ -176,13 +177,10 @@ pub(super) fn check_keys(keys: &Keys, is_defaults: bool) -> Result<()> {
         }
         if !known.contains(key) {
             let other = ELSEWHERE.iter().find(|(other, _)| other == key);
-            let alike = |known: &&String| strsim::jaro_winkler(key, known);
-            let nearest = known.iter().max_by(|a, b| alike(a).total_cmp(&alike(b)));
-            let nearest = nearest
-                .filter(|known| alike(known) > 0.8)
-                .map(String::as_str);
-            let nearest = other.map(|(_, key)| *key).or(nearest);
-            let hint = nearest.map_or_else(String::new, |key| format!("; did you mean {key}?"));
+            let hint = other.map_or_else(
+                || suggestion(key, &known),
+                |(_, key)| format!("; did you mean {key}?"),
+            );
             return Err(located.error(format_args!("there is no key {key}{hint}")));
         }
     }

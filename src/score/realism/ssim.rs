@@ -1,5 +1,10 @@
 //! Structural similarity of two images: [`ssim`].
 
+#![expect(
+    clippy::inline_always,
+    reason = "only inlined code is compiled for a kernel's instruction set, see isa"
+)]
+
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
@@ -103,7 +108,7 @@ impl Kernel for Band<'_> {
         let stride = 3 * self.images[0].width();
         let windows = stride - 3 * (TAPS - 1);
         // The means over each of the last rows, by its number modulo the taps.
-        let mut rows = [[[0.0; TILE]; MOMENTS]; TAPS];
+        let mut rows = vec![[[0.0; TILE]; MOMENTS]; TAPS];
         for begin in (0..windows).step_by(TILE) {
             let tile = begin..windows.min(begin + TILE);
             for line in 0..self.sums.len() + TAPS - 1 {

@@ -1,0 +1,50 @@
+//! Which known name is meant by an unknown one: [`nearest`].
+
+use strsim::jaro_winkler;
+
+/// Least similarity of two names, by Jaro and Winkler; chosen.
+const ALIKE: f64 = 0.8;
+
+/// The most similar of the known names, whatever the case; `None` if none is similar.
+pub(crate) fn nearest<'a, S: AsRef<str> + 'a>(
+    name: &str,
+    known: impl IntoIterator<Item = &'a S>,
+) -> Option<&'a str> {
+    let name = name.to_lowercase();
+    let known = known.into_iter().map(AsRef::as_ref);
+    let alike = known.map(|other| (jaro_winkler(&name, &other.to_lowercase()), other));
+    let nearest = alike.max_by(|(a, _), (b, _)| a.total_cmp(b));
+    nearest.and_then(|(alike, other)| (alike > ALIKE).then_some(other))
+}
+
+/// The most similar of the known names, as a question at the end of a message; empty if none is similar.
+pub(crate) fn suggestion<'a, S: AsRef<str> + 'a>(
+    name: &str,
+    known: impl IntoIterator<Item = &'a S>,
+) -> String {
+    nearest(name, known).map_or_else(String::new, |other| format!("; did you mean {other}?"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_most_similar_name_is_found_and_no_other() {
+        let known = ["lift", "gray-gain", "speed", "angle"];
+        for (name, meant) in [
+            ("lfit", "lift"),
+            ("Lift", "lift"),
+            ("graygain", "gray-gain"),
+            ("sped", "speed"),
+            ("angel", "angle"),
+        ] {
+            assert_eq!(nearest(name, &known), Some(meant), "{name}");
+        }
+        for name in ["zoom", "", "darkir"] {
+            assert_eq!(nearest(name, &known), None, "{name}");
+        }
+        assert_eq!(suggestion("sped", &known), "; did you mean speed?");
+        assert_eq!(suggestion("zoom", &known), "");
+    }
+}
