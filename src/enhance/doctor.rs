@@ -92,19 +92,20 @@ impl Enhancer {
             color_out: Some(order),
             ..stated.clone()
         };
-        let trials = self.trials(dark, &stated, [None; 2])?.ok_or_else(|| {
+        let trials = self.trials(dark, [&stated, &swapped], [None; 2])?.ok_or_else(|| {
             self.fault("it takes none of the small sizes of the probe; state `multiple` or `fixed` in MODEL.onnx.toml beside it".to_owned())
         })?;
-        let Trials { frames, probe } = trials;
-        let other = self.trials(dark, &swapped, [None; 2])?;
-        let other = other.map(|trials| trials.probe);
+        let Trials {
+            frames,
+            probes: [probe, swapped],
+        } = trials;
         let others = self.other_outputs(&frames, probe.best())?;
         let stated = self.stated_pair();
         let is_plausible = |pair: &RangePair| probe.plausible().contains(pair);
         let mut found = match (image, stated) {
             (ImageOutput::Unknown, _) => Found::no_output(&self.output_title(), &probe, &others),
             (ImageOutput::Known, Some(pair)) if is_plausible(&pair) => Found::stated(pair),
-            (ImageOutput::Known, _) => propose(&probe, stated, other.as_ref(), order),
+            (ImageOutput::Known, _) => propose(&probe, stated, &swapped, order),
         };
         if !found.lines.is_empty() {
             found.lines.extend(self.found_size());
@@ -112,7 +113,7 @@ impl Enhancer {
         if image == ImageOutput::Known {
             found.mention(&others);
         }
-        let columns = shown(&probe, stated, other.as_ref(), others);
+        let columns = shown(&probe, stated, &swapped, others);
         Ok(Examination {
             settled: found.settled,
             frames,
@@ -176,7 +177,8 @@ impl Enhancer {
             let Ok(graph) = self.graph().with_convention(convention) else {
                 continue;
             };
-            if let Some(made) = made(&graph, frames)? {
+            let made = made(&[graph], frames)?;
+            if let Some(made) = made.and_then(|mut made| made.pop()) {
                 let pair = PairTrial::new(ranges, &seen, made);
                 columns.push(column(&pair, format!("output {name:?}, {ranges}")));
             }
@@ -196,7 +198,7 @@ fn swapped(order: ChannelOrder) -> ChannelOrder {
 fn shown(
     probe: &Probe,
     stated: Option<RangePair>,
-    swapped: Option<&Probe>,
+    swapped: &Probe,
     others: Vec<ExaminedConvention>,
 ) -> Vec<ExaminedConvention> {
     let stated_title = stated.map(|pair| format!("{pair}, as stated"));
@@ -204,16 +206,14 @@ fn shown(
         Some(title) if stated == Some(ranges) => title.clone(),
         _ => ranges.to_string(),
     });
-    if let Some(swapped) = swapped {
-        let swapped = columns(swapped, |ranges| {
-            format!("{ranges}, red and blue swapped in the output")
-        });
-        // Nine more pictures of what cannot be would only distract.
-        let plausible = swapped
-            .into_iter()
-            .filter(|column| column.problem.is_none());
-        shown.extend(plausible);
-    }
+    let swapped = columns(swapped, |ranges| {
+        format!("{ranges}, red and blue swapped in the output")
+    });
+    // Nine more pictures of what cannot be would only distract.
+    let plausible = swapped
+        .into_iter()
+        .filter(|column| column.problem.is_none());
+    shown.extend(plausible);
     shown.extend(others);
     if shown.iter().any(|column| column.problem.is_none()) {
         shown.retain(|column| {
@@ -315,7 +315,7 @@ impl Found {
 fn propose(
     probe: &Probe,
     stated: Option<RangePair>,
-    swapped: Option<&Probe>,
+    swapped: &Probe,
     order: ChannelOrder,
 ) -> Found {
     match probe.plausible().as_slice() {
@@ -341,7 +341,7 @@ fn propose(
         let seen = pair.verdict();
         pair.ranges == probe.usual && seen.is_some_and(|seen| seen.example.flaw == Flaw::Hue)
     });
-    let plausible = swapped.map_or_else(Vec::new, Probe::plausible);
+    let plausible = swapped.plausible();
     let pair = match &plausible[..] {
         [pair] => Some(*pair),
         several => stated.filter(|pair| several.contains(pair)),

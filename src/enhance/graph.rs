@@ -256,24 +256,32 @@ impl Graph {
     /// Runs the model on a whole image of floats.
     pub(super) fn planes(&self, planes: &Planes) -> Result<RunResult<Planes>> {
         let (reading, size) = (Arc::clone(&self.reading), planes.size());
-        let part = TileWindow {
-            left: 0,
-            top: 0,
-            right: size[1],
-            bottom: size[0],
-        };
         let dark = reading.needs_dark().then(|| planes.clone());
         self.run(&self.options, &FedImage::Whole(planes), move |outputs| {
-            reading.planes(outputs, size, part, dark.as_ref())
+            reading.planes(outputs, size, TileWindow::whole(size), dark.as_ref())
         })
     }
 
-    /// Runs the model on a whole image; returns codes of 0..255 that are neither clamped nor rounded.
-    pub(super) fn codes(&self, image: &Rgb) -> Result<RunResult<Codes>> {
-        Ok(match self.planes(&Planes::of(image))? {
-            RunResult::Output(planes) => RunResult::Output(Codes::of_planes(&planes)),
-            RunResult::Failed(problem) => RunResult::Failed(problem),
-            RunResult::Unusable(values) => RunResult::Unusable(values),
+    /// Runs the model once on a whole image, and reads it by the conventions of several graphs, which feed it as this one does.
+    pub(super) fn readings(&self, image: &Rgb, graphs: &[Self]) -> Result<RunResult<Vec<Codes>>> {
+        let readings: Vec<Arc<Composition>> = graphs
+            .iter()
+            .map(|graph| Arc::clone(&graph.reading))
+            .collect();
+        let dark = Planes::of(image);
+        let fed = dark.clone();
+        self.run(&self.options, &FedImage::Whole(&fed), move |outputs| {
+            let size = dark.size();
+            let codes = readings.iter().map(|reading| {
+                let dark = reading.needs_dark().then_some(&dark);
+                let planes = reading.planes(outputs, size, TileWindow::whole(size), dark);
+                // The rules about plausible images name values that are none.
+                planes.map_or_else(
+                    |_| Codes::unusable(size),
+                    |planes| Codes::of_planes(&planes),
+                )
+            });
+            Ok(codes.collect())
         })
     }
 

@@ -137,12 +137,7 @@ fn measure(graph: &Graph, rule: SizeRule, available: u64) -> Result<Estimate> {
 
 /// Runs a model on a small image; returns whether that worked.
 fn probe(graph: &Graph, side: usize, arena: Arena) -> Result<bool> {
-    let window = TileWindow {
-        left: 0,
-        top: 0,
-        right: side,
-        bottom: side,
-    };
+    let window = TileWindow::whole([side; 2]);
     graph.restart_clock();
     let image = texture([side; 2], &CODES[1]);
     let result = graph.probe_memory(&image, window, arena)?;

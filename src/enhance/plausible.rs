@@ -73,6 +73,15 @@ pub(super) struct Codes {
 }
 
 impl Codes {
+    /// Codes of this height and width that are no numbers: those of an output whose values cannot be an image.
+    pub(super) fn unusable([height, width]: [usize; 2]) -> Self {
+        Self {
+            height,
+            width,
+            samples: vec![f32::NAN; height * width * 3],
+        }
+    }
+
     /// The codes of an image of bytes.
     pub(super) fn of(image: &Rgb) -> Self {
         Self {

@@ -17,10 +17,11 @@ use crate::types::enhancer_note::{ProbeNote, ProbeOutcome};
 const SIZES: [[usize; 2]; 3] = [[144, 96], [160, 120], [128, 128]];
 
 /// What a model made of dark frames.
-pub(super) struct Trials {
+pub(super) struct Trials<const N: usize> {
     /// The frames as they were fed.
     pub(super) frames: Vec<Rgb>,
-    pub(super) probe: Probe,
+    /// What was made by each of the conventions.
+    pub(super) probes: [Probe; N],
 }
 
 impl Enhancer {
@@ -30,13 +31,16 @@ impl Enhancer {
     /// If its images cannot be enhanced images, or several ranges would do, with the lines of a sidecar that would repair it; not if
     /// implausible images are used.
     pub(crate) fn probe(&mut self, dark: &[Rgb], implausible: Implausible) -> Result<()> {
-        let mut trials = self.trials(dark, self.convention(), self.stated_ranges())?;
+        let mut trials = self.trials(dark, [self.convention()], self.stated_ranges())?;
         if let (None, Some(frame)) = (&trials, dark.first()) {
             // It may take the size of a frame, or show which sizes it takes.
             self.enhance(frame)?;
-            trials = self.trials(dark, self.convention(), self.stated_ranges())?;
+            trials = self.trials(dark, [self.convention()], self.stated_ranges())?;
         }
-        let Some(Trials { probe, .. }) = trials else {
+        let Some(Trials {
+            probes: [probe], ..
+        }) = trials
+        else {
             warn_of_untried(self.name());
             return Ok(());
         };
@@ -108,14 +112,14 @@ impl Enhancer {
         seen.judge_in(&self.usage(), self.path(), place, implausible)
     }
 
-    /// What the model makes of dark frames by a convention, with each pair of ranges that is not stated; `None` if it fails at all
-    /// sizes that are tried.
-    pub(super) fn trials(
+    /// What the model makes of dark frames by each of these conventions, which differ in how its output is read, with each pair of
+    /// ranges that is not stated; `None` if it fails at all sizes that are tried. It runs once for each frame and range of the input.
+    pub(super) fn trials<const N: usize>(
         &self,
         dark: &[Rgb],
-        convention: &ModelSidecar,
+        conventions: [&ModelSidecar; N],
         [input, output]: [Option<ValueRange>; 2],
-    ) -> Result<Option<Trials>> {
+    ) -> Result<Option<Trials<N>>> {
         let usual = self.ranges();
         let ranges = match (input, output) {
             (Some(_), Some(_)) => Ranges::Stated,
@@ -128,30 +132,44 @@ impl Enhancer {
                 .map(|frame| self.probe_image(frame, size))
                 .collect::<Result<_>>()?;
             let seen: Vec<Codes> = frames.iter().map(Codes::of).collect();
-            let mut pairs = Vec::new();
-            for ranges in RangePair::all(input, output) {
-                let convention = ModelSidecar {
-                    range_in: Some(ranges.input),
-                    range_out: Some(ranges.output),
-                    ..convention.clone()
-                };
-                let graph = self.graph().with_convention(convention);
-                let graph = graph.map_err(|problem| self.fault(problem))?;
-                let Some(made) = made(&graph, &frames)? else {
+            let mut pairs = [(); N].map(|()| Vec::new());
+            for fed_alike in RangePair::all(input, output).chunk_by(|a, b| a.input == b.input) {
+                let graphs = conventions.iter().flat_map(|convention| {
+                    fed_alike
+                        .iter()
+                        .map(|ranges| self.read_by(convention, *ranges))
+                });
+                let graphs: Vec<Graph> = graphs.collect::<Result<_>>()?;
+                let Some(made) = made(&graphs, &frames)? else {
                     break;
                 };
-                pairs.push(PairTrial::new(ranges, &seen, made));
+                let mut made = made.into_iter();
+                for pairs in &mut pairs {
+                    let trials = fed_alike.iter().zip(&mut made);
+                    pairs.extend(trials.map(|(ranges, made)| PairTrial::new(*ranges, &seen, made)));
+                }
             }
-            if !pairs.is_empty() {
-                let probe = Probe {
+            if pairs.iter().all(|pairs| !pairs.is_empty()) {
+                let probes = pairs.map(|pairs| Probe {
                     ranges,
                     usual,
                     pairs,
-                };
-                return Ok(Some(Trials { frames, probe }));
+                });
+                return Ok(Some(Trials { frames, probes }));
             }
         }
         Ok(None)
+    }
+
+    /// The model, fed and read by a convention with these ranges.
+    fn read_by(&self, convention: &ModelSidecar, ranges: RangePair) -> Result<Graph> {
+        let convention = ModelSidecar {
+            range_in: Some(ranges.input),
+            range_out: Some(ranges.output),
+            ..convention.clone()
+        };
+        let graph = self.graph().with_convention(convention);
+        graph.map_err(|problem| self.fault(problem))
     }
 
     /// A frame in a size of the probe, or in the size that the graph fixes.
@@ -170,20 +188,24 @@ impl Enhancer {
     }
 }
 
-/// What a model makes of each frame; `None` if it fails on one.
-pub(super) fn made(graph: &Graph, frames: &[Rgb]) -> Result<Option<Vec<Codes>>> {
-    let mut all = Vec::with_capacity(frames.len());
+/// What a model makes of each frame, read by each of these graphs of it, which feed it alike; `None` if it fails on a frame.
+pub(super) fn made(graphs: &[Graph], frames: &[Rgb]) -> Result<Option<Vec<Vec<Codes>>>> {
+    let mut all = vec![Vec::with_capacity(frames.len()); graphs.len()];
+    let Some(graph) = graphs.first() else {
+        return Ok(Some(all));
+    };
     for frame in frames {
         graph.restart_clock();
-        match graph.codes(frame)? {
-            RunResult::Output(codes) => all.push(codes),
+        let readings = match graph.readings(frame, graphs)? {
+            RunResult::Output(readings) => readings,
             RunResult::Failed(_) => return Ok(None),
-            // The rules name it.
-            RunResult::Unusable(_) => all.push(Codes {
-                height: frame.height(),
-                width: frame.width(),
-                samples: vec![f32::NAN; frame.samples().len()],
-            }),
+            // The rules about plausible images name it.
+            RunResult::Unusable(_) => {
+                vec![Codes::unusable([frame.height(), frame.width()]); graphs.len()]
+            }
+        };
+        for (made, codes) in all.iter_mut().zip(readings) {
+            made.push(codes);
         }
     }
     Ok(Some(all))

@@ -132,12 +132,7 @@ enum Trial {
 }
 
 fn trial(graph: &Graph, size: [usize; 2]) -> Result<Trial> {
-    let window = TileWindow {
-        left: 0,
-        top: 0,
-        right: size[1],
-        bottom: size[0],
-    };
+    let window = TileWindow::whole(size);
     graph.restart_clock();
     let result = graph.probe(&texture(size, &CODES[1]), window)?;
     Ok(match result {

@@ -23,6 +23,16 @@ pub(super) struct TileWindow {
 }
 
 impl TileWindow {
+    /// The whole of an image of this height and width.
+    pub(super) fn whole([height, width]: [usize; 2]) -> Self {
+        Self {
+            left: 0,
+            top: 0,
+            right: width,
+            bottom: height,
+        }
+    }
+
     /// Height and width in pixels.
     pub(super) fn size(self) -> [usize; 2] {
         [self.bottom - self.top, self.right - self.left]

@@ -5,7 +5,7 @@ use strsim::jaro_winkler;
 /// Least similarity of two names, by Jaro and Winkler; chosen.
 const ALIKE: f64 = 0.8;
 
-/// The most similar of the known names, whatever the case; `None` if none is similar.
+/// The most similar of the known names, whatever the case, and the first of equally similar ones; `None` if none is similar.
 pub(crate) fn nearest<'a, S: AsRef<str> + 'a>(
     name: &str,
     known: impl IntoIterator<Item = &'a S>,
@@ -13,8 +13,10 @@ pub(crate) fn nearest<'a, S: AsRef<str> + 'a>(
     let name = name.to_lowercase();
     let known = known.into_iter().map(AsRef::as_ref);
     let alike = known.map(|other| (jaro_winkler(&name, &other.to_lowercase()), other));
-    let nearest = alike.max_by(|(a, _), (b, _)| a.total_cmp(b));
-    nearest.and_then(|(alike, other)| (alike > ALIKE).then_some(other))
+    let near = alike.filter(|(alike, _)| *alike > ALIKE);
+    // Of equal ones, the minimum is the first, and the maximum the last.
+    let nearest = near.min_by(|(a, _), (b, _)| b.total_cmp(a));
+    nearest.map(|(_, other)| other)
 }
 
 /// The most similar of the known names, as a question at the end of a message; empty if none is similar.
@@ -31,13 +33,21 @@ mod tests {
 
     #[test]
     fn the_most_similar_name_is_found_and_no_other() {
-        let known = ["lift", "gray-gain", "speed", "angle"];
+        let known = [
+            "lift",
+            "gray-gain",
+            "speed",
+            "angle",
+            "ruas-lol",
+            "ruas-upe",
+        ];
         for (name, meant) in [
             ("lfit", "lift"),
             ("Lift", "lift"),
             ("graygain", "gray-gain"),
             ("sped", "speed"),
             ("angel", "angle"),
+            ("ruas", "ruas-lol"),
         ] {
             assert_eq!(nearest(name, &known), Some(meant), "{name}");
         }

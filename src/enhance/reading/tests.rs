@@ -32,12 +32,7 @@ fn image(height: usize, width: usize) -> Rgb {
 }
 
 fn whole(image: &Rgb) -> TileWindow {
-    TileWindow {
-        left: 0,
-        top: 0,
-        right: image.width(),
-        bottom: image.height(),
-    }
+    TileWindow::whole([image.height(), image.width()])
 }
 
 fn near(a: &TensorData, b: &TensorData) -> bool {

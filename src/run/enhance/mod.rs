@@ -91,7 +91,12 @@ pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome
             let problem = "needs at least one image that can be read";
             return Err(Error::usage("INPUT", problem));
         }
-        return doctor::doctor(&args.doctor, image, &mut enhancer, &darkened(&sample), out);
+        let dark = darkened(&sample);
+        let (model, n) = (args.model.display(), dark.len());
+        progress.say(&format!(
+            "{model} enhances {n} dark images with each convention"
+        ));
+        return doctor::doctor(&args.doctor, image, &mut enhancer, &dark, out);
     }
     if !sample.is_empty() {
         enhancer.probe(&darkened(&sample), args.loading.probe.implausible())?;

@@ -112,15 +112,12 @@ fn a_preset_says_what_its_authors_do() {
     assert_ne!(digests[0], digests[1]);
     let message = open(&file("nonesuch")).err().unwrap().to_string();
     assert!(
-        message.contains("is not a preset. The presets are"),
+        message.contains("is not a preset; the presets are"),
         "{message}"
     );
     for (typed, meant) in [("zerodce", "zero-dce"), ("ruas", "ruas-lol")] {
         let message = open(&file(typed)).err().unwrap().to_string();
-        assert!(
-            message.contains("; did you mean") && message.contains(&format!("{meant}?"))
-                || message.contains(&format!("{meant} or")),
-            "{message}"
-        );
+        let question = format!("; did you mean {meant}?");
+        assert!(message.contains(&question), "{message}");
     }
 }
