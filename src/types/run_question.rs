@@ -77,6 +77,19 @@ impl RunQuestion {
         self
     }
 
+    /// The digest of what a judge is told of the question: its words and its right answers. The same answer to two such questions has
+    /// one mark.
+    #[must_use]
+    pub(crate) fn judged_words(&self) -> Digest {
+        let answer = self.answer.as_deref().unwrap_or_default();
+        let further = self.extra_answers.iter().flat_map(|answers| {
+            let answers = answers.iter().map(String::as_bytes);
+            std::iter::once(&b"extra"[..]).chain(answers)
+        });
+        let words = [self.text.as_bytes(), answer.as_bytes()].into_iter();
+        Digest::of_parts(words.chain(further))
+    }
+
     /// The name of the question among those that are asked about every image; its own name if it is about one image alone.
     #[must_use]
     pub fn bank_id(&self) -> &str {

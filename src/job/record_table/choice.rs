@@ -9,7 +9,7 @@ use crate::store::CellKind::{Bool, Int8, Int32, Text};
 use crate::store::Presence::{Always, MayBeNull};
 use crate::store::{Cell, Column};
 use crate::types::manifest::RunManifest;
-use crate::types::{AnswerReading, ChoiceDetail, Record};
+use crate::types::{AnswerReading, ChoiceDetail, Record, RunQuestion};
 
 impl Tabled for ChoiceDetail {
     const TABLE: &'static str = "darkqa.records/1";
@@ -35,7 +35,7 @@ impl Tabled for ChoiceDetail {
         parts.into_iter().flatten().collect()
     }
 
-    fn context(_folder: &Path, _manifest: &RunManifest) -> Result<()> {
+    fn context(_: &Path, _: &RunManifest, _: &[RunQuestion]) -> Result<()> {
         Ok(())
     }
 

@@ -19,13 +19,15 @@ use crate::store::{Cell, Column, each_record};
 use crate::types::flag::read_word;
 use crate::types::manifest::RunManifest;
 use crate::types::recorded_names::RecordedNames;
-use crate::types::{Digest, OpenDetail, QuestionId, Record, Step};
+use crate::types::{Digest, OpenDetail, QuestionId, Record, RunQuestion, Step};
 
 /// The marks of a run.
 pub(super) struct Marks {
     judge: Option<String>,
     protocol: Protocol,
-    /// The mark of an answer; `None` if none is read in the judge's reply. By the digest of question and answer.
+    /// What the judge is told of each question, as a digest.
+    words: HashMap<QuestionId, Digest>,
+    /// The mark of an answer; `None` if none is read in the judge's reply. By the digest of the question's words and the answer.
     by_answer: HashMap<Digest, Option<i64>>,
 }
 
@@ -59,7 +61,10 @@ impl Tabled for OpenDetail {
         parts.into_iter().flatten().collect()
     }
 
-    fn context(folder: &Path, manifest: &RunManifest) -> Result<Marks> {
+    fn context(folder: &Path, manifest: &RunManifest, questions: &[RunQuestion]) -> Result<Marks> {
+        let words = questions.iter();
+        let words = words.map(|question| (question.id.clone(), question.judged_words()));
+        let words: HashMap<QuestionId, Digest> = words.collect();
         let setting = |name| manifest.settings.get(name).and_then(Value::as_str);
         let judge = setting(JUDGE).map(str::to_owned);
         let protocol = setting(PROTOCOL).map_or(Ok(Protocol::Upstream), read_word)?;
@@ -69,16 +74,18 @@ impl Tabled for OpenDetail {
             let is_of_judge = Some(names.shown(&record.model)) == judge.as_deref();
             let detail = &record.detail;
             if let (Step::Mark, Some(answer)) = (detail.step, &detail.judged)
+                && let Some(words) = words.get(&record.question)
                 && is_of_judge
                 && !record.failed()
             {
                 let reply = record.reply.as_deref().unwrap_or_default();
-                marks.insert(judged(&record.question, answer), mark(reply, protocol));
+                marks.insert(judged(words, answer), mark(reply, protocol));
             }
         })?;
         Ok(Marks {
             judge,
             protocol,
+            words,
             by_answer: marks,
         })
     }
@@ -124,7 +131,8 @@ impl Marks {
             AnswerState::Null => return unmarked(AnswerOutcome::Null),
             AnswerState::Text { answer, .. } => answer,
         };
-        let known = self.by_answer.get(&judged(&record.question, &answer));
+        let words = self.words.get(&record.question);
+        let known = words.and_then(|words| self.by_answer.get(&judged(words, &answer)));
         let outcome = match known {
             None => AnswerOutcome::Unjudged,
             Some(None) => AnswerOutcome::Unmarked,
@@ -138,9 +146,9 @@ impl Marks {
     }
 }
 
-/// What identifies an answer to a question for the judge.
-fn judged(question: &QuestionId, answer: &str) -> Digest {
-    Digest::of_parts([question.0.as_bytes(), answer.as_bytes()])
+/// What identifies an answer for the judge.
+fn judged(words: &Digest, answer: &str) -> Digest {
+    Digest::of_parts([words.to_string().as_bytes(), answer.as_bytes()])
 }
 
 /// The true answer, the answer that was given, and its mark.

@@ -30,7 +30,11 @@ pub(super) trait Tabled: Detail + Sync + 'static {
     ///
     /// # Errors
     /// If a record is broken.
-    fn context(folder: &Path, manifest: &RunManifest) -> Result<Self::Context>;
+    fn context(
+        folder: &Path,
+        manifest: &RunManifest,
+        questions: &[RunQuestion],
+    ) -> Result<Self::Context>;
 
     /// What the row of a record has besides it; `None` if the record has no row.
     fn further(context: &Self::Context, record: &Record<Self>) -> Option<Self::Further>;
@@ -115,7 +119,7 @@ impl<'r, D: Tabled> Rows<'r, D> {
         manifest: &RunManifest,
         questions: &'r [RunQuestion],
     ) -> Result<Self> {
-        let questions = questions.iter().map(|question| {
+        let texts = questions.iter().map(|question| {
             let texts = QuestionTexts {
                 scene: Some(question.scene.clone()).filter(|scene| !scene.is_empty()),
                 answer: question.answer.clone(),
@@ -125,8 +129,8 @@ impl<'r, D: Tabled> Rows<'r, D> {
         Ok(Self {
             names: RecordedNames::of(manifest),
             lights: HashMap::new(),
-            questions: questions.collect(),
-            context: D::context(folder, manifest)?,
+            questions: texts.collect(),
+            context: D::context(folder, manifest, questions)?,
         })
     }
 

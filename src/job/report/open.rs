@@ -32,7 +32,7 @@ use crate::store::Store;
 use crate::types::flag::read_word;
 use crate::types::manifest::{RunManifest, Status};
 use crate::types::{
-    ModelListing, OpenDetail, QuestionId, Record, RunQuestion, Step, Thumbnail, TrialRef,
+    Digest, ModelListing, OpenDetail, QuestionId, Record, RunQuestion, Step, Thumbnail, TrialRef,
 };
 
 /// Setting in the manifest with the name of the judge.
@@ -65,13 +65,19 @@ impl Scores {
         let protocol = setting(PROTOCOL).map_or(Ok(Protocol::Upstream), read_word)?;
         let ids: Vec<&QuestionId> = run.questions.iter().map(|question| &question.id).collect();
         let predictions = predictions(&run.records, &ids, protocol);
-        let marks = marks(&run.records, judge.as_deref());
+        let words: Vec<Digest> = run
+            .questions
+            .iter()
+            .map(RunQuestion::judged_words)
+            .collect();
+        let marks = marks(&run, &words, judge.as_deref());
         let failures = failures(&run.records);
         let (mut scored, mut answers) = (Vec::new(), Vec::new());
         for prediction in predictions {
             let question = ids[prediction.question];
-            let outcome = outcome(&prediction, question, &marks, protocol);
-            let judgement = judgement(&prediction, question, &marks);
+            let words = words[prediction.question];
+            let outcome = outcome(&prediction, words, &marks, protocol);
+            let judgement = judgement(&prediction, words, &marks);
             let failure = failures.get(&(question, prediction.subject.clone()));
             let failure = failure.filter(|_| outcome == AnswerOutcome::Missing);
             scored.push(ScoredAnswer {
@@ -300,17 +306,21 @@ fn is_answer(trial: TrialRef<'_, OpenDetail>) -> bool {
     trial.is_answer()
 }
 
-/// The marks of a judge, by question and answer.
-type Marks<'a> = HashMap<(&'a QuestionId, &'a str), &'a Record<OpenDetail>>;
+/// The marks of a judge, by the words of the question and the answer: a mark is that of all questions with the same words.
+type Marks<'a> = HashMap<(Digest, &'a str), &'a Record<OpenDetail>>;
 
-fn marks<'a>(records: &'a [Record<OpenDetail>], judge: Option<&str>) -> Marks<'a> {
-    let marks = records.iter().filter(|record| {
+fn marks<'a>(run: &'a OpenRun, words: &[Digest], judge: Option<&str>) -> Marks<'a> {
+    let ids = run.questions.iter().map(|question| &question.id);
+    let words: HashMap<&QuestionId, Digest> = ids.zip(words.iter().copied()).collect();
+    let marks = run.records.iter().filter(|record| {
         let is_mark = record.detail.step == Step::Mark && Some(&*record.model) == judge;
         is_mark && record.failure.is_none()
     });
-    marks
-        .filter_map(|record| Some(((&record.question, record.detail.judged.as_deref()?), record)))
-        .collect()
+    let marks = marks.filter_map(|record| {
+        let words = *words.get(&record.question)?;
+        Some(((words, record.detail.judged.as_deref()?), record))
+    });
+    marks.collect()
 }
 
 /// Why trials have no answer, in words with what the error says, by question and subject.
@@ -329,18 +339,18 @@ fn failures(records: &[Record<OpenDetail>]) -> BTreeMap<(&QuestionId, Subject), 
 }
 
 /// What the judge said of an answer.
-fn judgement(prediction: &Prediction, question: &QuestionId, marks: &Marks<'_>) -> Option<String> {
+fn judgement(prediction: &Prediction, words: Digest, marks: &Marks<'_>) -> Option<String> {
     let AnswerState::Text { answer, .. } = &prediction.state else {
         return None;
     };
-    let record = marks.get(&(question, &**answer))?;
+    let record = marks.get(&(words, &**answer))?;
     record.reply.clone()
 }
 
 /// The outcome of an answer, from its mark.
 fn outcome(
     prediction: &Prediction,
-    question: &QuestionId,
+    words: Digest,
     marks: &Marks<'_>,
     protocol: Protocol,
 ) -> AnswerOutcome {
@@ -349,7 +359,7 @@ fn outcome(
         AnswerState::Null => return AnswerOutcome::Null,
         AnswerState::Text { answer, .. } => answer,
     };
-    let Some(record) = marks.get(&(question, &**answer)) else {
+    let Some(record) = marks.get(&(words, &**answer)) else {
         return AnswerOutcome::Unjudged;
     };
     // Marks of earlier versions are read again, so that all tables use the same reading.

@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::house::House;
+use crate::support::parquet_file::rows;
 use crate::support::run::{records, words};
 use crate::support::table::check_rows;
 
@@ -65,6 +66,48 @@ fn marks_come_to_upstreams_score() {
     // Several people's answers are no file of upstream's, which has one a question.
     assert!(!house.0.path("run/upstream/human-L0.json").exists());
     assert!(house.0.path("run/upstream/human-L2-noise.json").exists());
+}
+
+/// OpenEQA itself asks some questions about several walks.
+#[test]
+fn the_same_answer_to_the_same_words_is_marked_once_and_scored_in_each_walk() {
+    let house = House::new();
+    let mut questions = house.read("questions.json");
+    let twin = |id: &str, category: &str, extra: Value| json!({"question_id": id, "question": "What colour is it?", "answer": "brown", "category": category, "episode_history": "scannet-v0/001-b", "extra_answers": extra});
+    let questions = questions.as_array_mut().unwrap();
+    questions.push(twin("q4", "world knowledge", Value::Null));
+    // Another right answer makes another mark.
+    questions.push(twin("q5", "world knowledge", json!(["red"])));
+    let questions = json!(questions);
+    house.0.file("questions.json", questions.to_string());
+    house.0.file("a.jsonl", "{\"default\": \"red\"}");
+    let judge = MockEndpoint::start(["2", "3", "4", "5"].map(Answer::text));
+    let called = house.call(&words(&format!(
+        "--model script:a.jsonl --levels L0 --judge j --judge-base-url {} --concurrency 1 --out run",
+        judge.base_url()
+    )));
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_eq!(judge.requests().len(), 4);
+    assert!(!called.stderr.contains("not judged"), "{called:?}");
+    let items = records(&house.0.path("run"));
+    let mark_of = |id: &str| {
+        let mut marks = items
+            .iter()
+            .filter(|record| record["question"] == id && record["step"] == "mark");
+        marks.next().map(|mark| mark["upstream"].clone())
+    };
+    assert!(mark_of("q1").is_some() && mark_of("q4").is_none() && mark_of("q5").is_some());
+    let summary = house.read("run/summary.json");
+    let all = summary["rows"].as_array().unwrap().iter();
+    let all = all.clone().find(|row| row["by"] == "all").unwrap();
+    assert_eq!(all["n"], json!(5), "{all}");
+    let table = rows(&house.0.path("run/records.parquet"));
+    let of = |id: &str| {
+        let mut rows = table.iter().filter(|row| row["question"] == id);
+        rows.next().unwrap()["mark"].clone()
+    };
+    assert_eq!(of("q1"), of("q4"));
+    assert_ne!(of("q4"), of("q5"));
 }
 
 #[test]
