@@ -68,7 +68,7 @@ fn marks_come_to_upstreams_score() {
     assert!(house.0.path("run/upstream/human-L2-noise.json").exists());
 }
 
-/// OpenEQA itself asks some questions about several walks.
+/// OpenEQA itself asks four questions more than once.
 #[test]
 fn the_same_answer_to_the_same_words_is_marked_once_and_scored_in_each_walk() {
     let house = House::new();
