@@ -125,7 +125,13 @@ impl StoreFolder {
         self.make()?;
         let mut options = OpenOptions::new();
         options.write(true).create(true).truncate(false);
-        options.open(self.root.join(".lock"))
+        let path = self.root.join(".lock");
+        // Opening a pipe would wait for its reader.
+        if fs::metadata(&path).is_ok_and(|lock| !lock.is_file()) {
+            let problem = ".lock is a pipe, a device or a folder, not a file; remove it";
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
+        }
+        options.open(path)
     }
 }
 
