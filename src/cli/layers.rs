@@ -4,8 +4,8 @@
 //! them are parsed together, once. So a value is read in the same way wherever it comes from. ripgrep does so with its configuration
 //! file (`crates/core/flags/parse.rs`).
 
+mod invalid_toml;
 mod layered_value;
-mod messages;
 mod models_file;
 mod sent_secrets;
 mod value_text;
@@ -19,13 +19,13 @@ use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command};
 use toml::{Table, Value};
 
+use self::invalid_toml::invalid_toml;
 use self::layered_value::LayeredValue;
-use self::messages::invalid_toml;
 use self::value_text::text_of;
 use crate::ask::OPENAI_KEY;
 use crate::error::{Error, Result};
 use crate::files::reading;
-use crate::types::near_name::{nearest, suggestion};
+use crate::types::near_name::{nearest, question, suggestion};
 
 /// Prefix of this program's environment variables.
 const PREFIX: &str = "DARKQA_";
@@ -256,9 +256,9 @@ fn read_table(
             return Err(Error::usage(origin, problem));
         }
         if !flags.contains(&flag) {
-            let near = nearest(&flag, flags).map(|near| format!("; did you mean --{near}?"));
-            let near = near.unwrap_or_default();
-            let problem = format_args!("there is no flag --{flag} here{near}");
+            let near = nearest(&flag, flags).map(|near| format!("--{near}"));
+            let hint = question(near.as_deref());
+            let problem = format_args!("there is no flag --{flag} here{hint}");
             return Err(Error::usage(origin, problem));
         }
         let values = match value {

@@ -40,10 +40,19 @@ pub(crate) fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
 /// # Errors
 /// If the file cannot be opened.
 pub(crate) fn open(path: &Path) -> io::Result<File> {
+    refuse_pipes(path)?;
+    File::open(path)
+}
+
+/// Refuses what [`open`] refuses, before a file is opened in another way.
+///
+/// # Errors
+/// If there is a pipe or a device, or nothing.
+pub(crate) fn refuse_pipes(path: &Path) -> io::Result<()> {
     let kind = fs::metadata(path)?.file_type();
     let is_named = path.starts_with("/dev") || path.starts_with("/proc");
     if kind.is_file() || kind.is_dir() || is_named {
-        return File::open(path);
+        return Ok(());
     }
     let problem = "this is a pipe or a device, not a file; put a file there";
     Err(io::Error::new(io::ErrorKind::InvalidInput, problem))

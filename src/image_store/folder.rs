@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::SystemTime;
 
 use crate::files::folder_access::FolderAccess;
+use crate::files::reading;
 use crate::types::Digest;
 
 /// Version of the layout, a folder of its own.
@@ -126,12 +127,12 @@ impl StoreFolder {
         let mut options = OpenOptions::new();
         options.write(true).create(true).truncate(false);
         let path = self.root.join(".lock");
-        // Opening a pipe would wait for its reader.
-        if fs::metadata(&path).is_ok_and(|lock| !lock.is_file()) {
-            let problem = ".lock is a pipe, a device or a folder, not a file; remove it";
-            return Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
+        match reading::refuse_pipes(&path) {
+            Err(e) if e.kind() != io::ErrorKind::NotFound => {
+                Err(io::Error::new(e.kind(), format!(".lock: {e}")))
+            }
+            _ => options.open(path),
         }
-        options.open(path)
     }
 }
 

@@ -19,12 +19,17 @@ pub(crate) fn nearest<'a, S: AsRef<str> + 'a>(
     nearest.map(|(_, other)| other)
 }
 
-/// The most similar of the known names, as a question at the end of a message; empty if none is similar.
+/// The most similar of the known names, as a [`question`].
 pub(crate) fn suggestion<'a, S: AsRef<str> + 'a>(
     name: &str,
     known: impl IntoIterator<Item = &'a S>,
 ) -> String {
-    nearest(name, known).map_or_else(String::new, |other| format!("; did you mean {other}?"))
+    question(nearest(name, known))
+}
+
+/// Whether a name was meant, as a question at the end of a message; empty without a name.
+pub(crate) fn question(meant: Option<&str>) -> String {
+    meant.map_or_else(String::new, |meant| format!("; did you mean {meant}?"))
 }
 
 #[cfg(test)]

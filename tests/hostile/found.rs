@@ -47,6 +47,10 @@ fn pipes_and_devices_in_the_place_of_files_are_refused() {
             "enhance models/two.onnx a.png --offline --out out",
         ),
         (
+            "store/v1/.lock",
+            "--data frames --model random --levels L0,L3 --llie lift --images-cache store --out stored",
+        ),
+        (
             "prompts/blind.txt",
             "--model m --base-url http://127.0.0.1:9/v1 --prompts prompts --data set.jsonl --out out",
         ),

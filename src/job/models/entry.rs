@@ -12,7 +12,7 @@ use super::name::ModelName;
 use crate::ask::Price;
 use crate::error::{Error, Result};
 use crate::types::View;
-use crate::types::near_name::suggestion;
+use crate::types::near_name::{nearest, question};
 
 /// Keys of a model that are no flags, or have another form than the flag.
 const OWN: [&str; 10] = [
@@ -177,10 +177,8 @@ pub(super) fn check_keys(keys: &Keys, is_defaults: bool) -> Result<()> {
         }
         if !known.contains(key) {
             let other = ELSEWHERE.iter().find(|(other, _)| other == key);
-            let hint = other.map_or_else(
-                || suggestion(key, &known),
-                |(_, key)| format!("; did you mean {key}?"),
-            );
+            let other = other.map(|(_, key)| *key);
+            let hint = question(other.or_else(|| nearest(key, &known)));
             return Err(located.error(format_args!("there is no key {key}{hint}")));
         }
     }

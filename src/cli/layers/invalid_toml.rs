@@ -1,4 +1,4 @@
-//! Messages about files of flags: [`invalid_toml`].
+//! The error about a file of flags that is not TOML: [`invalid_toml`].
 
 use std::path::Path;
 
