@@ -254,7 +254,7 @@ pub(crate) const CASES: &[Case] = &[
         ],
     ),
     Case::new(
-        "batch cancel submitted",
+        "batch cancel submitted --poll 0.02",
         &["submitted"],
         &[
             "reply/GET-batches-id.json",

@@ -280,13 +280,20 @@ impl<D: Detail> Driver<'_, D> {
         Ok(Step::Waiting)
     }
 
-    /// Whether a part's file or batch has been missing for long enough to be sure that it does not exist.
-    pub(super) fn is_missing(&mut self, part: usize) -> bool {
+    /// Whether a part's file or batch has been missing for long enough to be sure that it does not exist; says so if it has not.
+    pub(super) fn is_missing(&mut self, part: usize, what: &str) -> bool {
         let now = Instant::now();
         let since = *self.notes.missing_since.entry(part).or_insert(now);
-        let is_missing = now - since >= self.search_time(part);
+        let search = self.search_time(part);
+        let is_missing = now - since >= search;
         if is_missing {
             self.notes.missing_since.remove(&part);
+        } else {
+            self.warn_once(format!(
+                "{}: the server does not list its {what}; looked for again for {} s, as a list may be late",
+                self.part(part).name,
+                search.as_secs_f64()
+            ));
         }
         is_missing
     }

@@ -69,7 +69,7 @@ impl<D: Detail> Driver<'_, D> {
             files.find(|file| file.name == name && file.bytes.is_none_or(|other| other == bytes));
         let event = match found {
             Some(file) => Event::Uploaded { id: file.id },
-            None if !self.is_missing(part) => return Ok(Step::Waiting),
+            None if !self.is_missing(part, "file") => return Ok(Step::Waiting),
             None => Event::Refused {
                 why: "the file is not at the server".to_owned(),
             },
@@ -137,7 +137,7 @@ impl<D: Detail> Driver<'_, D> {
         };
         match self.of_part(part, batches) {
             Some(batch) => self.created(part, batch.id),
-            None if self.is_missing(part) => self.refuse(part, "the batch is not at the server"),
+            None if self.is_missing(part, "batch") => self.refuse(part, "the batch is not at the server"),
             None => Ok(Step::Waiting),
         }
     }

@@ -43,7 +43,8 @@ def load_run(path: str | os.PathLike[str], questions: bool = True) -> pandas.Dat
     Args:
         path: The folder of a run, or a folder with the shards of one run (``--shard``).
         questions: Whether to read ``questions.jsonl``. If not, the columns that need it are left out: ``scene`` and
-            ``text``, for ``openeqa`` ``text`` and ``answer``; and questions are in the order of their names.
+            ``text``, for ``openeqa`` ``text`` and ``answer``; and questions are in the order of their names. The file of a run
+            of ``openeqa`` is read all the same, because a mark belongs to all questions with the same words.
 
     Raises:
         ImportError: pandas is not installed.

@@ -39,14 +39,15 @@ class Run(NamedTuple):
         """
         settings = self.manifest["settings"]
         judge, protocol = settings.get("--judge"), settings.get("--protocol", "upstream")
-        marks = self._marks(judge, protocol) if self.schema == OPEN else {}
+        words = self._judged_words(questions)
+        marks = self._marks(judge, protocol, words) if self.schema == OPEN else {}
         path = self.folder / "records.jsonl"
         for number, record in _lines(path):
             try:
                 if record.get("step") == "mark":
                     continue
                 if self.schema == OPEN:
-                    add_mark(record, judge, protocol, marks)
+                    add_mark(record, judge, protocol, marks, words.get(record["question"]))
                 else:
                     add_readings(record)
                 add_reply(record)
@@ -61,12 +62,27 @@ class Run(NamedTuple):
                 add_question(record, questions[record["question"]])
             yield record
 
-    def _marks(self, judge: str | None, protocol: str) -> dict[tuple[str, str], int | None]:
-        """The marks of a judge, by question and answer."""
+    def _judged_words(self, questions: dict[str, Record] | None) -> dict[str, str]:
+        """What a judge is told of each open question, by the name of the question."""
+        if self.schema != OPEN:
+            return {}
+        if questions is None:
+            questions = self.questions()
+        parts = ("question", "answer", "extra_answers")
+        return {name: json.dumps([question.get(part) for part in parts]) for name, question in questions.items()}
+
+    def _marks(self, judge: str | None, protocol: str, words: dict[str, str]) -> dict[tuple[str, str], int | None]:
+        """The marks of a judge, by what it is told: the words of the question and the answer.
+
+        Two questions with the same words and the same answer have one mark.
+        """
         return {
-            (record["question"], record["judged"]): record[protocol]
+            (words[record["question"]], record["judged"]): record[protocol]
             for _, record in _lines(self.folder / "records.jsonl")
-            if record.get("step") == "mark" and record["model"] == judge and record["failure"] is None
+            if record.get("step") == "mark"
+            and record["model"] == judge
+            and record["failure"] is None
+            and record["question"] in words
         }
 
 

@@ -133,17 +133,21 @@ def add_readings(record: Record) -> None:
         record[mode] = chosen
 
 
-def add_mark(record: Record, judge: str | None, protocol: str, marks: dict[tuple[str, str], int | None]) -> None:
+Marks = dict[tuple[str | None, str], int | None]
+
+
+def add_mark(record: Record, judge: str | None, protocol: str, marks: Marks, words: str | None) -> None:
     """Add the answer to an open question as the judge gets it, and its mark and score.
 
     Args:
         record: The record of an answer.
         judge: The name of the judge.
         protocol: ``upstream`` or ``tolerant``.
-        marks: The marks of the judge by question and answer; ``None`` if its reply has no mark.
+        marks: The marks of the judge by the words of the question and the answer; ``None`` if its reply has no mark.
+        words: What the judge is told of the question.
     """
     predicted = None if record["failure"] else judged_answer(record, protocol)
-    mark = None if predicted is None else marks.get((record["question"], predicted))
+    mark = None if predicted is None else marks.get((words, predicted))
     if record["failure"]:
         outcome = "failed"
     elif predicted is None:
@@ -151,7 +155,7 @@ def add_mark(record: Record, judge: str | None, protocol: str, marks: dict[tuple
     elif mark is not None:
         outcome = "marked"
     else:
-        outcome = "unmarked" if (record["question"], predicted) in marks else "unjudged"
+        outcome = "unmarked" if (words, predicted) in marks else "unjudged"
     # An answer that is null scores 0 without a judge.
     points = {"marked": mark, "null": 1}.get(outcome)
     record.update(

@@ -60,6 +60,8 @@ fn a_batch_that_is_listed_late_is_not_made_again() {
     assert_eq!(called.code, Some(0), "{called:?}");
     assert_each_once(&bench, &mock, QUESTIONS);
     assert_eq!(mock.count("POST batches"), 1);
+    let said = "part-1-m-001.jsonl: the server does not list its batch; looked for again for 60 s, as a list may be late";
+    assert_eq!(called.stderr.matches(said).count(), 1, "{called:?}");
 
     // It was given up, and is listed before the next attempt.
     let bench = Bench::with_questions(QUESTIONS);
