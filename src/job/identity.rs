@@ -84,7 +84,7 @@ pub(crate) fn columns<'a>(
 }
 
 /// Settings that decide the replies of a model besides question and images, by flag; with the address of its endpoint.
-fn model(model: &ModelUnderTest) -> Value {
+pub(crate) fn model(model: &ModelUnderTest) -> Value {
     let mut content = model.model.content();
     if let (Some(address), Some(fields)) = (model.address(), content.as_object_mut()) {
         let own = std::mem::take(fields).into_iter();

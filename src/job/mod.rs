@@ -30,6 +30,7 @@ pub(crate) mod input_tally;
 pub(crate) mod interrupt;
 mod lanes;
 mod manifest;
+mod mark_index;
 mod measured_tokens;
 pub(crate) mod merge;
 pub(crate) mod models;

@@ -126,6 +126,83 @@ fn several_runs_are_compared_if_one_judge_marked_them() {
     );
 }
 
+/// An endpoint whose model answers `brown`, and marks with 2 at temperature 0.2 and with 4 else.
+fn answering_and_marking() -> MockEndpoint {
+    MockEndpoint::answering(|request| {
+        let is_mark = request.to_string().contains("Your mark");
+        Answer::text(match (is_mark, &request["temperature"]) {
+            (false, _) => "brown",
+            (true, low) if *low == json!(0.2) => "2",
+            (true, _) => "4",
+        })
+    })
+}
+
+#[test]
+fn a_model_that_marks_itself_has_its_marks_also_beside_another_run() {
+    let house = House::new();
+    let mock = answering_and_marking();
+    let base = mock.base_url();
+    for (out, temperature) in [("one", "0.5"), ("two", "1")] {
+        let called = house.call(&words(&format!(
+            "--model m --judge m --base-url {base} --temperature {temperature} --levels L0 --out {out}"
+        )));
+        assert_eq!(called.code, Some(0), "{called:?}");
+    }
+    house.0.complete(&["report", "one", "two", "--out", "both"]);
+    let summary = fs::read_to_string(house.0.path("both/summary.csv")).unwrap();
+    let of_all: Vec<&str> = summary
+        .lines()
+        .filter(|line| line.contains(",all,all,"))
+        .collect();
+    // Three of three answers are marked with 2, at the temperature of the judge.
+    for (line, temperature) in of_all.iter().zip(["0.5", "1"]) {
+        let begin =
+            format!("m (--temperature {temperature}),image,L0,none,,all,all,3,3,0,0,0,0,0,0.25,");
+        assert!(line.starts_with(&begin), "{line}");
+    }
+    assert_eq!(of_all.len(), 2, "{summary}");
+    // The temperature of the answers is known beside that of the marks.
+    let again = house.call(&words(&format!(
+        "--model m --judge m --base-url {base} --temperature 1 --levels L0 --out one"
+    )));
+    assert_eq!(again.code, Some(2), "{again:?}");
+}
+
+#[test]
+fn two_judges_of_one_name_are_two_judges() {
+    let house = House::new();
+    let mock = answering_and_marking();
+    let base = mock.base_url();
+    for (out, temperature) in [("one", "0.2"), ("two", "1")] {
+        let called = house.call(&words(&format!(
+            "--model m --judge j --base-url {base} --judge-temperature {temperature} --levels L0 --out {out}"
+        )));
+        assert_eq!(called.code, Some(0), "{called:?}");
+    }
+    let refused = house.0.call(&["report", "one", "two"]);
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    assert!(
+        refused
+            .stderr
+            .contains("--temperature is 0.2 in one and 1 in two"),
+        "{}",
+        refused.stderr
+    );
+    // And in one run.
+    let again = house.call(&words(&format!(
+        "--model m --judge j --base-url {base} --judge-temperature 1 --levels L0 --out one"
+    )));
+    assert_eq!(again.code, Some(2), "{again:?}");
+
+    scripts(&house);
+    complete(&house, "--out three");
+    house.0.file("j.jsonl", "{\"default\": \"1\"}");
+    complete(&house, "--out four");
+    let refused = house.0.call(&["report", "three", "four"]);
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+}
+
 #[test]
 fn the_images_of_a_walk_are_made_again_and_proved() {
     let house = House::new();

@@ -137,7 +137,9 @@ impl<D: Detail> Driver<'_, D> {
         };
         match self.of_part(part, batches) {
             Some(batch) => self.created(part, batch.id),
-            None if self.is_missing(part, "batch") => self.refuse(part, "the batch is not at the server"),
+            None if self.is_missing(part, "batch") => {
+                self.refuse(part, "the batch is not at the server")
+            }
             None => Ok(Step::Waiting),
         }
     }

@@ -1,6 +1,5 @@
 //! The table of records of open questions: a row is an answer, with its mark.
 
-use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -9,6 +8,7 @@ use serde_json::Value;
 use super::common::{column, head, image, last, reply};
 use super::row::{Row, SentImage, Tabled};
 use crate::error::Result;
+use crate::job::mark_index::MarkIndex;
 use crate::job::predictions::{AnswerState, answer_state};
 use crate::job::report::open::{JUDGE, PROTOCOL};
 use crate::score::llm_match::{Protocol, mark};
@@ -19,16 +19,14 @@ use crate::store::{Cell, Column, each_record};
 use crate::types::flag::read_word;
 use crate::types::manifest::RunManifest;
 use crate::types::recorded_names::RecordedNames;
-use crate::types::{Digest, OpenDetail, QuestionId, Record, RunQuestion, Step};
+use crate::types::{OpenDetail, Record, RunQuestion, Step};
 
 /// The marks of a run.
 pub(super) struct Marks {
     judge: Option<String>,
     protocol: Protocol,
-    /// What the judge is told of each question, as a digest.
-    words: HashMap<QuestionId, Digest>,
-    /// The mark of an answer; `None` if none is read in the judge's reply. By the digest of the question's words and the answer.
-    by_answer: HashMap<Digest, Option<i64>>,
+    /// The mark of an answer; `None` if none is read in the judge's reply.
+    by_answer: MarkIndex<Option<i64>>,
 }
 
 /// An answer with its mark.
@@ -62,30 +60,25 @@ impl Tabled for OpenDetail {
     }
 
     fn context(folder: &Path, manifest: &RunManifest, questions: &[RunQuestion]) -> Result<Marks> {
-        let words = questions.iter();
-        let words = words.map(|question| (question.id.clone(), question.judged_words()));
-        let words: HashMap<QuestionId, Digest> = words.collect();
         let setting = |name| manifest.settings.get(name).and_then(Value::as_str);
         let judge = setting(JUDGE).map(str::to_owned);
         let protocol = setting(PROTOCOL).map_or(Ok(Protocol::Upstream), read_word)?;
         let names = RecordedNames::of(manifest);
-        let mut marks = HashMap::new();
+        let mut marks = MarkIndex::of(questions);
         each_record(folder, |record: Record<Self>, _| {
             let is_of_judge = Some(names.shown(&record.model)) == judge.as_deref();
             let detail = &record.detail;
             if let (Step::Mark, Some(answer)) = (detail.step, &detail.judged)
-                && let Some(words) = words.get(&record.question)
                 && is_of_judge
                 && !record.failed()
             {
                 let reply = record.reply.as_deref().unwrap_or_default();
-                marks.insert(judged(words, answer), mark(reply, protocol));
+                marks.add(&record.question, answer, mark(reply, protocol));
             }
         })?;
         Ok(Marks {
             judge,
             protocol,
-            words,
             by_answer: marks,
         })
     }
@@ -131,8 +124,7 @@ impl Marks {
             AnswerState::Null => return unmarked(AnswerOutcome::Null),
             AnswerState::Text { answer, .. } => answer,
         };
-        let words = self.words.get(&record.question);
-        let known = words.and_then(|words| self.by_answer.get(&judged(words, &answer)));
+        let known = self.by_answer.get(&record.question, &answer);
         let outcome = match known {
             None => AnswerOutcome::Unjudged,
             Some(None) => AnswerOutcome::Unmarked,
@@ -144,11 +136,6 @@ impl Marks {
             judge: self.judge.clone().filter(|_| known.is_some()),
         }
     }
-}
-
-/// What identifies an answer for the judge.
-fn judged(words: &Digest, answer: &str) -> Digest {
-    Digest::of_parts([words.to_string().as_bytes(), answer.as_bytes()])
 }
 
 /// The true answer, the answer that was given, and its mark.

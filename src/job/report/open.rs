@@ -11,8 +11,10 @@ use super::enhancers;
 use super::join::join;
 use super::listing::listing;
 use super::report_folder::ReportFolder;
+use super::settings::{Settings, decisive, differing};
 use super::whole_report::{WholeReport, with_summary};
 use crate::error::{Error, Result};
+use crate::job::mark_index::MarkIndex;
 use crate::job::outcome::Outcome;
 use crate::job::outcome::StdoutFormat;
 use crate::job::predictions::{AnswerState, Prediction, predictions};
@@ -32,13 +34,16 @@ use crate::store::Store;
 use crate::types::flag::read_word;
 use crate::types::manifest::{RunManifest, Status};
 use crate::types::{
-    Digest, ModelListing, OpenDetail, QuestionId, Record, RunQuestion, Step, Thumbnail, TrialRef,
+    ModelListing, OpenDetail, QuestionId, Record, RunQuestion, Step, Thumbnail, TrialRef,
 };
 
 /// Setting in the manifest with the name of the judge.
 pub(crate) const JUDGE: &str = "--judge";
 /// Setting in the manifest with the protocol of judging.
 pub(crate) const PROTOCOL: &str = "--protocol";
+
+/// Column of the manifest with what decides the marks of each judge.
+pub(crate) const JUDGES: &str = "judge";
 
 /// The answers of a run, with their scores.
 pub(crate) struct Scores {
@@ -65,19 +70,16 @@ impl Scores {
         let protocol = setting(PROTOCOL).map_or(Ok(Protocol::Upstream), read_word)?;
         let ids: Vec<&QuestionId> = run.questions.iter().map(|question| &question.id).collect();
         let predictions = predictions(&run.records, &ids, protocol);
-        let words: Vec<Digest> = run
-            .questions
-            .iter()
-            .map(RunQuestion::judged_words)
-            .collect();
-        let marks = marks(&run, &words, judge.as_deref());
+        let marks = marks(&run, judge.as_deref());
         let failures = failures(&run.records);
         let (mut scored, mut answers) = (Vec::new(), Vec::new());
         for prediction in predictions {
             let question = ids[prediction.question];
-            let words = words[prediction.question];
-            let outcome = outcome(&prediction, words, &marks, protocol);
-            let judgement = judgement(&prediction, words, &marks);
+            let record = match &prediction.state {
+                AnswerState::Text { answer, .. } => marks.get(question, answer).copied(),
+                AnswerState::Missing | AnswerState::Null => None,
+            };
+            let outcome = outcome(&prediction, record, protocol);
             let failure = failures.get(&(question, prediction.subject.clone()));
             let failure = failure.filter(|_| outcome == AnswerOutcome::Missing);
             scored.push(ScoredAnswer {
@@ -91,7 +93,7 @@ impl Scores {
                 question: prediction.question,
                 answer: prediction.full_answer,
                 outcome,
-                judgement,
+                judgement: record.and_then(|record| record.reply.clone()),
                 failure: failure.cloned(),
             });
         }
@@ -252,6 +254,7 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
             }
         }
     }
+    check_judges(&runs)?;
     let joined = join(runs, is_answer)?;
     let mut alerts = of_runs(&joined);
     alerts.extend(of_joining(&joined));
@@ -266,8 +269,14 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
     let mut trials = joined.trials;
     let ids = joined.questions.iter().map(|question| &question.id);
     sort(&mut trials, ids, &first.manifest.models);
+    let mut records: Vec<Record<OpenDetail>> = trials.iter().map(TrialRef::record).collect();
+    // A model that stands under two names may be the judge, who has one.
+    let is_mark = |record: &&mut Record<OpenDetail>| record.detail.step == Step::Mark;
+    for record in records.iter_mut().filter(is_mark) {
+        record.model = joined.models.asked(&record.model).to_owned();
+    }
     let run = OpenRun {
-        records: trials.iter().map(TrialRef::record).collect(),
+        records,
         folder: first.folder,
         layout: first.layout,
         manifest: first.manifest,
@@ -280,6 +289,32 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
         enhancers,
         listing,
     })
+}
+
+/// Checks that judges of one name are the same: their marks are not told apart.
+fn check_judges(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
+    let judges: Vec<Option<Settings>> = runs.iter().map(|run| of_judge(&run.manifest)).collect();
+    let names: Vec<String> = runs.iter().map(StoredRun::name).collect();
+    let differences = differing(&judges);
+    let Some(first) = differences.first() else {
+        return Ok(());
+    };
+    let path = runs[first.values[0].0].folder.clone();
+    let words: Vec<String> = differences.iter().map(|one| one.words(&names)).collect();
+    let problem = format!(
+        "the judges of the runs have one name and differ: {}; marks of two judges cannot be compared; report each run alone, or mark \
+         the answers of one again: openeqa with the other's --judge flags, --answers with a file of its upstream folder, and a new --out",
+        words.join("; ")
+    );
+    Err(Error::Run { path, problem })
+}
+
+/// What decides the marks of the judge of a run; `None` if no judge was asked, or the run does not say.
+fn of_judge(manifest: &RunManifest) -> Option<Settings> {
+    let judge = manifest.settings.get(JUDGE)?.as_str()?;
+    // Runs of earlier versions have the judge among the models alone.
+    let columns = [JUDGES, "model"].map(|column| manifest.columns.get(column)?.get(judge));
+    columns.into_iter().flatten().next().map(decisive)
 }
 
 /// Scores a run, and writes its report and manifest into its folder. The run is incomplete if a mark cannot be read.
@@ -306,21 +341,18 @@ fn is_answer(trial: TrialRef<'_, OpenDetail>) -> bool {
     trial.is_answer()
 }
 
-/// The marks of a judge, by the words of the question and the answer: a mark is that of all questions with the same words.
-type Marks<'a> = HashMap<(Digest, &'a str), &'a Record<OpenDetail>>;
-
-fn marks<'a>(run: &'a OpenRun, words: &[Digest], judge: Option<&str>) -> Marks<'a> {
-    let ids = run.questions.iter().map(|question| &question.id);
-    let words: HashMap<&QuestionId, Digest> = ids.zip(words.iter().copied()).collect();
-    let marks = run.records.iter().filter(|record| {
-        let is_mark = record.detail.step == Step::Mark && Some(&*record.model) == judge;
-        is_mark && record.failure.is_none()
-    });
-    let marks = marks.filter_map(|record| {
-        let words = *words.get(&record.question)?;
-        Some(((words, record.detail.judged.as_deref()?), record))
-    });
-    marks.collect()
+/// The marks of the judge of a run.
+fn marks<'a>(run: &'a OpenRun, judge: Option<&str>) -> MarkIndex<&'a Record<OpenDetail>> {
+    let mut marks = MarkIndex::of(&run.questions);
+    for record in &run.records {
+        let is_of_judge = Some(&*record.model) == judge && record.failure.is_none();
+        if let (Step::Mark, Some(answer)) = (record.detail.step, &record.detail.judged)
+            && is_of_judge
+        {
+            marks.add(&record.question, answer, record);
+        }
+    }
+    marks
 }
 
 /// Why trials have no answer, in words with what the error says, by question and subject.
@@ -338,33 +370,22 @@ fn failures(records: &[Record<OpenDetail>]) -> BTreeMap<(&QuestionId, Subject), 
     failed.collect()
 }
 
-/// What the judge said of an answer.
-fn judgement(prediction: &Prediction, words: Digest, marks: &Marks<'_>) -> Option<String> {
-    let AnswerState::Text { answer, .. } = &prediction.state else {
-        return None;
-    };
-    let record = marks.get(&(words, &**answer))?;
-    record.reply.clone()
-}
-
-/// The outcome of an answer, from its mark.
+/// The outcome of an answer, from the record of its mark.
 fn outcome(
     prediction: &Prediction,
-    words: Digest,
-    marks: &Marks<'_>,
+    mark_record: Option<&Record<OpenDetail>>,
     protocol: Protocol,
 ) -> AnswerOutcome {
-    let answer = match &prediction.state {
-        AnswerState::Missing => return AnswerOutcome::Missing,
-        AnswerState::Null => return AnswerOutcome::Null,
-        AnswerState::Text { answer, .. } => answer,
-    };
-    let Some(record) = marks.get(&(words, &**answer)) else {
-        return AnswerOutcome::Unjudged;
-    };
-    // Marks of earlier versions are read again, so that all tables use the same reading.
-    let reply = record.reply.as_deref().unwrap_or_default();
-    mark(reply, protocol).map_or(AnswerOutcome::Unmarked, AnswerOutcome::Marked)
+    match (&prediction.state, mark_record) {
+        (AnswerState::Missing, _) => AnswerOutcome::Missing,
+        (AnswerState::Null, _) => AnswerOutcome::Null,
+        (AnswerState::Text { .. }, None) => AnswerOutcome::Unjudged,
+        (AnswerState::Text { .. }, Some(record)) => {
+            // Marks of earlier versions are read again, so that all tables use the same reading.
+            let reply = record.reply.as_deref().unwrap_or_default();
+            mark(reply, protocol).map_or(AnswerOutcome::Unmarked, AnswerOutcome::Marked)
+        }
+    }
 }
 
 fn topic(question: &RunQuestion) -> QuestionGroups {

@@ -221,9 +221,15 @@ pub(super) fn parameters(run: &RunManifest, model: &str) -> Option<Settings> {
         "--prompts"
     };
     let shared = some(run, &[asked_by]);
-    let own =
-        leaves(content).filter(|(flag, _)| !["--base-url", "--model"].contains(&flag.as_str()));
-    Some(own.chain(shared).collect())
+    Some(decisive(content).into_iter().chain(shared).collect())
+}
+
+/// The settings of a model without its address and name.
+pub(super) fn decisive(content: &Value) -> Settings {
+    let settings = leaves(content);
+    settings
+        .filter(|(flag, _)| !["--base-url", "--model"].contains(&flag.as_str()))
+        .collect()
 }
 
 /// The parameters of all models of a run that have flags: a flag with several values has all of them. `None` if no model has.
@@ -236,9 +242,7 @@ pub(super) fn parameter_flags(run: &RunManifest) -> Option<Settings> {
         .filter(|content| content.get("--base-url").is_some())
     {
         remote += 1;
-        for (flag, value) in
-            leaves(content).filter(|(flag, _)| !["--base-url", "--model"].contains(&flag.as_str()))
-        {
+        for (flag, value) in decisive(content) {
             values.entry(flag).or_default().insert(value);
         }
     }

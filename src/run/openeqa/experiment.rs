@@ -1,6 +1,6 @@
 //! The [`Experiment`] of open questions and of marks for the answers.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -111,8 +111,17 @@ impl Experiment for OpenSetup<'_> {
     }
 
     fn columns(&self) -> Columns {
-        let models = self.models.iter().chain(&self.judge);
-        identity::columns(models, &self.recipe, &self.config.job)
+        let mut columns = identity::columns(&self.models, &self.recipe, &self.config.job);
+        if let Some(judge) = &self.judge {
+            // A model that is its own judge may be asked for marks in another way than for answers.
+            let content = || BTreeMap::from([(judge.name.to_string(), identity::model(judge))]);
+            columns.insert(open::JUDGES.to_owned(), content());
+            let models = columns.entry("model".to_owned()).or_default();
+            for (name, content) in content() {
+                models.entry(name).or_insert(content);
+            }
+        }
+        columns
     }
 
     fn notes(&self) -> Vec<(&'static str, Value)> {
