@@ -107,7 +107,7 @@ fn flag(parameter: &str) -> String {
 
 /// Settings that decide the pixels of an enhancer. Automatic tiles are not among them: at most one sample in a thousand differs from
 /// those of the whole image.
-fn enhancer(digest: &Digest, size: &SizeArgs) -> Value {
+pub(crate) fn enhancer(digest: &Digest, size: &SizeArgs) -> Value {
     let tile = (size.tile != Tiling::Auto).then(|| size.tile.to_string());
     let mut content = json!({
         "--llie": digest,

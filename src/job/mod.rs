@@ -45,6 +45,7 @@ pub(crate) mod part_args;
 mod part_cost;
 pub(crate) mod photograph;
 pub(crate) mod photographs;
+pub(crate) mod placed_image;
 mod placed_trials;
 pub(crate) mod plan;
 pub(crate) mod predictions;

@@ -17,7 +17,7 @@ use crate::error::{Error, Result};
 use crate::types::Severity;
 use crate::types::key_values::{number, pairs};
 
-/// How automatic exposure answers less light (`--auto`).
+/// How automatic exposure answers less light.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub struct AutoExposure {
@@ -31,16 +31,53 @@ pub struct AutoExposure {
     pub base_time: f64,
 }
 
-impl Default for AutoExposure {
-    /// From 1/120 s to the 1/30 s of a video with 30 frames a second, then four stops of gain, where noise reduction would take
-    /// over; chosen. The gain is 1/16 of the largest K of the paper's range.
+/// Most stops of gain by default, where noise reduction would take over; chosen.
+const MOST_GAIN: f64 = 4.0;
+
+/// The same as the user writes it (`--auto`). What is not named of the gain follows from the camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AutoSettings {
+    shutter: f64,
+    gain: Option<f64>,
+    base_gain: Option<f64>,
+    base_time: f64,
+}
+
+impl Default for AutoSettings {
+    /// From 1/120 s to the 1/30 s of a video with 30 frames a second; chosen.
     fn default() -> Self {
         Self {
             shutter: 2.0,
-            gain: 4.0,
-            base_gain: 0.375,
+            gain: None,
+            base_gain: None,
             base_time: 1.0 / 120.0,
         }
+    }
+}
+
+impl AutoSettings {
+    /// The settings for a camera. The gain that is not named ends at the camera's greatest K, [`MOST_GAIN`] stops above K₀ if the camera
+    /// has so many.
+    #[must_use]
+    pub fn of_camera(&self, camera: &CameraModel) -> AutoExposure {
+        let [low, high] = camera.gain_range();
+        let base_gain = self
+            .base_gain
+            .unwrap_or_else(|| low.max(high / libm::exp2(MOST_GAIN)));
+        let most = || libm::log2(high / base_gain).clamp(0.0, MOST_GAIN);
+        AutoExposure {
+            shutter: self.shutter,
+            gain: self.gain.unwrap_or_else(most),
+            base_gain,
+            base_time: self.base_time,
+        }
+    }
+}
+
+impl Default for AutoExposure {
+    /// That of the paper's camera.
+    fn default() -> Self {
+        AutoSettings::default().of_camera(&CameraModel::default())
     }
 }
 
@@ -76,6 +113,10 @@ impl AutoExposure {
     }
 }
 
+/// How far K may be outside the range of the camera, as a share: a measured K has an error of 0.1 to 0.2 % (`calibrate`), and who types
+/// it rounds it.
+const GAIN_ERROR: f64 = 2e-3;
+
 impl AutoShot {
     /// The sensor branch for this shot: physical, with the gain K of the shot.
     ///
@@ -84,8 +125,8 @@ impl AutoShot {
     pub(crate) fn synthesis(&self, camera: &CameraModel) -> Result<Synthesis> {
         let [low, high] = camera.gain_range();
         let gain = self.system_gain;
-        if !(low..=high).contains(&gain) {
-            let rounded = |gain: f64| (gain * 1000.0).round() / 1000.0;
+        if gain < low * (1.0 - GAIN_ERROR) || gain > high * (1.0 + GAIN_ERROR) {
+            let rounded = |gain: f64| (gain * 1e4).round() / 1e4;
             let problem = format_args!(
                 "at {} stops of gain, K is {}, but {} has K from {} to {}; set another base-gain or fewer stops of gain",
                 self.gain,
@@ -102,7 +143,7 @@ impl AutoShot {
     }
 }
 
-impl FromStr for AutoExposure {
+impl FromStr for AutoSettings {
     type Err = String;
 
     /// Reads `shutter=2,gain=4,base-gain=0.375,base-time=1/120`; what is not named is as by default.
@@ -111,10 +152,11 @@ impl FromStr for AutoExposure {
         for (key, value) in pairs(text, &["shutter", "gain", "base-gain", "base-time"])? {
             match key {
                 "shutter" => auto.shutter = number(key, value, "EV", 0.0..=16.0)?,
-                "gain" => auto.gain = number(key, value, "EV", 0.0..=16.0)?,
+                "gain" => auto.gain = Some(number(key, value, "EV", 0.0..=16.0)?),
                 "base-gain" => {
                     let [low, high] = GAINS;
-                    auto.base_gain = number(key, value, "ADU per electron", low..=high)?;
+                    let base_gain = number(key, value, "ADU per electron", low..=high)?;
+                    auto.base_gain = Some(base_gain);
                 }
                 _ => auto.base_time = seconds(value)?,
             }
@@ -142,24 +184,34 @@ fn seconds(value: &str) -> Result<f64, String> {
     })
 }
 
-impl fmt::Display for AutoExposure {
+impl fmt::Display for AutoSettings {
+    /// What is named, as it is read.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            shutter,
-            gain,
-            base_gain,
-            base_time,
-        } = self;
-        write!(
-            f,
-            "shutter={shutter},gain={gain},base-gain={base_gain},base-time="
-        )?;
-        let whole = base_time.recip().round();
-        if whole > 1.0 && whole.recip().to_bits() == base_time.to_bits() {
+        write!(f, "shutter={},", self.shutter)?;
+        for (key, value) in [("gain", self.gain), ("base-gain", self.base_gain)] {
+            if let Some(value) = value {
+                write!(f, "{key}={value},")?;
+            }
+        }
+        f.write_str("base-time=")?;
+        let whole = self.base_time.recip().round();
+        if whole > 1.0 && whole.recip().to_bits() == self.base_time.to_bits() {
             write!(f, "1/{whole}")
         } else {
-            write!(f, "{base_time}")
+            write!(f, "{}", self.base_time)
         }
+    }
+}
+
+impl fmt::Display for AutoExposure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let named = AutoSettings {
+            shutter: self.shutter,
+            gain: Some(self.gain),
+            base_gain: Some(self.base_gain),
+            base_time: self.base_time,
+        };
+        named.fmt(f)
     }
 }
 
@@ -195,7 +247,8 @@ mod tests {
     #[test]
     fn a_gain_that_the_camera_lacks_is_refused() {
         let camera = CameraModel::default();
-        let shot = |auto: &str, drop| auto.parse::<AutoExposure>().unwrap().shot(drop);
+        let settings = |auto: &str| auto.parse::<AutoSettings>().unwrap();
+        let shot = |auto: &str, drop| settings(auto).of_camera(&camera).shot(drop);
         let most = shot("gain=4", Severity::L3).synthesis(&camera).unwrap();
         assert_eq!(most.name().as_str(), "physical");
         for auto in [
@@ -215,17 +268,51 @@ mod tests {
     }
 
     #[test]
+    fn the_gain_follows_from_the_camera() {
+        let of = |auto: &str, camera: &CameraModel| {
+            let settings: AutoSettings = auto.parse().unwrap();
+            let auto = settings.of_camera(camera);
+            // Whatever the camera, no level is refused.
+            for drop in [Severity::L1, Severity::L3, Severity::L5] {
+                auto.shot(drop).synthesis(camera).unwrap();
+            }
+            (auto.base_gain, auto.gain)
+        };
+        let nikon = CameraModel::preset("nikon-d850").unwrap();
+        let [_, high] = nikon.gain_range();
+        assert_eq!(of("shutter=2", &nikon), (high / 16.0, 4.0));
+        assert_eq!(of("gain=2", &nikon), (high / 16.0, 2.0));
+        assert_eq!(of(&format!("base-gain={}", high / 4.0), &nikon).1, 2.0);
+        // One setting was measured: there is no gain to raise. Its K is typed with the digits of a table.
+        let mut own = CameraModel::default();
+        own.set_gain_range([0.399_7, 0.399_7]).unwrap();
+        assert_eq!(of("shutter=2", &own), (0.399_7, 0.0));
+        assert_eq!(of("gain=0,base-gain=0.4", &own), (0.4, 0.0));
+        let shot = "gain=0,base-gain=0.401".parse::<AutoSettings>().unwrap();
+        let shot = shot.of_camera(&own).shot(Severity::L1);
+        let error = shot.synthesis(&own).unwrap_err().to_string();
+        assert!(
+            error.contains("K is 0.401, but sony-a7s2 has K from 0.3997 to 0.3997"),
+            "{error}"
+        );
+    }
+
+    #[test]
     fn settings_are_written_as_they_are_read() {
         let written = "shutter=2,gain=4,base-gain=0.375,base-time=1/120";
         assert_eq!(AutoExposure::default().to_string(), written);
+        let of_flag = "shutter=2,base-time=1/120";
+        assert_eq!(AutoSettings::default().to_string(), of_flag);
         for text in [
             written,
+            of_flag,
+            "shutter=2,base-gain=1,base-time=1/120",
             "shutter=0,gain=0,base-gain=6,base-time=0.5",
             "shutter=1.5,gain=3,base-gain=0.1,base-time=2.5",
             "shutter=1,gain=1,base-gain=1,base-time=1/3",
         ] {
-            let auto: AutoExposure = text.parse().unwrap();
-            let again: AutoExposure = auto.to_string().parse().unwrap();
+            let auto: AutoSettings = text.parse().unwrap();
+            let again: AutoSettings = auto.to_string().parse().unwrap();
             assert_eq!(again, auto, "{text}");
         }
         for (wrong, part) in [
@@ -243,7 +330,7 @@ mod tests {
             ("base-time=1/0", "base-time=1/0"),
             ("base-time=11", "up to 10, expected, as 1/120 or 0.01"),
         ] {
-            let error = wrong.parse::<AutoExposure>().unwrap_err();
+            let error = wrong.parse::<AutoSettings>().unwrap_err();
             assert!(error.contains(part), "{wrong}: {error}");
         }
     }

@@ -89,7 +89,9 @@ mod tests {
     use crate::synthesis::noise::{Term, add};
     use crate::synthesis::reading::{Amplify, LightReading, Synthesis};
     use crate::synthesis::unprocess::unprocess;
-    use crate::synthesis::{AutoExposure, CameraModel, CameraState, FrameView, Motion};
+    use crate::synthesis::{
+        AutoExposure, AutoSettings, CameraModel, CameraState, FrameView, Motion,
+    };
     use crate::types::{Degradation, FrameId, Severity};
 
     fn key(frame: &str) -> NoiseKey {
@@ -107,7 +109,9 @@ mod tests {
         camera.pin_gain(3.0).unwrap();
         camera.pin_ratio(7.0).unwrap();
         let synthesis = Synthesis::of(LightReading::Eld, camera);
-        let camera: (AutoExposure, Motion) = (auto.parse().unwrap(), motion.parse().unwrap());
+        let auto: AutoSettings = auto.parse().unwrap();
+        let auto = auto.of_camera(&CameraModel::default());
+        let camera: (AutoExposure, Motion) = (auto, motion.parse().unwrap());
         let how: Degradation = how.parse().unwrap();
         let view = FrameView {
             width: 640,
@@ -301,7 +305,9 @@ mod tests {
     #[test]
     fn a_gain_or_a_path_beyond_the_camera_is_refused() {
         let refused = |how: &str, auto: &str, motion: &str| {
-            let camera: (AutoExposure, Motion) = (auto.parse().unwrap(), motion.parse().unwrap());
+            let auto: AutoSettings = auto.parse().unwrap();
+            let auto = auto.of_camera(&CameraModel::default());
+            let camera: (AutoExposure, Motion) = (auto, motion.parse().unwrap());
             let how: Degradation = how.parse().unwrap();
             let view = FrameView {
                 width: 640,

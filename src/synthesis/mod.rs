@@ -53,7 +53,7 @@ mod streak;
 pub(crate) mod unprocess;
 
 pub use applied::AppliedDegradation;
-pub use auto::{AutoExposure, AutoShot};
+pub use auto::{AutoExposure, AutoSettings, AutoShot};
 pub use camera::{Calibration, CameraModel, CameraState, Sampling};
 pub use clean::Clean;
 pub(crate) use clean_raw::CleanRaw;

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use super::applied::AppliedDegradation;
-use super::auto::AutoExposure;
+use super::auto::{AutoExposure, AutoSettings};
 use super::levels::{LIGHT, Levels, ladder};
 use super::motion::{FrameView, Motion};
 use super::random::NoiseKey;
@@ -60,10 +60,11 @@ pub(crate) struct CameraArgs {
     /// How the automatic exposure of the variant auto meets a drop: the maximum number of stops of longer exposure, then of stops of gain,
     /// starting at L0 from a system gain K in ADU per electron and an exposure time in seconds; the rest of the drop stays dark
     ///
-    /// Settings that are not named have their defaults. The noise is that of the light reading physical at this gain, in the sensor of
-    /// --camera.
-    #[arg(long, value_name = "KEY=VALUE,…", default_value_t = AutoExposure::default(), add = Decides::Pixels)]
-    pub auto: AutoExposure,
+    /// Settings that are not named have their defaults. Those of gain and base-gain follow from the sensor of --camera: the gain ends at
+    /// its greatest K, and starts 4 stops below, or at its least K (the paper's: gain=4,base-gain=0.375). The noise is that of the
+    /// light reading physical at this gain, in this sensor.
+    #[arg(long, value_name = "KEY=VALUE,…", default_value_t = AutoSettings::default(), add = Decides::Pixels)]
+    pub auto: AutoSettings,
     /// How the camera turns during an exposure, in the variants motion and auto: speed in degrees per second, horizontal field of view in
     /// degrees if the data do not state the camera, angle in degrees (0: to the side, 90: up or down) or random for each image
     ///
@@ -252,9 +253,10 @@ impl KindSettings {
     /// # Errors
     /// [`Error::Usage`] with the flag that cannot be used.
     pub(crate) fn resolve(sensor: &SensorArgs, camera: &CameraArgs) -> Result<Self> {
+        let sensor = SensorSettings::resolve(sensor)?;
         Ok(Self {
-            sensor: SensorSettings::resolve(sensor)?,
-            auto: camera.auto,
+            auto: camera.auto.of_camera(&sensor.readings.camera()),
+            sensor,
             motion: camera.motion,
         })
     }

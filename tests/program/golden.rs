@@ -72,4 +72,4 @@ fn open_questions_with_marks_and_an_enhancer() {
 
 const EVALUATION: &str = "606a2241c9576e4d";
 const READINGS: &str = "7dd1c3480f882b09";
-const OPENEQA: &str = "4bd4495fc97beb16";
+const OPENEQA: &str = "1bcb4bceb5abc5b5";

@@ -254,5 +254,9 @@ pub(super) fn why(reason: NoEvidence) -> String {
             percent(distance).replace('-', "−"),
             percent(MIN_DISTANCE)
         ),
+        NoEvidence::Unsure(low) => format!(
+            "the ceiling may be no higher than the floor: the 95 % interval of their distance begins at {} points",
+            percent(low).replace('-', "−")
+        ),
     }
 }

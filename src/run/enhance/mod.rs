@@ -1,26 +1,28 @@
 //! `enhance`: writing images that an enhancer made, describing the enhancer, or examining it.
 
 mod doctor;
+mod origin;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::ask::png;
-use crate::dataset::inputs::{InputFrame, Inputs};
+use crate::dataset::inputs::Inputs;
 use crate::dataset::{CodesArgs, PixelLimit, RootArgs};
 use crate::enhance::{Enhancer, FRAMES, ImageOutput, ModelFile};
 use crate::error::{Error, Result};
-use crate::files::write;
 use crate::job::Outcome;
 use crate::job::dark_frames::{darkened, evenly};
 use crate::job::enhancers::{EnhancerRunArgs, OpenEnhancers};
+use crate::job::identity;
 use crate::job::input_tally::InputTally;
 use crate::job::part_args::{PartArgs, keep_part};
+use crate::job::placed_image::{ImageOutcome, Placed};
 use crate::job::progress::Progress;
 use crate::types::manifest::Status;
 use crate::types::{Decides, Rgb};
 use doctor::DoctorArgs;
+use origin::EnhancedOrigin;
 
 /// Number of outputs that are tried as the image; chosen: models that give each of their steps have fewer.
 const MOST_OUTPUTS: usize = 16;
@@ -36,7 +38,7 @@ pub(crate) struct EnhanceArgs {
     /// Images (PNG, JPEG, WebP, TIFF, BMP) and folders of frames
     #[arg(value_name = "INPUT", required_unless_present = "describe", add = Decides::Pixels)]
     pub inputs: Vec<PathBuf>,
-    /// Where the enhanced images go, as PNG under their own names; default: nowhere, with --describe
+    /// Where the enhanced images go, as PNG under their own names, each with a JSON file; default: nowhere, with --describe
     #[arg(long, value_name = "DIR", required_unless_present = "describe", add = Decides::Nothing)]
     pub out: Option<PathBuf>,
     /// Print how the model's input and output are read, and why; enhances nothing
@@ -51,7 +53,7 @@ pub(crate) struct EnhanceArgs {
     /// The part of the images.
     #[command(flatten)]
     pub part: PartArgs,
-    /// Replace images that exist already
+    /// Replace images that exist already, also those of other models and settings
     #[arg(long, help_heading = "Output", add = Decides::Nothing)]
     pub force: bool,
     /// The maximum size of an image.
@@ -72,7 +74,9 @@ pub(crate) struct EnhanceArgs {
 /// # Errors
 /// If the model or an input is missing, two images have the same name, or the folder cannot be written to.
 pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
-    let (mut enhancer, image) = open(args)?;
+    let file = ModelFile::read(&args.model)?;
+    let digest = file.digest();
+    let (mut enhancer, image) = open(file, args)?;
     let Some(out) = &args.out else {
         return Ok(Outcome::text(Status::Complete, enhancer.describe()));
     };
@@ -105,18 +109,25 @@ pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome
         progress.bar("images", images.entries.len()),
         InputTally::default(),
     );
+    let settings = identity::enhancer(&digest, &args.loading.size);
     let (mut written, mut unchanged, mut failed) = (0, 0, 0);
     for entry in &images.entries {
-        let path = out.join(format!("{}.png", entry.stem));
-        if path.exists() && !args.force {
-            unchanged += 1;
-        } else {
-            match enhance_one(&mut enhancer, &images, entry, &path, &tally) {
-                Ok(()) => written += 1,
-                Err(e) => {
-                    failed += 1;
-                    tracing::error!("{e}");
-                }
+        let picture = images.picture(entry);
+        let outcome = picture.and_then(|picture| {
+            tally.add(&entry.id, &picture.note());
+            let origin = EnhancedOrigin::new(&entry.id, &picture, &settings);
+            let place = Placed::new(out, &entry.stem, args.force);
+            place.put(&origin, || {
+                let enhanced = enhancer.enhance(&picture.decode()?);
+                enhanced.map_err(|e| Error::data(format_args!("image {:?}", entry.id.0), e))
+            })
+        });
+        match outcome {
+            Ok(ImageOutcome::Written) => written += 1,
+            Ok(ImageOutcome::Unchanged) => unchanged += 1,
+            Err(e) => {
+                failed += 1;
+                tracing::error!("{e}");
             }
         }
         bar.inc();
@@ -145,14 +156,14 @@ pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome
 }
 
 /// The enhancer, and whether it is known which of its outputs is the image. If it is not, `--doctor` examines all of them.
-fn open(args: &EnhanceArgs) -> Result<(Enhancer, ImageOutput)> {
+fn open(file: ModelFile, args: &EnhanceArgs) -> Result<(Enhancer, ImageOutput)> {
     let load = |file: ModelFile| -> Result<Enhancer> {
         let enhancers = OpenEnhancers::load(vec![file], &args.loading)?.take()?;
         let mut enhancers = enhancers.into_iter();
         let only = enhancers.next();
         only.ok_or_else(|| Error::usage("MODEL", "one model expected"))
     };
-    let problem = match load(ModelFile::read(&args.model)?) {
+    let problem = match load(file) {
         Ok(enhancer) => return Ok((enhancer, ImageOutput::Known)),
         Err(problem) => problem,
     };
@@ -164,18 +175,4 @@ fn open(args: &EnhanceArgs) -> Result<(Enhancer, ImageOutput)> {
         }
     }
     Err(problem)
-}
-
-fn enhance_one(
-    enhancer: &mut Enhancer,
-    images: &Inputs,
-    entry: &InputFrame,
-    path: &Path,
-    tally: &InputTally,
-) -> Result<()> {
-    let picture = images.picture(entry)?;
-    tally.add(&entry.id, &picture.note());
-    let enhanced = enhancer.enhance(&picture.decode()?);
-    let with_name = |e| Error::data(format_args!("image {:?}", entry.id.0), e);
-    write(path, &png(&enhanced.map_err(with_name)?)?)
 }

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::placed::OutputFile;
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::job::Outcome;
+use crate::job::placed_image::OutputFile;
 use crate::types::manifest::Status;
 
 /// The schemas of JSON files that vouch for an image. Other JSON files of the folder are left alone.

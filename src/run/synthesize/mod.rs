@@ -1,7 +1,6 @@
 //! `synthesize`: writing low-light versions of images, the same as an evaluation of the same folder would send.
 
 mod check;
-mod placed;
 mod sheet;
 mod sidecar;
 
@@ -20,6 +19,7 @@ use crate::job::frame_work::FrameWork;
 use crate::job::image_steps::ImageSteps;
 use crate::job::input_tally::InputTally;
 use crate::job::part_args::{PartArgs, keep_part};
+use crate::job::placed_image::{ImageOutcome, Placed, Sidecar};
 use crate::job::progress::{Progress, StepBar};
 use crate::job::recipe::Recipe;
 use crate::job::source::Frames;
@@ -29,7 +29,6 @@ use crate::report::words::counted;
 use crate::synthesis::{LightArgs, LightSettings, NoiseKey};
 use crate::types::manifest::Status;
 use crate::types::{Condition, Decides, Degradation, FrameId, SetLight};
-use placed::{ImageOutcome, Placed, Sidecar};
 
 pub(crate) use sheet::Sheet;
 use sheet::SheetRecipe;

@@ -8,10 +8,10 @@ use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::placed::ImageOrigin;
 use crate::dataset::Picture;
 use crate::error::Result;
 use crate::job::frame_work::FrameWork;
+use crate::job::placed_image::ImageOrigin;
 use crate::report::sheet::{self, LevelBlock, LevelImage, LevelRow, Signal};
 use crate::synthesis::bayer::Bayer;
 use crate::synthesis::noise::{self, Term};

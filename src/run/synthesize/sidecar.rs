@@ -5,9 +5,9 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::placed::{ImageOrigin, Sidecar};
 use crate::dataset::Picture;
 use crate::error::{Error, Result};
+use crate::job::placed_image::{ImageOrigin, Sidecar};
 use crate::synthesis::blur::{blur, blurred_codes};
 use crate::synthesis::{
     self, Amplify, AppliedDegradation, CameraState, Clean, Coupling, Draws, NoiseKey, Streak, Tone,

@@ -22,6 +22,9 @@ pub(crate) enum NoEvidence {
     NotBlind,
     /// The ceiling is less than [`MIN_DISTANCE`] above the floor: this distance.
     Close(f64),
+    /// The 95 % interval of this distance begins at or below 0: here. A share of a distance that may be 0 has no bounded interval (Fieller
+    /// 1954, J. R. Stat. Soc. B 16:175).
+    Unsure(f64),
 }
 
 /// Agreement with the answers in the light of the same model: without an image, and asked again in the light.
@@ -31,33 +34,44 @@ pub(super) struct Bounds {
     blind: Vec<ClusterCount>,
     /// The ceiling, by cluster.
     again: Vec<ClusterCount>,
+    /// Floor and ceiling in each draw of the bootstrap; not a number in a draw without a reply.
+    drawn: Vec<[f64; 2]>,
 }
 
 impl Bounds {
     /// The bounds of a subject on the items of a family.
     ///
     /// # Errors
-    /// If one of them was not asked, or they are too close.
+    /// If one of them was not asked, or they are too close, or may be.
     pub(super) fn of(
         grid: &Grid<'_>,
-        subject: &Subject,
-        family: Option<&Family>,
+        (subject, family): (&Subject, Option<&Family>),
         mode: ReadingMode,
+        draws: &Resamples,
     ) -> Result<Self, NoEvidence> {
         let light = Subject::seeing(&subject.model, AxisLevel::L0, &subject.variant, None);
         let again = grid.stand_in(&light).ok_or(NoEvidence::NotAgain)?;
         let blind = Subject::new(&subject.model, None);
         let blind = grid.stand_in(&blind).ok_or(NoEvidence::NotBlind)?;
-        let bounds = Self {
-            blind: grid.counts(blind, family, mode),
-            again: grid.counts(again, family, mode),
-        };
-        let ceiling = share(&bounds.again).ok_or(NoEvidence::NotAgain)?;
-        let floor = share(&bounds.blind).ok_or(NoEvidence::NotBlind)?;
+        let [blind, again] = [blind, again].map(|subject| grid.counts(subject, family, mode));
+        let ceiling = share(&again).ok_or(NoEvidence::NotAgain)?;
+        let floor = share(&blind).ok_or(NoEvidence::NotBlind)?;
         if ceiling - floor < MIN_DISTANCE {
             return Err(NoEvidence::Close(ceiling - floor));
         }
-        Ok(bounds)
+        let floors = drawn_shares(&blind, draws).into_iter();
+        let drawn = floors.zip(drawn_shares(&again, draws));
+        let drawn: Vec<[f64; 2]> = drawn.map(|(floor, ceiling)| [floor, ceiling]).collect();
+        let distances = drawn.iter().map(|[floor, ceiling]| ceiling - floor);
+        let [low, _] = draws.interval(distances.filter(|distance| !distance.is_nan()).collect());
+        if low <= 0.0 {
+            return Err(NoEvidence::Unsure(low));
+        }
+        Ok(Self {
+            blind,
+            again,
+            drawn,
+        })
     }
 }
 
@@ -66,6 +80,17 @@ fn share(counts: &[ClusterCount]) -> Option<f64> {
     let right: u32 = counts.iter().map(|count| count.right).sum();
     let replies: u32 = counts.iter().map(|count| count.replies).sum();
     (replies > 0).then(|| f64::from(right) / f64::from(replies))
+}
+
+/// The share of the items that agree in each draw; not a number in one without a reply.
+fn drawn_shares(counts: &[ClusterCount], draws: &Resamples) -> Vec<f64> {
+    let sums = |number: fn(&ClusterCount) -> u32| {
+        let numbers: Vec<f32> = counts.iter().map(|count| number(count) as f32).collect();
+        draws.sums(&numbers)
+    };
+    let (right, replies) = (sums(|count| count.right), sums(|count| count.replies));
+    let shares = right.iter().zip(&replies).map(|(right, n)| right / n);
+    shares.collect()
 }
 
 /// Share of the way from the floor B to the ceiling C that the agreement G of a condition has: (G − B) / (C − B), with the interval of the
@@ -77,22 +102,10 @@ pub(super) fn evidence(
 ) -> Option<Estimate> {
     let of = |here: f64, floor: f64, ceiling: f64| (here - floor) / (ceiling - floor);
     let value = of(share(counts)?, share(&bounds.blind)?, share(&bounds.again)?);
-    let sums = |counts: &[ClusterCount], number: fn(&ClusterCount) -> u32| {
-        let numbers: Vec<f32> = counts.iter().map(|count| number(count) as f32).collect();
-        draws.sums(&numbers)
-    };
-    let shares = |counts: &[ClusterCount]| -> Vec<f64> {
-        let (right, replies) = (sums(counts, |c| c.right), sums(counts, |c| c.replies));
-        right
-            .iter()
-            .zip(&replies)
-            .map(|(right, n)| right / n)
-            .collect()
-    };
-    let (here, floor, ceiling) = (shares(counts), shares(&bounds.blind), shares(&bounds.again));
-    let drawn = here.iter().zip(floor.iter().zip(&ceiling));
-    let drawn = drawn.map(|(here, (floor, ceiling))| of(*here, *floor, *ceiling));
-    // A draw without a reply says nothing.
+    let drawn = drawn_shares(counts, draws).into_iter().zip(&bounds.drawn);
+    let drawn = drawn.map(|(here, [floor, ceiling])| of(here, *floor, *ceiling));
+    // A draw without a reply says nothing. Where floor and ceiling meet, which happens in fewer draws than lie outside the interval, an
+    // end of the interval is never infinite.
     let drawn: Vec<f64> = drawn.filter(|value| !value.is_nan()).collect();
     let replies = counts.iter().map(|count| count.replies as usize).sum();
     Some(Estimate::around(value, draws.interval(drawn), replies))
@@ -126,7 +139,7 @@ pub(super) fn curves(grid: &Grid<'_>, draws: &Resamples) -> Vec<EvidenceCurve> {
     let all = CurvePoints::all(grid).into_iter().filter_map(|points| {
         let (_, light) = points.subjects.first()?;
         let (darkest, _) = points.subjects.last()?;
-        let bounds = Bounds::of(grid, &grid.subjects[*light], None, mode);
+        let bounds = Bounds::of(grid, (&grid.subjects[*light], None), mode, draws);
         let threshold = match bounds {
             Err(reason) => Err(NoHalf::NoEvidence(reason)),
             Ok(bounds) => {

@@ -50,6 +50,26 @@ fn the_command_enhances_files_and_folders() {
     });
     let (_, out, _) = call(&["c.png", "--out", "mended", "--llie-anyway"]);
     assert!(out.contains("1 left as they were"), "{out}");
+    // What another model made, or the same with other settings, is never taken for the image.
+    std::fs::write(at("gain.onnx.toml"), "color_out = \"bgr\"\n").unwrap();
+    let (code, out, err) = call(&["c.png", "--out", "mended", "--llie-anyway"]);
+    assert_eq!(
+        (code, out.as_str()),
+        (1, "mended: 0 made by gain, 1 failed\n"),
+        "{err}"
+    );
+    assert!(
+        err.contains(
+            "c.png: made from another image or with other settings; --force overwrites it"
+        ),
+        "{err}"
+    );
+    std::fs::remove_file(at("gain.onnx.toml")).unwrap();
+    // An image of an earlier version has no JSON file: it is the same if its pixels are.
+    std::fs::remove_file(at("mended/c.json")).unwrap();
+    let (code, out, _) = call(&["c.png", "--out", "mended", "--llie-anyway"]);
+    assert!(code == 0 && out.contains("1 left as they were"), "{out}");
+    assert!(at("mended/c.json").is_file());
     let (code, out, _) = call(&["--describe"]);
     assert!(
         code == 0 && out.contains("NCHW") && out.contains("usual"),

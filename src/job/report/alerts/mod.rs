@@ -13,7 +13,7 @@ mod servers;
 mod settings;
 mod words;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::combine::Combined;
 use super::enhancers::of_enhancers;
@@ -26,7 +26,7 @@ use crate::score::pair_darkness::PairDarkness;
 use crate::score::photographed_set::PhotographedSet;
 use crate::score::self_agreement::SelfAgreement;
 use crate::types::manifest::Status;
-use crate::types::{Detail, InputSummary};
+use crate::types::{Detail, FrameId, InputSummary};
 
 /// All alerts of a report on questions with choices, in the order of their kinds.
 pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert> {
@@ -43,6 +43,7 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
     alerts.extend(questions::of_repeats(combined));
     alerts.extend(questions::of_items(findings));
     alerts.extend(of_clusters(findings.grid.clusters, findings.unit));
+    alerts.extend(of_one_frame(combined, findings.grid.clusters));
     alerts.extend(of_set(findings.set));
     let oddities = findings.pairs.iter().flat_map(PairDarkness::oddities);
     alerts.extend(oddities.map(|text| Alert::new(AlertKind::Pairs, text)));
@@ -61,6 +62,7 @@ pub(super) fn alerts_without_truths(combined: &Combined, found: &SelfAgreement<'
         &combined.trials,
     ));
     alerts.extend(of_clusters(found.grid.clusters, found.unit));
+    alerts.extend(of_one_frame(combined, found.grid.clusters));
     alerts.extend(of_set(found.set));
     alerts.sort_by_key(|alert| alert.kind);
     alerts
@@ -79,6 +81,15 @@ fn of_clusters(clusters: usize, unit: ClusterUnit) -> Option<Alert> {
             "Only {} ({MIN_SCENES} are needed): intervals and tests are rough.",
             counted(clusters, &unit.to_string())
         );
+        Alert::new(AlertKind::Clusters, text)
+    })
+}
+
+/// That all questions are about one frame, of which there are enough for intervals.
+fn of_one_frame(combined: &Combined, clusters: usize) -> Option<Alert> {
+    let frames: BTreeSet<&FrameId> = combined.questions.iter().map(|one| &one.frame).collect();
+    (frames.len() == 1 && clusters >= MIN_SCENES).then(|| {
+        let text = "Only 1 frame: intervals and tests are by question, and say nothing about other frames.";
         Alert::new(AlertKind::Clusters, text)
     })
 }

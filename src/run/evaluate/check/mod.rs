@@ -37,7 +37,7 @@ pub(crate) struct CheckArgs {
     /// The data, in place of --data; default: --data
     #[arg(value_name = "DATA", value_parser = crate::dataset::place, add = Decides::Nothing)]
     pub place: Option<DataPlace>,
-    /// Decode every image, so that a truncated file is found
+    /// Decode every image, so that damage inside a file is found; one that ends early is found without
     #[arg(long, help_heading = "Check", add = Decides::Nothing)]
     pub deep: bool,
     /// Write the questions as they were read, one a line, with the SHA-256 of each image; default: none

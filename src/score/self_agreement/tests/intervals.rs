@@ -1,6 +1,7 @@
 //! How often the intervals hold the truth.
 
 use super::simulated::{Draws, cell, record};
+use crate::score::self_agreement::evidence::NoEvidence;
 use crate::score::split_mix::SplitMix;
 use crate::types::Record;
 
@@ -46,4 +47,23 @@ fn intervals_of_evidence_and_kappa_hold_the_truth() {
     }
     // Three standard errors below 95 in a hundred. Of 400 runs 382 and 385 held it.
     assert!(held.iter().all(|held| *held >= 52), "{held:?}");
+}
+
+/// One image with four questions: the model agrees with itself at L0, and without the image for half of the questions. In many draws of
+/// the bootstrap floor and ceiling are the same.
+#[test]
+fn no_share_is_given_of_a_distance_that_may_be_nothing() {
+    let mut records = Vec::new();
+    for question in 0..4 {
+        records.push(record(question, 0, "L0", 0, Some(0)));
+        records.push(record(question, 0, "L0", 1, Some(0)));
+        records.push(record(question, 0, "", 0, Some(question % 2)));
+        records.push(record(question, 0, "L5-noise", 0, Some(question / 2)));
+    }
+    let dark = cell(&records, "L5-noise");
+    assert!(
+        matches!(dark.evidence, Some(Err(NoEvidence::Unsure(low))) if low <= 0.0),
+        "{:?}",
+        dark.evidence
+    );
 }

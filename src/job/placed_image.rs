@@ -16,7 +16,7 @@ use crate::files::{reading, write};
 use crate::types::{Digest, Rgb};
 
 /// What an image was made from, as its JSON file holds it.
-pub(super) trait ImageOrigin: Clone + PartialEq + Serialize + DeserializeOwned {
+pub(crate) trait ImageOrigin: Clone + PartialEq + Serialize + DeserializeOwned {
     /// The values of `schema` that are read; the first is written.
     const SCHEMAS: &'static [&'static str];
     /// Whether an intact image with other settings is replaced; else it is refused.
@@ -25,12 +25,12 @@ pub(super) trait ImageOrigin: Clone + PartialEq + Serialize + DeserializeOwned {
 
 /// The content of a JSON file beside an image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Sidecar<R> {
+pub(crate) struct Sidecar<R> {
     schema: String,
     /// The version of this program, for information only.
     darkqa_eval: String,
     #[serde(flatten)]
-    pub(super) recipe: R,
+    pub(crate) recipe: R,
     /// The image file; `None` in files of the first schema.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     output: Option<OutputFile>,
@@ -38,9 +38,9 @@ pub(super) struct Sidecar<R> {
 
 /// An image file as it was written.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct OutputFile {
+pub(crate) struct OutputFile {
     /// The name of the file, in the folder of the JSON file.
-    pub(super) file: String,
+    pub(crate) file: String,
     /// Its length.
     bytes: u64,
     /// The BLAKE3 digest of its bytes.
@@ -58,7 +58,7 @@ impl OutputFile {
     }
 
     /// What is wrong with the bytes of the file; `None` if they are those that were written.
-    pub(super) fn fault(&self, bytes: &[u8]) -> Option<String> {
+    pub(crate) fn fault(&self, bytes: &[u8]) -> Option<String> {
         if bytes.len() as u64 != self.bytes {
             let found = bytes.len();
             return Some(format!(
@@ -76,7 +76,7 @@ impl<R: ImageOrigin> Sidecar<R> {
     ///
     /// # Errors
     /// If it cannot be read, is not of this form, or has a schema that this program does not know.
-    pub(super) fn read(path: &Path) -> Result<Self> {
+    pub(crate) fn read(path: &Path) -> Result<Self> {
         let text = reading::text(path)?;
         let wrong = |problem: String| Error::data(path.display(), problem);
         let read: Self = serde_json::from_str(&text)
@@ -92,7 +92,7 @@ impl<R: ImageOrigin> Sidecar<R> {
     }
 
     /// The version of the program that wrote the file.
-    pub(super) fn program(&self) -> &str {
+    pub(crate) fn program(&self) -> &str {
         &self.darkqa_eval
     }
 
@@ -113,7 +113,7 @@ impl<R: ImageOrigin> Sidecar<R> {
 
 /// What became of one output file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum ImageOutcome {
+pub(crate) enum ImageOutcome {
     /// The image was made.
     Written,
     /// The image was there.
@@ -131,7 +131,7 @@ enum Verdict {
 }
 
 /// The place of an image and of its JSON file.
-pub(super) struct Placed {
+pub(crate) struct Placed {
     image: PathBuf,
     json: PathBuf,
     /// Whether to write over whatever is there.
@@ -140,7 +140,7 @@ pub(super) struct Placed {
 
 impl Placed {
     /// The place of the image `name` in a folder.
-    pub(super) fn new(folder: &Path, name: &str, is_forced: bool) -> Self {
+    pub(crate) fn new(folder: &Path, name: &str, is_forced: bool) -> Self {
         let [image, json] = [".png", ".json"].map(|end| folder.join(name.to_owned() + end));
         Self {
             image,
@@ -153,7 +153,7 @@ impl Placed {
     ///
     /// # Errors
     /// If another image or JSON file is there, or a file cannot be read or written.
-    pub(super) fn put<R: ImageOrigin>(
+    pub(crate) fn put<R: ImageOrigin>(
         &self,
         recipe: &R,
         make: impl FnOnce() -> Result<Rgb>,
