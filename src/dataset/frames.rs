@@ -211,10 +211,24 @@ pub(super) fn open(folder: &Path, questions: Option<&Path>, set: &SetArgs) -> Re
         if folder.join(FRAMES).exists() && folder.join(CLASSES).exists() {
             return frames(folder, &set.root.data_root);
         }
+        let is_empty = fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_none());
+        let what = if is_empty {
+            "the folder is empty: "
+        } else {
+            ""
+        };
         let problem = format_args!(
-            "no {QUESTIONS} in this folder, and no {FRAMES} with {CLASSES} to make questions of; --questions FILE names some, and --ask home asks about photographs without any"
+            "{what}no {QUESTIONS} or questions.csv in this folder, and no {FRAMES} with {CLASSES} to make questions of; --questions FILE names some, and --ask home asks about photographs without any"
         );
         return Err(Error::data(folder.display(), problem));
+    }
+    let beside = |ending: &&&str| questions.is_none() && file.with_extension(ending).exists();
+    if let Some(ending) = ["csv", "tsv", "json", "parquet"].iter().find(beside) {
+        let other = file.with_extension(ending);
+        tracing::warn!(
+            "{0} is not read, because {QUESTIONS} is in the same folder; --data {0} reads it alone",
+            other.display()
+        );
     }
     let read = ready_made::about_frames(&file, set)?;
     Dataset::new(

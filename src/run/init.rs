@@ -9,7 +9,7 @@ use serde_json::json;
 use crate::ask::png;
 use crate::dataset::{DataPlace, Dataset, ReadingRule, SceneArgs, SelectionArgs, SetArgs};
 use crate::error::{Error, Result};
-use crate::files::write;
+use crate::files::{reading, write};
 use crate::job::Outcome;
 use crate::job::progress::Progress;
 use crate::job::questions::open_data;
@@ -25,18 +25,21 @@ pub(crate) struct InitArgs {
     /// The folder to make
     #[arg(value_name = "DIR", add = Decides::Nothing)]
     pub folder: PathBuf,
-    /// Write lines about the images in this folder; default: three pictures of built-in rooms are written
+    /// Copy the first three images of this folder, and write lines about them; default: pictures of built-in rooms
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub frames: Option<PathBuf>,
 }
 
 /// The rooms whose pictures are written.
 const ROOMS: &str = "frames=3,seed=7,size=480x360";
-/// The number of questions about each picture, and of pictures of a folder that lines are written about.
+/// The number of questions about each picture, and of images of a folder that are copied.
 const EACH: usize = 2;
 const PICTURES: usize = 3;
 /// The number of columns of choices.
 const COLUMNS: usize = 4;
+
+/// Why a file is not written.
+const EXISTS: &str = "exists already; init overwrites nothing: name another folder";
 
 const README: &str = "\
 This folder is a data set of darkqa-eval: images, and questions about them.
@@ -47,7 +50,7 @@ questions.csv   one question per line; a spreadsheet can edit it
   A B C D       the choices; leave cells empty for fewer than four, add E, F, ... for more
   answer        the letter of the true choice
   category      the kind of question, by which the report groups
-the images      PNG, JPEG, WebP, TIFF, BMP or OpenEXR; --data-root DIR allows a folder outside of this one
+images/         PNG, JPEG, WebP, TIFF, BMP or OpenEXR; --data-root DIR allows a folder outside of this one
 dataset.json    the name of the data set
 
 Replace the images and the lines with your own, then run the check again.
@@ -56,7 +59,7 @@ Replace the images and the lines with your own, then run the check again.
 /// Writes the folder. Nothing is overwritten.
 ///
 /// # Errors
-/// If a file exists already, or cannot be written.
+/// If a file exists already, or cannot be read or written.
 pub(crate) fn init(args: &InitArgs, progress: &Progress) -> Result<Outcome> {
     let at = |name: &str| args.folder.join(name);
     let files = [
@@ -68,8 +71,7 @@ pub(crate) fn init(args: &InitArgs, progress: &Progress) -> Result<Outcome> {
         "images/room3.png",
     ];
     if let Some(exists) = files.iter().map(|name| at(name)).find(|path| path.exists()) {
-        let problem = "exists already; init overwrites nothing: name another folder";
-        return Err(Error::data(exists.display(), problem));
+        return Err(Error::data(exists.display(), EXISTS));
     }
     let lines = match &args.frames {
         Some(frames) => of_frames(frames, &args.folder)?,
@@ -96,27 +98,17 @@ pub(crate) fn init(args: &InitArgs, progress: &Progress) -> Result<Outcome> {
     let info = json!({"schema": "darkqa.dataset/1", "name": name});
     write(&at("dataset.json"), format!("{info:#}\n").as_bytes())?;
     write(&at("README.txt"), README.as_bytes())?;
-    let data = words(&args.folder, args.frames.as_deref());
+    let folder = args.folder.display().to_string();
+    let data = shell_word(&folder);
     Ok(Outcome::wrote(
         &args.folder,
         Status::Complete,
         format!(
             "{}: {}\n\nnext:\n  darkqa-eval check {data}\n  darkqa-eval --data {data} --model gpt-4o --dry-run\n  darkqa-eval --data {data} --model gpt-4o\n",
-            args.folder.display(),
+            folder,
             counted(lines.len(), "question")
         ),
     ))
-}
-
-/// The folder as words of a command, with the flag for images that lie outside it.
-fn words(folder: &Path, frames: Option<&Path>) -> String {
-    let quoted = |path: &Path| shell_word(&path.display().to_string()).into_owned();
-    let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    let outside = frames.filter(|frames| !real(frames).starts_with(real(folder)));
-    let root = outside.map_or_else(String::new, |frames| {
-        format!(" --data-root {}", quoted(frames))
-    });
-    format!("{}{root}", quoted(folder))
 }
 
 /// A line of the table.
@@ -174,15 +166,21 @@ fn of_rooms(folder: &Path, progress: &Progress) -> Result<Vec<Line>> {
     Ok(lines)
 }
 
-/// Lines about the images of a folder that are true of any image: whether it has colours, and its form.
+/// Copies images of a folder, and returns lines about them that are true of any image: whether it has colours, and its form.
 fn of_frames(frames: &Path, folder: &Path) -> Result<Vec<Line>> {
     let dataset = Dataset::of_images(frames, &[])?;
     let mut lines = Vec::new();
     let yes_no = ["yes".to_owned(), "no".to_owned()];
     for frame in dataset.frames().take(PICTURES) {
         let path = dataset.image_file(frame).unwrap_or(frames);
-        let image = from(folder, path);
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let image = format!("images/{name}");
         let picture = dataset.picture(frame)?.decode()?;
+        let copy = folder.join(&image);
+        if copy.exists() {
+            return Err(Error::data(copy.display(), EXISTS));
+        }
+        write(&copy, &reading::bytes(path)?)?;
         let is_wide = picture.width() > picture.height();
         let mut pixels = picture.samples().chunks_exact(3);
         let has_colours = pixels
@@ -194,14 +192,4 @@ fn of_frames(frames: &Path, folder: &Path) -> Result<Vec<Line>> {
         lines.push(ask("Does this photograph have colours?", has_colours));
     }
     Ok(lines)
-}
-
-/// The path of a file from a folder.
-fn from(folder: &Path, file: &Path) -> String {
-    let real = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-    let file = real(file);
-    file.strip_prefix(real(folder))
-        .unwrap_or(&file)
-        .to_string_lossy()
-        .replace('\\', "/")
 }

@@ -211,6 +211,9 @@ fn the_template_can_be_checked_and_run_as_it_is() {
     assert!(third.stderr.contains("room2.png"), "{third:?}");
     let own = bench.call(&words("init own --frames my-data/images"));
     assert_eq!(own.code, Some(0), "{own:?}");
+    let table = fs::read_to_string(bench.path("own/questions.csv")).unwrap();
+    let lines = table.lines().skip(1);
+    assert_eq!(lines.filter(|line| line.starts_with("images/")).count(), 6);
     let check = own
         .stdout
         .lines()
@@ -219,6 +222,39 @@ fn the_template_can_be_checked_and_run_as_it_is() {
     let command: Vec<&str> = check.split_whitespace().skip(1).collect();
     let checked = bench.complete(&command);
     assert!(checked.contains("ok: 6 questions"), "{checked}");
+}
+
+#[test]
+fn the_table_that_is_not_read_is_named() {
+    let bench = Bench::new();
+    bench.complete(&words("init my-data"));
+    fs::create_dir(bench.path("empty")).unwrap();
+    let empty = bench.call(&words("--data empty --model random"));
+    assert_eq!(empty.code, Some(2), "{empty:?}");
+    assert!(
+        empty
+            .stderr
+            .contains("the folder is empty: no questions.jsonl or questions.csv"),
+        "{}",
+        empty.stderr
+    );
+    let line = json!({"id": "a", "frame": "room1.png", "question": "A?", "choices": ["yes", "no"], "answer": "no", "family": "f"});
+    bench.file("my-data/images/questions.jsonl", format!("{line}\n"));
+    fs::copy(
+        bench.path("my-data/questions.csv"),
+        bench.path("my-data/images/questions.csv"),
+    )
+    .unwrap();
+    let both = bench.call(&words(
+        "--data my-data/images --model random --levels L0 --out run",
+    ));
+    assert_eq!(both.code, Some(0), "{both:?}");
+    assert!(
+        both.stderr
+            .contains("questions.csv is not read, because questions.jsonl is in the same folder"),
+        "{}",
+        both.stderr
+    );
 }
 
 /// A set of eight yes-or-no questions, two about each of four images, of which the last two pairs have one that says no.
