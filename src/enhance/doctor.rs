@@ -86,13 +86,8 @@ impl Enhancer {
     /// If it takes none of the sizes of the probe.
     pub(crate) fn examine(&mut self, dark: &[Rgb], image: ImageOutput) -> Result<Examination> {
         let sizes = self.try_sizes(dark);
-        let stated = self.convention().clone();
-        let order = swapped(stated.color_out.or(stated.color).unwrap_or_default());
-        let swapped = ModelSidecar {
-            color_out: Some(order),
-            ..stated.clone()
-        };
-        let trials = self.trials(dark, [&stated, &swapped], [None; 2])?.ok_or_else(|| {
+        let order = self.other_order();
+        let trials = self.trials_of_all(dark)?.ok_or_else(|| {
             self.fault("it takes none of the small sizes of the probe; state `multiple` or `fixed` in MODEL.onnx.toml beside it".to_owned())
         })?;
         let Trials {
@@ -113,7 +108,12 @@ impl Enhancer {
         if image == ImageOutput::Known {
             found.mention(&others);
         }
-        let columns = shown(&probe, stated, &swapped, others);
+        let convention = self.convention();
+        let is_stated = convention.color.is_some()
+            || convention.color_out.is_some()
+            || self.stated_ranges().iter().any(Option::is_some);
+        let as_stated = is_stated.then_some(probe.usual);
+        let columns = shown(&probe, as_stated, (&swapped, order), others);
         Ok(Examination {
             settled: found.settled,
             frames,
@@ -122,6 +122,44 @@ impl Enhancer {
             conclusion: found.conclusion,
             sizes,
         })
+    }
+
+    /// The order of the output's colours that is not stated.
+    fn other_order(&self) -> ChannelOrder {
+        let stated = self.convention();
+        swapped(stated.color_out.or(stated.color).unwrap_or_default())
+    }
+
+    /// What the model makes of dark frames with all ranges, in the order of colours that is stated and in the other.
+    fn trials_of_all(&self, dark: &[Rgb]) -> Result<Option<Trials<2>>> {
+        let stated = self.convention().clone();
+        let swapped = ModelSidecar {
+            color_out: Some(self.other_order()),
+            ..stated.clone()
+        };
+        self.trials(dark, [&stated, &swapped], [None; 2])
+    }
+
+    /// The lines of the sidecar with which the images of dark frames can be enhanced images, in a sentence; `None` if no lines are the
+    /// only ones.
+    pub(super) fn better_lines(&self, dark: &[Rgb]) -> Result<Option<String>> {
+        let Some(trials) = self.trials_of_all(dark)? else {
+            return Ok(None);
+        };
+        let [probe, swapped] = trials.probes;
+        let found = propose(&probe, self.stated_pair(), &swapped, self.other_order());
+        let lines: Vec<String> = found
+            .lines
+            .iter()
+            .map(|line| format!("`{}`", line.line))
+            .collect();
+        Ok((!lines.is_empty()).then(|| {
+            format!(
+                "{} If its authors do that, state in MODEL.onnx.toml beside it, in place of what is stated: {}",
+                found.conclusion,
+                lines.join(" and ")
+            )
+        }))
     }
 
     /// The output that is read, as a title.
@@ -194,11 +232,11 @@ fn swapped(order: ChannelOrder) -> ChannelOrder {
     }
 }
 
-/// The conventions that are drawn: the plausible ones, and the stated one, which a run would use. All without a plausible one.
+/// The conventions that are drawn: the plausible ones, and the one of which something is stated, which a run would use. All without a plausible one.
 fn shown(
     probe: &Probe,
     stated: Option<RangePair>,
-    swapped: &Probe,
+    (swapped, order): (&Probe, ChannelOrder),
     others: Vec<ExaminedConvention>,
 ) -> Vec<ExaminedConvention> {
     let stated_title = stated.map(|pair| format!("{pair}, as stated"));
@@ -206,9 +244,7 @@ fn shown(
         Some(title) if stated == Some(ranges) => title.clone(),
         _ => ranges.to_string(),
     });
-    let swapped = columns(swapped, |ranges| {
-        format!("{ranges}, red and blue swapped in the output")
-    });
+    let swapped = columns(swapped, |ranges| format!("{ranges}, {order} in the output"));
     // Nine more pictures of what cannot be would only distract.
     let plausible = swapped
         .into_iter()
@@ -290,8 +326,10 @@ impl Found {
     /// Names the other outputs whose images could be enhanced ones.
     fn mention(&mut self, others: &[ExaminedConvention]) {
         for output in others.iter().filter(|output| output.problem.is_none()) {
-            let also = " gives plausible images, too, so check which output its authors use.";
-            self.conclusion += &[" The ", &*output.title, also].concat();
+            self.conclusion += &format!(
+                " The {} gives plausible images: check which output its authors use.",
+                output.title
+            );
         }
     }
 
@@ -360,6 +398,6 @@ fn propose(
         return found;
     }
     Found::nothing(
-        "With none of the conventions below its images can be enhanced images. Perhaps another output is the image, the dimensions have another order, or the export has lost its weights.".to_owned(),
+        "With none of the conventions of the output that is read its images can be enhanced images. Perhaps another output is the image, the dimensions have another order, or the export has lost its weights.".to_owned(),
     )
 }

@@ -23,6 +23,7 @@ use super::reach::Context;
 use super::reading::OutOfRange;
 use super::runtime::Runtime;
 use super::session::{GraphSource, Stopper};
+use super::sidecar;
 use super::size_plan::{NoPlan, SeamRule, SizePlan, SizeRule, global, seams_differ};
 use super::size_search::{MULTIPLES, SizeSearch, TakenSizes, not_found};
 use super::tiles::{TileWindow, TiledImage, Tiling};
@@ -95,6 +96,7 @@ impl Enhancer {
         )?
         .map_err(|problem| {
             let path = file.path.clone();
+            let problem = sidecar::named(&problem, &path);
             Error::Enhancer { path, problem }
         })?;
         let enhancer = Self {
@@ -389,7 +391,7 @@ impl Enhancer {
     pub(super) fn fault(&self, problem: String) -> Error {
         Error::Enhancer {
             path: self.path.clone(),
-            problem,
+            problem: sidecar::named(&problem, &self.path),
         }
     }
 

@@ -1,6 +1,7 @@
 //! An enhancement model on disk: [`ModelFile`].
 
 use std::collections::BTreeMap;
+use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::{Component, Path, PathBuf};
 
@@ -202,7 +203,12 @@ const MOST_BYTES: u64 = i32::MAX as u64;
 
 /// The bytes of an ONNX file. A file that is too large to be one is refused before it is read.
 fn read_model(path: &Path) -> Result<Vec<u8>> {
-    let unreadable = |e| Error::file(path, "read", e);
+    let unreadable = |e: std::io::Error| match e.kind() {
+        ErrorKind::NotFound => {
+            Error::usage("--llie", format_args!("{}: no such file", path.display()))
+        }
+        _ => Error::file(path, "read", e),
+    };
     let size = std::fs::metadata(path).map_err(unreadable)?.len();
     if size > MOST_BYTES {
         return Err(Error::Enhancer {
@@ -369,7 +375,7 @@ mod tests {
         assert!(
             missing
                 .to_string()
-                .starts_with("missing.onnx: cannot read: ")
+                .starts_with("--llie: missing.onnx: no such file")
         );
     }
 }

@@ -7,7 +7,7 @@ use super::graph::{Graph, RunResult};
 use super::planes::Planes;
 use super::plausible::Codes;
 use super::probe::{Conclusion, PairTrial, Probe, RangePair, Ranges};
-use super::sidecar::ModelSidecar;
+use super::sidecar::{self, ModelSidecar};
 use super::usage::{ImageUse, Implausible, Seen};
 use crate::error::Result;
 use crate::types::Rgb;
@@ -49,7 +49,7 @@ impl Enhancer {
             Conclusion::Doubtful(_) => ProbeOutcome::Doubtful,
             _ => ProbeOutcome::Overruled,
         };
-        let problem = probe.problem();
+        let problem = self.problem(&probe, dark)?;
         match (&problem, outcome, implausible) {
             (Some(problem), ProbeOutcome::Overruled, Implausible::Refused) => {
                 return Err(self.fault(format!(
@@ -67,6 +67,20 @@ impl Enhancer {
             outcome,
         };
         self.set_probed(note)
+    }
+
+    /// What is wrong with the images of a probe, and what would repair it; `None` if nothing is. If lines of the sidecar are wrong, those
+    /// that are right are found by trial.
+    fn problem(&self, probe: &Probe, dark: &[Rgb]) -> Result<Option<String>> {
+        let problem = match probe.conclusion() {
+            Conclusion::Implausible(seen) => {
+                let better = self.better_lines(dark)?;
+                better.map(|better| format!("{seen}. {better}"))
+            }
+            _ => None,
+        };
+        let problem = problem.or_else(|| probe.problem());
+        Ok(problem.map(|problem| sidecar::named(&problem, self.path())))
     }
 
     /// Enhances a frame in a condition, and looks at the result; with what its note got from it.
@@ -126,7 +140,7 @@ impl Enhancer {
             (None, None) => Ranges::Open,
             _ => Ranges::OneStated,
         };
-        for size in SIZES {
+        'sizes: for size in SIZES {
             let frames: Vec<Rgb> = dark
                 .iter()
                 .map(|frame| self.probe_image(frame, size))
@@ -140,8 +154,9 @@ impl Enhancer {
                         .map(|ranges| self.read_by(convention, *ranges))
                 });
                 let graphs: Vec<Graph> = graphs.collect::<Result<_>>()?;
+                // What fails in one range says nothing about the others at this size.
                 let Some(made) = made(&graphs, &frames)? else {
-                    break;
+                    continue 'sizes;
                 };
                 let mut made = made.into_iter();
                 for pairs in &mut pairs {
@@ -149,14 +164,12 @@ impl Enhancer {
                     pairs.extend(trials.map(|(ranges, made)| PairTrial::new(*ranges, &seen, made)));
                 }
             }
-            if pairs.iter().all(|pairs| !pairs.is_empty()) {
-                let probes = pairs.map(|pairs| Probe {
-                    ranges,
-                    usual,
-                    pairs,
-                });
-                return Ok(Some(Trials { frames, probes }));
-            }
+            let probes = pairs.map(|pairs| Probe {
+                ranges,
+                usual,
+                pairs,
+            });
+            return Ok(Some(Trials { frames, probes }));
         }
         Ok(None)
     }

@@ -92,6 +92,13 @@ pub(super) fn path_for(model: &Path) -> PathBuf {
     path.into()
 }
 
+/// A text in which the sidecar is `MODEL.onnx.toml`, with the name of the file.
+pub(super) fn named(text: &str, model: &Path) -> String {
+    let path = path_for(model);
+    let name = path.file_name().unwrap_or_default();
+    text.replace("MODEL.onnx.toml", &name.to_string_lossy())
+}
+
 /// Text of a model's sidecar; empty if there is none.
 pub(super) fn text_for(model: &Path) -> Result<String> {
     let path = path_for(model);
@@ -100,6 +107,13 @@ pub(super) fn text_for(model: &Path) -> Result<String> {
         _ => reading::settings(&path),
     }
 }
+
+/// Most letters of a line that a message repeats.
+const LONGEST_LINE: usize = 60;
+
+/// Where all keys stand.
+const KEYS: &str =
+    "; all keys: https://github.com/darkqa-eval/darkqa-eval/blob/main/models/README.md";
 
 /// Largest side, in pixels, that a sidecar may state; chosen: no image of this program is larger.
 const MOST_SIDE: usize = 1 << 16;
@@ -122,13 +136,19 @@ impl ModelSidecar {
     /// # Errors
     /// If a key is unknown or a value is not allowed; the message names the file.
     pub(super) fn parse(model: &Path, text: &str) -> Result<Self> {
-        let wrong = |problem: &str| {
-            Error::data(
-                path_for(model).display(),
-                format_args!("{problem}; models/README.md lists all keys"),
+        let path = path_for(model);
+        let wrong = |problem: &str| Error::data(path.display(), format_args!("{problem}{KEYS}"));
+        let sidecar: Self = toml::from_str(text).map_err(|e| {
+            let before = e.span().and_then(|span| text.get(..span.start));
+            let line = before.unwrap_or_default().matches('\n').count() + 1;
+            let stated = text.lines().nth(line - 1).unwrap_or_default().trim();
+            let stated: String = stated.chars().take(LONGEST_LINE).collect();
+            Error::line(
+                &path,
+                line,
+                format_args!("`{stated}`: {}{KEYS}", e.message()),
             )
-        };
-        let sidecar: Self = toml::from_str(text).map_err(|e| wrong(e.message()))?;
+        })?;
         sidecar.check_bounds().map_err(|problem| wrong(&problem))?;
         if sidecar.output.is_some() && sidecar.image.is_some() {
             return Err(wrong(
@@ -281,7 +301,8 @@ mod tests {
     fn unknown_keys_and_values_are_errors_that_name_the_file() {
         let model = Path::new("a/model.onnx");
         for (text, part) in [
-            ("range = \"-1..1\"", "range"),
+            ("range = \"-1..1\"", "line 1: `range = \"-1..1\"`: unknown field"),
+            ("color = \"rgb\"\nmultiple = 4 4", "line 2: `multiple = 4 4`: "),
             ("range_in = \"0..2\"", "0..2"),
             ("output = -1", "index from 0"),
             ("output = [1]", "index from 0"),
@@ -308,7 +329,7 @@ mod tests {
             ("output = \"a\"\nimage = \"a\"", "state image alone"),
         ] {
             let message = ModelSidecar::parse(model, text).unwrap_err().to_string();
-            assert!(message.starts_with("a/model.onnx.toml: "), "{message}");
+            assert!(message.starts_with("a/model.onnx.toml"), "{message}");
             assert!(message.contains(part), "{message}");
         }
     }

@@ -69,9 +69,10 @@ pub(super) fn doctor(
                 return Err(Error::usage(
                     "--write",
                     format_args!(
-                        "{} exists already and is never replaced; add the lines by hand: {}",
+                        "{} exists already and is never replaced; state these lines in it, in the place of those with the same keys: {}; {} shows why",
                         path.display(),
-                        lines.join(", ")
+                        lines.join(", "),
+                        out.join(PAGE).display()
                     ),
                 ));
             }

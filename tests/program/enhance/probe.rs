@@ -144,25 +144,23 @@ fn an_expression_mends_a_negative() {
 
 #[test]
 fn a_wrong_statement_is_found_too() {
-    for wrong in ["-1..1", "0..255"] {
-        let sidecar = format!("range_in = \"{wrong}\"\nrange_out = \"{wrong}\"\n");
-        let bench = bench(&onnx::enhancer_in_ranges(UNIT, UNIT), &sidecar);
+    let right =
+        "model.onnx.toml beside it, in place of what is stated: `range_in = \"0..1\"` and `range_out = \"0..1\"`";
+    for wrong in [
+        "range_in = \"-1..1\"\nrange_out = \"-1..1\"\n",
+        "range_in = \"0..255\"\nrange_out = \"0..255\"\n",
+        // One range alone: the other is looked for, and cannot explain the images.
+        "range_out = \"0..255\"",
+    ] {
+        let bench = bench(&onnx::enhancer_in_ranges(UNIT, UNIT), wrong);
         let called = ask(&bench, "");
         assert_eq!(called.code, Some(2), "{wrong}: {called:?}");
+        assert!(called.stderr.contains(right), "{wrong}: {called:?}");
+        bench.complete(&words("rooms --out rooms --frames 3 --size 144x96"));
+        bench.call(&words("enhance --doctor model.onnx rooms --out doctor"));
+        let page = fs::read_to_string(bench.path("doctor/doctor.html")).unwrap();
+        assert!(page.contains(" out, as stated"), "{wrong}");
     }
-    // One range alone: the other is looked for, and cannot explain the images.
-    let bench = bench(
-        &onnx::enhancer_in_ranges(UNIT, UNIT),
-        "range_out = \"0..255\"",
-    );
-    let called = ask(&bench, "");
-    assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(
-        called
-            .stderr
-            .contains("the one range that its sidecar states"),
-        "{called:?}"
-    );
 }
 
 #[test]
@@ -189,8 +187,18 @@ fn the_doctor_finds_a_wrong_order_of_colours_beside_stated_ranges() {
     let right = fs::read_to_string(models.join("lift.onnx.toml")).unwrap();
     bench.file("model.onnx.toml", right + "\ncolor_out = \"bgr\"\n");
     bench.complete(&words("rooms --out rooms --frames 6 --size 144x96"));
+    let called = bench.call(&words("enhance model.onnx rooms --out enhanced"));
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert!(
+        called
+            .stderr
+            .contains("in place of what is stated: `color_out = \"rgb\"`"),
+        "{called:?}"
+    );
     let called = bench.call(&words("enhance --doctor model.onnx rooms --out doctor"));
     assert_eq!(called.code, Some(0), "{called:?}");
+    let page = fs::read_to_string(bench.path("doctor/doctor.html")).unwrap();
+    assert!(page.contains("as stated") && page.contains("RGB in the output"));
     assert!(
         called.stdout.contains("color_out = \"rgb\"") && !called.stdout.contains("range_in = "),
         "{called:?}"
