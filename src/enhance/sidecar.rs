@@ -301,8 +301,14 @@ mod tests {
     fn unknown_keys_and_values_are_errors_that_name_the_file() {
         let model = Path::new("a/model.onnx");
         for (text, part) in [
-            ("range = \"-1..1\"", "line 1: `range = \"-1..1\"`: unknown field"),
-            ("color = \"rgb\"\nmultiple = 4 4", "line 2: `multiple = 4 4`: "),
+            (
+                "range = \"-1..1\"",
+                "line 1: `range = \"-1..1\"`: unknown field",
+            ),
+            (
+                "color = \"rgb\"\nmultiple = 4 4",
+                "line 2: `multiple = 4 4`: ",
+            ),
             ("range_in = \"0..2\"", "0..2"),
             ("output = -1", "index from 0"),
             ("output = [1]", "index from 0"),

@@ -168,7 +168,7 @@ fn lines<E: Experiment>(
                 tokens.add(text_tokens(&trial.prompt), trial.item.reply_tokens());
             }
             let source = &sources[place];
-            if group.condition.is_some() {
+            if group.condition.is_some() && tokens.requests > before {
                 let mut shown = source.order.iter().map(|place| source.frames[*place].size);
                 let charged = measured.image(index);
                 let of_request = shown.try_fold(0.0, |sum, size| {

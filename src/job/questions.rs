@@ -13,6 +13,7 @@ use crate::dataset::{
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::questions::rules::Rules;
+use crate::report::words::counted;
 use crate::types::{Digest, Family, Question};
 
 /// The rulebook in a file; without one, the one built in.
@@ -122,9 +123,10 @@ impl QuestionBank {
         let questions = self.bank.about(found.dataset.frames(), self.per_image);
         let images = found.dataset.frames().count();
         progress.note(&format!(
-            "--ask {}: {} questions about {images} images without answers ({} each); each model is compared with its own answers at L0, and is asked without images, too",
+            "--ask {}: {} about {} without answers ({} each); each model is compared with its own answers at L0, and is asked without images, too",
             self.place,
-            questions.len(),
+            counted(questions.len(), "question"),
+            counted(images, "image"),
             self.each()
         ));
         Ok(found.dataset.with_rule(rule).with_questions(questions))

@@ -29,7 +29,7 @@ pub(crate) fn shortened(answer: &str) -> &str {
 }
 
 /// The mark in a judge's reply; `None` if there is none. The upstream reading accepts any integer, which [`points`] clips to
-/// 1 to 5; the tolerant reading accepts only 1 to 5.
+/// 1 to 5. The tolerant protocol also reads what that leaves, and there accepts only 1 to 5.
 #[must_use]
 pub(crate) fn mark(reply: &str, protocol: Protocol) -> Option<i64> {
     upstream(reply).or_else(|| match protocol {

@@ -2,6 +2,10 @@
 
 use crate::types::SetLight;
 
+/// Mean linear brightness from which photographs are as bright as those in the light. Chosen: a well-lit room has about 0.15, and is at
+/// 0.04 two stops darker.
+const BRIGHT: f64 = 0.08;
+
 /// The light in which the photographs of a set were taken.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct PhotographedSet {
@@ -20,9 +24,15 @@ impl PhotographedSet {
         let brightness = self.brightness.map(|(mean, frames)| {
             format!(" Their mean linear brightness is {mean:.4} of 1 (measured on {frames}); a mid-grey, code 128, is 0.22.")
         });
+        let is_bright = self.brightness.is_some_and(|(mean, _)| mean >= BRIGHT);
+        let doubt = if is_bright {
+            " That is as bright as photographs in the light: if these are not from the dark, leave out --light dark."
+        } else {
+            ""
+        };
         Some(format!(
-            "These photographs were taken in the dark: L0 is each as photographed, there is no image in the light to compare with, and \
-             no darkness threshold.{}",
+            "These photographs are said to be from the dark (--light dark): L0 is each as photographed, there is no image in the light to \
+             compare with, and no darkness threshold.{}{doubt}",
             brightness.unwrap_or_default()
         ))
     }

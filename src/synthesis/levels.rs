@@ -191,6 +191,12 @@ fn level(text: &str) -> Result<AxisLevel, String> {
     if text.eq_ignore_ascii_case("L0") {
         return Ok(AxisLevel::L0);
     }
+    if text.to_ascii_lowercase().ends_with("lux") {
+        return Err(format!(
+            "{text:?}: a level is an exposure drop in EV, not lux. Measure the lux where the images were taken; each EV halves it: from \
+             200 lux, 2 lux are log2(200 / 2) = 6.6"
+        ));
+    }
     if is_number {
         return measured(kind, number);
     }

@@ -437,7 +437,7 @@ fn photographs_in_the_dark() -> Bench {
 }
 
 /// What a reader is told of photographs in the dark.
-const NOTICE: &str = "These photographs were taken in the dark: L0 is each as photographed, there is no image in the light to compare with";
+const NOTICE: &str = "These photographs are said to be from the dark (--light dark): L0 is each as photographed, there is no image in the light";
 
 #[test]
 fn photographs_in_the_dark_are_asked_as_they_are() {

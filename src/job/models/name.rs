@@ -44,7 +44,8 @@ impl ModelName {
         Err(Error::usage("--model", problem))
     }
 
-    /// Refuses the name of a remote model that is almost that of a built-in one: it would be sent to an endpoint, with images.
+    /// Refuses the name of a remote model that is almost that of a built-in one, or a list of names: it would be sent to an endpoint,
+    /// with images.
     ///
     /// # Errors
     /// If it is, and the table of prices has no model of this name.
@@ -52,6 +53,15 @@ impl ModelName {
         let Self::Remote(name) = self else {
             return Ok(());
         };
+        let several: Vec<&str> = name.split(',').map(str::trim).collect();
+        if several.len() > 1 {
+            let flags: Vec<String> = several.iter().map(|one| format!("--model {one}")).collect();
+            let problem = format_args!(
+                "{name}: several models are several flags: {}. To ask an endpoint for a model of this name: --models FILE, or --base-url",
+                flags.join(" ")
+            );
+            return Err(Error::usage("--model", problem));
+        }
         let word = name.split(':').next().unwrap_or(name).to_lowercase();
         let mut near = BUILT_IN.into_iter().filter(|built_in| {
             let most = if built_in.len() <= SHORT { 1 } else { 2 };
@@ -133,6 +143,8 @@ mod tests {
             let error = near(wrong).unwrap_err().to_string();
             assert!(error.contains("did you mean"), "{wrong}: {error}");
         }
+        let error = near("random,gpt-4o").unwrap_err().to_string();
+        assert!(error.contains("--model random --model gpt-4o"), "{error}");
         for name in [
             "random", "observer", "script:a", "gpt-4o", "qwen:7b", "rando-vl", "o3",
         ] {

@@ -82,7 +82,11 @@ pub(crate) fn serve(args: &ServeArgs, progress: &Progress) -> Result<Outcome> {
         &args.root.data_root,
     )?);
     let prior = Random { seed: args.seed };
-    let observer = Observer::open(&dataset, &args.data, &[], Rules::built_in()?)?;
+    let observer = Observer::open(&dataset, &args.data, &[], Rules::built_in()?);
+    let observer = observer.map_err(|e| match e {
+        Error::Usage { .. } => e.at("--data"),
+        other => other,
+    })?;
     let models = [
         ("darkqa-observer", Model::Local(observer.model(None, prior))),
         ("darkqa-random", Model::Random(prior)),

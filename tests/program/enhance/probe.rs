@@ -144,8 +144,7 @@ fn an_expression_mends_a_negative() {
 
 #[test]
 fn a_wrong_statement_is_found_too() {
-    let right =
-        "model.onnx.toml beside it, in place of what is stated: `range_in = \"0..1\"` and `range_out = \"0..1\"`";
+    let right = "model.onnx.toml beside it, in place of what is stated: `range_in = \"0..1\"` and `range_out = \"0..1\"`";
     for wrong in [
         "range_in = \"-1..1\"\nrange_out = \"-1..1\"\n",
         "range_in = \"0..255\"\nrange_out = \"0..255\"\n",

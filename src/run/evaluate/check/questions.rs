@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, HashMap};
 
 use super::findings::{Findings, Mark};
+use crate::report::words::counted;
 use crate::types::Question;
 use crate::types::question::letter;
 
@@ -23,8 +24,8 @@ pub(super) fn questions(questions: &[Question], findings: &mut Findings) {
         .map(|(size, count)| format!("{count} with {size} choices"))
         .collect();
     findings.ok(format!(
-        "{} questions, {}; chance {:.1} %",
-        questions.len(),
+        "{}, {}; chance {:.1} %",
+        counted(questions.len(), "question"),
         sizes.join(", "),
         100.0 * chance / questions.len().max(1) as f64
     ));
