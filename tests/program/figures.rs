@@ -198,6 +198,18 @@ fn one_model_in_the_light_has_the_figures_there_are() {
     }
     let captions = fs::read_to_string(scene.bench.path("out/captions.txt")).unwrap();
     assert!(captions.contains("enhancers: left out"), "{captions}");
+    // With a dark level there are records, and too few of them.
+    let line = "--model script:m.jsonl --data frames --levels L0,L3 --limit 2 --out few";
+    scene.bench.complete(&words(line));
+    let said = scene.bench.complete(&words("figures few --out out2"));
+    assert!(
+        said.contains("thresholds: left out, no curve has a threshold: "),
+        "{said}"
+    );
+    assert!(
+        said.contains("blur_thresholds: left out, the runs have no records"),
+        "{said}"
+    );
 }
 
 #[test]

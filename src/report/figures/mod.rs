@@ -25,6 +25,7 @@ pub(crate) use names::{KnownNames, Names};
 pub(crate) use overview::{OverviewPanels, overview};
 pub(crate) use story::{StoryCurves, story_curves};
 pub(crate) use tables::{PaperCell, PaperMark, PaperRow, PaperTable, paper_tables};
+pub(crate) use thresholds::without_threshold;
 
 /// One figure of a report, before it is drawn.
 #[derive(Debug, Clone)]

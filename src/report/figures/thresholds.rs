@@ -1,10 +1,31 @@
 //! The figures of the thresholds, one for each axis.
 
+use std::collections::BTreeSet;
+
+use super::super::tables::level_words;
 use super::super::words::stops;
 use super::{Drawing, Overview};
 use crate::report::chart::drawn::Drawn;
 use crate::report::chart::thresholds::{Scale, ThresholdChart, ThresholdRow};
+use crate::score::findings::Findings;
 use crate::types::degradation::Axis;
+
+/// The names of the figures.
+const NAMES: [(&str, Axis); 2] = [
+    ("thresholds", Axis::LIGHT),
+    ("blur_thresholds", Axis::MOTION),
+];
+
+/// Why a figure cannot be drawn although its images were asked: the curves have no threshold. `None` if it is for another reason.
+pub(crate) fn without_threshold(findings: &Findings<'_>, figure: &str) -> Option<String> {
+    let (_, axis) = NAMES.into_iter().find(|(name, _)| *name == figure)?;
+    let curves = findings.curves.iter();
+    let curves = curves.filter(|curve| curve.family.is_none() && curve.axis() == axis);
+    let reasons = curves.filter_map(|curve| curve.summary.threshold.as_ref().err());
+    let reasons: BTreeSet<String> = reasons.map(level_words).collect();
+    let reasons: Vec<String> = reasons.into_iter().collect();
+    (!reasons.is_empty()).then(|| format!("no curve has a threshold: {}", reasons.join("; ")))
+}
 
 impl Overview<'_> {
     /// The figure of each axis on which a curve has a threshold.

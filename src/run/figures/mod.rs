@@ -15,6 +15,7 @@ use crate::job::report::FigureRuns;
 use crate::report::chart::drawn::Drawn;
 use crate::report::figures::{
     Drawing, FIGURES, KnownNames, Names, PaperTable, drawings, overview, paper_tables,
+    without_threshold,
 };
 use crate::report::paper::{
     Look, OverviewSheet, Palette, Sheet, overview_sheet, pdf, sheet, svg, tables, tex,
@@ -151,7 +152,11 @@ pub(crate) fn figures(args: &FiguresArgs) -> Result<Outcome> {
         }
         match drawings.iter().find(|drawing| drawing.name == name) {
             Some(drawing) => files.add_drawing(drawing, &args.format, &look)?,
-            None => files.leave_out(name, "the runs have no records for it"),
+            None => {
+                let reason = without_threshold(findings, name);
+                let reason = reason.as_deref();
+                files.leave_out(name, reason.unwrap_or("the runs have no records for it"));
+            }
         }
     }
     let said = names.said();
