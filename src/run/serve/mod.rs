@@ -13,8 +13,10 @@ mod recognise;
 mod request;
 
 use std::io::Write as _;
-use std::net::{Ipv4Addr, SocketAddr};
+use std::net::{Ipv4Addr, SocketAddr, TcpListener};
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::sync::atomic::Ordering::Relaxed;
 
 use axum::Router;
 use axum::extract::{Request, State};
@@ -70,6 +72,8 @@ struct ServerState {
     models: [(&'static str, Model); 2],
     /// Places for requests that are read and answered.
     places: Semaphore,
+    /// Whether an image has come that shows no frame.
+    met_unknown: AtomicBool,
 }
 
 /// Answers requests until the process is interrupted.
@@ -77,6 +81,8 @@ struct ServerState {
 /// # Errors
 /// If the frames cannot be read, or another process uses the port.
 pub(crate) fn serve(args: &ServeArgs, progress: &Progress) -> Result<Outcome> {
+    // A port that is taken is an error before any frame is drawn.
+    let listener = bind(args.port)?;
     let dataset = Arc::new(Dataset::open_without_questions(
         &args.data,
         &args.root.data_root,
@@ -96,28 +102,37 @@ pub(crate) fn serve(args: &ServeArgs, progress: &Progress) -> Result<Outcome> {
         likenesses,
         models,
         places: Semaphore::new(AT_ONCE),
+        met_unknown: AtomicBool::new(false),
     });
     let runtime = runtime::Builder::new_multi_thread()
         .enable_all()
         .build()
         .map_err(|e| Error::usage("serve", e))?;
-    runtime.block_on(listen(args, state, progress))?;
+    runtime.block_on(listen(listener, state, progress))?;
     Ok(Outcome::text(Status::Complete, String::new()))
 }
 
-async fn listen(args: &ServeArgs, state: Arc<ServerState>, progress: &Progress) -> Result<()> {
-    let address = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
-    let cannot_listen = |e| {
+/// A listener at a port of this machine.
+fn bind(port: u16) -> Result<TcpListener> {
+    let address = SocketAddr::from((Ipv4Addr::LOCALHOST, port));
+    let listener = TcpListener::bind(address);
+    let listener = listener.and_then(|listener| listener.set_nonblocking(true).map(|()| listener));
+    listener.map_err(|e| {
         let problem =
             format!("cannot listen at {address}: {e}; --port N takes another port, 0 any free one");
         Error::usage("--port", problem)
-    };
-    let listener = tokio::net::TcpListener::bind(address)
-        .await
-        .map_err(cannot_listen)?;
-    let address = listener.local_addr().map_err(cannot_listen)?;
+    })
+}
+
+async fn listen(listener: TcpListener, state: Arc<ServerState>, progress: &Progress) -> Result<()> {
+    let unusable = |e| Error::usage("--port", e);
+    let listener = tokio::net::TcpListener::from_std(listener).map_err(unusable)?;
+    let address = listener.local_addr().map_err(unusable)?;
     let names: Vec<&str> = state.names().collect();
-    progress.say(&format!("models: {}; Ctrl-C ends it", names.join(", ")));
+    progress.note(&format!(
+        "models: {}; no key is needed; Ctrl-C ends it",
+        names.join(", ")
+    ));
     // A client may wait for the address on standard output. A closed output is ignored.
     let mut out = std::io::stdout().lock();
     let _ = writeln!(out, "http://{address}/v1").and_then(|()| out.flush());
@@ -183,6 +198,12 @@ impl ServerState {
             .image
             .as_ref()
             .and_then(|(image, _)| self.likenesses.most_like(image));
+        if request.image.is_some() && frame.is_none() && !self.met_unknown.swap(true, Relaxed) {
+            tracing::warn!(
+                "an image shows none of the {} frames of --data: about such images the observer guesses, too",
+                self.likenesses.len()
+            );
+        }
         let words = Digest::of(request.text.as_bytes()).to_string();
         let image = request.image.as_ref().map(|(_, payload)| payload);
         let images = image.map(std::slice::from_ref);

@@ -48,6 +48,11 @@ impl Likenesses {
         seen.collect::<Result<_>>().map(Self)
     }
 
+    /// Number of frames.
+    pub(super) fn len(&self) -> usize {
+        self.0.len()
+    }
+
     /// The frame with the highest correlation to an image; `None` if it is below the minimum.
     pub(super) fn most_like(&self, image: &Rgb) -> Option<&FrameId> {
         let own = likeness(image);
