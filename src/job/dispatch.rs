@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use tokio::runtime;
 use tokio::sync::mpsc::{self, Receiver, Sender};
 use tokio::task::{JoinError, JoinSet};
+use tokio::time::timeout;
 
 use super::budget::{Budget, text_tokens};
 use super::circuit_breaker::{CircuitBreaker, EndReason};
@@ -93,6 +94,9 @@ impl Dispatcher<'_> {
         .failing_fast(self.settings.money.fail_fast)
     }
 }
+
+/// How long trials that wait may take to end after their models are closed; chosen: they need microseconds.
+const CLOSING: Duration = Duration::from_millis(50);
 
 /// Asks trials, and stores their replies.
 struct ReplySink<'a, I: Item> {
@@ -207,6 +211,13 @@ impl<I: Item> ReplySink<'_, I> {
         grace: Option<Duration>,
     ) -> Result<()> {
         let progress = self.dispatcher.progress;
+        for model in self.dispatcher.models {
+            model.model.close();
+        }
+        // Those that have only waited end now, and are not counted.
+        while let Ok(Some(done)) = timeout(CLOSING, in_flight.join_next()).await {
+            self.store_result(done)?;
+        }
         if !in_flight.is_empty() {
             let (at_most, again) = match grace {
                 Some(grace) => (
@@ -219,9 +230,6 @@ impl<I: Item> ReplySink<'_, I> {
                 "stopping when the requests in flight ({}) have ended{at_most}; interrupt{again} to abort them",
                 in_flight.len()
             ));
-        }
-        for model in self.dispatcher.models {
-            model.model.close();
         }
         let out_of_grace = async {
             match grace {

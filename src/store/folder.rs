@@ -14,6 +14,7 @@ use crate::error::{Error, Result};
 use crate::files::folder_access::FolderAccess;
 use crate::files::{self, is_unfinished, reading};
 use crate::types::manifest::{ColumnDifference, RunManifest, differences};
+use crate::types::recorded_names::RecordedNames;
 use crate::types::{Detail, Distinct, ImageFidelity, Record, RunQuestion, Thumbnail, TrialKey};
 
 pub(super) const MANIFEST: &str = "manifest.json";
@@ -279,7 +280,9 @@ pub(super) fn check_same_run(
             continue;
         }
         let is_address = field == ADDRESS;
-        if is_address && address_change == AddressChange::Allowed {
+        // Nothing was asked at an address that gave no reply, such as a mistyped one.
+        let is_first = is_address && !has_reply(folder, stored, value)?;
+        if is_first || (is_address && address_change == AddressChange::Allowed) {
             tracing::warn!(
                 "{value} was asked at {before} in this run; from now on it is asked at {after}"
             );
@@ -296,6 +299,19 @@ pub(super) fn check_same_run(
         ));
     }
     Ok(())
+}
+
+/// Whether a run has a reply of a model, or may have one in a batch.
+fn has_reply(folder: &Path, stored: &RunManifest, model: &str) -> Result<bool> {
+    if folder.join(BATCH).exists() {
+        return Ok(true);
+    }
+    let names = RecordedNames::of(stored);
+    let mut has_reply = false;
+    each_line(&folder.join(RECORDS), |trial: StoredTrial| {
+        has_reply |= !trial.failed() && names.shown(&trial.model) == model;
+    })?;
+    Ok(has_reply)
 }
 
 /// Creates a run in a new or empty folder: writes the manifest before any other file. A new folder is for this user alone.

@@ -44,6 +44,26 @@ fn a_stopped_run_goes_on_where_it_stopped() {
 }
 
 #[test]
+fn a_mistyped_address_without_a_reply_binds_the_run_to_nothing() {
+    let bench = Bench::with_frames();
+    let line = "--data frames --levels L0 --retries 0 --out run";
+    let wrong = bench.call(&model_args("http://127.0.0.1:9/v1", line));
+    assert_eq!(wrong.code, Some(1), "{wrong:?}");
+    let endpoint = MockEndpoint::start([Answer::text("A")]);
+    let right = bench.call(&model_args(&endpoint.base_url(), line));
+    assert_eq!(right.code, Some(0), "{right:?}");
+    assert!(
+        right.stderr.contains("from now on it is asked at"),
+        "{right:?}"
+    );
+    // Now there are replies, so that another address needs a word of the user.
+    let other = MockEndpoint::start([Answer::text("A")]);
+    let refused = bench.call(&model_args(&other.base_url(), line));
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    assert!(refused.stderr.contains("--resume"), "{refused:?}");
+}
+
+#[test]
 fn a_torn_record_is_asked_again_and_nothing_else() {
     let bench = Bench::with_frames();
     let endpoint = MockEndpoint::start([Answer::text("A")]);
