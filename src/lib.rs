@@ -72,6 +72,8 @@
 //! types, error, files = the ground     job = the engine of everything asked     run = one folder or file a command     cli = words → calls
 //! ```
 //!
+//! - [`error`]: the one error type. `files`: files and folders, read with bounds and written whole. `internals`: what benchmarks and tests
+//!   of this repository use besides.
 //! - [`types`]: the vocabulary. [`Frame`](types::Frame)s are seen, [`Question`]s are asked, a
 //!   [`Degradation`] is what was done to a frame, a [`Condition`] is a degradation with or
 //!   without an enhancer, a [`Reply`](types::Reply) is what a model sent, and a [`Record`](types::Record) is what came of one trial:
@@ -85,7 +87,7 @@
 //! - [`synthesis`]: a clean image × a degradation → a degraded one; pure, given a noise key.
 //! - [`calibrate`]: frames of a sensor → the camera that the synthesis takes its noise from.
 //! - [`enhance`]: a degraded image → an enhanced one, by the user's ONNX model.
-//! - [`ask`]: a prompt and images → a reply; the only asynchronous stage. `ask/wire`: one file an API.
+//! - [`ask`]: a prompt and images → a reply; the only asynchronous stage. `ask/wire`: the APIs of endpoints, their requests and replies.
 //! - [`score`]: a reply → a choice or a mark; records → numbers with their intervals.
 //! - [`store`]: `results/<run>/`, append-only and resumable.
 //! - `image_store`: a folder of images that were made, shared by runs and processes; it may be deleted at any time.
@@ -98,17 +100,8 @@
 //!
 //! # Where to add what
 //!
-//! The files that are edited by hand; snapshots of the help, the pages in `src/docs` and CHANGELOG come on top.
-//!
-//! | to add | files |
-//! |---|---|
-//! | a flag | the structure of its group, where it acts, the test of what it does, for an evaluation or `openeqa` its row in `tests/program/identity.rs`; where it may be idle, `cli/no_effect.rs` |
-//! | a format to import | `import/<kind>.rs`, `import/mod.rs`, `import/README.md`, `tests/program/import.rs` |
-//! | a kind of degradation | `types/degradation.rs`, `synthesis/<kind>.rs`, `synthesis/mod.rs`, `synthesis/applied.rs`, `synthesis/exposures.rs`, `tests/program/synthesize.rs`, `results/README.md`; with an axis of its own `types/severity.rs`, `synthesis/levels.rs` |
-//! | an API of endpoints | `ask/wire_kind.rs`, `ask/wire/<api>.rs`, `ask/wire/mod.rs`, `tests/program/faults/wires.rs` |
-//! | a vendor of endpoints | `ask/vendors.toml`, `ask/thinking.toml` |
-//! | a rule of reading replies | `score/choice/`, its words in `words.toml`, `LENIENT_VERSION`, `tests/data/replies_by_rule.jsonl` |
-//! | an experiment | `run/<experiment>/`, its detail in `types/detail.rs` and `score/record.rs`, `job/stored.rs` |
+//! `CONTRIBUTING.md` has a checklist for each kind of change: a flag, a format to import, a kind of degradation, an API or a vendor of
+//! endpoints, a rule of reading replies, a statistic, an experiment and others.
 //!
 //! # What must hold
 //!
