@@ -1,6 +1,7 @@
 //! Runs as read from their folders: [`StoredRun`], and [`AnyRun`] for either kind of experiment.
 
 use std::collections::HashMap;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::renamed;
@@ -274,9 +275,34 @@ pub(super) fn open_questions(folder: &Path, instead: &str) -> Error {
     }
 }
 
+/// Most runs that a message lists.
+const MOST_LISTED: usize = 8;
+
+/// The folders with a manifest in a folder, for a message; the last text says how many more there are.
+fn runs_below(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut runs: Vec<String> = entries
+        .map(|entry| entry.path())
+        .filter(|path| path.join(store::MANIFEST).is_file())
+        .map(|path| path.display().to_string())
+        .collect();
+    runs.sort();
+    let more = runs.len().saturating_sub(MOST_LISTED);
+    runs.truncate(MOST_LISTED);
+    if more > 0 {
+        runs.push(format!("and {more} more"));
+    }
+    runs
+}
+
 fn no_run(folder: &Path) -> Error {
+    let below = runs_below(folder);
+    let hint = match &*below {
+        [] => String::new(),
+        below => format!("; there are runs in it: {}", below.join(" ")),
+    };
     Error::Run {
         path: folder.to_owned(),
-        problem: "no run in this folder: it has no manifest.json".to_owned(),
+        problem: format!("no run in this folder: it has no manifest.json{hint}"),
     }
 }

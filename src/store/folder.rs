@@ -17,7 +17,7 @@ use crate::types::manifest::{ColumnDifference, RunManifest, differences};
 use crate::types::recorded_names::RecordedNames;
 use crate::types::{Detail, Distinct, ImageFidelity, Record, RunQuestion, Thumbnail, TrialKey};
 
-pub(super) const MANIFEST: &str = "manifest.json";
+pub(crate) const MANIFEST: &str = "manifest.json";
 pub(super) const RECORDS: &str = "records.jsonl";
 /// The questions of a run, with their words and scenes.
 pub(super) const QUESTIONS: &str = "questions.jsonl";

@@ -135,6 +135,13 @@ fn runs_that_cannot_be_compared_are_named() {
         none.stderr.contains("nowhere: no run in this folder"),
         "{none:?}"
     );
+    let above = bench.call(&["report", "."]);
+    assert!(
+        above
+            .stderr
+            .contains("there are runs in it: ./foreign ./one ./strange"),
+        "{above:?}"
+    );
 }
 
 #[test]
