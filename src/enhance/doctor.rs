@@ -88,7 +88,7 @@ impl Enhancer {
         let sizes = self.try_sizes(dark);
         let order = self.other_order();
         let trials = self.trials_of_all(dark)?.ok_or_else(|| {
-            self.fault("it takes none of the small sizes of the probe; state `multiple` or `fixed` in MODEL.onnx.toml beside it".to_owned())
+            self.fault("it takes none of the small sizes of the probe; state `multiple` or `fixed` in MODEL.onnx.toml beside it")
         })?;
         let Trials {
             frames,
@@ -326,10 +326,8 @@ impl Found {
     /// Names the other outputs whose images could be enhanced ones.
     fn mention(&mut self, others: &[ExaminedConvention]) {
         for output in others.iter().filter(|output| output.problem.is_none()) {
-            self.conclusion += &format!(
-                " The {} gives plausible images: check which output its authors use.",
-                output.title
-            );
+            let found = " gives plausible images: check which output its authors use.";
+            self.conclusion += &[" The ", &*output.title, found].concat();
         }
     }
 

@@ -355,7 +355,7 @@ impl Enhancer {
         let enhanced = enhanced.map_err(|e| self.fault(e))?;
         let enhanced = enhanced
             .to_rgb(self.graph.reading.rounding)
-            .ok_or_else(|| self.fault("gave no pixels".to_owned()))?;
+            .ok_or_else(|| self.fault("gave no pixels"))?;
         self.log.add_rule(rule);
         Ok(Ok(enhanced))
     }
@@ -388,10 +388,10 @@ impl Enhancer {
         })
     }
 
-    pub(super) fn fault(&self, problem: String) -> Error {
+    pub(super) fn fault(&self, problem: impl AsRef<str>) -> Error {
         Error::Enhancer {
             path: self.path.clone(),
-            problem: sidecar::named(&problem, &self.path),
+            problem: sidecar::named(problem.as_ref(), &self.path),
         }
     }
 

@@ -197,7 +197,7 @@ impl Enhancer {
         let planes = planes.map_err(|problem| self.fault(problem))?;
         planes
             .to_rgb(Rounding::Round)
-            .ok_or_else(|| self.fault("a frame of the probe has no pixel".to_owned()))
+            .ok_or_else(|| self.fault("a frame of the probe has no pixel"))
     }
 }
 

@@ -282,7 +282,8 @@ mod tests {
         let [_, high] = nikon.gain_range();
         assert_eq!(of("shutter=2", &nikon), (high / 16.0, 4.0));
         assert_eq!(of("gain=2", &nikon), (high / 16.0, 2.0));
-        assert_eq!(of(&format!("base-gain={}", high / 4.0), &nikon).1, 2.0);
+        let quarter = high / 4.0;
+        assert_eq!(of(&format!("base-gain={quarter}"), &nikon), (quarter, 2.0));
         // One setting was measured: there is no gain to raise. Its K is typed with the digits of a table.
         let mut own = CameraModel::default();
         own.set_gain_range([0.399_7, 0.399_7]).unwrap();

@@ -150,13 +150,12 @@ pub(crate) fn figures(args: &FiguresArgs) -> Result<Outcome> {
             files.add_tables(&paper_tables(findings, &names), args, &look);
             continue;
         }
-        match drawings.iter().find(|drawing| drawing.name == name) {
-            Some(drawing) => files.add_drawing(drawing, &args.format, &look)?,
-            None => {
-                let reason = without_threshold(findings, name);
-                let reason = reason.as_deref();
-                files.leave_out(name, reason.unwrap_or("the runs have no records for it"));
-            }
+        if let Some(drawing) = drawings.iter().find(|drawing| drawing.name == name) {
+            files.add_drawing(drawing, &args.format, &look)?;
+        } else {
+            let reason = without_threshold(findings, name);
+            let reason = reason.as_deref();
+            files.leave_out(name, reason.unwrap_or("the runs have no records for it"));
         }
     }
     let said = names.said();
