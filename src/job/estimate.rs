@@ -46,6 +46,7 @@ pub(crate) fn estimate<E: Experiment>(
         .first()
         .map_or_else(Vec::new, |plan| experiment.expected_requests(&plan.sources));
     let (mut lines, mut all_models) = (Vec::new(), Vec::new());
+    let mut built_in = Vec::new();
     let mut loads = Vec::new();
     for (phase, plan) in plans.iter().enumerate() {
         let expected = if phase == 0 { &[] } else { &expected[..] };
@@ -54,6 +55,7 @@ pub(crate) fn estimate<E: Experiment>(
             add_load(&mut loads, &experiment.models(phase)[model], &line);
             lines.push(line);
         }
+        built_in.extend(built_in_models(experiment.models(phase), plan));
         all_models.extend(experiment.models(phase).iter().cloned());
     }
     let budget = Budget::new(money, &all_models, stored)?;
@@ -110,6 +112,7 @@ pub(crate) fn estimate<E: Experiment>(
     let remaining: usize = plans.iter().map(Plan::remaining).sum();
     Ok(Forecast {
         lines,
+        built_in,
         trials: planned + expected.len(),
         answered: planned - remaining,
         spent: budget.spent(),
@@ -132,6 +135,25 @@ pub(crate) fn estimate<E: Experiment>(
             .any(|source| source.order.len() > 1)
             .then_some(largest_request),
     })
+}
+
+/// The models of this program that a plan asks, with the number of trials of each.
+fn built_in_models<I>(models: &[ModelUnderTest], plan: &Plan<I>) -> Vec<(String, usize)> {
+    let mut trials = vec![0; models.len()];
+    for trial in plan.groups().flat_map(|(_, group)| &group.trials) {
+        trials[trial.model] += 1;
+    }
+    let models = models.iter().zip(trials);
+    let built_in = models.filter(|(model, trials)| !model.model.is_remote() && *trials > 0);
+    built_in
+        .map(|(model, trials)| {
+            let role = match model.view {
+                View::Blind => " (blind)",
+                View::Image => "",
+            };
+            (format!("{}{role}", model.name), trials)
+        })
+        .collect()
 }
 
 /// What is too large for an endpoint: the largest image, or the request with the most of them.

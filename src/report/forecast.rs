@@ -55,6 +55,8 @@ pub(crate) struct ReadingCost {
 pub(crate) struct Forecast {
     /// Requests left, by model.
     pub lines: Vec<CostLine>,
+    /// The built-in models, which are asked at no endpoint, with the trials left of each; controls are among them.
+    pub built_in: Vec<(String, usize)>,
     /// Number of all trials.
     pub trials: usize,
     /// Number of trials with a reply.
@@ -173,10 +175,11 @@ pub(crate) fn render(forecast: &Forecast) -> String {
     }
     let store = forecast.image_store.as_ref();
     let store = store.map(StoreForecast::line).unwrap_or_default();
+    let built_in = built_in_line(&forecast.built_in);
     if forecast.lines.is_empty() {
-        return text + ".\n" + &store;
+        return text + ".\n" + &built_in + &store;
     }
-    let _ = write!(text, ".\n{table}");
+    let _ = write!(text, ".\n{table}{built_in}");
     for line in &forecast.lines {
         if let Some(tokens) = line.charged_image_tokens {
             let _ = writeln!(
@@ -218,6 +221,18 @@ pub(crate) fn render(forecast: &Forecast) -> String {
         let _ = writeln!(text, "the run would not start: {problem}");
     }
     text
+}
+
+/// The built-in models with their trials; empty without any.
+fn built_in_line(models: &[(String, usize)]) -> String {
+    let models: Vec<String> = models
+        .iter()
+        .map(|(model, trials)| format!("{model} {}", count(*trials as f64)))
+        .collect();
+    match &*models {
+        [] => String::new(),
+        models => format!("at no endpoint, built in: {}\n", models.join(", ")),
+    }
 }
 
 /// Where the models would be asked: a line for each address, with its models if there are several addresses.

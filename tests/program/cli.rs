@@ -139,6 +139,20 @@ fn completions_and_manual_come_from_the_flags() {
 }
 
 #[test]
+fn an_estimate_names_the_models_that_need_no_endpoint() {
+    let bench = Bench::new();
+    let said = bench.complete(&words(
+        "--model observer --blind-model random --data rooms:frames=3,size=96x64 --levels L0,L3 --dry-run",
+    ));
+    let built_in =
+        "at no endpoint, built in: observer 30, observer:other-room 30, random (blind) 10\n";
+    assert!(
+        said.contains("70 of 70 trials") && said.contains(built_in),
+        "{said}"
+    );
+}
+
+#[test]
 fn a_dry_run_needs_no_key() {
     let bench = Bench::with_questions(3);
     let args = words("--data set.jsonl --model gpt-4o --dry-run");
