@@ -197,7 +197,12 @@ fn a_run_continues_at_another_address_only_if_allowed() {
         manifest
     };
     let base = tempfile::tempdir().unwrap();
-    drop(Store::open(base.path(), &at("here"), AddressChange::Refused).unwrap());
+    let open = |address| Store::open(base.path(), &at(address), AddressChange::Refused).unwrap();
+    drop(open("typo"));
+    // Without a reply, another address is no other run.
+    let mut store = open("here");
+    store.append(&record("a", TrialOutcome::Right)).unwrap();
+    drop(store);
     assert!(Store::open(base.path(), &at("there"), AddressChange::Allowed).is_ok());
     let error = Store::open(base.path(), &at("there"), AddressChange::Refused).unwrap_err();
     assert!(error.to_string().contains("--resume"), "{error}");
