@@ -54,10 +54,17 @@ impl Photographs {
 
     fn in_folder(folder: &Path, further: &[PathBuf]) -> Result<Self> {
         let mut notes = Vec::new();
-        if folder.join(frames::QUESTIONS).exists() {
+        let own = [
+            frames::QUESTIONS,
+            "questions.csv",
+            "questions.tsv",
+            "questions.json",
+        ];
+        let own = own.map(|name| folder.join(name));
+        for file in own.iter().filter(|file| file.exists()) {
             notes.push(format!(
                 "{} is ignored: the questions are those of --ask",
-                folder.join(frames::QUESTIONS).display()
+                file.display()
             ));
         }
         if folder.join(frames::FRAMES).exists() {

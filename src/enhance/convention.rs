@@ -102,8 +102,10 @@ words!(Channels { Rgb = "RGB", Y = "Y" });
 pub(super) enum ChannelOrder {
     /// Red first, as in all published models.
     #[default]
+    #[serde(alias = "RGB")]
     Rgb,
     /// Blue first, as in OpenCV.
+    #[serde(alias = "BGR")]
     Bgr,
 }
 

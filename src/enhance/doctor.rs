@@ -356,8 +356,11 @@ fn propose(
 ) -> Found {
     match probe.plausible().as_slice() {
         [pair] => {
+            let stated = stated.map_or_else(String::new, |stated| {
+                format!(" Stated are {stated}, with which they cannot.")
+            });
             let conclusion = format!(
-                "With {pair}, and with no other ranges, its images can be enhanced images."
+                "With {pair}, and with no other ranges, its images can be enhanced images.{stated}"
             );
             return Found::ranges(*pair, conclusion);
         }

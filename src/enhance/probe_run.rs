@@ -73,7 +73,7 @@ impl Enhancer {
     /// that are right are found by trial.
     fn problem(&self, probe: &Probe, dark: &[Rgb]) -> Result<Option<String>> {
         let problem = match probe.conclusion() {
-            Conclusion::Implausible(seen) => {
+            Conclusion::Implausible(seen) | Conclusion::Doubtful(seen) => {
                 let better = self.better_lines(dark)?;
                 better.map(|better| format!("{seen}. {better}"))
             }

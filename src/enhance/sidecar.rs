@@ -103,7 +103,18 @@ pub(super) fn named(text: &str, model: &Path) -> String {
 pub(super) fn text_for(model: &Path) -> Result<String> {
     let path = path_for(model);
     match fs::symlink_metadata(&path) {
-        Err(error) if error.kind() == ErrorKind::NotFound => Ok(String::new()),
+        Err(error) if error.kind() == ErrorKind::NotFound => {
+            let near = model.with_extension("toml");
+            if near.exists() {
+                tracing::warn!(
+                    "{} is not read: the sidecar of {} is {}",
+                    near.display(),
+                    model.display(),
+                    path.display()
+                );
+            }
+            Ok(String::new())
+        }
         _ => reading::settings(&path),
     }
 }

@@ -9,7 +9,7 @@ use super::source::{Frames, Source, SourceFrame};
 use crate::dataset::Picture;
 use crate::enhance::{EnhancerArgs, brightness as brightness_in_codes};
 use crate::synthesis::{LightSettings, mean_luminance};
-use crate::types::{AxisLevel, Rgb, SetLight};
+use crate::types::{AxisLevel, SetLight};
 
 /// Maximum number of frames that are measured; chosen.
 const SAMPLED: usize = 24;
@@ -46,7 +46,9 @@ pub(crate) fn tell(job: &JobSettings, progress: &Progress) {
 
 /// Mean linear luminance of up to [`SAMPLED`] frames, evenly spread, and their number; `None` without frames that can be decoded.
 pub(crate) fn brightness(frames: &dyn Frames, sources: &[Source]) -> Option<(f64, usize)> {
-    let sample = sampled(frames, sources, mean_luminance);
+    let sample = sampled(frames, sources, |picture| {
+        Some(mean_luminance(&picture.decode().ok()?))
+    });
     let mean = sample.iter().sum::<f64>() / sample.len() as f64;
     (!sample.is_empty()).then_some((mean, sample.len()))
 }
@@ -90,22 +92,25 @@ pub(super) fn warn<E: Experiment>(experiment: &E) {
 /// The median of the mean luma of up to [`SAMPLED`] frames, evenly spread; the upper of two. `None` without frames in files. Built-in
 /// rooms are lit. A file that cannot be decoded is left out: the trial that needs its image says so.
 fn median_luma(frames: &dyn Frames, sources: &[Source]) -> Option<f64> {
-    let mut sample = sampled(frames, sources, brightness_in_codes);
+    let mut sample = sampled(frames, sources, |picture| match picture {
+        Picture::Encoded(_) => Some(brightness_in_codes(&picture.decode().ok()?)),
+        Picture::Drawn(..) => None,
+    });
     sample.sort_by(f64::total_cmp);
     sample.get(sample.len() / 2).copied()
 }
 
-/// A number of up to [`SAMPLED`] frames in files, evenly spread.
-fn sampled(frames: &dyn Frames, sources: &[Source], of: impl Fn(&Rgb) -> f64 + Sync) -> Vec<f64> {
+/// A number of up to [`SAMPLED`] frames that have one, evenly spread.
+fn sampled(
+    frames: &dyn Frames,
+    sources: &[Source],
+    of: impl Fn(&Picture) -> Option<f64> + Sync,
+) -> Vec<f64> {
     let all: Vec<&SourceFrame> = sources.iter().flat_map(|source| &source.frames).collect();
     let number = all.len().min(SAMPLED);
     let sample = (0..number).into_par_iter().filter_map(|index| {
         let frame = all[index * all.len() / number];
-        let picture = frames.picture(&frame.id).ok()?;
-        match picture {
-            Picture::Encoded(_) => Some(of(&picture.decode().ok()?)),
-            Picture::Drawn(..) => None,
-        }
+        of(&frames.picture(&frame.id).ok()?)
     });
     sample.collect()
 }

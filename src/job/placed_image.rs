@@ -4,10 +4,12 @@
 //! order: bytes, then pixels, then refusal. An image is in its place before its JSON file is, so that no JSON file vouches for an
 //! image that is not there.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 
 use crate::ask::png;
 use crate::dataset::{ImageFile, ReadingRule};
@@ -106,7 +108,7 @@ impl<R: ImageOrigin> Sidecar<R> {
     }
 
     fn write(&self, path: &Path) -> Result<()> {
-        let text = format!("{:#}\n", serde_json::json!(self));
+        let text = format!("{:#}\n", json!(self));
         write(path, text.as_bytes())
     }
 }
@@ -197,11 +199,10 @@ impl Placed {
         let fault = stored.output.as_ref().map(|output| output.fault(&bytes));
         if stored.recipe != *recipe {
             if R::IS_REPLACED && fault == Some(None) {
-                return Ok(Verdict::Make(Some(
-                    "made from another image or with other settings",
-                )));
+                return Ok(Verdict::Make(Some(OTHER)));
             }
-            return Err(self.refusal("made from another image or with other settings"));
+            let fields = differing(&json!(stored.recipe), &json!(recipe));
+            return Err(self.refusal(&format!("{OTHER} ({})", fields.join(", "))));
         }
         Ok(match (fault, decoded(&self.image, &bytes)) {
             (Some(None), _) => Verdict::Keep,
@@ -218,6 +219,29 @@ impl Placed {
         let remedy = "--force overwrites it, another --out keeps both";
         Error::data(self.image.display(), format_args!("{problem}; {remedy}"))
     }
+}
+
+/// Why an image is not the one that is asked for.
+const OTHER: &str = "made from another image or with other settings";
+
+/// The names of the fields that differ, with those of objects in them.
+fn differing(one: &Value, other: &Value) -> Vec<String> {
+    let (Some(one), Some(other)) = (one.as_object(), other.as_object()) else {
+        return Vec::new();
+    };
+    let names: BTreeSet<&String> = one.keys().chain(other.keys()).collect();
+    let differ = names
+        .into_iter()
+        .filter(|name| one.get(*name) != other.get(*name));
+    differ
+        .map(|name| {
+            let inner = one.get(name).zip(other.get(name));
+            match inner.map_or_else(Vec::new, |(one, other)| differing(one, other)) {
+                inner if inner.is_empty() => name.clone(),
+                inner => format!("{name}: {}", inner.join(" and ")),
+            }
+        })
+        .collect()
 }
 
 /// The pixels of a PNG; `None` if it cannot be decoded.

@@ -46,6 +46,12 @@ const MODEL: &str = "model";
 /// The field of a model's entry in the manifest that holds the address.
 const ADDRESS: &str = "--base-url";
 
+/// The column of the judges of open answers, whose flags have this word.
+const JUDGE: &str = "judge";
+
+/// The field of an enhancer with the digest of its file and its sidecar.
+const ENHANCER_FILE: &str = "--llie";
+
 /// Writes a file into a folder, completely or not at all; a file with the same content is left untouched.
 pub(super) fn write(folder: &Path, name: &str, content: &[u8]) -> Result<()> {
     if reading::read(&folder.join(name)).is_ok_and(|existing| existing == content) {
@@ -280,6 +286,10 @@ pub(super) fn check_same_run(
             continue;
         }
         let is_address = field == ADDRESS;
+        let field = match column {
+            JUDGE => field.replacen("--", "--judge-", 1),
+            _ => field,
+        };
         // Nothing was asked at an address that gave no reply, such as a mistyped one.
         let is_first = is_address && !has_reply(folder, stored, value)?;
         if is_first || (is_address && address_change == AddressChange::Allowed) {
@@ -287,6 +297,12 @@ pub(super) fn check_same_run(
                 "{value} was asked at {before} in this run; from now on it is asked at {after}"
             );
             continue;
+        }
+        if field == ENHANCER_FILE {
+            return wrong(format!(
+                "the {column} {value} is another one in this run: its file, its sidecar or its preset was changed since ({before} before, \
+                 {after} now); restore it, or use another --out"
+            ));
         }
         let hint = if is_address {
             " (the same model at another address: --resume)"

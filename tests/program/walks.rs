@@ -92,6 +92,16 @@ fn several_runs_are_compared_if_one_judge_marked_them() {
     let house = House::new();
     scripts(&house);
     complete(&house, "--out one");
+    // An answer in the dark stays one when its file is given to another run.
+    let given = house.call(&words(
+        "--answers again=one/upstream/script_a.jsonl-L3-noise.json --judge script:j.jsonl --levels L0,L3 --out given",
+    ));
+    assert_eq!(given.code, Some(0), "{given:?}");
+    let summary = fs::read_to_string(house.0.path("given/summary.csv")).unwrap();
+    assert!(
+        summary.contains("again,image,L3,noise,") && !summary.contains("again,image,L0,"),
+        "{summary}"
+    );
     house.0.file("b.jsonl", "{\"default\": \"grey\"}");
     let run_other = |judge: &str, out: &str| {
         let line = format!("--model script:b.jsonl --levels L0,L3 --judge {judge} --out {out}");
@@ -185,7 +195,7 @@ fn two_judges_of_one_name_are_two_judges() {
     assert!(
         refused
             .stderr
-            .contains("--temperature is 0.2 in one and 1 in two"),
+            .contains("--judge-temperature is 0.2 in one and 1 in two"),
         "{}",
         refused.stderr
     );
@@ -194,6 +204,12 @@ fn two_judges_of_one_name_are_two_judges() {
         "--model m --judge j --base-url {base} --judge-temperature 1 --levels L0 --out one"
     )));
     assert_eq!(again.code, Some(2), "{again:?}");
+    assert!(
+        again
+            .stderr
+            .contains("the judge j has another --judge-temperature"),
+        "{again:?}"
+    );
 
     scripts(&house);
     complete(&house, "--out three");

@@ -302,8 +302,7 @@ fn check_judges(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
     let path = runs[first.values[0].0].folder.clone();
     let words: Vec<String> = differences.iter().map(|one| one.words(&names)).collect();
     let problem = format!(
-        "the judges of the runs have one name and differ: {}; marks of two judges cannot be compared; report each run alone, or mark \
-         the answers of one again: openeqa with the other's --judge flags, --answers with a file of its upstream folder, and a new --out",
+        "the judges of the runs have one name and differ: {}; marks of two judges cannot be compared: report each run alone",
         words.join("; ")
     );
     Err(Error::Run { path, problem })
@@ -314,7 +313,9 @@ fn of_judge(manifest: &RunManifest) -> Option<Settings> {
     let judge = manifest.settings.get(JUDGE)?.as_str()?;
     // Runs of earlier versions have the judge among the models alone.
     let columns = [JUDGES, "model"].map(|column| manifest.columns.get(column)?.get(judge));
-    columns.into_iter().flatten().next().map(decisive)
+    let settings = columns.into_iter().flatten().next().map(decisive)?;
+    let of_flag = |(flag, value): (String, String)| (flag.replacen("--", "--judge-", 1), value);
+    Some(settings.into_iter().map(of_flag).collect())
 }
 
 /// Scores a run, and writes its report and manifest into its folder. The run is incomplete if a mark cannot be read.

@@ -237,8 +237,16 @@ pub(super) fn parameter_flags(run: &RunManifest) -> Option<Settings> {
     let models = run.columns.get("model")?;
     let mut values = BTreeMap::<String, BTreeSet<String>>::new();
     let mut remote = 0;
-    for content in models
-        .values()
+    // A judge stands among the models, too, and has flags of its own.
+    let judges = run.columns.get("judge");
+    let is_judge = |name: &String, content: &Value| {
+        judges.and_then(|judges| judges.get(name)) == Some(content)
+    };
+    let asked = models
+        .iter()
+        .filter(|(name, content)| !is_judge(name, content));
+    for content in asked
+        .map(|(_, content)| content)
         .filter(|content| content.get("--base-url").is_some())
     {
         remote += 1;

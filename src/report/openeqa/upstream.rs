@@ -13,9 +13,13 @@ use crate::score::subject::Subject;
 const FOLDER: &str = "upstream";
 
 #[derive(Serialize)]
-struct Answer<'a> {
+struct GivenAnswer<'a> {
     question_id: &'a str,
     answer: Option<&'a str>,
+    /// In which condition, so that `--answers` takes it for no other; left out at L0, as in upstream's own files. Upstream's scripts
+    /// read the first two fields alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    condition: Option<&'a str>,
 }
 
 /// For each subject, `NAME.json` with its answers and, if there is a judge, `NAME-JUDGE-metrics.json` with its marks.
@@ -45,14 +49,16 @@ pub(super) fn files(report: &OpenReport<'_>) -> Result<Vec<(String, Vec<u8>)>> {
         let Some(answers_by_question) = answers_by_question else {
             continue;
         };
-        let stem = file_name(&format!("{}-{}", subject.model, subject.condition()));
+        let condition = subject.condition();
+        let stem = file_name(&format!("{}-{condition}", subject.model));
         let answers = answers_by_question
             .iter()
-            .map(|(question, reported)| Answer {
+            .map(|(question, reported)| GivenAnswer {
                 question_id: &report.questions[*question].id.0,
                 answer: reported.answer.as_deref(),
+                condition: Some(&*condition).filter(|condition| *condition != "L0"),
             });
-        let answers: Vec<Answer<'_>> = answers.collect();
+        let answers: Vec<GivenAnswer<'_>> = answers.collect();
         files.push((format!("{FOLDER}/{stem}.json"), json_file(&answers)?));
         let Some(judge) = report.judge else {
             continue;

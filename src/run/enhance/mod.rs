@@ -14,7 +14,6 @@ use crate::error::{Error, Result};
 use crate::job::Outcome;
 use crate::job::dark_frames::{darkened, evenly};
 use crate::job::enhancers::{EnhancerRunArgs, OpenEnhancers};
-use crate::job::identity;
 use crate::job::input_tally::InputTally;
 use crate::job::part_args::{PartArgs, keep_part};
 use crate::job::placed_image::{ImageOutcome, Placed};
@@ -109,7 +108,7 @@ pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome
         progress.bar("images", images.entries.len()),
         InputTally::default(),
     );
-    let settings = identity::enhancer(&digest, &args.loading.size);
+    let settings = origin::settings(&digest, &args.loading.size);
     let (mut written, mut unchanged, mut failed) = (0, 0, 0);
     for entry in &images.entries {
         let picture = images.picture(entry);

@@ -4,8 +4,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::dataset::Picture;
+use crate::enhance::SizeArgs;
+use crate::job::identity;
 use crate::job::placed_image::ImageOrigin;
-use crate::types::{FrameId, InputNote};
+use crate::types::{Digest, FrameId, InputNote};
 
 /// Everything that decides the pixels of an enhanced image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -23,6 +25,17 @@ pub(super) struct EnhancedOrigin {
 impl ImageOrigin for EnhancedOrigin {
     const SCHEMAS: &'static [&'static str] = &["darkqa.enhanced/1"];
     const IS_REPLACED: bool = false;
+}
+
+/// What decides the pixels besides the image, with a name for the digest that a reader of the message understands.
+pub(super) fn settings(digest: &Digest, size: &SizeArgs) -> Value {
+    let mut settings = identity::enhancer(digest, size);
+    if let Some(fields) = settings.as_object_mut()
+        && let Some(digest) = fields.remove("--llie")
+    {
+        fields.insert("model with its sidecar".to_owned(), digest);
+    }
+    settings
 }
 
 impl EnhancedOrigin {

@@ -60,7 +60,7 @@ fn the_command_enhances_files_and_folders() {
     );
     assert!(
         err.contains(
-            "c.png: made from another image or with other settings; --force overwrites it"
+            "c.png: made from another image or with other settings (enhancer: model with its sidecar); --force overwrites it"
         ),
         "{err}"
     );
