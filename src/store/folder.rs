@@ -300,7 +300,7 @@ pub(super) fn check_same_run(
         }
         if field == ENHANCER_FILE {
             return wrong(format!(
-                "the {column} {value} is another one in this run: its file, its sidecar or its preset was changed since ({before} before, \
+                "the {column} {value} ({field}) is another one in this run: its file, its sidecar or its preset was changed since ({before} before, \
                  {after} now); restore it, or use another --out"
             ));
         }

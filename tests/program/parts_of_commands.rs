@@ -92,7 +92,7 @@ fn images_are_synthesized_in_parts() {
 fn images_are_enhanced_in_parts() {
     let bench = with_frames();
     let (whole, parts) = in_parts(&bench, "enhance lift frames");
-    assert_eq!(whole.len(), 7);
+    assert_eq!(whole.len(), 14); // Each with its JSON file.
     assert_together(&whole, &parts);
 }
 
