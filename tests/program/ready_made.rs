@@ -157,7 +157,11 @@ fn a_check_names_everything_that_is_wrong() {
         "{line} --model gpt-4o --llie none.onnx --prompts nowhere"
     )));
     assert_eq!(called.code, Some(1), "{called:?}");
-    for part in ["problem  none.onnx", "problem  OPENAI_API_KEY", "nowhere"] {
+    for part in [
+        "problem  --llie: none.onnx: no such file",
+        "problem  OPENAI_API_KEY",
+        "nowhere",
+    ] {
         assert!(called.stdout.contains(part), "{part}: {}", called.stdout);
     }
     assert!(
