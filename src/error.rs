@@ -87,6 +87,12 @@ pub enum Error {
     },
 }
 
+/// The line, counted from 1, at which a text is not the TOML that was expected.
+pub(crate) fn line_of_toml(text: &str, error: &toml::de::Error) -> usize {
+    let before = error.span().and_then(|span| text.get(..span.start));
+    before.unwrap_or_default().matches('\n').count() + 1
+}
+
 impl Error {
     /// An error about a flag, variable or configuration line.
     pub fn usage(origin: impl Into<String>, problem: impl Display) -> Self {
@@ -125,6 +131,15 @@ impl Error {
                 place: origin.into(),
                 problem,
             },
+            other => other,
+        }
+    }
+
+    /// An error of a flag or variable at another one; any other error stays where it is.
+    #[must_use]
+    pub(crate) fn usage_at(self, origin: &str) -> Self {
+        match self {
+            Self::Usage { .. } => self.at(origin),
             other => other,
         }
     }

@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 use super::key_form::looks_like_key;
 use super::vendor::Vendor;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, line_of_toml};
 use crate::files::reading;
 
 /// The vendors of a file, above those of the built-in table. The default has none.
@@ -37,8 +37,7 @@ impl VendorTable {
             Error::usage("--vendor", problem)
         };
         let Rows { vendor: rows, .. } = toml::from_str(&text).map_err(|e: toml::de::Error| {
-            let start = e.span().map_or(0, |span| span.start);
-            let line = text.get(..start).unwrap_or_default().matches('\n').count() + 1;
+            let line = line_of_toml(&text, &e);
             wrong(format!("line {line}: {}", e.message().replace('\n', ", ")))
         })?;
         if rows.is_empty() {

@@ -222,9 +222,8 @@ pub(super) fn open(folder: &Path, questions: Option<&Path>, set: &SetArgs) -> Re
         );
         return Err(Error::data(folder.display(), problem));
     }
-    let beside = |ending: &&&str| questions.is_none() && file.with_extension(ending).exists();
-    if let Some(ending) = ["csv", "tsv", "json", "parquet"].iter().find(beside) {
-        let other = file.with_extension(ending);
+    let mut others = other_questions(folder).filter(|_| questions.is_none());
+    if let Some(other) = others.next() {
         tracing::warn!(
             "{0} is not read, because {QUESTIONS} is in the same folder; --data {0} reads it alone",
             other.display()
@@ -237,6 +236,13 @@ pub(super) fn open(folder: &Path, questions: Option<&Path>, set: &SetArgs) -> Re
         Vec::new(),
     )
     .with_questions_of(&file, read)
+}
+
+/// The files of questions that are in a folder besides [`QUESTIONS`].
+pub(super) fn other_questions(folder: &Path) -> impl Iterator<Item = PathBuf> {
+    let all = ["csv", "tsv", "json", "parquet"].map(|ending| format!("questions.{ending}"));
+    let all = all.map(|name| folder.join(name)).into_iter();
+    all.filter(|file| file.exists())
 }
 
 /// Whether a place is a folder of frames, and not a ready-made set.

@@ -54,14 +54,9 @@ impl Photographs {
 
     fn in_folder(folder: &Path, further: &[PathBuf]) -> Result<Self> {
         let mut notes = Vec::new();
-        let own = [
-            frames::QUESTIONS,
-            "questions.csv",
-            "questions.tsv",
-            "questions.json",
-        ];
-        let own = own.map(|name| folder.join(name));
-        for file in own.iter().filter(|file| file.exists()) {
+        let own = folder.join(frames::QUESTIONS);
+        let own = own.exists().then_some(own).into_iter();
+        for file in own.chain(frames::other_questions(folder)) {
             notes.push(format!(
                 "{} is ignored: the questions are those of --ask",
                 file.display()

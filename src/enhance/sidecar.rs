@@ -14,7 +14,7 @@ use super::convention::{
 };
 use super::expression::Expression;
 use super::extra::ExtraValue;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, line_of_toml};
 use crate::files::reading;
 
 /// Statements of a sidecar. Every key may be missing; an unknown key is an error.
@@ -150,8 +150,7 @@ impl ModelSidecar {
         let path = path_for(model);
         let wrong = |problem: &str| Error::data(path.display(), format_args!("{problem}{KEYS}"));
         let sidecar: Self = toml::from_str(text).map_err(|e| {
-            let before = e.span().and_then(|span| text.get(..span.start));
-            let line = before.unwrap_or_default().matches('\n').count() + 1;
+            let line = line_of_toml(text, &e);
             let stated = text.lines().nth(line - 1).unwrap_or_default().trim();
             let stated: String = stated.chars().take(LONGEST_LINE).collect();
             Error::line(

@@ -55,7 +55,7 @@ pub(crate) fn estimate<E: Experiment>(
             add_load(&mut loads, &experiment.models(phase)[model], &line);
             lines.push(line);
         }
-        built_in.extend(built_in_models(experiment.models(phase), plan));
+        built_in.extend(built_in_models(experiment, phase, plan));
         all_models.extend(experiment.models(phase).iter().cloned());
     }
     let budget = Budget::new(money, &all_models, stored)?;
@@ -138,7 +138,12 @@ pub(crate) fn estimate<E: Experiment>(
 }
 
 /// The models of this program that a plan asks, with the number of trials of each.
-fn built_in_models<I>(models: &[ModelUnderTest], plan: &Plan<I>) -> Vec<(String, usize)> {
+fn built_in_models<E: Experiment>(
+    experiment: &E,
+    phase: usize,
+    plan: &Plan<E::Item>,
+) -> Vec<(String, usize)> {
+    let models = experiment.models(phase);
     let mut trials = vec![0; models.len()];
     for trial in plan.groups().flat_map(|(_, group)| &group.trials) {
         trials[trial.model] += 1;
@@ -146,14 +151,18 @@ fn built_in_models<I>(models: &[ModelUnderTest], plan: &Plan<I>) -> Vec<(String,
     let models = models.iter().zip(trials);
     let built_in = models.filter(|(model, trials)| !model.model.is_remote() && *trials > 0);
     built_in
-        .map(|(model, trials)| {
-            let role = match model.view {
-                View::Blind => " (blind)",
-                View::Image => "",
-            };
-            (format!("{}{role}", model.name), trials)
-        })
+        .map(|(model, trials)| (label(model, E::PHASES[phase]), trials))
         .collect()
+}
+
+/// The name of a model with what it is asked for, or as what.
+fn label(model: &ModelUnderTest, phase: &str) -> String {
+    let role = match (phase, model.view) {
+        ("marks", _) => " (judge)",
+        (_, View::Blind) => " (blind)",
+        (_, View::Image) => "",
+    };
+    format!("{}{role}", model.name)
 }
 
 /// What is too large for an endpoint: the largest image, or the request with the most of them.
@@ -302,14 +311,9 @@ fn line(
         .model
         .max_tokens()
         .map(|limit| requests * f64::from(limit));
-    let role = match (phase, model.view) {
-        ("marks", _) => " (judge)",
-        (_, View::Blind) => " (blind)",
-        (_, View::Image) => "",
-    };
     let readings = by_reading.iter().filter(|(_, part)| part.requests > 0);
     CostLine {
-        model: format!("{}{role}", model.name),
+        model: label(model, phase),
         endpoints: model
             .server
             .as_deref()

@@ -283,7 +283,7 @@ fn runs_below(folder: &Path) -> Vec<String> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let mut runs: Vec<String> = entries
         .map(|entry| entry.path())
-        .filter(|path| path.join(store::MANIFEST).is_file())
+        .filter(|path| store::holds_run(path))
         .map(|path| path.display().to_string())
         .collect();
     runs.sort();

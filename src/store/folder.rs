@@ -13,11 +13,11 @@ use super::stored_trial::StoredTrial;
 use crate::error::{Error, Result};
 use crate::files::folder_access::FolderAccess;
 use crate::files::{self, is_unfinished, reading};
-use crate::types::manifest::{ColumnDifference, RunManifest, differences};
+use crate::types::manifest::{ColumnDifference, JUDGES, RunManifest, differences, judge_flag};
 use crate::types::recorded_names::RecordedNames;
 use crate::types::{Detail, Distinct, ImageFidelity, Record, RunQuestion, Thumbnail, TrialKey};
 
-pub(crate) const MANIFEST: &str = "manifest.json";
+pub(super) const MANIFEST: &str = "manifest.json";
 pub(super) const RECORDS: &str = "records.jsonl";
 /// The questions of a run, with their words and scenes.
 pub(super) const QUESTIONS: &str = "questions.jsonl";
@@ -45,9 +45,6 @@ const MODEL: &str = "model";
 
 /// The field of a model's entry in the manifest that holds the address.
 const ADDRESS: &str = "--base-url";
-
-/// The column of the judges of open answers, whose flags have this word.
-const JUDGE: &str = "judge";
 
 /// The field of an enhancer with the digest of its file and its sidecar.
 const ENHANCER_FILE: &str = "--llie";
@@ -155,8 +152,13 @@ pub(crate) fn find(base: &Path, hash: &str) -> Option<PathBuf> {
                 .and_then(OsStr::to_str)
                 .is_some_and(|name| name.ends_with(&ending))
         })
-        .filter(|path| path.join(MANIFEST).is_file())
+        .filter(|path| holds_run(path))
         .max()
+}
+
+/// Whether a folder is that of a run.
+pub(crate) fn holds_run(folder: &Path) -> bool {
+    folder.join(MANIFEST).is_file()
 }
 
 /// Whether another process writes to a run folder.
@@ -287,12 +289,12 @@ pub(super) fn check_same_run(
         }
         let is_address = field == ADDRESS;
         let field = match column {
-            JUDGE => field.replacen("--", "--judge-", 1),
+            JUDGES => judge_flag(&field),
             _ => field,
         };
         // Nothing was asked at an address that gave no reply, such as a mistyped one.
-        let is_first = is_address && !has_reply(folder, stored, value)?;
-        if is_first || (is_address && address_change == AddressChange::Allowed) {
+        let is_allowed = address_change == AddressChange::Allowed;
+        if is_address && (is_allowed || !has_reply(folder, stored, value)?) {
             tracing::warn!(
                 "{value} was asked at {before} in this run; from now on it is asked at {after}"
             );

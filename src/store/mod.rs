@@ -51,7 +51,7 @@ pub(crate) use record_log::{QuestionFile, RecordLog, each_record, each_reread_re
 pub(crate) use stored_trial::StoredTrial;
 
 pub(crate) use folder::{
-    AddressChange, BATCH, MANIFEST, PLAN, each_placed_question, each_question, find, is_locked,
+    AddressChange, BATCH, PLAN, each_placed_question, each_question, find, holds_run, is_locked,
     read_fidelity, read_manifest, read_questions, read_records, read_thumbnails, read_trials,
     schema,
 };

@@ -64,6 +64,14 @@ pub(crate) fn differences<'a>(
     })
 }
 
+/// The column of what decides the marks of each judge of open answers.
+pub(crate) const JUDGES: &str = "judge";
+
+/// The flag of a judge for a setting that models have, too: `--judge-temperature` for `--temperature`.
+pub(crate) fn judge_flag(flag: &str) -> String {
+    flag.replacen("--", "--judge-", 1)
+}
+
 /// A value of a column with different meanings in two runs: the field that differs, and what it is in each run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ColumnDifference<'a> {

@@ -2,16 +2,14 @@
 
 use std::path::Path;
 
-use crate::error::Error;
+use crate::error::{Error, line_of_toml};
 
 /// The error about invalid TOML, on one line and with its line number.
 pub(super) fn invalid_toml(path: &Path, text: &str, error: &toml::de::Error) -> Error {
-    let before = error.span().and_then(|span| text.get(..span.start));
-    let line = before.unwrap_or_default().matches('\n').count() + 1;
     let problem: Vec<&str> = error.message().lines().map(str::trim).collect();
     Error::line(
         path,
-        line,
+        line_of_toml(text, error),
         format_args!("not valid TOML: {}", problem.join(", ")),
     )
 }

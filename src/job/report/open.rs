@@ -32,7 +32,7 @@ use crate::score::open::{
 use crate::score::subject::Subject;
 use crate::store::Store;
 use crate::types::flag::read_word;
-use crate::types::manifest::{RunManifest, Status};
+use crate::types::manifest::{JUDGES, RunManifest, Status, judge_flag};
 use crate::types::{
     ModelListing, OpenDetail, QuestionId, Record, RunQuestion, Step, Thumbnail, TrialRef,
 };
@@ -41,9 +41,6 @@ use crate::types::{
 pub(crate) const JUDGE: &str = "--judge";
 /// Setting in the manifest with the protocol of judging.
 pub(crate) const PROTOCOL: &str = "--protocol";
-
-/// Column of the manifest with what decides the marks of each judge.
-pub(crate) const JUDGES: &str = "judge";
 
 /// The answers of a run, with their scores.
 pub(crate) struct Scores {
@@ -314,8 +311,9 @@ fn of_judge(manifest: &RunManifest) -> Option<Settings> {
     // Runs of earlier versions have the judge among the models alone.
     let columns = [JUDGES, "model"].map(|column| manifest.columns.get(column)?.get(judge));
     let settings = columns.into_iter().flatten().next().map(decisive)?;
-    let of_flag = |(flag, value): (String, String)| (flag.replacen("--", "--judge-", 1), value);
-    Some(settings.into_iter().map(of_flag).collect())
+    let settings = settings.into_iter();
+    let of_judge = settings.map(|(flag, value)| (judge_flag(&flag), value));
+    Some(of_judge.collect())
 }
 
 /// Scores a run, and writes its report and manifest into its folder. The run is incomplete if a mark cannot be read.

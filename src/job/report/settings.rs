@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::Value;
 
 use crate::types::degradation::Kind;
-use crate::types::manifest::RunManifest;
+use crate::types::manifest::{JUDGES, RunManifest};
 
 /// Settings by flag, as text.
 pub(super) type Settings = BTreeMap<String, String>;
@@ -238,7 +238,7 @@ pub(super) fn parameter_flags(run: &RunManifest) -> Option<Settings> {
     let mut values = BTreeMap::<String, BTreeSet<String>>::new();
     let mut remote = 0;
     // A judge stands among the models, too, and has flags of its own.
-    let judges = run.columns.get("judge");
+    let judges = run.columns.get(JUDGES);
     let is_judge = |name: &String, content: &Value| {
         judges.and_then(|judges| judges.get(name)) == Some(content)
     };

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ._trial import CHOICE, COLUMNS, OPEN, Record, add_mark, add_question, add_readings, add_reply
+from ._trial import CHOICE, COLUMNS, OPEN, Marks, Record, add_mark, add_question, add_readings, add_reply
 
 
 class Run(NamedTuple):
@@ -71,7 +71,7 @@ class Run(NamedTuple):
         parts = ("question", "answer", "extra_answers")
         return {name: json.dumps([question.get(part) for part in parts]) for name, question in questions.items()}
 
-    def _marks(self, judge: str | None, protocol: str, words: dict[str, str]) -> dict[tuple[str, str], int | None]:
+    def _marks(self, judge: str | None, protocol: str, words: dict[str, str]) -> Marks:
         """The marks of a judge, by what it is told: the words of the question and the answer.
 
         Two questions with the same words and the same answer have one mark.

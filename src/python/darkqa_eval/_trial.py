@@ -6,9 +6,11 @@ besides, under the names of the columns.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Optional
 
 Record = dict[str, Any]
+# The marks of a judge, by what it is told: the words of the question and the answer. None if its reply has no mark.
+Marks = dict[tuple[Optional[str], str], Optional[int]]
 
 CHOICE = "darkqa.run/2"
 OPEN = "darkqa.openeqa/2"
@@ -131,9 +133,6 @@ def add_readings(record: Record) -> None:
         record["predicted" + suffix] = None if chosen is None else choices[chosen]
         record["why" + suffix] = read["why"]
         record[mode] = chosen
-
-
-Marks = dict[tuple[str | None, str], int | None]
 
 
 def add_mark(record: Record, judge: str | None, protocol: str, marks: Marks, words: str | None) -> None:

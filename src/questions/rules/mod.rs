@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, line_of_toml};
 use crate::types::Digest;
 
 pub use entries::*;
@@ -82,8 +82,7 @@ impl Rules {
     pub fn parse(text: &str) -> Result<Self> {
         let wrong = |problem: String| Error::data("rules", problem);
         let book: RuleBook = toml::from_str(text).map_err(|e| {
-            let before = e.span().and_then(|span| text.get(..span.start));
-            let line = before.unwrap_or_default().matches('\n').count() + 1;
+            let line = line_of_toml(text, &e);
             wrong(format!("line {line}: {}", e.message().replace('\n', ", ")))
         })?;
         book.check().map_err(wrong)?;

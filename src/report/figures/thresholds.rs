@@ -7,6 +7,7 @@ use super::super::words::stops;
 use super::{Drawing, Overview};
 use crate::report::chart::drawn::Drawn;
 use crate::report::chart::thresholds::{Scale, ThresholdChart, ThresholdRow};
+use crate::score::curve::Curve;
 use crate::score::findings::Findings;
 use crate::types::degradation::Axis;
 
@@ -19,12 +20,17 @@ const NAMES: [(&str, Axis); 2] = [
 /// Why a figure cannot be drawn although its images were asked: the curves have no threshold. `None` if it is for another reason.
 pub(crate) fn without_threshold(findings: &Findings<'_>, figure: &str) -> Option<String> {
     let (_, axis) = NAMES.into_iter().find(|(name, _)| *name == figure)?;
-    let curves = findings.curves.iter();
-    let curves = curves.filter(|curve| curve.family.is_none() && curve.axis() == axis);
-    let reasons = curves.filter_map(|curve| curve.summary.threshold.as_ref().err());
+    let reasons =
+        curves_on(findings, axis).filter_map(|curve| curve.summary.threshold.as_ref().err());
     let reasons: BTreeSet<String> = reasons.map(level_words).collect();
     let reasons: Vec<String> = reasons.into_iter().collect();
     (!reasons.is_empty()).then(|| format!("no curve has a threshold: {}", reasons.join("; ")))
+}
+
+/// The curves of all families together on an axis.
+fn curves_on<'f>(findings: &'f Findings<'_>, axis: Axis) -> impl Iterator<Item = &'f Curve> {
+    let curves = findings.curves.iter();
+    curves.filter(move |curve| curve.family.is_none() && curve.axis() == axis)
 }
 
 impl Overview<'_> {
@@ -38,9 +44,7 @@ impl Overview<'_> {
 
     /// A row for each curve, with its threshold and interval on an axis. `None` if no curve has a threshold.
     fn thresholds_on(&self, axis: Axis) -> Option<Drawing> {
-        let curves = self.findings.curves.iter();
-        let curves = curves.filter(|curve| curve.family.is_none() && curve.axis() == axis);
-        let rows = curves.filter_map(|curve| {
+        let rows = curves_on(self.findings, axis).filter_map(|curve| {
             let threshold = *curve.summary.threshold.as_ref().ok()?;
             let darkest = curve.summary.darkest.value();
             let light = self.light(&curve.variant, curve.enhancer.as_ref());

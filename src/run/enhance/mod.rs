@@ -73,7 +73,7 @@ pub(crate) struct EnhanceArgs {
 /// # Errors
 /// If the model or an input is missing, two images have the same name, or the folder cannot be written to.
 pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
-    let file = ModelFile::read(&args.model).map_err(of_model)?;
+    let file = ModelFile::read(&args.model).map_err(|e| e.usage_at("MODEL"))?;
     let digest = file.digest();
     let (mut enhancer, image) = open(file, args)?;
     let Some(out) = &args.out else {
@@ -152,14 +152,6 @@ pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome
             count(failed, "failed")
         ),
     ))
-}
-
-/// An error about a model with the name of its argument here.
-fn of_model(error: Error) -> Error {
-    match error {
-        Error::Usage { .. } => error.at("MODEL"),
-        other => other,
-    }
 }
 
 /// The enhancer, and whether it is known which of its outputs is the image. If it is not, `--doctor` examines all of them.

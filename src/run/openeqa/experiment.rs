@@ -24,7 +24,7 @@ use crate::job::stored::StoredRun;
 use crate::job::trial::Item as _;
 use crate::job::{Outcome, StdoutFormat};
 use crate::store::Store;
-use crate::types::manifest::PartPlace;
+use crate::types::manifest::{JUDGES, PartPlace};
 use crate::types::{Family, FrameId, OpenDetail, Record, RunQuestion};
 
 /// A typical answer, for estimating the length of a judge's prompt.
@@ -115,7 +115,7 @@ impl Experiment for OpenSetup<'_> {
         if let Some(judge) = &self.judge {
             // A model that is its own judge may be asked for marks in another way than for answers.
             let content = || BTreeMap::from([(judge.name.to_string(), identity::model(judge))]);
-            columns.insert(open::JUDGES.to_owned(), content());
+            columns.insert(JUDGES.to_owned(), content());
             let models = columns.entry("model".to_owned()).or_default();
             for (name, content) in content() {
                 models.entry(name).or_insert(content);

@@ -89,10 +89,7 @@ pub(crate) fn serve(args: &ServeArgs, progress: &Progress) -> Result<Outcome> {
     )?);
     let prior = Random { seed: args.seed };
     let observer = Observer::open(&dataset, &args.data, &[], Rules::built_in()?);
-    let observer = observer.map_err(|e| match e {
-        Error::Usage { .. } => e.at("--data"),
-        other => other,
-    })?;
+    let observer = observer.map_err(|e| e.usage_at("--data"))?;
     let models = [
         ("darkqa-observer", Model::Local(observer.model(None, prior))),
         ("darkqa-random", Model::Random(prior)),

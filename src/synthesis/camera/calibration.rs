@@ -4,7 +4,7 @@ use std::fmt::Display;
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, line_of_toml};
 
 /// Names and files of the five built-in calibrations, the paper's camera first.
 const PRESETS: [(&str, &str); 5] = [
@@ -98,8 +98,7 @@ impl Calibration {
     /// [`Error::Data`] with the key that is missing, unknown or out of range.
     pub fn parse(text: &str, place: impl Display) -> Result<Self> {
         let calibration: Self = toml::from_str(text).map_err(|e| {
-            let before = e.span().and_then(|span| text.get(..span.start));
-            let line = before.unwrap_or_default().matches('\n').count() + 1;
+            let line = line_of_toml(text, &e);
             Error::data(
                 format_args!("{place}, line {line}"),
                 format_args!("not a calibration: {}", e.message()),

@@ -42,8 +42,8 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
     ));
     alerts.extend(questions::of_repeats(combined));
     alerts.extend(questions::of_items(findings));
-    alerts.extend(of_clusters(findings.grid.clusters, findings.unit));
-    alerts.extend(of_one_frame(combined, findings.grid.clusters));
+    let clusters = (findings.grid.clusters, findings.unit);
+    alerts.extend(of_clusters(combined, clusters));
     alerts.extend(of_set(findings.set));
     let oddities = findings.pairs.iter().flat_map(PairDarkness::oddities);
     alerts.extend(oddities.map(|text| Alert::new(AlertKind::Pairs, text)));
@@ -61,8 +61,8 @@ pub(super) fn alerts_without_truths(combined: &Combined, found: &SelfAgreement<'
         &combined.runs,
         &combined.trials,
     ));
-    alerts.extend(of_clusters(found.grid.clusters, found.unit));
-    alerts.extend(of_one_frame(combined, found.grid.clusters));
+    let clusters = (found.grid.clusters, found.unit);
+    alerts.extend(of_clusters(combined, clusters));
     alerts.extend(of_set(found.set));
     alerts.sort_by_key(|alert| alert.kind);
     alerts
@@ -74,24 +74,21 @@ fn of_set(set: PhotographedSet) -> Option<Alert> {
     notice.map(|text| Alert::new(AlertKind::Pairs, text))
 }
 
-/// That there are too few clusters for good intervals.
-fn of_clusters(clusters: usize, unit: ClusterUnit) -> Option<Alert> {
-    (clusters < MIN_SCENES).then(|| {
-        let text = format!(
+/// That there are too few clusters for good intervals, or that all are questions about one frame.
+fn of_clusters(combined: &Combined, (clusters, unit): (usize, ClusterUnit)) -> Option<Alert> {
+    let frames: BTreeSet<&FrameId> = combined.questions.iter().map(|one| &one.frame).collect();
+    let text = if clusters < MIN_SCENES {
+        format!(
             "Only {} ({MIN_SCENES} are needed): intervals and tests are rough.",
             counted(clusters, &unit.to_string())
-        );
-        Alert::new(AlertKind::Clusters, text)
-    })
-}
-
-/// That all questions are about one frame, of which there are enough for intervals.
-fn of_one_frame(combined: &Combined, clusters: usize) -> Option<Alert> {
-    let frames: BTreeSet<&FrameId> = combined.questions.iter().map(|one| &one.frame).collect();
-    (frames.len() == 1 && clusters >= MIN_SCENES).then(|| {
-        let text = "Only 1 frame: intervals and tests are by question, and say nothing about other frames.";
-        Alert::new(AlertKind::Clusters, text)
-    })
+        )
+    } else if frames.len() == 1 {
+        "Only 1 frame: intervals and tests are by question, and say nothing about other frames."
+            .to_owned()
+    } else {
+        return None;
+    };
+    Some(Alert::new(AlertKind::Clusters, text))
 }
 
 /// The alerts that follow from manifests and the questions asked, of runs of either kind.
