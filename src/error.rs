@@ -87,12 +87,6 @@ pub enum Error {
     },
 }
 
-/// The line, counted from 1, at which a text is not the TOML that was expected.
-pub(crate) fn line_of_toml(text: &str, error: &toml::de::Error) -> usize {
-    let before = error.span().and_then(|span| text.get(..span.start));
-    before.unwrap_or_default().matches('\n').count() + 1
-}
-
 impl Error {
     /// An error about a flag, variable or configuration line.
     pub fn usage(origin: impl Into<String>, problem: impl Display) -> Self {

@@ -8,6 +8,7 @@ use serde::Deserialize;
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::types::Usage;
+use crate::types::toml_fault::TomlFault;
 
 /// The price of a model, in dollars per million tokens.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
@@ -74,7 +75,10 @@ impl Prices {
             let problem = format!("{}: {problem}; {expected}", path.display());
             Error::usage("--prices", problem)
         };
-        let prices: Self = toml::from_str(&text).map_err(|e| wrong(e.message().to_owned()))?;
+        let prices: Self = toml::from_str(&text).map_err(|e| {
+            let TomlFault { line, problem } = TomlFault::of(&text, &e);
+            wrong(format!("line {line}: {problem}"))
+        })?;
         let numbers = prices.models.iter().flat_map(|(name, price)| {
             let cached = price.cached_input.unwrap_or(0.0);
             [price.input, price.output, cached].map(|n| (name.as_str(), n))

@@ -6,8 +6,9 @@ use serde::Deserialize;
 
 use super::key_form::looks_like_key;
 use super::vendor::Vendor;
-use crate::error::{Error, Result, line_of_toml};
+use crate::error::{Error, Result};
 use crate::files::reading;
+use crate::types::toml_fault::TomlFault;
 
 /// The vendors of a file, above those of the built-in table. The default has none.
 #[derive(Debug, Clone, Copy, Default)]
@@ -37,8 +38,8 @@ impl VendorTable {
             Error::usage("--vendor", problem)
         };
         let Rows { vendor: rows, .. } = toml::from_str(&text).map_err(|e: toml::de::Error| {
-            let line = line_of_toml(&text, &e);
-            wrong(format!("line {line}: {}", e.message().replace('\n', ", ")))
+            let TomlFault { line, problem } = TomlFault::of(&text, &e);
+            wrong(format!("line {line}: {problem}"))
         })?;
         if rows.is_empty() {
             return Err(wrong("there is no [[vendor]] in it".to_owned()));

@@ -315,15 +315,18 @@ fn images(root: &Root) -> Result<BTreeMap<FrameId, ImageSource>> {
     if sources.is_empty() {
         let has_images =
             |inner: &&PathBuf| entries(inner).is_ok_and(|of| of.iter().any(|path| is_image(path)));
-        let remedy = all
-            .iter()
-            .find(has_images)
-            .map_or_else(String::new, |inner| {
-                format!(
-                    "; a folder in it has some: name that one, as {}",
-                    inner.display()
-                )
-            });
+        let questions = folder.join(QUESTIONS);
+        let remedy = match all.iter().find(has_images) {
+            Some(_) if questions.exists() => format!(
+                "; name {}, whose images may be in folders",
+                questions.display()
+            ),
+            Some(inner) => format!(
+                "; a folder in it has some: name that one, as {}",
+                inner.display()
+            ),
+            None => String::new(),
+        };
         let unread = names
             .unread()
             .map_or(String::new(), |unread| format!("; {unread}"));

@@ -54,6 +54,15 @@ impl ModelFile {
         }
         let (preset, path) = Preset::split(model)?;
         let bytes = read_model(&path)?;
+        if let Some(preset) = &preset
+            && let Some(other) = preset.named_after(&path)
+        {
+            tracing::warn!(
+                "{} is read as a model of {}, but is named like one of {other}",
+                path.display(),
+                preset.name
+            );
+        }
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let name = EnhancerName::new(&stem)?;
         let text = sidecar::text_for(&path)?;

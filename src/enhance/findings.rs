@@ -64,6 +64,13 @@ pub(super) fn warn_of_untried(name: &EnhancerName) {
 }
 
 impl Enhancer {
+    /// Why its images may be read in a wrong way, if it is used in spite of it; to be called after the probe.
+    pub(crate) fn used_anyway(&self) -> Option<String> {
+        let probe = self.usage().note().probe?;
+        let is_overruled = probe.outcome == ProbeOutcome::Overruled;
+        probe.problem.filter(|_| is_overruled)
+    }
+
     /// What is known of it now; to be called after the probe.
     pub(crate) fn findings(&self) -> Findings {
         let note = self.usage().note();

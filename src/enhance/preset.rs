@@ -164,6 +164,19 @@ impl Preset {
         Ok((Some(Self { name, content }), PathBuf::from(file)))
     }
 
+    /// The preset that a file is named after, if it is not this one or a sibling of it, as `ruas-upe` of `ruas-lol`.
+    pub(super) fn named_after(&self, file: &Path) -> Option<String> {
+        let stem = file.file_stem()?.to_string_lossy().to_lowercase();
+        let words: Vec<&str> = stem.split(|c: char| !c.is_alphanumeric()).collect();
+        let is_named = |preset: &str| {
+            let family = preset.split(['-', '+']).next().unwrap_or(preset);
+            words.iter().any(|word| word.starts_with(family))
+        };
+        let mut others = all().ok()?.into_keys();
+        let other = others.find(|name| is_named(name));
+        other.filter(|_| !is_named(&self.name))
+    }
+
     /// What decides which output is taken.
     pub(super) fn outputs(&self) -> PresetOutputs<'_> {
         PresetOutputs {

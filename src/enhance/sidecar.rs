@@ -14,8 +14,9 @@ use super::convention::{
 };
 use super::expression::Expression;
 use super::extra::ExtraValue;
-use crate::error::{Error, Result, line_of_toml};
+use crate::error::{Error, Result};
 use crate::files::reading;
+use crate::types::toml_fault::TomlFault;
 
 /// Statements of a sidecar. Every key may be missing; an unknown key is an error.
 #[derive(Debug, Default, Clone, PartialEq, Serialize, Deserialize)]
@@ -150,14 +151,10 @@ impl ModelSidecar {
         let path = path_for(model);
         let wrong = |problem: &str| Error::data(path.display(), format_args!("{problem}{KEYS}"));
         let sidecar: Self = toml::from_str(text).map_err(|e| {
-            let line = line_of_toml(text, &e);
+            let TomlFault { line, problem } = TomlFault::of(text, &e);
             let stated = text.lines().nth(line - 1).unwrap_or_default().trim();
             let stated: String = stated.chars().take(LONGEST_LINE).collect();
-            Error::line(
-                &path,
-                line,
-                format_args!("`{stated}`: {}{KEYS}", e.message()),
-            )
+            Error::line(&path, line, format_args!("`{stated}`: {problem}{KEYS}"))
         })?;
         sidecar.check_bounds().map_err(|problem| wrong(&problem))?;
         if sidecar.output.is_some() && sidecar.image.is_some() {

@@ -17,6 +17,8 @@ use super::trial::Item as _;
 use crate::ask::{ImageLimit, Price, Server};
 use crate::error::Result;
 use crate::report::forecast::{CostLine, Forecast, ReadingCost, StoreForecast};
+use crate::report::words::counted;
+use crate::score::cluster::MIN_SCENES;
 use crate::store::StoredTrial;
 use crate::types::{Condition, Degradation, ImageFacts, ReadingName, View};
 
@@ -63,7 +65,8 @@ pub(crate) fn estimate<E: Experiment>(
         Some(plan) => SampledImages::make(experiment, plan, pipeline)?,
         None => SampledImages::default(),
     };
-    let (mut bytes, mut largest_request, mut images, mut seconds) = (0.0, 0.0_f64, 0, 0.0);
+    let (mut bytes, mut largest_request, mut seconds) = (0.0, 0.0_f64, 0.0);
+    let (mut images, mut sent) = (0, 0);
     let mut image_set = settings.images.image_set();
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     for (phase, plan) in plans.iter().enumerate() {
@@ -80,6 +83,7 @@ pub(crate) fn estimate<E: Experiment>(
                     let request =
                         shown + trial.prompt.parts().concat().len() as f64 + REQUEST_BYTES;
                     bytes += request;
+                    sent += group.condition.as_ref().map_or(0, |_| source.order.len());
                     largest_request = largest_request.max(request);
                 }
             }
@@ -117,6 +121,7 @@ pub(crate) fn estimate<E: Experiment>(
         answered: planned - remaining,
         spent: budget.spent(),
         images,
+        images_sent: sent,
         bytes,
         largest_image: largest.map_or(0, |image| image.bytes),
         sampled: sample.images.len(),
@@ -130,6 +135,8 @@ pub(crate) fn estimate<E: Experiment>(
         batch: money.prices.batch,
         image_store: image_set.map(|set| StoreForecast::new(set.words(), set.bytes(), set.room())),
         reply: E::REPLY,
+        few_sources: (experiment.part().is_none() && sources.len() < MIN_SCENES)
+            .then(|| counted(sources.len(), E::SOURCE)),
         largest_request: sources
             .iter()
             .any(|source| source.order.len() > 1)

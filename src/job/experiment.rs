@@ -44,6 +44,9 @@ pub(crate) trait Experiment: Sync {
     /// Description of the shortest reply, for the estimate of cost.
     const REPLY: &'static str;
 
+    /// What one source is: a frame or a walk.
+    const SOURCE: &'static str;
+
     /// The settings that every experiment has.
     fn settings(&self) -> &JobSettings;
 

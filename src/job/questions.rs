@@ -129,6 +129,12 @@ impl QuestionBank {
             counted(images, "image"),
             self.each()
         ));
+        if images == 1 {
+            tracing::warn!(
+                "--ask {}: with one image, nothing shows that an answer depends on the image; name a folder with several",
+                self.place
+            );
+        }
         Ok(found.dataset.with_rule(rule).with_questions(questions))
     }
 }

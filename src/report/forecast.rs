@@ -8,7 +8,9 @@ use serde::Serialize;
 use super::table::ColumnKind::{Count, Text};
 use super::table::TableBuilder;
 use super::terminal;
+use super::words::counted;
 use crate::error::{Error, Result};
+use crate::score::cluster::MIN_SCENES;
 use crate::types::ReadingName;
 
 /// Estimate of the requests that are left for one model.
@@ -65,6 +67,8 @@ pub(crate) struct Forecast {
     pub spent: Option<f64>,
     /// Number of images to be made.
     pub images: usize,
+    /// Number of images in all requests: an image counts once for each request about it.
+    pub images_sent: usize,
     /// Number of bytes to be sent, with images as base64.
     pub bytes: f64,
     /// Size of the largest sampled image file in bytes.
@@ -85,7 +89,10 @@ pub(crate) struct Forecast {
     pub batch: f64,
     /// Length of the shortest reply that is assumed, in words.
     pub reply: &'static str,
-    /// Size of the largest request in bytes, if requests hold many images.
+    /// The frames or walks, with their number, if intervals and tests need more of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub few_sources: Option<String>,
+    /// Size of the largest request in bytes, as sampled images suggest, if requests hold many images.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub largest_request: Option<f64>,
     /// What an image store gives the next model; `None` without one.
@@ -174,10 +181,16 @@ pub(crate) fn render(forecast: &Forecast) -> String {
         let _ = write!(text, "; the {answered} answered ones cost {}", money(spent));
     }
     let store = forecast.image_store.as_ref();
-    let store = store.map(StoreForecast::line).unwrap_or_default();
+    let mut last = store.map(StoreForecast::line).unwrap_or_default();
+    if let Some(few) = &forecast.few_sources {
+        let _ = writeln!(
+            last,
+            "only {few} ({MIN_SCENES} are needed): intervals and tests would be rough"
+        );
+    }
     let built_in = built_in_line(&forecast.built_in);
     if forecast.lines.is_empty() {
-        return text + ".\n" + &built_in + &store;
+        return text + ".\n" + &built_in + &last;
     }
     let _ = write!(text, ".\n{table}{built_in}");
     for line in &forecast.lines {
@@ -203,12 +216,13 @@ pub(crate) fn render(forecast: &Forecast) -> String {
     }
     let _ = writeln!(
         text,
-        "to send: {} with {images} images, the largest {:.2} MB (of {sampled} made as a sample)",
+        "to send: {} with {} ({images} made), the largest {:.2} MB (of {sampled} made as a sample)",
         bytes(forecast.bytes),
+        counted(forecast.images_sent, "image"),
         forecast.largest_image as f64 / 1e6
     );
     if let Some(request) = forecast.largest_request {
-        let _ = writeln!(text, "a request has up to {}", bytes(request));
+        let _ = writeln!(text, "a request has about {}", bytes(request));
     }
     let _ = writeln!(
         text,
@@ -216,7 +230,7 @@ pub(crate) fn render(forecast: &Forecast) -> String {
         hours(forecast.asking_seconds),
         hours(forecast.making_seconds)
     );
-    text += &store;
+    text += &last;
     if let Some(problem) = &forecast.too_large {
         let _ = writeln!(text, "the run would not start: {problem}");
     }

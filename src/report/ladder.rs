@@ -33,6 +33,11 @@ impl<'a> Series<'a> {
         }
     }
 
+    /// Whether an enhancer made its images.
+    pub(super) fn is_enhanced(&self) -> bool {
+        self.enhancer.is_some()
+    }
+
     /// The quantity over which the series runs, which is light for the darkness of pairs; `None` for untouched frames.
     pub(super) fn axis(&self) -> Option<Axis> {
         let pair = self.variant.pair.as_ref().map(|_| Axis::LIGHT);

@@ -31,7 +31,7 @@ pub(crate) struct InitArgs {
 }
 
 /// The rooms whose pictures are written.
-const ROOMS: &str = "frames=3,seed=7,size=480x360";
+const ROOMS: &str = "frames=3,seed=20,size=480x360";
 /// The number of questions about each picture, and of images of a folder that are copied.
 const EACH: usize = 2;
 const PICTURES: usize = 3;
@@ -50,7 +50,8 @@ questions.csv   one question per line; a spreadsheet can edit it
   A B C D       the choices; leave cells empty for fewer than four, add E, F, ... for more
   answer        the letter of the true choice
   category      the kind of question, by which the report groups
-images/         PNG, JPEG, WebP, TIFF, BMP or OpenEXR; --data-root DIR allows a folder outside of this one
+*.png           the images: PNG, JPEG, WebP, TIFF, BMP or OpenEXR, here or in folders below;
+                --data-root DIR allows a folder outside of this one
 dataset.json    the name of the data set
 
 Replace the images and the lines with your own, then run the check again.
@@ -66,9 +67,9 @@ pub(crate) fn init(args: &InitArgs, progress: &Progress) -> Result<Outcome> {
         "README.txt",
         "questions.csv",
         "dataset.json",
-        "images/room1.png",
-        "images/room2.png",
-        "images/room3.png",
+        "room1.png",
+        "room2.png",
+        "room3.png",
     ];
     if let Some(exists) = files.iter().map(|name| at(name)).find(|path| path.exists()) {
         return Err(Error::data(exists.display(), EXISTS));
@@ -136,7 +137,7 @@ fn of_rooms(folder: &Path, progress: &Progress) -> Result<Vec<Line>> {
     )?;
     let mut lines = Vec::new();
     for (number, frame) in dataset.frames().enumerate() {
-        let name = format!("images/room{}.png", number + 1);
+        let name = format!("room{}.png", number + 1);
         write(
             &folder.join(&name),
             &png(&dataset.picture(frame)?.decode()?)?,
@@ -171,25 +172,33 @@ fn of_frames(frames: &Path, folder: &Path) -> Result<Vec<Line>> {
     let dataset = Dataset::of_images(frames, &[])?;
     let mut lines = Vec::new();
     let yes_no = ["yes".to_owned(), "no".to_owned()];
-    for frame in dataset.frames().take(PICTURES) {
+    for (number, frame) in dataset.frames().take(PICTURES).enumerate() {
         let path = dataset.image_file(frame).unwrap_or(frames);
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let image = format!("images/{name}");
+        let name = path.file_name().unwrap_or_default();
+        let image = name.to_string_lossy().into_owned();
         let picture = dataset.picture(frame)?.decode()?;
         let copy = folder.join(&image);
         if copy.exists() {
             return Err(Error::data(copy.display(), EXISTS));
         }
         write(&copy, &reading::bytes(path)?)?;
-        let is_wide = picture.width() > picture.height();
         let mut pixels = picture.samples().chunks_exact(3);
         let has_colours = pixels
             .any(|p| p.iter().max() > p.iter().min().map(|least| least.saturating_add(8)).as_ref());
-        let ask = |question: &str, is_true: bool| {
-            line(&image, question, &yes_no, usize::from(!is_true), "form")
-        };
-        lines.push(ask("Is this photograph wider than it is high?", is_wide));
-        lines.push(ask("Does this photograph have colours?", has_colours));
+        let (width, height) = (picture.width(), picture.height());
+        let form = [
+            ("Is this photograph wider than it is high?", width > height),
+            ("Is this photograph higher than it is wide?", height > width),
+        ];
+        let colours = [
+            ("Is this photograph black and white?", !has_colours),
+            ("Does this photograph have colours?", has_colours),
+        ];
+        // By turns, so that neither answer is always the true one.
+        for (question, is_true) in [form[number % 2], colours[number % 2]] {
+            let truth = usize::from(!is_true);
+            lines.push(line(&image, question, &yes_no, truth, "form"));
+        }
     }
     Ok(lines)
 }

@@ -50,6 +50,7 @@ pub(crate) mod shown_text;
 mod size_log;
 pub(crate) mod small_number;
 mod strict_group;
+pub(crate) mod toml_fault;
 pub(crate) mod treatment;
 pub(crate) mod treatment_set;
 pub(crate) mod trial_key;

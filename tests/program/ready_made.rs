@@ -209,15 +209,15 @@ fn the_template_can_be_checked_and_run_as_it_is() {
         "{}",
         again.stderr
     );
-    bench.file("pictures/images/room2.png", "mine");
+    bench.file("pictures/room2.png", "mine");
     let third = bench.call(&words("init pictures"));
     assert_eq!(third.code, Some(2), "{third:?}");
     assert!(third.stderr.contains("room2.png"), "{third:?}");
-    let own = bench.call(&words("init own --frames my-data/images"));
+    let own = bench.call(&words("init own --frames my-data"));
     assert_eq!(own.code, Some(0), "{own:?}");
     let table = fs::read_to_string(bench.path("own/questions.csv")).unwrap();
     let lines = table.lines().skip(1);
-    assert_eq!(lines.filter(|line| line.starts_with("images/")).count(), 6);
+    assert_eq!(lines.filter(|line| line.starts_with("room")).count(), 6);
     let check = own
         .stdout
         .lines()
@@ -226,6 +226,7 @@ fn the_template_can_be_checked_and_run_as_it_is() {
     let command: Vec<&str> = check.split_whitespace().skip(1).collect();
     let checked = bench.complete(&command);
     assert!(checked.contains("ok: 6 questions"), "{checked}");
+    assert!(!checked.contains("always the"), "{checked}");
 }
 
 #[test]
@@ -243,14 +244,9 @@ fn the_table_that_is_not_read_is_named() {
         empty.stderr
     );
     let line = json!({"id": "a", "frame": "room1.png", "question": "A?", "choices": ["yes", "no"], "answer": "no", "family": "f"});
-    bench.file("my-data/images/questions.jsonl", format!("{line}\n"));
-    fs::copy(
-        bench.path("my-data/questions.csv"),
-        bench.path("my-data/images/questions.csv"),
-    )
-    .unwrap();
+    bench.file("my-data/questions.jsonl", format!("{line}\n"));
     let both = bench.call(&words(
-        "--data my-data/images --model random --levels L0 --out run",
+        "--data my-data --model random --levels L0 --out run",
     ));
     assert_eq!(both.code, Some(0), "{both:?}");
     assert!(
@@ -259,6 +255,31 @@ fn the_table_that_is_not_read_is_named() {
         "{}",
         both.stderr
     );
+}
+
+#[test]
+fn a_folder_whose_images_are_in_folders_names_its_file_of_questions() {
+    let bench = Bench::new();
+    bench.complete(&words("init flat"));
+    fs::create_dir_all(bench.path("data/images")).unwrap();
+    fs::copy(
+        bench.path("flat/room1.png"),
+        bench.path("data/images/room1.png"),
+    )
+    .unwrap();
+    let line = json!({"id": "a", "frame": "images/room1.png", "question": "A?", "choices": ["yes", "no"], "answer": "no"});
+    bench.file("data/questions.jsonl", format!("{line}\n"));
+    let folder = bench.call(&words("check data"));
+    assert_eq!(folder.code, Some(1), "{folder:?}");
+    assert!(
+        folder
+            .stdout
+            .contains("name data/questions.jsonl, whose images may be in folders"),
+        "{}",
+        folder.stdout
+    );
+    let named = bench.complete(&words("check data/questions.jsonl"));
+    assert!(named.contains("1 question on 1 image"), "{named}");
 }
 
 /// A set of eight yes-or-no questions, two about each of four images, of which the last two pairs have one that says no.

@@ -133,12 +133,12 @@ fn every_number_is_that_of_the_runs_own_files() {
             &of(&[("kind", "level"), ("condition", "L5-noise")]),
         );
         let pairs = [
-            ("drop", "difference"),
-            ("drop_low", "low"),
-            ("drop_high", "high"),
+            ("change", "difference"),
+            ("change_low", "low"),
+            ("change_high", "high"),
         ];
         assert_equal(row, drop, &pairs);
-        assert_eq!(row["drop_shown"], drop["shown"]);
+        assert_eq!(row["change_shown"], drop["shown"]);
         let condition = format!("{}-noise+{}", row["best_level"], row["best_enhancer"]);
         let gain = [
             &all[..],

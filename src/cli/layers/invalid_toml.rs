@@ -2,14 +2,11 @@
 
 use std::path::Path;
 
-use crate::error::{Error, line_of_toml};
+use crate::error::Error;
+use crate::types::toml_fault::TomlFault;
 
 /// The error about invalid TOML, on one line and with its line number.
 pub(super) fn invalid_toml(path: &Path, text: &str, error: &toml::de::Error) -> Error {
-    let problem: Vec<&str> = error.message().lines().map(str::trim).collect();
-    Error::line(
-        path,
-        line_of_toml(text, error),
-        format_args!("not valid TOML: {}", problem.join(", ")),
-    )
+    let TomlFault { line, problem } = TomlFault::of(text, error);
+    Error::line(path, line, format_args!("not valid TOML: {problem}"))
 }

@@ -23,6 +23,7 @@ pub(super) struct Summary<'a> {
     pub(super) left: &'a LeftOut,
     /// What the groups of questions are like; `None` without groups.
     pub(super) groups: Option<String>,
+    /// The images of the set; none if the questions are about frames of other data.
     pub(super) sources: &'a BTreeMap<FrameId, ImageSource>,
     /// The images of questions that show several.
     pub(super) series: &'a Series,
@@ -48,7 +49,7 @@ impl Summary<'_> {
                 "{}: {} on {} in {} ({by})",
                 self.name,
                 count(self.questions.len(), "question", "questions"),
-                count(self.sources.len(), "image", "images"),
+                count(self.images(), "image", "images"),
                 count(families.len(), "family", "families")
             ),
             self.columns(),
@@ -74,6 +75,14 @@ impl Summary<'_> {
         }
         lines.extend(self.notes.iter().cloned());
         lines
+    }
+
+    fn images(&self) -> usize {
+        if self.sources.is_empty() {
+            let frames = self.questions.iter().map(|question| &question.frame);
+            return frames.collect::<BTreeSet<_>>().len();
+        }
+        self.sources.len()
     }
 
     /// How many questions show several images; `None` if all show one.
@@ -130,6 +139,9 @@ impl Summary<'_> {
 
     /// How many images are of which format, as `PNG 3, files 2`.
     fn formats(&self) -> String {
+        if self.sources.is_empty() {
+            return "names of frames".to_owned();
+        }
         let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
         for source in self.sources.values() {
             let format = match source {

@@ -48,6 +48,22 @@ fn presets_stand_before_a_colon() {
 }
 
 #[test]
+fn a_file_that_is_named_after_another_preset_is_found() {
+    for (name, file, other) in [
+        ("zero-dce", "a/ruas_upe_1out.onnx", Some("ruas-dark")),
+        ("enlightengan", "Zero_DCE_epoch99.onnx", Some("zero-dce")),
+        ("ruas-lol", "ruas_upe.onnx", None),
+        ("zero-dce++", "zero_dce_epoch99.onnx", None),
+        ("pairlie", "hpc203_pairlie_HxW.onnx", None),
+        ("zero-dce", "zerodce-kind.onnx", None),
+        ("darkir", "model.onnx", None),
+    ] {
+        let found = preset(name).named_after(Path::new(file));
+        assert_eq!(found.as_deref(), other, "{name}:{file}");
+    }
+}
+
+#[test]
 fn every_preset_is_described_and_stands_in_the_help() {
     let texts = [
         include_str!("../../../models/README.md"),

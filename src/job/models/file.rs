@@ -9,6 +9,7 @@ use toml::{Spanned, Table, Value};
 use crate::ask::{is_secret_name, is_secret_value, looks_like_key};
 use crate::error::{Error, Result};
 use crate::files::reading;
+use crate::types::toml_fault::TomlFault;
 
 /// The number of characters from which the value of a header with a telling name is taken for a secret; chosen.
 const LONG: usize = 20;
@@ -53,11 +54,9 @@ impl ModelsFile {
             format!("{}, line {line}", path.display())
         };
         let invalid = |e: toml::de::Error| {
-            let start = e.span().map_or(0, |span| span.start);
-            Error::usage(
-                at(start),
-                format_args!("not valid TOML: {}", e.message().replace('\n', ", ")),
-            )
+            let TomlFault { line, problem } = TomlFault::of(&text, &e);
+            let origin = format!("{}, line {line}", path.display());
+            Error::usage(origin, format_args!("not valid TOML: {problem}"))
         };
         let values: Table = toml::from_str(&text).map_err(invalid)?;
         let spans = DeTable::parse(&text).map_err(invalid)?;

@@ -10,7 +10,7 @@ use super::row::{Row, SentImage, Tabled};
 use crate::error::Result;
 use crate::job::mark_index::MarkIndex;
 use crate::job::predictions::{AnswerState, answer_state};
-use crate::job::report::open::{JUDGE, PROTOCOL};
+use crate::job::report::judges::{JUDGE, PROTOCOL};
 use crate::score::llm_match::{Protocol, mark};
 use crate::score::open::AnswerOutcome;
 use crate::store::CellKind::{Double, Int32, LongText, Text};

@@ -9,6 +9,7 @@ mod cost;
 mod enhancers;
 mod figure_runs;
 mod join;
+pub(crate) mod judges;
 mod lights;
 mod listing;
 mod models;

@@ -9,9 +9,9 @@ use super::alerts::{of_joining, of_runs};
 use super::combine::typed;
 use super::enhancers;
 use super::join::join;
+use super::judges::{self, JUDGE, PROTOCOL};
 use super::listing::listing;
 use super::report_folder::ReportFolder;
-use super::settings::{Settings, decisive, differing};
 use super::whole_report::{WholeReport, with_summary};
 use crate::error::{Error, Result};
 use crate::job::mark_index::MarkIndex;
@@ -23,6 +23,7 @@ use crate::report::alert::{Alert, AlertKind};
 use crate::report::markdown::MarkdownReport;
 use crate::report::openeqa::{OpenReport, ReportedAnswer, products, render, summary_json, tables};
 use crate::report::outcome_words;
+use crate::report::products::PAGE;
 use crate::report::table::Table;
 use crate::report::tables::EnhancerRow;
 use crate::score::llm_match::{Protocol, mark};
@@ -32,15 +33,10 @@ use crate::score::open::{
 use crate::score::subject::Subject;
 use crate::store::Store;
 use crate::types::flag::read_word;
-use crate::types::manifest::{JUDGES, RunManifest, Status, judge_flag};
+use crate::types::manifest::{RunManifest, Status};
 use crate::types::{
     ModelListing, OpenDetail, QuestionId, Record, RunQuestion, Step, Thumbnail, TrialRef,
 };
-
-/// Setting in the manifest with the name of the judge.
-pub(crate) const JUDGE: &str = "--judge";
-/// Setting in the manifest with the protocol of judging.
-pub(crate) const PROTOCOL: &str = "--protocol";
 
 /// The answers of a run, with their scores.
 pub(crate) struct Scores {
@@ -125,7 +121,7 @@ impl Scores {
             enhancers: &self.enhancers,
             judge: self.judge.as_deref(),
             protocol: self.protocol,
-            name: name(&self.run.folder),
+            name: self.run.names(),
             folder: typed(&self.run.folder),
             questions: &self.run.questions,
             answers: &self.answers,
@@ -165,7 +161,7 @@ impl Scores {
         match show {
             StdoutFormat::Json => summary_json(report, tables, Some(folder)),
             StdoutFormat::Markdown => Ok(MarkdownReport::of_open(report, tables).text()),
-            _ => Ok(render(report, tables, folder)),
+            _ => Ok(render(report, tables, &self.run.folders)),
         }
     }
 
@@ -178,7 +174,11 @@ impl Scores {
         let report = self.report();
         let tables = tables(&report);
         target.write(&files(&report, &tables)?, &self.run.manifest)?;
-        self.show(&report, &tables, show)
+        let mut text = self.show(&report, &tables, show)?;
+        if !show.is_document() {
+            text += &format!("report: {}\n", target.path().join(PAGE).display());
+        }
+        Ok(text)
     }
 }
 
@@ -190,13 +190,23 @@ fn files(report: &OpenReport<'_>, tables: &[Table]) -> Result<Vec<(String, Vec<u
 
 /// A run of open questions, or several joined to one, with its whole records.
 pub(crate) struct OpenRun {
+    /// The folder of the run, or of the first of several.
     pub(crate) folder: PathBuf,
+    /// The folders of all runs.
+    folders: Vec<PathBuf>,
     pub(crate) layout: RunLayout,
     pub(crate) manifest: RunManifest,
     /// In the order of the questions, conditions and models.
     pub(crate) records: Vec<Record<OpenDetail>>,
     pub(crate) questions: Vec<RunQuestion>,
     pub(crate) thumbnails: Vec<Thumbnail>,
+}
+
+impl OpenRun {
+    fn names(&self) -> String {
+        let names = self.folders.iter().map(|folder| name(folder));
+        names.collect::<Vec<String>>().join(", ")
+    }
 }
 
 /// Several runs, joined to one.
@@ -215,27 +225,9 @@ pub(super) struct JoinedRuns {
 /// # Errors
 /// If the runs have different judges or protocols, or different questions under the same name.
 pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
+    judges::check(&runs)?;
     let mut questions = HashMap::<QuestionId, RunQuestion>::new();
-    let mut marked: Option<(PathBuf, [Option<Value>; 2])> = None;
     for run in &runs {
-        let wrong = |problem: String| {
-            let path = run.folder.clone();
-            Err(Error::Run { path, problem })
-        };
-        let by = [JUDGE, PROTOCOL].map(|name| run.manifest.settings.get(name).cloned());
-        match &marked {
-            Some((other, other_by)) if *other_by != by => {
-                return wrong(format!(
-                    "its answers were marked by {} and those of {} by {}: marks of two judges or protocols cannot be compared; report \
-                     each run alone, or run openeqa on its folder again with the other's --judge and --protocol: only marks are asked",
-                    judged(&by),
-                    other.display(),
-                    judged(other_by)
-                ));
-            }
-            Some(_) => {}
-            None => marked = Some((run.folder.clone(), by)),
-        }
         for question in &run.questions {
             let known = questions
                 .entry(question.id.clone())
@@ -244,14 +236,15 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
                 image: None,
                 ..question.clone()
             }) {
-                return wrong(format!(
+                let problem = format!(
                     "the question {} is different in the other runs; report each run alone",
                     question.id
-                ));
+                );
+                let path = run.folder.clone();
+                return Err(Error::Run { path, problem });
             }
         }
     }
-    check_judges(&runs)?;
     let joined = join(runs, is_answer)?;
     let mut alerts = of_runs(&joined);
     alerts.extend(of_joining(&joined));
@@ -261,6 +254,7 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
     }
     let enhancers = enhancers::rows(&joined.runs);
     let listing = listing(&joined);
+    let folders = joined.runs.iter().map(|run| run.folder.clone()).collect();
     let first = joined.runs.into_iter().next();
     let first = first.ok_or_else(|| Error::usage("RUN", "no run is named"))?;
     let mut trials = joined.trials;
@@ -275,6 +269,7 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
     let run = OpenRun {
         records,
         folder: first.folder,
+        folders,
         layout: first.layout,
         manifest: first.manifest,
         questions: joined.questions,
@@ -286,34 +281,6 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
         enhancers,
         listing,
     })
-}
-
-/// Checks that judges of one name are the same: their marks are not told apart.
-fn check_judges(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
-    let judges: Vec<Option<Settings>> = runs.iter().map(|run| of_judge(&run.manifest)).collect();
-    let names: Vec<String> = runs.iter().map(StoredRun::name).collect();
-    let differences = differing(&judges);
-    let Some(first) = differences.first() else {
-        return Ok(());
-    };
-    let path = runs[first.values[0].0].folder.clone();
-    let words: Vec<String> = differences.iter().map(|one| one.words(&names)).collect();
-    let problem = format!(
-        "the judges of the runs have one name and differ: {}; marks of two judges cannot be compared: report each run alone",
-        words.join("; ")
-    );
-    Err(Error::Run { path, problem })
-}
-
-/// What decides the marks of the judge of a run; `None` if no judge was asked, or the run does not say.
-fn of_judge(manifest: &RunManifest) -> Option<Settings> {
-    let judge = manifest.settings.get(JUDGE)?.as_str()?;
-    // Runs of earlier versions have the judge among the models alone.
-    let columns = [JUDGES, "model"].map(|column| manifest.columns.get(column)?.get(judge));
-    let settings = columns.into_iter().flatten().next().map(decisive)?;
-    let settings = settings.into_iter();
-    let of_judge = settings.map(|(flag, value)| (judge_flag(&flag), value));
-    Some(of_judge.collect())
 }
 
 /// Scores a run, and writes its report and manifest into its folder. The run is incomplete if a mark cannot be read.
@@ -394,13 +361,4 @@ fn topic(question: &RunQuestion) -> QuestionGroups {
         category: question.family.name().to_owned(),
         episode,
     }
-}
-
-/// A judge and a protocol in words.
-fn judged([judge, protocol]: &[Option<Value>; 2]) -> String {
-    let word = |value: &Option<Value>, other: &str| {
-        let word = value.as_ref().and_then(Value::as_str);
-        word.unwrap_or(other).to_owned()
-    };
-    format!("{} ({})", word(judge, "nobody"), word(protocol, "upstream"))
 }

@@ -10,8 +10,9 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, Result, line_of_toml};
+use crate::error::{Error, Result};
 use crate::types::Digest;
+use crate::types::toml_fault::TomlFault;
 
 pub use entries::*;
 
@@ -82,8 +83,8 @@ impl Rules {
     pub fn parse(text: &str) -> Result<Self> {
         let wrong = |problem: String| Error::data("rules", problem);
         let book: RuleBook = toml::from_str(text).map_err(|e| {
-            let line = line_of_toml(text, &e);
-            wrong(format!("line {line}: {}", e.message().replace('\n', ", ")))
+            let TomlFault { line, problem } = TomlFault::of(text, &e);
+            wrong(format!("line {line}: {problem}"))
         })?;
         book.check().map_err(wrong)?;
         // The digest covers the values, not the text: a comment does not change it.

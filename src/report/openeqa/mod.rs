@@ -9,7 +9,7 @@ mod tables;
 mod upstream;
 
 use std::fmt::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
@@ -85,9 +85,9 @@ pub(crate) fn summary_json(
 }
 
 /// The text at the end of a run: its progress if it is not complete, the scores by level, split and category, the number of
-/// scored answers, and the folder.
+/// scored answers, and the folders of the runs.
 #[must_use]
-pub(crate) fn render(report: &OpenReport<'_>, tables: &[Table], folder: &Path) -> String {
+pub(crate) fn render(report: &OpenReport<'_>, tables: &[Table], folders: &[PathBuf]) -> String {
     let mut text = lines(report.alerts);
     text += &terminal::progress(report.manifest, "answers and marks stored");
     match report.judge {
@@ -98,7 +98,8 @@ pub(crate) fn render(report: &OpenReport<'_>, tables: &[Table], folder: &Path) -
     for line in coverage(report).into_iter().chain(open) {
         text += &wrapped("", &line, " ");
     }
-    let _ = writeln!(text, "run: {}", folder.display());
-    let _ = writeln!(text, "report: {}", folder.join(PAGE).display());
+    for folder in folders {
+        let _ = writeln!(text, "run: {}", folder.display());
+    }
     text
 }

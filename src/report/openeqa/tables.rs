@@ -63,7 +63,6 @@ fn summary(summary: &OpenSummary) -> Table {
         let change = summary.change(&cell.subject, baseline, &cell.group)?;
         Some(change.difference)
     };
-    let drop = "csv drop drop_low drop_high drop_n";
     TableBuilder::new(SUMMARY, &summary.cells)
         .subject(|cell| &cell.subject, |variant| variant.word().into_owned())
         .column(Text, "csv by", |cell| cell.group.kind())
@@ -76,7 +75,11 @@ fn summary(summary: &OpenSummary) -> Table {
         .column(Count, "csv null", |cell| cell.null)
         .column(Count, "csv cut", |cell| cell.cut)
         .column(Share, "csv value low high", |cell| cell.score)
-        .column(Points, drop, |cell| change(cell, Baseline::Clean))
+        .column(
+            Points,
+            "csv change change_low change_high change_n",
+            |cell| change(cell, Baseline::Clean),
+        )
         .column(Points, "csv gain gain_low gain_high", |cell| {
             change(cell, Baseline::Raw)
         })
@@ -122,7 +125,7 @@ fn of_axis(report: &OpenReport<'_>, axis: Axis, ladder: &Ladder<'_, OpenCell>) -
     let judge = report.judge.unwrap_or("nobody");
     let protocol = report.protocol;
     table.heading = Some(format!(
-        "Score in %{of} (LLM-Match, marked by {judge}, protocol {protocol}): mean (drop from L0), and how far the widest 95 % interval over {} {}s reaches down and up",
+        "Score in %{of} (LLM-Match, marked by {judge}, protocol {protocol}): mean (difference from L0), and how far the widest 95 % interval over {} {}s reaches down and up",
         summary.clusters, summary.unit
     ));
     table.latex = Some(format!(

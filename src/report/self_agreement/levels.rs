@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::measure::AGREEMENT;
-use crate::report::ladder::{Ladder, SeriesByLevel};
+use crate::report::ladder::{Ladder, Series, SeriesByLevel};
 use crate::report::table::ColumnKind::{Accuracy, Text};
 use crate::report::table::{Table, TableBuilder, TableCell};
 use crate::report::words::{percent, with_interval};
@@ -187,19 +187,28 @@ fn of_axis(found: &SelfAgreement<'_>, axis: Axis, ladder: &Ladder<'_, AgreementC
         .column(Text, "terminal | page | latex Measure", |row| {
             row.measure.name()
         });
+    let is_enhanced = |(series, cells): (&Series<'_>, &SeriesByLevel<'_, AgreementCell>)| {
+        series.is_enhanced() && cells.contains_key(&AxisLevel::L0)
+    };
+    let (again, first) = if ladder.series.iter().any(is_enhanced) {
+        (
+            "",
+            "L0: the same images asked again, the ceiling; in a row with an enhancer, these images enhanced",
+        )
+    } else {
+        (
+            " again",
+            "L0 again: the same images asked again, the ceiling",
+        )
+    };
     for (index, level) in levels.iter().enumerate() {
-        let again = if *level == AxisLevel::L0 {
-            " again"
-        } else {
-            ""
-        };
+        let again = if *level == AxisLevel::L0 { again } else { "" };
         let names = format!("terminal {level}{again} | page {level}{again} | latex {level}{again}");
         table = table.column(Accuracy, &*names, |row| row.cells[index].clone());
     }
     let mut table = table.build();
     table.heading = Some(format!(
-        "Agreement with its own answer at L0 by {by}, in % (κ and entropy from 0 to 1); L0 again: the same images asked again, the \
-         ceiling; 95 %: how far the widest interval of the row reaches down and up"
+        "Agreement with its own answer at L0 by {by}, in % (κ and entropy from 0 to 1); {first}; 95 %: how far the widest interval of the row reaches down and up"
     ));
     table.latex = Some(format!(
         "Agreement of each model with its own answer at L0 by {by} (strict reading), not with the truth; intervals by {}.",

@@ -31,7 +31,7 @@ pub(crate) struct ChoiceRow {
     /// The darkest level; `None` if no degraded level was asked.
     darkest: Option<AxisLevel>,
     /// Accuracy at the darkest level less that at L0, and whether a loss is shown.
-    drop: Option<(Estimate, Significance)>,
+    change: Option<(Estimate, Significance)>,
     threshold: Option<Result<EvThreshold, NoThreshold>>,
     /// The enhancer, the level and the difference from raw images of the largest gain.
     gain: Option<(String, AxisLevel, Estimate, Significance)>,
@@ -121,7 +121,7 @@ fn row(findings: &Findings<'_>, variant: &KindReading, model: &str, run: &RunLin
                 && first.variant == *variant
         })
     };
-    let drop = of(ComparisonKind::Level).find(|found| found.first.level == darkest);
+    let change = of(ComparisonKind::Level).find(|found| found.first.level == darkest);
     let gains = of(ComparisonKind::Enhancer);
     let gain = gains.max_by(|a, b| {
         let value = |found: &Comparison| found.paired.difference.value;
@@ -142,7 +142,7 @@ fn row(findings: &Findings<'_>, variant: &KindReading, model: &str, run: &RunLin
         clean,
         area: curve.and_then(|curve| curve.summary.area),
         darkest,
-        drop: drop.map(|drop| (drop.paired.difference, drop.significance)),
+        change: change.map(|change| (change.paired.difference, change.significance)),
         threshold: curve.map(|curve| curve.summary.threshold),
         gain: gain.and_then(|gain| {
             let enhancer = gain.first.enhancer.as_ref()?.to_string();
@@ -170,11 +170,14 @@ pub(super) fn table(number: usize, digests: &GroupDigests, rows: &[ChoiceRow]) -
         .column(Text, "csv darkest", |row| {
             row.darkest.map(|level| level.to_string())
         })
-        .column(Points, "csv drop drop_low drop_high drop_n", |row| {
-            row.drop.map(|(drop, _)| drop)
-        })
-        .column(Text, "csv drop_shown", |row| {
-            row.drop.map(|(_, verdict)| verdict.is_shown().to_string())
+        .column(
+            Points,
+            "csv change change_low change_high change_n",
+            |row| row.change.map(|(change, _)| change),
+        )
+        .column(Text, "csv change_shown", |row| {
+            row.change
+                .map(|(_, verdict)| verdict.is_shown().to_string())
         })
         .column(
             Threshold,
@@ -222,7 +225,7 @@ const HEAD: [&str; 12] = [
     "n",
     "L0 in %",
     "area in %",
-    "drop in points",
+    "change in points",
     "threshold in EV",
     "best enhancer, gain in points",
     "below blind at",
@@ -250,8 +253,10 @@ fn board_row(row: &ChoiceRow) -> BoardRow {
         row.run.name.clone()
     };
     let n = row.clean.map(|clean| clean.n);
-    let drop = match (&row.drop, row.darkest) {
-        (Some((drop, verdict)), Some(darkest)) => difference(*drop, *verdict, &darkest.to_string()),
+    let change = match (&row.change, row.darkest) {
+        (Some((change, verdict)), Some(darkest)) => {
+            difference(*change, *verdict, &darkest.to_string())
+        }
         _ => BoardCell::of(Points, &TableCell::Missing),
     };
     let gain = match &row.gain {
@@ -286,7 +291,7 @@ fn board_row(row: &ChoiceRow) -> BoardRow {
             BoardCell::of(Count, &TableCell::from(n)),
             share(row.clean),
             share(row.area),
-            drop,
+            change,
             threshold,
             gain,
             below.class(if row.below.is_empty() { "" } else { "below" }),

@@ -109,12 +109,13 @@ pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome
         InputTally::default(),
     );
     let settings = origin::settings(&digest, &args.loading.size);
+    let used_anyway = enhancer.used_anyway();
     let (mut written, mut unchanged, mut failed) = (0, 0, 0);
     for entry in &images.entries {
         let picture = images.picture(entry);
         let outcome = picture.and_then(|picture| {
             tally.add(&entry.id, &picture.note());
-            let origin = EnhancedOrigin::new(&entry.id, &picture, &settings);
+            let origin = EnhancedOrigin::new(&entry.id, &picture, &settings, used_anyway.as_ref());
             let place = Placed::new(out, &entry.stem, args.force);
             place.put(&origin, || {
                 let enhanced = enhancer.enhance(&picture.decode()?);
@@ -145,11 +146,16 @@ pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome
             Status::Incomplete
         },
         format!(
-            "{}: {written} made by {}{}{}\n",
+            "{}: {written} made by {}{}{}{}\n",
             out.display(),
             enhancer.name(),
             count(unchanged, "left as they were (--force makes them again)"),
-            count(failed, "failed")
+            count(failed, "failed"),
+            if used_anyway.is_some() {
+                "; they may be read in a wrong way, and were made because of --llie-anyway"
+            } else {
+                ""
+            }
         ),
     ))
 }

@@ -29,6 +29,7 @@ impl Experiment for ChoiceSetup<'_> {
 
     const PHASES: &'static [&'static str] = &["answers"];
     const REPLY: &'static str = "a letter";
+    const SOURCE: &'static str = "frame";
 
     fn settings(&self) -> &JobSettings {
         &self.config.job

@@ -17,7 +17,7 @@ use crate::job::identity::{self, Columns, Identity};
 use crate::job::models::ModelUnderTest;
 use crate::job::plan::SourcePlan;
 use crate::job::recipe::Recipe;
-use crate::job::report::open;
+use crate::job::report::{judges, open};
 use crate::job::settings::JobSettings;
 use crate::job::source::{Frames, Source};
 use crate::job::stored::StoredRun;
@@ -36,6 +36,7 @@ impl Experiment for OpenSetup<'_> {
 
     const PHASES: &'static [&'static str] = &["answers", "marks"];
     const REPLY: &'static str = "a sentence or a mark";
+    const SOURCE: &'static str = "walk";
 
     fn settings(&self) -> &JobSettings {
         &self.config.job
@@ -128,8 +129,8 @@ impl Experiment for OpenSetup<'_> {
         let judge = self.judge.as_ref().map(|judge| &*judge.name);
         let answers: Vec<&str> = self.config.answers.iter().map(|file| &*file.name).collect();
         vec![
-            (open::JUDGE, json!(judge)),
-            (open::PROTOCOL, json!(self.config.protocol.to_string())),
+            (judges::JUDGE, json!(judge)),
+            (judges::PROTOCOL, json!(self.config.protocol.to_string())),
             ("--frames", json!(self.config.walk.folder)),
             ("--answers", json!(answers)),
         ]

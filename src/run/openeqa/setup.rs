@@ -18,6 +18,7 @@ use crate::job::progress::Progress;
 use crate::job::recipe::Recipe;
 use crate::job::source::Source;
 use crate::job::walk::WalkFolder;
+use crate::report::words::counted;
 use crate::types::manifest::PartPlace;
 use crate::types::{Condition, FrameId, OpenDetail, QuestionId, Record, View};
 
@@ -73,6 +74,7 @@ impl<'a> OpenSetup<'a> {
         let (sources, conditions) = if shows_frames {
             let sources = walks.inspect(&names, &config.walk, progress);
             warn_of_unseen(&sources, &questions)?;
+            warn_of_repeated(&sources);
             let on = job.enhancers.on();
             job.light.refuse_matches("the frames of walks have none")?;
             let conditions = conditions(&job.light, &[], on, &recipe.enhancers);
@@ -142,6 +144,25 @@ fn names(questions: &[OpenQuestion]) -> Vec<String> {
         .iter()
         .filter(|question| seen.insert(&question.episode));
     first.map(|question| question.episode.clone()).collect()
+}
+
+/// Warns of the walks that have fewer frames than are shown: each image of a request is sent and paid for.
+fn warn_of_repeated(sources: &[Source]) {
+    let short = sources
+        .iter()
+        .filter(|source| source.order.len() > source.frames.len());
+    let short: Vec<&Source> = short.collect();
+    if let Some(first) = short.first() {
+        tracing::warn!(
+            "{} of {} walks {} fewer frames than --num-frames {}: a request shows frames several times, as upstream does (the {} of {}, for example); a smaller number sends and costs less",
+            short.len(),
+            sources.len(),
+            if short.len() == 1 { "has" } else { "have" },
+            first.order.len(),
+            counted(first.frames.len(), "frame"),
+            first.name
+        );
+    }
 }
 
 /// Warns of the walks that cannot be shown; an error if none can be shown.

@@ -4,7 +4,8 @@ use std::fmt::Display;
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, Result, line_of_toml};
+use crate::error::{Error, Result};
+use crate::types::toml_fault::TomlFault;
 
 /// Names and files of the five built-in calibrations, the paper's camera first.
 const PRESETS: [(&str, &str); 5] = [
@@ -98,10 +99,10 @@ impl Calibration {
     /// [`Error::Data`] with the key that is missing, unknown or out of range.
     pub fn parse(text: &str, place: impl Display) -> Result<Self> {
         let calibration: Self = toml::from_str(text).map_err(|e| {
-            let line = line_of_toml(text, &e);
+            let TomlFault { line, problem } = TomlFault::of(text, &e);
             Error::data(
                 format_args!("{place}, line {line}"),
-                format_args!("not a calibration: {}", e.message()),
+                format_args!("not a calibration: {problem}"),
             )
         })?;
         calibration

@@ -29,6 +29,8 @@ fn a_dry_run_says_what_it_would_take_and_sends_nothing() {
         (&estimate["trials"], &estimate["images"]),
         (&json!(18), &json!(18))
     );
+    // Each of the nine requests about a walk has its three frames.
+    assert_eq!(estimate["images_sent"], json!(27));
     assert!(estimate["lines"][0]["dollars"].as_f64().unwrap() > 0.0);
     assert!(estimate["bytes"].as_f64().unwrap() > 9.0 * 3.0 * 100.0);
     assert!(silent.requests().is_empty() && !house.0.path("run").exists());

@@ -55,7 +55,7 @@ fn marks_come_to_upstreams_score() {
     let degraded = row("L2");
     // The first question alone is there in both: 1 against (1 + 0) / 2.
     assert_eq!(
-        (&degraded["drop"], &degraded["drop_n"]),
+        (&degraded["change"], &degraded["change_n"]),
         (&json!(0.5), &json!(1))
     );
     assert!(

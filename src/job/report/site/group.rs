@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::error::Result;
 use crate::job::report::combine::Combined;
-use crate::job::report::open::{JUDGE, PROTOCOL};
+use crate::job::report::judges::{JUDGE, PROTOCOL};
 use crate::job::report::settings::{ENCODING, readings_and_variants};
 use crate::job::report::settings::{Settings, differing, identity, pixels, short, some};
 use crate::job::stored::StoredRun;

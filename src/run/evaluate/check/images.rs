@@ -11,6 +11,7 @@ use crate::error::Result;
 use crate::job::dark_already::{DarkImages, advice};
 use crate::job::progress::Progress;
 use crate::job::source::first_asked;
+use crate::report::words::counted;
 use crate::types::{Digest, FrameId, InputNote, InputSummary, Question};
 
 /// Whether the pixels of images are looked at.
@@ -87,8 +88,8 @@ pub(super) fn images(
         }
     }
     findings.ok(format!(
-        "{} images, {}, {}",
-        shown.len(),
+        "{}, {}, {}",
+        counted(shown.len(), "image"),
         megabytes(bytes),
         listed(&sizes)
     ));
@@ -143,7 +144,8 @@ fn light(dataset: &Dataset, shown: &[&FrameId], dark: DarkImages, findings: &mut
     match advice(*median).filter(|_| dark == DarkImages::Odd) {
         Some(advice) => findings.warn(advice),
         None => findings.ok(format!(
-            "median brightness {median:.0} of 255 ({number} images)"
+            "median brightness {median:.0} of 255 ({})",
+            counted(number, "image")
         )),
     }
 }

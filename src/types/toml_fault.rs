@@ -1,0 +1,93 @@
+//! What is wrong with a TOML text, as messages say it: [`TomlFault`].
+
+use super::near_name::suggestion;
+
+/// Where a text is not the TOML that was expected, and why.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct TomlFault {
+    /// The line, from 1.
+    pub(crate) line: usize,
+    /// The problem on one line, with the key that an unknown one is most similar to.
+    pub(crate) problem: String,
+}
+
+impl TomlFault {
+    /// The fault of a text, as the parser found it.
+    pub(crate) fn of(text: &str, error: &toml::de::Error) -> Self {
+        let before = error.span().and_then(|span| text.get(..span.start));
+        let line = before.unwrap_or_default().matches('\n').count() + 1;
+        let message: Vec<&str> = error.message().lines().map(str::trim).collect();
+        let stated = text.lines().nth(line - 1).unwrap_or_default();
+        Self {
+            line,
+            problem: message.join(", ") + &meant(error.message()) + quotes(stated),
+        }
+    }
+}
+
+/// The known key that an unknown one is most similar to, as a question; empty if the message is about something else.
+fn meant(message: &str) -> String {
+    let names: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
+    match &*names {
+        [unknown, known @ ..] if message.starts_with("unknown field") => suggestion(unknown, known),
+        _ => String::new(),
+    }
+}
+
+/// That a text needs quotes, if the value of a line is one without them.
+fn quotes(line: &str) -> &'static str {
+    let stated = line.split('#').next().unwrap_or_default();
+    let value = stated.split_once('=').map_or("", |(_, value)| value.trim());
+    let is_number = |text: &str| text.replace('_', "").parse::<f64>().is_ok();
+    let begins = |text: &str| text.starts_with(['"', '\'', '[', '{']);
+    let is_value = value.is_empty() || begins(value) || is_number(value);
+    if is_value || ["true", "false"].contains(&value) {
+        ""
+    } else {
+        "; a text stands in quotes"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde::Deserialize;
+
+    use super::*;
+
+    #[derive(Debug, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Known {
+        #[expect(dead_code)]
+        range_in: Option<String>,
+        #[expect(dead_code)]
+        multiple: Option<u32>,
+    }
+
+    #[test]
+    fn a_fault_has_its_line_and_says_how_to_mend_it() {
+        for (text, line, part) in [
+            ("\nrange = \"0..1\"", 2, "; did you mean range_in?"),
+            ("range_in = 0..1", 1, "; a text stands in quotes"),
+            (
+                "multiple = 2\nrange_in = nchw",
+                2,
+                "; a text stands in quotes",
+            ),
+        ] {
+            let fault = TomlFault::of(text, &toml::from_str::<Known>(text).unwrap_err());
+            assert_eq!(fault.line, line, "{fault:?}");
+            assert!(fault.problem.ends_with(part), "{fault:?}");
+            assert!(!fault.problem.contains('\n'), "{fault:?}");
+        }
+        for text in [
+            "multiple = \"2\"",
+            "zoom = 1 # far",
+            "multiple = true",
+            "multiple = 1_0.5",
+            "range_in = [1]",
+        ] {
+            let fault = TomlFault::of(text, &toml::from_str::<Known>(text).unwrap_err());
+            assert!(!fault.problem.contains(';'), "{fault:?}");
+        }
+    }
+}
