@@ -173,6 +173,11 @@ impl CircuitBreaker {
             health,
         } = &mut self.models[model];
         let Failure { kind, message, .. } = &error.failure;
+        // The error that ends the run begins with the endpoint.
+        let message = message
+            .strip_prefix(endpoint.as_str())
+            .and_then(|rest| rest.strip_prefix(": "))
+            .unwrap_or(message);
         match kind {
             // The images or their content are the cause; the next may succeed.
             FailureKind::Image | FailureKind::Filtered => {}
@@ -217,7 +222,8 @@ impl CircuitBreaker {
         self.stopped |= self.fails_fast && newly;
         self.stopped |= too_many.is_some() || self.models.iter().all(|model| model.health.stopped);
         if let Some(problem) = problem.or(too_many) {
-            let problem = format!("{problem} (every reply is stored; the same command continues)");
+            let problem =
+                format!("{problem} (replies so far are stored; the same command continues)");
             if newly {
                 let (endpoint, problem) = (endpoint.clone(), problem.clone());
                 self.model_errors

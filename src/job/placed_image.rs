@@ -33,6 +33,9 @@ pub(crate) struct Sidecar<R> {
     darkqa_eval: String,
     #[serde(flatten)]
     pub(crate) recipe: R,
+    /// Why the image may be wrong although it was made (`--llie-anyway`). It follows from all images of a call, and decides no pixel.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    used_anyway: Option<String>,
     /// The image file; `None` in files of the first schema.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     output: Option<OutputFile>,
@@ -98,12 +101,13 @@ impl<R: ImageOrigin> Sidecar<R> {
         &self.darkqa_eval
     }
 
-    fn new(recipe: R, image: &Path, bytes: &[u8]) -> Self {
+    fn new(recipe: R, place: &Placed, bytes: &[u8]) -> Self {
         Self {
             schema: R::SCHEMAS[0].to_owned(),
             darkqa_eval: env!("CARGO_PKG_VERSION").to_owned(),
             recipe,
-            output: Some(OutputFile::of(image, bytes)),
+            used_anyway: place.used_anyway.clone(),
+            output: Some(OutputFile::of(&place.image, bytes)),
         }
     }
 
@@ -138,6 +142,8 @@ pub(crate) struct Placed {
     json: PathBuf,
     /// Whether to write over whatever is there.
     is_forced: bool,
+    /// Why the image may be wrong although it is made.
+    used_anyway: Option<String>,
 }
 
 impl Placed {
@@ -148,6 +154,15 @@ impl Placed {
             image,
             json,
             is_forced,
+            used_anyway: None,
+        }
+    }
+
+    /// The same place, whose JSON file says why the image may be wrong.
+    pub(crate) fn used_anyway(self, used_anyway: Option<String>) -> Self {
+        Self {
+            used_anyway,
+            ..self
         }
     }
 
@@ -173,7 +188,7 @@ impl Placed {
                     return Err(self.refusal(&problem));
                 }
                 let bytes = reading::bytes(&self.image)?;
-                Sidecar::new(recipe.clone(), &self.image, &bytes).write(&self.json)?;
+                Sidecar::new(recipe.clone(), self, &bytes).write(&self.json)?;
                 Ok(ImageOutcome::Unchanged)
             }
         }
@@ -181,7 +196,7 @@ impl Placed {
 
     fn write<R: ImageOrigin>(&self, recipe: &R, bytes: &[u8]) -> Result<ImageOutcome> {
         write(&self.image, bytes)?;
-        Sidecar::new(recipe.clone(), &self.image, bytes).write(&self.json)?;
+        Sidecar::new(recipe.clone(), self, bytes).write(&self.json)?;
         Ok(ImageOutcome::Written)
     }
 

@@ -18,7 +18,7 @@ const MAX_NAMED: usize = 3;
 fn topic(kind: PooledKind, variant: &KindReading, enhancer: Option<&EnhancerName>) -> String {
     match (kind, enhancer) {
         (PooledKind::Enhancer, Some(name)) => name.to_string(),
-        (PooledKind::Blind, _) => "the words alone".to_owned(),
+        (PooledKind::Blind, _) => "dark images against the words alone".to_owned(),
         _ => kind.name_on(variant.kind).to_owned(),
     }
 }
@@ -84,9 +84,13 @@ pub(super) fn impossible(findings: &Findings<'_>) -> Option<Sentence> {
 /// How wide the intervals are, if the widest is wide: from the narrowest to the widest. This is no power: what so small a sample
 /// would show of a true effect depends on more than the intervals.
 pub(super) fn power(all: &[PooledFinding], unit: ClusterUnit) -> Option<Sentence> {
-    let whole = all
-        .iter()
-        .filter(|finding| finding.family.is_none() && finding.verdict.is_possible());
+    let whole = all.iter().filter(|finding| finding.family.is_none());
+    let which = if whole.clone().all(|finding| finding.verdict.is_possible()) {
+        "the findings"
+    } else {
+        "the findings that may have a verdict"
+    };
+    let whole = whole.filter(|finding| finding.verdict.is_possible());
     let half = |finding: &PooledFinding| (finding.difference.high - finding.difference.low) / 2.0;
     let by_width = |a: &&PooledFinding, b: &&PooledFinding| half(a).total_cmp(&half(b));
     let narrowest = half(whole.clone().min_by(by_width)?);
@@ -106,7 +110,7 @@ pub(super) fn power(all: &[PooledFinding], unit: ClusterUnit) -> Option<Sentence
         format!("{least} to {most}")
     };
     let text = format!(
-        "With {} the intervals of the findings reach about {range} points to each side.",
+        "With {} the intervals of {which} reach about {range} points to each side.",
         numbers.clusters(widest.clusters)
     );
     let detail = "over all families; an effect much smaller than that cannot be shown with so small a sample";

@@ -1,6 +1,6 @@
 //! A contact sheet, images in rows and columns with a label above each column: [`contact`].
 
-use super::{GAP, LINE, SheetCanvas, fitted, mean};
+use super::{GAP, LINE, SheetCanvas, fitted, lines, mean};
 use crate::types::Rgb;
 
 /// Minimum width of a column in pixels, so that its label can be read.
@@ -22,15 +22,23 @@ pub(crate) fn contact(columns: &[ContactColumn<'_>]) -> Rgb {
     let largest = |side: usize| sizes.iter().map(|size| size[side]).max().unwrap_or(0);
     let (height, width) = (largest(0), largest(1).max(COLUMN));
     let rows = columns.iter().map(|column| column.images.len()).max();
+    let labels = columns
+        .iter()
+        .map(|column| lines(&column.label, width + 2 * GAP));
+    let labels: Vec<Vec<String>> = labels.collect();
+    let label_lines = labels.iter().map(Vec::len).max().unwrap_or(0);
+    let head = 2 * GAP + label_lines * LINE;
     let mut sheet = SheetCanvas::new(
-        2 * GAP + LINE + rows.unwrap_or(0) * (height + GAP),
+        head + rows.unwrap_or(0) * (height + GAP),
         GAP + columns.len() * (width + GAP),
     );
     for (place, column) in columns.iter().enumerate() {
         let left = GAP + place * (width + GAP);
-        sheet.write([GAP, left], width, &column.label, [0; 3]);
+        for (line, text) in labels[place].iter().enumerate() {
+            sheet.write([GAP + line * LINE, left], width, text, [0; 3]);
+        }
         for (row, image) in column.images.iter().enumerate() {
-            let (top, size) = (2 * GAP + LINE + row * (height + GAP), size(image));
+            let (top, size) = (head + row * (height + GAP), size(image));
             sheet.fill([top, left], size, |row, column| {
                 mean(image, size, row, column)
             });
@@ -58,5 +66,12 @@ mod tests {
         assert_eq!(at(top + 10 + GAP, GAP), 100);
         assert_eq!(at(top, 2 * GAP + COLUMN), 150);
         assert_eq!(at(top + 10 + GAP, 2 * GAP + COLUMN), 255);
+        // A long label takes a second line.
+        let label = "a label of many words that one line of a column cannot hold";
+        let taller = contact(&[column(label, vec![&one])]);
+        assert_eq!(
+            taller.samples()[((top + LINE) * taller.width() + GAP) * 3],
+            50
+        );
     }
 }

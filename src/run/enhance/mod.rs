@@ -115,8 +115,8 @@ pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome
         let picture = images.picture(entry);
         let outcome = picture.and_then(|picture| {
             tally.add(&entry.id, &picture.note());
-            let origin = EnhancedOrigin::new(&entry.id, &picture, &settings, used_anyway.as_ref());
-            let place = Placed::new(out, &entry.stem, args.force);
+            let origin = EnhancedOrigin::new(&entry.id, &picture, &settings);
+            let place = Placed::new(out, &entry.stem, args.force).used_anyway(used_anyway.clone());
             place.put(&origin, || {
                 let enhanced = enhancer.enhance(&picture.decode()?);
                 enhanced.map_err(|e| Error::data(format_args!("image {:?}", entry.id.0), e))

@@ -10,7 +10,7 @@ use crate::job::placed_image::ImageOrigin;
 use crate::types::{Digest, FrameId, InputNote};
 
 /// Everything that decides the pixels of an enhanced image.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct EnhancedOrigin {
     frame: String,
     /// The digest of the image that was enhanced.
@@ -20,17 +20,6 @@ pub(super) struct EnhancedOrigin {
     read: InputNote,
     /// The digest of the model with its sidecar, and the sizes it takes, by flag.
     enhancer: Value,
-    /// Why the images may be read in a wrong way, if the enhancer was used in spite of it (`--llie-anyway`).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    used_anyway: Option<String>,
-}
-
-/// What the probe found follows from all images of a call, and decides no pixel.
-impl PartialEq for EnhancedOrigin {
-    fn eq(&self, other: &Self) -> bool {
-        let decides = [self, other].map(|of| (&of.frame, &of.source, &of.read, &of.enhancer));
-        decides[0] == decides[1]
-    }
 }
 
 impl ImageOrigin for EnhancedOrigin {
@@ -51,18 +40,12 @@ pub(super) fn settings(digest: &Digest, size: &SizeArgs) -> Value {
 
 impl EnhancedOrigin {
     /// The origin of a frame's image, enhanced with these settings.
-    pub(super) fn new(
-        frame: &FrameId,
-        picture: &Picture,
-        enhancer: &Value,
-        used_anyway: Option<&String>,
-    ) -> Self {
+    pub(super) fn new(frame: &FrameId, picture: &Picture, enhancer: &Value) -> Self {
         Self {
             frame: frame.0.clone(),
             source: picture.digest().to_string(),
             read: picture.note(),
             enhancer: enhancer.clone(),
-            used_anyway: used_anyway.cloned(),
         }
     }
 }

@@ -203,8 +203,8 @@ fn too_few_clusters_are_no_verdict_set_by_set() {
     let without = of_kind(&few, "no verdict");
     assert_eq!(
         without[0],
-        "· With 7 frames no verdict on darkness, noise and the words alone is possible, however large the effect. (the smallest possible \
-         p = 0.078; take more frames)"
+        "· With 7 frames no verdict on darkness, noise and dark images against the words alone is possible, however large the effect. (the smallest \
+         possible p = 0.078; take more frames)"
     );
     let lift = of_kind(&few, "enhancer");
     assert!(
@@ -220,7 +220,7 @@ fn too_few_clusters_are_no_verdict_set_by_set() {
     assert!(of_kind(&fewer, "best").is_empty());
     let without = of_kind(&fewer, "no verdict");
     assert!(
-        without[0].starts_with("· With 4 frames no verdict on darkness, noise, lift, the words alone and the best model is possible,"),
+        without[0].starts_with("· With 4 frames no verdict on darkness, noise, lift, dark images against the words alone and the best model is possible,"),
         "{without:?}"
     );
     let enough = said(&asked("m", 8, &levels));
