@@ -81,10 +81,12 @@ impl Enhancer {
             probes: [probe, swapped],
         } = trials;
         let others = self.other_outputs(&frames, probe.best())?;
+        let plausible = others.iter().filter(|output| output.problem.is_none());
+        let plausible: Vec<String> = plausible.map(|output| output.title.clone()).collect();
         let stated = self.stated_pair();
         let is_plausible = |pair: &RangePair| probe.plausible().contains(pair);
         let mut found = match (image, stated) {
-            (ImageOutput::Unknown, _) => Found::no_output(&self.output_title(), &probe, &others),
+            (ImageOutput::Unknown, _) => Found::no_output(&self.output_title(), &probe, &plausible),
             (ImageOutput::Known, Some(pair)) if is_plausible(&pair) => Found::stated(pair),
             (ImageOutput::Known, _) => propose(&probe, stated, &swapped, order),
         };
@@ -92,7 +94,7 @@ impl Enhancer {
             found.lines.extend(self.found_size());
         }
         if image == ImageOutput::Known {
-            found.mention(&others);
+            found.mention(&plausible);
         }
         let convention = self.convention();
         let is_stated = convention.color.is_some()

@@ -1,6 +1,5 @@
 //! What follows from an examination: the lines of a sidecar that are proposed, and why ([`Found`]).
 
-use super::ExaminedConvention;
 use crate::enhance::convention::{ChannelOrder, ValueRange};
 use crate::enhance::probe::{Probe, RangePair};
 use crate::types::Flaw;
@@ -50,14 +49,13 @@ impl Found {
         }
     }
 
-    /// Several outputs could be the image.
-    pub(super) fn no_output(first: &str, probe: &Probe, others: &[ExaminedConvention]) -> Self {
+    /// Several outputs could be the image: that which is read, and the plausible others.
+    pub(super) fn no_output(first: &str, probe: &Probe, others: &[String]) -> Self {
         let mut plausible: Vec<&str> = Vec::new();
         if !probe.plausible().is_empty() {
             plausible.push(first);
         }
-        let others = others.iter().filter(|output| output.problem.is_none());
-        plausible.extend(others.map(|output| &*output.title));
+        plausible.extend(others.iter().map(String::as_str));
         Self::nothing(format!(
             "Which output is the image is not stated, and cannot be found: plausible are {}. State the one that its authors use, `output = \"NAME\"`, or name their preset.",
             if plausible.is_empty() {
@@ -69,10 +67,10 @@ impl Found {
     }
 
     /// Names the other outputs whose images could be enhanced ones.
-    pub(super) fn mention(&mut self, others: &[ExaminedConvention]) {
-        for output in others.iter().filter(|output| output.problem.is_none()) {
+    pub(super) fn mention(&mut self, others: &[String]) {
+        for output in others {
             let found = " gives plausible images: check which output its authors use.";
-            self.conclusion += &[" The ", &*output.title, found].concat();
+            self.conclusion += &[" The ", output, found].concat();
         }
     }
 
