@@ -4,6 +4,7 @@
 
 mod args;
 mod asking;
+mod check;
 mod describe;
 mod entry;
 mod file;
@@ -24,7 +25,8 @@ use crate::types::{Condition, View};
 
 pub(crate) use args::ModelArgs;
 pub(crate) use asking::AskingArgs;
-pub(crate) use describe::{check, describe};
+pub(crate) use check::check;
+pub(crate) use describe::describe;
 pub(crate) use name::ModelName;
 pub(crate) use run_defaults::{RunDefault, run_defaults};
 pub(crate) use settings::{AskSettings, KeyUse, ResolveContext, TextBaseline};

@@ -442,12 +442,16 @@ fn prices_of_a_model_hold_for_its_cost() {
 
 #[test]
 fn the_command_models_shows_what_each_comes_to() {
-    let mock = MockEndpoint::start([Answer::text("OK"), Answer::error(401, "x", "no")]);
+    let mock = MockEndpoint::start([
+        Answer::text("B"),
+        Answer::text("A"),
+        Answer::error(401, "x", "no"),
+    ]);
     let url = mock.base_url();
     let bench = bench(
         1,
         &format!(
-            "[[model]]\nname = \"A\"\nid = \"a\"\nendpoints = [\"{url}\"]\nkey-env = \"A_KEY\"\nbody = {{ top_k = 1 }}\n[[model]]\nid = \"b\"\nendpoints = [\"{url}\"]\n[[model]]\nid = \"random\"\n"
+            "[[model]]\nname = \"A\"\nid = \"a\"\nview = \"both\"\nendpoints = [\"{url}\"]\nkey-env = \"A_KEY\"\nbody = {{ top_k = 1 }}\n[[model]]\nid = \"b\"\nendpoints = [\"{url}\"]\n[[model]]\nid = \"random\"\n"
         ),
     );
     let shown = bench.complete(&["models", "models.toml"]);
@@ -466,12 +470,20 @@ fn the_command_models_shows_what_each_comes_to() {
     let mut command = bench.command(&["models", "models.toml", "--check", "--quiet"]);
     let checked = called(command.env("A_KEY", "secret-0123456789"));
     assert_eq!(checked.code, Some(1), "{checked:?}");
-    assert!(
-        checked.stdout.contains("A: \"OK\"") && checked.stdout.contains("b: FAILED"),
-        "{checked:?}"
-    );
+    for part in [
+        "A: \"B\" about a red image, of which B is true",
+        "A: \"A\" without an image",
+        "b: FAILED",
+    ] {
+        assert!(checked.stdout.contains(part), "{part}: {checked:?}");
+    }
     assert!(!checked.stdout.contains("secret-0123"));
-    assert_eq!(mock.requests().len(), 2);
+    let bodies = mock.requests();
+    let images = bodies.iter().map(|request| {
+        let body = request.json().to_string();
+        body.matches("data:image/png").count()
+    });
+    assert_eq!(images.collect::<Vec<_>>(), [1, 0, 1]);
 }
 
 #[test]
