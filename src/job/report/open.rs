@@ -1,6 +1,7 @@
 //! The report of a run of open questions: scored from its records, and written into its folder.
 
 use std::collections::{BTreeMap, HashMap};
+use std::fmt::Write;
 use std::path::PathBuf;
 
 use serde_json::Value;
@@ -176,7 +177,8 @@ impl Scores {
         target.write(&files(&report, &tables)?, &self.run.manifest)?;
         let mut text = self.show(&report, &tables, show)?;
         if !show.is_document() {
-            text += &format!("report: {}\n", target.path().join(PAGE).display());
+            let page = target.path().join(PAGE);
+            let _ = writeln!(text, "report: {}", page.display());
         }
         Ok(text)
     }
