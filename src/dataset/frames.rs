@@ -317,9 +317,10 @@ fn images(root: &Root) -> Result<BTreeMap<FrameId, ImageSource>> {
             |inner: &&PathBuf| entries(inner).is_ok_and(|of| of.iter().any(|path| is_image(path)));
         let questions = folder.join(QUESTIONS);
         let remedy = match all.iter().find(has_images) {
-            Some(_) if questions.exists() => format!(
-                "; name {}, whose images may be in folders",
-                questions.display()
+            Some(inner) if questions.exists() => format!(
+                "; name {} if its lines have paths such as {}/IMAGE",
+                questions.display(),
+                inner.file_name().unwrap_or_default().to_string_lossy()
             ),
             Some(inner) => format!(
                 "; a folder in it has some: name that one, as {}",

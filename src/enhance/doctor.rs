@@ -233,7 +233,7 @@ fn shown(
     (swapped, order): (&Probe, ChannelOrder),
     others: Vec<ExaminedConvention>,
 ) -> Vec<ExaminedConvention> {
-    let stated_title = stated.map(|pair| format!("{pair}, as stated"));
+    let stated_title = stated.map(|pair| format!("{output}{pair}, as stated"));
     let mut shown = columns(probe, |ranges| match &stated_title {
         Some(title) if stated == Some(ranges) => title.clone(),
         _ => format!("{output}{ranges}"),

@@ -16,6 +16,9 @@ use crate::types::near_name::suggestion;
 /// TOML file of all presets.
 const PRESETS: &str = include_str!("presets.toml");
 
+/// Length of a preset's name up to which it must be a word of a file's name; chosen.
+const SHORT: usize = 4;
+
 /// Convention of a published model.
 #[derive(Debug)]
 pub(super) struct Preset {
@@ -166,15 +169,28 @@ impl Preset {
 
     /// The preset that a file is named after, if it is not this one or a sibling of it, as `ruas-upe` of `ruas-lol`.
     pub(super) fn named_after(&self, file: &Path) -> Option<String> {
-        let stem = file.file_stem()?.to_string_lossy().to_lowercase();
-        let words: Vec<&str> = stem.split(|c: char| !c.is_alphanumeric()).collect();
-        let is_named = |preset: &str| {
-            let family = preset.split(['-', '+']).next().unwrap_or(preset);
-            words.iter().any(|word| word.starts_with(family))
+        let letters = |text: &str| {
+            text.to_lowercase()
+                .replace(|c: char| !c.is_alphanumeric(), "")
         };
-        let mut others = all().ok()?.into_keys();
-        let other = others.find(|name| is_named(name));
-        other.filter(|_| !is_named(&self.name))
+        let stem = file.file_stem()?.to_string_lossy().to_lowercase();
+        let words: Vec<&str> = stem.split(|c: char| !c.is_alphabetic()).collect();
+        let all_letters = letters(&stem);
+        // A short name may be a part of any word.
+        let is_named = |name: &str| {
+            let name = letters(name);
+            words.contains(&&*name) || name.len() > SHORT && all_letters.contains(&name)
+        };
+        let family = |name: &str| match name.split_once('-') {
+            Some((family @ ("ruas" | "pairlie"), _)) => family.to_owned(),
+            _ => name.trim_end_matches('+').to_owned(),
+        };
+        if is_named(&family(&self.name.replace("-pp", "++"))) {
+            return None;
+        }
+        let others = all().ok()?.into_keys();
+        let named = others.filter(|name| is_named(name) || is_named(&family(name)));
+        named.max_by_key(|name| (is_named(name), std::cmp::Reverse(name.len())))
     }
 
     /// What decides which output is taken.

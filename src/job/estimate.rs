@@ -16,8 +16,7 @@ use super::source::Source;
 use super::trial::Item as _;
 use crate::ask::{ImageLimit, Price, Server};
 use crate::error::Result;
-use crate::report::forecast::{CostLine, Forecast, ReadingCost, StoreForecast};
-use crate::report::words::counted;
+use crate::report::forecast::{CostLine, FewSources, Forecast, ReadingCost, StoreForecast};
 use crate::score::cluster::MIN_SCENES;
 use crate::store::StoredTrial;
 use crate::types::{Condition, Degradation, ImageFacts, ReadingName, View};
@@ -88,7 +87,7 @@ pub(crate) fn estimate<E: Experiment>(
                 }
             }
             if let Some(condition) = &group.condition {
-                images += source.order.len();
+                images += source.frames.len();
                 if let Some(set) = &mut image_set {
                     let bytes = mean.map_or(0.0, |mean| mean.bytes);
                     set.add(
@@ -135,8 +134,13 @@ pub(crate) fn estimate<E: Experiment>(
         batch: money.prices.batch,
         image_store: image_set.map(|set| StoreForecast::new(set.words(), set.bytes(), set.room())),
         reply: E::REPLY,
-        few_sources: (experiment.part().is_none() && sources.len() < MIN_SCENES)
-            .then(|| counted(sources.len(), E::SOURCE)),
+        few_sources: (experiment.part().is_none() && sources.len() < MIN_SCENES).then(|| {
+            FewSources {
+                number: sources.len(),
+                needed: MIN_SCENES,
+                of: E::SOURCE,
+            }
+        }),
         largest_request: sources
             .iter()
             .any(|source| source.order.len() > 1)

@@ -3,14 +3,19 @@
 
 use crate::error::{Error, Result};
 
-/// A listener for interrupts. While it exists, they do not end the process.
+/// A listener for interrupts. While it exists, they do not end the process. It keeps those that come while nobody waits: an interrupt
+/// is never lost between two calls of [`Self::next`].
 #[derive(Debug)]
 pub(crate) struct Interrupt {
+    #[cfg(unix)]
+    ctrl_c: tokio::signal::unix::Signal,
     #[cfg(unix)]
     terminate: tokio::signal::unix::Signal,
     /// `None` if it is ignored, as under `nohup`.
     #[cfg(unix)]
     hang_up: Option<tokio::signal::unix::Signal>,
+    #[cfg(windows)]
+    ctrl_c: tokio::signal::windows::CtrlC,
 }
 
 impl Interrupt {
@@ -20,6 +25,7 @@ impl Interrupt {
             use tokio::signal::unix::{SignalKind, signal};
             let listen = |kind, name| signal(kind).map_err(|e| Error::file(name, "listen for", e));
             Ok(Self {
+                ctrl_c: listen(SignalKind::interrupt(), "SIGINT")?,
                 terminate: listen(SignalKind::terminate(), "SIGTERM")?,
                 hang_up: if is_hang_up_ignored() {
                     None
@@ -28,20 +34,23 @@ impl Interrupt {
                 },
             })
         }
-        #[cfg(not(unix))]
-        Ok(Self {})
+        #[cfg(windows)]
+        Ok(Self {
+            ctrl_c: tokio::signal::windows::ctrl_c()
+                .map_err(|e| Error::file("Ctrl-C", "listen for", e))?,
+        })
     }
 
     /// Waits for the next interrupt.
     pub(crate) async fn next(&mut self) {
         #[cfg(unix)]
         tokio::select! {
-            _ = tokio::signal::ctrl_c() => {}
+            _ = self.ctrl_c.recv() => {}
             _ = self.terminate.recv() => {}
             Some(()) = async { self.hang_up.as_mut()?.recv().await } => {}
         }
-        #[cfg(not(unix))]
-        let _ = tokio::signal::ctrl_c().await;
+        #[cfg(windows)]
+        self.ctrl_c.recv().await;
     }
 }
 
@@ -60,4 +69,28 @@ fn is_hang_up_ignored() -> bool {
         || !std::io::IsTerminal::is_terminal(&std::io::stderr()),
         |mask| mask & HANG_UP != 0,
     )
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use std::process::{self, Command};
+    use std::time::Duration;
+
+    use super::*;
+
+    #[tokio::test]
+    async fn an_interrupt_that_comes_while_nobody_waits_is_not_lost() {
+        let mut interrupt = Interrupt::listen().unwrap();
+        for signal in ["-INT", "-TERM"] {
+            // As in a loop that does something else after each wait.
+            let early = tokio::time::timeout(Duration::from_millis(1), interrupt.next()).await;
+            assert!(early.is_err());
+            let pid = process::id().to_string();
+            let status = Command::new("kill").args([signal, &pid]).status().unwrap();
+            assert!(status.success());
+            tokio::time::sleep(Duration::from_millis(50)).await;
+            let late = tokio::time::timeout(Duration::from_secs(20), interrupt.next()).await;
+            assert!(late.is_ok(), "{signal}");
+        }
+    }
 }

@@ -1,6 +1,7 @@
 //! A run that is open for writing: [`OpenRun`].
 
 use std::collections::HashSet;
+use std::fmt::Write as _;
 use std::path::Path;
 use std::time::Instant;
 
@@ -312,13 +313,18 @@ impl<E: Experiment> OpenRun<'_, E> {
             manifest.updated = now();
         }
         let settings = self.experiment.settings();
-        let outcome = self.experiment.report(&self.store, run, settings.show)?;
+        let mut outcome = self.experiment.report(&self.store, run, settings.show)?;
         record_table::update(self.store.folder(), settings.table)?;
         match end {
             EndReason::Stopped(error) => Err(error),
             EndReason::ModelsStopped(errors) => {
+                // The last lines, below results that may be long.
                 for error in errors {
-                    tracing::warn!("not asked any further: {error}");
+                    if settings.show.is_document() {
+                        tracing::warn!("not asked any further: {error}");
+                    } else {
+                        let _ = writeln!(outcome.output, "! not asked any further: {error}");
+                    }
                 }
                 Ok(outcome)
             }

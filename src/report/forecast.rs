@@ -10,7 +10,6 @@ use super::table::TableBuilder;
 use super::terminal;
 use super::words::counted;
 use crate::error::{Error, Result};
-use crate::score::cluster::MIN_SCENES;
 use crate::types::ReadingName;
 
 /// Estimate of the requests that are left for one model.
@@ -89,15 +88,26 @@ pub(crate) struct Forecast {
     pub batch: f64,
     /// Length of the shortest reply that is assumed, in words.
     pub reply: &'static str,
-    /// The frames or walks, with their number, if intervals and tests need more of them.
+    /// The frames or walks, if intervals and tests need more of them.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub few_sources: Option<String>,
+    pub few_sources: Option<FewSources>,
     /// Size of the largest request in bytes, as sampled images suggest, if requests hold many images.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub largest_request: Option<f64>,
     /// What an image store gives the next model; `None` without one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub image_store: Option<StoreForecast>,
+}
+
+/// Frames or walks that are too few.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct FewSources {
+    /// How many there are.
+    pub number: usize,
+    /// How many intervals and tests need.
+    pub needed: usize,
+    /// What they are, in the singular.
+    pub of: &'static str,
 }
 
 /// What an image store gives another model that is asked about the same images.
@@ -185,7 +195,9 @@ pub(crate) fn render(forecast: &Forecast) -> String {
     if let Some(few) = &forecast.few_sources {
         let _ = writeln!(
             last,
-            "only {few} ({MIN_SCENES} are needed): intervals and tests would be rough"
+            "only {} ({} are needed): intervals and tests would be rough",
+            counted(few.number, few.of),
+            few.needed
         );
     }
     let built_in = built_in_line(&forecast.built_in);
@@ -216,13 +228,13 @@ pub(crate) fn render(forecast: &Forecast) -> String {
     }
     let _ = writeln!(
         text,
-        "to send: {} with {} ({images} made), the largest {:.2} MB (of {sampled} made as a sample)",
+        "to send: {} with {} (made once: {images}), the largest {:.2} MB (of {sampled} in a sample)",
         bytes(forecast.bytes),
         counted(forecast.images_sent, "image"),
         forecast.largest_image as f64 / 1e6
     );
     if let Some(request) = forecast.largest_request {
-        let _ = writeln!(text, "a request has about {}", bytes(request));
+        let _ = writeln!(text, "the largest request has about {}", bytes(request));
     }
     let _ = writeln!(
         text,

@@ -70,7 +70,11 @@ impl<'a> MarkdownReport<'a> {
         )];
         head.extend(coverage(report));
         Self {
-            names: vec![report.name.clone()],
+            names: report
+                .runs
+                .iter()
+                .map(|(name, _)| (*name).to_owned())
+                .collect(),
             head,
             alerts: report.alerts,
             sentences: &[],

@@ -17,7 +17,7 @@ use crate::questions::rules::Rules;
 use crate::report::words::counted;
 use crate::types::manifest::Status;
 use crate::types::question::letter;
-use crate::types::{Choices, Decides, Question, shell_word};
+use crate::types::{Choices, Decides, FrameId, Question, shell_word};
 
 /// The flags of `init`.
 #[derive(Debug, Args)]
@@ -35,6 +35,8 @@ const ROOMS: &str = "frames=3,seed=20,size=480x360";
 /// The number of questions about each picture, and of images of a folder that are copied.
 const EACH: usize = 2;
 const PICTURES: usize = 3;
+/// The files of the pictures of rooms.
+const ROOM_FILES: [&str; PICTURES] = ["room1.png", "room2.png", "room3.png"];
 /// The number of columns of choices.
 const COLUMNS: usize = 4;
 
@@ -50,7 +52,7 @@ questions.csv   one question per line; a spreadsheet can edit it
   A B C D       the choices; leave cells empty for fewer than four, add E, F, ... for more
   answer        the letter of the true choice
   category      the kind of question, by which the report groups
-*.png           the images: PNG, JPEG, WebP, TIFF, BMP or OpenEXR, here or in folders below;
+images          PNG, JPEG, WebP, TIFF, BMP or OpenEXR, in this folder or those below;
                 --data-root DIR allows a folder outside of this one
 dataset.json    the name of the data set
 
@@ -63,14 +65,10 @@ Replace the images and the lines with your own, then run the check again.
 /// If a file exists already, or cannot be read or written.
 pub(crate) fn init(args: &InitArgs, progress: &Progress) -> Result<Outcome> {
     let at = |name: &str| args.folder.join(name);
-    let files = [
-        "README.txt",
-        "questions.csv",
-        "dataset.json",
-        "room1.png",
-        "room2.png",
-        "room3.png",
-    ];
+    let mut files = vec!["README.txt", "questions.csv", "dataset.json"];
+    if args.frames.is_none() {
+        files.extend(ROOM_FILES);
+    }
     if let Some(exists) = files.iter().map(|name| at(name)).find(|path| path.exists()) {
         return Err(Error::data(exists.display(), EXISTS));
     }
@@ -136,10 +134,9 @@ fn of_rooms(folder: &Path, progress: &Progress) -> Result<Vec<Line>> {
         progress,
     )?;
     let mut lines = Vec::new();
-    for (number, frame) in dataset.frames().enumerate() {
-        let name = format!("room{}.png", number + 1);
+    for (number, (frame, name)) in dataset.frames().zip(ROOM_FILES).enumerate() {
         write(
-            &folder.join(&name),
+            &folder.join(name),
             &png(&dataset.picture(frame)?.decode()?)?,
         )?;
         let of_frame = dataset
@@ -156,7 +153,7 @@ fn of_rooms(folder: &Path, progress: &Progress) -> Result<Vec<Line>> {
             let choices: &Choices = &question.choices;
             let family = question.family.name();
             line(
-                &name,
+                name,
                 &question.text,
                 choices.texts(),
                 choices.truth().unwrap_or_default(),
@@ -170,18 +167,27 @@ fn of_rooms(folder: &Path, progress: &Progress) -> Result<Vec<Line>> {
 /// Copies images of a folder, and returns lines about them that are true of any image: whether it has colours, and its form.
 fn of_frames(frames: &Path, folder: &Path) -> Result<Vec<Line>> {
     let dataset = Dataset::of_images(frames, &[])?;
-    let mut lines = Vec::new();
-    let yes_no = ["yes".to_owned(), "no".to_owned()];
-    for (number, frame) in dataset.frames().take(PICTURES).enumerate() {
+    let copied = dataset.frames().take(PICTURES).map(|frame| {
         let path = dataset.image_file(frame).unwrap_or(frames);
         let name = path.file_name().unwrap_or_default();
-        let image = name.to_string_lossy().into_owned();
+        (frame, path, folder.join(name))
+    });
+    let copied: Vec<(&FrameId, &Path, PathBuf)> = copied.collect();
+    // The folder may be that of the images.
+    let is_itself = |path: &Path, copy: &Path| path.canonicalize().ok() == copy.canonicalize().ok();
+    let mut others = copied
+        .iter()
+        .filter(|(_, path, copy)| copy.exists() && !is_itself(path, copy));
+    if let Some((_, _, copy)) = others.next() {
+        return Err(Error::data(copy.display(), EXISTS));
+    }
+    let (mut lines, yes_no) = (Vec::new(), ["yes".to_owned(), "no".to_owned()]);
+    for (number, (frame, path, copy)) in copied.into_iter().enumerate() {
+        let image = copy.file_name().unwrap_or_default().to_string_lossy();
         let picture = dataset.picture(frame)?.decode()?;
-        let copy = folder.join(&image);
-        if copy.exists() {
-            return Err(Error::data(copy.display(), EXISTS));
+        if !copy.exists() {
+            write(&copy, &reading::bytes(path)?)?;
         }
-        write(&copy, &reading::bytes(path)?)?;
         let mut pixels = picture.samples().chunks_exact(3);
         let has_colours = pixels
             .any(|p| p.iter().max() > p.iter().min().map(|least| least.saturating_add(8)).as_ref());

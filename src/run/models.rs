@@ -31,7 +31,7 @@ pub(crate) struct ModelsArgs {
     /// Trust the file of models although the working directory is not in its folder: with --check it may then name any variable and file
     #[arg(long, help_heading = "Model", add = Decides::Nothing)]
     pub trust_models: bool,
-    /// Send one small request to each model, with a small red image if it is asked with images, and print the replies
+    /// Send one small request to each model, with a red image if it is asked with images, and print the replies
     #[arg(long, help_heading = "Model", add = Decides::Nothing)]
     pub check: bool,
 }

@@ -17,10 +17,9 @@ impl TomlFault {
         let before = error.span().and_then(|span| text.get(..span.start));
         let line = before.unwrap_or_default().matches('\n').count() + 1;
         let message: Vec<&str> = error.message().lines().map(str::trim).collect();
-        let stated = text.lines().nth(line - 1).unwrap_or_default();
         Self {
             line,
-            problem: message.join(", ") + &meant(error.message()) + quotes(stated),
+            problem: message.join(", ") + &meant(error.message()) + quotes(error.message()),
         }
     }
 }
@@ -34,17 +33,16 @@ fn meant(message: &str) -> String {
     }
 }
 
-/// That a text needs quotes, if the value of a line is one without them.
-fn quotes(line: &str) -> &'static str {
-    let stated = line.split('#').next().unwrap_or_default();
-    let value = stated.split_once('=').map_or("", |(_, value)| value.trim());
-    let is_number = |text: &str| text.replace('_', "").parse::<f64>().is_ok();
-    let begins = |text: &str| text.starts_with(['"', '\'', '[', '{']);
-    let is_value = value.is_empty() || begins(value) || is_number(value);
-    if is_value || ["true", "false"].contains(&value) {
-        ""
-    } else {
+/// That a text needs quotes, if the parser took one for a number or a date: of others it says so itself.
+fn quotes(message: &str) -> &'static str {
+    let is_number = ["invalid fraction", "invalid float", "invalid integer"]
+        .iter()
+        .any(|problem| message.starts_with(problem));
+    let is_date = message.starts_with("invalid type: map, expected a string");
+    if is_number || is_date {
         "; a text stands in quotes"
+    } else {
+        ""
     }
 }
 
@@ -73,6 +71,7 @@ mod tests {
                 2,
                 "; a text stands in quotes",
             ),
+            ("range_in = 2024-01-01", 1, "; a text stands in quotes"),
         ] {
             let fault = TomlFault::of(text, &toml::from_str::<Known>(text).unwrap_err());
             assert_eq!(fault.line, line, "{fault:?}");
@@ -85,6 +84,12 @@ mod tests {
             "multiple = true",
             "multiple = 1_0.5",
             "range_in = [1]",
+            "multiple = True",
+            "range_in = gpt-4o",
+            "range_in = \"a\" \"b=c\"",
+            "range_in == \"a\"",
+            "\"a=b\" = 3 4",
+            "zoom = 2024-01-01",
         ] {
             let fault = TomlFault::of(text, &toml::from_str::<Known>(text).unwrap_err());
             assert!(!fault.problem.contains(';'), "{fault:?}");

@@ -131,6 +131,46 @@ fn a_bundle_is_the_run_again_and_the_same_bytes_each_time() {
 }
 
 #[test]
+fn models_that_flags_cannot_name_are_a_file_in_the_readme() {
+    let [one, two] = [1, 2].map(|_| MockEndpoint::start([Answer::text("A")]));
+    let bench = Bench::with_frames();
+    let table = |name: &str, mock: &MockEndpoint, more: &str| {
+        format!(
+            "[[model]]\nname = \"{name}\"\nid = \"m\"\nendpoints = [\"{}\"]\nkey-env = \"none\"\n{more}\n",
+            mock.base_url()
+        )
+    };
+    let more = "view = \"both\"\nmax-tokens = 77\ntop-p = 0.5";
+    bench.file(
+        "my.toml",
+        table("One \\\"1\\\"", &one, more) + &table("Two", &two, ""),
+    );
+    bench.complete(&words(
+        "--models my.toml --data frames --levels L0 --out run",
+    ));
+    bench.complete(&words("bundle run --out run.zip"));
+    unpack(&bench.path("run.zip"), &bench.path("all"));
+    let readme = fs::read_to_string(bench.path("all/run/README.md")).unwrap();
+    let (_, file) = readme.split_once("cat > models.toml <<'END'\n").unwrap();
+    let (file, command) = file.split_once("END\n").unwrap();
+    assert!(
+        command.starts_with("darkqa-eval --models models.toml"),
+        "{command}"
+    );
+    bench.file("models.toml", file);
+    let [before, again] = ["my.toml", "models.toml"].map(|file| {
+        let shown = bench.complete(&["models", file]);
+        let same = |line: &&str| !line.trim_start().starts_with("key ");
+        shown
+            .lines()
+            .filter(same)
+            .map(str::to_owned)
+            .collect::<Vec<_>>()
+    });
+    assert_eq!(again, before, "{file}");
+}
+
+#[test]
 fn only_a_bundle_is_replaced() {
     let bench = Bench::new();
     bench.complete(&words("--model random --levels L0 --out run"));

@@ -328,7 +328,9 @@ fn a_fatal_answer_stops_one_model_alone() {
     assert_eq!(run.code, Some(1), "{run:?}");
     assert_eq!((refused.requests().len(), good.requests().len()), (1, 8));
     assert!(
-        run.stderr.contains("not asked any further") && run.stderr.contains("locked: "),
+        run.stdout.lines().last().is_some_and(|last| {
+            last.starts_with("! not asked any further: ") && last.contains("locked: ")
+        }),
         "{run:?}"
     );
     assert!(run.stdout.contains("open"), "{}", run.stdout);
@@ -471,7 +473,7 @@ fn the_command_models_shows_what_each_comes_to() {
     let checked = called(command.env("A_KEY", "secret-0123456789"));
     assert_eq!(checked.code, Some(1), "{checked:?}");
     for part in [
-        "A: \"B\" about a red image, of which B is true",
+        "A: \"B\" about a red image, of which B is true, in ",
         "A: \"A\" without an image",
         "b: FAILED",
     ] {

@@ -218,6 +218,15 @@ fn the_template_can_be_checked_and_run_as_it_is() {
     let table = fs::read_to_string(bench.path("own/questions.csv")).unwrap();
     let lines = table.lines().skip(1);
     assert_eq!(lines.filter(|line| line.starts_with("room")).count(), 6);
+    // A folder of images gets the questions beside them.
+    fs::create_dir(bench.path("mine")).unwrap();
+    fs::copy(
+        bench.path("my-data/room1.png"),
+        bench.path("mine/room1.png"),
+    )
+    .unwrap();
+    let beside = bench.complete(&words("init mine --frames mine"));
+    assert!(beside.contains("mine: 2 questions"), "{beside}");
     let check = own
         .stdout
         .lines()
@@ -274,12 +283,32 @@ fn a_folder_whose_images_are_in_folders_names_its_file_of_questions() {
     assert!(
         folder
             .stdout
-            .contains("name data/questions.jsonl, whose images may be in folders"),
+            .contains("name data/questions.jsonl if its lines have paths such as images/IMAGE"),
         "{}",
         folder.stdout
     );
     let named = bench.complete(&words("check data/questions.jsonl"));
     assert!(named.contains("1 question on 1 image"), "{named}");
+}
+
+#[test]
+fn an_answer_that_is_no_text_of_a_choice_is_named_in_the_own_form() {
+    let bench = Bench::new();
+    bench.complete(&words("init data"));
+    fs::remove_file(bench.path("data/questions.csv")).unwrap();
+    let line = |id: &str, answer: &str| json!({"id": id, "frame": "room1.png", "question": "A?", "choices": ["yes", "no"], "answer": answer});
+    bench.file(
+        "data/questions.jsonl",
+        format!("{}\n{}\n", line("a", "yes"), line("b", "A")),
+    );
+    let refused = bench.call(&words("--data data --model random"));
+    assert!(
+        refused
+            .stderr
+            .contains("line 2: the answer \"A\" is not one of the options"),
+        "{}",
+        refused.stderr
+    );
 }
 
 /// A set of eight yes-or-no questions, two about each of four images, of which the last two pairs have one that says no.

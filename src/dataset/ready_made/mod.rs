@@ -99,7 +99,8 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
     let files: Vec<Arc<SetFile>> = files.into_iter().map(Arc::new).collect();
     let mut table = rows(&files, joined, args)?;
     let (group, no_group) = preset.map_or((None, None), |preset| preset.group(&table));
-    let map = Map::joined(group.iter().chain(&info.map).chain(&args.map));
+    let frame = of_frame(&table).filter(|_| is_own(&table) && table.find("image").is_none());
+    let map = Map::joined(frame.iter().chain(&group).chain(&info.map).chain(&args.map));
     let wrong = |table: &Table, problem: String| {
         let hint = preset::recognised(&table.columns, args.preset.as_deref());
         let hint = hint.map_or_else(String::new, |hint| format!("\n {hint}"));
@@ -206,6 +207,12 @@ pub(super) enum Form {
 /// Questions, and what was taken for what when they were read, one fact a line.
 pub(super) type ReadQuestions = (Vec<Question>, Vec<String>);
 
+/// That the column `frame` names the image, if there is one.
+fn of_frame(table: &Table) -> Option<Map> {
+    let frame = table.find("frame");
+    frame.and_then(|_| "image=frame".parse().ok())
+}
+
 /// The questions of a file about frames of other data, and what was taken for what.
 ///
 /// # Errors
@@ -213,7 +220,7 @@ pub(super) type ReadQuestions = (Vec<Question>, Vec<String>);
 pub(super) fn about_frames(file: &Path, args: &SetArgs) -> Result<ReadQuestions> {
     let mut table = Table::default();
     SetFile::open(file.to_owned(), String::new())?.read(args.rows.as_deref(), &mut table)?;
-    let own: Option<Map> = table.find("frame").and_then(|_| "image=frame".parse().ok());
+    let own = of_frame(&table);
     let folder = file.parent().unwrap_or(Path::new(""));
     let info = FolderInfo::of(folder)?;
     let map = Map::joined(own.iter().chain(&info.map).chain(&args.map));

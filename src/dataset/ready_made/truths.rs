@@ -238,7 +238,8 @@ impl<'h> ColumnReading<'h> {
             How::ByRule | How::Split(_) => {
                 let texts = is_own(table) && are_texts(table, column);
                 let texts = texts.then(|| by(Reading::Text));
-                match texts.filter(|read| read.fit == rows.len()) {
+                // Of two readings that fit as many rows, the text is what this form has.
+                match texts.filter(|read| read.fit > 0 && 2 * read.fit >= rows.len()) {
                     Some(texts) => texts,
                     None => by(by_rule(&rows).map_err(|(readings, row)| {
                         ambiguous(table, &items[row].0, rows[row], readings, column)

@@ -50,12 +50,17 @@ fn presets_stand_before_a_colon() {
 #[test]
 fn a_file_that_is_named_after_another_preset_is_found() {
     for (name, file, other) in [
-        ("zero-dce", "a/ruas_upe_1out.onnx", Some("ruas-dark")),
+        ("zero-dce", "a/ruas_upe_1out.onnx", Some("ruas-upe")),
         ("enlightengan", "Zero_DCE_epoch99.onnx", Some("zero-dce")),
+        ("darkir", "hpc203_pairlie_HxW.onnx", Some("pairlie")),
+        ("darkir", "sci3.onnx", Some("sci")),
         ("ruas-lol", "ruas_upe.onnx", None),
         ("zero-dce++", "zero_dce_epoch99.onnx", None),
+        ("zero-dce-pp", "zero_dcepp.onnx", None),
         ("pairlie", "hpc203_pairlie_HxW.onnx", None),
-        ("zero-dce", "zerodce-kind.onnx", None),
+        ("darkir", "dark-ir-kind.onnx", None),
+        ("enlightengan", "zero_shot.onnx", None),
+        ("enlightengan", "science_mankind.onnx", None),
         ("darkir", "model.onnx", None),
     ] {
         let found = preset(name).named_after(Path::new(file));

@@ -114,6 +114,7 @@ impl AskSettings {
             };
             trust::check(file, &entries, asking, context.data, trust)?;
         }
+        refuse_models_of_file(&entries, &args.blind_model)?;
         let flag = |name: &ModelName, view| Entry::of_flag(name.clone(), view, asking.clone());
         entries.extend(args.model.iter().map(|name| flag(name, view)));
         entries.extend(args.blind_model.iter().map(|name| flag(name, View::Blind)));
@@ -365,6 +366,23 @@ fn note(entry: &Entry, resolved: &ModelSettings) -> Value {
         fields.retain(|_, value| !value.is_null());
     }
     note
+}
+
+/// Refuses `--blind-model` with a model of the file: it would be asked at another address, and with other settings than with images.
+fn refuse_models_of_file(entries: &[Entry], blind: &[ModelName]) -> Result<()> {
+    for name in blind.iter().map(ModelName::label) {
+        let mut entries = entries.iter();
+        let known = entries.find(|entry| entry.name == name || entry.id.label() == name);
+        if let Some(Entry { name, id, .. }) = known
+            && matches!(id, ModelName::Remote(_))
+        {
+            let problem = format_args!(
+                "{name} is a model of the file, and the flag would ask for it elsewhere; view = \"both\" in its table, or --set {name:?}.view=both, asks it without images, too"
+            );
+            return Err(Error::usage("--blind-model", problem));
+        }
+    }
+    Ok(())
 }
 
 /// Refuses two models of one name and view: their replies could not be told apart in tables.

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
@@ -19,7 +19,7 @@ use crate::job::mark_index::MarkIndex;
 use crate::job::outcome::Outcome;
 use crate::job::outcome::StdoutFormat;
 use crate::job::predictions::{AnswerState, Prediction, predictions};
-use crate::job::stored::{RunLayout, ShownModels, StoredRun, name, sort};
+use crate::job::stored::{RunLayout, ShownModels, StoredRun, sort};
 use crate::report::alert::{Alert, AlertKind};
 use crate::report::markdown::MarkdownReport;
 use crate::report::openeqa::{OpenReport, ReportedAnswer, products, render, summary_json, tables};
@@ -122,7 +122,7 @@ impl Scores {
             enhancers: &self.enhancers,
             judge: self.judge.as_deref(),
             protocol: self.protocol,
-            name: self.run.names(),
+            runs: self.run.runs(),
             folder: typed(&self.run.folder),
             questions: &self.run.questions,
             answers: &self.answers,
@@ -162,7 +162,7 @@ impl Scores {
         match show {
             StdoutFormat::Json => summary_json(report, tables, Some(folder)),
             StdoutFormat::Markdown => Ok(MarkdownReport::of_open(report, tables).text()),
-            _ => Ok(render(report, tables, &self.run.folders)),
+            _ => Ok(render(report, tables, &self.run.folders())),
         }
     }
 
@@ -192,22 +192,38 @@ fn files(report: &OpenReport<'_>, tables: &[Table]) -> Result<Vec<(String, Vec<u
 
 /// A run of open questions, or several joined to one, with its whole records.
 pub(crate) struct OpenRun {
-    /// The folder of the run, or of the first of several.
+    /// The name of the run, or of the first of several.
+    name: String,
     pub(crate) folder: PathBuf,
-    /// The folders of all runs.
-    folders: Vec<PathBuf>,
     pub(crate) layout: RunLayout,
     pub(crate) manifest: RunManifest,
     /// In the order of the questions, conditions and models.
     pub(crate) records: Vec<Record<OpenDetail>>,
     pub(crate) questions: Vec<RunQuestion>,
     pub(crate) thumbnails: Vec<Thumbnail>,
+    /// The runs after the first, if there are several.
+    others: Vec<OtherRun>,
+}
+
+/// A run that was joined to the first one.
+struct OtherRun {
+    name: String,
+    folder: PathBuf,
+    manifest: RunManifest,
 }
 
 impl OpenRun {
-    fn names(&self) -> String {
-        let names = self.folders.iter().map(|folder| name(folder));
-        names.collect::<Vec<String>>().join(", ")
+    /// The names and manifests of all runs.
+    fn runs(&self) -> Vec<(&str, &RunManifest)> {
+        let first = std::iter::once((&*self.name, &self.manifest));
+        let others = self.others.iter().map(|run| (&*run.name, &run.manifest));
+        first.chain(others).collect()
+    }
+
+    /// The folders of all runs.
+    fn folders(&self) -> Vec<&Path> {
+        let others = self.others.iter().map(|run| &*run.folder);
+        std::iter::once(&*self.folder).chain(others).collect()
     }
 }
 
@@ -256,8 +272,8 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
     }
     let enhancers = enhancers::rows(&joined.runs);
     let listing = listing(&joined);
-    let folders = joined.runs.iter().map(|run| run.folder.clone()).collect();
-    let first = joined.runs.into_iter().next();
+    let mut runs = joined.runs.into_iter();
+    let first = runs.next();
     let first = first.ok_or_else(|| Error::usage("RUN", "no run is named"))?;
     let mut trials = joined.trials;
     let ids = joined.questions.iter().map(|question| &question.id);
@@ -270,8 +286,15 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
     }
     let run = OpenRun {
         records,
+        others: runs
+            .map(|run| OtherRun {
+                name: run.name,
+                folder: run.folder,
+                manifest: run.manifest,
+            })
+            .collect(),
+        name: first.name,
         folder: first.folder,
-        folders,
         layout: first.layout,
         manifest: first.manifest,
         questions: joined.questions,

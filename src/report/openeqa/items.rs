@@ -66,7 +66,11 @@ fn data<'a>(
     let results = results(report, subjects);
     PageData {
         kind: PageKind::Open,
-        runs: vec![report.name.clone()],
+        runs: report
+            .runs
+            .iter()
+            .map(|(name, _)| (*name).to_owned())
+            .collect(),
         folders: vec![report.folder.clone()],
         levels: levels(subjects.iter().filter_map(|subject| subject.level)),
         sizes: sizes(report.thumbnails, &frames.list),

@@ -8,8 +8,9 @@ mod page;
 mod tables;
 mod upstream;
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::Serialize;
 
@@ -51,6 +52,9 @@ struct Head<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     folder: Option<&'a Path>,
     run: &'a RunManifest,
+    /// The runs that were joined to it, with their names.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    joined: BTreeMap<&'a str, &'a RunManifest>,
     judge: Option<&'a str>,
     protocol: String,
     clustered_by: &'static str,
@@ -74,6 +78,7 @@ pub(crate) fn summary_json(
         schema: "darkqa.openeqa-summary/1",
         folder,
         run: report.manifest,
+        joined: report.runs.iter().skip(1).copied().collect(),
         judge: report.judge,
         protocol: report.protocol.to_string(),
         clustered_by: report.summary.unit,
@@ -87,7 +92,7 @@ pub(crate) fn summary_json(
 /// The text at the end of a run: its progress if it is not complete, the scores by level, split and category, the number of
 /// scored answers, and the folders of the runs.
 #[must_use]
-pub(crate) fn render(report: &OpenReport<'_>, tables: &[Table], folders: &[PathBuf]) -> String {
+pub(crate) fn render(report: &OpenReport<'_>, tables: &[Table], folders: &[&Path]) -> String {
     let mut text = lines(report.alerts);
     text += &terminal::progress(report.manifest, "answers and marks stored");
     match report.judge {

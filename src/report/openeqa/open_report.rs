@@ -13,7 +13,10 @@ use crate::types::{RunQuestion, Thumbnail};
 #[derive(Debug, Clone)]
 pub(crate) struct OpenReport<'a> {
     pub summary: &'a OpenSummary,
+    /// The manifest of the run, or of the first of several.
     pub manifest: &'a RunManifest,
+    /// The names and manifests of all runs.
+    pub runs: Vec<(&'a str, &'a RunManifest)>,
     /// What stands above everything, if there are several runs.
     pub alerts: &'a [Alert],
     /// How the enhancers were used.
@@ -22,8 +25,6 @@ pub(crate) struct OpenReport<'a> {
     pub judge: Option<&'a str>,
     /// Protocol by which the answers are judged.
     pub protocol: Protocol,
-    /// Name of the run: its folder.
-    pub name: String,
     /// The folder of the run as a command on it names it.
     pub folder: String,
     /// The questions in the order of their file.

@@ -26,13 +26,15 @@ pub(super) fn page(
     figures: &[Figure],
 ) -> Result<String> {
     let content = OpenContent {
-        title: format!("OpenEQA in the dark: {}", report.name),
+        title: match &*report.runs {
+            [(name, _)] => format!("OpenEQA in the dark: {name}"),
+            several => format!("OpenEQA in the dark: {} runs compared", several.len()),
+        },
         intro: intro(report),
         alerts: &alerts(report),
         tables,
         sections: &SECTIONS,
-        name: &report.name,
-        manifest: report.manifest,
+        runs: &report.runs,
         items: packed(report)?,
     };
     page_of_open_questions(content, figures)
@@ -71,7 +73,7 @@ fn intro(report: &OpenReport<'_>) -> Vec<String> {
     let mut lines = vec![
         format!(
             "{} questions about {} walks. Score: 100 · mean((mark − 1) / 4), marks from 1 to 5 by {judge}, protocol {}. Intervals are \
-             95 %, by {} ({} clusters); drops are of unrounded means, on the questions that are scored in both.",
+             95 %, by {} ({} clusters); differences are of unrounded means, on the questions that are scored in both.",
             report.questions.len(),
             report
                 .questions

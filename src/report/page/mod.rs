@@ -168,9 +168,8 @@ pub(in crate::report) struct OpenContent<'a> {
     pub(in crate::report) alerts: &'a [String],
     pub(in crate::report) tables: &'a [Table],
     pub(in crate::report) sections: &'static [Section],
-    /// Name of the run.
-    pub(in crate::report) name: &'a str,
-    pub(in crate::report) manifest: &'a RunManifest,
+    /// The names and manifests of the runs.
+    pub(in crate::report) runs: &'a [(&'a str, &'a RunManifest)],
     /// The items, as compressed JSON in base64.
     pub(in crate::report) items: String,
 }
@@ -194,7 +193,11 @@ pub(in crate::report) fn page_of_open_questions(
             answers_title: "",
             intro: content.intro,
             sections: sections::sections(content.sections, content.tables, figures, &[]),
-            runs: vec![json!({"name": content.name, "rows": manifest_facts(content.manifest)})],
+            runs: content
+                .runs
+                .iter()
+                .map(|(name, manifest)| json!({"name": name, "rows": manifest_facts(manifest)}))
+                .collect(),
             data: content.items,
             css: STYLE,
             script: [CHART_SCRIPT, SCRIPT].concat(),

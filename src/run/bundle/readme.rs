@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::job::stored::AnyRun;
 use crate::types::manifest::RunManifest;
@@ -106,10 +106,17 @@ pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
     };
     let setting = |name: &str| manifest.settings.get(name).and_then(Value::as_str);
     let judge = setting("--judge");
-    for model in asked.seeing.iter().filter(|model| !is_control(model)) {
+    let remote = remote_models(manifest);
+    let file = models_file(&remote, &asked, judge);
+    let is_in_file = |model: &String| file.is_some() && remote.contains_key(model);
+    if file.is_some() {
+        words.extend(["--models", "models.toml"].map(str::to_owned));
+    }
+    let seeing = asked.seeing.iter().filter(|model| !is_control(model));
+    for model in seeing.filter(|model| !is_in_file(model)) {
         words.extend(["--model".to_owned(), word(model)]);
     }
-    for model in &asked.blind {
+    for model in asked.blind.iter().filter(|model| !is_in_file(model)) {
         // The judge sees no image, either.
         if Some(&**model) != judge {
             words.extend(["--blind-model".to_owned(), word(model)]);
@@ -120,7 +127,9 @@ pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
             words.extend([flag.to_owned(), word(value)]);
         }
     }
-    words.extend(of_models(manifest));
+    if file.is_none() {
+        words.extend(of_models(&remote));
+    }
     for (flag, value) in &manifest.images {
         words.extend(flag_words(&format!("--{flag}"), value));
     }
@@ -139,7 +148,65 @@ pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
         .flat_map(|(flag, value)| flag_words(flag, value))
         .collect();
     words.extend(more);
-    words.join(" ")
+    let command = words.join(" ");
+    file.map_or(command.clone(), |file| {
+        format!("cat > models.toml <<'END'\n{file}END\n{command}")
+    })
+}
+
+/// The settings of the models at endpoints, by their names.
+fn remote_models(manifest: &RunManifest) -> BTreeMap<&String, &Value> {
+    let models = manifest.columns.get("model").into_iter().flatten();
+    let remote = models.filter(|(_, content)| content.get("--base-url").is_some());
+    remote.collect()
+}
+
+/// A file of models that asks for the same, if flags cannot: if names are not those at the endpoints, or settings differ.
+fn models_file(
+    remote: &BTreeMap<&String, &Value>,
+    asked: &Asked,
+    judge: Option<&str>,
+) -> Option<String> {
+    let decides = |content: &Value| {
+        let mut content = content.as_object().cloned().unwrap_or_default();
+        content.remove("--model");
+        content
+    };
+    let mut contents = remote.values().map(|content| decides(content));
+    let first = contents.next()?;
+    let mut named = remote.iter();
+    if contents.all(|other| other == first) && named.all(|(name, of)| of["--model"] == **name) {
+        return None;
+    }
+    let mut text = String::new();
+    let models = remote
+        .iter()
+        .filter(|(name, _)| Some(name.as_str()) != judge);
+    for (name, content) in models {
+        let view = match (asked.seeing.contains(*name), asked.blind.contains(*name)) {
+            (true, true) => "both",
+            (false, true) => "blind",
+            _ => "image",
+        };
+        let _ = writeln!(text, "[[model]]\nname = {}\nview = \"{view}\"", json!(name));
+        for (flag, value) in content.as_object().into_iter().flatten() {
+            let value = match (flag.as_str(), value) {
+                ("--base-url", Value::String(_)) => json!([value]),
+                (_, Value::Null | Value::Object(_)) => continue,
+                _ => value.clone(),
+            };
+            let key = match flag.as_str() {
+                "--model" => "id",
+                "--base-url" => "endpoints",
+                "--sampling-seed" => "seed",
+                "--extra-body" => "body",
+                "--omit-field" => "omit",
+                flag => flag.trim_start_matches("--"),
+            };
+            let _ = writeln!(text, "{key} = {value}");
+        }
+    }
+    Some(text)
 }
 
 /// Whether a model is a control of the observer, which is asked with it.
@@ -148,13 +215,8 @@ fn is_control(model: &str) -> bool {
 }
 
 /// The flags of models that all of them have with the same value.
-fn of_models(manifest: &RunManifest) -> Vec<String> {
-    let models = manifest.columns.get("model");
-    let remote = models.into_iter().flatten();
-    let remote: Vec<&Value> = remote
-        .map(|(_, content)| content)
-        .filter(|content| content.get("--base-url").is_some())
-        .collect();
+fn of_models(remote: &BTreeMap<&String, &Value>) -> Vec<String> {
+    let remote: Vec<&Value> = remote.values().copied().collect();
     let Some(first) = remote.first().and_then(|first| first.as_object()) else {
         return Vec::new();
     };

@@ -149,13 +149,13 @@ pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome
             "{}: {written} made by {}{}{}{}\n",
             out.display(),
             enhancer.name(),
-            count(unchanged, "left as they were (--force makes them again)"),
-            count(failed, "failed"),
-            if used_anyway.is_some() {
-                "; they may be read in a wrong way, and were made because of --llie-anyway"
+            if used_anyway.is_some() && written > 0 {
+                " because of --llie-anyway"
             } else {
                 ""
-            }
+            },
+            count(unchanged, "left as they were (--force makes them again)"),
+            count(failed, "failed")
         ),
     ))
 }

@@ -152,15 +152,21 @@ fn warn_of_repeated(sources: &[Source]) {
         .iter()
         .filter(|source| source.order.len() > source.frames.len());
     let short: Vec<&Source> = short.collect();
-    if let Some(first) = short.first() {
+    let most = short.iter().map(|source| source.frames.len()).max();
+    if let (Some(first), Some(most)) = (short.first(), most) {
         tracing::warn!(
-            "{} of {} walks {} fewer frames than --num-frames {}: a request shows frames several times, as upstream does (the {} of {}, for example); a smaller number sends and costs less",
+            "{} of {} walks {} fewer frames than --num-frames {}: they are shown several times in a request, as upstream does (the {} of {}, for example){}",
             short.len(),
             sources.len(),
             if short.len() == 1 { "has" } else { "have" },
             first.order.len(),
             counted(first.frames.len(), "frame"),
-            first.name
+            first.name,
+            if short.len() == sources.len() {
+                format!("; --num-frames {most} shows each once at most, and costs less")
+            } else {
+                String::new()
+            }
         );
     }
 }

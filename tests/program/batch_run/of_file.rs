@@ -132,7 +132,7 @@ fn a_model_that_cannot_be_asked_stops_alone() {
     let called = call(&bench, RUN);
     assert_eq!(called.code, Some(1), "{called:?}");
     assert!(
-        called.stderr.contains("not asked any further"),
+        called.stdout.contains("! not asked any further"),
         "{called:?}"
     );
     let models: BTreeSet<String> = answered(&bench)
@@ -159,7 +159,7 @@ fn a_vendor_that_refuses_batches_stops_its_models_alone() {
     bench.file("models.toml", table("m", &one) + &table("n", &two));
     let called = call(&bench, &format!("{RUN} --no-scout"));
     assert_eq!(called.code, Some(1), "{called:?}");
-    assert!(called.stderr.contains("this line is no JSON"), "{called:?}");
+    assert!(called.stdout.contains("this line is no JSON"), "{called:?}");
     assert_eq!(answered(&bench).len(), QUESTIONS);
     // What cannot be begun is not tried again by the same command.
     assert_eq!(one.count("POST batches"), 1);

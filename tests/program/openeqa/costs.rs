@@ -27,10 +27,32 @@ fn a_dry_run_says_what_it_would_take_and_sends_nothing() {
     assert_eq!(estimate["lines"][1]["model"], "gpt-4o-mini (judge)");
     assert_eq!(
         (&estimate["trials"], &estimate["images"]),
-        (&json!(18), &json!(18))
+        (&json!(18), &json!(15))
     );
     // Each of the nine requests about a walk has its three frames.
     assert_eq!(estimate["images_sent"], json!(27));
+    assert_eq!(
+        estimate["few_sources"],
+        json!({"number": 2, "needed": 8, "of": "walk"})
+    );
+    // More frames than a walk has are shown several times, and made once.
+    let short = house.0.call(&words(&format!(
+        "openeqa --questions questions.json --frames walks --num-frames 7 --image-size 48 --levels L0,L2,L4 --variant noise --model gpt-4o \
+         --base-url {base} --judge gpt-4o-mini --out run --dry-run --json"
+    )));
+    assert_eq!(short.code, Some(0), "{short:?}");
+    let repeated: Value = serde_json::from_str(&short.stdout).unwrap();
+    assert_eq!(
+        (&repeated["images_sent"], &repeated["images"]),
+        (&json!(63), &json!(21))
+    );
+    assert!(
+        short
+            .stderr
+            .contains("2 of 2 walks have fewer frames than --num-frames 7"),
+        "{}",
+        short.stderr
+    );
     assert!(estimate["lines"][0]["dollars"].as_f64().unwrap() > 0.0);
     assert!(estimate["bytes"].as_f64().unwrap() > 9.0 * 3.0 * 100.0);
     assert!(silent.requests().is_empty() && !house.0.path("run").exists());
