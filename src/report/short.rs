@@ -5,6 +5,7 @@ pub(super) mod marked;
 mod name_column;
 pub(super) mod wrapped;
 
+use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -112,7 +113,7 @@ pub(super) fn head(report: &ChoiceReport<'_>) -> String {
         [one] => (*one).to_owned(),
         several => counted(several.len(), "model"),
     };
-    let questions: std::collections::BTreeSet<_> = grid
+    let questions: BTreeSet<_> = grid
         .items
         .iter()
         .map(|item| &*item.asked.question)
@@ -188,7 +189,13 @@ fn table(report: &ChoiceReport<'_>) -> String {
         let questions = counted(common.shared_questions, "question");
         format!(" on the {questions} that all models with images answered")
     });
-    let mut text = format!(" accuracy in %{}\n", shared.unwrap_or_default());
+    let counts = rows.iter().flat_map(|row| row.cells.values());
+    let counts: BTreeSet<usize> = counts.filter_map(|cell| Some(cell.accuracy?.n)).collect();
+    let counts = match (counts.first(), counts.last()) {
+        (Some(least), Some(most)) if least < most => format!("; n from {least} to {most}"),
+        _ => String::new(),
+    };
+    let mut text = format!(" accuracy in %{}{counts}\n", shared.unwrap_or_default());
     for block in rows.chunk_by(|a, b| a.block == b.block) {
         for axis in Axis::ALL {
             let is_on = |level: &AxisLevel| level.is_shown_on(axis);

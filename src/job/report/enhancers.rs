@@ -116,17 +116,21 @@ fn looks(note: &EnhancerNote) -> String {
     let probe = match &note.probe {
         None => "no probe was run".to_owned(),
         Some(probe) => match probe.outcome {
-            ProbeOutcome::Plausible => format!("plausible on {} of the probe", probe.frames),
+            ProbeOutcome::Plausible => {
+                format!("plausible on the {} frames of the probe", probe.frames)
+            }
             ProbeOutcome::Doubtful => "odd in the probe".to_owned(),
             ProbeOutcome::Overruled => "refused by the probe, used all the same".to_owned(),
         },
     };
     let judged = &note.judged;
     match (judged.images, judged.flaws()) {
-        (0, _) => format!("{probe}; none looked at in the run"),
-        (images, 0) => format!("{probe}; {images} looked at in the run, no flaw"),
+        (0, _) => format!("{probe}; no image of the run was checked"),
+        (images, 0) => {
+            format!("{probe}; {images} images of the run were checked, and have no flaw")
+        }
         (images, flawed) => format!(
-            "{probe}; {flawed} of {images} looked at in the run have a flaw: {}",
+            "{probe}; {flawed} of {images} images of the run that were checked have a flaw: {}",
             flaws(judged)
         ),
     }

@@ -13,7 +13,7 @@ use std::collections::BTreeSet;
 
 use super::chart::drawn::Drawn;
 use super::chart::{Chart, DarkMark, LineStyle, Panel, PanelContent, PlotLine};
-use super::words::{family as family_name, light_with};
+use super::words::{counted, family as family_name, light_with};
 use crate::score::choice::ReadingMode;
 use crate::score::estimate::Estimate;
 use crate::score::findings::Findings;
@@ -264,12 +264,21 @@ impl<'a> Overview<'a> {
 
     /// Note on the number of items and on the intervals.
     fn note(&self) -> String {
-        let (grid, unit) = (&self.findings.grid, self.findings.unit);
         format!(
-            "n = {} items in {} {unit}s; bands and bars are 95 % intervals by {unit}; strict reading",
-            grid.items.len(),
-            grid.clusters
+            "n = {}; bands and bars are 95 % intervals by {}; strict reading",
+            self.items(),
+            self.findings.unit
         )
+    }
+
+    /// The number of items, as `177 items in 24 scenes`.
+    fn items(&self) -> String {
+        let grid = &self.findings.grid;
+        let (items, unit) = (
+            counted(grid.items.len(), "item"),
+            self.findings.unit.to_string(),
+        );
+        format!("{items} in {}", counted(grid.clusters, &unit))
     }
 
     fn n(&self, family: Option<&Family>) -> usize {

@@ -49,11 +49,19 @@ pub(crate) fn overview(findings: &Findings<'_>, names: &Names) -> OverviewPanels
         charts: vec![
             ("models", by_model),
             ("variants", by_variant),
-            ("enhancers", by_enhancer.ok_or("no enhancer was asked")),
+            (
+                "enhancers",
+                by_enhancer.ok_or(if overview.enhancers.is_empty() {
+                    "no enhancer was asked"
+                } else {
+                    "no enhancer was asked in the light of the first panel by the same models"
+                }),
+            ),
         ],
         variant,
         enhancer,
-        note: overview.note(),
+        // The caption of each panel says what its bands are.
+        note: format!("n = {}; strict reading", overview.items()),
     }
 }
 

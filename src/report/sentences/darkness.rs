@@ -118,11 +118,16 @@ pub(super) fn with_variant(
 
 /// The largest loss that the intervals leave open, if it is large: so that nobody takes too few images for eyes that see in the dark.
 fn not_ruled_out(levels: &[&PooledFinding], numbers: &mut Numbers) -> String {
-    let losses = levels.iter().map(|finding| -finding.difference.low);
-    let largest = losses.fold(0.0, f64::max);
+    let lowest =
+        |a: &&&PooledFinding, b: &&&PooledFinding| a.difference.low.total_cmp(&b.difference.low);
+    let Some(finding) = levels.iter().min_by(lowest) else {
+        return String::new();
+    };
+    let largest = -finding.difference.low;
     if largest <= WIDE {
         return String::new();
     }
     let points = numbers.number("possible loss", 100.0 * largest, 0);
-    format!(", and a loss of {points} points is not ruled out")
+    let level = finding.level;
+    format!(", and a loss of {points} points at {level} is not ruled out")
 }

@@ -128,7 +128,7 @@ fn each_kind_and_verdict_has_its_words() {
     assert_eq!(
         said,
         [
-            "· It is not shown that darkness costs anything at any level, and a loss of 6 points is not ruled out. (mean of these 2 \
+            "· It is not shown that darkness costs anything at any level, and a loss of 6 points at L1 is not ruled out. (mean of these 2 \
           models: −1.0 [−5.0, +3.0], p = 0.062; at L2; n = 1,237 in 30 scenes)"
         ]
     );
