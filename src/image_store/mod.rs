@@ -22,6 +22,7 @@ mod sweep;
 
 pub(crate) use access::ImageStore;
 pub(crate) use entry::{Content, Entry, EntryFacts, Shown};
+pub(crate) use image_set::ImageSet;
 pub(crate) use key::Key;
 pub(crate) use kinds::StoredKinds;
 pub(crate) use listing::{clear, listing};

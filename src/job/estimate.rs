@@ -2,16 +2,15 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::time::Instant;
 
 use super::budget::{Budget, image_tokens, text_tokens};
 use super::experiment::{ExpectedRequest, Experiment};
-use super::frame_work::FrameWork;
 use super::image_pipeline::ImagePipeline;
 use super::measured_tokens::MeasuredTokens;
 use super::models::ModelUnderTest;
 use super::open_run::limit;
 use super::plan::Plan;
+use super::planned_images::{PlannedImages, SampledImages};
 use super::source::Source;
 use super::trial::Item as _;
 use crate::ask::{ImageLimit, Price, Server};
@@ -19,19 +18,10 @@ use crate::error::Result;
 use crate::report::forecast::{CostLine, FewSources, Forecast, ReadingCost, StoreForecast};
 use crate::score::cluster::MIN_SCENES;
 use crate::store::StoredTrial;
-use crate::types::{Condition, Degradation, ImageFacts, ReadingName, View};
-
-/// Number of sources whose images are made to measure their size; with enhancers, only the first source.
-const SAMPLED: usize = 3;
+use crate::types::{Degradation, ImageFacts, ReadingName, View};
 
 /// Assumed time of a reply in seconds, if no reply is stored.
 const REPLY_SECONDS: f64 = 2.0;
-
-/// Bytes of a request besides its images and its text.
-const REQUEST_BYTES: f64 = 300.0;
-
-/// Bytes of base64 text for each byte of an image.
-const BASE64: f64 = 4.0 / 3.0;
 
 /// The remaining requests with their tokens, cost, bytes and time. A few images are made to measure their size.
 pub(crate) fn estimate<E: Experiment>(
@@ -64,44 +54,7 @@ pub(crate) fn estimate<E: Experiment>(
         Some(plan) => SampledImages::make(experiment, plan, pipeline)?,
         None => SampledImages::default(),
     };
-    let (mut bytes, mut largest_request, mut seconds) = (0.0, 0.0_f64, 0.0);
-    let (mut images, mut sent) = (0, 0);
-    let mut image_set = settings.images.image_set();
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    for (phase, plan) in plans.iter().enumerate() {
-        let models = experiment.models(phase);
-        for (place, group) in plan.groups() {
-            let source = &sources[place];
-            let mean = group
-                .condition
-                .as_ref()
-                .and_then(|condition| sample.mean(condition));
-            let shown = mean.map_or(0.0, |mean| mean.bytes * BASE64 * source.order.len() as f64);
-            for trial in &group.trials {
-                if models[trial.model].model.is_remote() {
-                    let request =
-                        shown + trial.prompt.parts().concat().len() as f64 + REQUEST_BYTES;
-                    bytes += request;
-                    sent += group.condition.as_ref().map_or(0, |_| source.order.len());
-                    largest_request = largest_request.max(request);
-                }
-            }
-            if let Some(condition) = &group.condition {
-                images += source.frames.len();
-                if let Some(set) = &mut image_set {
-                    let bytes = mean.map_or(0.0, |mean| mean.bytes);
-                    set.add(
-                        condition.enhancer.is_some(),
-                        bytes * source.frames.len() as f64,
-                    );
-                }
-                // The frames of a walk are made in parallel, one per core. A frame alone is made by all cores together.
-                let frames = source.frames.len() as f64;
-                let in_parallel = if source.frames.len() > 1 { cores } else { 1 };
-                seconds += mean.map_or(0.0, |mean| mean.seconds * frames / in_parallel as f64);
-            }
-        }
-    }
+    let images = PlannedImages::of(experiment, plans, &sample);
     let latencies = stored.iter().filter_map(StoredTrial::latency_ms);
     let latencies: Vec<u64> = latencies.collect();
     // Endpoints are asked side by side: the slowest decides.
@@ -113,38 +66,40 @@ pub(crate) fn estimate<E: Experiment>(
     let limit = limit(settings);
     let planned: usize = plans.iter().map(|plan| plan.keys.len()).sum();
     let remaining: usize = plans.iter().map(Plan::remaining).sum();
+    let is_few = experiment.part().is_none() && sources.len() < MIN_SCENES;
+    let few_sources = FewSources {
+        number: sources.len(),
+        needed: MIN_SCENES,
+        of: E::SOURCE,
+    };
     Ok(Forecast {
         lines,
         built_in,
         trials: planned + expected.len(),
         answered: planned - remaining,
         spent: budget.spent(),
-        images,
-        images_sent: sent,
-        bytes,
+        images: images.made,
+        images_sent: images.sent,
+        bytes: images.bytes,
         largest_image: largest.map_or(0, |image| image.bytes),
         sampled: sample.images.len(),
         too_large: limit
             .zip(largest)
             .and_then(|(limit, image)| too_large(limit, image, sources)),
-        making_seconds: seconds,
+        making_seconds: images.seconds,
         asking_seconds,
         pace,
         prices: format!("prices of {}", money.prices.as_of),
         batch: money.prices.batch,
-        image_store: image_set.map(|set| StoreForecast::new(set.words(), set.bytes(), set.room())),
+        image_store: images
+            .set
+            .map(|set| StoreForecast::new(set.words(), set.bytes(), set.room())),
         reply: E::REPLY,
-        few_sources: (experiment.part().is_none() && sources.len() < MIN_SCENES).then(|| {
-            FewSources {
-                number: sources.len(),
-                needed: MIN_SCENES,
-                of: E::SOURCE,
-            }
-        }),
+        few_sources: is_few.then_some(few_sources),
         largest_request: sources
             .iter()
             .any(|source| source.order.len() > 1)
-            .then_some(largest_request),
+            .then_some(images.largest_request),
     })
 }
 
@@ -381,60 +336,4 @@ fn asking_time(load: &Load, latencies_ms: &[u64]) -> (f64, String) {
         }
     }
     slowest
-}
-
-/// Mean size in bytes and mean time in seconds of an image.
-#[derive(Debug, Clone, Copy)]
-struct ImageMeans {
-    bytes: f64,
-    seconds: f64,
-}
-
-/// Images that were made to measure their size and time.
-#[derive(Default)]
-struct SampledImages {
-    images: Vec<ImageFacts>,
-    /// Sum of bytes, sum of seconds and number of images, by condition.
-    sums: BTreeMap<Condition, (f64, f64, usize)>,
-}
-
-impl SampledImages {
-    /// Makes the images of the middle frame of a few sources spread over the plan.
-    fn make<E: Experiment>(
-        experiment: &E,
-        plan: &Plan<E::Item>,
-        pipeline: &mut ImagePipeline<'_>,
-    ) -> Result<Self> {
-        let mut sample = Self::default();
-        let sources = experiment.sources();
-        let shown = plan.sources.iter().filter_map(|part| {
-            let source = &sources[part.source];
-            Some((part, source, source.middle()?))
-        });
-        let shown: Vec<_> = shown.collect();
-        let step = shown.len().div_ceil(SAMPLED).max(1);
-        for (i, (part, source, frame)) in shown.into_iter().step_by(step).enumerate() {
-            let mut work = FrameWork::planned(pipeline.steps, source, frame);
-            let conditions = part.conditions();
-            for condition in conditions.filter(|condition| i == 0 || condition.enhancer.is_none()) {
-                let started = Instant::now();
-                let image = pipeline.image(&mut work, condition)?;
-                let facts = image.facts();
-                let (bytes, seconds, n) = sample.sums.entry(condition.clone()).or_default();
-                *bytes += facts.bytes as f64;
-                *seconds += started.elapsed().as_secs_f64();
-                *n += 1;
-                sample.images.push(facts.clone());
-            }
-        }
-        Ok(sample)
-    }
-
-    fn mean(&self, condition: &Condition) -> Option<ImageMeans> {
-        let (bytes, seconds, n) = self.sums.get(condition)?;
-        Some(ImageMeans {
-            bytes: bytes / *n as f64,
-            seconds: seconds / *n as f64,
-        })
-    }
 }

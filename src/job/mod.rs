@@ -48,6 +48,7 @@ pub(crate) mod photographs;
 pub(crate) mod placed_image;
 mod placed_trials;
 pub(crate) mod plan;
+mod planned_images;
 pub(crate) mod predictions;
 pub(crate) mod progress;
 pub(crate) mod questions;
