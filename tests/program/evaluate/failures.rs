@@ -67,7 +67,7 @@ fn a_model_that_does_not_exist_stops_itself_alone() {
     )));
     assert_eq!(run.code, Some(1), "{run:?}");
     assert!(
-        run.stderr.contains("gone") && run.stderr.contains("no such model"),
+        run.stdout.contains("gone") && run.stdout.contains("no such model"),
         "{run:?}"
     );
     let csv = fs::read_to_string(bench.path("run/summary.csv")).unwrap();

@@ -197,7 +197,7 @@ fn a_model_that_is_gone_keeps_nobody_elses_answers_from_their_marks() {
         "--model gone --model m --judge j --base-url {base} --levels L0 --out run"
     )));
     assert_eq!(called.code, Some(1), "{called:?}");
-    assert!(called.stderr.contains("no such model"), "{}", called.stderr);
+    assert!(called.stdout.contains("no such model"), "{}", called.stdout);
     let summary = house.read("run/summary.json");
     let mut rows = summary["rows"].as_array().unwrap().iter();
     let row = rows
