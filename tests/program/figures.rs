@@ -213,6 +213,32 @@ fn one_model_in_the_light_has_the_figures_there_are() {
 }
 
 #[test]
+fn models_that_were_not_asked_in_the_light_of_the_sheet_are_named() {
+    let scene = Scene::new();
+    for (name, more) in [("a", "--seed 0"), ("b", "--seed 1")] {
+        scene
+            .bench
+            .file(&format!("{name}.jsonl"), "{\"default\": \"red\"}");
+        let line = format!(
+            "--model script:{name}.jsonl --data frames --levels L0,L3 {more} --out {name}-run"
+        );
+        scene.bench.complete(&words(&line));
+    }
+    let said = scene
+        .bench
+        .complete(&words("figures a-run b-run --only paper --out out"));
+    assert!(
+        said.contains("variants: left out, the same models were not asked in two variants"),
+        "{said}"
+    );
+    let captions = fs::read_to_string(scene.bench.path("out/captions.txt")).unwrap();
+    assert!(
+        captions.contains("with noise @a-run") && captions.contains(" Not asked in this light: b."),
+        "{captions}"
+    );
+}
+
+#[test]
 fn a_run_of_open_questions_is_refused_with_what_to_do() {
     let house = House::new();
     let model = MockEndpoint::start([Answer::text("one")]);

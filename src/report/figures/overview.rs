@@ -1,11 +1,13 @@
 //! The panels of the figure that tells a run on one sheet: [`OverviewPanels`].
 
+use std::fmt::Write;
+
 use super::{ACCURACY, Names, Overview};
 use crate::report::chart::{Chart, LineStyle, Panel, PanelContent, PlotLine};
 use crate::score::findings::Findings;
 use crate::score::subject::{CHANCE, pooled_models};
 use crate::types::degradation::{Axis, Kind};
-use crate::types::{EnhancerName, KindReading};
+use crate::types::{AxisLevel, EnhancerName, KindReading};
 
 /// A chart with its caption, or the reason why there is none.
 pub(crate) type PanelChart = Result<(String, Chart), &'static str>;
@@ -39,7 +41,9 @@ pub(crate) fn overview(findings: &Findings<'_>, names: &Names) -> OverviewPanels
     let by_model = by_model.map(|variant| overview.each_model(variant));
     let by_variant = match variants.len() {
         0 | 1 => Err("only one variant of the light was asked"),
-        _ => Ok(overview.mean_by_variant(&variants, &models)),
+        _ => overview
+            .mean_by_variant(&variants, &models)
+            .ok_or("the same models were not asked in two variants"),
     };
     let by_enhancer = match &variant {
         Some(variant) => overview.mean_by_enhancer(variant, &models),
@@ -107,22 +111,36 @@ impl Overview<'_> {
 
     fn each_model(&self, variant: &KindReading) -> (String, Chart) {
         let light = self.light(variant, None);
-        let caption = format!(
+        let mut caption = format!(
             "Accuracy of each model by level, {light}, with 95 % intervals by {}. Broken: without images. Dotted: chance.",
             self.findings.unit
         );
-        let lines = self.accuracies(variant, None);
+        let (lines, alone) = with_dark_levels(self.accuracies(variant, None));
+        if !alone.is_empty() {
+            let _ = write!(caption, " Not asked in this light: {}.", alone.join(", "));
+        }
         (caption, Self::one(format!("each model, {light}"), lines))
     }
 
-    fn mean_by_variant(&self, variants: &[&KindReading], models: &[&str]) -> (String, Chart) {
-        let lines = self.lines_of_variants(variants, models);
+    /// The mean over the models by variant; `None` unless all of them were asked in two.
+    fn mean_by_variant(
+        &self,
+        variants: &[&KindReading],
+        models: &[&str],
+    ) -> Option<(String, Chart)> {
+        let (lines, alone) = with_dark_levels(self.lines_of_variants(variants, models));
+        if variants.len() - alone.len() < 2 {
+            return None;
+        }
         let who = self.who(models);
-        let caption = format!(
+        let mut caption = format!(
             "Accuracy by variant of the light, {who}. {}",
             self.band(models)
         );
-        (caption, Self::one(format!("{who}, raw"), lines))
+        if !alone.is_empty() {
+            let _ = write!(caption, " Not asked of all of them: {}.", alone.join(", "));
+        }
+        Some((caption, Self::one(format!("{who}, raw"), lines)))
     }
 
     /// The mean over the models, raw and with each enhancer; `None` without an enhancer that has a line.
@@ -156,4 +174,15 @@ impl Overview<'_> {
         );
         Some((caption, Self::one(format!("{who}, {light}"), lines)))
     }
+}
+
+/// The lines that have more than L0, and the names of the curves that have not.
+fn with_dark_levels(lines: Vec<PlotLine>) -> (Vec<PlotLine>, Vec<String>) {
+    let is_alone = |line: &PlotLine| match &line.content {
+        PanelContent::Curve(points) => points.iter().all(|(level, _)| *level == AxisLevel::L0),
+        _ => false,
+    };
+    let (alone, lines): (Vec<PlotLine>, Vec<PlotLine>) = lines.into_iter().partition(is_alone);
+    let names = alone.into_iter().map(|line| line.name);
+    (lines, names.collect())
 }
