@@ -70,11 +70,7 @@ impl<'a> MarkdownReport<'a> {
         )];
         head.extend(coverage(report));
         Self {
-            names: report
-                .runs
-                .iter()
-                .map(|(name, _)| (*name).to_owned())
-                .collect(),
+            names: report.names(),
             head,
             alerts: report.alerts,
             sentences: &[],

@@ -14,14 +14,17 @@ pub(crate) struct TomlFault {
 impl TomlFault {
     /// The fault of a text, as the parser found it.
     pub(crate) fn of(text: &str, error: &toml::de::Error) -> Self {
-        let before = error.span().and_then(|span| text.get(..span.start));
-        let line = before.unwrap_or_default().matches('\n').count() + 1;
         let message: Vec<&str> = error.message().lines().map(str::trim).collect();
         Self {
-            line,
+            line: line_at(text, error.span().map_or(0, |span| span.start)),
             problem: message.join(", ") + &meant(error.message()) + quotes(error.message()),
         }
     }
+}
+
+/// The line, from 1, of a place in a text.
+pub(crate) fn line_at(text: &str, start: usize) -> usize {
+    text.get(..start).unwrap_or_default().matches('\n').count() + 1
 }
 
 /// The known key that an unknown one is most similar to, as a question; empty if the message is about something else.

@@ -171,6 +171,39 @@ fn models_that_flags_cannot_name_are_a_file_in_the_readme() {
 }
 
 #[test]
+fn a_judge_needs_no_file_of_models_and_keeps_its_address() {
+    let house = House::new();
+    let mock = MockEndpoint::start([Answer::text("5")]);
+    let base = mock.base_url();
+    let readme = |run: &str| {
+        house
+            .0
+            .complete(&words(&format!("bundle {run} --out {run}.zip")));
+        unpack(&house.0.path(&format!("{run}.zip")), &house.0.path("all"));
+        fs::read_to_string(house.0.path(&format!("all/{run}/README.md"))).unwrap()
+    };
+    let line = format!("--judge j --base-url {base} --levels L0");
+    house.call(&words(&format!("--model m {line} --out plain")));
+    let plain = readme("plain");
+    assert!(!plain.contains("models.toml"), "{plain}");
+    for part in ["--model m", "--judge j", &format!("--base-url {base}")] {
+        assert!(plain.contains(part), "{part}: {plain}");
+    }
+    let table = format!("[[model]]\nname = \"One\"\nid = \"m\"\nendpoints = [\"{base}\"]\n");
+    house.0.file("models.toml", table);
+    house.call(&words(&format!("--models models.toml {line} --out named")));
+    let named = readme("named");
+    for part in [
+        "name = \"One\"",
+        "--judge j",
+        &format!("--judge-base-url {base}"),
+    ] {
+        assert!(named.contains(part), "{part}: {named}");
+    }
+    assert!(!named.contains("name = \"j\""), "{named}");
+}
+
+#[test]
 fn only_a_bundle_is_replaced() {
     let bench = Bench::new();
     bench.complete(&words("--model random --levels L0 --out run"));

@@ -9,7 +9,7 @@ use toml::{Spanned, Table, Value};
 use crate::ask::{is_secret_name, is_secret_value, looks_like_key};
 use crate::error::{Error, Result};
 use crate::files::reading;
-use crate::types::toml_fault::TomlFault;
+use crate::types::toml_fault::{TomlFault, line_at};
 
 /// The number of characters from which the value of a header with a telling name is taken for a secret; chosen.
 const LONG: usize = 20;
@@ -49,14 +49,11 @@ impl ModelsFile {
     /// line, and shows no secret.
     pub(super) fn read(path: &Path) -> Result<Self> {
         let text = reading::settings(path)?;
-        let at = |start: usize| {
-            let line = text.get(..start).unwrap_or_default().matches('\n').count() + 1;
-            format!("{}, line {line}", path.display())
-        };
+        let in_line = |line: usize| format!("{}, line {line}", path.display());
+        let at = |start: usize| in_line(line_at(&text, start));
         let invalid = |e: toml::de::Error| {
             let TomlFault { line, problem } = TomlFault::of(&text, &e);
-            let origin = format!("{}, line {line}", path.display());
-            Error::usage(origin, format_args!("not valid TOML: {problem}"))
+            Error::usage(in_line(line), format_args!("not valid TOML: {problem}"))
         };
         let values: Table = toml::from_str(&text).map_err(invalid)?;
         let spans = DeTable::parse(&text).map_err(invalid)?;

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use super::join::JoinedRun;
 use crate::report::alert::{Alert, AlertKind};
 use crate::report::tables::EnhancerRow;
+use crate::report::words::counted;
 use crate::types::enhancer_note::{EnhancerNote, JudgedImages, ProbeOutcome};
 
 /// A row for each enhancer; several runs that used it in the same way have one.
@@ -117,7 +118,10 @@ fn looks(note: &EnhancerNote) -> String {
         None => "no probe was run".to_owned(),
         Some(probe) => match probe.outcome {
             ProbeOutcome::Plausible => {
-                format!("plausible on the {} frames of the probe", probe.frames)
+                format!(
+                    "plausible on the {} of the probe",
+                    counted(probe.frames, "frame")
+                )
             }
             ProbeOutcome::Doubtful => "odd in the probe".to_owned(),
             ProbeOutcome::Overruled => "refused by the probe, used all the same".to_owned(),
@@ -126,11 +130,15 @@ fn looks(note: &EnhancerNote) -> String {
     let judged = &note.judged;
     match (judged.images, judged.flaws()) {
         (0, _) => format!("{probe}; no image of the run was checked"),
-        (images, 0) => {
-            format!("{probe}; {images} images of the run were checked, and have no flaw")
-        }
+        (images, 0) => format!(
+            "{probe}; no flaw in the {} of the run that {} checked",
+            counted(images, "image"),
+            if images == 1 { "was" } else { "were" }
+        ),
         (images, flawed) => format!(
-            "{probe}; {flawed} of {images} images of the run that were checked have a flaw: {}",
+            "{probe}; a flaw in {flawed} of the {} of the run that {} checked: {}",
+            counted(images, "image"),
+            if images == 1 { "was" } else { "were" },
             flaws(judged)
         ),
     }

@@ -66,11 +66,7 @@ fn data<'a>(
     let results = results(report, subjects);
     PageData {
         kind: PageKind::Open,
-        runs: report
-            .runs
-            .iter()
-            .map(|(name, _)| (*name).to_owned())
-            .collect(),
+        runs: report.names(),
         folders: vec![report.folder.clone()],
         levels: levels(subjects.iter().filter_map(|subject| subject.level)),
         sizes: sizes(report.thumbnails, &frames.list),

@@ -36,6 +36,12 @@ pub(crate) struct OpenReport<'a> {
 }
 
 impl OpenReport<'_> {
+    /// The names of all runs.
+    pub(in crate::report) fn names(&self) -> Vec<String> {
+        let names = self.runs.iter().map(|(name, _)| (*name).to_owned());
+        names.collect()
+    }
+
     /// The light readings of the noisy images.
     pub(super) fn light_readings(&self) -> LightReadings {
         LightReadings::of(self.answers.iter().map(|answer| &answer.subject))

@@ -58,7 +58,7 @@ pub(crate) fn levels(clean: &Rgb, blocks: &[LevelBlock], foot: &str) -> Rgb {
     let foot = [foot.to_owned(), how_inset(blocks)];
     let foot: Vec<String> = foot
         .iter()
-        .flat_map(|text| lines(text, sheet_width))
+        .flat_map(|text| lines(text, sheet_width.saturating_sub(2 * GAP)))
         .collect();
     let below = heights.sum::<usize>() + GAP;
     let foot_height = match foot.len() {

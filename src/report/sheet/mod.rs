@@ -103,7 +103,7 @@ impl SheetCanvas {
 
 /// A text in lines of a width in pixels, cut between words; none for an empty text.
 fn lines(text: &str, width: usize) -> Vec<String> {
-    let letters = width.saturating_sub(2 * GAP) / letter_width();
+    let letters = width / letter_width();
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
         match lines.last_mut() {

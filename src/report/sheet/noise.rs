@@ -34,7 +34,7 @@ pub(crate) fn noise(signals: &[Signal], foot: &str) -> Rgb {
     let step = [GAP + 3 * LINE + height, GAP + CELL];
     let below = signals.len().div_ceil(COLUMNS) * step[0] + GAP;
     let sheet_width = COLUMNS * step[1] + GAP;
-    let foot = lines(foot, sheet_width);
+    let foot = lines(foot, sheet_width.saturating_sub(2 * GAP));
     let mut sheet = SheetCanvas::new(below + foot.len() * LINE + GAP, sheet_width);
     for (index, signal) in signals.iter().enumerate() {
         let top = GAP + index / COLUMNS * step[0];

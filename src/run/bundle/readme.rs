@@ -6,7 +6,7 @@ use std::fmt::Write;
 use serde_json::{Value, json};
 
 use crate::job::stored::AnyRun;
-use crate::types::manifest::RunManifest;
+use crate::types::manifest::{RunManifest, judge_flag};
 use crate::types::{AxisLevel, Detail, Trials, shell_word};
 
 /// What a README is written from.
@@ -127,8 +127,12 @@ pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
             words.extend([flag.to_owned(), word(value)]);
         }
     }
-    if file.is_none() {
-        words.extend(of_models(&remote));
+    match (&file, judge.and_then(|judge| remote.get(&judge.to_owned()))) {
+        (None, _) => words.extend(of_models(&remote)),
+        (Some(_), Some(judge)) => {
+            words.extend(flag_words(&judge_flag("--base-url"), &judge["--base-url"]));
+        }
+        (Some(_), None) => {}
     }
     for (flag, value) in &manifest.images {
         words.extend(flag_words(&format!("--{flag}"), value));
@@ -172,16 +176,16 @@ fn models_file(
         content.remove("--model");
         content
     };
-    let mut contents = remote.values().map(|content| decides(content));
+    // The judge has flags of its own.
+    let is_model = |name: &str| Some(name) != judge || asked.seeing.contains(name);
+    let models = remote.iter().filter(|(name, _)| is_model(name));
+    let mut contents = models.clone().map(|(_, content)| decides(content));
     let first = contents.next()?;
-    let mut named = remote.iter();
+    let mut named = models.clone();
     if contents.all(|other| other == first) && named.all(|(name, of)| of["--model"] == **name) {
         return None;
     }
     let mut text = String::new();
-    let models = remote
-        .iter()
-        .filter(|(name, _)| Some(name.as_str()) != judge);
     for (name, content) in models {
         let view = match (asked.seeing.contains(*name), asked.blind.contains(*name)) {
             (true, true) => "both",
@@ -199,7 +203,6 @@ fn models_file(
                 "--model" => "id",
                 "--base-url" => "endpoints",
                 "--sampling-seed" => "seed",
-                "--extra-body" => "body",
                 "--omit-field" => "omit",
                 flag => flag.trim_start_matches("--"),
             };
