@@ -1,7 +1,5 @@
 //! The image of a frame before decoding: [`Picture`].
 
-use std::sync::Arc;
-
 use super::image_file::ImageFile;
 use super::reading_rule::ReadingRule;
 use crate::error::Result;
@@ -61,9 +59,9 @@ impl Picture {
     pub fn pixels(&self) -> Result<Pixels> {
         match self {
             Self::Encoded(file) => file.pixels(),
-            Self::Drawn(room, rule) => Ok(match room.light()? {
-                Some(light) => Pixels::Light(rule.scaled(light)),
-                None => Pixels::Codes8(Arc::new(room.frame()?.rgb.clone())),
+            Self::Drawn(room, rule) => Ok(match room.pixels() {
+                Pixels::Light(light) => Pixels::Light(rule.scaled(light)),
+                codes => codes,
             }),
         }
     }

@@ -69,10 +69,7 @@ impl FrameFiles<'_> {
     /// If an image or a map is broken, or a map has another size than the image; the error names the file.
     pub fn decode(&self) -> Result<Frame> {
         if let Picture::Drawn(room, _) = &self.picture {
-            return Ok(Frame {
-                rgb: self.picture.decode()?,
-                ..room.frame()?.as_ref().clone()
-            });
+            return room.frame_with(self.picture.decode()?);
         }
         let rgb = self.picture.decode()?;
         let size = (rgb.height(), rgb.width());

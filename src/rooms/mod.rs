@@ -9,6 +9,7 @@ mod bvh;
 mod camera;
 mod clutter;
 mod dice;
+mod drawn_room;
 mod furniture;
 mod kinds;
 mod light;
@@ -29,22 +30,20 @@ mod surface;
 mod viewpoint;
 
 use std::collections::BTreeMap;
+use std::convert::Infallible;
 use std::sync::{Arc, LazyLock};
 
-use ndarray::Array2;
-
 use self::dice::Dice;
+use self::drawn_room::DrawnRoom;
 use self::kinds::RoomKind;
 use self::plan::FloorPlan;
 pub(crate) use self::room_light::RoomLight;
 pub use self::settings::Rooms;
 use self::viewpoint::Height;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::labels;
 use crate::types::recent::Recent;
-use crate::types::{
-    DepthKind, Digest, Frame, FrameId, Labels, Light, Pixels, Rgb, SegmentName, Segmentation,
-};
+use crate::types::{Digest, Frame, FrameId, Labels, Light, Pixels, Rgb, SegmentName};
 
 /// The version of the generator. Any change of a pixel or a name needs another version.
 pub const VERSION: u32 = 2;
@@ -52,19 +51,15 @@ pub const VERSION: u32 = 2;
 /// The label space of the semantic maps.
 const SPACE: &str = "mpcat40";
 
-/// The maximum size of the frame cache in bytes (chosen). A frame is drawn for its image, and not again for its maps.
+/// The maximum size of the frame cache in bytes: the 48 frames of the default data set, which are drawn once for their questions and
+/// their images.
 const CACHE_BYTES: usize = 104 << 20;
-
-/// The bytes per pixel: three for colour, four for depth, two for the class, four for the segment.
-const BYTES_PER_PIXEL: usize = 13;
-/// The further bytes per pixel of linear light.
-const BYTES_OF_LIGHT: usize = 12;
 
 /// The number of frames of a size that fit into the cache; at least one.
 fn cached_frames([width, height]: [usize; 2], light: RoomLight) -> usize {
     let bytes = match light {
-        RoomLight::Display => BYTES_PER_PIXEL,
-        RoomLight::Linear => BYTES_PER_PIXEL + BYTES_OF_LIGHT,
+        RoomLight::Display => DrawnRoom::BYTES_PER_PIXEL,
+        RoomLight::Linear => DrawnRoom::BYTES_PER_PIXEL + DrawnRoom::BYTES_OF_LIGHT,
     };
     (CACHE_BYTES / (width * height * bytes).max(1)).max(1)
 }
@@ -74,15 +69,7 @@ fn cached_frames([width, height]: [usize; 2], light: RoomLight) -> usize {
 pub struct Room {
     rooms: Rooms,
     index: usize,
-    cache: Arc<Recent<usize, DrawnRoom>>,
-}
-
-/// A frame that is drawn.
-#[derive(Debug, Clone)]
-struct DrawnRoom {
-    frame: Arc<Frame>,
-    /// Its linear light; `None` if only codes of a display are drawn.
-    light: Option<Arc<Light>>,
+    cache: Arc<Recent<usize, Arc<DrawnRoom>>>,
 }
 
 /// The ground truth of a frame, for checking questions.
@@ -242,16 +229,33 @@ impl Room {
     ///
     /// # Errors
     /// If a map has another size than the image, which cannot happen.
-    pub fn frame(&self) -> Result<Arc<Frame>> {
-        Ok(self.drawn()?.frame)
+    pub fn frame(&self) -> Result<Frame> {
+        let drawn = self.drawn();
+        drawn.frame(Rgb::clone(&drawn.rgb))
+    }
+
+    /// The frame with its maps and another image of its size.
+    ///
+    /// # Errors
+    /// If the image has another size.
+    pub(crate) fn frame_with(&self, rgb: Rgb) -> Result<Frame> {
+        self.drawn().frame(rgb)
+    }
+
+    /// The pixels of the frame: linear light if it is drawn, else codes of a display.
+    #[must_use]
+    pub fn pixels(&self) -> Pixels {
+        let drawn = self.drawn();
+        match &drawn.light {
+            Some(light) => Pixels::Light(Arc::clone(light)),
+            None => Pixels::Codes8(Arc::clone(&drawn.rgb)),
+        }
     }
 
     /// The linear light of the frame; `None` if only codes of a display are drawn.
-    ///
-    /// # Errors
-    /// As of [`Self::frame`].
-    pub fn light(&self) -> Result<Option<Arc<Light>>> {
-        Ok(self.drawn()?.light)
+    #[must_use]
+    pub fn light(&self) -> Option<Arc<Light>> {
+        self.drawn().light.clone()
     }
 
     /// Whether the pixels of the frame are linear light.
@@ -260,25 +264,20 @@ impl Room {
         self.rooms.light == RoomLight::Linear
     }
 
-    fn drawn(&self) -> Result<DrawnRoom> {
-        self.cache.get(&self.index, || self.draw())
+    fn drawn(&self) -> Arc<DrawnRoom> {
+        let Ok(drawn) = self
+            .cache
+            .get(&self.index, || Ok::<_, Infallible>(Arc::new(self.draw())));
+        drawn
     }
 
-    fn draw(&self) -> Result<DrawnRoom> {
+    fn draw(&self) -> DrawnRoom {
         let plan = self.plan();
         let camera = self.camera(&plan);
         let view = render::render(&plan.scene, &camera, self.rooms.light);
-        let [width, height] = self.rooms.size;
-        let numbers = plan
-            .scene
-            .things
-            .iter()
-            .map(|thing| number(thing.kind.class));
-        let numbers: Vec<u16> = std::iter::once(0).chain(numbers).collect();
-        let classes = view.things.iter().map(|thing| numbers[*thing as usize]);
-        let classes: Vec<u16> = classes.collect();
-        let shape = |e| Error::data(format_args!("frame {}", self.id()), e);
-        let names = plan.scene.things.iter().zip(1..).map(|(thing, number)| {
+        let things = &plan.scene.things;
+        let classes = things.iter().map(|thing| number(thing.kind.class));
+        let names = things.iter().zip(1..).map(|(thing, number)| {
             let name = SegmentName {
                 name: thing.kind.word.to_owned(),
                 canonical: thing.kind.class.to_owned(),
@@ -286,27 +285,21 @@ impl Room {
             };
             (number, name)
         });
-        let (light, pixels) = match view.pixels {
-            Pixels::Light(light) => (Some(Arc::clone(&light)), Pixels::Light(light)),
-            pixels => (None, pixels),
-        };
-        let frame = Frame {
+        DrawnRoom {
             id: self.id(),
             scene: self.scene(),
-            depth: Some(Array2::from_shape_vec((height, width), view.depth).map_err(shape)?),
-            depth_kind: DepthKind::Planar,
-            intrinsics: Some(camera.intrinsics()),
-            semantic: Some(Array2::from_shape_vec((height, width), classes).map_err(shape)?),
-            segments: Some(Array2::from_shape_vec((height, width), view.things).map_err(shape)?),
-            segmentation: Segmentation::Instances,
+            room: self.kind().name(),
+            intrinsics: camera.intrinsics(),
+            rgb: view.pixels.codes(),
+            light: match view.pixels {
+                Pixels::Light(light) => Some(light),
+                Pixels::Codes8(_) | Pixels::Codes16(_) => None,
+            },
+            depth: view.depth,
+            things: view.things,
+            classes: std::iter::once(0).chain(classes).collect(),
             names: Arc::new(names.collect()),
-            room: Some(self.kind().name().to_owned()),
-            rgb: Rgb::clone(&pixels.codes()),
-        };
-        Ok(DrawnRoom {
-            frame: Arc::new(frame),
-            light,
-        })
+        }
     }
 
     /// The camera pose in metres: a matrix from the camera (x right, y up, z backwards) to the room, row by row.
@@ -364,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn a_room_is_drawn_once() {
+    fn the_default_rooms_are_drawn_once() {
         let rooms = Rooms {
             frames: 2,
             seed: 1,
@@ -372,12 +365,13 @@ mod tests {
             light: RoomLight::Display,
         };
         let all: Vec<Room> = rooms.all().map(|(_, room)| room).collect();
-        let first = all[0].frame().unwrap();
-        assert!(Arc::ptr_eq(&first, &all[0].frame().unwrap()));
+        assert!(Arc::ptr_eq(&all[0].drawn(), &all[0].drawn()));
+        let defaults = Rooms::default();
+        assert!(cached_frames(defaults.size, defaults.light) >= defaults.frames);
         let sizes = [[640, 480], [3000, 2000], [4000, 4000]];
         let cached = |size| cached_frames(size, RoomLight::Display);
-        assert_eq!(sizes.map(cached), [27, 1, 1]);
-        assert_eq!(cached_frames([640, 480], RoomLight::Linear), 14);
+        assert_eq!(sizes.map(cached), [50, 2, 1]);
+        assert_eq!(cached_frames([640, 480], RoomLight::Linear), 18);
     }
 
     #[test]
@@ -390,10 +384,9 @@ mod tests {
                 light,
             };
             let drawn = |room: &Room| {
-                let drawn = room.drawn().unwrap();
-                let frame = Frame::clone(&drawn.frame);
+                let frame = room.frame().unwrap();
                 let maps = (frame.depth, frame.semantic, frame.segments);
-                let light = drawn.light.map(|light| light.samples().to_vec());
+                let light = room.light().map(|light| light.samples().to_vec());
                 (frame.id, frame.rgb, maps, frame.names, light)
             };
             // The views of room 17, drawn before any other, and after those of the rooms before it.

@@ -22,10 +22,10 @@ use crate::types::{Light, Pixels, Rgb};
 #[derive(Debug)]
 pub(super) struct RenderedView {
     pub(super) pixels: Pixels,
-    /// The depth of each pixel in millimetres along the optical axis; 0 if there is none.
-    pub(super) depth: Vec<u32>,
+    /// Depth of each pixel in millimetres along the optical axis, at most 65,535; 0 if there is none.
+    pub(super) depth: Vec<u16>,
     /// The number of the thing at each pixel, from 1; 0 if there is none.
-    pub(super) things: Vec<u32>,
+    pub(super) things: Vec<u16>,
 }
 
 /// The offsets of the four rays of a pixel at an edge, in pixels (rotated grid).
@@ -102,7 +102,7 @@ pub(super) fn render(scene: &Scene, camera: &Camera, shown: RoomLight) -> Render
         depth: depth(&spots, camera),
         things: spots
             .iter()
-            .map(|spot| spot.map_or(0, |spot| spot.thing as u32 + 1))
+            .map(|spot| spot.map_or(0, |spot| spot.thing as u16 + 1))
             .collect(),
         pixels,
     }
@@ -119,13 +119,13 @@ fn spots(scene: &Scene, tree: &Bvh, camera: &Camera) -> Vec<Option<Spot>> {
     spots.collect()
 }
 
-/// The depth of each pixel in millimetres along the optical axis; 0 if there is none.
-fn depth(spots: &[Option<Spot>], camera: &Camera) -> Vec<u32> {
+/// Depth of each pixel in millimetres along the optical axis, at most 65,535; 0 if there is none.
+fn depth(spots: &[Option<Spot>], camera: &Camera) -> Vec<u16> {
     let (width, axis) = (camera.size[0], camera.axis());
     let depths = spots.iter().enumerate().map(|(i, spot)| {
         let ray = camera.ray((i % width) as f32, (i / width) as f32);
         spot.map_or(0, |spot| {
-            (spot.distance * ray.direction.dot(axis) * 1000.0 + 0.5) as u32
+            (spot.distance * ray.direction.dot(axis) * 1000.0 + 0.5) as u16
         })
     });
     depths.collect()

@@ -99,7 +99,7 @@ fn write_frame(args: &RoomsArgs, room: &Room) -> Result<WrittenFrame> {
     let mut line = paths.line(&frame.rgb);
     let codes = paths.write("rgb", "png", &png(&frame.rgb)?)?;
     // The frame is its light; the PNG file beside it is for looking at.
-    let image = match room.light()? {
+    let image = match room.light() {
         Some(light) => paths.write("rgb", "exr", &frame_folder::exr(&light)?)?,
         None => codes,
     };

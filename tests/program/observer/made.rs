@@ -50,7 +50,7 @@ impl Set {
     pub(super) fn rooms(rooms: Rooms, is_wanted: impl Fn(&FrameId) -> bool + Sync) -> Self {
         let all: Vec<_> = rooms.all().filter(|(id, _)| is_wanted(id)).collect();
         let frames = all.into_par_iter().map(|(_, room)| room.frame().unwrap());
-        Self::of(frames.collect(), &labels())
+        Self::of(frames.map(Arc::new).collect(), &labels())
     }
 
     /// Frames with the questions that the built-in rules ask about them.
