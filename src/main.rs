@@ -9,7 +9,19 @@ use darkqa_eval::{cli, enhance};
     reason = "a switch that ONNX Runtime reads from the environment alone"
 )]
 fn main() -> ExitCode {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    limit_heaps();
     // SAFETY: nothing has started a thread yet.
     unsafe { enhance::forbid_telemetry() };
     cli::main(std::env::args_os())
+}
+
+/// Limits glibc to one heap per core. By default it opens up to eight, and each keeps the memory of images that it once held: 48 frames
+/// on two cores take 680 MB then, and 330 MB with two heaps.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+#[expect(unsafe_code, reason = "a switch of the C library")]
+fn limit_heaps() {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    // SAFETY: the call takes two numbers, and no other thread runs yet. If it fails, the default stays.
+    unsafe { libc::mallopt(libc::M_ARENA_MAX, cores as libc::c_int) };
 }

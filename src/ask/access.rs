@@ -113,6 +113,8 @@ impl Access {
     /// The HTTP client of all requests. It follows no redirects, because a POST would become a GET and the key would be sent
     /// elsewhere. Proxies come from the environment (`HTTPS_PROXY`, `NO_PROXY`, …); there is none for this machine.
     pub(super) fn client(&self, timeout: Duration, scrub: &Scrub) -> Result<Client> {
+        // An error means that a provider is installed already.
+        let _ = rustls::crypto::ring::default_provider().install_default();
         let mut client = Client::builder()
             .user_agent(concat!("darkqa-eval/", env!("CARGO_PKG_VERSION")))
             .redirect(redirect::Policy::none())

@@ -3,8 +3,7 @@
 //! Arimo 1.33 (Steve Matteson, SIL Open Font License 1.1), reduced to Latin, Greek, punctuation and a few signs. Its letters are as wide
 //! as those of Arial, Helvetica and Liberation Sans, so that an SVG has the same measures where one of them is installed.
 
-use skrifa::instance::{LocationRef, Size};
-use skrifa::{FontRef, GlyphId, MetadataProvider};
+use ttf_parser::{Face, GlyphId};
 
 /// The file of the font.
 pub(super) const FILE: &[u8] = include_bytes!("font/Arimo-figures.ttf");
@@ -13,45 +12,61 @@ pub(super) const FILE: &[u8] = include_bytes!("font/Arimo-figures.ttf");
 pub(super) const FAMILIES: &str = "Arimo, 'Liberation Sans', Arial, Helvetica, sans-serif";
 
 /// The bundled font.
-pub(super) struct Font(FontRef<'static>);
+pub(super) struct Font(Face<'static>);
 
 /// One letter of a text.
 pub(super) struct Letter {
     pub glyph: GlyphId,
     /// Width for letters of height 1.
     pub advance: f32,
-    /// The bytes of the text that it stands for.
-    pub bytes: std::ops::Range<usize>,
+}
+
+/// Measures of the font, in thousandths of the letter height.
+pub(super) struct Metrics {
+    /// Left, bottom, right and top of the box that holds every glyph.
+    pub bounds: [f32; 4],
+    pub ascent: f32,
+    /// Negative below the baseline.
+    pub descent: f32,
+    pub capital_height: f32,
 }
 
 impl Font {
     /// The bundled font.
     pub(super) fn bundled() -> Self {
-        Self(FontRef::new(FILE).expect("the bundled font is a font: a test reads it"))
+        Self(Face::parse(FILE, 0).expect("the bundled font is a font: a test reads it"))
     }
 
     /// Whether the font has a letter.
     pub(super) fn has(&self, letter: char) -> bool {
-        self.0.charmap().map(letter).is_some()
+        self.0.glyph_index(letter).is_some()
     }
 
     /// The letters of a text; of one that the font lacks, the sign for a missing letter.
     pub(super) fn letters(&self, text: &str) -> Vec<Letter> {
-        let (map, metrics) = (
-            self.0.charmap(),
-            self.0
-                .glyph_metrics(Size::unscaled(), LocationRef::default()),
-        );
-        let units = f32::from(metrics_units(&self.0));
-        let letters = text.char_indices().map(|(at, letter)| {
-            let glyph = map.map(letter).unwrap_or(GlyphId::NOTDEF);
-            Letter {
-                glyph,
-                advance: metrics.advance_width(glyph).unwrap_or(0.0) / units,
-                bytes: at..at + letter.len_utf8(),
-            }
-        });
-        letters.collect()
+        let units = f32::from(self.0.units_per_em());
+        text.chars()
+            .map(|letter| {
+                let glyph = self.0.glyph_index(letter).unwrap_or(GlyphId(0));
+                let advance = self.0.glyph_hor_advance(glyph).unwrap_or(0);
+                Letter {
+                    glyph,
+                    advance: f32::from(advance) / units,
+                }
+            })
+            .collect()
+    }
+
+    /// The measures of the font that a PDF file states.
+    pub(super) fn metrics(&self) -> Metrics {
+        let thousandths = |units: i16| f32::from(units) * 1000.0 / f32::from(self.0.units_per_em());
+        let bounds = self.0.global_bounding_box();
+        Metrics {
+            bounds: [bounds.x_min, bounds.y_min, bounds.x_max, bounds.y_max].map(thousandths),
+            ascent: thousandths(self.0.ascender()),
+            descent: thousandths(self.0.descender()),
+            capital_height: thousandths(self.0.capital_height().unwrap_or(self.0.ascender())),
+        }
     }
 
     /// Width in points of a text in letters of `size` points.
@@ -136,11 +151,6 @@ impl Lengths {
     fn without_middle(&self, head: usize, tail: usize) -> f64 {
         self.trimmed_starts[head] + self.trimmed_ends[tail]
     }
-}
-
-fn metrics_units(font: &FontRef<'_>) -> u16 {
-    font.metrics(Size::unscaled(), LocationRef::default())
-        .units_per_em
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ mod lines;
 mod look;
 mod overview;
 mod pdf;
+mod pdf_font;
 mod reliability;
 mod samples;
 mod sheet;

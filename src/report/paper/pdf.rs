@@ -1,219 +1,275 @@
-//! A sheet as PDF: [`pdf`]. One page of the size of the sheet; words are words of the bundled font, of which the file holds the letters
-//! that occur. Nothing in the file depends on when or where it was written.
+//! Writes a sheet as a PDF file: [`pdf`].
+//!
+//! One page of the size of the sheet. Text stays text, in the letters of the bundled font that occur. The same sheet gives the same bytes:
+//! the file has no date.
 
-use krilla::color::rgb;
-use krilla::configure::{ConfigurationBuilder, PdfVersion};
-use krilla::geom::{Path, PathBuilder, Point, Size, Transform};
-use krilla::image::Image;
-use krilla::metadata::Metadata;
-use krilla::num::NormalizedF32;
-use krilla::page::PageSettings;
-use krilla::paint::{Fill, LineJoin, Stroke as PdfStroke, StrokeDash};
-use krilla::surface::Surface;
-use krilla::text::{Font as PdfFont, GlyphId, KrillaGlyph};
-use krilla::{Document, SerializeSettings};
+use std::collections::BTreeMap;
 
-use super::font::{FILE, Font};
+use pdf_writer::types::LineJoinStyle;
+use pdf_writer::{Content, Filter, Finish as _, Name, Pdf, Rect, Ref, Str, TextStr};
+
+use super::pdf_font::{EmbeddedFont, deflated};
 use super::sheet::{Colour, Mark, Place, Sheet, Stroke, Turn, Words};
 use crate::error::{Error, Result};
 use crate::report::chart::INK;
+use crate::types::Rgb;
 
-/// Four arcs of a circle by cubic curves have their handles at this share of the radius: 4 (√2 − 1) / 3.
+/// Handle length of a cubic curve that draws a quarter of a circle, in radii: 4 (√2 − 1) / 3.
 const HANDLE: f64 = 0.552_284_749_8;
 
-/// The sheet as a PDF file of version 1.4, which every TeX takes without a warning.
+/// Name of the font in the content of the page.
+const FONT: Name<'_> = Name(b"F");
+
+/// The sheet as a PDF 1.4 file, the version that every TeX takes without a warning.
 ///
 /// # Errors
-/// If the sheet has no size, or the file cannot be made.
+/// If the sheet has no area or the font cannot be embedded.
 pub(crate) fn pdf(sheet: &Sheet, title: &str) -> Result<Vec<u8>> {
-    let version = ConfigurationBuilder::new().with_version(PdfVersion::Pdf14);
-    let configuration = version.finish().map_err(|e| failed(&e))?;
-    let mut document = Document::new_with(SerializeSettings {
-        xmp_metadata: false,
-        enable_tagging: false,
-        configuration,
-        ..SerializeSettings::default()
-    });
-    let name = Metadata::new().title(title.to_owned());
-    document.set_metadata(name.document_id(title.to_owned()));
-    let [width, height] = sheet.size;
-    let settings = PageSettings::from_wh(width as f32, height as f32);
-    let settings = settings.ok_or_else(|| failed(&"a figure without a size"))?;
-    let font = PdfFont::new(FILE.to_vec().into(), 0);
-    let font = font.ok_or_else(|| failed(&"the bundled font cannot be read"))?;
-    {
-        let mut page = document.start_page_with(settings);
-        let mut surface = page.surface();
-        for mark in &sheet.marks {
-            draw(&mut surface, mark, &font);
-        }
-        surface.finish();
-        page.finish();
+    let [width, height] = sheet.size.map(|length| length as f32);
+    if !(width > 0.0 && height > 0.0) {
+        return Err(Error::data(
+            "figure as PDF",
+            format!("a figure of {width} × {height} points has no area"),
+        ));
     }
-    document.finish().map_err(|e| failed(&e))
+    let mut page = Page::new(height);
+    for mark in &sheet.marks {
+        page.draw(mark);
+    }
+    page.document([width, height], title)
 }
 
-fn failed(problem: &impl std::fmt::Debug) -> Error {
-    Error::data("figure as PDF", format!("{problem:?}"))
+/// The content of the page, with the fonts, opacities and pictures it refers to.
+struct Page<'a> {
+    content: Content,
+    font: EmbeddedFont,
+    /// Names of graphics states by opacity in thousandths.
+    opacities: BTreeMap<u16, String>,
+    pictures: Vec<&'a Rgb>,
 }
 
-fn draw(surface: &mut Surface<'_>, mark: &Mark, font: &PdfFont) {
-    match mark {
-        Mark::Line { places, stroke } => {
-            painted(surface, path(places, End::Open), None, Some(stroke), 1.0);
+impl<'a> Page<'a> {
+    /// An empty page whose y axis points down, as that of a sheet does.
+    fn new(height: f32) -> Self {
+        let mut content = Content::new();
+        content.transform([1.0, 0.0, 0.0, -1.0, 0.0, height]);
+        content.set_line_join(LineJoinStyle::RoundJoin);
+        Self {
+            content,
+            font: EmbeddedFont::default(),
+            opacities: BTreeMap::new(),
+            pictures: Vec::new(),
         }
-        Mark::Area {
-            corners,
-            fill,
-            opacity,
-        } => painted(
-            surface,
-            path(corners, End::Closed),
-            Some(*fill),
-            None,
-            *opacity,
-        ),
-        Mark::Disc {
-            centre,
-            radius,
-            fill,
-            edge,
-        } => painted(surface, circle(*centre, *radius), *fill, edge.as_ref(), 1.0),
-        Mark::Words(words) => write_words(surface, words, font),
-        Mark::Picture {
-            corner: [x, y],
-            size: [width, height],
-            image,
-        } => {
-            let opaque = image.samples().chunks_exact(3);
-            let opaque = opaque.flat_map(|pixel| [pixel[0], pixel[1], pixel[2], 255]);
-            let picture = Image::from_rgba8(
-                opaque.collect(),
-                image.width() as u32,
-                image.height() as u32,
-            );
-            if let Some(size) = Size::from_wh(*width as f32, *height as f32) {
-                surface.push_transform(&Transform::from_translate(*x as f32, *y as f32));
-                surface.draw_image(picture, size);
-                surface.pop();
+    }
+
+    fn draw(&mut self, mark: &'a Mark) {
+        match mark {
+            Mark::Line { places, stroke } => {
+                self.path(places);
+                self.paint(None, Some(stroke));
+            }
+            Mark::Area {
+                corners,
+                fill,
+                opacity,
+            } => {
+                self.content.save_state();
+                self.set_opacity(*opacity);
+                self.path(corners);
+                self.content.close_path();
+                self.paint(Some(*fill), None);
+                self.content.restore_state();
+            }
+            Mark::Disc {
+                centre,
+                radius,
+                fill,
+                edge,
+            } => {
+                self.circle(*centre, *radius);
+                self.paint(*fill, edge.as_ref());
+            }
+            Mark::Words(words) => self.write(words),
+            Mark::Picture {
+                corner: [x, y],
+                size: [width, height],
+                image,
+            } => {
+                let [x, y, width, height] = [x, y, width, height].map(|length| *length as f32);
+                let name = picture_name(self.pictures.len());
+                self.pictures.push(image);
+                self.content.save_state();
+                // A picture fills the unit square, its first row at the top.
+                self.content
+                    .transform([width, 0.0, 0.0, -height, x, y + height]);
+                self.content.x_object(Name(name.as_bytes()));
+                self.content.restore_state();
             }
         }
     }
-}
 
-/// Whether a path returns to its start.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum End {
-    Open,
-    Closed,
-}
-
-fn path(places: &[Place], end: End) -> Option<Path> {
-    let mut path = PathBuilder::new();
-    for (index, [x, y]) in places.iter().enumerate() {
-        let (x, y) = (*x as f32, *y as f32);
-        if index == 0 {
-            path.move_to(x, y);
-        } else {
-            path.line_to(x, y);
+    fn path(&mut self, places: &[Place]) {
+        for (index, [x, y]) in places.iter().enumerate() {
+            let (x, y) = (*x as f32, *y as f32);
+            if index == 0 {
+                self.content.move_to(x, y);
+            } else {
+                self.content.line_to(x, y);
+            }
         }
     }
-    if end == End::Closed {
-        path.close();
-    }
-    path.finish()
-}
 
-fn circle([x, y]: Place, radius: f64) -> Option<Path> {
-    let handle = HANDLE * radius;
-    let mut path = PathBuilder::new();
-    path.move_to((x + radius) as f32, y as f32);
-    // From a quarter to the next: the ends of the arc, each as (across, down) in radii.
-    let quarters = [
-        ([1.0, 0.0], [0.0, 1.0]),
-        ([0.0, 1.0], [-1.0, 0.0]),
-        ([-1.0, 0.0], [0.0, -1.0]),
-        ([0.0, -1.0], [1.0, 0.0]),
-    ];
-    for (from, to) in quarters {
-        let at = |near: [f64; 2], other: [f64; 2]| {
-            [
-                (x + radius * near[0] + handle * other[0]) as f32,
-                (y + radius * near[1] + handle * other[1]) as f32,
-            ]
+    fn circle(&mut self, [x, y]: Place, radius: f64) {
+        let at = |across: f64, down: f64| {
+            let [x, y] = [x + radius * across, y + radius * down];
+            [x as f32, y as f32]
         };
-        let ([x1, y1], [x2, y2], [x3, y3]) = (at(from, to), at(to, from), at(to, [0.0, 0.0]));
-        path.cubic_to(x1, y1, x2, y2, x3, y3);
+        let [start_x, start_y] = at(1.0, 0.0);
+        self.content.move_to(start_x, start_y);
+        // Unit vectors of the start and the end of each quarter.
+        for ([from_x, from_y], [to_x, to_y]) in [
+            ([1.0, 0.0], [0.0, 1.0]),
+            ([0.0, 1.0], [-1.0, 0.0]),
+            ([-1.0, 0.0], [0.0, -1.0]),
+            ([0.0, -1.0], [1.0, 0.0]),
+        ] {
+            let [x1, y1] = at(from_x + HANDLE * to_x, from_y + HANDLE * to_y);
+            let [x2, y2] = at(to_x + HANDLE * from_x, to_y + HANDLE * from_y);
+            let [x3, y3] = at(to_x, to_y);
+            self.content.cubic_to(x1, y1, x2, y2, x3, y3);
+        }
+        self.content.close_path();
     }
-    path.close();
-    path.finish()
+
+    /// Fills and strokes the current path.
+    fn paint(&mut self, fill: Option<Colour>, stroke: Option<&Stroke>) {
+        if let Some(fill) = fill {
+            self.set_fill(fill);
+        }
+        if let Some(stroke) = stroke {
+            let [red, green, blue] = parts(stroke.colour);
+            let dash = stroke.dash.iter().map(|length| *length as f32);
+            self.content
+                .set_stroke_rgb(red, green, blue)
+                .set_line_width(stroke.width as f32)
+                .set_dash_pattern(dash, 0.0);
+        }
+        match (fill, stroke) {
+            (Some(_), Some(_)) => self.content.fill_nonzero_and_stroke(),
+            (Some(_), None) => self.content.fill_nonzero(),
+            (None, Some(_)) => self.content.stroke(),
+            (None, None) => self.content.end_path(),
+        };
+    }
+
+    fn set_fill(&mut self, colour: Colour) {
+        let [red, green, blue] = parts(colour);
+        self.content.set_fill_rgb(red, green, blue);
+    }
+
+    fn set_opacity(&mut self, opacity: f64) {
+        let thousandths = (opacity.clamp(0.0, 1.0) * 1000.0).round() as u16;
+        let name = self
+            .opacities
+            .entry(thousandths)
+            .or_insert_with(|| format!("G{thousandths}"));
+        self.content.set_parameters(Name(name.as_bytes()));
+    }
+
+    fn write(&mut self, words: &Words) {
+        let [x, y] = words.start.map(|part| part as f32);
+        // Letters stand upright although the y axis points down.
+        let matrix = match words.turn {
+            Turn::Right => [1.0, 0.0, 0.0, -1.0, x, y],
+            Turn::Up => [0.0, -1.0, -1.0, 0.0, x, y],
+        };
+        let text = self.font.encode(&words.text);
+        self.set_fill(INK);
+        self.content
+            .begin_text()
+            .set_font(FONT, words.size as f32)
+            .set_text_matrix(matrix)
+            .show(Str(&text))
+            .end_text();
+    }
+
+    /// The whole file.
+    fn document(self, [width, height]: [f32; 2], title: &str) -> Result<Vec<u8>> {
+        let mut next = Ref::new(1);
+        let (catalog, pages, page) = (next.bump(), next.bump(), next.bump());
+        let (content, info) = (next.bump(), next.bump());
+        let mut pdf = Pdf::new();
+        pdf.set_version(1, 4);
+        let id = title.as_bytes().to_vec();
+        pdf.set_file_id((id.clone(), id));
+        pdf.catalog(catalog).pages(pages);
+        pdf.document_info(info).title(TextStr(title));
+        pdf.pages(pages).kids([page]).count(1);
+        let packed = deflated(&self.content.finish());
+        pdf.stream(content, &packed).filter(Filter::FlateDecode);
+
+        let font = self.font.write(&mut pdf, &mut next)?;
+        let pictures: Vec<Ref> = self
+            .pictures
+            .iter()
+            .map(|image| write_picture(&mut pdf, next.bump(), image))
+            .collect();
+
+        let mut entry = pdf.page(page);
+        entry
+            .parent(pages)
+            .media_box(Rect::new(0.0, 0.0, width, height))
+            .contents(content);
+        let mut resources = entry.resources();
+        if let Some(font) = font {
+            resources.fonts().pair(FONT, font);
+        }
+        let mut states = resources.ext_g_states();
+        for (thousandths, name) in &self.opacities {
+            states
+                .insert(Name(name.as_bytes()))
+                .start::<pdf_writer::writers::ExtGraphicsState<'_>>()
+                .non_stroking_alpha(f32::from(*thousandths) / 1000.0);
+        }
+        states.finish();
+        let mut objects = resources.x_objects();
+        for (index, picture) in pictures.into_iter().enumerate() {
+            objects.pair(Name(picture_name(index).as_bytes()), picture);
+        }
+        objects.finish();
+        resources.finish();
+        entry.finish();
+        Ok(pdf.finish())
+    }
 }
 
-fn colour([red, green, blue]: Colour) -> rgb::Color {
-    rgb::Color::new(red, green, blue)
+fn write_picture(pdf: &mut Pdf, id: Ref, image: &Rgb) -> Ref {
+    let packed = deflated(image.samples());
+    let mut object = pdf.image_xobject(id, &packed);
+    object.filter(Filter::FlateDecode);
+    object
+        .width(image.width() as i32)
+        .height(image.height() as i32)
+        .bits_per_component(8)
+        .color_space()
+        .device_rgb();
+    id
 }
 
-fn painted(
-    surface: &mut Surface<'_>,
-    path: Option<Path>,
-    fill: Option<Colour>,
-    stroke: Option<&Stroke>,
-    opacity: f64,
-) {
-    let Some(path) = path else {
-        return;
-    };
-    surface.set_fill(fill.map(|fill| Fill {
-        paint: colour(fill).into(),
-        opacity: NormalizedF32::new(opacity as f32).unwrap_or(NormalizedF32::ONE),
-        ..Fill::default()
-    }));
-    surface.set_stroke(stroke.map(|stroke| PdfStroke {
-        paint: colour(stroke.colour).into(),
-        width: stroke.width as f32,
-        line_join: LineJoin::Round,
-        dash: (!stroke.dash.is_empty()).then(|| StrokeDash {
-            array: stroke.dash.iter().map(|length| *length as f32).collect(),
-            offset: 0.0,
-        }),
-        ..PdfStroke::default()
-    }));
-    surface.draw_path(&path);
+fn picture_name(index: usize) -> String {
+    format!("I{index}")
 }
 
-fn write_words(surface: &mut Surface<'_>, words: &Words, font: &PdfFont) {
-    let letters = Font::bundled().letters(&words.text);
-    let glyphs = letters.into_iter().map(|letter| {
-        let glyph = GlyphId::new(letter.glyph.to_u32());
-        KrillaGlyph::new(glyph, letter.advance, 0.0, 0.0, 0.0, letter.bytes, None)
-    });
-    let glyphs: Vec<KrillaGlyph> = glyphs.collect();
-    let [x, y] = words.start.map(|part| part as f32);
-    surface.set_stroke(None);
-    surface.set_fill(Some(Fill {
-        paint: colour(INK).into(),
-        ..Fill::default()
-    }));
-    let angle = match words.turn {
-        Turn::Right => 0.0,
-        Turn::Up => -90.0,
-    };
-    surface.push_transform(&Transform::from_rotate_at(angle, x, y));
-    surface.draw_glyphs(
-        Point::from_xy(x, y),
-        &glyphs,
-        font.clone(),
-        &words.text,
-        words.size as f32,
-        false,
-    );
-    surface.pop();
+/// Red, green and blue from 0 to 1.
+fn parts(colour: Colour) -> [f32; 3] {
+    colour.map(|part| f32::from(part) / 255.0)
 }
 
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
 
+    use super::super::font::FILE;
     use super::super::sheet::Anchor;
     use super::*;
     use crate::types::Rgb;
