@@ -51,7 +51,7 @@ Results go to standard output, progress and logs to standard error (RUST_LOG=dar
 #[derive(Debug, Parser)]
 #[command(
     name = NAME, version, about, long_about, max_term_width = 110, after_help = AFTER_HELP,
-    args_conflicts_with_subcommands = true
+    override_usage = "darkqa-eval [OPTIONS]\n       darkqa-eval <COMMAND>"
 )]
 pub(crate) struct Cli {
     /// The command; `None` for an evaluation.

@@ -355,14 +355,34 @@ fn parse_words(
     words: Vec<OsString>,
     origins: &BTreeMap<String, String>,
 ) -> Result<ArgMatches, Problem> {
-    command
+    let matches = command
         .try_get_matches_from_mut(words)
         .map_err(|e| match e.kind() {
             ErrorKind::DisplayHelp
             | ErrorKind::DisplayVersion
             | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => Problem::Help(e),
             _ => Problem::Error(with_origin(&e, origins)),
-        })
+        })?;
+    check_flags_before_command(&command, &matches)?;
+    Ok(matches)
+}
+
+/// Refuses a flag of the evaluation in front of a command: `--levels L0 report RUN`. Global flags may stand there. clap's
+/// `args_conflicts_with_subcommands` would refuse them too.
+fn check_flags_before_command(command: &Command, matches: &ArgMatches) -> Result<()> {
+    let Some(name) = matches.subcommand_name() else {
+        return Ok(());
+    };
+    let misplaced = command.get_arguments().find(|arg| {
+        let source = matches.value_source(arg.get_id().as_str());
+        source == Some(ValueSource::CommandLine) && !arg.is_global_set()
+    });
+    match misplaced.and_then(Arg::get_long) {
+        Some(flag) => Err(Error::CommandLine(format!(
+            "--{flag} stands before the command {name}; only --quiet, --color and --config may; put flags of {name} after it"
+        ))),
+        None => Ok(()),
+    }
 }
 
 fn with_origin(error: &clap::Error, origins: &BTreeMap<String, String>) -> Error {

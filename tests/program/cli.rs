@@ -60,6 +60,31 @@ fn refused(bench: &Bench, line: &str, parts: &[&str]) {
 }
 
 #[test]
+fn global_flags_stand_before_or_after_a_command() {
+    let bench = Bench::new();
+    bench.complete(&words(
+        "--model random --levels L0 --limit 2 --no-parquet --out run",
+    ));
+    bench.file("flags.toml", "quiet = true\n");
+    for flag in ["--quiet", "--color never", "--config flags.toml"] {
+        let before = bench.complete(&words(&format!("{flag} report run")));
+        let after = bench.complete(&words(&format!("report {flag} run")));
+        assert!(!before.is_empty());
+        assert_eq!(before, after, "{flag}");
+    }
+}
+
+#[test]
+fn flags_of_an_evaluation_before_a_command_are_refused() {
+    let bench = Bench::new();
+    refused(
+        &bench,
+        "--levels L0 report nowhere",
+        &["--levels", "the command report"],
+    );
+}
+
+#[test]
 fn wrong_words_name_their_flag() {
     let bench = Bench::new();
     let rows = [
