@@ -114,8 +114,8 @@
 //!
 //! # Who may import whom
 //!
-//! `tests/architecture/` reads this table and fails on a breach. A room may use only rooms whose rows are above its own. No file of
-//! `run` uses another command's, and files import each other in no circles but those that `tests/architecture/main.rs` lists with
+//! `tests/program/architecture/` reads this table and fails on a breach. A room may use only rooms whose rows are above its own. No file of
+//! `run` uses another command's, and files import each other in no circles but those that `tests/program/architecture/mod.rs` lists with
 //! a reason.
 //!
 //! | module | may use |

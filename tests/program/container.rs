@@ -3,11 +3,7 @@
 //! The file system is the one that `.ci/image-files` puts together, with the libraries of this machine. The program runs in it as
 //! user 65532 in namespaces of its own, which needs no builder of images.
 #![cfg(target_os = "linux")]
-#![expect(
-    clippy::print_stderr,
-    clippy::print_stdout,
-    reason = "what a test leaves out, and the size of the image"
-)]
+#![expect(clippy::print_stdout, reason = "the size of the image")]
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -16,6 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use crate::support::run::Bench;
+use crate::support::tools::{skip, succeeds};
 
 /// User and group of the image.
 const USER: u32 = 65532;
@@ -33,12 +30,13 @@ fn ended_well(what: &str, output: &Output) {
     );
 }
 
-/// Whether this process may have a mount namespace and a network of its own.
+/// Finds `chroot`, which is not on the PATH of every user.
+const CHROOT: &str = "PATH=$PATH:/usr/sbin:/sbin; command -v chroot";
+
+/// True if this process may have a mount namespace and a network of its own, and can change its root folder.
 fn may_unshare() -> bool {
-    let made = Command::new("unshare")
-        .args(["--mount", "--net", "true"])
-        .output();
-    made.is_ok_and(|output| output.status.success())
+    succeeds("unshare", &["--mount", "--net", "sh", "-c", CHROOT])
+        && succeeds("ldd", &["--version"])
 }
 
 /// The libraries that a program or library is linked to, as paths of this machine, and the loader.
@@ -85,12 +83,12 @@ if touch \"$1/models/new\" 2> /dev/null; then exit 9; fi
 cd \"$1\"
 root=$1
 shift 2
-exec env -i \"$(command -v chroot)\" --userspec=65532:65532 \"$root\" \"$@\"";
+exec env -i \"$(PATH=$PATH:/usr/sbin:/sbin; command -v chroot)\" --userspec=65532:65532 \"$root\" \"$@\"";
 
 #[test]
 fn a_read_only_file_system_without_a_home_or_a_network_suffices() {
     if !may_unshare() {
-        eprintln!("skipped: this process may have no namespaces of its own");
+        skip("it takes root, unshare, chroot and ldd");
         return;
     }
     let bench = Bench::new();
@@ -119,8 +117,8 @@ fn a_read_only_file_system_without_a_home_or_a_network_suffices() {
 #[ignore = "takes minutes, root, buildah and mmdebstrap, and the mirror of the distribution"]
 fn the_image_is_built_and_runs() {
     for (program, words) in [("buildah", "version"), ("mmdebstrap", "--version")] {
-        if Command::new(program).arg(words).output().is_err() || !may_unshare() {
-            eprintln!("skipped: it takes root, buildah and mmdebstrap");
+        if !succeeds(program, &[words]) || !may_unshare() {
+            skip("it takes root, buildah and mmdebstrap");
             return;
         }
     }

@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
-use std::io::Write as _;
 use std::process::Command;
 
 use crate::compared::Scene;
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::house::House;
 use crate::support::run::{files, model_args, words};
+use crate::support::tools::{skip, succeeds};
 
 const LONG: &str = "a-model-with-a-name-of-30-characters";
 
@@ -267,12 +267,16 @@ fn document(width: f64) -> String {
 
 #[test]
 fn tex_sets_figures_and_tables_in_their_columns() {
-    if Command::new("pdflatex").arg("--version").output().is_err() {
-        writeln!(
-            std::io::stderr(),
-            "skipped: there is no pdflatex here; the widths are reckoned by the tests of the library"
-        )
-        .unwrap();
+    // The files of `document`, and that of its bold and italic letters.
+    let files = [
+        "mathptmx.sty",
+        "booktabs.sty",
+        "graphicx.sty",
+        "pgfplots.sty",
+        "ptmr8t.tfm",
+    ];
+    if !succeeds("pdflatex", &["--version"]) || !succeeds("kpsewhich", &files) {
+        skip("there is no pdflatex with mathptmx, booktabs, graphicx and pgfplots");
         return;
     }
     let scene = runs();

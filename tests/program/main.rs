@@ -7,6 +7,7 @@
 mod support;
 
 mod apart;
+mod architecture;
 mod ask;
 mod batch;
 mod batch_run;
@@ -29,6 +30,7 @@ mod fidelity;
 mod figures;
 mod golden;
 mod hm3d;
+mod hostile;
 mod identity;
 mod image_store;
 mod import;
@@ -42,9 +44,11 @@ mod models_listing;
 mod models_trust;
 mod models_wires;
 mod money;
+mod mutations;
 mod observer;
 mod openeqa;
 mod own_requests;
+mod page;
 mod parts_of_commands;
 mod photographs;
 mod pins;

@@ -9,6 +9,7 @@ use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::house::House;
 use crate::support::parquet_file::{body, metadata, rows};
 use crate::support::run::{Bench, model_args, records, words};
+use crate::support::tools::{skip, succeeds};
 use serde_json::{Map, Value, json};
 
 const NAME: &str = "records.parquet";
@@ -343,7 +344,6 @@ fn open_questions_have_a_row_an_answer_with_its_mark() {
 
 /// Skipped where Python has no DuckDB.
 #[test]
-#[expect(clippy::print_stderr, reason = "a test that does nothing says so")]
 fn duckdb_counts_as_the_summary_does() {
     let query = "select model, view, coalesce(level, ''), variant, coalesce(enhancer, ''), family, 'strict', coalesce(reading, ''), \
                  count(\"right\"), count(*) filter (\"right\"), count(*) filter (\"right\" is null) \
@@ -353,9 +353,8 @@ fn duckdb_counts_as_the_summary_does() {
         json!(query)
     );
     let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let has_duckdb = Command::new(&python).args(["-c", "import duckdb"]).output();
-    if !has_duckdb.is_ok_and(|output| output.status.success()) {
-        eprintln!("not tested: {python} has no duckdb");
+    if !succeeds(&python, &["-c", "import duckdb"]) {
+        skip(&format!("{python} has no duckdb"));
         return;
     }
     let bench = Bench::new();

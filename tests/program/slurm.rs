@@ -1,6 +1,5 @@
 //! An evaluation as arrays of a real Slurm: killed, and gone on with in another number of parts.
 #![cfg(unix)]
-#![expect(clippy::print_stderr, reason = "what a test leaves out is said")]
 
 use std::process::{Command, Stdio};
 use std::time::Duration;
@@ -10,6 +9,7 @@ use serde_json::json;
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::process::wait_until;
 use crate::support::run::{Bench, assert_same_products, model_args, words};
+use crate::support::tools::{skip, succeeds};
 
 /// Frames of the set.
 const FRAMES: u8 = 12;
@@ -62,9 +62,8 @@ fn array(bench: &Bench, tasks: usize, args: &[&str]) -> Command {
 #[test]
 #[ignore = "needs a Slurm that runs on this machine alone, and takes a minute"]
 fn killed_tasks_go_on_in_another_number_of_parts() {
-    let answers = Command::new("sinfo").output();
-    if !answers.is_ok_and(|output| output.status.success()) {
-        eprintln!("skipped: no Slurm answers here");
+    if !succeeds("sinfo", &[]) {
+        skip("no Slurm answers");
         return;
     }
     let bench = with_set();

@@ -24,6 +24,7 @@ pub mod process;
 pub mod run;
 pub mod table;
 pub mod tiff_files;
+pub mod tools;
 
 /// Keeps the ONNX Runtime of this test program from reporting anything; to be called before it is opened.
 #[expect(unsafe_code, reason = "the environment is how ONNX Runtime is told")]

@@ -1,0 +1,166 @@
+//! Holds the code to the map in the crate documentation: which room may use which, and where each library stands.
+
+mod circles;
+mod controls;
+mod digests;
+mod files;
+mod map;
+mod rules;
+mod source;
+mod unsafe_code;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+use files::Files;
+use map::Map;
+
+/// The libraries that stand in some places (folders or files in `src/`) alone. Test code may use them anywhere.
+const LIBRARIES: [(&str, &[&str]); 20] = [
+    ("anstream", &["cli"]),
+    ("anstyle", &["report"]),
+    ("axum", &["run/serve"]),
+    ("glam", &["rooms"]),
+    ("plotters", &["report"]),
+    ("noto_sans_mono_bitmap", &["report/sheet"]),
+    ("comfy_table", &["report"]),
+    ("terminal_size", &["report"]),
+    ("unicode_width", &["report"]),
+    ("tokio", &["ask", "job", "run/serve"]),
+    ("reqwest", &["ask"]),
+    ("ort", &["enhance"]),
+    ("rand", &["synthesis", "score/split_mix.rs"]),
+    ("rand_distr", &["synthesis", "score/bootstrap.rs"]),
+    ("image", &["dataset", "enhance/planes.rs", "ask/payload.rs"]),
+    ("png", &["dataset/raw_png.rs"]),
+    ("tiff", &["calibrate/mosaic"]),
+    ("exr", &["dataset/frame_folder.rs", "dataset/image_file"]),
+    ("moxcms", &["dataset/colour"]),
+    (
+        "parquet",
+        &["dataset/ready_made/container", "store/column_file"],
+    ),
+];
+
+/// The places where a future may be awaited. Test code may await anywhere.
+const AWAITS: [&str; 3] = ["ask", "job", "run/serve"];
+
+/// The most lines that a file may have.
+const MOST_LINES: usize = 600;
+
+/// The circles of files that may be, each with its reason, or with how to cut it.
+const CIRCLES: [(&[&str], &str); 4] = [
+    (
+        &[
+            "score/choice/lenient.rs",
+            "score/choice/stated.rs",
+            "score/choice/structured.rs",
+        ],
+        "it stays: a reply within a reply is read by the reader that found it",
+    ),
+    (
+        &["types/trials/mod.rs", "types/trials/trial_ref.rs"],
+        "it stays: a trial is read through the tables of all, which hand it out",
+    ),
+    (
+        &["dataset/frames.rs", "dataset/mod.rs"],
+        "to cut it, move Dataset and stem out of dataset/mod.rs; what opens a place stays there",
+    ),
+    (
+        &["synthesis/exposures.rs", "synthesis/mod.rs"],
+        "to cut it, move VERSION out of synthesis/mod.rs into a file of its own",
+    ),
+];
+
+/// The functions that make a digest, and use debug output in what they tell the user alone.
+const DEBUG_IN_MESSAGES: [(&str, &str); 3] = [
+    ("run/questions/mod.rs", "measure_frame"),
+    ("run/serve/mod.rs", "answer"),
+    ("types/digest.rs", "from_str"),
+];
+
+/// The files of `src/`, read once for all tests.
+static FILES: LazyLock<Files> = LazyLock::new(|| Files::read(&src()));
+
+fn src() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
+}
+
+fn the_map() -> Map {
+    let lib = fs::read_to_string(src().join("lib.rs")).unwrap();
+    Map::read(&lib).unwrap_or_else(|problem| panic!("{problem}"))
+}
+
+/// Fails with everything that is wrong.
+#[track_caller]
+fn assert_none(wrong: &[String]) {
+    assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn the_map_has_the_rooms_of_src() {
+    assert_none(&the_map().untrue(&FILES.rooms()));
+}
+
+#[test]
+fn rooms_use_only_what_the_map_allows() {
+    assert_none(&rules::imports(&FILES, &the_map()));
+}
+
+/// What several commands need is in `job` or below.
+#[test]
+fn no_command_uses_another() {
+    assert_none(&rules::commands(&FILES));
+}
+
+#[test]
+fn files_do_not_import_each_other_in_circles() {
+    assert_none(&circles::wrong(&FILES, &CIRCLES));
+}
+
+#[test]
+fn libraries_stand_in_their_places() {
+    let found = LIBRARIES
+        .iter()
+        .flat_map(|(name, places)| rules::library(&FILES, name, places));
+    assert_none(&found.collect::<Vec<_>>());
+}
+
+#[test]
+fn futures_are_awaited_in_their_places() {
+    assert_none(&rules::awaits(&FILES, &AWAITS));
+}
+
+/// Each stands there with its number and its reason, so that a new one is seen by who reads the page.
+#[test]
+fn unsafe_code_is_listed_in_the_security_page() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join(".github/SECURITY.md");
+    let listed = unsafe_code::listed(&fs::read_to_string(page).unwrap());
+    let counts = FILES.iter().filter_map(|source| {
+        let text = fs::read_to_string(src().join(&source.path)).unwrap();
+        let count = unsafe_code::count(&text).unwrap();
+        (count > 0).then(|| (source.path.clone(), count))
+    });
+    assert_eq!(listed, counts.collect());
+}
+
+#[test]
+fn no_file_is_too_long() {
+    assert_none(&rules::long_files(&FILES, MOST_LINES));
+}
+
+#[test]
+fn no_code_is_missing() {
+    assert_none(&rules::unfinished(&FILES));
+}
+
+/// Debug output has no promised form: a new field would change every digest that it enters.
+#[test]
+fn no_digest_is_made_of_debug_output() {
+    let makers = digests::makers(&FILES);
+    assert!(makers.len() > 20, "{makers:?}");
+    let debug = makers.into_iter().filter(|(_, _, has_debug)| *has_debug);
+    let found: Vec<_> = debug.map(|(file, name, _)| (file, name)).collect();
+    assert_eq!(found, DEBUG_IN_MESSAGES);
+}

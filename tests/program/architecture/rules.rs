@@ -1,0 +1,111 @@
+//! The rules about single files and lines. Each gives one line for each breach.
+
+use super::files::Files;
+use super::map::Map;
+use super::source::{Kind, Part, Source};
+
+/// The files that have too many lines.
+pub(crate) fn long_files(files: &Files, most: usize) -> Vec<String> {
+    let long = files.iter().filter(|source| source.lines > most);
+    let lines = long.map(|source| {
+        let rule = format!("{} lines, and a file may have {most}", source.lines);
+        at(source, source.lines, &rule)
+    });
+    lines.collect()
+}
+
+/// The imports of rooms that the map does not allow; those of tests count, too.
+pub(crate) fn imports(files: &Files, map: &Map) -> Vec<String> {
+    let mut wrong = Vec::new();
+    for (source, part, path) in paths(files) {
+        let Some(room) = source.module.first() else {
+            continue;
+        };
+        let rule = match path.first().map(String::as_str) {
+            None | Some("*") => format!("`{room}` uses the whole crate: name the room"),
+            Some(other) if !map.has(other) => {
+                format!("`{room}` uses `crate::{other}`, which is no room of the map")
+            }
+            Some(other) if !map.allows(room, other) => format!("`{room}` may not use `{other}`"),
+            Some(_) => continue,
+        };
+        wrong.push(at(source, part.line, &rule));
+    }
+    wrong
+}
+
+/// The paths by which one command's folder or file uses another command's; those of tests count, too.
+pub(crate) fn commands(files: &Files) -> Vec<String> {
+    let mut wrong = Vec::new();
+    for (source, part, path) in paths(files) {
+        let is_run = |module: &[String]| module.first().is_some_and(|room| room == "run");
+        if is_run(&source.module) && is_run(&path) && source.module.get(1) != path.get(1) {
+            let rule = format!("a command uses `{}`, which is not its own", path.join("::"));
+            wrong.push(at(source, part.line, &rule));
+        }
+    }
+    wrong
+}
+
+/// The calls of `todo!` and `unimplemented!`.
+pub(crate) fn unfinished(files: &Files) -> Vec<String> {
+    let mut wrong = Vec::new();
+    for (source, part) in files.parts() {
+        let name = part.names.last().map_or("", String::as_str);
+        if matches!(part.kind, Kind::Macro) && matches!(name, "todo" | "unimplemented") {
+            let rule = format!("`{name}!` stands for code that is missing");
+            wrong.push(at(source, part.line, &rule));
+        }
+    }
+    wrong
+}
+
+/// Where a library is used outside of its places, and its places that do not use it; tests are free.
+pub(crate) fn library(files: &Files, name: &str, places: &[&str]) -> Vec<String> {
+    let uses = files.parts_outside_tests().filter(|(_, part)| {
+        let is_whole = part.names.len() > 1 || matches!(part.kind, Kind::Import { .. });
+        part.is_path() && is_whole && part.names[0] == name
+    });
+    misplaced(&uses.collect::<Vec<_>>(), &format!("`{name}`"), places)
+}
+
+/// Where a future is awaited outside of some places, and the places that await none; tests are free.
+pub(crate) fn awaits(files: &Files, places: &[&str]) -> Vec<String> {
+    let parts = files.parts_outside_tests();
+    let uses = parts.filter(|(_, part)| matches!(part.kind, Kind::Await));
+    misplaced(&uses.collect::<Vec<_>>(), "`.await`", places)
+}
+
+/// The uses outside of the places (folders or files in `src/`), and the places without a use.
+fn misplaced(uses: &[(&Source, &Part)], what: &str, places: &[&str]) -> Vec<String> {
+    let is_in = |source: &Source, place: &str| {
+        let rest = source.path.strip_prefix(place);
+        rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+    };
+    let mut wrong = Vec::new();
+    for (source, part) in uses {
+        if !places.iter().any(|place| is_in(source, place)) {
+            let rule = format!("{what} may stand only in {}", places.join(", "));
+            wrong.push(at(source, part.line, &rule));
+        }
+    }
+    for place in places {
+        if !uses.iter().any(|(source, _)| is_in(source, place)) {
+            wrong.push(format!(
+                "{what} may stand in {place}, but does not: delete this place"
+            ));
+        }
+    }
+    wrong
+}
+
+/// The paths into this crate, from its root.
+fn paths(files: &Files) -> impl Iterator<Item = (&Source, &Part, Vec<String>)> {
+    files
+        .parts()
+        .filter_map(|(source, part)| Some((source, part, files.path_from_root(part)?)))
+}
+
+fn at(source: &Source, line: usize, rule: &str) -> String {
+    format!("src/{}:{line}: {rule}", source.path)
+}
