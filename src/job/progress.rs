@@ -58,7 +58,10 @@ impl Progress {
         let bar = self
             .bars
             .add(ProgressBar::new(length as u64).with_message(what));
-        StepBar(style.map_or(bar.clone(), |style| bar.with_style(style)))
+        let bar = style.map_or(bar.clone(), |style| bar.with_style(style));
+        // Shown from the start, not only after the first step.
+        bar.tick();
+        StepBar(bar)
     }
 
     /// The bar of the trials: answered, failed, rate, remaining time.

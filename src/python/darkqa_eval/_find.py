@@ -32,7 +32,7 @@ def find_darkqa_bin() -> str:
     places = "\n".join(f"  {folder}" for folder in searched)
     raise FileNotFoundError(
         f"no {_PROGRAM} beside the Python package darkqa_eval; searched:\n{places}\n"
-        "Install the package again: pip install --force-reinstall --no-deps darkqa-eval"
+        "Install the package again, in a clone of its repository: pip install --force-reinstall --no-deps ."
     )
 
 

@@ -55,7 +55,7 @@ def load_run(path: str | os.PathLike[str], questions: bool = True) -> pandas.Dat
     try:
         import pandas
     except ImportError as error:
-        raise ImportError('load_run needs pandas: pip install "darkqa-eval[pandas]"') from error
+        raise ImportError('load_run needs pandas: pip install pandas') from error
     runs = runs_in(Path(path))
     schema = runs[0].schema
     left_out = set() if questions else FROM_QUESTIONS[schema]
