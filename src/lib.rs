@@ -114,26 +114,17 @@
 //!
 //! # Who may import whom
 //!
-//! `tests/program/architecture/` reads this table and fails on a breach. A room may use only rooms whose rows are above its own. No file of
+//! `tests/program/architecture/` reads this table and fails on a breach. A room may use crates of the workspace and rooms whose rows are above its own. No file of
 //! `run` uses another command's, and files import each other in no circles but those that `tests/program/architecture/mod.rs` lists with
 //! a reason.
 //!
 //! | module | may use |
 //! |---|---|
-//! | `error` | nothing |
-//! | `types` | `error` |
-//! | `files` | `error` |
-//! | `questions` | `types`, `error` |
-//! | `synthesis` | `files`, `types`, `error` |
-//! | `enhance` | `synthesis`, `files`, `types`, `error` |
-//! | `ask` | `files`, `types`, `error` |
-//! | `score` | `types`, `error` |
-//! | `labels` | `files`, `types`, `error` |
-//! | `rooms` | `labels`, `types`, `error` |
 //! | `dataset` | `rooms`, `labels`, `files`, `types`, `error` |
 //! | `import` | `dataset`, `labels`, `files`, `types`, `error` |
+//! | `ask` | `files`, `types`, `error` |
 //! | `calibrate` | `dataset`, `synthesis`, `files`, `types`, `error` |
-//! | `store` | `files`, `types`, `error` |
+//! | `store` | `score`, `files`, `types`, `error` |
 //! | `image_store` | `files`, `types`, `error` |
 //! | `report` | `types`, `error`, `score`, `questions`, `calibrate` |
 //! | `job` | `files`, `types`, `error`, `rooms`, `labels`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `image_store`, `report` |
@@ -149,23 +140,22 @@ mod calibrate;
 #[doc(hidden)]
 pub mod cli;
 mod dataset;
-pub mod enhance;
-mod error;
-mod files;
 mod image_store;
 mod import;
 #[doc(hidden)]
 pub mod internals;
 mod job;
-mod labels;
-pub mod questions;
 mod report;
-mod rooms;
 mod run;
-pub mod score;
 mod store;
-pub mod synthesis;
-pub mod types;
+
+pub use darkqa_enhance as enhance;
+pub use darkqa_ground::{error, types};
+pub(crate) use darkqa_ground::{files, labels};
+pub use darkqa_light as synthesis;
+pub use darkqa_questions as questions;
+pub(crate) use darkqa_scenes as rooms;
+pub use darkqa_score as score;
 
 pub use error::{Error, Result};
 pub use types::degradation::Kind;

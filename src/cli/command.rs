@@ -39,7 +39,7 @@ Exit codes: 0 everything scored; 1 finished with failures; 2 usage, configuratio
 --max-cost; 130 interrupted.
 [trials], [reply] and [pixels] mark what a flag decides: which trials there are, what a model is sent, the content of images. No other flag
 changes an answer.
-Results go to standard output, progress and logs to standard error (RUST_LOG=darkqa_eval=debug shows more).";
+Results go to standard output, progress and logs to standard error (RUST_LOG=darkqa_=debug shows more).";
 
 /// Measures how well a vision-language model sees in the dark.
 ///

@@ -43,6 +43,9 @@ const OVER_BUDGET: u8 = 3;
 /// Exit code: interrupted; the same command continues.
 const INTERRUPTED: u8 = 130;
 
+/// What is logged by default. The names of all crates of this workspace begin with `darkqa_`.
+const LOGGED: &str = "darkqa_=warn";
+
 /// Printed after the error of a call without any word.
 const FIRST_STEPS: &str = "
   darkqa-eval --model observer --llie lift                    try it, without key or data
@@ -78,8 +81,7 @@ pub fn main(words: impl Iterator<Item = OsString>) -> ExitCode {
         Verbosity::Normal
     };
     let progress = Progress::new(verbosity);
-    let filter =
-        EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("darkqa_eval=warn"));
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(LOGGED));
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_target(false)

@@ -54,7 +54,7 @@ pub(crate) struct SelectionArgs {
     #[arg(long, value_name = "FILE", add = Decides::Reply)]
     pub questions: Option<PathBuf>,
     /// The rulebook that makes the questions of data that have none, and that the observer answers by; default: the one built in
-    /// (src/questions/rules.toml)
+    /// (src/questions/src/rules.toml)
     #[arg(long, value_name = "FILE", add = Decides::Reply)]
     pub rules: Option<PathBuf>,
     /// Only the first N questions; default: all

@@ -23,6 +23,7 @@ use super::truncation::TruncationCheck;
 use super::workers::unstarted;
 use crate::ask::{AskError, Call, Reach};
 use crate::error::{Error, Result};
+use crate::score::record::answered;
 use crate::store::Store;
 use crate::types::{Failure, FailureKind, Reply};
 
@@ -371,7 +372,7 @@ impl<I: Item> ReplySink<'_, I> {
         let model = &self.dispatcher.models[ready.trial.model];
         let blank = I::blank(&ready.trial, &ready.stimulus, &model.name);
         self.store.append(&match result {
-            Ok(reply) => blank.answered(reply)?,
+            Ok(reply) => answered(blank, reply)?,
             Err(error) => blank.failed_by(error.failure, error.attempts),
         })
     }

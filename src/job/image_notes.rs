@@ -7,9 +7,10 @@ use super::thumbnail::MissingThumbnails;
 use crate::ask::Payload;
 use crate::error::Result;
 use crate::score::realism::{psnr, ssim::ssim};
+use crate::score::record::Detail;
 use crate::store::Store;
 use crate::types::outlines::PixelBox;
-use crate::types::{Condition, Detail, FrameId, ImageFidelity, Rgb, Shared, Thumbnail};
+use crate::types::{Condition, FrameId, ImageFidelity, Rgb, Shared, Thumbnail};
 
 /// The notes about one image; `None` for what is not wanted or exists already.
 #[derive(Debug, Default)]

@@ -13,8 +13,9 @@ use super::thumbnail::MissingThumbnails;
 use super::{Outcome, ShowArgs, StdoutFormat};
 use crate::error::{Error, Result};
 use crate::files::folder_access::FolderAccess;
+use crate::score::record::Detail;
 use crate::store::{self, AddressChange, Store};
-use crate::types::{ChoiceDetail, Decides, Detail, OpenDetail};
+use crate::types::{ChoiceDetail, Decides, OpenDetail};
 
 /// The flags of `merge`.
 #[derive(Debug, Args)]

@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 
 use super::placed_trials::{append, trials_of};
 use crate::error::{Error, Result};
+use crate::score::record::Detail;
 use crate::store::{self, Store};
 use crate::types::manifest::{RunManifest, differences};
-use crate::types::{Detail, FrameId, TextPlace, TrialKey};
+use crate::types::{FrameId, TextPlace, TrialKey};
 
 /// The parts of a run in another number than now, as when a job array was stopped and goes on with another size.
 pub(super) struct OtherParts(Vec<(PathBuf, RunManifest)>);

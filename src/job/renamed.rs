@@ -9,11 +9,12 @@ use serde_json::{Value, json};
 
 use super::models::{ADAPTED_FOR, AskSettings};
 use crate::error::Result;
+use crate::score::record::Detail;
 use crate::types::control::OBSERVER;
 use crate::types::manifest::RunManifest;
 use crate::types::model_views::{Fit, StoredViews, Views};
 use crate::types::recorded_names::RecordedNames;
-use crate::types::{Control, Detail, Digest, Record, Trials};
+use crate::types::{Control, Digest, Record, Trials};
 
 /// The entry of a manifest's settings that holds the models which its file of models no longer has.
 const LEFT_OUT: &str = "models left out";

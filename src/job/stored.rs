@@ -9,11 +9,13 @@ use super::run_files::RunFiles;
 use super::run_texts::HeldTexts;
 pub(crate) use super::run_texts::RunTexts;
 use crate::error::{Error, Result};
+use crate::score::record::Detail;
 use crate::store;
+use crate::types::StoredDetail as _;
 use crate::types::manifest::RunManifest;
 use crate::types::{
-    ChoiceDetail, Detail, ImageFidelity, KeptTrial, ListedModel, ModelListing, OpenDetail,
-    QuestionId, Record, RunQuestion, TextPlace, Thumbnail, TrialRef, Trials,
+    ChoiceDetail, ImageFidelity, KeptTrial, ListedModel, ModelListing, OpenDetail, QuestionId,
+    Record, RunQuestion, TextPlace, Thumbnail, TrialRef, Trials,
 };
 
 /// The models of a run that a report shows.

@@ -8,7 +8,8 @@ use super::image_notes::ImageNotes;
 use super::models::ModelUnderTest;
 use crate::ask::{ImagePlaces, Message, Payload, Query};
 use crate::error::{Error, Result};
-use crate::types::{Condition, Detail, Digest, QuestionId, Record, TrialKey};
+use crate::score::record::Detail;
+use crate::types::{Condition, Digest, QuestionId, Record, TrialKey};
 
 /// The subject of a trial: a question with choices, an open question, or an answer to judge.
 pub(crate) trait Item: Clone + Send + Sync + 'static {

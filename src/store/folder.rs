@@ -13,9 +13,10 @@ use super::stored_trial::StoredTrial;
 use crate::error::{Error, Result};
 use crate::files::folder_access::FolderAccess;
 use crate::files::{self, is_unfinished, reading};
+use crate::score::record::Detail;
 use crate::types::manifest::{ColumnDifference, JUDGES, RunManifest, differences, judge_flag};
 use crate::types::recorded_names::RecordedNames;
-use crate::types::{Detail, Distinct, ImageFidelity, Record, RunQuestion, Thumbnail, TrialKey};
+use crate::types::{Distinct, ImageFidelity, Record, RunQuestion, Thumbnail, TrialKey};
 
 pub(super) const MANIFEST: &str = "manifest.json";
 pub(super) const RECORDS: &str = "records.jsonl";

@@ -15,7 +15,8 @@ use super::trial_line::TrialLine;
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::files::write_synced;
-use crate::types::{Detail, ImageFidelity, Record, RunQuestion, Thumbnail, Usage};
+use crate::score::record::Detail;
+use crate::types::{ImageFidelity, Record, RunQuestion, Thumbnail, Usage};
 
 /// Appends lines to a file, which is created if it does not exist.
 pub(super) fn append<T: Serialize + StoredLine>(path: &Path, values: &[T]) -> Result<File> {

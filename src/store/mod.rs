@@ -27,11 +27,12 @@ use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
 use crate::files::write_with;
+use crate::score::record::Detail;
 use crate::types::manifest::RunManifest;
 use crate::types::recorded_names::RecordedNames;
 use crate::types::{
-    ChoiceDetail, Detail, Distinct, FrameId, ImageFidelity, QuestionId, Record, RunQuestion,
-    Thumbnail, TrialKey, Via,
+    ChoiceDetail, Distinct, FrameId, ImageFidelity, QuestionId, Record, RunQuestion, Thumbnail,
+    TrialKey, Via,
 };
 
 use folder::{

@@ -10,7 +10,8 @@ use super::pieces::{LinePlace, open_if_there};
 use super::reread_record::RereadRecord;
 use super::trial_line::TrialLine;
 use crate::error::{Error, Result};
-use crate::types::{Detail, Record};
+use crate::score::record::Detail;
+use crate::types::Record;
 
 /// The bytes that are read at once for a single line. Chosen: most lines are shorter.
 const LINE_BYTES: usize = 2048;

@@ -2,6 +2,7 @@ use super::*;
 use std::collections::BTreeMap;
 use std::fs;
 
+use crate::types::StoredDetail as _;
 use crate::types::manifest::{Counts, Status};
 use crate::types::{Digest, Family, FrameId, QuestionId, TrialOutcome};
 

@@ -172,7 +172,7 @@ fn shards_of_the_observer_are_one_light() {
 #[test]
 fn runs_by_other_rules_say_so_and_keep_their_controls() {
     let bench = Bench::new();
-    let rules = include_str!("../../src/questions/rules.toml");
+    let rules = include_str!("../../src/questions/src/rules.toml");
     let own = rules.replace("detail_ppm = 500 ", "detail_ppm = 501 ");
     assert_ne!(own, rules);
     bench.file("own.toml", own);

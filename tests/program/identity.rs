@@ -93,7 +93,7 @@ impl Scene {
             json!({"id": "color", "question": "What color?", "choices": ["red", "blue"]}),
         ];
         bench.file("bank.jsonl", bank.map(|line| line.to_string()).join("\n"));
-        let rules = include_str!("../../src/questions/rules.toml");
+        let rules = include_str!("../../src/questions/src/rules.toml");
         bench.file("rules.toml", rules.replace("gap_mm = 300", "gap_mm = 301"));
         onnx::gain(0.5).write(&bench.path(""), "one.onnx");
         onnx::gamma(0.5).write(&bench.path(""), "two.onnx");

@@ -451,7 +451,7 @@ fn rules_and_colours_are_a_file_that_stands_in_each_question() {
     let rules = out.path().join("rules.toml");
     let built_in = fs::read_to_string(concat!(
         env!("CARGO_MANIFEST_DIR"),
-        "/src/questions/rules.toml"
+        "/src/questions/src/rules.toml"
     ))
     .unwrap();
     fs::write(&rules, built_in.replace("crushed = 3 ", "crushed = 4 ")).unwrap();

@@ -10,7 +10,7 @@ use super::driver::{Driver, Step, Until};
 use super::event::Event;
 use crate::ask::batch_api::{ApiResult, BatchState, RemoteBatch};
 use crate::error::{Error, Result};
-use crate::types::Detail;
+use crate::score::record::Detail;
 
 /// Bytes that a reply may have; chosen: far more than the longest reply of a reasoning model.
 const MOST_REPLY_BYTES: u64 = 4 << 20;

@@ -20,9 +20,10 @@ use crate::error::{Error, Result};
 use crate::job::models::ModelUnderTest;
 use crate::job::money::MoneySettings;
 use crate::job::progress::Progress;
+use crate::score::record::Detail;
 use crate::store::Store;
+use crate::types::TrialKey;
 use crate::types::manifest::RunManifest;
-use crate::types::{Detail, TrialKey};
 
 /// How many times as long as at first the wait between two looks may become; chosen: 5 minutes with the default of 10 s.
 const LONGEST_WAIT: u32 = 30;

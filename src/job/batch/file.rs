@@ -9,8 +9,9 @@ use sha2::{Digest as _, Sha256};
 use super::event::PartFacts;
 use super::journal::Journal;
 use crate::error::{Error, Result};
+use crate::score::record::Detail;
 use crate::store::Store;
-use crate::types::{Detail, Record};
+use crate::types::Record;
 
 /// Extension of a file until it is complete.
 pub(super) const PART: &str = "part";

@@ -18,8 +18,8 @@ use crate::ask::{AccessArgs, Endpoint, Sending};
 use crate::error::{Error, Result};
 use crate::job::progress::Progress;
 use crate::job::workers::unstarted;
+use crate::score::record::Detail;
 use crate::store::Store;
-use crate::types::Detail;
 use crate::types::manifest::RunManifest;
 
 /// What is done with the batches of a folder.

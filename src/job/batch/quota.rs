@@ -11,7 +11,7 @@ use super::requests::SHARE_OF_QUOTA;
 use crate::ask::batch_api::QuotaRefusal;
 use crate::error::Result;
 use crate::job::budget::{Answering, Budget};
-use crate::types::Detail;
+use crate::score::record::Detail;
 
 /// How many looks long nothing is submitted after the first refusal; chosen: a minute with the default of 10 s.
 const FIRST_HOLD: u32 = 6;

@@ -9,10 +9,11 @@ use crate::ask::Constrain;
 use crate::ask::batch::{BatchLine, with_letter};
 use crate::error::{Error, Result};
 use crate::files::reading;
+use crate::score::record::{Detail, answered};
 use crate::store::Store;
 use crate::types::flag::read_word;
 use crate::types::manifest::RunManifest;
-use crate::types::{Detail, Failure, FailureKind, Record, Reply, TrialKey};
+use crate::types::{Failure, FailureKind, Record, Reply, TrialKey};
 
 /// Numbers of lines, by what they led to.
 #[derive(Debug, Default)]
@@ -82,7 +83,7 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
             attempts: 1,
             ..with_letter(reply, constrain, choices)
         };
-        self.store.append(&blank.answered(reply)?)?;
+        self.store.append(&answered(blank, reply)?)?;
         Ok(Imported::Answered)
     }
 

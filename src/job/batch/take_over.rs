@@ -11,7 +11,8 @@ use super::replies::{Imported, ReplyImport};
 use crate::ask::Model;
 use crate::error::{Error, Result};
 use crate::files::reading;
-use crate::types::{Detail, Failure, FailureKind, TrialKey};
+use crate::score::record::Detail;
+use crate::types::{Failure, FailureKind, TrialKey};
 
 impl<'a, D: Detail> Driver<'a, D> {
     /// Reads the replies of a part into the records of the run. What has no line may be asked again.

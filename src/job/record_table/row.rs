@@ -5,11 +5,12 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::error::Result;
+use crate::score::record::Detail;
 use crate::store::Column;
 use crate::types::manifest::RunManifest;
 use crate::types::recorded_names::RecordedNames;
 use crate::types::{
-    Condition, ConditionColumns, Detail, Digest, QuestionId, Record, RunQuestion, Severity,
+    Condition, ConditionColumns, Digest, QuestionId, Record, RunQuestion, Severity,
 };
 
 /// The detail of a record that has a table of its own.

@@ -7,8 +7,9 @@ use serde_json::Value;
 use crate::ask::{Price, Prices};
 use crate::error::Result;
 use crate::report::forecast::money;
+use crate::score::record::Detail;
 use crate::types::manifest::RunManifest;
-use crate::types::{Detail, TrialRef, Via};
+use crate::types::{TrialRef, Via};
 
 /// The cost of replies of a model at list prices, in US dollars; `None` if the model has no known price or no reply says its tokens.
 pub(super) fn dollars<'t, D: Detail + 't>(

@@ -8,10 +8,11 @@ use super::lights::Lights;
 use super::models::Names;
 use crate::error::Result;
 use crate::job::stored::{RunLayout, RunTexts, StoredRun};
+use crate::score::record::Detail;
 use crate::types::manifest::RunManifest;
 use crate::types::{
-    Condition, Detail, FrameId, ImageFidelity, ModelListing, QuestionId, RunQuestion, Thumbnail,
-    TrialKey, TrialRef, Trials,
+    Condition, FrameId, ImageFidelity, ModelListing, QuestionId, RunQuestion, Thumbnail, TrialKey,
+    TrialRef, Trials,
 };
 
 /// The runs, with all trials, questions and thumbnails.

@@ -6,7 +6,8 @@ use serde_json::Value;
 
 use super::join::{Joined, JoinedRun};
 use crate::job::models::ADAPTED_FOR;
-use crate::types::{Detail, ModelColumn, ModelListing};
+use crate::score::record::Detail;
+use crate::types::{ModelColumn, ModelListing};
 
 /// The order and the groups of the files of models of all runs, one after the other by the runs' names; and what is known of each
 /// model.

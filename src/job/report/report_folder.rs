@@ -5,8 +5,8 @@ use std::path::Path;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::job::stored::RunLayout;
+use crate::score::record::Detail;
 use crate::store::{AddressChange, Store};
-use crate::types::Detail;
 use crate::types::manifest::RunManifest;
 
 /// The folder that the report of one run is written into.

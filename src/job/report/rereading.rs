@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::score::choice::LENIENT_VERSION;
+use crate::score::record::reread;
 use crate::types::manifest::{FIRST_REPLY_READING, RunManifest};
 use crate::types::{ChoiceDetail, Record};
 
@@ -45,7 +46,7 @@ impl LenientChange {
     ) -> Result<Self> {
         for record in records {
             let record = record?;
-            self.add(&record.detail, &record.clone().reread()?.detail);
+            self.add(&record.detail, &reread(record.clone())?.detail);
         }
         Ok(self)
     }

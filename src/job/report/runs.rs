@@ -26,9 +26,10 @@ use crate::report::alert::Alert;
 use crate::report::choice_report::ChoiceReport;
 use crate::report::json::{RunList, summary};
 use crate::report::products::PAGE;
+use crate::score::record::{self, Detail as _};
 use crate::store::{AddressChange, Store};
 use crate::types::manifest::Status;
-use crate::types::{ChoiceDetail, Decides, Detail as _, ModelColumn, OpenDetail, TrialRef, Truths};
+use crate::types::{ChoiceDetail, Decides, ModelColumn, OpenDetail, TrialRef, Truths};
 
 /// The flags of `report`.
 #[derive(Debug, Args)]
@@ -373,7 +374,7 @@ fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<String> {
     let mut lenient = LenientChange::of(&run.manifest);
     for trial in run.trials.iter() {
         let record = run.record(trial)?;
-        let now = record.clone().reread()?;
+        let now = record::reread(record.clone())?;
         lenient.add(&record.detail, &now.detail);
         if now != record {
             store.append(&now)?;

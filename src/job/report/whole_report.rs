@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::error::{Error, Result};
 use crate::job::stored::{ShownModels, StoredRun};
-use crate::types::Detail;
+use crate::score::record::Detail;
 
 /// Name of the file with the rows of the summary.
 const SUMMARY_JSON: &str = "summary.json";

@@ -11,8 +11,9 @@ use super::trials::each_once;
 use crate::error::Result;
 use crate::job::placed_trials::read_part;
 use crate::job::stored::sort;
+use crate::score::record::Detail;
+use crate::types::Trials;
 use crate::types::manifest::{Counts, RunManifest, Status};
-use crate::types::{Detail, Trials};
 
 /// The parts of one run, of any divisions of it.
 pub(in crate::job) struct RunParts<D: Detail> {

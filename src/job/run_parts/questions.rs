@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use crate::error::Result;
+use crate::score::record::Detail;
 use crate::store::{LinePlace, QuestionFile, Store, each_placed_question};
-use crate::types::{Detail, FrameId, QuestionId, RunQuestion};
+use crate::types::{FrameId, QuestionId, RunQuestion};
 
 /// The questions of several parts in the order of the data, each once.
 pub(in crate::job) struct PartQuestions(Vec<PartQuestion>);

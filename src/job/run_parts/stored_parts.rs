@@ -10,8 +10,9 @@ use crate::error::Result;
 use crate::job::run_texts::RunTexts;
 use crate::job::stored::{AnyRun, ExperimentKind, RunLayout, StoredRun, manifest, open_questions};
 use crate::job::thumbnail::MissingThumbnails;
+use crate::score::record::Detail;
 use crate::store;
-use crate::types::{ChoiceDetail, Detail, Trials};
+use crate::types::{ChoiceDetail, Trials};
 
 /// The run in a folder; that of all parts in it if the folder itself holds none. What is in no part is said.
 ///

@@ -173,7 +173,7 @@ def add_mark(record: Record, judge: str | None, protocol: str, marks: Marks, wor
 def judged_answer(record: Record, protocol: str) -> str | None:
     """The answer in a reply to an open question, as the judge gets it; ``None`` if the reply has none.
 
-    The rules are those of ``src/job/predictions.rs`` and ``src/score/llm_match.rs``.
+    The rules are those of ``src/job/predictions.rs`` and ``src/score/src/llm_match.rs``.
     """
     reply = record["reply"]
     if reply is None or record["refusal"] is not None or not reply.strip():

@@ -12,9 +12,10 @@ use crate::job::progress::Progress;
 use crate::job::report::{choice, open};
 use crate::job::stored::{ExperimentKind, StoredRun, manifest};
 use crate::job::{Outcome, ShowArgs, StdoutFormat};
+use crate::score::record::Detail;
 use crate::store::{AddressChange, Store};
 use crate::types::manifest::Status;
-use crate::types::{ChoiceDetail, Decides, Detail, OpenDetail};
+use crate::types::{ChoiceDetail, Decides, OpenDetail};
 
 /// The flags of `batch status`.
 #[derive(Debug, Args)]

@@ -12,9 +12,10 @@ use crate::job::record_table;
 use crate::job::report::{choice, open};
 use crate::job::stored::{ExperimentKind, StoredRun, manifest};
 use crate::job::{Outcome, ShowArgs, StdoutFormat, count};
+use crate::score::record::Detail;
 use crate::store::{AddressChange, Store};
 use crate::types::manifest::RunManifest;
-use crate::types::{ChoiceDetail, Decides, Detail, OpenDetail, TrialRef};
+use crate::types::{ChoiceDetail, Decides, OpenDetail, TrialRef};
 
 pub(crate) use folder::{BatchFolderArgs, BatchStatusArgs, cancel, fetch, status};
 

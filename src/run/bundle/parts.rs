@@ -12,9 +12,10 @@ use crate::error::{Error, Result};
 use crate::job::run_files::RunFiles;
 use crate::job::stored::{AnyRun, ExperimentKind, StoredRun, manifest};
 use crate::report::page::shown_thumbnails;
+use crate::score::record::Detail;
 use crate::store;
 use crate::types::manifest::RunManifest;
-use crate::types::{Detail, Record, Thumbnail};
+use crate::types::{Record, Thumbnail};
 
 /// The small images that a bundle has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -6,8 +6,9 @@ use std::fmt::Write;
 use serde_json::{Value, json};
 
 use crate::job::stored::AnyRun;
+use crate::score::record::Detail;
 use crate::types::manifest::{RunManifest, judge_flag};
-use crate::types::{AxisLevel, Detail, Trials, shell_word};
+use crate::types::{AxisLevel, Trials, shell_word};
 
 /// What a README is written from.
 pub(super) struct ReadmeInputs<'a> {

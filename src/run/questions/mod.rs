@@ -49,10 +49,10 @@ pub(crate) struct QuestionsArgs {
     /// Where the questions go (.jsonl); the statistics of the frames go into a file next to it
     #[arg(long, value_name = "FILE", value_parser = file, add = Decides::Nothing)]
     pub out: PathBuf,
-    /// The rulebook; default: the one built in (src/questions/rules.toml)
+    /// The rulebook; default: the one built in (src/questions/src/rules.toml)
     #[arg(long, value_name = "FILE", help_heading = "Rules", add = Decides::Trials)]
     pub rules: Option<PathBuf>,
-    /// The names of colours, a table like src/questions/colors.txt; default: the one built in
+    /// The names of colours, a table like src/questions/src/colors.txt; default: the one built in
     #[arg(long, value_name = "FILE", help_heading = "Rules", add = Decides::Trials)]
     pub colors: Option<PathBuf>,
     /// Only these families: room_type, affordance, presence, color, closest; default: all

@@ -12,8 +12,11 @@ use super::source::Kind;
 type Imports<'a> = BTreeMap<&'a str, BTreeMap<&'a str, BTreeSet<String>>>;
 
 /// The circles that are not listed, and the listed ones that are no circles.
-pub(crate) fn wrong(files: &Files, listed: &[(&[&str], &str)]) -> Vec<String> {
-    let imports = imports(files);
+pub(crate) fn wrong<'a>(
+    crates: impl Iterator<Item = &'a Files>,
+    listed: &[(&[&str], &str)],
+) -> Vec<String> {
+    let imports: Imports<'_> = crates.flat_map(imports).collect();
     let found = circles(&imports);
     let is_listed = |circle: &&Vec<&str>| listed.iter().any(|(files, _)| files == circle);
     let is_found = |files: &[&str]| found.iter().any(|circle| circle == files);

@@ -17,11 +17,19 @@ pub(crate) struct Files {
 }
 
 impl Files {
-    /// The Rust files of a folder and of the folders in it.
+    /// The Rust files of a folder and of the folders in it, without other crates.
     pub(crate) fn read(folder: &Path) -> Self {
         let mut texts = Vec::new();
         collect(folder, "", &mut texts);
         Self::of(&texts)
+    }
+
+    /// The same files, with paths below a folder of `src/`.
+    pub(crate) fn below(mut self, folder: &str) -> Self {
+        for source in &mut self.sources {
+            source.path.insert_str(0, folder);
+        }
+        self
     }
 
     /// The files with these paths and texts.
@@ -144,7 +152,7 @@ fn collect(folder: &Path, before: &str, texts: &mut Vec<(String, String)>) {
     entries.sort();
     for entry in entries {
         let path = format!("{before}{}", entry.file_name().unwrap().to_str().unwrap());
-        if entry.is_dir() {
+        if entry.is_dir() && !entry.join("Cargo.toml").exists() {
             collect(&entry, &format!("{path}/"), texts);
         } else if entry.extension().is_some_and(|end| end == "rs") {
             texts.push((path, fs::read_to_string(&entry).unwrap()));

@@ -14,8 +14,8 @@ pub(crate) fn long_files(files: &Files, most: usize) -> Vec<String> {
     lines.collect()
 }
 
-/// The imports of rooms that the map does not allow; those of tests count, too.
-pub(crate) fn imports(files: &Files, map: &Map) -> Vec<String> {
+/// The imports of rooms and crates that the map does not allow; those of tests count, too.
+pub(crate) fn imports(files: &Files, map: &Map, crates: &[&str]) -> Vec<String> {
     let mut wrong = Vec::new();
     for (source, part, path) in paths(files) {
         let Some(room) = source.module.first() else {
@@ -23,7 +23,7 @@ pub(crate) fn imports(files: &Files, map: &Map) -> Vec<String> {
         };
         let rule = match path.first().map(String::as_str) {
             None | Some("*") => format!("`{room}` uses the whole crate: name the room"),
-            Some(other) if !map.has(other) => {
+            Some(other) if !map.has(other) && !crates.contains(&other) => {
                 format!("`{room}` uses `crate::{other}`, which is no room of the map")
             }
             Some(other) if !map.allows(room, other) => format!("`{room}` may not use `{other}`"),

@@ -154,7 +154,7 @@ fn with_one_scene_the_control_is_shown_the_tiles_in_another_order() {
 #[test]
 fn the_rules_make_the_questions_and_the_answers_alike() {
     let bench = Bench::new();
-    let rules = include_str!("../../../src/questions/rules.toml");
+    let rules = include_str!("../../../src/questions/src/rules.toml");
     let own = rules.replace(
         "Is there {article} {object} in the image?",
         "Can {article} {object} be seen?",

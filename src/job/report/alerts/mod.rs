@@ -24,9 +24,10 @@ use crate::score::cluster::{ClusterUnit, MIN_SCENES};
 use crate::score::findings::Findings;
 use crate::score::pair_darkness::PairDarkness;
 use crate::score::photographed_set::PhotographedSet;
+use crate::score::record::Detail;
 use crate::score::self_agreement::SelfAgreement;
 use crate::types::manifest::Status;
-use crate::types::{Detail, FrameId, InputSummary};
+use crate::types::{FrameId, InputSummary};
 
 /// All alerts of a report on questions with choices, in the order of their kinds.
 pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert> {

@@ -7,7 +7,7 @@ use crate::job::report::join::{Joined, JoinedRun};
 use crate::job::report::models::ModelApart;
 use crate::job::report::settings::{Setting, listed};
 use crate::report::alert::{Alert, AlertKind};
-use crate::types::Detail;
+use crate::score::record::Detail;
 
 /// The fields of a built-in model in a manifest, in words.
 const FIELDS: [(&str, &str); 3] = [

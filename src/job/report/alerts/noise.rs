@@ -7,8 +7,9 @@ use serde_json::Value;
 
 use crate::job::report::join::Joined;
 use crate::report::alert::{Alert, AlertKind};
+use crate::score::record::Detail;
 use crate::types::degradation::Kind;
-use crate::types::{Condition, Degradation, Detail, Severity, TrialRef};
+use crate::types::{Condition, Degradation, Severity, TrialRef};
 
 /// The exposure drop in hundredths of EV above which at most nine codes are left: white has code
 /// 255 · 2^(−EV/2.2) = 8 there.

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use crate::report::alert::{Alert, AlertKind};
 use crate::report::words::plural;
-use crate::types::{Detail, Trials};
+use crate::score::record::Detail;
+use crate::types::Trials;
 
 /// One alert for each model whose replies name several providers, with the number of replies of each.
 pub(super) fn of_providers<D: Detail>(trials: &Trials<D>) -> Vec<Alert> {

@@ -8,8 +8,9 @@ use crate::job::report::settings::{is_of_people, listed};
 use crate::report::alert::{Alert, AlertKind};
 use crate::report::words::counted;
 use crate::score::findings::Findings;
+use crate::score::record::Detail;
 use crate::score::subject::is_control;
-use crate::types::{Detail, QuestionId, RunQuestion, TrialRef};
+use crate::types::{QuestionId, RunQuestion, TrialRef};
 
 /// What differs between the questions of the runs, and between the files that they are about.
 pub(super) fn of_questions<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {

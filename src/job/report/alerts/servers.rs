@@ -6,7 +6,7 @@ use super::words::{names, sentence};
 use crate::job::report::join::Joined;
 use crate::job::report::settings::{Settings, address, differing, is_of_people, listed};
 use crate::report::alert::{Alert, AlertKind};
-use crate::types::Detail;
+use crate::score::record::Detail;
 
 /// The names that servers gave for a model, and the addresses, if there are several.
 pub(super) fn of_servers<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {

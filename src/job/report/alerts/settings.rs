@@ -8,7 +8,7 @@ use crate::job::report::settings::{
     ENCODING, Setting, Settings, differing, light, listed, parameter_flags, some, without_repeated,
 };
 use crate::report::alert::{Alert, AlertKind};
-use crate::types::Detail;
+use crate::score::record::Detail;
 use crate::types::manifest::RunManifest;
 
 /// The flags that decide the orders in which choices are shown.

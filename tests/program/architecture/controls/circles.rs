@@ -6,7 +6,7 @@ use crate::architecture::{assert_none, circles};
 
 /// The files of the circles, without the paths that they use.
 fn circles_of(files: &Files) -> Vec<String> {
-    let found = circles::wrong(files, &[]);
+    let found = circles::wrong(std::iter::once(files), &[]);
     let first_line = |text: &String| text.lines().next().map(str::to_owned);
     found.iter().filter_map(first_line).collect()
 }
@@ -80,7 +80,7 @@ fn listed_circles_must_be_there() {
         "  ask/b.rs uses ask/a.rs: super::a",
     ];
     let gone = "a listed circle is none: ask/a.rs, ask/c.rs: delete it, or list what is left of it";
-    let wrong = |listed: &[&str]| circles::wrong(&small, &[(listed, "a reason")]);
+    let wrong = |listed: &[&str]| circles::wrong(std::iter::once(&small), &[(listed, "a reason")]);
     assert_none(&wrong(&["ask/a.rs", "ask/b.rs"]));
     assert_eq!(wrong(&["ask/a.rs", "ask/c.rs"]), [&found.join("\n"), gone]);
 }

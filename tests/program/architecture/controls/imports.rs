@@ -7,7 +7,7 @@ use crate::architecture::rules;
 #[test]
 fn imports_are_found_in_all_forms() {
     check(
-        |files| rules::imports(files, &map()),
+        |files| rules::imports(files, &map(), &[]),
         &["src/ask/mod.rs:2: `ask` may not use `score`"],
         &[
             "ask/mod.rs: use crate::types::Rgb;\nuse crate::score::read;",
@@ -42,7 +42,7 @@ fn imports_are_found_in_all_forms() {
         ],
     );
     check(
-        |files| rules::imports(files, &map()),
+        |files| rules::imports(files, &map(), &[]),
         &["src/ask/wire/mod.rs:1: `ask` may not use `score`"],
         &[
             "ask/wire/mod.rs: use super::super::score;",
@@ -53,7 +53,7 @@ fn imports_are_found_in_all_forms() {
 
 #[test]
 fn imports_of_no_room_are_found() {
-    let rule = |files: &Files| rules::imports(files, &map());
+    let rule = |files: &Files| rules::imports(files, &map(), &[]);
     check(
         rule,
         &["src/ask/mod.rs:1: `ask` uses the whole crate: name the room"],
@@ -79,7 +79,7 @@ fn imports_of_no_room_are_found() {
 #[test]
 fn imports_that_the_map_allows_are_not_found() {
     check(
-        |files| rules::imports(files, &map()),
+        |files| rules::imports(files, &map(), &[]),
         &[],
         &[
             "ask/mod.rs: use crate::{types::Rgb, error::E, ask::remote}; use super::types;",

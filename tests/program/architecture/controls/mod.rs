@@ -72,7 +72,7 @@ fn a_folder_is_read_with_the_folders_in_it() {
     assert_eq!(paths, texts.map(|(path, _)| path));
     assert_eq!(files.rooms(), BTreeSet::from(["ask", "error"]));
     assert_none(&rules::awaits(&files, &[]));
-    let found = rules::imports(&files, &map());
+    let found = rules::imports(&files, &map(), &[]);
     assert_eq!(found, ["src/ask/wire/mod.rs:1: `ask` may not use `score`"]);
 }
 

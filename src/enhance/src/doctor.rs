@@ -1,0 +1,278 @@
+//! Examination of a model whose convention is not known: [`Enhancer::examine`].
+//!
+//! The model runs on a few dark frames with each convention that could be meant. What is proposed is the only convention whose images
+//! can be enhanced images; if there are several or none, nothing is.
+
+mod proposal;
+
+use std::collections::BTreeSet;
+
+use super::convention::ChannelOrder;
+use super::enhancer::Enhancer;
+use super::plausible::{Codes, Facts};
+use super::port::Port;
+use super::probe::{PairTrial, Probe, RangePair};
+use super::probe_run::{Trials, made};
+use super::sidecar::{ModelSidecar, OutputChoice};
+use super::size_search::TakenSizes;
+use darkqa_ground::error::Result;
+use darkqa_ground::types::Rgb;
+use proposal::{Found, propose};
+pub use proposal::{ProposedLine, Settled};
+
+/// What a model makes of dark frames, by convention.
+#[derive(Debug)]
+pub struct Examination {
+    /// The dark frames as they are fed.
+    pub frames: Vec<Rgb>,
+    /// The conventions that were tried.
+    pub columns: Vec<ExaminedConvention>,
+    /// The lines of a sidecar that are proposed.
+    pub proposal: Vec<ProposedLine>,
+    /// Why they are proposed, or why nothing is.
+    pub conclusion: String,
+    /// What was done because of the sizes of the frames, or why it failed.
+    pub sizes: String,
+    /// Which parts of the convention the frames decide.
+    pub settled: Settled,
+}
+
+/// Whether it is known which output is the image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ImageOutput {
+    /// One output is the image.
+    Known,
+    /// Several could be, and the first of them is read.
+    Unknown,
+}
+
+/// The images of one convention.
+#[derive(Debug)]
+pub struct ExaminedConvention {
+    /// What it is, as a heading.
+    pub title: String,
+    /// What the model made of each frame.
+    pub images: Vec<ExaminedImage>,
+    /// What is wrong with at least half of them; `None` if they can be enhanced images.
+    pub problem: Option<String>,
+}
+
+/// One image of a model.
+#[derive(Debug)]
+pub struct ExaminedImage {
+    /// The image, clamped and rounded.
+    pub image: Rgb,
+    /// Its figures before it was clamped.
+    pub facts: Facts,
+    /// What is wrong with it; `None` if it can be an enhanced image.
+    pub problem: Option<String>,
+}
+
+impl Enhancer {
+    /// Runs the model on dark frames with each convention that could be meant.
+    ///
+    /// # Errors
+    /// If it takes none of the sizes of the probe.
+    pub fn examine(&mut self, dark: &[Rgb], image: ImageOutput) -> Result<Examination> {
+        let sizes = self.try_sizes(dark);
+        let order = self.other_order();
+        let trials = self.trials_of_all(dark)?.ok_or_else(|| {
+            self.fault("it takes none of the small sizes of the probe; state `multiple` or `fixed` in MODEL.onnx.toml beside it")
+        })?;
+        let Trials {
+            frames,
+            probes: [probe, swapped],
+        } = trials;
+        let others = self.other_outputs(&frames, probe.best())?;
+        let plausible = others.iter().filter(|output| output.problem.is_none());
+        let plausible: Vec<String> = plausible.map(|output| output.title.clone()).collect();
+        let stated = self.stated_pair();
+        let is_plausible = |pair: &RangePair| probe.plausible().contains(pair);
+        let mut found = match (image, stated) {
+            (ImageOutput::Unknown, _) => Found::no_output(&self.output_title(), &probe, &plausible),
+            (ImageOutput::Known, Some(pair)) if is_plausible(&pair) => Found::stated(pair),
+            (ImageOutput::Known, _) => propose(&probe, stated, &swapped, order),
+        };
+        if !found.lines.is_empty() {
+            found.lines.extend(self.found_size());
+        }
+        if image == ImageOutput::Known {
+            found.mention(&plausible);
+        }
+        let convention = self.convention();
+        let is_stated = convention.color.is_some()
+            || convention.color_out.is_some()
+            || self.stated_ranges().iter().any(Option::is_some);
+        let as_stated = is_stated.then_some(probe.usual);
+        let output = match image {
+            ImageOutput::Known => String::new(),
+            ImageOutput::Unknown => self.output_title() + ", ",
+        };
+        let columns = shown(&output, &probe, as_stated, (&swapped, order), others);
+        Ok(Examination {
+            settled: found.settled,
+            frames,
+            columns,
+            proposal: found.lines,
+            conclusion: found.conclusion,
+            sizes,
+        })
+    }
+
+    /// The order of the output's colours that is not stated.
+    fn other_order(&self) -> ChannelOrder {
+        let stated = self.convention();
+        swapped(stated.color_out.or(stated.color).unwrap_or_default())
+    }
+
+    /// What the model makes of dark frames with all ranges, in the order of colours that is stated and in the other.
+    fn trials_of_all(&self, dark: &[Rgb]) -> Result<Option<Trials<2>>> {
+        let stated = self.convention().clone();
+        let swapped = ModelSidecar {
+            color_out: Some(self.other_order()),
+            ..stated.clone()
+        };
+        self.trials(dark, [&stated, &swapped], [None; 2])
+    }
+
+    /// The lines of the sidecar with which the images of dark frames can be enhanced images, in a sentence; `None` if no lines are the
+    /// only ones.
+    pub(super) fn better_lines(&self, dark: &[Rgb]) -> Result<Option<String>> {
+        let Some(trials) = self.trials_of_all(dark)? else {
+            return Ok(None);
+        };
+        let [probe, swapped] = trials.probes;
+        let found = propose(&probe, self.stated_pair(), &swapped, self.other_order());
+        let lines: Vec<String> = found
+            .lines
+            .iter()
+            .map(|line| format!("`{}`", line.line))
+            .collect();
+        Ok((!lines.is_empty()).then(|| {
+            format!(
+                "{} If its authors do that, state in MODEL.onnx.toml beside it, in place of what is stated: {}",
+                found.conclusion,
+                lines.join(" and ")
+            )
+        }))
+    }
+
+    /// The output that is read, as a title.
+    fn output_title(&self) -> String {
+        format!("output {:?}", self.graph().signature.outputs[0].port.name)
+    }
+
+    /// The ranges that are stated; `None` if one is not.
+    fn stated_pair(&self) -> Option<RangePair> {
+        let [input, output] = self.stated_ranges();
+        Some(RangePair {
+            input: input?,
+            output: output?,
+        })
+    }
+
+    /// Runs the model on a frame of each size, which shows what it takes. What is wrong with its images is not looked at here.
+    fn try_sizes(&mut self, frames: &[Rgb]) -> String {
+        let mut tried = BTreeSet::new();
+        for frame in frames {
+            if tried.insert([frame.height(), frame.width()])
+                && let Err(problem) = self.enhance(frame)
+            {
+                return problem.to_string();
+            }
+        }
+        self.usage().note().sizes
+    }
+
+    /// The line for the size that was found by trial.
+    fn found_size(&self) -> Option<ProposedLine> {
+        let line = match self.found_sizes()? {
+            TakenSizes::Multiple(multiple) => format!("multiple = {multiple}"),
+            TakenSizes::Traced([height, width]) => format!("fixed = [{width}, {height}]"),
+        };
+        let reason = "found by trial: it fails at other sizes".to_owned();
+        Some(ProposedLine { line, reason })
+    }
+
+    /// The images of the outputs that are not read.
+    fn other_outputs(&self, frames: &[Rgb], ranges: RangePair) -> Result<Vec<ExaminedConvention>> {
+        let seen: Vec<Codes> = frames.iter().map(Codes::of).collect();
+        let mut columns = Vec::new();
+        for Port { name, .. } in &self.graph().signature.unread {
+            let convention = ModelSidecar {
+                output: Some(OutputChoice::Name(name.clone())),
+                image: None,
+                range_in: Some(ranges.input),
+                range_out: Some(ranges.output),
+                ..self.convention().clone()
+            };
+            // An output that is no image, such as curves, is left out.
+            let Ok(graph) = self.graph().with_convention(convention) else {
+                continue;
+            };
+            let made = made(&[graph], frames)?;
+            if let Some(made) = made.and_then(|mut made| made.pop()) {
+                let pair = PairTrial::new(ranges, &seen, made);
+                columns.push(column(&pair, format!("output {name:?}, {ranges}")));
+            }
+        }
+        Ok(columns)
+    }
+}
+
+fn swapped(order: ChannelOrder) -> ChannelOrder {
+    match order {
+        ChannelOrder::Rgb => ChannelOrder::Bgr,
+        ChannelOrder::Bgr => ChannelOrder::Rgb,
+    }
+}
+
+/// The conventions that are drawn: the plausible ones, and the one of which something is stated, which a run would
+/// use. All without a plausible one. `output` names the output that is read, if it is not known which is the image.
+fn shown(
+    output: &str,
+    probe: &Probe,
+    stated: Option<RangePair>,
+    (swapped, order): (&Probe, ChannelOrder),
+    others: Vec<ExaminedConvention>,
+) -> Vec<ExaminedConvention> {
+    let stated_title = stated.map(|pair| format!("{output}{pair}, as stated"));
+    let mut shown = columns(probe, |ranges| match &stated_title {
+        Some(title) if stated == Some(ranges) => title.clone(),
+        _ => format!("{output}{ranges}"),
+    });
+    let swapped = columns(swapped, |ranges| {
+        format!("{output}{ranges}, {order} in the output")
+    });
+    // Nine more pictures of what cannot be would only distract.
+    let plausible = swapped
+        .into_iter()
+        .filter(|column| column.problem.is_none());
+    shown.extend(plausible);
+    shown.extend(others);
+    if shown.iter().any(|column| column.problem.is_none()) {
+        shown.retain(|column| {
+            column.problem.is_none() || stated_title.as_ref() == Some(&column.title)
+        });
+    }
+    shown
+}
+
+fn columns(probe: &Probe, title: impl Fn(RangePair) -> String) -> Vec<ExaminedConvention> {
+    let pairs = probe.pairs.iter();
+    pairs.map(|pair| column(pair, title(pair.ranges))).collect()
+}
+
+fn column(pair: &PairTrial, title: String) -> ExaminedConvention {
+    let images = pair.made.iter().zip(&pair.verdicts);
+    let images = images.map(|(made, verdict)| ExaminedImage {
+        image: made.to_rgb(),
+        facts: made.facts(),
+        problem: verdict.map(|verdict| verdict.to_string()),
+    });
+    ExaminedConvention {
+        title,
+        images: images.collect(),
+        problem: pair.verdict().map(|seen| seen.to_string()),
+    }
+}

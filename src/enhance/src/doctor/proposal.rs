@@ -1,0 +1,147 @@
+//! What follows from an examination: the lines of a sidecar that are proposed, and why ([`Found`]).
+
+use crate::convention::{ChannelOrder, ValueRange};
+use crate::probe::{Probe, RangePair};
+use darkqa_ground::types::Flaw;
+
+/// Whether an examination found one convention.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Settled {
+    /// Exactly one convention is plausible.
+    Yes,
+    /// Several are, or none is.
+    No,
+}
+
+/// A line of a sidecar.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ProposedLine {
+    /// The line, as `range_in = "0..1"`.
+    pub line: String,
+    /// Why it is proposed.
+    pub reason: String,
+}
+
+/// What an examination found.
+pub(super) struct Found {
+    pub(super) lines: Vec<ProposedLine>,
+    pub(super) conclusion: String,
+    pub(super) settled: Settled,
+}
+
+impl Found {
+    fn nothing(conclusion: String) -> Self {
+        Self {
+            lines: Vec::new(),
+            conclusion,
+            settled: Settled::No,
+        }
+    }
+
+    /// The ranges that are stated are plausible.
+    pub(super) fn stated(pair: RangePair) -> Self {
+        let conclusion = format!(
+            "With {pair}, as its sidecar, its preset or its types state, its images can be enhanced images."
+        );
+        Self {
+            settled: Settled::Yes,
+            ..Self::nothing(conclusion)
+        }
+    }
+
+    /// Several outputs could be the image: that which is read, and the plausible others.
+    pub(super) fn no_output(first: &str, probe: &Probe, others: &[String]) -> Self {
+        let mut plausible: Vec<&str> = Vec::new();
+        if !probe.plausible().is_empty() {
+            plausible.push(first);
+        }
+        plausible.extend(others.iter().map(String::as_str));
+        Self::nothing(format!(
+            "Which output is the image is not stated, and cannot be found: plausible are {}. State the one that its authors use, `output = \"NAME\"`, or name their preset.",
+            if plausible.is_empty() {
+                "none".to_owned()
+            } else {
+                plausible.join("; ")
+            }
+        ))
+    }
+
+    /// Names the other outputs whose images could be enhanced ones.
+    pub(super) fn mention(&mut self, others: &[String]) {
+        for output in others {
+            let found = " gives plausible images: check which output its authors use.";
+            self.conclusion += &[" The ", output, found].concat();
+        }
+    }
+
+    fn ranges(pair: RangePair, conclusion: String) -> Self {
+        let reason = "the only value ranges with which its images can be enhanced images";
+        let line = |key: &str, range: ValueRange| ProposedLine {
+            line: format!("{key} = \"{range}\""),
+            reason: reason.to_owned(),
+        };
+        Self {
+            lines: vec![line("range_in", pair.input), line("range_out", pair.output)],
+            conclusion,
+            settled: Settled::Yes,
+        }
+    }
+}
+
+/// What follows from the pairs of ranges: the only plausible one is proposed. `swapped` is the probe with the other order of the
+/// output's colours, which is considered if the colours are why nothing else is plausible; of several pairs that are plausible
+/// with it, that which is `stated` is taken.
+pub(super) fn propose(
+    probe: &Probe,
+    stated: Option<RangePair>,
+    swapped: &Probe,
+    order: ChannelOrder,
+) -> Found {
+    match probe.plausible().as_slice() {
+        [pair] => {
+            let stated = stated.map_or_else(String::new, |stated| {
+                format!(" Stated are {stated}, with which they cannot.")
+            });
+            let conclusion = format!(
+                "With {pair}, and with no other ranges, its images can be enhanced images.{stated}"
+            );
+            return Found::ranges(*pair, conclusion);
+        }
+        [] => {}
+        several => {
+            let list: Vec<String> = several.iter().map(ToString::to_string).collect();
+            let stated = stated.map_or_else(String::new, |pair| {
+                format!(" {pair}, which is stated, is not one of them.")
+            });
+            return Found::nothing(format!(
+                "Its images can be enhanced images with several value ranges: {}.{stated} Compare them below with the model's own examples, and state those that its authors use.",
+                list.join("; ")
+            ));
+        }
+    }
+    let is_hue = probe.pairs.iter().any(|pair| {
+        let seen = pair.verdict();
+        pair.ranges == probe.usual && seen.is_some_and(|seen| seen.example.flaw == Flaw::Hue)
+    });
+    let plausible = swapped.plausible();
+    let pair = match &plausible[..] {
+        [pair] => Some(*pair),
+        several => stated.filter(|pair| several.contains(pair)),
+    };
+    if let Some(pair) = pair.filter(|_| is_hue) {
+        let conclusion =
+            format!("With {pair} and {order} in the output its images can be enhanced images.");
+        let mut found = Found::ranges(pair, conclusion);
+        if stated == Some(pair) {
+            found.lines.clear();
+        }
+        found.lines.push(ProposedLine {
+            line: format!("color_out = \"{}\"", order.to_string().to_lowercase()),
+            reason: "with the other order, its images are blue where the frames are red".to_owned(),
+        });
+        return found;
+    }
+    Found::nothing(
+        "With none of the conventions of the output that is read its images can be enhanced images. Perhaps another output is the image, the dimensions have another order, or the export has lost its weights.".to_owned(),
+    )
+}

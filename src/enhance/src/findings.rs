@@ -1,0 +1,95 @@
+//! What is known of an enhancer that was opened and tried before: [`Findings`].
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::enhancer::Enhancer;
+use super::size_search::TakenSizes;
+use super::usage::{Implausible, Usage};
+use darkqa_ground::error::Result;
+use darkqa_ground::types::EnhancerName;
+use darkqa_ground::types::enhancer_note::{ConventionLine, ProbeNote, ProbeOutcome};
+
+/// What opening an enhancer and trying it on dark frames found: all that its note has before its first image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Findings {
+    /// How the model is fed and read.
+    convention: Vec<ConventionLine>,
+    /// What the probe found; `None` if the model takes none of its sizes.
+    probe: Option<ProbeNote>,
+    /// The sizes that the model takes, in words, if they were found by trial.
+    sizes: Option<String>,
+}
+
+impl Findings {
+    /// Whether a run that treats implausible images like this may go on with them.
+    pub fn allow(&self, implausible: Implausible) -> bool {
+        let probe = self.probe.as_ref();
+        let is_overruled = probe.is_some_and(|probe| probe.outcome == ProbeOutcome::Overruled);
+        implausible != Implausible::Refused || !is_overruled
+    }
+
+    /// A note that begins with them.
+    pub fn usage(&self) -> Usage {
+        let usage = Usage::default();
+        usage.update(|note| {
+            note.convention.clone_from(&self.convention);
+            note.probe.clone_from(&self.probe);
+        });
+        usage
+    }
+
+    /// Says again what the probe said.
+    pub fn warn(&self, name: &EnhancerName, path: &Path) {
+        if let Some(sizes) = &self.sizes {
+            tracing::warn!("{}: {sizes}", path.display());
+        }
+        match &self.probe {
+            None => warn_of_untried(name),
+            Some(probe) => {
+                if let Some(problem) = &probe.problem {
+                    tracing::warn!("{name}: {problem}");
+                }
+            }
+        }
+    }
+}
+
+/// Warns about a model that takes none of the sizes of the probe.
+pub(super) fn warn_of_untried(name: &EnhancerName) {
+    tracing::warn!(
+        "{name}: it takes none of the small sizes of the probe, so nothing is known of whether its images can be enhanced images"
+    );
+}
+
+impl Enhancer {
+    /// Why its images may be read in a wrong way, if it is used in spite of it; to be called after the probe.
+    pub fn used_anyway(&self) -> Option<String> {
+        let probe = self.usage().note().probe?;
+        let is_overruled = probe.outcome == ProbeOutcome::Overruled;
+        probe.problem.filter(|_| is_overruled)
+    }
+
+    /// What is known of it now; to be called after the probe.
+    pub fn findings(&self) -> Findings {
+        let note = self.usage().note();
+        Findings {
+            convention: note.convention,
+            probe: note.probe,
+            sizes: self.found_sizes().map(TakenSizes::words),
+        }
+    }
+
+    /// The same enhancer as if the probe had found this now, with a note that it goes on with.
+    ///
+    /// # Errors
+    /// If the graph contradicts its own convention, which is a bug.
+    pub fn tried_before(self, findings: &Findings, usage: Usage) -> Result<Self> {
+        let mut enhancer = self.with_usage(usage);
+        if let Some(probe) = &findings.probe {
+            enhancer.set_probed(probe.clone())?;
+        }
+        Ok(enhancer)
+    }
+}

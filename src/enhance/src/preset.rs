@@ -1,0 +1,294 @@
+//! Conventions of published models, as their authors' code has them: [`Preset`].
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::expression::Expression;
+use super::extra::{ExtraValue, Number};
+use super::port::{Port, list};
+use super::sidecar::{ModelSidecar, OutputChoice};
+use darkqa_ground::error::{Error, Result};
+use darkqa_ground::types::near_name::suggestion;
+
+/// TOML file of all presets.
+const PRESETS: &str = include_str!("presets.toml");
+
+/// Length of a preset's name up to which it must be a word of a file's name; chosen.
+const SHORT: usize = 4;
+
+/// Convention of a published model.
+#[derive(Debug)]
+pub(super) struct Preset {
+    /// Name as the user gave it, as `zero-dce`.
+    pub(super) name: String,
+    /// Source, outputs, and statements in the form of a sidecar.
+    pub(super) content: PresetContent,
+}
+
+/// What the file of presets says of one.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PresetContent {
+    /// Repository on GitHub.
+    repository: String,
+    /// Commit of the repository that was read.
+    commit: String,
+    /// Files in it that were read.
+    file: String,
+    /// Authors, place and year, and a remark.
+    paper: String,
+    /// Names of the output that is the image, the first one first.
+    names: Vec<String>,
+    /// Lists of outputs of which the image is known by its place.
+    #[serde(default)]
+    signatures: Vec<OutputList>,
+    /// The image as an expression of outputs.
+    image: Option<Expression>,
+    /// All else.
+    pub(super) sidecar: ModelSidecar,
+}
+
+/// A list of outputs, and which of them is the image.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OutputList {
+    /// Channels of each output, in order.
+    channels: Vec<usize>,
+    /// Place of the image, from 1.
+    nth: usize,
+}
+
+/// What decides, beside the sidecar's keys, which output of a file a preset takes; for the digest of an enhancer.
+#[derive(Serialize)]
+pub(super) struct PresetOutputs<'a> {
+    names: &'a [String],
+    signatures: &'a [OutputList],
+    image: Option<&'a Expression>,
+}
+
+/// All presets by their names.
+fn all() -> Result<BTreeMap<String, PresetContent>> {
+    toml::from_str(PRESETS).map_err(|e| Error::data("presets.toml", e))
+}
+
+/// Number that a preset gives an input of this name, and the preset's name.
+pub(super) fn number_of(input: &str) -> Option<(Number, String)> {
+    let mut presets = all().ok()?.into_iter();
+    presets.find_map(|(name, content)| match content.sidecar.extra.get(input)? {
+        ExtraValue::Number(number) | ExtraValue::Map(number) => Some((*number, name)),
+        ExtraValue::Noise(_) | ExtraValue::From(_) => None,
+    })
+}
+
+/// Names of the presets that know a list of outputs by its channels.
+pub(super) fn that_know(outputs: &[Port]) -> Vec<String> {
+    let presets = all().unwrap_or_default().into_iter();
+    let known = presets.filter(|(_, content)| content.by_channels(outputs).is_some());
+    known.map(|(name, _)| name).collect()
+}
+
+impl PresetContent {
+    /// Index of the image, by the channels of all outputs.
+    fn by_channels(&self, outputs: &[Port]) -> Option<usize> {
+        let channels: Vec<Option<usize>> = outputs.iter().map(Port::channels).collect();
+        let is_it = |list: &&OutputList| {
+            list.channels.len() == channels.len()
+                && list
+                    .channels
+                    .iter()
+                    .zip(&channels)
+                    .all(|(a, b)| Some(*a) == *b)
+        };
+        let list = self.signatures.iter().find(is_it)?;
+        list.nth.checked_sub(1)
+    }
+
+    /// The image, by the names of the outputs. The name of a first output counts only if the others were named too: see
+    /// [`Port::is_numbered`].
+    fn by_name(&self, outputs: &[Port]) -> Option<usize> {
+        let place = |name: &String| outputs.iter().position(|port| port.name == *name);
+        let numbered = outputs.iter().any(Port::is_numbered);
+        let mut places = self.names.iter().filter_map(place);
+        places.find(|place| *place > 0 || !numbered)
+    }
+
+    /// Whether the outputs have all names of the expression of the image.
+    fn image_of(&self, outputs: &[Port]) -> Option<&Expression> {
+        let has = |name: &String| name == "input" || outputs.iter().any(|port| port.name == *name);
+        self.image
+            .as_ref()
+            .filter(|image| image.names().iter().all(has))
+    }
+}
+
+impl fmt::Display for PresetContent {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            repository,
+            commit,
+            file,
+            paper,
+            ..
+        } = self;
+        write!(f, "{paper}; github.com/{repository} at {commit}: {file}")
+    }
+}
+
+impl Preset {
+    /// Splits `zero-dce:FILE` into preset and file; there is no preset if `model` is only a file.
+    ///
+    /// # Errors
+    /// If the word before the colon is not a preset, and the whole is not a file.
+    pub(super) fn split(model: &Path) -> Result<(Option<Self>, PathBuf)> {
+        let text = model.to_string_lossy();
+        let Some((name, file)) = text.split_once(':').filter(|_| !model.exists()) else {
+            return Ok((None, model.to_owned()));
+        };
+        // The colon belongs to a drive of Windows, or to a path.
+        if name.len() < 2 || name.contains(['/', '\\', '.']) {
+            return Ok((None, model.to_owned()));
+        }
+        let mut all = all()?;
+        // The shell needs no quotes for zero-dce-pp.
+        let known = name.replace("-pp", "++");
+        let Some(content) = all.remove(&known) else {
+            let names: Vec<String> = all.into_keys().collect();
+            let near = suggestion(&known, &names);
+            let names = names.join(", ");
+            let problem = format_args!(
+                "{name:?} before the colon is not a preset; the presets are {names}{near}"
+            );
+            return Err(Error::usage("--llie", problem));
+        };
+        let name = name.to_owned();
+        Ok((Some(Self { name, content }), PathBuf::from(file)))
+    }
+
+    /// The preset that a file is named after, if it is not this one or a sibling of it, as `ruas-upe` of `ruas-lol`.
+    pub(super) fn named_after(&self, file: &Path) -> Option<String> {
+        let letters = |text: &str| {
+            text.to_lowercase()
+                .replace(|c: char| !c.is_alphanumeric(), "")
+        };
+        let stem = file.file_stem()?.to_string_lossy().to_lowercase();
+        let words: Vec<&str> = stem.split(|c: char| !c.is_alphabetic()).collect();
+        let all_letters = letters(&stem);
+        // A short name may be a part of any word.
+        let is_named = |name: &str| {
+            let name = letters(name);
+            words.contains(&&*name) || name.len() > SHORT && all_letters.contains(&name)
+        };
+        let family = |name: &str| match name.split_once('-') {
+            Some((family @ ("ruas" | "pairlie"), _)) => family.to_owned(),
+            _ => name.trim_end_matches('+').to_owned(),
+        };
+        if is_named(&family(&self.name.replace("-pp", "++"))) {
+            return None;
+        }
+        let others = all().ok()?.into_keys();
+        let named = others.filter(|name| is_named(name) || is_named(&family(name)));
+        named.max_by_key(|name| (is_named(name), std::cmp::Reverse(name.len())))
+    }
+
+    /// What decides which output is taken.
+    pub(super) fn outputs(&self) -> PresetOutputs<'_> {
+        PresetOutputs {
+            names: &self.content.names,
+            signatures: &self.content.signatures,
+            image: self.content.image.as_ref(),
+        }
+    }
+
+    /// The preset's statements for a graph: what they say of further inputs that the graph has, and how the image is read.
+    ///
+    /// # Errors
+    /// If none of the outputs is known to be the image.
+    pub(super) fn for_graph(
+        &self,
+        sidecar: &ModelSidecar,
+        inputs: &[Port],
+        outputs: &[Port],
+    ) -> std::result::Result<ModelSidecar, String> {
+        let mut stated = self.content.sidecar.clone();
+        stated.extra = inputs
+            .iter()
+            .filter_map(|port| {
+                let value = stated.extra.get(&port.name)?.clone();
+                // The same number at each pixel is the same for the model, whichever form its export takes.
+                let value = match value {
+                    ExtraValue::Number(number) if !port.is_scalar() => ExtraValue::Map(number),
+                    ExtraValue::Map(number) if port.is_scalar() => ExtraValue::Number(number),
+                    other => other,
+                };
+                Some((port.name.clone(), value))
+            })
+            .collect();
+        if sidecar.output.is_some() || sidecar.image.is_some() || outputs.len() == 1 {
+            return Ok(stated);
+        }
+        if let Some(image) = self.content.image_of(outputs) {
+            stated.image = Some(image.clone());
+            return Ok(stated);
+        }
+        let may_be_image = |port: &&Port| port.channels().is_none_or(|channels| channels == 3);
+        let found = self.content.by_name(outputs);
+        match found.or_else(|| self.content.by_channels(outputs)) {
+            Some(index) if index < outputs.len() => {
+                stated.output = Some(OutputChoice::Name(outputs[index].name.clone()));
+                Ok(stated)
+            }
+            _ if outputs.iter().filter(may_be_image).count() == 1 => Ok(stated),
+            _ => Err(format!(
+                "is not as preset {} knows it: {}; it has {}; say which in MODEL.onnx.toml beside it: `output = \"NAME\"`",
+                self.name,
+                self.known_outputs(),
+                list(outputs)
+            )),
+        }
+    }
+
+    /// What of a graph is not as the authors' model has it; `None` if nothing is.
+    pub(super) fn differing(&self, inputs: &[Port], outputs: &[Port]) -> Option<String> {
+        let content = &self.content;
+        let known = outputs.len() == 1
+            || content.image_of(outputs).is_some()
+            || content.by_channels(outputs).is_some();
+        // Some authors' models have one output, and an export that adds others says by name which it is.
+        let named = content.signatures.is_empty() && content.by_name(outputs).is_some();
+        if !known && !named {
+            return Some(format!(
+                "outputs are not those of the preset: {}; it has {}",
+                self.known_outputs(),
+                list(outputs)
+            ));
+        }
+        let other = |port: &&Port| !content.sidecar.extra.contains_key(&port.name);
+        let others: Vec<Port> = inputs.iter().filter(other).cloned().collect();
+        (others.len() > 1).then(|| {
+            format!(
+                "inputs are not those of the preset: it takes {}",
+                list(&others)
+            )
+        })
+    }
+
+    /// The outputs that the preset knows, in words.
+    fn known_outputs(&self) -> String {
+        let content = &self.content;
+        let mut known = vec![format!("an image named {}", content.names.join(", "))];
+        if let Some(image) = &content.image {
+            known.insert(0, format!("outputs for {image}"));
+        }
+        known.extend(content.signatures.iter().map(|list| {
+            let channels: Vec<String> = list.channels.iter().map(ToString::to_string).collect();
+            format!("outputs of {} channels", channels.join(", "))
+        }));
+        known.join("; or ")
+    }
+}
+
+#[cfg(test)]
+mod tests;

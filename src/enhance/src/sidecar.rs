@@ -1,0 +1,349 @@
+//! Statements about a model, in the user's `MODEL.onnx.toml` beside it or in a preset: [`ModelSidecar`].
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::fs;
+use std::io::ErrorKind;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::convention::{
+    ChannelOrder, Channels, Padding, Rounding, TensorLayout, Tile, ValueRange,
+};
+use super::expression::Expression;
+use super::extra::ExtraValue;
+use darkqa_ground::error::{Error, Result};
+use darkqa_ground::files::reading;
+use darkqa_ground::types::toml_fault::TomlFault;
+
+/// Statements of a sidecar. Every key may be missing; an unknown key is an error.
+#[derive(Debug, Default, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ModelSidecar {
+    /// Order of the input's dimensions.
+    pub(super) layout_in: Option<TensorLayout>,
+    /// Order of the output's dimensions.
+    pub(super) layout_out: Option<TensorLayout>,
+    /// Order of the channels of input and output.
+    pub(super) color: Option<ChannelOrder>,
+    /// Order of the channels of the output, if it is another.
+    pub(super) color_out: Option<ChannelOrder>,
+    /// Channels of input and output.
+    pub(super) channels: Option<Channels>,
+    /// What is fed, as an expression of `image`, the dark image in 0..1.
+    pub(super) input: Option<Expression>,
+    /// The enhanced image, as an expression of outputs in 0..1 and of `input`, the dark image in 0..1.
+    pub(super) image: Option<Expression>,
+    /// Values of black and white in the input.
+    pub(super) range_in: Option<ValueRange>,
+    /// Values of black and white in the output.
+    pub(super) range_out: Option<ValueRange>,
+    /// Number subtracted from each channel of the input, in its channel order and range.
+    pub(super) mean: Option<[f32; 3]>,
+    /// Number that each channel is then divided by.
+    pub(super) std: Option<[f32; 3]>,
+    /// Number of pixels of which height and width must be multiples.
+    pub(super) multiple: Option<NonZeroUsize>,
+    /// Pixels that fill an image up to a multiple.
+    pub(super) pad: Option<Padding>,
+    /// Whether at least one row and one column are filled, even if the sides are multiples already.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) pad_always: Option<bool>,
+    /// Width and height that a graph takes alone, which tracing has frozen although the graph says any size.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) fixed: Option<[NonZeroUsize; 2]>,
+    /// Output that is the enhanced image.
+    pub(super) output: Option<OutputChoice>,
+    /// Whether tiles are exact, and with which context.
+    pub(super) tile: Option<Tile>,
+    /// Rounding of values to bytes.
+    pub(super) rounding: Option<Rounding>,
+    /// Values of further inputs, by their names.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub(super) extra: BTreeMap<String, ExtraValue>,
+}
+
+/// Output of a graph, by index or by name.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "`output` is an index from 0 or a name in quotes"
+)]
+pub(super) enum OutputChoice {
+    /// Index among the outputs, from 0.
+    Index(usize),
+    Name(String),
+}
+
+impl fmt::Display for OutputChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Index(index) => write!(f, "output = {index}"),
+            Self::Name(name) => write!(f, "output = {name:?}"),
+        }
+    }
+}
+
+/// Path of a model's sidecar: the model's path followed by `.toml`.
+pub(super) fn path_for(model: &Path) -> PathBuf {
+    let mut path = model.as_os_str().to_owned();
+    path.push(".toml");
+    path.into()
+}
+
+/// A text in which the sidecar is `MODEL.onnx.toml`, with the name of the file.
+pub(super) fn named(text: &str, model: &Path) -> String {
+    let path = path_for(model);
+    let name = path.file_name().unwrap_or_default();
+    text.replace("MODEL.onnx.toml", &name.to_string_lossy())
+}
+
+/// Text of a model's sidecar; empty if there is none.
+pub(super) fn text_for(model: &Path) -> Result<String> {
+    let path = path_for(model);
+    match fs::symlink_metadata(&path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => {
+            let near = model.with_extension("toml");
+            if near.exists() {
+                tracing::warn!(
+                    "{} is not read: the sidecar of {} is {}",
+                    near.display(),
+                    model.display(),
+                    path.display()
+                );
+            }
+            Ok(String::new())
+        }
+        _ => reading::settings(&path),
+    }
+}
+
+/// Most letters of a line that a message repeats.
+const LONGEST_LINE: usize = 60;
+
+/// Where all keys stand.
+const KEYS: &str =
+    "; all keys: https://github.com/darkqa-eval/darkqa-eval/blob/main/models/README.md";
+
+/// Largest side, in pixels, that a sidecar may state; chosen: no image of this program is larger.
+const MOST_SIDE: usize = 1 << 16;
+
+/// Most pixels of the size that a sidecar may state: the default of `--max-pixels`.
+const MOST_PIXELS: usize = 100_000_000;
+
+/// Largest multiple, in pixels; chosen: twice what any published model needs, and a small image filled up to it still fits anywhere.
+const MOST_MULTIPLE: usize = 1024;
+
+/// Most further inputs; chosen.
+const MOST_EXTRA: usize = 64;
+
+/// Largest mean and deviation, and the inverse of the smallest deviation; chosen.
+const MOST_SCALE: f32 = 1e6;
+
+impl ModelSidecar {
+    /// Parses the text of the sidecar of `model`.
+    ///
+    /// # Errors
+    /// If a key is unknown or a value is not allowed; the message names the file.
+    pub(super) fn parse(model: &Path, text: &str) -> Result<Self> {
+        let path = path_for(model);
+        let wrong = |problem: &str| Error::data(path.display(), format_args!("{problem}{KEYS}"));
+        let sidecar: Self = toml::from_str(text).map_err(|e| {
+            let TomlFault { line, problem } = TomlFault::of(text, &e);
+            let stated = text.lines().nth(line - 1).unwrap_or_default().trim();
+            let stated: String = stated.chars().take(LONGEST_LINE).collect();
+            Error::line(&path, line, format_args!("`{stated}`: {problem}{KEYS}"))
+        })?;
+        sidecar.check_bounds().map_err(|problem| wrong(&problem))?;
+        if sidecar.output.is_some() && sidecar.image.is_some() {
+            return Err(wrong(
+                "output and image are both stated; state image alone, which names its outputs",
+            ));
+        }
+        let values = sidecar.extra.iter();
+        let mut checks = values.map(|(name, value)| value.check(name));
+        let input = sidecar.input.as_ref();
+        let input = input.map_or(Ok(()), |input| input.check_names("input", &["image"]));
+        checks
+            .find(Result::is_err)
+            .unwrap_or(input)
+            .map_err(|problem| wrong(&problem))?;
+        Ok(sidecar)
+    }
+
+    /// Checks that no number makes an image too large or a value unusable.
+    fn check_bounds(&self) -> Result<(), String> {
+        let means = self.mean.into_iter().flatten();
+        let mut deviations = self.std.into_iter().flatten();
+        let is_scale = |number: f32| (1.0 / MOST_SCALE..=MOST_SCALE).contains(&number);
+        if !means.map(f32::abs).all(|mean| mean <= MOST_SCALE) || !deviations.all(is_scale) {
+            return Err(format!(
+                "mean is three numbers of at most {MOST_SCALE}, and std three from {} to {MOST_SCALE}",
+                1.0 / MOST_SCALE
+            ));
+        }
+        if self
+            .multiple
+            .is_some_and(|multiple| multiple.get() > MOST_MULTIPLE)
+        {
+            return Err(format!("multiple is at most {MOST_MULTIPLE} pixels"));
+        }
+        if let Some([width, height]) = self.fixed {
+            let is_too_long = width.max(height).get() > MOST_SIDE;
+            if is_too_long || width.get() * height.get() > MOST_PIXELS {
+                return Err(format!(
+                    "the sides of fixed are at most {MOST_SIDE} pixels, and their product at most {MOST_PIXELS}"
+                ));
+            }
+        }
+        if self.extra.len() > MOST_EXTRA {
+            return Err(format!("extra has at most {MOST_EXTRA} inputs"));
+        }
+        Ok(())
+    }
+
+    /// The sidecar without statements that equal the defaults, so that sidecars of the same meaning have the same digest.
+    pub(super) fn without_defaults(self) -> Self {
+        fn unless<T: PartialEq>(value: Option<T>, default: &T) -> Option<T> {
+            value.filter(|value| value != default)
+        }
+        let color = self.color.unwrap_or_default();
+        Self {
+            color: unless(self.color, &ChannelOrder::default()),
+            color_out: unless(self.color_out, &color),
+            channels: unless(self.channels, &Channels::default()),
+            input: self.input.filter(|input| !input.is_name("image")),
+            mean: unless(self.mean, &[0.0; 3]),
+            std: unless(self.std, &[1.0; 3]),
+            multiple: unless(self.multiple, &NonZeroUsize::MIN),
+            pad: unless(self.pad, &Padding::default()),
+            pad_always: unless(self.pad_always, &false),
+            rounding: unless(self.rounding, &Rounding::default()),
+            ..self
+        }
+    }
+
+    /// The statements of this sidecar, and those of a preset for the missing keys.
+    pub(super) fn with_defaults(self, preset: &Self) -> Self {
+        let mut extra = preset.extra.clone();
+        extra.extend(self.extra);
+        // Each says what is read.
+        let (output, image) = match (self.output, self.image) {
+            (None, None) => (preset.output.clone(), preset.image.clone()),
+            stated => stated,
+        };
+        Self {
+            layout_in: self.layout_in.or(preset.layout_in),
+            layout_out: self.layout_out.or(preset.layout_out),
+            color: self.color.or(preset.color),
+            color_out: self.color_out.or(preset.color_out),
+            channels: self.channels.or(preset.channels),
+            input: self.input.or_else(|| preset.input.clone()),
+            image,
+            range_in: self.range_in.or(preset.range_in),
+            range_out: self.range_out.or(preset.range_out),
+            mean: self.mean.or(preset.mean),
+            std: self.std.or(preset.std),
+            multiple: self.multiple.or(preset.multiple),
+            pad: self.pad.or(preset.pad),
+            pad_always: self.pad_always.or(preset.pad_always),
+            fixed: self.fixed.or(preset.fixed),
+            output,
+            tile: self.tile.or(preset.tile),
+            rounding: self.rounding.or(preset.rounding),
+            extra,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_key_is_read() {
+        let text = r#"
+            layout_in = "nhwc"
+            layout_out = "chw"
+            color = "bgr"
+            range_in = "0..255"
+            range_out = "-1..1"
+            mean = [0.5, 0.5, 0.5]
+            std = [1, 1, 1]
+            multiple = 8
+            pad = "replicate"
+            pad_always = true
+            fixed = [64, 48]
+            output = "enhanced"
+            tile = "exact:12"
+            rounding = "truncate"
+            color_out = "rgb"
+            channels = "y"
+            input = "image ^ 0.8"
+            [extra]
+            exposure = 0.5
+            z = { noise = "normal", std = 0.9 }
+        "#;
+        let read = ModelSidecar::parse(Path::new("m.onnx"), text).unwrap();
+        assert_eq!(read.layout_in, Some(TensorLayout::Nhwc));
+        assert_eq!(read.tile, Some(Tile::Exact(12)));
+        assert_eq!(read.extra.len(), 2);
+        assert_eq!(
+            (read.color_out, read.channels),
+            (Some(ChannelOrder::Rgb), Some(Channels::Y))
+        );
+        assert_eq!(read.input, "image ^ 0.8".parse().ok());
+        assert_eq!(read.output, Some(OutputChoice::Name("enhanced".into())));
+        assert_eq!(ModelSidecar::default().with_defaults(&read), read);
+        let own = ModelSidecar {
+            multiple: NonZeroUsize::new(4),
+            ..ModelSidecar::default()
+        };
+        assert_eq!(own.with_defaults(&read).multiple, NonZeroUsize::new(4));
+    }
+
+    #[test]
+    fn unknown_keys_and_values_are_errors_that_name_the_file() {
+        let model = Path::new("a/model.onnx");
+        for (text, part) in [
+            (
+                "range = \"-1..1\"",
+                "line 1: `range = \"-1..1\"`: unknown field",
+            ),
+            (
+                "color = \"rgb\"\nmultiple = 4 4",
+                "line 2: `multiple = 4 4`: ",
+            ),
+            ("range_in = \"0..2\"", "0..2"),
+            ("output = -1", "index from 0"),
+            ("output = [1]", "index from 0"),
+            ("output", "expected"),
+            ("multiple = 0", "nonzero"),
+            ("multiple = 1025", "at most 1024"),
+            ("multiple = 2147483648", "at most 1024"),
+            ("fixed = [64, 0]", "nonzero"),
+            ("fixed = [64]", "length"),
+            ("fixed = [99999999999, 8]", "at most 65536"),
+            ("fixed = [60000, 60000]", "product at most 100000000"),
+            ("pad_always = 1", "boolean"),
+            ("std = [1, 0, 1]", "std three from"),
+            ("std = [1, nan, 1]", "std three from"),
+            ("std = [1, -1, 1]", "std three from"),
+            ("mean = [inf, 0, 0]", "at most 1000000"),
+            ("mean = [nan, 0, 0]", "at most 1000000"),
+            ("tile = \"exact\"", "exact:8"),
+            ("[extra]\ngamma = nan", "extra.gamma"),
+            ("[extra]\na = { from = \"image +\" }", "the end"),
+            ("channels = \"yuv\"", "yuv"),
+            ("input = \"2 * imag\"", "names `imag`"),
+            ("image = \"(1\"", "a closing parenthesis"),
+            ("output = \"a\"\nimage = \"a\"", "state image alone"),
+        ] {
+            let message = ModelSidecar::parse(model, text).unwrap_err().to_string();
+            assert!(message.starts_with("a/model.onnx.toml"), "{message}");
+            assert!(message.contains(part), "{message}");
+        }
+    }
+}

@@ -1,0 +1,261 @@
+//! What an enhancer did in a run, shared by all threads that use it: [`Usage`]; and what follows if that is odd: [`Implausible`].
+
+use std::collections::{BTreeMap, HashSet};
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use serde::{Deserialize, Serialize};
+
+use super::plausible::{Codes, DARK, Gravity, Verdict, brightness, judge};
+use darkqa_ground::error::{Error, Result};
+use darkqa_ground::types::enhancer_note::{EnhancerNote, FlawedImage};
+use darkqa_ground::types::{Digest, Rgb, SizeLog};
+
+/// Number of dark images from which on a verdict on the enhancer is possible; chosen as the number of frames of the probe.
+const ENOUGH: usize = super::probe::FRAMES;
+/// Number of the twin that stands for images that were read from a store.
+const STORED: usize = usize::MAX;
+
+/// What happens to a model whose images cannot be enhanced images.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Implausible {
+    /// It is refused.
+    #[default]
+    Refused,
+    /// It is used (`--llie-anyway`).
+    Used,
+    /// Its images are not looked at, because they are those of a run that is there.
+    NotLookedFor,
+}
+
+/// What was seen on an enhanced image.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub(super) enum Seen {
+    /// It was not looked at, because the degraded image is not dark: good models fail the rules on those.
+    #[default]
+    Bright,
+    /// The degraded image is dark; what is wrong with the enhanced one, if something is.
+    Dark(Option<Verdict>),
+}
+
+impl Seen {
+    /// What is seen on the enhanced image of a degraded one.
+    pub(super) fn on([degraded, made]: [&Rgb; 2]) -> Self {
+        if brightness(degraded) > DARK {
+            Self::Bright
+        } else {
+            Self::Dark(judge(&Codes::small(degraded), &Codes::small(made)))
+        }
+    }
+}
+
+/// What the note of an enhancer gets from one image; kept with images that are stored.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct ImageUse {
+    pub(super) seen: Seen,
+    /// What was done because of the size of the image.
+    pub(super) sizes: SizeLog,
+}
+
+impl ImageUse {
+    /// Notes an image of a frame in a condition that was made in another run or process, as if the enhancer in this file made it now.
+    ///
+    /// # Errors
+    /// If most of its images of dark frames so far cannot be enhanced images.
+    pub fn note_in(
+        &self,
+        usage: &Usage,
+        model: &Path,
+        place: [&dyn ToString; 2],
+        implausible: Implausible,
+    ) -> Result<()> {
+        usage.add_sizes_of_stored(&self.sizes);
+        self.seen.judge_in(usage, model, place, implausible)
+    }
+}
+
+impl Seen {
+    /// Counts what was seen on the image of a frame in a condition, unless images are not looked at. The model is named by its file.
+    ///
+    /// # Errors
+    /// If most images of dark frames so far cannot be enhanced images.
+    pub(super) fn judge_in(
+        &self,
+        usage: &Usage,
+        model: &Path,
+        place: [&dyn ToString; 2],
+        implausible: Implausible,
+    ) -> Result<()> {
+        if implausible == Implausible::NotLookedFor {
+            return Ok(());
+        }
+        let judged = usage.judge(self, place, implausible);
+        judged.map_err(|problem| Error::EnhancerEnded {
+            path: model.to_owned(),
+            problem,
+        })
+    }
+}
+
+/// A handle to the note of an enhancer, which grows while it is used.
+#[derive(Debug, Clone, Default)]
+pub struct Usage(Arc<Mutex<State>>);
+
+#[derive(Debug, Default)]
+struct State {
+    note: EnhancerNote,
+    /// Number of images that cannot be enhanced images.
+    impossible: usize,
+    /// The digests of the frames and conditions whose images were looked at.
+    judged: HashSet<Digest>,
+    /// What each twin did because of sizes.
+    sizes: BTreeMap<usize, SizeLog>,
+}
+
+impl Usage {
+    /// The note as it is now.
+    pub fn note(&self) -> EnhancerNote {
+        self.with(|state| state.note.clone())
+    }
+
+    /// Notes what a twin did so far because of sizes.
+    pub(super) fn set_sizes(&self, twin: usize, log: &SizeLog) {
+        self.change_sizes(twin, |sizes| sizes.clone_from(log));
+    }
+
+    fn change_sizes(&self, twin: usize, change: impl FnOnce(&mut SizeLog)) {
+        self.with(|state| {
+            change(state.sizes.entry(twin).or_default());
+            let mut all = SizeLog::default();
+            state.sizes.values().for_each(|log| all.add(log));
+            state.note.sizes = all.summary();
+            state.note.resized = all.resized + all.reduced > 0;
+            state.note.size_counts = all;
+        });
+    }
+
+    /// Adds what was done because of sizes to an image that was made earlier and is read now.
+    pub(super) fn add_sizes_of_stored(&self, log: &SizeLog) {
+        self.change_sizes(STORED, |sizes| sizes.add(log));
+    }
+
+    /// Forgets what was done to stored images because of sizes.
+    pub(super) fn count_stored_anew(&self) {
+        self.set_sizes(STORED, &SizeLog::default());
+    }
+
+    /// Changes the note.
+    pub(super) fn update(&self, change: impl FnOnce(&mut EnhancerNote)) {
+        self.with(|state| change(&mut state.note));
+    }
+
+    /// Counts what was seen on the image of a frame in a condition; an image that is made again counts once.
+    ///
+    /// # Errors
+    /// What was seen, if more than half of at least six images cannot be enhanced images, unless such images are used.
+    pub(super) fn judge(
+        &self,
+        seen: &Seen,
+        [frame, condition]: [&dyn ToString; 2],
+        implausible: Implausible,
+    ) -> Result<(), String> {
+        let &Seen::Dark(verdict) = seen else {
+            return Ok(());
+        };
+        let place = [frame, condition].map(ToString::to_string);
+        let key = Digest::of_parts(place.iter().map(String::as_bytes));
+        if !self.with(|state| state.judged.insert(key)) {
+            return Ok(());
+        }
+        let [frame, condition] = place;
+        let flawed = verdict.map(|verdict| FlawedImage {
+            frame,
+            condition,
+            flaw: verdict.flaw,
+        });
+        self.with(|state| {
+            state.note.judged.count(flawed);
+            let impossible = verdict.filter(|verdict| verdict.gravity == Gravity::Impossible);
+            state.impossible += usize::from(impossible.is_some());
+            let judged = state.note.judged.images;
+            match (impossible, implausible) {
+                (Some(example), Implausible::Refused)
+                    if judged >= ENOUGH && 2 * state.impossible > judged =>
+                {
+                    Err(format!(
+                        "{} of its {judged} images of dark frames cannot be enhanced images; they {example}. `darkqa-eval enhance MODEL FRAMES… --doctor --out DIR` draws what it makes with each convention; --llie-anyway uses it as it is",
+                        state.impossible
+                    ))
+                }
+                _ => Ok(()),
+            }
+        })
+    }
+
+    fn with<T>(&self, use_state: impl FnOnce(&mut State) -> T) -> T {
+        use_state(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An image of squares of different light, `gain` times as bright.
+    fn squares(gain: f32) -> Rgb {
+        let samples = (0..96 * 96).flat_map(|place| {
+            let light = (place / 12 % 8 * 5 + place / 1152 * 3) as f32;
+            [gain * light; 3].map(|code| code as u8)
+        });
+        Rgb::new(96, 96, samples.collect()).unwrap()
+    }
+
+    fn judged(usage: &Usage, frame: usize, made: &Rgb, how: Implausible) -> Result<(), String> {
+        usage.judge(&Seen::on([&squares(1.0), made]), [&frame, &"L3+ev+m"], how)
+    }
+
+    #[test]
+    fn an_enhancer_ends_when_most_of_its_images_are_impossible() {
+        let usage = Usage::default();
+        let (good, flat) = (squares(3.0), Rgb::black(96, 96));
+        for frame in 0..3 {
+            judged(&usage, frame, &good, Implausible::Refused).unwrap();
+        }
+        for frame in 3..6 {
+            judged(&usage, frame, &flat, Implausible::Refused).unwrap();
+        }
+        let problem = judged(&usage, 6, &flat, Implausible::Refused).unwrap_err();
+        assert!(problem.starts_with("4 of its 7 images"), "{problem}");
+        judged(&usage, 7, &flat, Implausible::Used).unwrap();
+        assert_eq!(usage.note().judged.flaws(), 5);
+    }
+
+    #[test]
+    fn an_image_that_is_made_again_counts_once() {
+        let usage = Usage::default();
+        let flat = Rgb::black(96, 96);
+        for frame in [0, 1, 0, 1, 1] {
+            judged(&usage, frame, &flat, Implausible::Used).unwrap();
+        }
+        let again = Seen::on([&squares(1.0), &flat]);
+        usage
+            .judge(&again, [&0, &"L4+ev+m"], Implausible::Used)
+            .unwrap();
+        let judged = usage.note().judged;
+        assert_eq!((judged.images, judged.flaws()), (3, 3));
+        assert_eq!(judged.examples.len(), 3);
+    }
+
+    #[test]
+    fn bright_frames_are_not_judged() {
+        let usage = Usage::default();
+        let bright = squares(6.0);
+        let made = Rgb::black(96, 96);
+        let seen = Seen::on([&bright, &made]);
+        assert_eq!(seen, Seen::Bright);
+        usage
+            .judge(&seen, [&"frame", &"L0"], Implausible::Refused)
+            .unwrap();
+        assert_eq!(usage.note().judged.images, 0);
+    }
+}

@@ -1,0 +1,113 @@
+//! Files that are written completely or not at all, by [`write()`] and [`write_synced`]; and helpers to read files, in [`reading`].
+
+pub mod folder_access;
+pub mod guarded;
+pub mod reading;
+
+use std::ffi::OsStr;
+use std::fs::{self, File};
+use std::io::{self, BufRead as _, BufReader, BufWriter, Write as _};
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+
+/// The ending of a file's name until the file is complete.
+pub const UNFINISHED: &str = ".part";
+
+/// Writes a file that can be made again: a killed process leaves the old or the new one, a power cut may lose both.
+///
+/// # Errors
+/// If the folder cannot be created or the file cannot be written.
+pub fn write(path: &Path, content: &[u8]) -> Result<()> {
+    replace(path, content, |_| Ok(()))
+}
+
+/// Writes a file and forces it to the disk before it returns.
+///
+/// # Errors
+/// If the folder cannot be created or the file cannot be written.
+pub fn write_synced(path: &Path, content: &[u8]) -> Result<()> {
+    replace(path, content, File::sync_all)
+}
+
+/// Whether a name is that of an unfinished file, which a killed process leaves behind.
+pub fn is_unfinished(name: &OsStr) -> bool {
+    name.to_string_lossy().ends_with(UNFINISHED)
+}
+
+/// Writes a file by `write`, and forces it to the disk before it returns. A file with the same content is left untouched.
+///
+/// # Errors
+/// If the folder cannot be created, the file cannot be written, or `write` fails.
+pub fn write_with(path: &Path, write: impl FnOnce(&mut dyn io::Write) -> Result<()>) -> Result<()> {
+    create_folder(path)?;
+    let unfinished = unfinished(path);
+    let unwritable = |e| Error::file(&unfinished, "write", e);
+    let mut file = BufWriter::new(create_new(&unfinished).map_err(unwritable)?);
+    write(&mut file)?;
+    file.flush().map_err(unwritable)?;
+    file.get_ref().sync_all().map_err(unwritable)?;
+    drop(file);
+    if is_same(path, &unfinished).unwrap_or(false) {
+        return fs::remove_file(&unfinished).map_err(unwritable);
+    }
+    fs::rename(&unfinished, path).map_err(|e| Error::file(path, "write", e))
+}
+
+/// Whether two files have the same content.
+fn is_same(one: &Path, other: &Path) -> io::Result<bool> {
+    if fs::metadata(one)?.len() != fs::metadata(other)?.len() {
+        return Ok(false);
+    }
+    let [mut one, mut other] = [
+        BufReader::new(File::open(one)?),
+        BufReader::new(File::open(other)?),
+    ];
+    loop {
+        let (a, b) = (one.fill_buf()?, other.fill_buf()?);
+        let length = a.len().min(b.len());
+        if length == 0 {
+            return Ok(a.len() == b.len());
+        }
+        if a[..length] != b[..length] {
+            return Ok(false);
+        }
+        one.consume(length);
+        other.consume(length);
+    }
+}
+
+/// The path of a file until it is complete.
+pub fn unfinished(path: &Path) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!(".{name}{UNFINISHED}"))
+}
+
+/// A new file in the place of what a killed process may have left there, or of a link that stands there.
+fn create_new(path: &Path) -> io::Result<File> {
+    match fs::remove_file(path) {
+        Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),
+        _ => {}
+    }
+    File::options().write(true).create_new(true).open(path)
+}
+
+fn create_folder(path: &Path) -> Result<()> {
+    match path.parent() {
+        Some(folder) => fs::create_dir_all(folder).map_err(|e| Error::file(folder, "create", e)),
+        None => Ok(()),
+    }
+}
+
+// tempfile's `persist` is not used: its random name leaves a further file after each killed process, and its file mode denies
+// access to colleagues who share a results folder.
+fn replace(path: &Path, content: &[u8], sync: impl FnOnce(&File) -> io::Result<()>) -> Result<()> {
+    create_folder(path)?;
+    let unfinished = unfinished(path);
+    let written = create_new(&unfinished).and_then(|mut file| {
+        file.write_all(content)?;
+        sync(&file)
+    });
+    written.map_err(|e| Error::file(&unfinished, "write", e))?;
+    fs::rename(&unfinished, path).map_err(|e| Error::file(path, "write", e))
+}

@@ -1,0 +1,200 @@
+//! Readers of folders ([`entries`]), files ([`open`]), text files ([`text`], [`settings`]) and files of one JSON object a line ([`json_lines`]).
+//!
+//! Each has a bound, so that no file takes memory without end, and none waits for ever: a stranger's file may be a link to `/dev/zero`,
+//! or a pipe.
+
+use std::fs::{self, File};
+use std::io::{self, BufRead as _, BufReader, Read as _};
+use std::path::{Path, PathBuf};
+
+use serde::de::DeserializeOwned;
+
+use crate::error::{Error, Result};
+
+/// The most bytes of a file of settings. Chosen: people write a few kilobytes.
+const MOST_SETTINGS: u64 = 1 << 20;
+
+/// The most bytes of a line of text. Chosen: a question with its choices has less than a kilobyte.
+const MOST_LINE: u64 = 4 << 20;
+
+/// The most bytes of any other file that is read at once. Chosen: the largest published lists of questions have a tenth.
+const MOST_BYTES: u64 = 1 << 30;
+
+/// The paths in a folder, sorted by name.
+///
+/// # Errors
+/// If the folder cannot be read.
+pub fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
+    let unreadable = |e| Error::file(folder, "read", e);
+    let entries = fs::read_dir(folder).map_err(unreadable)?;
+    let mut paths = entries
+        .map(|entry| entry.map(|entry| entry.path()).map_err(unreadable))
+        .collect::<Result<Vec<PathBuf>>>()?;
+    paths.sort();
+    Ok(paths)
+}
+
+/// Opens a file to read it. A pipe or a device in the place of a file is refused: it may have no end, or wait for ever. It is opened
+/// where the path itself lies in `/dev` or `/proc`, as `/dev/stdin` and what a shell writes for `<(command)`.
+///
+/// # Errors
+/// If the file cannot be opened.
+pub fn open(path: &Path) -> io::Result<File> {
+    refuse_pipes(path)?;
+    File::open(path)
+}
+
+/// Refuses what [`open`] refuses, before a file is opened in another way.
+///
+/// # Errors
+/// If there is a pipe or a device, or nothing.
+pub fn refuse_pipes(path: &Path) -> io::Result<()> {
+    let kind = fs::metadata(path)?.file_type();
+    let is_named = path.starts_with("/dev") || path.starts_with("/proc");
+    if kind.is_file() || kind.is_dir() || is_named {
+        return Ok(());
+    }
+    let problem = "this is a pipe or a device, not a file; put a file there";
+    Err(io::Error::new(io::ErrorKind::InvalidInput, problem))
+}
+
+/// The bytes of a file that [`open`] opens.
+///
+/// # Errors
+/// If the file cannot be read, or is larger than 1 GB.
+pub fn read(path: &Path) -> io::Result<Vec<u8>> {
+    read_at_most(path, MOST_BYTES)
+}
+
+/// The text of a file that [`open`] opens.
+///
+/// # Errors
+/// If the file cannot be read, is larger than 1 GB, or is not UTF-8.
+pub fn read_to_string(path: &Path) -> io::Result<String> {
+    read(path).and_then(utf8)
+}
+
+fn read_at_most(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    let file = open(path)?;
+    let length = file.metadata()?.len();
+    let mut bytes = Vec::with_capacity(length.min(most) as usize);
+    if file.take(most + 1).read_to_end(&mut bytes)? as u64 > most {
+        let problem = format!("larger than {most} bytes, which no file of its kind needs");
+        return Err(io::Error::new(io::ErrorKind::InvalidData, problem));
+    }
+    Ok(bytes)
+}
+
+fn utf8(bytes: Vec<u8>) -> io::Result<String> {
+    String::from_utf8(bytes).map_err(|e| io::Error::new(io::ErrorKind::InvalidData, e))
+}
+
+/// The bytes of a file.
+///
+/// # Errors
+/// If the file cannot be read, or is larger than 1 GB.
+pub fn bytes(path: &Path) -> Result<Vec<u8>> {
+    at_most(path, MOST_BYTES)
+}
+
+/// The text of a file.
+///
+/// # Errors
+/// If the file cannot be read, is larger than 1 GB, or is not UTF-8.
+pub fn text(path: &Path) -> Result<String> {
+    read_to_string(path).map_err(|e| Error::file(path, "read", e))
+}
+
+/// The text of a file of settings.
+///
+/// # Errors
+/// If the file cannot be read, is larger than 1 MB, or is not UTF-8.
+pub fn settings(path: &Path) -> Result<String> {
+    let text = read_at_most(path, MOST_SETTINGS).and_then(utf8);
+    text.map_err(|e| Error::file(path, "read", e))
+}
+
+/// The bytes of a file that has no more than so many.
+///
+/// # Errors
+/// If the file cannot be read or is larger.
+pub fn at_most(path: &Path, most: u64) -> Result<Vec<u8>> {
+    read_at_most(path, most).map_err(|e| Error::file(path, "read", e))
+}
+
+/// The value in a JSON file.
+///
+/// # Errors
+/// If the file cannot be read or does not hold such a value.
+pub fn json<T: DeserializeOwned>(path: &Path) -> Result<T> {
+    serde_json::from_str(&text(path)?).map_err(|e| Error::data(path.display(), e))
+}
+
+/// The objects of a file with their line numbers, counted from 1; empty lines and a byte order mark are skipped.
+///
+/// # Errors
+/// If the file cannot be read, or a line is longer than 4 MB or does not hold such an object; the error names the line.
+pub fn json_lines<T: DeserializeOwned>(path: &Path) -> Result<Vec<(usize, T)>> {
+    let unreadable = |e| Error::file(path, "read", e);
+    let mut file = BufReader::new(open(path).map_err(unreadable)?);
+    let (mut values, mut line) = (Vec::new(), Vec::new());
+    for number in 1.. {
+        line.clear();
+        let read = (&mut file).take(MOST_LINE + 1).read_until(b'\n', &mut line);
+        if read.map_err(unreadable)? == 0 {
+            break;
+        }
+        if line.len() as u64 > MOST_LINE {
+            let problem = format!("longer than {MOST_LINE} bytes, which no line of its kind needs");
+            return Err(Error::line(path, number, problem));
+        }
+        let text = match number {
+            1 => line.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&line),
+            _ => &line[..],
+        };
+        if !text.trim_ascii().is_empty() {
+            let value = serde_json::from_slice(text.trim_ascii_end());
+            values.push((
+                number,
+                value.map_err(|e| Error::json_line(path, number, &e))?,
+            ));
+        }
+    }
+    Ok(values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_too_large_is_refused_by_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("list.jsonl");
+        let text = format!("\u{feff}1\n\n  2 \r\n{}3\n", " ".repeat(MOST_LINE as usize));
+        fs::write(&path, &text).unwrap();
+        let error = json_lines::<u8>(&path).unwrap_err().to_string();
+        assert!(
+            error.contains("line 4: longer than 4194304 bytes"),
+            "{error}"
+        );
+        fs::write(&path, text.trim_end_matches(['3', '\n', ' '])).unwrap();
+        assert_eq!(json_lines::<u8>(&path).unwrap(), [(1, 1), (3, 2)]);
+        assert!(settings(&path).is_ok());
+        fs::write(&path, vec![b' '; 1 + MOST_SETTINGS as usize]).unwrap();
+        let error = settings(&path).unwrap_err().to_string();
+        assert!(
+            error.contains("list.jsonl") && error.contains("larger than 1048576 bytes"),
+            "{error}"
+        );
+        assert!(text_of_bytes(&path, b"\xff").contains("UTF-8"));
+    }
+
+    fn text_of_bytes(path: &Path, bytes: &[u8]) -> String {
+        fs::write(path, bytes).unwrap();
+        text(path)
+            .unwrap_err()
+            .to_string()
+            .replace("utf-8", "UTF-8")
+    }
+}

@@ -1,0 +1,250 @@
+//! Built-in label spaces, by name: [`space`]; custom label spaces, in `classes.json`: `read`.
+
+pub mod names;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, Result};
+use crate::files::reading;
+use crate::types::{Label, Labels};
+
+/// The schema of `classes.json`.
+const SCHEMA: &str = "darkqa.classes/1";
+
+/// The built-in label spaces: name, table and void numbers.
+const SPACES: [(&str, &str, &[u16]); 4] = [
+    ("ade150", include_str!("ade150.tsv"), &[0]),
+    ("mpcat40", include_str!("mpcat40.tsv"), &[0, 41]),
+    ("nyu13", include_str!("nyu13.tsv"), &[0]),
+    ("nyu40", include_str!("nyu40.tsv"), &[0]),
+];
+
+/// The names of the built-in label spaces.
+#[must_use]
+pub fn names() -> Vec<&'static str> {
+    SPACES.iter().map(|(name, ..)| *name).collect()
+}
+
+/// A built-in label space by name; `None` if the name is unknown.
+#[must_use]
+pub fn space(name: &str) -> Option<Labels> {
+    let (_, table, void) = SPACES.iter().find(|(known, ..)| *known == name)?;
+    let (mut labels, mut expressible) = (BTreeMap::new(), BTreeSet::new());
+    let lines = table.lines().filter(|line| !line.starts_with('#'));
+    for line in lines {
+        let mut cells = line.split('\t');
+        let [id, word, canonical] = [(); 3].map(|()| cells.next().unwrap_or_default().to_owned());
+        if cells.next().is_none() {
+            expressible.insert(canonical.clone());
+        }
+        let label = Label {
+            name: word,
+            canonical,
+        };
+        labels.insert(id.parse().ok()?, label);
+    }
+    Some(Labels {
+        space: name.to_owned(),
+        void: void.iter().copied().collect(),
+        labels,
+        expressible,
+    })
+}
+
+/// The canonical classes: those of mpcat40 without `void` and `unlabeled`.
+#[must_use]
+pub fn canonical() -> BTreeSet<String> {
+    space("mpcat40").map_or_else(BTreeSet::new, |labels| labels.expressible)
+}
+
+/// The content of `classes.json`.
+#[derive(Debug, Serialize, Deserialize)]
+struct ClassesFile {
+    schema: String,
+    space: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    void_id: Option<u16>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    void_ids: Vec<u16>,
+    classes: Vec<ClassEntry>,
+}
+
+/// One class of `classes.json`.
+#[derive(Debug, Serialize, Deserialize)]
+struct ClassEntry {
+    id: u16,
+    name: String,
+    canonical: String,
+    /// Whether absence of the canonical class from a map means that the image shows no such object.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    expressible: Option<bool>,
+}
+
+/// Reads a `classes.json`: `{"schema": "darkqa.classes/1", "space", "void_ids": [0], "classes": [{"id", "name",
+/// "canonical", "expressible"}]}`.
+///
+/// A canonical class is expressible if one of its labels is marked so. If no label of the file has such a mark, the built-in
+/// space of the same name decides. Without such a space, every class with a label is expressible.
+///
+/// # Errors
+/// With the file, for invalid JSON, another schema, a repeated number, or a canonical class that mpcat40 does not have.
+pub fn read(path: &Path) -> Result<Labels> {
+    let file: ClassesFile = reading::json(path)?;
+    file.labels()
+        .map_err(|problem| Error::data(path.display(), problem))
+}
+
+impl ClassesFile {
+    fn labels(self) -> Result<Labels, String> {
+        if self.schema != SCHEMA {
+            return Err(format!("schema {:?}; {SCHEMA:?} expected", self.schema));
+        }
+        let known = canonical();
+        let mut labels = Labels {
+            space: self.space,
+            void: self.void_ids.into_iter().chain(self.void_id).collect(),
+            ..Labels::default()
+        };
+        let stated = self.classes.iter().any(|class| class.expressible.is_some());
+        for class in self.classes {
+            let ClassEntry {
+                id,
+                name,
+                canonical,
+                expressible,
+            } = class;
+            if !known.contains(&canonical) {
+                return Err(format!(
+                    "class {id} ({name:?}) has the canonical class {canonical:?}, which mpcat40 does not have; one of {} expected",
+                    known.into_iter().collect::<Vec<_>>().join(", ")
+                ));
+            }
+            if expressible.unwrap_or(!stated) {
+                labels.expressible.insert(canonical.clone());
+            }
+            if labels
+                .labels
+                .insert(id, Label { name, canonical })
+                .is_some()
+            {
+                return Err(format!("two classes have the number {id}"));
+            }
+        }
+        if let Some(preset) = space(&labels.space).filter(|_| !stated) {
+            labels
+                .expressible
+                .retain(|class| preset.expressible.contains(class));
+        }
+        Ok(labels)
+    }
+}
+
+/// The text of `classes.json` for a label space.
+pub fn json(labels: &Labels) -> String {
+    let classes = labels.labels.iter().map(|(&id, label)| ClassEntry {
+        id,
+        name: label.name.clone(),
+        canonical: label.canonical.clone(),
+        expressible: Some(labels.expressible.contains(&label.canonical)),
+    });
+    let file = ClassesFile {
+        schema: SCHEMA.to_owned(),
+        space: labels.space.clone(),
+        void_id: None,
+        void_ids: labels.void.iter().copied().collect(),
+        classes: classes.collect(),
+    };
+    // Serialization of names and numbers cannot fail.
+    serde_json::to_string_pretty(&file).unwrap_or_default() + "\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    fn parse(text: &str) -> Result<Labels> {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        fs::write(file.path(), text).unwrap();
+        read(file.path())
+    }
+
+    #[test]
+    fn the_built_in_spaces_are_complete() {
+        let sizes = [150, 40, 13, 40];
+        for (name, size) in names().into_iter().zip(sizes) {
+            let labels = space(name).unwrap();
+            let ids: Vec<u16> = labels.labels.keys().copied().collect();
+            assert_eq!(ids, (1..=size).collect::<Vec<u16>>(), "{name}");
+            for label in labels.labels.values() {
+                assert!(canonical().contains(&label.canonical), "{name}: {label:?}");
+            }
+            assert_eq!(parse(&json(&labels)).unwrap(), labels, "{name}");
+        }
+        assert_eq!(canonical().len(), 40);
+    }
+
+    #[test]
+    fn classes_that_a_space_cannot_express_are_known() {
+        let nyu13 = space("nyu13").unwrap().expressible;
+        for class in ["sink", "toilet", "cabinet", "tv_monitor"] {
+            assert!(!nyu13.contains(class), "{class}");
+        }
+        let nyu40 = space("nyu40").unwrap().expressible;
+        for class in ["plant", "stool", "fireplace", "appliances", "shower"] {
+            assert!(!nyu40.contains(class), "{class}");
+        }
+        assert!(nyu40.contains("sink") && nyu13.contains("chair"));
+    }
+
+    #[test]
+    fn a_file_without_expressible_marks_is_read_by_its_space() {
+        let class = |id: u16, canonical: &str, more: &str| {
+            format!(r#"{{"id":{id},"name":"x","canonical":"{canonical}"{more}}}"#)
+        };
+        let file = |space: &str, classes: &[String]| {
+            format!(
+                r#"{{"schema":"{SCHEMA}","space":"{space}","void_id":0,"classes":[{}]}}"#,
+                classes.join(",")
+            )
+        };
+        let bare = [class(24, "appliances", ""), class(5, "chair", "")];
+        let read = |text: &str| {
+            parse(text)
+                .unwrap()
+                .expressible
+                .into_iter()
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(read(&file("nyu40", &bare)), ["chair"]);
+        assert_eq!(read(&file("mine", &bare)), ["appliances", "chair"]);
+        let marked = [
+            class(24, "appliances", r#","expressible":true"#),
+            class(5, "chair", ""),
+        ];
+        assert_eq!(read(&file("nyu40", &marked)), ["appliances"]);
+    }
+
+    #[test]
+    fn a_broken_file_says_what_is_wrong() {
+        for (text, says) in [
+            ("{", "EOF"),
+            (r#"{"schema":"x","space":"","classes":[]}"#, "schema \"x\""),
+            (
+                r#"{"schema":"darkqa.classes/1","space":"","classes":[{"id":1,"name":"a","canonical":"desk"}]}"#,
+                "class 1 (\"a\") has the canonical class \"desk\"",
+            ),
+            (
+                r#"{"schema":"darkqa.classes/1","space":"","classes":[{"id":1,"name":"a","canonical":"bed"},{"id":1,"name":"b","canonical":"bed"}]}"#,
+                "two classes have the number 1",
+            ),
+        ] {
+            let error = parse(text).unwrap_err().to_string();
+            assert!(error.contains(says), "{error}");
+        }
+    }
+}

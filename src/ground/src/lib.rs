@@ -1,0 +1,15 @@
+//! What every crate of darkqa-eval shares: errors, files, types and label spaces.
+//!
+//! - [`error`]: the one error type.
+//! - [`types`]: the vocabulary, without input or output.
+//! - [`files`]: files and folders, read with bounds and written whole.
+//! - [`labels`]: the label spaces NYU40, mpcat40, ADE150 and NYU13.
+
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
+
+pub mod error;
+pub mod files;
+pub mod labels;
+pub mod types;
+
+pub use error::{Error, Result};

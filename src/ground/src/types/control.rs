@@ -1,0 +1,132 @@
+//! The observer's name, and its controls: [`Control`].
+
+use std::fmt;
+use std::str::FromStr;
+
+/// Name of the observer in records and tables.
+pub const OBSERVER: &str = "observer";
+
+/// A way to spoil an image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Control {
+    /// The image of a frame of another scene in the same condition. It is shown by the plan of the run; the image is not changed.
+    OtherRoom,
+    /// Means of squares of 12 pixels. This is a limit, and not always chance: it is the right image without detail, and of large
+    /// things enough is left.
+    Mosaic12,
+    /// Means of squares of 40 pixels.
+    Mosaic40,
+    /// Left and right exchanged.
+    Mirrored,
+    /// Top and bottom exchanged.
+    UpsideDown,
+    /// Squares of 80 pixels, none of them in its place.
+    Tiles,
+    /// All pixels black.
+    Black,
+    /// All pixels the mean colour of the image.
+    Flat,
+    /// Independent uniform codes.
+    WhiteNoise,
+    /// Noise with the same power in each octave, like that of natural images.
+    PinkNoise,
+    /// Each code subtracted from 255.
+    Negative,
+    /// Blurred by about σ = 20 pixels.
+    Blur,
+    /// Shifted by 32 pixels to the right and down, around the edges.
+    Shift32,
+    /// Shifted by 4 pixels to the right and down. This is a limit, too: some outlines still agree.
+    Shift4,
+    /// Each mask filled with a colour at random.
+    RandomMasks,
+    /// The outlines of the masks, black on grey.
+    Outlines,
+}
+
+impl Control {
+    /// All controls, in the order in which they are asked.
+    pub const ALL: [Self; 16] = [
+        Self::OtherRoom,
+        Self::Mosaic12,
+        Self::Mosaic40,
+        Self::Mirrored,
+        Self::UpsideDown,
+        Self::Tiles,
+        Self::Black,
+        Self::Flat,
+        Self::WhiteNoise,
+        Self::PinkNoise,
+        Self::Negative,
+        Self::Blur,
+        Self::Shift32,
+        Self::Shift4,
+        Self::RandomMasks,
+        Self::Outlines,
+    ];
+
+    /// Whether nothing is left to see, so that the score must be that of chance. The others are limits of the observer.
+    #[must_use]
+    pub fn leaves_nothing(self) -> bool {
+        !matches!(self, Self::Shift4 | Self::Mosaic12)
+    }
+
+    /// The controls of which each run with the observer asks the first that is possible: other-room, or the tiles of the right image
+    /// if all frames are of one scene.
+    pub const STANDING: [Self; 2] = [Self::OtherRoom, Self::Tiles];
+
+    /// The control that a model name names, also with a run behind it, as `observer:tiles (night)`; `None` for all other models.
+    pub fn of_model(model: &str) -> Option<Self> {
+        let name = model.strip_prefix(OBSERVER)?.strip_prefix(':')?;
+        name.split_once(" (")
+            .map_or(name, |(name, _)| name)
+            .parse()
+            .ok()
+    }
+
+    /// The name as a model, `observer:NAME`.
+    pub fn model_name(self) -> String {
+        format!("{OBSERVER}:{self}")
+    }
+
+    /// The name, as in `observer:NAME`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::OtherRoom => "other-room",
+            Self::Mosaic12 => "mosaic-12",
+            Self::Mosaic40 => "mosaic-40",
+            Self::Mirrored => "mirrored",
+            Self::UpsideDown => "upside-down",
+            Self::Tiles => "tiles",
+            Self::Black => "black",
+            Self::Flat => "flat",
+            Self::WhiteNoise => "white-noise",
+            Self::PinkNoise => "pink-noise",
+            Self::Negative => "negative",
+            Self::Blur => "blur",
+            Self::Shift32 => "shift-32",
+            Self::Shift4 => "shift-4",
+            Self::RandomMasks => "random-masks",
+            Self::Outlines => "outlines",
+        }
+    }
+}
+
+impl fmt::Display for Control {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Control {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = Self::ALL.into_iter().find(|control| control.name() == text);
+        found.ok_or_else(|| {
+            let names = Self::ALL.map(Self::name).join(", ");
+            format!("observer:{text} is not a control; there are: {names}")
+        })
+    }
+}

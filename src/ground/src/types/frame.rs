@@ -1,0 +1,196 @@
+//! Images and their maps: [`Frame`], [`FrameId`], [`Rgb`].
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::Arc;
+
+use ndarray::{Array2, Array3};
+use serde::{Deserialize, Serialize};
+
+use super::labels::SegmentName;
+use crate::error::Error;
+
+/// The name of a frame, unique in its data set: `scene/frame`, or the path of an image in a ready-made set.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct FrameId(pub String);
+
+impl FrameId {
+    /// The name without the ending of an image file, if it has one.
+    #[must_use]
+    pub fn bare(&self) -> &str {
+        match self.0.rsplit_once('.') {
+            Some((bare, ending))
+                if is_image_ending(ending) && !bare.is_empty() && !bare.ends_with('/') =>
+            {
+                bare
+            }
+            _ => &self.0,
+        }
+    }
+}
+
+impl fmt::Display for FrameId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(&self.0)
+    }
+}
+
+/// The endings of the names of image files that are read, in lower case.
+pub const IMAGE_ENDINGS: [&str; 8] = ["png", "jpg", "jpeg", "webp", "tif", "tiff", "bmp", "exr"];
+
+/// Whether the ending of a name is that of an image file that is read, in any case of its letters.
+pub fn is_image_ending(ending: &str) -> bool {
+    let mut known = IMAGE_ENDINGS.iter();
+    known.any(|known| ending.eq_ignore_ascii_case(known))
+}
+
+/// An 8-bit sRGB image, height × width × 3, contiguous, at least one pixel.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Rgb(Array3<u8>);
+
+impl Rgb {
+    /// Takes height × width × 3 samples, row by row, red first.
+    ///
+    /// # Errors
+    /// If the number of samples is not `height * width * 3`, or is zero.
+    pub fn new(height: usize, width: usize, samples: Vec<u8>) -> Result<Self, Error> {
+        let found = samples.len();
+        let expected = height
+            .checked_mul(width)
+            .and_then(|n| n.checked_mul(3))
+            .filter(|n| *n > 0 && *n == found);
+        let array = expected.and_then(|_| Array3::from_shape_vec((height, width, 3), samples).ok());
+        array.map(Self).ok_or_else(|| {
+            Error::data(
+                "image",
+                format_args!("{found} samples do not make a {height} × {width} RGB image"),
+            )
+        })
+    }
+
+    /// A black image of at least one pixel.
+    #[must_use]
+    pub fn black(height: usize, width: usize) -> Self {
+        Self(Array3::zeros((height.max(1), width.max(1), 3)))
+    }
+
+    /// The height in pixels.
+    #[must_use]
+    pub fn height(&self) -> usize {
+        self.0.dim().0
+    }
+
+    /// The width in pixels.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.0.dim().1
+    }
+
+    /// The samples, row by row, red first.
+    #[must_use]
+    pub fn samples(&self) -> &[u8] {
+        self.0.as_slice().unwrap_or_default()
+    }
+
+    /// The samples, to change them in place.
+    #[must_use]
+    pub fn samples_mut(&mut self) -> &mut [u8] {
+        self.0.as_slice_mut().unwrap_or_default()
+    }
+}
+
+impl fmt::Debug for Rgb {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Rgb({} × {})", self.height(), self.width())
+    }
+}
+
+/// One view of a scene: an image and, if the data set has them, its maps of the same height and width.
+#[derive(Debug, Clone)]
+pub struct Frame {
+    /// The name of the frame, unique in its data set.
+    pub id: FrameId,
+    /// The scene of the frame; empty if the data set names no scenes.
+    pub scene: String,
+    /// The pixels of the image, 8-bit sRGB.
+    pub rgb: Rgb,
+    /// The depth of each pixel in millimetres, 0 where it is unknown.
+    pub depth: Option<Array2<u32>>,
+    /// The direction along which depth is measured.
+    pub depth_kind: DepthKind,
+    /// The camera's projection; `None` if the data set does not state it.
+    pub intrinsics: Option<Intrinsics>,
+    /// The class of each pixel, as a number in the data set's label space.
+    pub semantic: Option<Array2<u16>>,
+    /// The segment of each pixel, 0 for none.
+    pub segments: Option<Array2<u32>>,
+    /// Whether a segment is an object or a part of one.
+    pub segmentation: Segmentation,
+    /// The names of the scene's segments, by segment; some may be missing.
+    pub names: Arc<BTreeMap<u32, SegmentName>>,
+    /// The type of the room; `None` if the data set does not state it.
+    pub room: Option<String>,
+}
+
+/// The direction along which depth is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "snake_case")]
+pub enum DepthKind {
+    /// The optical axis: z.
+    #[default]
+    Planar,
+    /// The ray through the pixel: the distance itself.
+    Euclid,
+}
+
+/// The meaning of a segment in a map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Segmentation {
+    /// Each object is one segment.
+    #[default]
+    Instances,
+    /// A segment is a part of an object, as superpixels are: neighbours of one class belong together.
+    Parts,
+}
+
+/// A pinhole camera; all values are in pixels, and (0, 0) is the centre of the first pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Intrinsics {
+    /// The focal length along a row, in pixels.
+    pub fx: f64,
+    /// The focal length along a column, in pixels.
+    pub fy: f64,
+    /// The position of the optical axis along a row, in pixels.
+    pub cx: f64,
+    /// The position of the optical axis along a column, in pixels.
+    pub cy: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_ending_of_an_image_file_is_not_part_of_the_name() {
+        for (name, bare) in [
+            ("a/b.PNG", "a/b"),
+            ("a.b.jpeg", "a.b"),
+            ("a.WebP", "a"),
+            ("a.heic", "a.heic"),
+            ("a.b", "a.b"),
+            ("a/.png", "a/.png"),
+            ("scene/1", "scene/1"),
+        ] {
+            assert_eq!(FrameId(name.into()).bare(), bare);
+        }
+    }
+
+    #[test]
+    fn images_are_checked() {
+        assert!(Rgb::new(2, 2, vec![0; 12]).is_ok());
+        for (height, width, samples) in [(2, 2, 11), (0, 2, 0), (usize::MAX, 2, 12), (2, 2, 13)] {
+            assert!(Rgb::new(height, width, vec![0; samples]).is_err());
+        }
+    }
+}

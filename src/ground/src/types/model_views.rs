@@ -1,0 +1,110 @@
+//! What the models of a run are shown: [`StoredViews`], what its manifest says of it.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use super::View;
+use super::manifest::RunManifest;
+
+/// The entry of a manifest's settings that holds the views of models which are asked without images.
+const VIEWS: &str = "views of models";
+
+/// What each model is shown, by its name in tables.
+pub type Views = BTreeMap<String, BTreeSet<View>>;
+
+/// How well what a model was shown fits what another one is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Fit {
+    /// One is shown images alone, and the other one none.
+    Apart,
+    /// The manifest does not say it.
+    Unknown,
+    /// One is shown what the other one is, and more.
+    Part,
+    /// The same.
+    Whole,
+}
+
+/// What the models of a stored run were shown, as far as its manifest says it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StoredViews {
+    known: Views,
+    /// Whether a model that is not among these was shown images alone.
+    is_whole: bool,
+}
+
+/// A model as the settings of a manifest hold it.
+#[derive(Deserialize)]
+struct Noted {
+    name: String,
+    view: BTreeSet<View>,
+}
+
+impl StoredViews {
+    /// What a manifest says.
+    pub fn of(manifest: &RunManifest) -> Self {
+        let read = |value: &Value| serde_json::from_value::<Views>(value.clone()).ok();
+        if let Some(known) = manifest.settings.get(VIEWS).and_then(read) {
+            return Self {
+                known,
+                is_whole: true,
+            };
+        }
+        // The models that the command before asked by its file.
+        let models = manifest.settings.get("models").cloned();
+        let models = models.and_then(|models| serde_json::from_value::<Vec<Noted>>(models).ok());
+        let models = models.into_iter().flatten();
+        Self {
+            known: models.map(|model| (model.name, model.view)).collect(),
+            is_whole: false,
+        }
+    }
+
+    /// Whether the manifest says it of all models.
+    pub fn is_noted(&self) -> bool {
+        self.is_whole
+    }
+
+    /// How well a stored model fits what a model is shown now.
+    pub fn fit(&self, stored: &str, now: &BTreeSet<View>) -> Fit {
+        match self.views(stored) {
+            None => Fit::Unknown,
+            Some(views) if views == *now => Fit::Whole,
+            Some(views) if views.is_disjoint(now) => Fit::Apart,
+            Some(_) => Fit::Part,
+        }
+    }
+
+    /// Notes the views in a manifest under the names of now: those of the stored models, each with its new name, and those of the
+    /// command.
+    pub fn note<'a>(
+        &self,
+        manifest: &mut RunManifest,
+        stored: impl Iterator<Item = (&'a String, String)>,
+        now: &Views,
+    ) {
+        let mut views = Views::new();
+        for (name, new) in stored {
+            views
+                .entry(new)
+                .or_default()
+                .extend(self.views(name).into_iter().flatten());
+        }
+        for (name, shown) in now {
+            views.entry(name.clone()).or_default().extend(shown);
+        }
+        views.retain(|_, views| views.contains(&View::Blind));
+        if views.is_empty() {
+            manifest.settings.remove(VIEWS);
+        } else {
+            manifest.settings.insert(VIEWS.to_owned(), json!(views));
+        }
+    }
+
+    fn views(&self, name: &str) -> Option<BTreeSet<View>> {
+        let known = self.known.get(name).cloned();
+        known.or_else(|| self.is_whole.then(|| BTreeSet::from([View::Image])))
+    }
+}

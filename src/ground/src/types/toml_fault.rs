@@ -1,0 +1,101 @@
+//! What is wrong with a TOML text, as messages say it: [`TomlFault`].
+
+use super::near_name::suggestion;
+
+/// Where a text is not the TOML that was expected, and why.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TomlFault {
+    /// The line, from 1.
+    pub line: usize,
+    /// The problem on one line, with the key that an unknown one is most similar to.
+    pub problem: String,
+}
+
+impl TomlFault {
+    /// The fault of a text, as the parser found it.
+    pub fn of(text: &str, error: &toml::de::Error) -> Self {
+        let message: Vec<&str> = error.message().lines().map(str::trim).collect();
+        Self {
+            line: line_at(text, error.span().map_or(0, |span| span.start)),
+            problem: message.join(", ") + &meant(error.message()) + quotes(error.message()),
+        }
+    }
+}
+
+/// The line, from 1, of a place in a text.
+pub fn line_at(text: &str, start: usize) -> usize {
+    text.get(..start).unwrap_or_default().matches('\n').count() + 1
+}
+
+/// The known key that an unknown one is most similar to, as a question; empty if the message is about something else.
+fn meant(message: &str) -> String {
+    let names: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
+    match &*names {
+        [unknown, known @ ..] if message.starts_with("unknown field") => suggestion(unknown, known),
+        _ => String::new(),
+    }
+}
+
+/// That a text needs quotes, if the parser took one for a number or a date: of others it says so itself.
+fn quotes(message: &str) -> &'static str {
+    let is_number = ["invalid fraction", "invalid float", "invalid integer"]
+        .iter()
+        .any(|problem| message.starts_with(problem));
+    let is_date = message.starts_with("invalid type: map, expected a string");
+    if is_number || is_date {
+        "; a text stands in quotes"
+    } else {
+        ""
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde::Deserialize;
+
+    use super::*;
+
+    #[derive(Debug, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Known {
+        #[expect(dead_code)]
+        range_in: Option<String>,
+        #[expect(dead_code)]
+        multiple: Option<u32>,
+    }
+
+    #[test]
+    fn a_fault_has_its_line_and_says_how_to_mend_it() {
+        for (text, line, part) in [
+            ("\nrange = \"0..1\"", 2, "; did you mean range_in?"),
+            ("range_in = 0..1", 1, "; a text stands in quotes"),
+            (
+                "multiple = 2\nrange_in = nchw",
+                2,
+                "; a text stands in quotes",
+            ),
+            ("range_in = 2024-01-01", 1, "; a text stands in quotes"),
+        ] {
+            let fault = TomlFault::of(text, &toml::from_str::<Known>(text).unwrap_err());
+            assert_eq!(fault.line, line, "{fault:?}");
+            assert!(fault.problem.ends_with(part), "{fault:?}");
+            assert!(!fault.problem.contains('\n'), "{fault:?}");
+        }
+        for text in [
+            "multiple = \"2\"",
+            "zoom = 1 # far",
+            "multiple = true",
+            "multiple = 1_0.5",
+            "range_in = [1]",
+            "multiple = True",
+            "range_in = gpt-4o",
+            "range_in = \"a\" \"b=c\"",
+            "range_in == \"a\"",
+            "\"a=b\" = 3 4",
+            "zoom = 2024-01-01",
+        ] {
+            let fault = TomlFault::of(text, &toml::from_str::<Known>(text).unwrap_err());
+            assert!(!fault.problem.contains(';'), "{fault:?}");
+        }
+    }
+}

@@ -1,0 +1,62 @@
+//! Where the texts of a trial are: [`TextPlace`].
+
+/// The place of the line of a trial in the file of its run, or its number where lines are held in memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct TextPlace {
+    log: u16,
+    high: u16,
+    low: u32,
+}
+
+impl TextPlace {
+    /// A place in the first file.
+    #[must_use]
+    pub fn new(start: u64) -> Self {
+        Self {
+            log: 0,
+            high: (start >> 32) as u16,
+            low: start as u32,
+        }
+    }
+
+    /// The same place in the file of another number.
+    #[must_use]
+    pub fn in_log(self, log: usize) -> Self {
+        Self {
+            log: log as u16,
+            ..self
+        }
+    }
+
+    /// The number of the file among those of all runs.
+    #[must_use]
+    pub fn log(self) -> usize {
+        usize::from(self.log)
+    }
+
+    /// The first byte of the line in its file, or the number of the line.
+    #[must_use]
+    pub fn start(self) -> u64 {
+        u64::from(self.high) << 32 | u64::from(self.low)
+    }
+
+    /// The same place, if this many files stand before those of its run.
+    pub(super) fn after(self, logs: usize) -> Self {
+        Self {
+            log: self.log + logs as u16,
+            ..self
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_beyond_4_gb_are_kept() {
+        let place = TextPlace::new(0x1234_5678_9abc).after(3);
+        assert_eq!((place.log(), place.start()), (3, 0x1234_5678_9abc));
+        assert_eq!(size_of::<TextPlace>(), 8);
+    }
+}

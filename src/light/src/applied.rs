@@ -1,0 +1,119 @@
+//! A degradation with all that decides the pixels of one frame: [`AppliedDegradation`].
+
+use super::auto::{AutoExposure, AutoShot};
+use super::motion::{FrameView, Motion};
+use super::random::NoiseKey;
+use super::reading::Synthesis;
+use super::streak::Streak;
+use darkqa_ground::error::Result;
+use darkqa_ground::types::degradation::Kind;
+use darkqa_ground::types::{Degradation, ExposureFacts, ReadingName, Severity};
+
+/// A degradation with all that decides the pixels of one frame, besides the frame itself and the key of its noise.
+#[derive(Debug, Clone, PartialEq)]
+pub enum AppliedDegradation {
+    /// Less light.
+    Exposure(Severity),
+    /// Less light, with sensor noise.
+    Sensor {
+        /// How much less light.
+        severity: Severity,
+        /// Name of the light reading.
+        reading: ReadingName,
+        /// Content of the light reading.
+        synthesis: Synthesis,
+    },
+    /// Less light, as a camera with automatic exposure meets it.
+    Auto {
+        /// The answer of the camera.
+        shot: AutoShot,
+        /// The path of the picture during the exposure.
+        streak: Streak,
+        /// The sensor: the light reading `physical` at the gain of the shot.
+        synthesis: Synthesis,
+    },
+    /// The motion blur of an exposure.
+    Motion {
+        /// Exposure time, in seconds.
+        time: f64,
+        /// The path of the picture during the exposure.
+        streak: Streak,
+    },
+}
+
+impl AppliedDegradation {
+    /// What a degradation does to a frame. `synthesis` is the content of its light reading; a kind without readings has its sensor.
+    ///
+    /// # Errors
+    /// If the sensor lacks the gain of an automatic exposure, or the picture would move too far.
+    pub fn new(
+        how: &Degradation,
+        synthesis: &Synthesis,
+        (auto, motion): (&AutoExposure, &Motion),
+        view: FrameView,
+        key: &NoiseKey,
+    ) -> Result<Self> {
+        let severity = how.severity();
+        Ok(match how.kind() {
+            Kind::Exposure => Self::Exposure(severity),
+            Kind::Sensor => Self::Sensor {
+                severity,
+                reading: how.reading().cloned().unwrap_or(ReadingName::PAPER),
+                synthesis: synthesis.clone(),
+            },
+            Kind::Auto => {
+                let shot = auto.shot(severity);
+                Self::Auto {
+                    streak: motion.streak(shot.time, view, key)?,
+                    synthesis: shot.synthesis(&synthesis.camera)?,
+                    shot,
+                }
+            }
+            Kind::Motion => {
+                let time = severity.value() / 1000.0;
+                Self::Motion {
+                    streak: motion.streak(time, view, key)?,
+                    time,
+                }
+            }
+        })
+    }
+
+    /// What the camera did, for records and files; `None` for a kind that leaves it open.
+    #[must_use]
+    pub fn exposure(&self) -> Option<ExposureFacts> {
+        let (shot, time, streak) = match self {
+            Self::Exposure(_) | Self::Sensor { .. } => return None,
+            Self::Auto { shot, streak, .. } => (Some(shot), shot.time, streak),
+            Self::Motion { time, streak } => (None, *time, streak),
+        };
+        Some(ExposureFacts {
+            shutter: shot.map(|shot| shot.shutter),
+            gain: shot.map(|shot| shot.gain),
+            dark: shot.map(|shot| shot.dark),
+            time_ms: 1000.0 * time,
+            system_gain: shot.map(|shot| shot.system_gain),
+            blur_px: Some(streak.length()),
+            blur_angle: Some(streak.angle()),
+        })
+    }
+
+    /// The content of the sensor branch; `None` for a kind without noise.
+    #[must_use]
+    pub fn synthesis(&self) -> Option<&Synthesis> {
+        match self {
+            Self::Exposure(_) | Self::Motion { .. } => None,
+            Self::Sensor { synthesis, .. } | Self::Auto { synthesis, .. } => Some(synthesis),
+        }
+    }
+
+    /// The exposure drop in EV after which the sensor's light is shown; 0 for a kind that does not reduce the light.
+    #[must_use]
+    pub fn drop_ev(&self) -> f64 {
+        match self {
+            Self::Exposure(severity) | Self::Sensor { severity, .. } => severity.value(),
+            Self::Auto { shot, .. } => shot.dark,
+            Self::Motion { .. } => 0.0,
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! The levels of the kinds of a run: those that are named, or each kind's own ladder.
+
+use super::levels::{LIGHT, Levels, ladder};
+use super::reading::Readings;
+use darkqa_ground::error::{Error, Result};
+use darkqa_ground::types::degradation::{Axis, Kind};
+use darkqa_ground::types::{AxisLevel, KindSet, PairDark};
+
+impl Levels {
+    /// The levels of a run with these kinds. Kinds of an axis on which no level is named have their own ladder, if L0 to L5 are
+    /// named, as by default.
+    ///
+    /// # Errors
+    /// If a kind has no level, or a level no kind.
+    pub(super) fn of_kinds(&self, kinds: KindSet) -> Result<Vec<AxisLevel>> {
+        let mut levels = self.0.clone();
+        levels.retain(|level| *level != AxisLevel::PAIR);
+        let on = |axis: Axis| move |level: &&AxisLevel| level.axis() == Some(axis);
+        let is_clean = levels.iter().all(|level| level.severity().is_none());
+        let light = levels
+            .iter()
+            .filter(|level| level.axis() != Some(Axis::MOTION));
+        let has_ladders = light.eq(&ladder(LIGHT));
+        for axis in Axis::ALL.into_iter().filter(|_| !is_clean) {
+            let mut of_axis = kinds.kinds().filter(|kind| kind.axis() == axis);
+            match (of_axis.next(), self.0.iter().find(on(axis))) {
+                (Some(kind), None) if has_ladders => levels.extend(ladder(kind)),
+                (Some(kind), None) => {
+                    let [first, last] = ends(kind);
+                    let problem = format_args!(
+                        "no level of {kind} is named; add {first}-{last}, or leave out {kind} in --variant"
+                    );
+                    return Err(Error::usage("--levels", problem));
+                }
+                (None, Some(_)) if axis == Axis::LIGHT && has_ladders => {
+                    levels.retain(|level| level.axis() != Some(axis));
+                }
+                (None, Some(level)) => {
+                    let all = Kind::ALL.into_iter().filter(|kind| kind.axis() == axis);
+                    let words: Vec<&str> = all.map(Kind::word).collect();
+                    let problem = format_args!(
+                        "{level} is a level of {}, of which --variant {kinds} names none",
+                        words.join(", ")
+                    );
+                    return Err(Error::usage("--levels", problem));
+                }
+                (Some(_), Some(_)) | (None, None) => {}
+            }
+        }
+        levels.sort_unstable();
+        levels.dedup();
+        Ok(levels)
+    }
+
+    /// The kinds and readings whose synthetic images are as dark as each frame's own photograph; empty unless `match` is among the
+    /// levels.
+    ///
+    /// # Errors
+    /// If it is, and no kind reduces the light.
+    pub(super) fn matches(&self, kinds: KindSet, readings: &Readings) -> Result<Vec<PairDark>> {
+        if !self.0.contains(&AxisLevel::PAIR) {
+            return Ok(Vec::new());
+        }
+        let mut all = Vec::new();
+        for kind in kinds.kinds().filter(|kind| kind.can_match()) {
+            if kind.has_readings() {
+                let readings = readings.iter().map(|(name, _)| Some(name.clone()));
+                all.extend(readings.map(|reading| PairDark::Match(kind, reading)));
+            } else {
+                all.push(PairDark::Match(kind, None));
+            }
+        }
+        if all.is_empty() {
+            let problem = format_args!(
+                "match reduces the light, which --variant {kinds} does not; add ev or noise to it"
+            );
+            return Err(Error::usage("--levels", problem));
+        }
+        Ok(all)
+    }
+}
+
+/// The first and the last level of a kind's own ladder.
+fn ends(kind: Kind) -> [String; 2] {
+    let ladder = kind.ladder();
+    [ladder.first(), ladder.last()]
+        .map(|severity| severity.map_or(String::new(), |severity| kind.label(*severity)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_kind_has_its_levels() {
+        let of = |levels: &str, kinds: &str| {
+            let levels: Levels = levels.parse().unwrap();
+            let levels = levels.of_kinds(kinds.parse().unwrap());
+            let levels = levels.map_err(|e| e.to_string())?;
+            let names: Vec<String> = levels.iter().map(ToString::to_string).collect();
+            Ok::<String, String>(names.join(" "))
+        };
+        let light = "L0 L1 L2 L3 L4 L5";
+        let times = "T8.33 T16.67 T33.33 T66.67 T133.33";
+        for (levels, kinds, expected) in [
+            ("L0-L5", "both", light.to_owned()),
+            ("L0-L5", "auto", light.to_owned()),
+            ("L0-L5", "motion", format!("L0 {times}")),
+            ("L0-L5", "all", format!("{light} {times}")),
+            ("L0-L5,T5", "ev,motion", format!("{light} T5")),
+            ("L0,T5", "motion", "L0 T5".to_owned()),
+            ("L3,T5", "noise,motion", "L3 T5".to_owned()),
+            ("L0,3.3", "auto", "L0 E3.3".to_owned()),
+            ("L0", "all", "L0".to_owned()),
+        ] {
+            assert_eq!(of(levels, kinds), Ok(expected), "{levels} {kinds}");
+        }
+        for (levels, kinds, part) in [
+            (
+                "L0,L3",
+                "noise,motion",
+                "--levels: no level of motion is named; add T8.33-T133.33, or leave out motion in --variant",
+            ),
+            ("T5", "both,motion", "no level of ev is named; add L1-L5"),
+            (
+                "L0,L3",
+                "motion",
+                "L3 is a level of ev, noise, auto, of which --variant motion names none",
+            ),
+            ("L0-L5,2.5", "motion", "L1 is a level of ev, noise, auto"),
+            (
+                "L0-L5,T5",
+                "both",
+                "T5 is a level of motion, of which --variant both names none",
+            ),
+        ] {
+            let error = of(levels, kinds).unwrap_err();
+            assert!(error.contains(part), "{levels} {kinds}: {error}");
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! Degraded versions of a clean frame, as a camera would take it in less light. [`degrade`] is the entry point.
+//!
+//! ```text
+//! Exposure   sRGB ─ gamma ─ × 2^−ΔEV ─ gamma⁻¹ ─ 8 bit                            a table of 256 codes
+//! Sensor     sRGB ─ unprocess ─ RAW ─ shot, read, row, quantisation ─ balance ─┐
+//!                                                     a Negative, drawn once ◄─┘
+//!            Negative ─ demosaic ─ camera → sRGB ─ × 2^−ΔEV ─ gamma⁻¹ ─ 8 bit     for each level
+//! Motion     sRGB ─ gamma ─ blur ─ gamma⁻¹ ─ 8 bit                                the mean over the path of an exposure
+//! Auto       sRGB ─ gamma ─ blur ─ unprocess ─ … the sensor branch, physical, at the camera's own gain
+//! ```
+//!
+//! The sensor branch has no forward tone curve, because the paper lists none. Before the drop, its shadows are therefore
+//! brighter than those of the exposure branch (grey 16 becomes 39, 192 becomes 172). So the two branches differ in
+//! contrast as well as in noise.
+//!
+//! The result depends only on the arguments and on [`VERSION`], not on threads, order or machine. Random numbers are
+//! addressed by where they are used (see [`random`]). Powers and logarithms come from `libm` and are tabulated (see
+//! [`piecewise`]). All else is IEEE sums, products, quotients and square roots in a fixed order. The camera's state is
+//! computed in double precision, samples in single precision, many at once (see [`lanes`] and [`isa`](darkqa_ground::types::isa)).
+
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
+#![expect(
+    clippy::inline_always,
+    reason = "only inlined code is compiled for a kernel's instruction set, see isa"
+)]
+
+mod applied;
+mod auto;
+pub mod bayer;
+pub mod blur;
+pub mod camera;
+mod clean;
+mod clean_raw;
+mod codes;
+pub mod colour;
+pub mod curve;
+pub mod exposure;
+mod exposures;
+mod isp;
+mod kind_levels;
+pub mod lanes;
+mod levels;
+mod motion;
+pub mod negative;
+pub mod noise;
+mod pair_ev;
+pub mod piecewise;
+pub mod poisson;
+pub mod quantile;
+pub mod random;
+mod reading;
+mod settings;
+mod streak;
+pub mod unprocess;
+
+pub use applied::AppliedDegradation;
+pub use auto::{AutoExposure, AutoSettings, AutoShot};
+pub use camera::{Calibration, CameraModel, CameraState, Sampling};
+pub use clean::Clean;
+pub use clean_raw::CleanRaw;
+pub use exposure::{expose, expose_by};
+pub use exposures::Exposures;
+pub use exposures::version;
+pub use motion::{FrameView, Motion, MotionAngle};
+pub use negative::{Negative, develop_with_state};
+pub use pair_ev::{PairEv, mean_luminance};
+pub use random::NoiseKey;
+pub use random::{Component, Site};
+pub use reading::{Amplify, Coupling, Draws, LightReading, Synthesis, Tone};
+pub use settings::{
+    CameraArgs, KindSettings, LightArgs, LightSettings, SensorArgs, SensorSettings,
+};
+pub use streak::{Streak, Tap};
+
+use darkqa_ground::error::Result;
+use darkqa_ground::types::{Degradation, Rgb};
+
+/// Version of the sensor branch, raised whenever a pixel changes, so that results of an older version are not reused.
+/// The exposure branch has [another](exposure::VERSION).
+pub const VERSION: u32 = 2;
+
+/// The frame after a degradation; without one, the frame itself.
+///
+/// `synthesis` is the content of the degradation's light reading. Automatic exposure and the camera's motion are as by default, and
+/// the focal length is not known. For other settings, and for several degradations of one frame, [`Exposures`] makes the images of
+/// [`AppliedDegradation`]s with less work.
+///
+/// # Errors
+/// If the sensor lacks the gain of an automatic exposure, or the picture would move too far during the exposure.
+pub fn degrade(
+    clean: &Rgb,
+    degradation: Option<&Degradation>,
+    key: &NoiseKey,
+    synthesis: &Synthesis,
+) -> Result<Rgb> {
+    let Some(how) = degradation else {
+        return Ok(clean.clone());
+    };
+    let view = FrameView {
+        width: clean.width(),
+        focal: None,
+    };
+    let camera = (&AutoExposure::default(), &Motion::default());
+    let applied = AppliedDegradation::new(how, synthesis, camera, view, key)?;
+    Ok(Exposures::default().degrade(clean.into(), &applied, key))
+}
+
+#[cfg(test)]
+mod signal_to_noise;
+#[cfg(test)]
+mod statistics;
+#[cfg(test)]
+mod tests;

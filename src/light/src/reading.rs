@@ -1,0 +1,285 @@
+//! Light readings, ways to understand the paper's noise model: [`Synthesis`], its named contents [`LightReading`], and those
+//! of a run, [`Readings`].
+
+use std::collections::BTreeMap;
+
+use clap::ValueEnum;
+use serde::{Deserialize, Serialize};
+
+use super::camera::CameraModel;
+use darkqa_ground::error::{Error, Result};
+use darkqa_ground::types::flag::flag_words;
+use darkqa_ground::types::{Degradation, ReadingName};
+
+/// Choices that define the sensor branch. The default follows the paper to the letter.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Synthesis {
+    /// Noise terms that the ratio r amplifies.
+    pub amplify: Amplify,
+    /// Position of a forward tone curve.
+    pub tone: Tone,
+    /// Random draws that the levels of a frame share.
+    pub draws: Draws,
+    /// Quantity that the ratio r depends on.
+    pub coupling: Coupling,
+    /// Distribution that each frame's camera is drawn from.
+    pub camera: CameraModel,
+}
+
+/// A named way to understand the paper's noise model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum LightReading {
+    /// The DarkQA paper to the letter.
+    #[default]
+    Paper,
+    /// The ratio amplifies all noise, as in ELD (Wei et al. 2020).
+    Eld,
+    /// The ratio is 2^ΔEV: photons decrease with the level, read noise does not increase.
+    Level,
+    /// As in physics: all noise is amplified, less light means fewer photons, and the tone curve is applied again.
+    Physical,
+}
+
+impl LightReading {
+    /// All readings, in the order in which tables list them.
+    pub const ALL: [Self; 4] = [Self::Paper, Self::Eld, Self::Level, Self::Physical];
+
+    /// Name in conditions, as `eld` in `L3-noise@eld`.
+    #[must_use]
+    pub fn name(self) -> ReadingName {
+        match self {
+            Self::Paper => ReadingName::PAPER,
+            Self::Eld => ReadingName::of("eld"),
+            Self::Level => ReadingName::of("level"),
+            Self::Physical => ReadingName::of("physical"),
+        }
+    }
+}
+
+impl Synthesis {
+    /// The choices of a named reading, with the given camera.
+    #[must_use]
+    pub fn of(reading: LightReading, camera: CameraModel) -> Self {
+        let (amplify, tone, coupling) = match reading {
+            LightReading::Paper => Default::default(),
+            LightReading::Eld => (Amplify::All, Tone::None, Coupling::Independent),
+            LightReading::Level => (Amplify::ShotOnly, Tone::None, Coupling::Photon),
+            LightReading::Physical => (Amplify::All, Tone::BeforeEv, Coupling::Photon),
+        };
+        Self {
+            amplify,
+            tone,
+            draws: Draws::Shared,
+            coupling,
+            camera,
+        }
+    }
+
+    /// Name of the reading that has these choices, whatever the camera; `custom` if there is none.
+    #[must_use]
+    pub fn name(&self) -> ReadingName {
+        let mut readings = LightReading::ALL.into_iter();
+        let same = readings.find(|reading| Self::of(*reading, self.camera.clone()) == *self);
+        same.map_or(ReadingName::CUSTOM, LightReading::name)
+    }
+}
+
+/// Light readings of a run by name; at least one.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(transparent)]
+pub struct Readings(BTreeMap<ReadingName, Synthesis>);
+
+impl Default for Readings {
+    fn default() -> Self {
+        Synthesis::default().into()
+    }
+}
+
+impl From<Synthesis> for Readings {
+    fn from(synthesis: Synthesis) -> Self {
+        Self([(synthesis.name(), synthesis)].into())
+    }
+}
+
+impl Readings {
+    /// Several named readings with one camera; `paper` alone for an empty list.
+    #[must_use]
+    pub fn named(readings: &[LightReading], camera: &CameraModel) -> Self {
+        let contents = readings.iter();
+        let contents: BTreeMap<_, _> = contents
+            .map(|reading| (reading.name(), Synthesis::of(*reading, camera.clone())))
+            .collect();
+        if contents.is_empty() {
+            return Synthesis::of(LightReading::Paper, camera.clone()).into();
+        }
+        Self(contents)
+    }
+
+    /// Names and contents of the readings, `paper` first.
+    pub fn iter(&self) -> impl Iterator<Item = (&ReadingName, &Synthesis)> {
+        self.0.iter()
+    }
+
+    /// The sensor of all readings, with neither its gain nor its ratio pinned.
+    pub fn camera(&self) -> CameraModel {
+        let camera = self.0.values().next().map(|content| &content.camera);
+        camera.map_or_else(CameraModel::default, CameraModel::unpinned)
+    }
+
+    /// Content of a degradation's light reading. For a kind without readings it is any of them, because the pixels do not
+    /// depend on it.
+    ///
+    /// # Errors
+    /// If the run does not have the reading.
+    pub fn of(&self, degradation: Option<&Degradation>) -> Result<&Synthesis> {
+        let content = match degradation.and_then(Degradation::reading) {
+            None => self.0.values().next(),
+            Some(name) => self.get(name),
+        };
+        content.ok_or_else(|| {
+            let names: Vec<&str> = self.0.keys().map(ReadingName::as_str).collect();
+            let problem = format_args!(
+                "{} needs a light reading that is not among those of --profile ({}); add it there",
+                degradation.map_or("L0".to_owned(), ToString::to_string),
+                names.join(", ")
+            );
+            Error::usage("--profile", problem)
+        })
+    }
+
+    /// Content of the reading of this name; `None` if the run does not have it.
+    pub fn get(&self, name: &ReadingName) -> Option<&Synthesis> {
+        self.0.get(name)
+    }
+
+    /// The content of the only reading.
+    ///
+    /// # Errors
+    /// If there are several.
+    pub fn only(&self) -> Result<&Synthesis> {
+        let mut contents = self.0.values();
+        match (contents.next(), contents.next()) {
+            (Some(content), None) => Ok(content),
+            _ => Err(Error::usage(
+                "--profile",
+                "this command takes one light reading",
+            )),
+        }
+    }
+}
+
+/// Noise terms that the ratio r amplifies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Amplify {
+    /// The shot noise alone, and read, row and quantisation noise act after it (DarkQA, noise item 1).
+    #[default]
+    ShotOnly,
+    /// The sum of all four (ELD, and every public implementation).
+    All,
+}
+
+/// Position of a forward tone curve, 3x² − 2x³, on the way back to sRGB.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Tone {
+    /// Nowhere, as the paper lists none.
+    #[default]
+    None,
+    /// Before the exposure drop: without noise, greys are as in the exposure branch.
+    BeforeEv,
+    /// After the exposure drop, as in a camera: it crushes the darkest levels.
+    AfterEv,
+}
+
+/// Random draws that the levels of a frame share.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Draws {
+    /// The camera and the noise field: levels differ in light alone.
+    #[default]
+    Shared,
+    /// The camera alone: each level has another noise field.
+    Fresh,
+}
+
+/// Quantity that the ratio r depends on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Coupling {
+    /// Nothing: it is drawn once per frame (DarkQA).
+    #[default]
+    Independent,
+    /// The level: r = 2^ΔEV, so that less light means fewer photons.
+    Photon,
+}
+
+impl Coupling {
+    /// How many EV above white the sensor saturates, in front of a scene and after an exposure drop. In the paper's chain light is
+    /// clipped at white before the drop (0). If less light means fewer photons, the light is gone before it reaches the
+    /// sensor, which then saturates that much later.
+    #[must_use]
+    pub fn headroom_ev(self, drop_ev: f64) -> f64 {
+        match self {
+            Self::Independent => 0.0,
+            Self::Photon => drop_ev.max(0.0),
+        }
+    }
+}
+
+flag_words!(Amplify, Tone, Draws, Coupling);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_written_as_they_are_read() {
+        for name in ["none", "before-ev", "after-ev"] {
+            let tone = Tone::from_str(name, false).unwrap();
+            assert_eq!(tone.to_string(), name);
+            assert_eq!(serde_json::to_value(tone).unwrap(), name);
+        }
+    }
+
+    #[test]
+    fn the_default_is_the_paper() {
+        let camera = CameraModel::default();
+        assert_eq!(
+            Synthesis::of(LightReading::Paper, camera.clone()),
+            Synthesis::default()
+        );
+        let physical = Synthesis::of(LightReading::Physical, camera);
+        assert_eq!(physical.amplify, Amplify::All);
+        assert_eq!(physical.coupling, Coupling::Photon);
+    }
+
+    #[test]
+    fn parts_that_match_a_reading_have_its_name() {
+        let mut camera = CameraModel::default();
+        camera.pin_gain(0.1).unwrap();
+        for reading in LightReading::ALL {
+            let synthesis = Synthesis::of(reading, camera.clone());
+            assert_eq!(synthesis.name(), reading.name());
+            let fresh = Synthesis {
+                draws: Draws::Fresh,
+                ..synthesis
+            };
+            assert_eq!(fresh.name(), ReadingName::CUSTOM);
+        }
+    }
+
+    #[test]
+    fn a_reading_that_the_run_lacks_is_named() {
+        let readings = Readings::named(&[LightReading::Paper], &CameraModel::default());
+        let degradation: Degradation = "L3-noise@eld".parse().unwrap();
+        let error = readings.of(Some(&degradation)).unwrap_err().to_string();
+        assert!(
+            error.contains(
+                "L3-noise@eld needs a light reading that is not among those of --profile (paper)"
+            ),
+            "{error}"
+        );
+        assert!(readings.of(None).is_ok());
+    }
+}

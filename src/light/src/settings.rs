@@ -1,0 +1,455 @@
+//! Levels, kinds and noise of degradations: as flags ([`LightArgs`], [`SensorArgs`]) and resolved ([`LightSettings`],
+//! [`SensorSettings`]).
+
+use std::path::Path;
+
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+
+use super::applied::AppliedDegradation;
+use super::auto::{AutoExposure, AutoSettings};
+use super::levels::{LIGHT, Levels, ladder};
+use super::motion::{FrameView, Motion};
+use super::random::NoiseKey;
+use super::reading::{Amplify, Coupling, Draws, LightReading, Readings, Synthesis, Tone};
+use super::{Calibration, CameraModel, Sampling};
+use darkqa_ground::error::{Error, Result};
+use darkqa_ground::files::reading;
+use darkqa_ground::types::degradation::Kind;
+use darkqa_ground::types::{
+    AxisLevel, Decides, Degradation, KindSet, PairDark, ReadingName, SetLight,
+};
+
+/// The levels and kinds of degradation.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Light")]
+pub struct LightArgs {
+    /// Levels, as L0-L5 or L0,L3, exposure drops in EV up to 16, as L0,3.3, and ranges of them, as 0..10:0.5; of motion,
+    /// exposure times in ms, as T33.33 or T8.33-T133.33; match is as dark as the photograph in the dark of each frame; default: L0-L5,
+    /// of photographs in the dark L0
+    ///
+    /// L0-L5 is also the ladder of motion, T8.33-T133.33, unless exposure times are named.
+    #[arg(long, value_name = "LEVELS", add = Decides::Trials)]
+    pub levels: Option<Levels>,
+    /// Which variants, one or several as ev,auto: ev (exposure drop alone), noise (with sensor noise), both (of these two), auto (as
+    /// a camera with automatic exposure meets the drop), motion (motion blur alone), all
+    #[arg(long, value_name = "LIST", default_value_t = KindSet::BOTH, add = Decides::Trials)]
+    pub variant: KindSet,
+    /// The sensor and its noise.
+    #[command(flatten)]
+    pub sensor: SensorArgs,
+    /// The camera's automatic exposure and its motion.
+    #[command(flatten)]
+    pub camera: CameraArgs,
+}
+
+impl LightArgs {
+    /// The levels: those that are named, else L0 to L5, and of photographs in the dark L0 alone, because their own noise is in them.
+    pub fn levels(&self, set: SetLight) -> Levels {
+        self.levels.clone().unwrap_or_else(|| {
+            Levels(match set {
+                SetLight::Lit => ladder(LIGHT),
+                SetLight::Dark => vec![AxisLevel::L0],
+            })
+        })
+    }
+}
+
+/// The camera's automatic exposure and its motion.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Light")]
+pub struct CameraArgs {
+    /// How the automatic exposure of the variant auto meets a drop: the maximum number of stops of longer exposure, then of stops of gain,
+    /// starting at L0 from a system gain K in ADU per electron and an exposure time in seconds; the rest of the drop stays dark
+    ///
+    /// Settings that are not named have their defaults. Those of gain and base-gain follow from the sensor of --camera: the gain ends at
+    /// its greatest K, and starts 4 stops below, or at its least K (the paper's: gain=4,base-gain=0.375). The noise is that of the
+    /// light reading physical at this gain, in this sensor.
+    #[arg(long, value_name = "KEY=VALUE,…", default_value_t = AutoSettings::default(), add = Decides::Pixels)]
+    pub auto: AutoSettings,
+    /// How the camera turns during an exposure, in the variants motion and auto: speed in degrees per second, horizontal field of view in
+    /// degrees if the data do not state the camera, angle in degrees (0: to the side, 90: up or down) or random for each image
+    ///
+    /// Settings that are not named have their defaults.
+    #[arg(long, value_name = "KEY=VALUE,…", default_value_t = Motion::default(), add = Decides::Pixels)]
+    pub motion: Motion,
+}
+
+/// The sensor and its noise.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Light")]
+pub struct SensorArgs {
+    /// The seed of all random draws
+    #[arg(long, value_name = "N", default_value_t = 0, add = Decides::Pixels)]
+    pub seed: u64,
+    /// Light readings, ways to understand the paper's noise, one or several as paper,eld; the four flags below replace choices
+    /// of a single reading, which is then custom, or has the name of the reading with the same choices
+    ///
+    /// By default the noise variant has the same signal-to-noise ratio at every level: the levels are one noisy image at five
+    /// brightnesses. `--profile physical` loses photons with the light; `--profile all` asks under every reading of the paper.
+    ///
+    /// Conditions with noise carry the reading's name, as L3-noise@physical; that of paper is left out: L3-noise.
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_enum,
+        value_delimiter = ',',
+        default_value = "paper", add = Decides::Trials)]
+    pub profile: Vec<Profile>,
+    /// What the light ratio r amplifies; default: as --profile says, shot-only in paper
+    ///
+    /// It is the choice that matters most. At grey 128, L1, K 0.77 and r 200, read, row and quantisation noise add 0.03, 0
+    /// and 0 codes of deviation with shot-only, and 9–19, 1–3 and 1–2 codes with all. shot-only is the default because it is
+    /// what the paper says, and because the paper's comparison with real images fits the weaker noise.
+    #[arg(long, value_enum, add = Decides::Pixels)]
+    pub amplify: Option<Amplify>,
+    /// Where a forward tone curve is applied; default: as --profile says, none in paper
+    #[arg(long, value_enum, add = Decides::Pixels)]
+    pub tone: Option<Tone>,
+    /// Whether the levels of a frame are developed from one noisy RAW image or each from its own; default: as --profile says, shared
+    /// in paper
+    #[arg(long, value_enum, add = Decides::Pixels)]
+    pub draws: Option<Draws>,
+    /// What the light ratio r depends on; default: as --profile says, independent in paper
+    #[arg(long, value_enum, add = Decides::Pixels)]
+    pub coupling: Option<Coupling>,
+    /// The sensor: sony-a7s2, nikon-d850, canon-eos-5d4, canon-eos-70d, canon-eos-700d, or a TOML file of a calibration
+    #[arg(long, value_name = "NAME|FILE", default_value = "sony-a7s2", add = Decides::Pixels)]
+    pub camera: String,
+    /// Pin the system gain K of the noise variant's sensor, in ADU per electron; default: log-uniform in the camera's range (0.1–6
+    /// for sony-a7s2) for each image
+    #[arg(long, value_name = "K", add = Decides::Pixels)]
+    pub gain: Option<f64>,
+    /// Pin the light ratio r of the sensor noise; not with --coupling photon, where it is 2^EV; default: uniform in the camera's
+    /// range for each image (100–300 for the built-in ones)
+    #[arg(long, value_name = "R", add = Decides::Pixels)]
+    pub ratio: Option<f64>,
+    /// Take the middle of every distribution for each image, instead of a draw
+    #[arg(long, add = Decides::Pixels)]
+    pub fixed: bool,
+}
+
+/// Word of `--profile`: a light reading or all of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Profile {
+    /// As the DarkQA paper states it
+    Paper,
+    /// --amplify all
+    Eld,
+    /// --coupling photon
+    Level,
+    /// --amplify all --tone before-ev --coupling photon
+    Physical,
+    /// All four, side by side
+    All,
+}
+
+impl Profile {
+    fn readings(self) -> &'static [LightReading] {
+        match self {
+            Self::Paper => &[LightReading::Paper],
+            Self::Eld => &[LightReading::Eld],
+            Self::Level => &[LightReading::Level],
+            Self::Physical => &[LightReading::Physical],
+            Self::All => &LightReading::ALL,
+        }
+    }
+}
+
+/// Degradations that a run applies to its frames.
+#[derive(Debug)]
+pub struct LightSettings {
+    /// Levels in ascending order of degradation, axis by axis, without duplicates.
+    pub levels: Vec<AxisLevel>,
+    /// Synthetic images that are as dark as each frame's own photograph; none unless `--levels` has `match`.
+    pub matches: Vec<PairDark>,
+    /// Kinds of degradation at all levels of their axis except L0.
+    pub variants: KindSet,
+    /// Settings of each kind.
+    pub kinds: KindSettings,
+}
+
+/// Settings of each kind of degradation.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct KindSettings {
+    /// Settings of the sensor branch.
+    pub sensor: SensorSettings,
+    /// The automatic exposure.
+    pub auto: AutoExposure,
+    /// The motion of the camera.
+    pub motion: Motion,
+}
+
+/// Settings of the sensor branch, which makes the noisy images.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct SensorSettings {
+    /// Seed of all random draws.
+    pub seed: u64,
+    /// Light readings that noisy images are made in.
+    pub readings: Readings,
+}
+
+impl LightSettings {
+    /// Resolves the flags; reads the camera's file if `--camera` names one.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the flag that cannot be used.
+    pub fn resolve(args: &LightArgs, set: SetLight) -> Result<Self> {
+        let levels = args.levels(set);
+        let kinds = KindSettings::resolve(&args.sensor, &args.camera)?;
+        let light = Self {
+            levels: levels.of_kinds(args.variant)?,
+            matches: levels.matches(args.variant, &kinds.sensor.readings)?,
+            variants: args.variant,
+            kinds,
+        };
+        for how in light.degradations().iter().flatten() {
+            light.kinds.check(how)?;
+        }
+        Ok(light)
+    }
+
+    /// Refuses synthetic images that are as dark as photographs, because there are none; `why` says why.
+    ///
+    /// # Errors
+    /// If `--levels` has `match`.
+    pub fn refuse_matches(&self, why: &str) -> Result<()> {
+        if self.matches.is_empty() {
+            return Ok(());
+        }
+        let problem = format_args!(
+            "match makes each frame as dark as its photograph in the dark, and {why}; name levels as L0-L5"
+        );
+        Err(Error::usage("--levels", problem))
+    }
+
+    /// Degradations of each frame, level by level: each kind, in each light reading if it has readings; `None` is L0.
+    pub fn degradations(&self) -> Vec<Option<Degradation>> {
+        let mut all = Vec::new();
+        for level in &self.levels {
+            let Some(severity) = level.severity() else {
+                all.push(None);
+                continue;
+            };
+            let kinds = self.variants.kinds();
+            for kind in kinds.filter(|kind| AxisLevel::new(*kind, severity) == *level) {
+                let readings: Vec<Option<ReadingName>> = if kind.has_readings() {
+                    let readings = self.kinds.sensor.readings.iter();
+                    readings.map(|(name, _)| Some(name.clone())).collect()
+                } else {
+                    vec![None]
+                };
+                let degradations = readings
+                    .into_iter()
+                    .filter_map(|reading| Degradation::new(kind, severity, reading).ok());
+                all.extend(degradations.map(Some));
+            }
+        }
+        all
+    }
+}
+
+impl KindSettings {
+    /// Resolves the flags; reads the camera's file if `--camera` names one.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the flag that cannot be used.
+    pub fn resolve(sensor: &SensorArgs, camera: &CameraArgs) -> Result<Self> {
+        let sensor = SensorSettings::resolve(sensor)?;
+        Ok(Self {
+            auto: camera.auto.of_camera(&sensor.readings.camera()),
+            sensor,
+            motion: camera.motion,
+        })
+    }
+
+    /// What a degradation does to a frame.
+    ///
+    /// # Errors
+    /// If the light reading is not among those of `--profile`, the sensor lacks the gain of an automatic exposure, or the picture would
+    /// move too far.
+    pub fn apply(
+        &self,
+        how: &Degradation,
+        view: FrameView,
+        key: &NoiseKey,
+    ) -> Result<AppliedDegradation> {
+        let synthesis = self.sensor.readings.of(Some(how))?;
+        let camera = (&self.auto, &self.motion);
+        AppliedDegradation::new(how, synthesis, camera, view, key)
+    }
+
+    /// Checks what can be known of a degradation without its frame.
+    ///
+    /// # Errors
+    /// If the sensor lacks the gain of an automatic exposure.
+    fn check(&self, how: &Degradation) -> Result<()> {
+        if how.kind() == Kind::Auto {
+            let camera = self.sensor.readings.camera();
+            self.auto.shot(how.severity()).synthesis(&camera)?;
+        }
+        Ok(())
+    }
+}
+
+impl SensorSettings {
+    /// Resolves the flags; reads the camera's file if `--camera` names one.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the flag that cannot be used.
+    pub fn resolve(args: &SensorArgs) -> Result<Self> {
+        Ok(Self {
+            seed: args.seed,
+            readings: readings(args)?,
+        })
+    }
+}
+
+/// The readings of `--profile`; for a single one, with the choices of the other flags.
+fn readings(args: &SensorArgs) -> Result<Readings> {
+    let profiles = args.profile.iter();
+    let mut chosen: Vec<LightReading> = Vec::new();
+    for reading in profiles.flat_map(|profile| profile.readings()) {
+        if !chosen.contains(reading) {
+            chosen.push(*reading);
+        }
+    }
+    let camera = camera(args)?;
+    if let [reading] = chosen[..] {
+        return synthesis(args, Synthesis::of(reading, camera)).map(Readings::from);
+    }
+    let choices = [
+        ("--amplify", args.amplify.is_some()),
+        ("--tone", args.tone.is_some()),
+        ("--draws", args.draws.is_some()),
+        ("--coupling", args.coupling.is_some()),
+    ];
+    if let Some((flag, _)) = choices.into_iter().find(|(_, is_set)| *is_set) {
+        let problem = "cannot be combined with several profiles; name one in --profile";
+        return Err(Error::usage(flag, problem));
+    }
+    let by_light = |reading: &&LightReading| {
+        Synthesis::of(**reading, camera.clone()).coupling == Coupling::Photon
+    };
+    if args.ratio.is_some()
+        && let Some(reading) = chosen.iter().find(by_light)
+    {
+        let name = reading.name();
+        let problem = format!("the ratio of {name} is 2^EV; leave out --ratio or {name}");
+        return Err(Error::usage("--ratio", problem));
+    }
+    Ok(Readings::named(&chosen, &camera))
+}
+
+/// A reading's choices, each replaced if its flag is set.
+fn synthesis(args: &SensorArgs, reading: Synthesis) -> Result<Synthesis> {
+    let synthesis = Synthesis {
+        amplify: args.amplify.unwrap_or(reading.amplify),
+        tone: args.tone.unwrap_or(reading.tone),
+        draws: args.draws.unwrap_or(reading.draws),
+        coupling: args.coupling.unwrap_or(reading.coupling),
+        camera: reading.camera,
+    };
+    if synthesis.coupling == Coupling::Photon && args.ratio.is_some() {
+        let problem = "with --coupling photon, or a profile that has it, the ratio is 2^EV; leave out --ratio";
+        return Err(Error::usage("--ratio", problem));
+    }
+    Ok(synthesis)
+}
+
+fn camera(args: &SensorArgs) -> Result<CameraModel> {
+    let path = Path::new(&args.camera);
+    let mut camera = if is_file(path) {
+        let text = reading::settings(path)?;
+        CameraModel::new(Calibration::parse(&text, path.display())?)
+    } else {
+        CameraModel::preset(&args.camera)?
+    };
+    if args.fixed {
+        camera.set_sampling(Sampling::Fixed);
+    }
+    if let Some(gain) = args.gain {
+        camera.pin_gain(gain)?;
+    }
+    if let Some(ratio) = args.ratio {
+        camera.pin_ratio(ratio)?;
+    }
+    Ok(camera)
+}
+
+/// Whether `--camera` is a file: it has an extension or a folder, which names of cameras do not have.
+fn is_file(path: &Path) -> bool {
+    path.extension().is_some() || path.components().count() > 1
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::FromArgMatches as _;
+
+    use super::*;
+
+    /// The sensor settings of these command-line words.
+    fn sensor(words: &[&str]) -> Result<SensorSettings> {
+        let command = SensorArgs::augment_args(clap::Command::new("sensor"));
+        let words = std::iter::once("sensor").chain(words.iter().copied());
+        let matches = command.try_get_matches_from(words);
+        let matches = matches.map_err(|e| Error::usage("words", e))?;
+        SensorSettings::resolve(&SensorArgs::from_arg_matches(&matches).unwrap())
+    }
+
+    #[test]
+    fn profiles_are_a_list_and_flags_change_a_single_one() {
+        let names = |words: &[&str]| -> Result<Vec<String>> {
+            let readings = sensor(words)?.readings;
+            Ok(readings.iter().map(|(name, _)| name.to_string()).collect())
+        };
+        for (words, expected) in [
+            (
+                &["--profile=physical,paper"][..],
+                &["paper", "physical"][..],
+            ),
+            (&["--profile=all"], &["paper", "eld", "level", "physical"]),
+            (&["--profile=physical", "--tone=none"], &["custom"]),
+            (&["--profile=physical", "--tone=before-ev"], &["physical"]),
+        ] {
+            assert_eq!(names(words).unwrap(), expected, "{words:?}");
+        }
+        for (words, part) in [
+            (
+                &["--profile=paper,eld", "--tone=none"][..],
+                "--tone: cannot be combined with several profiles",
+            ),
+            (
+                &["--profile=paper,physical", "--ratio=200"],
+                "--ratio: the ratio of physical is 2^EV",
+            ),
+            (
+                &["--profile=physical", "--ratio=9"],
+                "--ratio: with --coupling photon",
+            ),
+            (&["--profile=papre"], "invalid value 'papre'"),
+            (
+                &["--camera=leica"],
+                "--camera: \"leica\" is not one of sony-a7s2",
+            ),
+            (&["--camera=no/such.toml"], "no/such.toml"),
+        ] {
+            let error = names(words).unwrap_err().to_string();
+            assert!(error.contains(part), "{words:?}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_flag_replaces_the_choice_of_the_profile() {
+        let readings = sensor(&["--profile=physical", "--tone=none"])
+            .unwrap()
+            .readings;
+        let synthesis = readings.only().unwrap();
+        assert_eq!(synthesis.amplify, Amplify::All);
+        assert_eq!(synthesis.tone, Tone::None);
+        assert_eq!(synthesis.coupling, Coupling::Photon);
+        assert_eq!(sensor(&[]).unwrap().readings, Readings::default());
+        let nikon = sensor(&["--camera=nikon-d850"]).unwrap().readings;
+        assert_ne!(nikon, Readings::default());
+    }
+}

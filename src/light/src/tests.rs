@@ -1,0 +1,411 @@
+//! Tests of the whole pipeline: its figures, and that pixels depend on its arguments alone.
+
+use super::camera::tests::median;
+use super::negative::ladder;
+use super::noise::Term;
+use super::*;
+use darkqa_ground::types::degradation::Kind;
+use darkqa_ground::types::{Digest, FrameId, Severity};
+
+fn key(seed: u64, frame: &str) -> NoiseKey {
+    NoiseKey::new(seed, &FrameId(frame.to_owned()))
+}
+
+fn sensor(severity: Severity) -> Degradation {
+    Degradation::new(Kind::Sensor, severity, None).unwrap()
+}
+
+fn exposure_of(severity: Severity) -> Degradation {
+    Degradation::new(Kind::Exposure, severity, None).unwrap()
+}
+
+fn flat(code: u8, size: usize) -> Rgb {
+    Rgb::new(size, size, vec![code; size * size * 3]).unwrap()
+}
+
+/// Red rises along a row, green along a column, blue falls along the diagonal.
+fn ramps(height: usize, width: usize) -> Rgb {
+    let code = |at: usize, size: usize| (at * 255 / size.max(2)) as u8;
+    let samples = (0..height * width).flat_map(|i| {
+        let (row, column) = (i / width, i % width);
+        let diagonal = 255 - code(row + column, height + width);
+        [code(column, width), code(row, height), diagonal]
+    });
+    Rgb::new(height, width, samples.collect()).unwrap()
+}
+
+/// Mean and standard deviation of each channel.
+fn statistics(image: &Rgb) -> [[f64; 2]; 3] {
+    let n = (image.height() * image.width()) as f64;
+    std::array::from_fn(|channel| {
+        let codes = || {
+            let samples = image.samples().iter().skip(channel).step_by(3);
+            samples.map(|code| f64::from(*code))
+        };
+        let mean = codes().sum::<f64>() / n;
+        let variance = codes().map(|code| (code - mean).powi(2)).sum::<f64>() / n;
+        [mean, variance.sqrt()]
+    })
+}
+
+#[test]
+fn without_a_degradation_the_frame_is_unchanged() {
+    let clean = ramps(5, 7);
+    let same = degrade(&clean, None, &key(1, "a"), &Synthesis::default()).unwrap();
+    assert_eq!(same, clean);
+}
+
+#[test]
+fn one_negative_gives_the_images_of_degrade() {
+    let (clean, key, paper) = (ramps(10, 14), key(1, "a"), Synthesis::default());
+    let negative = Negative::new(&clean, &key, &paper, Severity::L1);
+    for level in Severity::LADDER {
+        let alone = degrade(&clean, Some(&sensor(level)), &key, &paper).unwrap();
+        assert_eq!(alone, negative.develop(level));
+        let exposed = degrade(&clean, Some(&exposure_of(level)), &key, &paper).unwrap();
+        assert_eq!(exposed, expose(&clean, level));
+    }
+}
+
+/// A change of these bytes changes every result, so it must raise [`VERSION`].
+#[test]
+fn bytes_are_those_of_this_version() {
+    let clean = ramps(48, 63);
+    let mut bytes = Vec::new();
+    for level in Severity::LADDER {
+        bytes.extend_from_slice(expose(&clean, level).samples());
+    }
+    let exposure = Digest::of(&bytes).to_string();
+    bytes.clear();
+    for frame in ["first", "second", "third", "fourth"] {
+        let negative = Negative::new(&clean, &key(20, frame), &Synthesis::default(), Severity::L1);
+        for level in Severity::LADDER {
+            bytes.extend_from_slice(negative.develop(level).samples());
+        }
+    }
+    let sensor = Digest::of(&bytes).to_string();
+    assert_eq!(VERSION, 2);
+    assert_eq!(
+        exposure,
+        "ef493dc91ffe0b7f1558f10c2c581c4419340505a34a969706ef98b04cf79a9e"
+    );
+    assert_eq!(
+        sensor,
+        "17eaa7dfafd65e100705809ef73a8dc5d8b77f97f6429524752b72b3fc52c72c"
+    );
+}
+
+/// The bytes of choices other than the default, including another camera.
+#[test]
+fn bytes_of_every_choice_are_those_of_this_version() {
+    let clean = ramps(37, 130);
+    let camera = || CameraModel::preset("nikon-d850").unwrap();
+    let choices = [
+        Synthesis::of(LightReading::Physical, CameraModel::default()),
+        Synthesis::of(LightReading::Physical, camera()),
+        Synthesis {
+            draws: Draws::Fresh,
+            tone: Tone::AfterEv,
+            ..Synthesis::of(LightReading::Paper, camera())
+        },
+    ];
+    let mut bytes = Vec::new();
+    for synthesis in &choices {
+        let mut images = Severity::LADDER.map(|_| Rgb::black(37, 130));
+        ladder(
+            &clean,
+            &key(20, "frame"),
+            synthesis,
+            &Severity::LADDER,
+            &mut images,
+        );
+        for image in &images {
+            bytes.extend_from_slice(image.samples());
+        }
+    }
+    assert_eq!(VERSION, 2);
+    let digest = "135736c6e5e5372959f81423e99612b894d09f2ba87bad7c88d6cd5ed9fcf884";
+    assert_eq!(Digest::of(&bytes).to_string(), digest);
+}
+
+#[test]
+fn the_number_of_threads_does_not_change_the_image() {
+    let develop = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        pool.build().unwrap().install(|| {
+            let negative = Negative::new(
+                &ramps(61, 40),
+                &key(3, "a"),
+                &Synthesis::default(),
+                Severity::L1,
+            );
+            Severity::LADDER.map(|level| negative.develop(level))
+        })
+    };
+    let single = develop(1);
+    for threads in [2, 5] {
+        assert_eq!(single, develop(threads));
+    }
+}
+
+#[test]
+fn seed_and_frame_change_the_image() {
+    let clean = flat(128, 64);
+    let take = |seed, frame| {
+        let negative = Negative::with_state(
+            &clean,
+            &key(seed, frame),
+            &median(),
+            Amplify::ShotOnly,
+            Tone::None,
+            &Term::ALL,
+            0.0,
+        );
+        negative.develop(Severity::L1)
+    };
+    let first = take(1, "a");
+    for other in [take(2, "a"), take(1, "b")] {
+        let pairs = || first.samples().chunks(3).zip(other.samples().chunks(3));
+        let changed = pairs().filter(|(a, b)| a != b).count();
+        assert!(changed * 10 > pairs().count() * 9, "{changed} changed");
+    }
+}
+
+#[test]
+fn every_size_is_kept() {
+    for (height, width) in [
+        (1, 1),
+        (1, 2),
+        (1, 9),
+        (2, 1),
+        (9, 1),
+        (3, 5),
+        (4, 5),
+        (5, 4),
+    ] {
+        let clean = ramps(height, width);
+        let how = sensor(Severity::L2);
+        let degraded = degrade(&clean, Some(&how), &key(1, "a"), &Synthesis::default()).unwrap();
+        assert_eq!((degraded.height(), degraded.width()), (height, width));
+    }
+}
+
+/// Published figures of flat greys for the fixed camera: mean and deviation of red, green and blue.
+#[test]
+fn flat_greys_have_their_figures() {
+    let cases = [
+        (128, Severity::L1, [[66.1, 15.2], [67.3, 9.4], [67.0, 11.0]]),
+        (128, Severity::L3, [[18.7, 4.3], [19.1, 2.7], [19.0, 3.1]]),
+        (128, Severity::L5, [[7.3, 1.7], [7.4, 1.1], [7.4, 1.3]]),
+        (32, Severity::L3, [[7.5, 4.4], [7.9, 3.2], [7.7, 3.6]]),
+    ];
+    for (code, level, expected) in cases {
+        let clean = flat(code, 512);
+        let negative = Negative::with_state(
+            &clean,
+            &key(4, "flat"),
+            &median(),
+            Amplify::ShotOnly,
+            Tone::None,
+            &Term::ALL,
+            0.0,
+        );
+        let found = statistics(&negative.develop(level));
+        for (found, expected) in found.iter().flatten().zip(expected.iter().flatten()) {
+            let close = (found - expected).abs() < 0.01 * expected + 0.07;
+            assert!(close, "grey {code}, {level:?}: {found} against {expected}");
+        }
+    }
+}
+
+#[test]
+fn noise_shrinks_with_the_light() {
+    let negative = Negative::with_state(
+        &flat(128, 256),
+        &key(5, "a"),
+        &median(),
+        Amplify::ShotOnly,
+        Tone::None,
+        &Term::ALL,
+        0.0,
+    );
+    let [lower, higher] = [Severity::L1, Severity::L2]
+        .map(|level| statistics(&negative.develop(level)).map(|[_, deviation]| deviation));
+    for (lower, higher) in lower.iter().zip(higher) {
+        assert!((higher / lower * f64::exp2(2.0 / 2.2) - 1.0).abs() < 0.02);
+    }
+}
+
+/// Without noise, grey and white become as dark as in the exposure branch.
+#[test]
+fn without_noise_a_mid_grey_and_white_are_the_exposure_branchs() {
+    for code in [128, 255] {
+        let clean = flat(code, 4);
+        for seed in 0..20 {
+            let key = key(seed, "a");
+            let state = CameraState::draw(&key, &CameraModel::default());
+            // With a brightness gain below 1, white cannot be reached.
+            if code == 255 && state.rgb_gain < 1.0 {
+                continue;
+            }
+            let negative = Negative::with_state(
+                &clean,
+                &key,
+                &state,
+                Amplify::ShotOnly,
+                Tone::None,
+                &[],
+                0.0,
+            );
+            for level in Severity::LADDER {
+                assert_eq!(
+                    negative.develop(level),
+                    expose(&clean, level),
+                    "{code}, {level:?}"
+                );
+            }
+        }
+    }
+}
+
+/// With the tone curve, which the paper leaves out, a grey ramp comes back unchanged.
+#[test]
+fn a_grey_ramp_comes_back_from_the_sensor_branch() {
+    let samples = (0..4 * 256).flat_map(|i| [(i % 256) as u8; 3]).collect();
+    let clean = Rgb::new(4, 256, samples).unwrap();
+    for seed in 0..20 {
+        let state = CameraState::draw(&key(seed, "a"), &CameraModel::default());
+        let tone = Tone::BeforeEv;
+        let key = key(seed, "a");
+        let negative =
+            Negative::with_state(&clean, &key, &state, Amplify::ShotOnly, tone, &[], 0.0);
+        let back = negative.develop_by(0.0);
+        for (column, codes) in back.samples().chunks(3).enumerate() {
+            for code in codes {
+                assert!(
+                    code.abs_diff((column % 256) as u8) <= 2,
+                    "{column} became {code}"
+                );
+            }
+        }
+    }
+}
+
+/// Before the drop, the tone curve gives the greys of the exposure branch; after it, it is applied to the degraded image.
+#[test]
+fn the_tone_curve_is_applied_where_it_is_set() {
+    let clean = flat(100, 4);
+    let develop = |tone| {
+        let negative = Negative::with_state(
+            &clean,
+            &key(1, "a"),
+            &median(),
+            Amplify::All,
+            tone,
+            &[],
+            0.0,
+        );
+        negative.develop(Severity::L1)
+    };
+    assert_eq!(develop(Tone::BeforeEv), expose(&clean, Severity::L1));
+    let degraded = f64::from(develop(Tone::None).samples()[0]) / 255.0;
+    let after = develop(Tone::AfterEv).samples()[0];
+    let expected = degraded * degraded * (3.0 - 2.0 * degraded) * 255.0;
+    assert!(
+        (f64::from(after) - expected).abs() < 1.0,
+        "{after} for {expected}"
+    );
+}
+
+/// With `photon`, less light means fewer photons: the ratio grows with the level. In the paper's reading it does not.
+#[test]
+fn coupling_makes_the_ratio_the_drop() {
+    let physical = Synthesis::of(LightReading::Physical, CameraModel::default());
+    let ratios = Severity::LADDER.map(|level| physical.state(&key(1, "a"), level).ratio);
+    for (found, expected) in ratios.iter().zip([4.0, 16.0, 64.0, 181.02, 512.0]) {
+        assert!((found - expected).abs() < 0.01, "{found}");
+    }
+    let paper = Synthesis::default();
+    let state = |level| paper.state(&key(1, "a"), level);
+    assert_eq!(state(Severity::L1), state(Severity::L5));
+}
+
+/// [`ladder`] gives the images of the single negatives, for every size and every choice of draws.
+#[test]
+fn ladders_are_their_negatives() {
+    let settings = [
+        Synthesis::default(),
+        Synthesis::of(LightReading::Physical, CameraModel::default()),
+        Synthesis {
+            draws: Draws::Fresh,
+            tone: Tone::AfterEv,
+            ..Synthesis::default()
+        },
+    ];
+    for (height, width) in [(1, 1), (2, 3), (33, 130), (64, 129), (67, 300)] {
+        let (clean, key) = (ramps(height, width), key(6, "a"));
+        for synthesis in &settings {
+            let mut images = Severity::LADDER.map(|_| Rgb::black(height, width));
+            ladder(&clean, &key, synthesis, &Severity::LADDER, &mut images);
+            for (level, image) in Severity::LADDER.into_iter().zip(&images) {
+                let negative = Negative::new(&clean, &key, synthesis, level);
+                assert!(negative.serves(level));
+                assert_eq!(
+                    negative.develop(level),
+                    *image,
+                    "{height} × {width}, {level:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn fresh_draws_differ_between_levels() {
+    let fresh = Synthesis {
+        draws: Draws::Fresh,
+        ..Synthesis::default()
+    };
+    let clean = flat(128, 32);
+    let at = |level| Negative::new(&clean, &key(1, "a"), &fresh, level);
+    assert!(!at(Severity::L1).serves(Severity::L2));
+    let [first, second] = [Severity::L1, Severity::L2].map(|level| at(level).develop(Severity::L3));
+    assert_ne!(first, second);
+    let state = |level| fresh.state(&key(1, "a"), level);
+    assert_eq!(state(Severity::L1), state(Severity::L2));
+}
+
+#[test]
+fn a_state_is_serialised_with_all_its_numbers() {
+    let state = serde_json::to_value(median()).unwrap();
+    assert_eq!(state["ratio"], 200.0);
+    assert_eq!(state["bias"].as_array().map(Vec::len), Some(4));
+    assert_eq!(state["rgb_to_camera"][2].as_array().map(Vec::len), Some(3));
+}
+
+#[test]
+fn every_kind_of_degradation_is_made_described_and_tested() {
+    use darkqa_ground::types::degradation::Kind;
+    use darkqa_ground::types::{Degradation, FrameId};
+
+    let clean = ramps(32, 64);
+    let key = super::NoiseKey::new(0, &FrameId("a".to_owned()));
+    let described = include_str!("../../../results/README.md");
+    let tested = include_str!("../../../tests/program/synthesize.rs");
+    let mut missing = Vec::new();
+    for kind in Kind::ALL {
+        let how = Degradation::new(kind, kind.ladder()[2], None).unwrap();
+        let degraded = degrade(&clean, Some(&how), &key, &Synthesis::default());
+        if degraded.unwrap() == clean {
+            missing.push(format!("{kind:?} changes no pixel"));
+        }
+        let word = kind.word();
+        if !described.contains(&format!("`{word}`")) {
+            missing.push(format!("{word} in results/README.md"));
+        }
+        if !tested.contains(&format!("-{word}")) {
+            missing.push(format!("L…-{word} in tests/program/synthesize.rs"));
+        }
+    }
+    assert!(missing.is_empty(), "{missing:?}");
+}

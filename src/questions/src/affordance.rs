@@ -1,0 +1,141 @@
+//! "I want to sleep, is this room suitable for this?"
+
+use serde_json::json;
+
+use super::reason::Reason;
+use super::rule_context::{Candidate, RuleContext, RuleResult, rejected, yes_no};
+use super::rules::ActivityRule;
+use super::statistics::Segment;
+use darkqa_ground::types::Family;
+
+/// Two candidates for every activity: yes and no.
+pub(super) fn candidates(context: &RuleContext<'_>) -> Vec<RuleResult> {
+    let activities = context.book.activity.iter();
+    activities
+        .flat_map(|activity| {
+            let reject = |answer, reason| {
+                rejected(Family::Affordance, &activity.activity, Some(answer), reason)
+            };
+            [
+                yes(context, activity).unwrap_or_else(|reason| reject(true, reason)),
+                no(context, activity).unwrap_or_else(|reason| reject(false, reason)),
+            ]
+        })
+        .collect()
+}
+
+/// Yes: the activity belongs to this type of room, and all objects of one of its enablers are evidence.
+fn yes(context: &RuleContext<'_>, activity: &ActivityRule) -> Result<RuleResult, Reason> {
+    let Some(room) = context.any_room else {
+        return Err(Reason::NoRoom);
+    };
+    if !activity.rooms.contains(room) {
+        return Err(Reason::OtherRoom);
+    }
+    if !can_be_enabled(context, activity) {
+        return Err(Reason::Inexpressible);
+    }
+    let evidence: Vec<&Segment> = context.statistics.evidence(context.book).collect();
+    let segment_of = |token: &String| {
+        evidence
+            .iter()
+            .find(|segment| segment.token(context.book) == token && is_called(context, segment))
+    };
+    let found = activity.enablers.iter().find_map(|tokens| {
+        tokens
+            .iter()
+            .map(|token| segment_of(token).copied())
+            .collect::<Option<Vec<&Segment>>>()
+    });
+    let Some(segments) = found else {
+        return Err(Reason::Unseen);
+    };
+    Ok(candidate(context, activity, room, 0, &segments))
+}
+
+/// Whether a yes is possible in this data set: it can name all objects of one enabler. Else "no" would be the answer to every
+/// question about the activity.
+fn can_be_enabled(context: &RuleContext<'_>, activity: &ActivityRule) -> bool {
+    let mut enablers = activity.enablers.iter();
+    enablers.any(|tokens| {
+        let mut tokens = tokens.iter();
+        tokens.all(|token| context.vocabulary.has_token(token))
+    })
+}
+
+/// Whether a segment is what its class says: its token is its own word, or questions call it by its word. The sofa of a coarse
+/// label space may be an armchair.
+fn is_called(context: &RuleContext<'_>, segment: &Segment) -> bool {
+    segment.token(context.book) != segment.class || segment.called(context.book).is_some()
+}
+
+/// No: the room is known and of another type, and no object that the activity needs, or that could substitute one, has a
+/// pixel.
+fn no(context: &RuleContext<'_>, activity: &ActivityRule) -> Result<RuleResult, Reason> {
+    let Some(room) = context.room else {
+        return Err(Reason::NoRoom);
+    };
+    if activity.rooms.contains(room) {
+        return Err(Reason::OtherRoom);
+    }
+    if !can_be_enabled(context, activity) {
+        return Err(Reason::Inexpressible);
+    }
+    if let Some(reason) = context.absence_blocker() {
+        return Err(reason);
+    }
+    let pinch = activity
+        .pinch
+        .iter()
+        .filter(|_| context.book.affordance.strict);
+    let tokens: Vec<&String> = activity.enablers.iter().flatten().chain(pinch).collect();
+    if !tokens.iter().all(|token| context.expressible(token)) {
+        return Err(Reason::Inexpressible);
+    }
+    if tokens.iter().any(|token| context.may_be_hidden(token)) {
+        return Err(Reason::Hidden);
+    }
+    if tokens
+        .iter()
+        .any(|token| context.statistics.shows(token, context.book))
+    {
+        return Err(Reason::Seen);
+    }
+    Ok(candidate(
+        context,
+        activity,
+        room,
+        1,
+        &context.signs_of(room),
+    ))
+}
+
+fn candidate(
+    context: &RuleContext<'_>,
+    activity: &ActivityRule,
+    room: &str,
+    truth: usize,
+    segments: &[&Segment],
+) -> RuleResult {
+    let text = context
+        .book
+        .affordance
+        .text
+        .replace("{activity}", &activity.activity);
+    let evidence = json!({
+        "room": room,
+        "scores": context.signs.scores,
+        "suitable": activity.rooms,
+    });
+    context.viable(
+        Candidate {
+            family: Family::Affordance,
+            about: activity.activity.clone(),
+            text,
+            choices: yes_no(),
+            truth,
+            evidence,
+        },
+        segments,
+    )
+}

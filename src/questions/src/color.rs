@@ -1,0 +1,160 @@
+//! "What color is the sofa in the image?"
+
+use serde_json::json;
+
+use super::colors::{Color, Palette};
+use super::reason::Reason;
+use super::relative::relative;
+use super::rule_context::{Candidate, RuleContext, RuleResult, rejected};
+use super::rules::{ClassFlag, ColorChoices, ColorRule};
+use super::statistics::{Segment, ppm};
+use darkqa_ground::types::Family;
+
+/// One candidate for every segment of a class whose colour may be asked.
+pub(super) fn candidates(context: &RuleContext<'_>, palette: &Palette) -> Vec<RuleResult> {
+    let segments = context.statistics.segments.iter();
+    let colored = segments.filter(|segment| context.book.is(&segment.class, ClassFlag::Color));
+    colored
+        .map(|segment| {
+            let result = candidate(context, segment, palette);
+            result.unwrap_or_else(|reason| rejected(Family::Color, &segment.class, None, reason))
+        })
+        .collect()
+}
+
+fn candidate(
+    context: &RuleContext<'_>,
+    segment: &Segment,
+    palette: &Palette,
+) -> Result<RuleResult, Reason> {
+    let rule = &context.book.color;
+    if let Some(reason) = context.statistics.disqualified(segment, context.book) {
+        return Err(reason);
+    }
+    if context.statistics.area(segment) < rule.area_ppm || segment.core < rule.eroded_px {
+        return Err(Reason::Small);
+    }
+    if !unique(context, segment) {
+        return Err(Reason::NotUnique);
+    }
+    let word = segment.called(context.book).ok_or(Reason::Wordless)?;
+    let color = dominant_color(segment, rule, palette)?;
+    check_light(context, segment, color, palette)?;
+    if context.views.disagree(context.statistics, segment, color) {
+        return Err(Reason::Disagreed);
+    }
+    let (choices, truth) = offered(context, color).ok_or(Reason::NotOffered)?;
+    let (_, most, next, none) = segment.leading_color();
+    let share = |part| ppm(part, segment.core);
+    let evidence = json!({
+        "core_px": segment.core,
+        "dominant_ppm": share(most),
+        "second_ppm": share(next),
+        "nameless_ppm": share(none),
+        "median_rgb": segment.median,
+        "light_rgb": context.statistics.light,
+        "around_luma": segment.around,
+    });
+    let text = context.book.filled(&rule.text, &rule.plural, word);
+    Ok(context.viable(
+        Candidate {
+            family: Family::Color,
+            about: segment.class.clone(),
+            text,
+            choices,
+            truth,
+            evidence,
+        },
+        &[segment],
+    ))
+}
+
+/// Whether a segment is the only visible one of its class. Pixels of the class outside of all segments count as another
+/// segment.
+fn unique(context: &RuleContext<'_>, segment: &Segment) -> bool {
+    let (statistics, least) = (context.statistics, context.book.color.lone_ppm);
+    let others = statistics.segments.iter().filter(|other| {
+        other.class == segment.class && other.id != segment.id && statistics.area(other) >= least
+    });
+    let loose = statistics.loose.get(&segment.class).copied().unwrap_or(0);
+    others.count() == 0 && statistics.ppm(loose) < least
+}
+
+/// The colour of a segment, if one colour clearly dominates.
+fn dominant_color(segment: &Segment, rule: &ColorRule, palette: &Palette) -> Result<Color, Reason> {
+    let (color, most, next, none) = segment.leading_color();
+    let share = |part| ppm(part, segment.core);
+    let color = color.ok_or(Reason::Nameless)?;
+    if color != Color::White && share(segment.bright) > rule.bright_ppm {
+        return Err(Reason::Bright);
+    }
+    if color != Color::Black && share(segment.crushed) > rule.crushed_ppm {
+        return Err(Reason::Crushed);
+    }
+    if share(none) >= rule.none_ppm {
+        return Err(Reason::Nameless);
+    }
+    let dominant = share(most) >= rule.dominant_ppm && most >= rule.lead * next;
+    if !dominant || palette.color(segment.median) != Some(color) {
+        return Err(Reason::Motley);
+    }
+    Ok(color)
+}
+
+/// Checks that the colour has the same name relative to the light of the frame, channel by channel, and relative to the light
+/// around the segment, whose colour is that of the neighbours and does not count.
+fn check_light(
+    context: &RuleContext<'_>,
+    segment: &Segment,
+    color: Color,
+    palette: &Palette,
+) -> Result<(), Reason> {
+    let lights = [
+        Some(context.statistics.light),
+        segment.around.map(|luma| [luma; 3]),
+    ];
+    let in_light = |light: [u8; 3]| {
+        let code = |channel: usize| relative(segment.median[channel], light[channel]);
+        palette.color([0, 1, 2].map(code)) == Some(color)
+    };
+    if lights.into_iter().flatten().all(in_light) {
+        Ok(())
+    } else {
+        Err(Reason::Lit)
+    }
+}
+
+/// The colours that are offered, and the index of the true one; `None` if it is not among them.
+fn offered(context: &RuleContext<'_>, truth: Color) -> Option<(Vec<String>, usize)> {
+    let rule = &context.book.color;
+    let mut colors = match rule.candidates {
+        ColorChoices::All11 => Color::ALL.to_vec(),
+        ColorChoices::Fixed8 => rule.fixed8.clone(),
+        ColorChoices::K5 => {
+            let near = |color: Color| {
+                rule.neighbours
+                    .iter()
+                    .any(|pair| *pair == [color, truth] || *pair == [truth, color])
+            };
+            let others = Color::ALL
+                .into_iter()
+                .filter(|color| *color != truth && !near(*color));
+            let mut others: Vec<Color> = others.collect();
+            context.picker.shuffle("color", &mut others);
+            others.truncate(4);
+            others.push(truth);
+            others
+        }
+    };
+    if rule.candidates == ColorChoices::K5 {
+        colors.sort_unstable();
+    }
+    let index = colors.iter().position(|color| *color == truth)?;
+    Some((
+        colors
+            .into_iter()
+            .map(|color| color.name().to_owned())
+            .collect(),
+        index,
+    ))
+}

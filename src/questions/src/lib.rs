@@ -1,0 +1,41 @@
+//! Stage 2a, WORDS: frames → questions, by rule (DarkQA, arXiv 2512.24985, Algorithm 1).
+//!
+//! First each frame is measured ([`statistics`]), with integers only. The rules ([`rules`], `rules.toml`) see only these
+//! measurements. They find the type of room ([`room`]) and then the questions, one file per family. [`generate()`] is the
+//! entry point. There is no random state: a pick is a function of the frame's name ([`pick`]), so the order of the frames
+//! does not matter.
+
+#![allow(
+    missing_docs,
+    reason = "fields and variants of this workspace's own use, whose names say what they are"
+)]
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
+
+mod affordance;
+pub mod balance;
+mod closest;
+mod color;
+#[cfg(test)]
+mod color_tree;
+pub mod colors;
+pub mod frequency;
+pub mod generate;
+pub mod look;
+pub mod observer;
+pub mod pick;
+mod presence;
+pub mod reason;
+mod relative;
+pub mod room;
+mod room_type;
+pub mod rule_context;
+pub mod rules;
+pub mod statistics;
+pub mod summary;
+#[cfg(test)]
+mod tests;
+mod views;
+mod vocabulary;
+
+pub use generate::{Generated, QuestionRequest, generate};
+pub use rule_context::GeneratedQuestion;

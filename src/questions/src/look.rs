@@ -1,0 +1,208 @@
+//! How a frame looks in numbers that any two sets of frames can be compared by: [`FrameLook`]. No rule reads them.
+
+use ndarray::Array2;
+
+use super::colors::{BINS, Color, NONE, Palette};
+use super::statistics::ppm;
+use darkqa_ground::types::{Frame, Rgb};
+
+/// The number of rows to which higher images are reduced before edges are looked for (chosen). A picture of more pixels has weaker
+/// edges from pixel to pixel, whatever it shows.
+const ROWS: usize = 480;
+
+/// The minimum gradient of an edge, in codes of luma per pixel (chosen).
+pub const STEEP: f32 = 2.5;
+
+/// The minimum area of a segment that is counted, in millionths of the frame; as in the rulebook.
+const LEAST_PPM: u64 = 500;
+
+/// The weights of red, green and blue in luminance and luma (ITU-R BT.709).
+const WEIGHTS: [f32; 3] = [0.2126, 0.7152, 0.0722];
+
+/// How a frame looks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrameLook {
+    /// Its mean linear light in EV relative to white.
+    pub light_ev: f64,
+    /// The share of its pixels at edges.
+    pub edges: f64,
+    /// The share of its pixels of each colour: the eleven names in order, then those without a name.
+    pub colors: [f64; BINS],
+    /// The number of its segments that are not tiny; `None` without a map of segments.
+    pub segments: Option<usize>,
+    /// The 10 %, 50 % and 90 % quantiles of its depth in metres; `None` without a depth map.
+    pub depth: Option<[f64; 3]>,
+}
+
+impl FrameLook {
+    /// The look of a frame, its colours named by a palette. The depth is taken as its map has it.
+    #[must_use]
+    pub fn of(frame: &Frame, palette: &Palette) -> Self {
+        let pixels = (frame.rgb.height() * frame.rgb.width()).max(1) as f64;
+        let mut colors = [0_u64; BINS];
+        let (codes, _) = frame.rgb.samples().as_chunks::<3>();
+        for code in codes {
+            let color = palette.color(*code);
+            let place = color.and_then(|name| Color::ALL.iter().position(|other| *other == name));
+            colors[place.unwrap_or(NONE)] += 1;
+        }
+        Self {
+            light_ev: mean_light(codes).log2(),
+            edges: edges(&frame.rgb),
+            colors: colors.map(|count| count as f64 / pixels),
+            segments: frame.segments.as_ref().map(segments),
+            depth: frame.depth.as_ref().and_then(depth),
+        }
+    }
+}
+
+/// The mean luminance of 8-bit sRGB codes, 1 for white; at least that of half a code (IEC 61966-2-1).
+fn mean_light(codes: &[[u8; 3]]) -> f64 {
+    let light: [f64; 256] = std::array::from_fn(|code| {
+        let value = code as f64 / 255.0;
+        if value <= 0.04045 {
+            value / 12.92
+        } else {
+            libm::pow((value + 0.055) / 1.055, 2.4)
+        }
+    });
+    let luminance = |code: &[u8; 3]| -> f64 {
+        let parts = code.iter().zip(WEIGHTS);
+        parts
+            .map(|(code, weight)| light[usize::from(*code)] * f64::from(weight))
+            .sum()
+    };
+    let sum: f64 = codes.iter().map(luminance).sum();
+    (sum / codes.len().max(1) as f64).max(light[1] / 2.0)
+}
+
+/// The share of pixels whose luma changes by [`STEEP`] codes per pixel or more: the magnitude of Sobel's gradient (I. Sobel and
+/// G. Feldman 1968), an eighth of the sums of its masks. Images of more than [`ROWS`] rows are reduced first.
+fn edges(image: &Rgb) -> f64 {
+    let luma = reduced(&luma(image));
+    let (height, width) = luma.dim();
+    let at = |y: usize, x: usize, down: usize, right: usize| {
+        let near =
+            |place: usize, step: usize, end: usize| (place + step).saturating_sub(1).min(end - 1);
+        luma[(near(y, down, height), near(x, right, width))]
+    };
+    let mut steep = 0_usize;
+    for y in 0..height {
+        for x in 0..width {
+            let side = |right| at(y, x, 0, right) + 2.0 * at(y, x, 1, right) + at(y, x, 2, right);
+            let row = |down| at(y, x, down, 0) + 2.0 * at(y, x, down, 1) + at(y, x, down, 2);
+            let (across, along) = (side(2) - side(0), row(2) - row(0));
+            steep += usize::from((across * across + along * along).sqrt() / 8.0 >= STEEP);
+        }
+    }
+    steep as f64 / (height * width).max(1) as f64
+}
+
+fn luma(image: &Rgb) -> Array2<f32> {
+    let (codes, _) = image.samples().as_chunks::<3>();
+    let width = image.width();
+    Array2::from_shape_fn((image.height(), width), |(y, x)| {
+        let code = codes[y * width + x].iter().zip(WEIGHTS);
+        code.map(|(code, weight)| f32::from(*code) * weight).sum()
+    })
+}
+
+/// A map with at most [`ROWS`] rows: each new pixel is the mean of what it covers.
+fn reduced(map: &Array2<f32>) -> Array2<f32> {
+    let (height, width) = map.dim();
+    if height <= ROWS {
+        return map.clone();
+    }
+    let columns = (width * ROWS / height).max(1);
+    let rows = shrunk(map, ROWS);
+    shrunk(&rows.reversed_axes(), columns).reversed_axes()
+}
+
+/// A map with another number of rows, each the mean of the rows that it covers.
+fn shrunk(map: &Array2<f32>, rows: usize) -> Array2<f32> {
+    let (height, width) = map.dim();
+    let step = height as f32 / rows as f32;
+    let mut shrunk = Array2::zeros((rows, width));
+    for row in 0..rows {
+        let (from, to) = (row as f32 * step, (row + 1) as f32 * step);
+        for y in from as usize..(to.ceil() as usize).min(height) {
+            let covered = to.min(y as f32 + 1.0) - from.max(y as f32);
+            shrunk
+                .row_mut(row)
+                .scaled_add(covered.max(0.0) / step, &map.row(y));
+        }
+    }
+    shrunk
+}
+
+fn segments(map: &Array2<u32>) -> usize {
+    let mut counts = std::collections::BTreeMap::<u32, u64>::new();
+    for number in map.iter().filter(|number| **number != 0) {
+        *counts.entry(*number).or_insert(0) += 1;
+    }
+    let whole = map.len() as u64;
+    counts
+        .values()
+        .filter(|count| ppm(**count, whole) >= LEAST_PPM)
+        .count()
+}
+
+fn depth(map: &Array2<u32>) -> Option<[f64; 3]> {
+    let mut known: Vec<u32> = map.iter().copied().filter(|depth| *depth > 0).collect();
+    known.sort_unstable();
+    let last = known.len().checked_sub(1)?;
+    Some([10, 50, 90].map(|percent| f64::from(known[last * percent / 100]) / 1000.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(height: usize, width: usize, code: impl Fn(usize, usize) -> u8) -> Rgb {
+        let codes = (0..height * width).flat_map(|i| [code(i / width, i % width); 3]);
+        Rgb::new(height, width, codes.collect()).unwrap()
+    }
+
+    #[test]
+    fn light_is_measured_in_ev_below_white() {
+        let ev = |code: u8| {
+            let codes = [[code; 3]; 5];
+            mean_light(&codes).log2()
+        };
+        assert!(ev(255).abs() < 1e-6);
+        // Code 188 is half of the light of white.
+        assert!((ev(188) + 1.0).abs() < 0.01, "{}", ev(188));
+        assert!(ev(0).is_finite());
+    }
+
+    #[test]
+    fn edges_are_where_luma_changes() {
+        assert!(edges(&image(40, 50, |_, _| 90)) == 0.0);
+        // A step of 100 codes: the two columns beside it.
+        let step = image(40, 50, |_, x| if x < 25 { 60 } else { 160 });
+        assert!((edges(&step) - 2.0 / 50.0).abs() < 1e-9);
+        // A slope below the threshold is none, one above it is, but for the border.
+        assert!(edges(&image(40, 50, |_, x| 2 * x as u8)) == 0.0);
+        assert!(edges(&image(40, 50, |_, x| 3 * x as u8)) > 0.9);
+    }
+
+    #[test]
+    fn a_large_picture_has_the_edges_of_the_small_one() {
+        let bars = |x: usize, width: usize| {
+            if (x / width).is_multiple_of(2) {
+                40
+            } else {
+                200
+            }
+        };
+        let small = edges(&image(480, 640, |_, x| bars(x, 16)));
+        let large = edges(&image(960, 1280, |_, x| bars(x, 32)));
+        assert!(
+            (small - large).abs() < 1e-9 && small > 0.1,
+            "{small} {large}"
+        );
+        let odd = reduced(&luma(&image(720, 960, |_, _| 77)));
+        assert_eq!(odd.dim(), (480, 640));
+        assert!(odd.iter().all(|luma| (luma - 77.0).abs() < 1e-3));
+    }
+}

@@ -1,0 +1,262 @@
+//! Whether the contrast along each outline is the one that the untouched frame predicts: [`Outline`].
+//!
+//! In each element (the pixels of a mask, and all else, in one cell) the difference of the means is compared with the one that
+//! is predicted: a matched filter whose template is the prediction, whitened by measured variances. Its amplitude is 1 where the
+//! contrast is as predicted and 0 where it is not there; its detectability d′ is the signal-to-noise ratio of the prediction.
+//! Noise is neither white nor independent along an outline. Two factors say by how much, each measured in the same image from
+//! what is left of the contrasts, and never below 1.
+
+use super::cells::{Cells, Element, Scale};
+use super::channel::Fit;
+use darkqa_ground::types::Rgb;
+
+/// Value of normal noise that is exceeded with probability 0.001 / 3: one false alarm in a thousand tests, over three scales
+/// (chosen).
+pub(super) const THRESHOLD: f64 = 3.402_932_835_385_304_3;
+
+/// Least amplitude: nearer to "as predicted" than to "nothing".
+const MIN_AMPLITUDE: f64 = 0.5;
+
+/// Share of the elements of an outline that must be confirmed for a thing to be seen. It is a rule (chosen), not a result.
+pub(super) const MIN_CONFIRMED: f64 = 0.5;
+
+/// Fewest elements of a thing at which a coarser scale counts, so that one lucky element does not make a thing seen (chosen).
+/// The finest scale always counts.
+const MIN_ELEMENTS: u32 = 3;
+
+/// Variance of rounding to whole codes, in codes squared.
+pub(super) const ROUNDING: f64 = 1.0 / 12.0;
+
+/// Fixed-point numbers have 16 binary digits after the point, so that sums are exact and have no order.
+const FIXED: f64 = 65_536.0;
+
+/// Sums over the pixels of a patch, by channel.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct PatchSums {
+    /// Received codes.
+    pub(super) received: [u64; 3],
+    /// Predicted codes and variances, in fixed point.
+    predicted: [[u64; 2]; 3],
+}
+
+impl PatchSums {
+    fn add(&mut self, other: &Self) {
+        for channel in 0..3 {
+            self.received[channel] += other.received[channel];
+            for part in 0..2 {
+                self.predicted[channel][part] += other.predicted[channel][part];
+            }
+        }
+    }
+
+    /// The means of received codes, predicted codes and variances of a channel, over `count` pixels.
+    fn means(&self, channel: usize, count: f64) -> [f64; 3] {
+        let [predicted, variance] = self.predicted[channel];
+        [
+            self.received[channel] as f64 / count,
+            predicted as f64 / FIXED / count,
+            variance as f64 / FIXED / count,
+        ]
+    }
+
+    fn without(&self, part: &Self) -> Self {
+        let minus = |a: u64, b: u64| a.saturating_sub(b);
+        Self {
+            received: [0, 1, 2].map(|i| minus(self.received[i], part.received[i])),
+            predicted: [0, 1, 2]
+                .map(|i| [0, 1].map(|j| minus(self.predicted[i][j], part.predicted[i][j]))),
+        }
+    }
+}
+
+/// The sums of the patches of the smallest cells.
+pub(super) fn patch_sums(
+    cells: &Cells,
+    untouched: &[u8],
+    fit: &Fit,
+    image: &Rgb,
+) -> Vec<PatchSums> {
+    let fixed = |value: f64| (value * FIXED + 0.5) as u32;
+    let tables: [[[u32; 2]; 256]; 3] = [0, 1, 2].map(|channel| {
+        let fit = &fit.channels[channel];
+        std::array::from_fn(|code| [fixed(fit.curve[code]), fixed(fit.variance[code])])
+    });
+    let mut sums = vec![PatchSums::default(); cells.scales[0].patches.len()];
+    let (mut untouched, _) = untouched.as_chunks::<3>();
+    let (mut received, _) = image.samples().as_chunks::<3>();
+    for run in &cells.runs {
+        let length = (run.length as usize).min(received.len());
+        let (own_untouched, rest) = untouched.split_at(length);
+        let (own_received, more) = received.split_at(length);
+        (untouched, received) = (rest, more);
+        let mut codes = [0_u32; 3];
+        let mut fitted = [[0_u64; 2]; 3];
+        for (untouched, received) in own_untouched.iter().zip(own_received) {
+            for channel in 0..3 {
+                let [curve, variance] = tables[channel][usize::from(untouched[channel])];
+                codes[channel] += u32::from(received[channel]);
+                fitted[channel][0] += u64::from(curve);
+                fitted[channel][1] += u64::from(variance);
+            }
+        }
+        sums[run.patch as usize].add(&PatchSums {
+            received: codes.map(u64::from),
+            predicted: fitted,
+        });
+    }
+    sums
+}
+
+/// What is known of the outline of one mask in one image.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Outline {
+    /// Largest share of confirmed elements at one scale, from 0 to 1.
+    pub(super) confirmed: f64,
+    /// Largest z of the whole outline at one scale; 0 if its amplitude is too small at all scales.
+    pub(super) z: f64,
+}
+
+impl Outline {
+    /// Whether the thing is detected by its whole outline. This does not decide answers: clutter that happens to agree is
+    /// enough for it.
+    pub(super) fn is_detected(&self) -> bool {
+        self.z >= THRESHOLD
+    }
+}
+
+/// The outline of each mask; index 0 is unused.
+pub(super) fn outlines(cells: &Cells, sums: &[PatchSums]) -> Vec<Outline> {
+    let mut outlines = vec![Outline::default(); cells.masks + 1];
+    for (index, scale) in cells.scales.iter().enumerate() {
+        let min_elements = if index == 0 { 1 } else { MIN_ELEMENTS };
+        measure(scale, sums, min_elements, &mut outlines);
+    }
+    outlines
+}
+
+/// The contrast of an element in one channel.
+#[derive(Debug, Clone, Copy)]
+struct Contrast {
+    /// Difference of the received means, in codes.
+    received: f64,
+    /// Difference of the predicted means, in codes.
+    predicted: f64,
+    /// Variance of the received difference, if the noise were white, in codes squared.
+    variance: f64,
+}
+
+/// Sums of an element, or of an outline, over the channels.
+#[derive(Debug, Clone, Copy, Default)]
+struct Filter {
+    /// Σ p d / v: the matched filter's output.
+    output: f64,
+    /// Σ p² / v: the power of the prediction.
+    power: f64,
+    /// Σ p (d − p) / v: what is left.
+    rest: f64,
+}
+
+impl Filter {
+    fn add(&mut self, other: &Self) {
+        self.output += other.output;
+        self.power += other.power;
+        self.rest += other.rest;
+    }
+
+    /// z of the filter if its variance is `inflation` times its power; `None` without power, or with too small an amplitude.
+    fn z(&self, inflation: f64) -> Option<f64> {
+        let is_enough = self.power > 0.0 && self.output >= MIN_AMPLITUDE * self.power;
+        is_enough.then(|| self.output / (inflation * self.power).sqrt())
+    }
+}
+
+/// Measures the elements of one scale, and raises the outlines that they confirm better than another scale.
+fn measure(scale: &Scale, sums: &[PatchSums], min_elements: u32, outlines: &mut [Outline]) {
+    let filters = filters(scale, sums);
+    let mut whole = vec![Filter::default(); outlines.len()];
+    for (element, filter) in scale.elements.iter().zip(&filters) {
+        whole[element.mask as usize].add(filter);
+    }
+    let single = inflation(&filters);
+    let shared = inflation(&whole);
+    let mut counts = vec![[0_u32; 2]; outlines.len()];
+    for (element, filter) in scale.elements.iter().zip(&filters) {
+        let is_confirmed = filter.z(single).is_some_and(|z| z >= THRESHOLD);
+        let [confirmed, all] = &mut counts[element.mask as usize];
+        *confirmed += u32::from(is_confirmed);
+        *all += 1;
+    }
+    for ((outline, [confirmed, all]), whole) in outlines.iter_mut().zip(counts).zip(&whole) {
+        if all >= min_elements {
+            let share = f64::from(confirmed) / f64::from(all);
+            outline.confirmed = outline.confirmed.max(share);
+        }
+        outline.z = outline.z.max(whole.z(shared).unwrap_or(0.0));
+    }
+}
+
+/// By how much the outputs of filters scatter more than their power says; at least 1.
+fn inflation(filters: &[Filter]) -> f64 {
+    let power: f64 = filters.iter().map(|filter| filter.power).sum();
+    let squares: f64 = filters.iter().map(|filter| filter.rest * filter.rest).sum();
+    if power > 0.0 {
+        (squares / power).max(1.0)
+    } else {
+        1.0
+    }
+}
+
+/// The filter of each element, after the variance of each channel is raised to what is left of its contrasts.
+fn filters(scale: &Scale, smallest: &[PatchSums]) -> Vec<Filter> {
+    let mut sums = vec![PatchSums::default(); scale.patches.len()];
+    for (part, whole) in smallest.iter().zip(&scale.part_of) {
+        sums[*whole as usize].add(part);
+    }
+    let mut totals = vec![PatchSums::default(); scale.cells];
+    for (patch, sums) in scale.patches.iter().zip(&sums) {
+        totals[patch.cell].add(sums);
+    }
+    let contrasts: Vec<[Contrast; 3]> = scale
+        .elements
+        .iter()
+        .map(|element| contrast(element, &sums[element.patch], &totals[element.cell]))
+        .collect();
+    let excess = [0, 1, 2].map(|channel| {
+        let terms = contrasts.iter().map(|contrast| {
+            let Contrast {
+                received,
+                predicted,
+                variance,
+            } = contrast[channel];
+            (received - predicted) * (received - predicted) / variance
+        });
+        (terms.sum::<f64>() / contrasts.len().max(1) as f64).max(1.0)
+    });
+    let filter = |contrast: &[Contrast; 3]| {
+        let mut filter = Filter::default();
+        for (contrast, excess) in contrast.iter().zip(excess) {
+            let (predicted, variance) = (contrast.predicted, contrast.variance * excess);
+            filter.add(&Filter {
+                output: predicted * contrast.received / variance,
+                power: predicted * predicted / variance,
+                rest: predicted * (contrast.received - predicted) / variance,
+            });
+        }
+        filter
+    };
+    contrasts.iter().map(filter).collect()
+}
+
+fn contrast(element: &Element, inside: &PatchSums, cell: &PatchSums) -> [Contrast; 3] {
+    let outside = cell.without(inside);
+    [0, 1, 2].map(|channel| {
+        let [received, predicted, noise] = inside.means(channel, element.inside);
+        let [around, expected, noise_around] = outside.means(channel, element.outside);
+        Contrast {
+            received: received - around,
+            predicted: predicted - expected,
+            variance: noise.max(ROUNDING) / element.inside
+                + noise_around.max(ROUNDING) / element.outside,
+        }
+    })
+}

@@ -1,0 +1,75 @@
+//! The subject of a question, read from its text: [`QuestionTopic`].
+
+use crate::rules::{RuleBook, Rules};
+use crate::statistics::Segment;
+use darkqa_ground::types::Question;
+
+/// The word by which a question calls a thing, with the class that the word belongs to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct ThingWord {
+    class: String,
+    word: String,
+}
+
+impl ThingWord {
+    /// Whether a segment is called so.
+    pub(super) fn calls(&self, segment: &Segment, book: &RuleBook) -> bool {
+        segment.class == self.class && segment.called(book) == Some(&*self.word)
+    }
+}
+
+/// Subject of a question of the rulebook.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum QuestionTopic {
+    /// The type of the room.
+    Room,
+    /// Whether the room suits an activity, given by its index in the rulebook.
+    Activity(usize),
+    /// Whether an object is visible.
+    Presence(ThingWord),
+    /// The colour of an object.
+    Color(ThingWord),
+    /// The object that is closest to the camera.
+    Closest,
+}
+
+impl QuestionTopic {
+    /// Compares the text of a question with the templates of the rulebook. The evidence, which holds the answer, is not read.
+    pub(super) fn of(question: &Question, book: &RuleBook) -> Option<Self> {
+        let text = question.text.trim();
+        if text == book.room_type.text {
+            return Some(Self::Room);
+        }
+        if text == book.closest.text {
+            return Some(Self::Closest);
+        }
+        let activity = book.activity.iter().position(|activity| {
+            text == book
+                .affordance
+                .text
+                .replace("{activity}", &activity.activity)
+        });
+        if let Some(activity) = activity {
+            return Some(Self::Activity(activity));
+        }
+        let word = |singular: &str, plural: &str| {
+            book.class.iter().find_map(|(class, rule)| {
+                let mut words = rule.words.iter();
+                let word = words.find(|word| text == book.filled(singular, plural, word))?;
+                Some(ThingWord {
+                    class: class.clone(),
+                    word: word.clone(),
+                })
+            })
+        };
+        word(&book.presence.text, &book.presence.plural)
+            .map(Self::Presence)
+            .or_else(|| word(&book.color.text, &book.color.plural).map(Self::Color))
+    }
+}
+
+/// Whether a question is one of the rulebook, so that the observer can answer it.
+#[must_use]
+pub fn understood(question: &Question, rules: &Rules) -> bool {
+    QuestionTopic::of(question, rules.book()).is_some()
+}

@@ -1,0 +1,154 @@
+//! "Is there a chair in the image?"
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde_json::json;
+
+use super::reason::Reason;
+use super::rule_context::{Candidate, RuleContext, RuleResult, rejected, yes_no};
+use super::rules::{ClassFlag, PresenceRule};
+use super::statistics::{Segment, ppm};
+use darkqa_ground::types::Family;
+
+/// Candidates for every asked class: if it has a pixel in the frame, a yes for each word by which its segments are called, else
+/// a no for each word that the data set has for it.
+pub(super) fn candidates(context: &RuleContext<'_>) -> Vec<RuleResult> {
+    let rule = &context.book.presence;
+    let expected = context.room.and_then(|room| {
+        context
+            .frequency
+            .expected(room, &context.statistics.scene, rule.frequent)
+    });
+    let classes = context.book.class.iter();
+    let asked = classes.filter(|(_, class)| class.flags.contains(&ClassFlag::Asked));
+    asked
+        .flat_map(|(class, _)| {
+            let present = context.statistics.of_class(class) > 0;
+            let result = if present {
+                yes(context, class)
+            } else {
+                no(context, class, expected.as_ref())
+            };
+            result.unwrap_or_else(|reason| {
+                vec![rejected(Family::Presence, class, Some(present), reason)]
+            })
+        })
+        .collect()
+}
+
+/// Yes: one segment that is called so is large enough, of one class and not cut by the border.
+fn yes(context: &RuleContext<'_>, class: &str) -> Result<Vec<RuleResult>, Reason> {
+    let rule = &context.book.presence;
+    let segments = context.statistics.segments.iter();
+    let mut segments: Vec<&Segment> = segments.filter(|segment| segment.class == class).collect();
+    segments.sort_by_key(|segment| (std::cmp::Reverse(segment.area), segment.id));
+    let mut shown: BTreeMap<&str, &Segment> = BTreeMap::new();
+    let mut first_flaw = None;
+    for segment in segments {
+        match (flaw(context, segment, rule), segment.called(context.book)) {
+            (None, Some(word)) => drop(shown.entry(word).or_insert(segment)),
+            (flaw, _) => {
+                first_flaw.get_or_insert(flaw.unwrap_or(Reason::Wordless));
+            }
+        }
+    }
+    if shown.is_empty() {
+        // The reason is that of the largest segment. If none is listed, all are tiny.
+        return Err(first_flaw.unwrap_or(Reason::Small));
+    }
+    let shown = shown.into_iter();
+    let found =
+        shown.map(|(word, segment)| candidate(context, (class, word), 0, &[segment], json!({})));
+    Ok(found.collect())
+}
+
+fn flaw(context: &RuleContext<'_>, segment: &Segment, rule: &PresenceRule) -> Option<Reason> {
+    if let Some(reason) = context.statistics.disqualified(segment, context.book) {
+        return Some(reason);
+    }
+    let area = context.statistics.area(segment);
+    if area < rule.area_ppm {
+        Some(Reason::Small)
+    } else if ppm(segment.pure, segment.area) < rule.purity_ppm {
+        Some(Reason::Mixed)
+    } else if ppm(segment.rim_on_border, segment.rim) > rule.border_ppm
+        && area < rule.border_area_ppm
+    {
+        Some(Reason::Cut)
+    } else {
+        None
+    }
+}
+
+/// No: the class and the classes and words that may be mistaken for it have no pixel, nothing of it can be hidden in a coarse
+/// class, absence can be shown in this frame, and the class is common in such rooms.
+fn no(
+    context: &RuleContext<'_>,
+    class: &str,
+    expected: Option<&BTreeSet<String>>,
+) -> Result<Vec<RuleResult>, Reason> {
+    let words: Vec<&str> = context.vocabulary.of_class(class).collect();
+    if words.is_empty() || !context.labels.expressible.contains(class) {
+        return Err(Reason::Inexpressible);
+    }
+    if context.may_be_hidden(class) {
+        return Err(Reason::Hidden);
+    }
+    if let Some(reason) = context.absence_blocker() {
+        return Err(reason);
+    }
+    let groups = context
+        .book
+        .confusable
+        .iter()
+        .filter(|group| group.classes.contains(class));
+    let confused = groups.clone().any(|group| {
+        group
+            .classes
+            .iter()
+            .any(|other| context.statistics.of_class(other) > 0)
+            || context
+                .statistics
+                .words
+                .keys()
+                .any(|word| group.names.contains(word))
+    });
+    let resembles = |word: &String| context.book.resembles(word, class);
+    if confused || context.statistics.words.keys().any(resembles) {
+        return Err(Reason::Confusable);
+    }
+    if expected.is_some_and(|expected| !expected.contains(class)) {
+        return Err(Reason::Implausible);
+    }
+    let evidence = json!({
+        "pixels": 0,
+        "void_ppm": context.statistics.ppm(context.statistics.effective_void),
+        "mirror_ppm": context.statistics.ppm(context.statistics.of_class("mirror")),
+        "confusable": groups.flat_map(|group| &group.classes).collect::<BTreeSet<_>>(),
+    });
+    let denied = words.into_iter();
+    let denied = denied.map(|word| candidate(context, (class, word), 1, &[], evidence.clone()));
+    Ok(denied.collect())
+}
+
+fn candidate(
+    context: &RuleContext<'_>,
+    (class, word): (&str, &str),
+    truth: usize,
+    segments: &[&Segment],
+    evidence: serde_json::Value,
+) -> RuleResult {
+    let rule = &context.book.presence;
+    let text = context.book.filled(&rule.text, &rule.plural, word);
+    context.viable(
+        Candidate {
+            family: Family::Presence,
+            about: class.to_owned(),
+            text,
+            choices: yes_no(),
+            truth,
+            evidence,
+        },
+        segments,
+    )
+}

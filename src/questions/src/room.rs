@@ -1,0 +1,225 @@
+//! ClassifyRoom of the paper's Algorithm 1: the type of room that a frame shows, [`classify`].
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::rules::{Clue, Contest, RuleBook, Sign};
+use super::statistics::{FrameStatistics, Segment};
+
+/// The evidence in a frame for each type of room, and the resulting type.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RoomSigns {
+    /// Score of each room type: the sum of the weights of its clues. Room types without a clue are left out.
+    pub scores: BTreeMap<String, u32>,
+    /// Numbers of the segments that are evidence for each room type.
+    pub segments: BTreeMap<String, Vec<u32>>,
+    /// The room type, or why there is none.
+    pub room: Result<String, NoRoom>,
+    /// The winner, also if questions do not ask about this room type.
+    pub winner: Option<String>,
+}
+
+/// Why a frame has no room type.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NoRoom {
+    /// No clue of the rulebook holds.
+    NoSigns,
+    /// The highest score is too low.
+    Weak,
+    /// Two or more room types have similar scores, and none wins.
+    Contested,
+    /// Questions do not ask about the winning room type.
+    NotAsked,
+}
+
+/// Source of a frame's room type.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+pub enum RoomSource {
+    /// The objects visible in the frame, as in the paper.
+    #[default]
+    Signature,
+    /// The room that the data set states.
+    Stated,
+}
+
+/// Classifies the room of a frame by the objects visible in it.
+///
+/// Each clue of the rulebook counts once. The room type with the highest score wins if the score is high enough and no other
+/// type is a rival. Against a single rival, one of the two wins by a contest of the rulebook. One also wins if the other is
+/// small and far behind, because that is a room seen through a door.
+#[must_use]
+pub fn classify(statistics: &FrameStatistics, book: &RuleBook) -> RoomSigns {
+    let signs = Signs::of(statistics, book);
+    let mut scores = BTreeMap::new();
+    let mut segments: BTreeMap<String, Vec<u32>> = BTreeMap::new();
+    for clue in &book.clue {
+        if let Some(seen) = signs.holds(clue) {
+            *scores.entry(clue.room.clone()).or_insert(0) += clue.weight;
+            let list = segments.entry(clue.room.clone()).or_default();
+            list.extend(seen.iter().map(|segment| segment.id));
+            list.sort_unstable();
+            list.dedup();
+        }
+    }
+    let winner = winner(&signs, &scores, &segments);
+    let room = winner.clone().and_then(|room| {
+        if book.room.order.contains(&room) {
+            Ok(room)
+        } else {
+            Err(NoRoom::NotAsked)
+        }
+    });
+    RoomSigns {
+        scores,
+        segments,
+        room,
+        winner: winner.ok(),
+    }
+}
+
+/// The segments that are evidence, by token.
+struct Signs<'a> {
+    statistics: &'a FrameStatistics,
+    book: &'a RuleBook,
+    tokens: BTreeMap<&'a str, Vec<&'a Segment>>,
+}
+
+impl<'a> Signs<'a> {
+    fn of(statistics: &'a FrameStatistics, book: &'a RuleBook) -> Self {
+        let mut tokens: BTreeMap<&str, Vec<&Segment>> = BTreeMap::new();
+        for segment in statistics.evidence(book) {
+            tokens.entry(segment.token(book)).or_default().push(segment);
+        }
+        Self {
+            statistics,
+            book,
+            tokens,
+        }
+    }
+
+    /// The segments that make a clue hold; `None` if it does not hold.
+    fn holds(&self, clue: &Clue) -> Option<Vec<&'a Segment>> {
+        if clue
+            .unseen
+            .iter()
+            .any(|token| self.statistics.shows(token, self.book))
+        {
+            return None;
+        }
+        let mut seen = Vec::new();
+        for sign in &clue.seen {
+            seen.extend(self.seen(sign)?);
+        }
+        Some(seen)
+    }
+
+    fn seen(&self, sign: &Sign) -> Option<Vec<&'a Segment>> {
+        let segments = self.tokens.get(sign.token.as_str())?;
+        let large = segments
+            .iter()
+            .filter(|segment| self.statistics.area(segment) >= sign.area_ppm);
+        let large: Vec<&Segment> = large.copied().collect();
+        let enough = large.len() >= sign.least && sign.most.is_none_or(|most| large.len() <= most);
+        enough.then_some(large)
+    }
+
+    fn area(&self, token: &str) -> u64 {
+        let segments = self.tokens.get(token).into_iter().flatten();
+        segments.map(|segment| segment.area).sum()
+    }
+
+    fn wins(&self, contest: &Contest, score: u32) -> bool {
+        let larger = contest
+            .tokens
+            .as_ref()
+            .is_none_or(|[own, other]| self.area(own) >= contest.area_ratio * self.area(other));
+        score >= contest.least_score
+            && larger
+            && !contest
+                .unseen
+                .iter()
+                .any(|token| self.statistics.shows(token, self.book))
+    }
+
+    /// Whether the second room is seen through a door: its segments are small and all far behind the first's.
+    fn behind(&self, first: &[u32], second: &[u32]) -> bool {
+        let rule = &self.book.doorway;
+        let listed = |ids: &[u32]| -> Vec<&Segment> {
+            let segments = self.statistics.segments.iter();
+            segments
+                .filter(|segment| ids.contains(&segment.id))
+                .collect()
+        };
+        let (first, second) = (listed(first), listed(second));
+        let area = |list: &[&Segment]| -> u64 { list.iter().map(|segment| segment.area).sum() };
+        let medians = |list: &[&Segment]| -> Option<Vec<u64>> {
+            let medians = list
+                .iter()
+                .map(|segment| Some(segment.measured(self.book)?.median.into()));
+            medians.collect()
+        };
+        let (Some(near), Some(far)) = (medians(&first), medians(&second)) else {
+            return false;
+        };
+        let (Some(near), Some(far)) = (near.into_iter().max(), far.into_iter().min()) else {
+            return false;
+        };
+        area(&first) >= rule.area_ratio * area(&second)
+            && far * 1_000_000 >= near * rule.depth_ratio_ppm
+    }
+}
+
+fn winner(
+    signs: &Signs<'_>,
+    scores: &BTreeMap<String, u32>,
+    segments: &BTreeMap<String, Vec<u32>>,
+) -> Result<String, NoRoom> {
+    let rule = &signs.book.room;
+    let position = |room: &str| {
+        rule.order
+            .iter()
+            .position(|other| other == room)
+            .unwrap_or(usize::MAX)
+    };
+    let mut ranked: Vec<(&String, u32)> =
+        scores.iter().map(|(room, score)| (room, *score)).collect();
+    ranked.sort_by_key(|(room, score)| (std::cmp::Reverse(*score), position(room), *room));
+    let Some(&(first, score)) = ranked.first() else {
+        return Err(NoRoom::NoSigns);
+    };
+    if score < rule.least_score {
+        return Err(NoRoom::Weak);
+    }
+    let is_rival = |other: u32| other >= rule.least_score || score - other < rule.least_lead;
+    let rivals: Vec<(&String, u32)> = ranked[1..]
+        .iter()
+        .copied()
+        .filter(|(_, other)| is_rival(*other))
+        .collect();
+    let [(second, other)] = rivals[..] else {
+        return if rivals.is_empty() {
+            Ok(first.clone())
+        } else {
+            Err(NoRoom::Contested)
+        };
+    };
+    for contest in &signs.book.contest {
+        let pair = [(first, second, score), (second, first, other)];
+        for (winner, loser, score) in pair {
+            let applies = contest.winner == *winner && contest.loser == *loser;
+            if applies && score >= rule.least_score && signs.wins(contest, score) {
+                return Ok(winner.clone());
+            }
+        }
+    }
+    let own = |room: &str| segments.get(room).map_or(&[][..], Vec::as_slice);
+    if signs.behind(own(first), own(second)) {
+        Ok(first.clone())
+    } else if score == other && signs.behind(own(second), own(first)) {
+        Ok(second.clone())
+    } else {
+        Err(NoRoom::Contested)
+    }
+}

@@ -1,0 +1,304 @@
+//! The rulebook: every threshold, table and template that questions are generated with, [`Rules`].
+//!
+//! A rulebook is one TOML file. The built-in one is `rules.toml`; its comments explain each entry and give its source. The
+//! fields here have the same names.
+
+mod check;
+mod entries;
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use darkqa_ground::error::{Error, Result};
+use darkqa_ground::types::Digest;
+use darkqa_ground::types::toml_fault::TomlFault;
+
+pub use entries::*;
+
+/// Text of the built-in rulebook.
+const BUILT_IN: &str = include_str!("../rules.toml");
+/// Schema of the file, with its version.
+const SCHEMA: &str = "darkqa.rules/1";
+
+/// A checked rulebook with its digests.
+#[derive(Debug, Clone)]
+pub struct Rules {
+    book: RuleBook,
+    digest: Digest,
+    measure_digest: Digest,
+}
+
+/// The content of a rulebook file.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RuleBook {
+    schema: String,
+    /// Version of the rules; it stands in the evidence of each question.
+    pub version: String,
+    /// Seed of every pick between candidates that are equally good.
+    pub seed: u64,
+    pub measure: MeasureRule,
+    pub qualified: EvidenceRule,
+    /// Canonical classes by name.
+    pub class: BTreeMap<String, ClassRule>,
+    pub words: GrammarRule,
+    pub coarse: CoarseRule,
+    pub names: WordRules,
+    pub confusable: Vec<Confusable>,
+    pub room: RoomRule,
+    /// The first token that matches a segment counts.
+    pub token: Vec<TokenRule>,
+    pub clue: Vec<Clue>,
+    pub contest: Vec<Contest>,
+    pub doorway: Doorway,
+    pub closed_world: ClosedWorld,
+    /// "What type of room is this?"
+    pub room_type: RoomTypeRule,
+    /// "Is this room suitable for this?"
+    pub affordance: AffordanceRule,
+    pub activity: Vec<ActivityRule>,
+    /// "Is there a chair in the image?"
+    pub presence: PresenceRule,
+    /// "What color is the chair in the image?"
+    pub color: ColorRule,
+    /// "Which object is closest to the camera?"
+    pub closest: ClosestRule,
+    pub balance: BalanceRule,
+}
+
+impl Rules {
+    /// Returns the built-in rulebook.
+    ///
+    /// # Errors
+    /// Never: a test parses the same text.
+    pub fn built_in() -> Result<Self> {
+        Self::parse(BUILT_IN)
+    }
+
+    /// Parses and checks a rulebook.
+    ///
+    /// # Errors
+    /// [`Error::Data`] if the text is not TOML of this schema, or names a class, room or token that it does not define.
+    pub fn parse(text: &str) -> Result<Self> {
+        let wrong = |problem: String| Error::data("rules", problem);
+        let book: RuleBook = toml::from_str(text).map_err(|e| {
+            let TomlFault { line, problem } = TomlFault::of(text, &e);
+            wrong(format!("line {line}: {problem}"))
+        })?;
+        book.check().map_err(wrong)?;
+        // The digest covers the values, not the text: a comment does not change it.
+        let content = |part: String| Digest::of_parts([part.as_bytes()]);
+        let whole = serde_json::to_string(&book).map_err(|e| wrong(e.to_string()))?;
+        let measured = (&book.measure, &book.coarse);
+        let measure = serde_json::to_string(&measured).map_err(|e| wrong(e.to_string()))?;
+        Ok(Self {
+            book,
+            digest: content(whole),
+            measure_digest: content(measure),
+        })
+    }
+
+    /// The content of the rulebook.
+    #[must_use]
+    pub fn book(&self) -> &RuleBook {
+        &self.book
+    }
+
+    /// The digest of the whole rulebook.
+    #[must_use]
+    pub fn digest(&self) -> Digest {
+        self.digest
+    }
+
+    /// The digest of `[measure]` and `[coarse]`, the parts of the rulebook that decide the statistics of a frame.
+    #[must_use]
+    pub fn measure_digest(&self) -> Digest {
+        self.measure_digest
+    }
+}
+
+impl RuleBook {
+    /// Whether a class has a property; false for unknown classes.
+    #[must_use]
+    pub fn is(&self, class: &str, flag: ClassFlag) -> bool {
+        let class = self.class.get(class);
+        class.is_some_and(|class| class.flags.contains(&flag))
+    }
+
+    /// The word in questions for a thing that an annotator calls by `word`; `None` if questions do not use this word for things
+    /// of the class.
+    #[must_use]
+    pub fn called(&self, class: &str, word: &str) -> Option<&str> {
+        let plain = word.replace('_', " ");
+        let spelled = self.words.spelled.get(&plain).unwrap_or(&plain);
+        let words = &self.class.get(class)?.words;
+        words
+            .iter()
+            .find(|known| *known == spelled)
+            .map(String::as_str)
+    }
+
+    /// A template with the word of a thing filled in; `plural` is used for plural words.
+    #[must_use]
+    pub fn filled(&self, singular: &str, plural: &str, word: &str) -> String {
+        if self.words.plural.contains(word) {
+            return plural.replace("{object}", word);
+        }
+        let article = if self.words.an.contains(word) {
+            "an"
+        } else {
+            "a"
+        };
+        singular
+            .replace("{article}", article)
+            .replace("{object}", word)
+    }
+
+    /// Whether a word of a data set may be another word for things of a class: its last words are one by which questions call
+    /// such things, as in "decorative lamp".
+    #[must_use]
+    pub fn resembles(&self, word: &str, class: &str) -> bool {
+        let plain = word.replace('_', " ");
+        let spelled = self.words.spelled.get(&plain).unwrap_or(&plain);
+        let words = self.class.get(class).into_iter();
+        let mut words = words.flat_map(|class| &class.words);
+        words.any(|known| {
+            let before = spelled.strip_suffix(known.as_str());
+            before.is_some_and(|before| before.is_empty() || before.ends_with(' '))
+        })
+    }
+
+    /// The token of a segment by its word and class; the class itself if no token matches.
+    #[must_use]
+    pub fn token<'a>(&'a self, name: &str, class: &'a str) -> &'a str {
+        let matches = |token: &&TokenRule| {
+            let word_matches = token.names.contains(name)
+                || token
+                    .starts
+                    .iter()
+                    .any(|start| name.starts_with(start.as_str()))
+                || token.names.is_empty() && token.starts.is_empty();
+            word_matches && token.class.as_deref().is_none_or(|only| only == class)
+        };
+        let token = self.token.iter().find(matches);
+        token.map_or(class, |token| &token.token)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_built_in_rules_are_complete() {
+        let rules = Rules::built_in().unwrap();
+        let book = rules.book();
+        let asked = book
+            .class
+            .values()
+            .filter(|class| class.flags.contains(&ClassFlag::Asked));
+        assert_eq!((asked.count(), book.class.len()), (23, 40));
+        assert_eq!(
+            (book.room.order.len(), book.color.neighbours.len()),
+            (6, 11)
+        );
+        assert_eq!(book.token("desk", "table"), "desk");
+        assert_eq!(book.token("side table", "table"), "table");
+        assert_eq!(book.token("shower curtain", "curtain"), "bath fitting");
+        assert_eq!(book.token("bathtub", "bathtub"), "bathtub");
+        assert_eq!(book.token("dog bed", "bed"), "pet bed");
+    }
+
+    #[test]
+    fn every_word_has_its_article() {
+        let rules = Rules::built_in().unwrap();
+        let book = rules.book();
+        let words = book.class.values().flat_map(|class| &class.words);
+        for word in words.filter(|word| !book.words.plural.contains(*word)) {
+            let vowel = word.starts_with(['a', 'e', 'i', 'o', 'u']);
+            assert_eq!(book.words.an.contains(word), vowel, "{word}");
+            let plural = word.ends_with('s') && word != "chest of drawers";
+            assert!(!plural, "{word} is not in words.plural");
+        }
+    }
+
+    #[test]
+    fn comments_change_no_digest() {
+        let commented = format!("# nothing\n{BUILT_IN}");
+        let (rules, same) = (
+            Rules::built_in().unwrap(),
+            Rules::parse(&commented).unwrap(),
+        );
+        assert_eq!(rules.digest(), same.digest());
+        let other = Rules::parse(&BUILT_IN.replace("gap_mm = 300", "gap_mm = 301")).unwrap();
+        assert_ne!(rules.digest(), other.digest());
+        assert_eq!(rules.measure_digest(), other.measure_digest());
+        let other = Rules::parse(&BUILT_IN.replace("bright = 252", "bright = 251")).unwrap();
+        assert_ne!(rules.measure_digest(), other.measure_digest());
+    }
+
+    #[test]
+    fn broken_rules_say_what_is_wrong() {
+        for (from, to, says) in [
+            ("gap_mm = 300", "gap_mm = \"wide\"", "line "),
+            ("gap_mm = 300", "gap_mn = 300", "unknown field `gap_mn`"),
+            (
+                "darkqa.rules/1",
+                "darkqa.rules/9",
+                "schema \"darkqa.rules/9\"",
+            ),
+            (
+                "classes = [\"plant\"]",
+                "classes = [\"palm\"]",
+                "the class \"palm\"",
+            ),
+            (
+                "token = \"nightstand\" }",
+                "token = \"nightstnd\" }",
+                "\"nightstnd\" is neither",
+            ),
+            (
+                "rooms = [\"office\"]",
+                "rooms = [\"study\"]",
+                "\"study\" has no clue",
+            ),
+            (
+                "{activity}, is",
+                "that, is",
+                "affordance.text has no {activity}",
+            ),
+            ("choices = 4", "choices = 1", "closest.choices is 1"),
+            (
+                "words = [\"sofa\"]",
+                "words = []",
+                "class.sofa has no words",
+            ),
+            (
+                "words = [\"sofa\"]",
+                "words = [\"bed\"]",
+                "has the word \"bed\" again",
+            ),
+            (
+                "\"towels\"]\n# Words",
+                "\"oxen\"]\n# Words",
+                "[words] has \"oxen\"",
+            ),
+            (
+                "hidden = [\"furniture\"]",
+                "hidden = [\"attic\"]",
+                "names the class \"attic\"",
+            ),
+            ("\"office\"]   #", "\"bedroom\"]   #", "\"bedroom\" twice"),
+        ] {
+            assert!(BUILT_IN.contains(from), "{from}");
+            let error = Rules::parse(&BUILT_IN.replacen(from, to, 1))
+                .unwrap_err()
+                .to_string();
+            assert!(
+                error.starts_with("rules: ") && error.contains(says),
+                "{error}"
+            );
+        }
+    }
+}

@@ -1,0 +1,361 @@
+//! Statistics of a set of questions: those of the paper's figure and more, [`QuestionSummary`].
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::Serialize;
+
+use super::generate::{FamilyCounts, Generated, OmissionReason, QuestionRequest, stated};
+use super::reason::Reason;
+use super::rule_context::GeneratedQuestion;
+use super::rules::RuleBook;
+use super::statistics::FrameStatistics;
+use darkqa_ground::types::{Digest, Family};
+
+/// The schema of the summary as JSON.
+const SCHEMA: &str = "darkqa.questions/1";
+
+/// Statistics of a set of questions. Shares are given as pairs of counts.
+#[derive(Debug, Serialize)]
+pub struct QuestionSummary {
+    schema: &'static str,
+    pub dataset: String,
+    /// Digest of the rulebook.
+    pub rules: Digest,
+    /// Digest of the colour table.
+    pub colors: Digest,
+    pub rules_version: String,
+    /// How far the answers were balanced: none, binary or full.
+    pub balance: String,
+    pub scenes: usize,
+    /// Number of frames that were measured.
+    pub frames: usize,
+    /// Number of frames that could not be measured.
+    pub failed: usize,
+    /// Number of frames that are too dark to ask about.
+    pub dark: usize,
+    pub questions: usize,
+    /// Numbers of candidates by outcome, for each family.
+    pub candidates: BTreeMap<Family, CandidateCounts>,
+    /// Number of frames by the number of questions asked of a frame.
+    pub per_frame: BTreeMap<usize, usize>,
+    /// Number of questions by family and answer.
+    pub answers: BTreeMap<Family, BTreeMap<String, usize>>,
+    /// Number of questions by text.
+    pub texts: BTreeMap<String, usize>,
+    /// Number of questions by the number of choices.
+    pub choices: BTreeMap<usize, usize>,
+    /// Numbers of yes and no answers by subject, for the yes-no families.
+    pub polarity: BTreeMap<Family, BTreeMap<String, [usize; 2]>>,
+    /// Pixels, segments, frames and questions of each class.
+    pub classes: BTreeMap<String, ClassCoverage>,
+    /// Frames and questions of each room type.
+    pub rooms: BTreeMap<String, RoomCoverage>,
+    /// Number of frames whose room type is both stated and classified, and number of those where both agree.
+    pub room_agreement: [usize; 2],
+    /// Number of questions by the gap between the two nearest objects, in mm, rounded down to a multiple of 250.
+    pub gaps: BTreeMap<u64, usize>,
+    /// Number of questions that repeat another one of their scene: same text, same answer.
+    pub repeats: usize,
+    /// Number of pixels of each map number that the label space does not have.
+    pub unknown: BTreeMap<u16, u64>,
+    /// Scores of answering without the image, by family; "all" is the total.
+    pub baselines: BTreeMap<String, Baselines>,
+}
+
+/// Numbers of a family's candidates, by outcome.
+#[derive(Debug, Default, Serialize)]
+pub struct CandidateCounts {
+    /// Number of candidates that the rules accept.
+    pub viable: u64,
+    pub asked: u64,
+    /// Number of viable candidates of frames that are asked another question of the family.
+    pub not_chosen: u64,
+    /// Number of questions that a person has rejected.
+    pub rejected: u64,
+    /// Number of questions dropped because their answer would be too frequent.
+    pub unbalanced: u64,
+    /// Number of candidates that the rules reject, by reason.
+    pub fallen: BTreeMap<Reason, u64>,
+}
+
+/// Amounts of one class in a set of frames and questions.
+#[derive(Debug, Default, Serialize)]
+pub struct ClassCoverage {
+    /// Number of pixels over all frames.
+    pub pixels: u64,
+    /// Number of segments, without the tiny ones.
+    pub segments: u64,
+    /// Number of frames that show the class.
+    pub frames: u64,
+    /// Number of questions about the class.
+    pub questions: u64,
+}
+
+/// Amounts of one room type in a set of frames and questions.
+#[derive(Debug, Default, Serialize)]
+pub struct RoomCoverage {
+    /// Number of frames that show this type of room.
+    pub frames: usize,
+    /// Number of room-type questions with this answer.
+    pub questions: usize,
+}
+
+/// Scores of answering without the image, as numbers of right answers or their expected values.
+#[derive(Debug, Default, Serialize)]
+pub struct Baselines {
+    pub questions: usize,
+    /// Expected number of right answers of a uniform guess.
+    pub chance: f64,
+    /// Number of right answers if the most common answer of the family is always given.
+    pub majority: usize,
+    /// Number of right answers with the most common answer to the same text in other scenes; else of the family there; else
+    /// of a guess. A model can know this from such questions, without the image.
+    pub prior: f64,
+}
+
+impl QuestionSummary {
+    /// The statistics of generated questions; `failed` is the number of frames that could not be measured.
+    #[must_use]
+    pub fn new(
+        frames: &[FrameStatistics],
+        generated: &Generated,
+        request: &QuestionRequest<'_>,
+        failed: usize,
+    ) -> Self {
+        let asked = &generated.asked;
+        let mut summary = Self {
+            schema: SCHEMA,
+            dataset: request.dataset.to_owned(),
+            rules: request.rules.digest(),
+            colors: request.palette.digest(),
+            rules_version: request.rules.book().version.clone(),
+            balance: request.balance.to_string(),
+            scenes: frames
+                .iter()
+                .map(|frame| &frame.scene)
+                .collect::<BTreeSet<_>>()
+                .len(),
+            frames: frames.len(),
+            failed,
+            dark: generated.dark.len(),
+            questions: asked.len(),
+            candidates: generated
+                .counts
+                .iter()
+                .map(|(family, counts)| (family.clone(), CandidateCounts::of(counts)))
+                .collect(),
+            per_frame: BTreeMap::new(),
+            answers: BTreeMap::new(),
+            texts: count(asked, |asked| asked.question.text.clone()),
+            choices: count(asked, |asked| asked.question.choices.len()),
+            polarity: BTreeMap::new(),
+            classes: coverage(frames, asked),
+            rooms: rooms(generated),
+            room_agreement: room_agreement(frames, generated, request.rules.book()),
+            gaps: BTreeMap::new(),
+            repeats: 0,
+            unknown: BTreeMap::new(),
+            baselines: baselines(asked),
+        };
+        let per_frame = count(asked, |asked| asked.question.frame.clone());
+        for frame in frames {
+            let questions = per_frame.get(&frame.frame).copied().unwrap_or(0);
+            *summary.per_frame.entry(questions).or_insert(0) += 1;
+            for (id, pixels) in &frame.unknown {
+                *summary.unknown.entry(*id).or_insert(0) += pixels;
+            }
+        }
+        for asked in asked {
+            summary.add(asked);
+        }
+        let by_content = count(asked, GeneratedQuestion::repeat_key);
+        summary.repeats = by_content.values().map(|count| count - 1).sum();
+        summary
+    }
+
+    fn add(&mut self, asked: &GeneratedQuestion) {
+        let question = &asked.question;
+        let answers = self.answers.entry(question.family.clone()).or_default();
+        *answers.entry(asked.answer().to_owned()).or_insert(0) += 1;
+        if matches!(question.family, Family::Affordance | Family::Presence) {
+            let subjects = self.polarity.entry(question.family.clone()).or_default();
+            let counts = subjects.entry(asked.about.clone()).or_default();
+            if let Some(truth) = question.choices.truth() {
+                counts[truth] += 1;
+            }
+        }
+        if let Some(gap) = question
+            .evidence
+            .get("gap_mm")
+            .and_then(serde_json::Value::as_u64)
+        {
+            *self.gaps.entry(gap / 250 * 250).or_insert(0) += 1;
+        }
+        if question.family == Family::RoomType {
+            self.rooms
+                .entry(asked.answer().to_owned())
+                .or_default()
+                .questions += 1;
+        }
+    }
+}
+
+impl CandidateCounts {
+    fn of(counts: &FamilyCounts) -> Self {
+        let omitted = |reason| counts.omitted.get(&reason).copied().unwrap_or(0);
+        Self {
+            viable: counts.viable,
+            asked: counts.asked,
+            not_chosen: omitted(OmissionReason::NotChosen),
+            rejected: omitted(OmissionReason::Rejected),
+            unbalanced: omitted(OmissionReason::Unbalanced),
+            fallen: counts.rejections.clone(),
+        }
+    }
+}
+
+fn count<'a, K: Ord>(
+    asked: impl IntoIterator<Item = &'a GeneratedQuestion>,
+    key: impl Fn(&'a GeneratedQuestion) -> K,
+) -> BTreeMap<K, usize> {
+    let mut counts = BTreeMap::new();
+    for asked in asked {
+        *counts.entry(key(asked)).or_insert(0) += 1;
+    }
+    counts
+}
+
+/// Expected number of right answers of uniform guesses, from the numbers of questions by number of choices.
+fn chance(sizes: &BTreeMap<usize, usize>) -> f64 {
+    let right = sizes
+        .iter()
+        .map(|(size, count)| *count as f64 / *size as f64);
+    right.sum()
+}
+
+fn coverage(
+    frames: &[FrameStatistics],
+    asked: &[GeneratedQuestion],
+) -> BTreeMap<String, ClassCoverage> {
+    let mut classes: BTreeMap<String, ClassCoverage> = BTreeMap::new();
+    for frame in frames {
+        for (class, pixels) in &frame.classes {
+            let coverage = classes.entry(class.clone()).or_default();
+            coverage.pixels += pixels;
+            coverage.frames += 1;
+        }
+        for segment in &frame.segments {
+            classes.entry(segment.class.clone()).or_default().segments += 1;
+        }
+    }
+    for asked in asked {
+        let of_class = matches!(
+            asked.question.family,
+            Family::Presence | Family::Color | Family::Closest
+        );
+        if of_class {
+            classes.entry(asked.about.clone()).or_default().questions += 1;
+        }
+    }
+    classes
+}
+
+/// Number of frames whose room type is both stated and classified, and number of those where both agree.
+fn room_agreement(
+    frames: &[FrameStatistics],
+    generated: &Generated,
+    book: &RuleBook,
+) -> [usize; 2] {
+    let signs: BTreeMap<_, _> = generated
+        .rooms
+        .iter()
+        .map(|(name, signs)| (name, signs))
+        .collect();
+    let mut agreement = [0, 0];
+    for frame in frames {
+        let signs = signs.get(&frame.frame);
+        let classified = signs.and_then(|signs| signs.room.as_ref().ok());
+        if let (Some(classified), Some(stated)) = (classified, stated(frame, book)) {
+            agreement[0] += 1;
+            agreement[1] += usize::from(*classified == stated);
+        }
+    }
+    agreement
+}
+
+fn rooms(generated: &Generated) -> BTreeMap<String, RoomCoverage> {
+    let mut rooms: BTreeMap<String, RoomCoverage> = BTreeMap::new();
+    for room in generated
+        .rooms
+        .iter()
+        .filter_map(|(_, signs)| signs.room.as_ref().ok())
+    {
+        rooms.entry(room.clone()).or_default().frames += 1;
+    }
+    rooms
+}
+
+fn baselines(asked: &[GeneratedQuestion]) -> BTreeMap<String, Baselines> {
+    let mut families: BTreeMap<&Family, Vec<&GeneratedQuestion>> = BTreeMap::new();
+    for asked in asked {
+        families
+            .entry(&asked.question.family)
+            .or_default()
+            .push(asked);
+    }
+    let mut all: BTreeMap<String, Baselines> = BTreeMap::new();
+    let mut total = Baselines::default();
+    for (family, list) in families {
+        let answers = count(list.iter().copied(), GeneratedQuestion::answer);
+        let sizes = count(list.iter().copied(), |asked| asked.question.choices.len());
+        let baselines = Baselines {
+            questions: list.len(),
+            chance: chance(&sizes),
+            majority: answers.values().copied().max().unwrap_or(0),
+            prior: prior(&list),
+        };
+        total.questions += baselines.questions;
+        total.chance += baselines.chance;
+        total.majority += baselines.majority;
+        total.prior += baselines.prior;
+        all.insert(family.name().to_owned(), baselines);
+    }
+    all.insert(Family::TOTAL.to_owned(), total);
+    all
+}
+
+/// The value of [`Baselines::prior`] for the questions of one family.
+fn prior(list: &[&GeneratedQuestion]) -> f64 {
+    // Counts by text, answer and scene. The empty text stands for all questions of the family.
+    let mut counts: BTreeMap<&str, BTreeMap<&str, BTreeMap<&str, usize>>> = BTreeMap::new();
+    for asked in list {
+        for text in ["", &asked.question.text] {
+            let scenes = counts
+                .entry(text)
+                .or_default()
+                .entry(asked.answer())
+                .or_default();
+            *scenes.entry(&asked.scene).or_insert(0) += 1;
+        }
+    }
+    let most_common = |text: &str, except: &str| {
+        let answers = counts.get(text).into_iter().flatten();
+        let counts = answers.map(|(answer, scenes)| {
+            let others = scenes.iter().filter(|(scene, _)| **scene != except);
+            (*answer, others.map(|(_, count)| count).sum::<usize>())
+        });
+        let best = counts.filter(|(_, count)| *count > 0);
+        best.min_by_key(|&(answer, count)| (std::cmp::Reverse(count), answer))
+            .map(|(answer, _)| answer)
+    };
+    let (mut right, mut guesses) = (0_usize, BTreeMap::<usize, usize>::new());
+    for asked in list {
+        match most_common(&asked.question.text, &asked.scene)
+            .or_else(|| most_common("", &asked.scene))
+        {
+            Some(answer) => right += usize::from(answer == asked.answer()),
+            None => *guesses.entry(asked.question.choices.len()).or_insert(0) += 1,
+        }
+    }
+    right as f64 + chance(&guesses)
+}

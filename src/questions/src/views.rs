@@ -1,0 +1,41 @@
+//! The colours of things in all views of a scene: [`Views`].
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::colors::{Color, Palette};
+use super::rules::RuleBook;
+use super::statistics::{FrameStatistics, Segment, WordSource};
+
+/// The colours of each thing, by scene, number and word, over all frames that show it well enough.
+///
+/// Only segments with names are the same thing in several frames: the names of a scene are those of its numbers. Numbers of
+/// connected components mean another thing in each frame.
+#[derive(Debug, Default)]
+pub struct Views(BTreeMap<(String, u32, String), BTreeSet<Option<Color>>>);
+
+impl Views {
+    /// The colours in these frames; the colour of a view is that of its median.
+    pub fn of(frames: &[FrameStatistics], palette: &Palette, book: &RuleBook) -> Self {
+        let mut views = Self::default();
+        for frame in frames {
+            let named = frame.segments.iter();
+            let named = named.filter(|segment| segment.source == WordSource::Name);
+            for segment in named.filter(|segment| segment.core >= book.color.view_px) {
+                let colors = views.0.entry(Self::key(frame, segment)).or_default();
+                colors.insert(palette.color(segment.median));
+            }
+        }
+        views
+    }
+
+    fn key(frame: &FrameStatistics, segment: &Segment) -> (String, u32, String) {
+        (frame.scene.clone(), segment.id, segment.word.clone())
+    }
+
+    /// Whether some view of the thing shows another colour than this one.
+    pub fn disagree(&self, frame: &FrameStatistics, segment: &Segment, color: Color) -> bool {
+        let colors = self.0.get(&Self::key(frame, segment));
+        segment.source == WordSource::Name
+            && colors.is_some_and(|colors| colors.iter().any(|other| *other != Some(color)))
+    }
+}

@@ -1,0 +1,405 @@
+//! The built-in rooms: images of furnished rooms with exact ground truth, generated from a seed.
+//!
+//! Each scene is one room of one of six kinds. Rules and random draws furnish it with parametric pieces (`furniture`); windows
+//! and lamps light it. Two frames show it: from the eye height of a person, and from that of a small robot. Frames are ray
+//! traced, so image, depth, classes and segments agree in every pixel. Seed, number and size decide a frame: the bytes are
+//! the same on every machine and for every number of threads. No model was trained on these rooms.
+
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
+
+mod bvh;
+mod camera;
+mod clutter;
+mod dice;
+mod drawn_room;
+mod furniture;
+mod kinds;
+mod light;
+mod light_grid;
+mod mesh;
+mod noise;
+mod openings;
+mod paint;
+mod pattern;
+mod plan;
+mod render;
+mod room_light;
+mod scene;
+mod settings;
+mod shell;
+mod spot;
+mod surface;
+mod viewpoint;
+
+use std::collections::BTreeMap;
+use std::convert::Infallible;
+use std::sync::{Arc, LazyLock};
+
+use self::dice::Dice;
+use self::drawn_room::DrawnRoom;
+use self::kinds::RoomKind;
+use self::plan::FloorPlan;
+pub use self::room_light::RoomLight;
+pub use self::settings::Rooms;
+use self::viewpoint::Height;
+use darkqa_ground::error::Result;
+use darkqa_ground::labels;
+use darkqa_ground::types::recent::Recent;
+use darkqa_ground::types::{Digest, Frame, FrameId, Labels, Light, Pixels, Rgb, SegmentName};
+
+/// The version of the generator. Any change of a pixel or a name needs another version.
+pub const VERSION: u32 = 2;
+
+/// The label space of the semantic maps.
+const SPACE: &str = "mpcat40";
+
+/// The maximum size of the frame cache in bytes: the 48 frames of the default data set, which are drawn once for their questions and
+/// their images.
+const CACHE_BYTES: usize = 104 << 20;
+
+/// The number of frames of a size that fit into the cache; at least one.
+fn cached_frames([width, height]: [usize; 2], light: RoomLight) -> usize {
+    let bytes = match light {
+        RoomLight::Display => DrawnRoom::BYTES_PER_PIXEL,
+        RoomLight::Linear => DrawnRoom::BYTES_PER_PIXEL + DrawnRoom::BYTES_OF_LIGHT,
+    };
+    (CACHE_BYTES / (width * height * bytes).max(1)).max(1)
+}
+
+/// One frame of the rooms, by its index; drawn only when needed.
+#[derive(Debug, Clone)]
+pub struct Room {
+    rooms: Rooms,
+    index: usize,
+    cache: Arc<Recent<usize, Arc<DrawnRoom>>>,
+}
+
+/// The ground truth of a frame, for checking questions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RoomTruth {
+    /// The kind of the room, as `living room`.
+    pub room: &'static str,
+    /// Everything in the room, in the order of the segment numbers, which start at 1.
+    pub things: Vec<ThingTruth>,
+}
+
+/// The maximum distance in metres between neighbouring points at which the surface of a thing is sampled (chosen).
+const SPACING: f32 = 0.06;
+
+/// The ground truth of one thing in the room.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ThingTruth {
+    /// The name of the thing, as `coffee table`.
+    pub word: &'static str,
+    /// The class of the thing in mpcat40.
+    pub class: &'static str,
+    /// The name of its main colour; empty if people would not agree on one.
+    pub color: &'static str,
+    /// The distance in metres from the camera to the nearest point of the thing within the view, hidden or not. The error is
+    /// a few centimetres. `f32::MAX` if no point is within the view.
+    pub near: f32,
+}
+
+impl Rooms {
+    /// The name of the data set. It depends on the seed only.
+    #[must_use]
+    pub fn title(&self) -> String {
+        format!("rooms-{}", self.seed)
+    }
+
+    /// The frames with their ids. Nothing is drawn yet.
+    pub fn all(self) -> impl Iterator<Item = (FrameId, Room)> {
+        let cache = Arc::new(Recent::new(cached_frames(self.size, self.light)));
+        (0..self.frames).map(move |index| {
+            let room = Room {
+                rooms: self,
+                index,
+                cache: Arc::clone(&cache),
+            };
+            (room.id(), room)
+        })
+    }
+}
+
+/// The labels of the semantic maps.
+#[must_use]
+pub fn labels() -> Labels {
+    labels::space(SPACE).unwrap_or_default()
+}
+
+impl Room {
+    fn kind(&self) -> RoomKind {
+        RoomKind::ALL[self.index / 2 % RoomKind::ALL.len()]
+    }
+
+    fn height(&self) -> Height {
+        if self.index.is_multiple_of(2) {
+            Height::Eye
+        } else {
+            Height::Robot
+        }
+    }
+
+    /// The name of the scene, as `living-room-0003`.
+    #[must_use]
+    pub fn scene(&self) -> String {
+        let number = self.index / 2 / RoomKind::ALL.len();
+        format!("{}-{number:04}", self.kind().name().replace(' ', "-"))
+    }
+
+    /// The name of the frame within its scene: the height of the camera, `eye` or `robot`.
+    #[must_use]
+    pub fn view(&self) -> &'static str {
+        self.height().name()
+    }
+
+    fn id(&self) -> FrameId {
+        FrameId(format!("{}/{}", self.scene(), self.view()))
+    }
+
+    /// The digest of everything that decides the pixels of the frame.
+    #[must_use]
+    pub fn digest(&self) -> Digest {
+        let [width, height] = self.rooms.size.map(|side| (side as u64).to_le_bytes());
+        let (version, seed) = (VERSION.to_le_bytes(), self.rooms.seed.to_le_bytes());
+        let id = self.id().0;
+        let parts: [&[u8]; 6] = [
+            b"darkqa.room/2",
+            &version,
+            &seed,
+            &width,
+            &height,
+            id.as_bytes(),
+        ];
+        let light: Option<&[u8]> = match self.rooms.light {
+            RoomLight::Display => None,
+            RoomLight::Linear => Some(b"linear light"),
+        };
+        Digest::of_parts(parts.into_iter().chain(light))
+    }
+
+    /// Width and height in pixels.
+    #[must_use]
+    pub fn size(&self) -> [usize; 2] {
+        self.rooms.size
+    }
+
+    /// The focal length in pixels.
+    #[must_use]
+    pub fn focal(&self) -> f64 {
+        f64::from(camera::focal(self.rooms.size))
+    }
+
+    fn plan(&self) -> FloorPlan {
+        let scene = self.scene();
+        self.kind()
+            .furnish(Dice::new(self.rooms.seed, &[&scene, "furniture"]))
+    }
+
+    fn camera(&self, plan: &FloorPlan) -> camera::Camera {
+        let scene = self.scene();
+        let mut dice = Dice::new(self.rooms.seed, &[&scene, self.view(), "camera"]);
+        viewpoint::camera(plan, self.height(), self.rooms.size, &mut dice)
+    }
+
+    /// The ground truth of the frame.
+    #[must_use]
+    pub fn truth(&self) -> RoomTruth {
+        let plan = self.plan();
+        let camera = self.camera(&plan);
+        let mut near = vec![f32::MAX; plan.scene.things.len()];
+        for (face, owner) in plan.scene.mesh.faces.iter().zip(&plan.scene.owners) {
+            let visible = face.points(SPACING).filter(|point| camera.sees(*point));
+            let nearest = visible.map(|point| point.distance(camera.at));
+            near[*owner] = nearest.fold(near[*owner], f32::min);
+        }
+        let things = plan.scene.things.iter().zip(near);
+        RoomTruth {
+            room: self.kind().name(),
+            things: things
+                .map(|(thing, near)| ThingTruth {
+                    word: thing.kind.word,
+                    class: thing.kind.class,
+                    color: thing.color,
+                    near,
+                })
+                .collect(),
+        }
+    }
+
+    /// The frame with its maps, from the cache or drawn.
+    ///
+    /// # Errors
+    /// If a map has another size than the image, which cannot happen.
+    pub fn frame(&self) -> Result<Frame> {
+        let drawn = self.drawn();
+        drawn.frame(Rgb::clone(&drawn.rgb))
+    }
+
+    /// The frame with its maps and another image of its size.
+    ///
+    /// # Errors
+    /// If the image has another size.
+    pub fn frame_with(&self, rgb: Rgb) -> Result<Frame> {
+        self.drawn().frame(rgb)
+    }
+
+    /// The pixels of the frame: linear light if it is drawn, else codes of a display.
+    #[must_use]
+    pub fn pixels(&self) -> Pixels {
+        let drawn = self.drawn();
+        match &drawn.light {
+            Some(light) => Pixels::Light(Arc::clone(light)),
+            None => Pixels::Codes8(Arc::clone(&drawn.rgb)),
+        }
+    }
+
+    /// The linear light of the frame; `None` if only codes of a display are drawn.
+    #[must_use]
+    pub fn light(&self) -> Option<Arc<Light>> {
+        self.drawn().light.clone()
+    }
+
+    /// Whether the pixels of the frame are linear light.
+    #[must_use]
+    pub fn is_light(&self) -> bool {
+        self.rooms.light == RoomLight::Linear
+    }
+
+    fn drawn(&self) -> Arc<DrawnRoom> {
+        let Ok(drawn) = self
+            .cache
+            .get(&self.index, || Ok::<_, Infallible>(Arc::new(self.draw())));
+        drawn
+    }
+
+    fn draw(&self) -> DrawnRoom {
+        let plan = self.plan();
+        let camera = self.camera(&plan);
+        let view = render::render(&plan.scene, &camera, self.rooms.light);
+        let things = &plan.scene.things;
+        let classes = things.iter().map(|thing| number(thing.kind.class));
+        let names = things.iter().zip(1..).map(|(thing, number)| {
+            let name = SegmentName {
+                name: thing.kind.word.to_owned(),
+                canonical: thing.kind.class.to_owned(),
+                region: None,
+            };
+            (number, name)
+        });
+        DrawnRoom {
+            id: self.id(),
+            scene: self.scene(),
+            room: self.kind().name(),
+            intrinsics: camera.intrinsics(),
+            rgb: view.pixels.codes(),
+            light: match view.pixels {
+                Pixels::Light(light) => Some(light),
+                Pixels::Codes8(_) | Pixels::Codes16(_) => None,
+            },
+            depth: view.depth,
+            things: view.things,
+            classes: std::iter::once(0).chain(classes).collect(),
+            names: Arc::new(names.collect()),
+        }
+    }
+
+    /// The camera pose in metres: a matrix from the camera (x right, y up, z backwards) to the room, row by row.
+    #[must_use]
+    pub fn pose(&self) -> [f32; 16] {
+        self.camera(&self.plan()).pose()
+    }
+}
+
+/// The number of a class in the label space.
+fn number(class: &str) -> u16 {
+    static NUMBERS: LazyLock<BTreeMap<String, u16>> = LazyLock::new(|| {
+        let labels = labels().labels;
+        labels
+            .into_iter()
+            .map(|(number, label)| (label.canonical, number))
+            .collect()
+    });
+    NUMBERS.get(class).copied().unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use darkqa_ground::labels::names::{Meaning, meaning};
+
+    #[test]
+    fn words_have_the_classes_that_they_have_in_other_data_sets() {
+        let rooms = Rooms {
+            frames: 120,
+            seed: 1,
+            size: [64, 48],
+            light: RoomLight::Display,
+        };
+        let mut kinds = BTreeMap::new();
+        for (_, room) in rooms.all().step_by(2) {
+            for thing in room.plan().scene.things {
+                kinds.insert(thing.kind.word, thing.kind.class);
+            }
+        }
+        assert!(kinds.len() > 40, "{kinds:?}");
+        for (word, class) in kinds {
+            assert_ne!(number(class), 0, "{class} is no class");
+            match meaning(word) {
+                Meaning::Class(known) => assert_eq!(class, known, "{word}"),
+                // Words that no data set has may have any class, but they are listed here.
+                Meaning::Nothing | Meaning::Unlisted => {
+                    assert!(
+                        ["desk lamp", "bowl of fruit", "mug", "wall", "tv"].contains(&word),
+                        "{word}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_default_rooms_are_drawn_once() {
+        let rooms = Rooms {
+            frames: 2,
+            seed: 1,
+            size: [64, 48],
+            light: RoomLight::Display,
+        };
+        let all: Vec<Room> = rooms.all().map(|(_, room)| room).collect();
+        assert!(Arc::ptr_eq(&all[0].drawn(), &all[0].drawn()));
+        let defaults = Rooms::default();
+        assert!(cached_frames(defaults.size, defaults.light) >= defaults.frames);
+        let sizes = [[640, 480], [3000, 2000], [4000, 4000]];
+        let cached = |size| cached_frames(size, RoomLight::Display);
+        assert_eq!(sizes.map(cached), [50, 2, 1]);
+        assert_eq!(cached_frames([640, 480], RoomLight::Linear), 18);
+    }
+
+    #[test]
+    fn a_room_alone_is_the_room_in_a_row() {
+        for light in [RoomLight::Display, RoomLight::Linear] {
+            let rooms = Rooms {
+                frames: 40,
+                seed: 7,
+                size: [64, 48],
+                light,
+            };
+            let drawn = |room: &Room| {
+                let frame = room.frame().unwrap();
+                let maps = (frame.depth, frame.semantic, frame.segments);
+                let light = room.light().map(|light| light.samples().to_vec());
+                (frame.id, frame.rgb, maps, frame.names, light)
+            };
+            // The views of room 17, drawn before any other, and after those of the rooms before it.
+            let some = |first, count| {
+                let rooms = rooms.all().map(|(_, room)| room);
+                let rooms: Vec<Room> = rooms.skip(first).take(count).collect();
+                rooms.iter().map(drawn).collect::<Vec<_>>()
+            };
+            let (alone, row) = (some(34, 2), some(30, 6));
+            assert!(alone == row[4..]);
+            assert!(alone[0] != alone[1]);
+        }
+    }
+}

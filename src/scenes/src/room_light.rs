@@ -1,0 +1,17 @@
+//! What the pixels of the built-in rooms are: [`RoomLight`].
+
+use clap::ValueEnum;
+
+use darkqa_ground::types::flag::flag_words;
+
+/// What the pixels of the rooms are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum RoomLight {
+    /// 8-bit codes of a display, with highlights compressed
+    #[default]
+    Display,
+    /// Linear light: windows and lamps keep their ratio to the room
+    Linear,
+}
+
+flag_words!(RoomLight);

@@ -1,0 +1,125 @@
+//! The settings of the rooms: [`Rooms`].
+
+use std::fmt;
+use std::str::FromStr;
+
+use clap::{Args, ValueEnum};
+
+use super::room_light::RoomLight;
+use darkqa_ground::error::Result;
+use darkqa_ground::types::Decides;
+
+/// The settings of the rooms, as `frames=48,seed=7,size=1280x720`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
+pub struct Rooms {
+    /// The number of frames, two of each room
+    #[arg(long, value_name = "N", value_parser = frames, default_value = "48", add = Decides::Trials)]
+    pub frames: usize,
+    /// The seed of the rooms
+    #[arg(long, value_name = "N", default_value_t = 7, add = Decides::Pixels)]
+    pub seed: u64,
+    /// Width and height in pixels
+    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size, default_value = "640x480", add = Decides::Pixels)]
+    pub size: [usize; 2],
+    /// What the pixels are; with linear light, OpenEXR files are written beside the PNG files
+    #[arg(long, value_enum, default_value_t, add = Decides::Pixels)]
+    pub light: RoomLight,
+}
+
+impl Default for Rooms {
+    fn default() -> Self {
+        Self {
+            frames: 48,
+            seed: 7,
+            size: [640, 480],
+            light: RoomLight::default(),
+        }
+    }
+}
+
+/// The maximum width and height of a frame in pixels (chosen).
+const LONGEST: usize = 8192;
+/// The maximum number of frames (chosen).
+const MOST: usize = 1_000_000;
+
+impl fmt::Display for Rooms {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [width, height] = self.size;
+        write!(
+            f,
+            "frames={},seed={},size={width}x{height}",
+            self.frames, self.seed
+        )?;
+        match self.light {
+            RoomLight::Display => Ok(()),
+            RoomLight::Linear => write!(f, ",light={}", self.light),
+        }
+    }
+}
+
+impl FromStr for Rooms {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut rooms = Self::default();
+        for part in text.split(',').filter(|part| !part.is_empty()) {
+            let (key, value) = part.split_once('=').unwrap_or((part, ""));
+            let wrong = |expected: String| format!("{key}={value}: {expected}");
+            match (key.trim(), value.trim()) {
+                ("frames", value) => rooms.frames = frames(value).map_err(wrong)?,
+                ("seed", value) => {
+                    let seed = value.parse();
+                    rooms.seed = seed.map_err(|_| wrong("a whole number expected".to_owned()))?;
+                }
+                ("size", value) => rooms.size = size(value).map_err(wrong)?,
+                ("light", value) => {
+                    let light = RoomLight::from_str(value, false);
+                    rooms.light =
+                        light.map_err(|_| wrong("display or linear expected".to_owned()))?;
+                }
+                _ => {
+                    return Err(wrong(
+                        "frames=N, seed=N, size=WIDTHxHEIGHT or light=linear expected".to_owned(),
+                    ));
+                }
+            }
+        }
+        Ok(rooms)
+    }
+}
+
+/// The number of frames in a text.
+fn frames(text: &str) -> Result<usize, String> {
+    let frames = text.parse().ok();
+    let frames = frames.filter(|frames| (1..=MOST).contains(frames));
+    frames.ok_or_else(|| format!("a number from 1 to {MOST} expected"))
+}
+
+/// The width and height in a text, in pixels.
+fn size(text: &str) -> Result<[usize; 2], String> {
+    let pixels = |text: &str| {
+        let pixels = text.parse().ok();
+        pixels.filter(|pixels| (32..=LONGEST).contains(pixels))
+    };
+    let sides = text.split_once('x');
+    let sides = sides.and_then(|(width, height)| Some([pixels(width)?, pixels(height)?]));
+    sides.ok_or_else(|| format!("WIDTHxHEIGHT of 32 to {LONGEST} pixels expected"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_read_back() {
+        for text in [
+            "frames=3,seed=9,size=1280x720",
+            "frames=48,seed=7,size=640x480",
+            "frames=48,seed=7,size=640x480,light=linear",
+        ] {
+            let rooms: Rooms = text.parse().unwrap();
+            assert_eq!(rooms.to_string(), text);
+        }
+        assert_eq!("".parse::<Rooms>().unwrap(), Rooms::default());
+    }
+}

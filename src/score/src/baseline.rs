@@ -1,0 +1,89 @@
+//! New runs against an old one: [`BaselineRow`].
+
+use super::choice::ReadingMode;
+use super::comparison::MIN_PAIRS;
+use super::grid::Grid;
+use super::health::Health;
+use super::paired::PairedComparison;
+use super::significance::{Significance, holm, least_p};
+use super::subject::Subject;
+
+/// A model in a condition, in the new runs against the old one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BaselineRow {
+    /// The model and condition of the new runs.
+    pub subject: Subject,
+    /// New less old on the items that both answered about the same image.
+    pub paired: PairedComparison,
+    /// p-value after Holm's correction over the conditions of the model.
+    pub holm: f64,
+    pub significance: Significance,
+    /// Number of items that both asked about different images; they do not count.
+    pub other_images: usize,
+    /// New and old, over all trials.
+    pub sides: [BaselineSide; 2],
+}
+
+/// What one side of a comparison with a baseline cost, and what could not be used of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BaselineSide {
+    /// Number of trials with a reply.
+    pub replies: usize,
+    /// Number of replies that could not be read.
+    pub unread: usize,
+    /// Number of trials without a reply.
+    pub failed: usize,
+    /// Cost of the replies in US dollars at list prices; `None` if it is not known.
+    pub cost: Option<f64>,
+}
+
+/// The rows of a grid. `pairs` holds the indices of a new subject and the old one; `health` belongs to the subjects of the grid;
+/// `cost` returns the cost of a subject.
+#[must_use]
+pub fn baseline_rows(
+    grid: &Grid<'_>,
+    health: &[Health],
+    pairs: &[(usize, usize)],
+    cost: impl Fn(usize) -> Option<f64>,
+) -> Vec<BaselineRow> {
+    let side = |subject: usize| BaselineSide {
+        replies: health[subject].replies,
+        unread: health[subject].replies - health[subject].read,
+        failed: health[subject].failures(),
+        cost: cost(subject),
+    };
+    let rows = pairs.iter().filter_map(|&(new, old)| {
+        let image = |subject, item| grid.trial(subject, item)?.sent();
+        let is_other = |item| {
+            let images = image(new, item).zip(image(old, item));
+            images.is_some_and(|(new, old)| new != old)
+        };
+        let mode = ReadingMode::Strict;
+        Some(BaselineRow {
+            subject: grid.subjects[new].clone(),
+            paired: PairedComparison::on_items(grid, new, old, mode, |item, _| !is_other(item))?,
+            holm: 1.0,
+            significance: Significance::TooFew,
+            other_images: (0..grid.items.len()).filter(|item| is_other(*item)).count(),
+            sides: [side(new), side(old)],
+        })
+    });
+    let mut rows: Vec<BaselineRow> = rows.collect();
+    for same_model in rows.chunk_by_mut(|one, other| one.subject.model == other.subject.model) {
+        let adjusted = |of: fn(&PairedComparison) -> f64| {
+            let values = same_model.iter().map(|row| of(&row.paired));
+            holm(&values.collect::<Vec<_>>())
+        };
+        let (corrected, least) = (
+            adjusted(|paired| paired.p),
+            adjusted(|paired| least_p(paired.clusters)),
+        );
+        for ((row, holm), least) in same_model.iter_mut().zip(corrected).zip(least) {
+            row.holm = holm;
+            if row.paired.difference.n >= MIN_PAIRS {
+                row.significance = Significance::of(row.paired.difference.value, holm, least);
+            }
+        }
+    }
+    rows
+}

@@ -1,0 +1,456 @@
+//! Whether a finding about noise holds under each light reading: [`FindingByReading`].
+//!
+//! The paper's noise can be read in several ways. A conclusion that holds under one of them alone is a conclusion about that
+//! reading. So each finding is computed under every reading on the same items, by the same formula, and the results stand beside
+//! each other. Only the levels of the paper, L1–L5, count.
+
+use std::collections::BTreeSet;
+
+use rayon::prelude::*;
+
+use super::choice::ReadingMode;
+use super::estimate::Estimate;
+use super::grid::Grid;
+use super::paired::difference;
+use super::significance::{holm, swap_test};
+use super::subject::Subject;
+use darkqa_ground::types::degradation::Kind;
+use darkqa_ground::types::{
+    AxisLevel, EnhancerName, Family, KindReading, LightGroup, ReadingName, View,
+};
+
+/// The level of the tests (chosen, as usual).
+const ALPHA: f64 = 0.05;
+
+/// A statement about noise, of which each light reading may say something else.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub enum LightClaim {
+    /// With noise, accuracy is lower than by the exposure drop alone: L1–L5 together, or one level.
+    NoiseCompounds(Option<AxisLevel>),
+    /// Darkness with noise costs accuracy: L5 against L0.
+    DarknessCosts,
+    /// An enhancer harms where light is left, L1–L3.
+    EnhancerHarms(EnhancerName),
+    /// An enhancer helps in the dark, L4–L5.
+    EnhancerHelps(EnhancerName),
+    /// A family is answered worse with a noisy image of a level than without images.
+    BelowBlind(Family, AxisLevel),
+}
+
+impl LightClaim {
+    /// The word in files.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::NoiseCompounds(_) => "noise_compounds",
+            Self::DarknessCosts => "darkness_costs",
+            Self::EnhancerHarms(_) => "enhancer_harms",
+            Self::EnhancerHelps(_) => "enhancer_helps",
+            Self::BelowBlind(..) => "below_blind",
+        }
+    }
+
+    /// Whether the claim is that the first side is better than the second; else that it is worse.
+    fn is_gain(&self) -> bool {
+        matches!(self, Self::NoiseCompounds(_) | Self::EnhancerHelps(_))
+    }
+
+    /// The family that the claim is about; `None` for all.
+    #[must_use]
+    pub fn family(&self) -> Option<&Family> {
+        match self {
+            Self::BelowBlind(family, _) => Some(family),
+            _ => None,
+        }
+    }
+
+    /// The enhancer that the claim is about.
+    #[must_use]
+    pub fn enhancer(&self) -> Option<&EnhancerName> {
+        match self {
+            Self::EnhancerHarms(name) | Self::EnhancerHelps(name) => Some(name),
+            _ => None,
+        }
+    }
+
+    /// The levels that the claim is about, as far as they were asked.
+    fn levels(&self) -> Vec<AxisLevel> {
+        let levels = paper_levels();
+        match self {
+            Self::NoiseCompounds(None) => levels,
+            Self::NoiseCompounds(Some(level)) | Self::BelowBlind(_, level) => vec![*level],
+            Self::DarknessCosts => levels[4..].to_vec(),
+            Self::EnhancerHarms(_) => levels[..3].to_vec(),
+            Self::EnhancerHelps(_) => levels[3..].to_vec(),
+        }
+    }
+}
+
+/// L1 to L5.
+fn paper_levels() -> Vec<AxisLevel> {
+    let ladder = Kind::Sensor.ladder().iter();
+    ladder
+        .map(|severity| AxisLevel::new(Kind::Sensor, *severity))
+        .collect()
+}
+
+/// What the interval of an effect says about a claim.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Standing {
+    /// The whole 95 % interval is on the side of the claim.
+    Holds,
+    /// The whole interval is on the other side.
+    Reversed,
+    /// The interval covers 0.
+    Open,
+}
+
+impl Standing {
+    /// The word in tables and files.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Holds => "holds",
+            Self::Reversed => "reversed",
+            Self::Open => "open",
+        }
+    }
+}
+
+/// A claim under all readings together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Robustness {
+    /// It holds under every reading of the report. Each test has the level 5 %, and so has their intersection.
+    All,
+    /// It holds under some readings, after Holm's correction over the readings.
+    Some,
+    /// It holds under no reading and is reversed under at least one.
+    None,
+    /// No reading decides it.
+    Open,
+}
+
+impl Robustness {
+    /// The words in tables and files.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::All => "under all",
+            Self::Some => "under some",
+            Self::None => "under none",
+            Self::Open => "open",
+        }
+    }
+}
+
+/// A claim under one reading.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EffectInReading {
+    /// The light reading.
+    pub reading: ReadingName,
+    /// First side less second, mean over the levels; `n` is the number of items. `None` if a side was not asked.
+    pub effect: Option<TestedEffect>,
+}
+
+/// An effect with its test.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TestedEffect {
+    /// The difference of accuracies with its 95 % interval by clusters.
+    pub difference: Estimate,
+    /// What the interval says about the claim.
+    pub standing: Standing,
+    /// p-value of swapping the two sides in whole clusters.
+    pub p: f64,
+    /// The p-value after Holm's correction over the readings.
+    pub holm: f64,
+}
+
+/// A claim about one model under every light reading, on the same items.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FindingByReading {
+    /// The model.
+    pub model: String,
+    /// The runs that show these images, in a report on runs that show different ones.
+    pub group: Option<LightGroup>,
+    /// What is claimed.
+    pub claim: LightClaim,
+    /// The levels that every reading was asked at.
+    pub levels: Vec<AxisLevel>,
+    /// The model without images that the claim compares with, if it is another one.
+    pub blind: Option<String>,
+    /// The effect under each reading of the report, `paper` first.
+    pub effects: Vec<EffectInReading>,
+    /// The claim under all readings together.
+    pub robustness: Robustness,
+    /// Number of items that were asked, but not answered on every side, level and reading.
+    pub dropped: usize,
+}
+
+/// All claims of each model, if the grid has several light readings; else none.
+#[must_use]
+pub fn by_reading(grid: &Grid<'_>) -> Vec<FindingByReading> {
+    let readings: BTreeSet<&ReadingName> = noisy(grid)
+        .filter_map(|subject| subject.variant.reading.as_ref())
+        .collect();
+    if readings.len() < 2 {
+        return Vec::new();
+    }
+    let readings: Vec<&ReadingName> = readings.into_iter().collect();
+    let models: BTreeSet<(&str, Option<&LightGroup>)> = noisy(grid)
+        .map(|subject| (&*subject.model, subject.variant.group.as_ref()))
+        .collect();
+    let mut models: Vec<(&str, Option<&LightGroup>)> = models.into_iter().collect();
+    models.sort_by_cached_key(|(model, _)| grid.listing.place(model));
+    let jobs: Vec<(&str, Option<&LightGroup>, LightClaim)> = models
+        .into_iter()
+        .flat_map(|(model, group)| {
+            let claims = claims(grid, model).into_iter();
+            claims.map(move |claim| (model, group, claim))
+        })
+        .collect();
+    let found = jobs.into_par_iter().filter_map(|(model, group, claim)| {
+        let sides = Sides { grid, model, group };
+        finding(&sides, claim, &readings)
+    });
+    found.collect()
+}
+
+/// The subjects with noisy images.
+fn noisy<'g>(grid: &'g Grid<'_>) -> impl Iterator<Item = &'g Subject> {
+    let subjects = grid.subjects.iter();
+    subjects.filter(|subject| {
+        subject.view == Some(View::Image) && subject.variant.kind.is_some_and(Kind::has_readings)
+    })
+}
+
+/// The claims that may be computed for a model, in the order of the table.
+fn claims(grid: &Grid<'_>, model: &str) -> Vec<LightClaim> {
+    let enhancers: BTreeSet<&EnhancerName> = noisy(grid)
+        .filter(|subject| subject.model == model)
+        .filter_map(|subject| subject.enhancer.as_ref())
+        .collect();
+    let levels = paper_levels();
+    let mut claims = vec![LightClaim::NoiseCompounds(None)];
+    let by_level = levels.iter();
+    claims.extend(by_level.map(|level| LightClaim::NoiseCompounds(Some(*level))));
+    claims.push(LightClaim::DarknessCosts);
+    for name in enhancers {
+        claims.push(LightClaim::EnhancerHarms(name.clone()));
+        claims.push(LightClaim::EnhancerHelps(name.clone()));
+    }
+    for family in grid.families() {
+        let dark = levels[3..].iter().rev();
+        claims.extend(dark.map(|level| LightClaim::BelowBlind(family.clone(), *level)));
+    }
+    claims
+}
+
+/// Where the two sides of a claim are found in the grid.
+struct Sides<'g, 'a> {
+    grid: &'g Grid<'a>,
+    model: &'g str,
+    group: Option<&'g LightGroup>,
+}
+
+impl Sides<'_, '_> {
+    /// The two subjects of a claim at a level under a reading, by their indices.
+    fn of(
+        &self,
+        claim: &LightClaim,
+        level: AxisLevel,
+        reading: &ReadingName,
+    ) -> Option<(usize, usize)> {
+        let light = |kind: Option<Kind>, reading: Option<&ReadingName>| KindReading {
+            kind,
+            reading: reading.cloned(),
+            pair: None,
+            group: self.group.cloned(),
+        };
+        let noisy = light(Some(Kind::Sensor), Some(reading));
+        let seeing = |level, variant: &KindReading, enhancer| {
+            let subject = Subject::seeing(self.model, level, variant, enhancer);
+            self.grid.stand_in(&subject)
+        };
+        let raw = seeing(level, &noisy, None);
+        Some(match claim {
+            LightClaim::NoiseCompounds(_) => (
+                seeing(level, &light(Kind::Sensor.base(), None), None)?,
+                raw?,
+            ),
+            LightClaim::DarknessCosts => (raw?, seeing(AxisLevel::L0, &noisy, None)?),
+            LightClaim::EnhancerHarms(name) | LightClaim::EnhancerHelps(name) => {
+                (seeing(level, &noisy, Some(name))?, raw?)
+            }
+            LightClaim::BelowBlind(..) => (raw?, self.blind()?),
+        })
+    }
+
+    /// The model itself without images; else the only model that was asked so.
+    fn blind(&self) -> Option<usize> {
+        let subjects = self.grid.subjects.iter().enumerate();
+        let blind = subjects.filter(|(_, subject)| subject.view == Some(View::Blind));
+        let blind: Vec<(usize, &Subject)> = blind.collect();
+        let own = blind.iter().find(|(_, other)| other.model == self.model);
+        match (own, &blind[..]) {
+            (Some((index, _)), _) | (None, [(index, _)]) => Some(*index),
+            _ => None,
+        }
+    }
+}
+
+/// A claim under every reading; `None` if no reading was asked on both sides.
+fn finding(
+    sides: &Sides<'_, '_>,
+    claim: LightClaim,
+    readings: &[&ReadingName],
+) -> Option<FindingByReading> {
+    let asked_at = |reading: &ReadingName| {
+        let levels = claim.levels().into_iter();
+        let asked = levels.filter(|level| sides.of(&claim, *level, reading).is_some());
+        asked.collect::<BTreeSet<AxisLevel>>()
+    };
+    let levels: Vec<BTreeSet<AxisLevel>> = readings.iter().map(|name| asked_at(name)).collect();
+    let asked = levels.iter().filter(|levels| !levels.is_empty());
+    let shared = asked.cloned().reduce(|all, more| &all & &more)?;
+    let levels: Vec<AxisLevel> = shared.into_iter().collect();
+    let pairs: Vec<Vec<(usize, usize)>> = readings
+        .iter()
+        .map(|reading| {
+            let pairs = levels.iter().map(|level| sides.of(&claim, *level, reading));
+            pairs.collect::<Option<_>>().unwrap_or_default()
+        })
+        .collect();
+    let (kept, dropped) = shared_items(sides.grid, &pairs, claim.family());
+    let effects: Vec<Option<TestedEffect>> = pairs
+        .iter()
+        .map(|pairs| effect(sides.grid, pairs, &kept, claim.is_gain()))
+        .collect();
+    let effects = corrected(effects);
+    let blind = matches!(claim, LightClaim::BelowBlind(..))
+        .then(|| sides.blind())
+        .flatten()
+        .map(|index| sides.grid.subjects[index].model.clone());
+    Some(FindingByReading {
+        model: sides.model.to_owned(),
+        group: sides.group.cloned(),
+        robustness: robustness(&effects)?,
+        claim,
+        levels,
+        blind: blind.filter(|name| name != sides.model),
+        effects: readings
+            .iter()
+            .zip(effects)
+            .map(|(reading, effect)| EffectInReading {
+                reading: (*reading).clone(),
+                effect,
+            })
+            .collect(),
+        dropped,
+    })
+}
+
+/// The items of a family that were answered on both sides of all pairs, and the number of those that were asked there but not
+/// answered.
+fn shared_items(
+    grid: &Grid<'_>,
+    pairs: &[Vec<(usize, usize)>],
+    family: Option<&Family>,
+) -> (Vec<usize>, usize) {
+    let sides: BTreeSet<usize> = pairs
+        .iter()
+        .flatten()
+        .flat_map(|(first, second)| [*first, *second])
+        .collect();
+    let items = grid.items.iter().enumerate();
+    let of_family = items.filter(|(_, item)| item.is_of(family));
+    let asked = of_family.map(|(index, _)| index).filter(|item| {
+        let mut sides = sides.iter();
+        sides.any(|side| grid.result(*side, *item).is_asked())
+    });
+    let (kept, dropped): (Vec<usize>, Vec<usize>) = asked.partition(|item| {
+        let mut sides = sides.iter();
+        sides.all(|side| grid.result(*side, *item).is_reply())
+    });
+    (kept, dropped.len())
+}
+
+/// The mean over the pairs of the first side less the second, on the items of `kept`; `None` without pairs or items.
+fn effect(
+    grid: &Grid<'_>,
+    pairs: &[(usize, usize)],
+    kept: &[usize],
+    is_gain: bool,
+) -> Option<TestedEffect> {
+    if pairs.is_empty() || kept.is_empty() {
+        return None;
+    }
+    let mut clusters = vec![(0_i64, 0_u32); grid.clusters];
+    let mut squares = 0;
+    for &index in kept {
+        let item = &grid.items[index];
+        let is_right = |subject: usize| {
+            let reading = grid.result(subject, index).reading(ReadingMode::Strict);
+            i64::from(reading.is_some_and(|chosen| item.is_right(chosen)))
+        };
+        let nets = pairs.iter();
+        let net: i64 = nets
+            .map(|(first, second)| is_right(*first) - is_right(*second))
+            .sum();
+        let cluster = &mut clusters[item.cluster as usize];
+        cluster.0 += net;
+        cluster.1 += 1;
+        squares += net * net;
+    }
+    clusters.retain(|(_, items)| *items > 0);
+    let levels = pairs.len() as f64;
+    let nets: Vec<i64> = clusters.iter().map(|(net, _)| *net).collect();
+    let sums: Vec<(f64, f64)> = clusters
+        .iter()
+        .map(|(net, items)| (*net as f64 / levels, f64::from(*items)))
+        .collect();
+    let difference = difference(&sums, squares as f64 / levels / levels, kept.len());
+    let p = swap_test(&nets).p;
+    Some(TestedEffect {
+        standing: standing(difference, is_gain),
+        difference,
+        p,
+        holm: p,
+    })
+}
+
+fn standing(difference: Estimate, is_gain: bool) -> Standing {
+    let (gain, loss) = (difference.low > 0.0, difference.high < 0.0);
+    match (is_gain, gain, loss) {
+        (true, true, _) | (false, _, true) => Standing::Holds,
+        (true, _, true) | (false, true, _) => Standing::Reversed,
+        _ => Standing::Open,
+    }
+}
+
+/// The effects with their p-values after Holm's correction over the readings.
+fn corrected(mut effects: Vec<Option<TestedEffect>>) -> Vec<Option<TestedEffect>> {
+    let p: Vec<f64> = effects.iter().flatten().map(|effect| effect.p).collect();
+    for (effect, holm) in effects.iter_mut().flatten().zip(holm(&p)) {
+        effect.holm = holm;
+    }
+    effects
+}
+
+/// The claim under the readings; `None` if it was asked under none. A reading that was not asked shows nothing, so that it cannot hold under
+/// all.
+fn robustness(effects: &[Option<TestedEffect>]) -> Option<Robustness> {
+    let asked: Vec<&TestedEffect> = effects.iter().flatten().collect();
+    let is = |standing: Standing| move |effect: &&&TestedEffect| effect.standing == standing;
+    let holding = asked.iter().filter(is(Standing::Holds));
+    let reversed = asked.iter().filter(is(Standing::Reversed)).count();
+    Some(match holding.clone().count() {
+        _ if asked.is_empty() => return None,
+        count if count == effects.len() => Robustness::All,
+        0 if reversed > 0 => Robustness::None,
+        _ if holding.clone().any(|effect| effect.holm < ALPHA) => Robustness::Some,
+        _ => Robustness::Open,
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,58 @@
+//! What the pixels contribute: the [`distances`] of probabilities with an image from those without.
+
+use super::confident_reply::usable;
+use crate::grid::Grid;
+use crate::subject::Subject;
+use darkqa_ground::types::View;
+
+/// For each item its cluster and the Jensen–Shannon distance, 0 to 1, between the probabilities of a subject and those of the same
+/// model without an image (the root of the divergence in bits: Endres and Schindelin 2003, IEEE Trans. Inf. Theory 49:1858). Empty if
+/// there are none of the latter.
+pub(super) fn distances(grid: &Grid<'_>, subject: usize) -> Vec<(u32, f64)> {
+    let seeing = &grid.subjects[subject];
+    let blind = grid.find(&Subject::new(&seeing.model, None));
+    let Some(blind) = blind.filter(|_| seeing.view == Some(View::Image)) else {
+        return Vec::new();
+    };
+    let items = grid.items.iter().enumerate();
+    let distances = items.filter_map(|(index, item)| {
+        let seen = usable(grid.trial(subject, index))?;
+        let unseen = usable(grid.trial(blind, index))?;
+        Some((item.cluster, distance(&seen.p, &unseen.p)))
+    });
+    distances.collect()
+}
+
+/// The Jensen–Shannon distance of two distributions.
+fn distance(one: &[f64], other: &[f64]) -> f64 {
+    let part = |p: f64, middle: f64| {
+        if p > 0.0 {
+            p * libm::log2(p / middle)
+        } else {
+            0.0
+        }
+    };
+    let pairs = one.iter().zip(other);
+    let divergence: f64 = pairs
+        .map(|(&p, &q)| {
+            let middle = f64::midpoint(p, q);
+            f64::midpoint(part(p, middle), part(q, middle))
+        })
+        .sum();
+    divergence.clamp(0.0, 1.0).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distances_are_those_of_the_definition() {
+        assert!(distance(&[0.2, 0.8], &[0.2, 0.8]) < 1e-9);
+        assert!((distance(&[1.0, 0.0], &[0.0, 1.0]) - 1.0).abs() < 1e-12);
+        // The divergence is (log₂ 4⁄3 + ½ log₂ 2⁄3 + ½) ⁄ 2 = 0.311278 bits.
+        assert!((distance(&[1.0, 0.0], &[0.5, 0.5]) - 0.557_923_045_3).abs() < 1e-9);
+        let (one, other) = ([0.7, 0.2, 0.1], [0.1, 0.1, 0.8]);
+        assert!((distance(&one, &other) - distance(&other, &one)).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,100 @@
+//! One reply with the model's confidence: [`ConfidentReply`].
+
+use crate::estimate::Estimate;
+use crate::grid::{ClusterCount, Grid};
+use darkqa_ground::types::{OptionProbabilities, TrialOutcome, TrialRef};
+
+/// The least probability of a true choice that is not listed and has no bound, either: probabilities are kept to six decimals.
+const LEAST: f64 = 1e-6;
+
+/// A reply with probabilities, and without reasoning before the answer.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ConfidentReply {
+    /// Index of its cluster.
+    pub(super) cluster: u32,
+    /// The greatest probability of a choice.
+    pub(super) confidence: f64,
+    /// Whether the strict reading is the true choice.
+    pub(super) right: bool,
+    /// Brier score: the sum over the choices of (p − truth)².
+    pub(super) brier: f64,
+    /// The Brier score of equal probabilities: 1 − 1/k with k choices.
+    pub(super) guess: f64,
+    /// −ln p of the true choice, which is at least the bound of a choice that is not listed.
+    pub(super) nll: f64,
+}
+
+/// The replies of a subject, and how many are left out.
+pub(super) struct SortedReplies {
+    /// The replies, in order of confidence.
+    pub(super) replies: Vec<ConfidentReply>,
+    /// Number of replies with reasoning before the answer.
+    pub(super) reasoned: usize,
+    /// Number of replies without probabilities.
+    pub(super) unstated: usize,
+}
+
+/// The replies of a subject.
+pub(super) fn confident_replies(grid: &Grid<'_>, subject: usize) -> SortedReplies {
+    let mut sorted = SortedReplies {
+        replies: Vec::new(),
+        reasoned: 0,
+        unstated: 0,
+    };
+    for (index, item) in grid.items.iter().enumerate() {
+        let trial = grid.trial(subject, index);
+        let Some(trial) = trial.filter(|trial| !trial.failed()) else {
+            continue;
+        };
+        match trial.options() {
+            None => sorted.unstated += 1,
+            Some(options) if options.reasoned => sorted.reasoned += 1,
+            Some(options) => sorted.replies.extend(reply(trial, options, item.cluster)),
+        }
+    }
+    let replies = &mut sorted.replies;
+    replies.sort_by(|a, b| a.confidence.total_cmp(&b.confidence));
+    sorted
+}
+
+/// The reply of a trial; `None` if the probabilities are not those of its choices, as in a file that was edited.
+fn reply(
+    trial: TrialRef<'_>,
+    options: &OptionProbabilities,
+    cluster: u32,
+) -> Option<ConfidentReply> {
+    let p = &options.p;
+    let truth = *p.get(trial.truth()?)?;
+    if p.len() != trial.choices().len() || options.mass <= 0.0 {
+        return None;
+    }
+    let squares: f64 = p.iter().map(|p| p * p).sum();
+    let least = (options.bound / options.mass).max(LEAST);
+    Some(ConfidentReply {
+        cluster,
+        confidence: options.confidence(),
+        right: trial.outcome() == TrialOutcome::Right,
+        brier: squares - 2.0 * truth + 1.0,
+        guess: 1.0 - 1.0 / p.len() as f64,
+        nll: -libm::log(truth.max(least).min(1.0)),
+    })
+}
+
+/// The share of right replies, with its interval by cluster.
+pub(super) fn accuracy(clusters: usize, replies: &[ConfidentReply]) -> Option<Estimate> {
+    let mut counts = vec![ClusterCount::default(); clusters];
+    for reply in replies {
+        let count = &mut counts[reply.cluster as usize];
+        count.replies += 1;
+        count.right += u32::from(reply.right);
+    }
+    Estimate::clustered(&counts)
+}
+
+/// The probabilities of a trial that figures may use; `None` if there are none, or reasoning stood before the answer.
+pub(super) fn usable(trial: Option<TrialRef<'_>>) -> Option<&OptionProbabilities> {
+    let trial = trial.filter(|trial| !trial.failed())?;
+    let options = trial.options()?;
+    let fits = options.p.len() == trial.choices().len();
+    (fits && !options.reasoned).then_some(options)
+}

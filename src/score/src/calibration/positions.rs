@@ -1,0 +1,46 @@
+//! Probabilities by the place of a choice: [`PositionShare`].
+
+use super::confident_reply::usable;
+use crate::grid::Grid;
+
+/// What a model gives to the choices of one place, and what is true there. A preference for a letter is the difference of both.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PositionShare {
+    /// Index of the place: 0 is A.
+    pub position: usize,
+    /// Mean probability of the choices of this place.
+    pub p: f64,
+    /// Share of the questions whose true choice stands there.
+    pub truth: f64,
+    /// Number of replies to questions that have so many choices.
+    pub n: usize,
+}
+
+/// The shares of each place for a subject.
+pub(super) fn shares(grid: &Grid<'_>, subject: usize) -> Vec<PositionShare> {
+    let mut shares: Vec<PositionShare> = Vec::new();
+    for (index, item) in grid.items.iter().enumerate() {
+        let Some(options) = usable(grid.trial(subject, index)) else {
+            continue;
+        };
+        for (position, p) in options.p.iter().enumerate() {
+            if shares.len() == position {
+                shares.push(PositionShare {
+                    position,
+                    p: 0.0,
+                    truth: 0.0,
+                    n: 0,
+                });
+            }
+            let share = &mut shares[position];
+            share.p += p;
+            share.truth += f64::from(u8::from(item.asked.truth == Some(position)));
+            share.n += 1;
+        }
+    }
+    for share in &mut shares {
+        share.p /= share.n as f64;
+        share.truth /= share.n as f64;
+    }
+    shares
+}

@@ -1,0 +1,133 @@
+//! Removal of hidden reasoning, invisible characters and leaked template tokens from a reply.
+
+use std::sync::LazyLock;
+
+use regex::Regex;
+use unicode_normalization::UnicodeNormalization;
+
+use darkqa_ground::types::question::UnreadReason;
+
+/// Markers that end a reasoning block: those of DeepSeek, Qwen and many others, Magistral, Kimi, Cohere, Seed, and the
+/// final channel of the harmony format (also as it reads if a server drops its special tokens).
+static END: LazyLock<Regex> = LazyLock::new(|| {
+    compiled(concat!(
+        r"(?i)</(?:seed:)?(?:think|thinking|thought|thoughts|reasoning|reflection|analysis|scratchpad)>",
+        r"|\[/(?:think|thinking|reasoning)\]|◁/think▷",
+        r"|<\|(?:/think|end_of_thought|end_thinking)\|>",
+        r"|<\|channel\|>\s*final\b[^<]{0,80}<\|message\|>|assistantfinal"
+    ))
+});
+
+/// Markers that begin a reasoning block.
+static BEGIN: LazyLock<Regex> = LazyLock::new(|| {
+    compiled(concat!(
+        r"(?i)<(?:seed:)?(?:think|thinking|thought|thoughts|reasoning|reflection|analysis|scratchpad)>",
+        r"|\[(?:think|thinking|reasoning)\]|◁think▷",
+        r"|<\|(?:think|begin_of_thought|start_thinking)\|>",
+        r"|<\|channel\|>\s*(?:analysis|commentary)\b"
+    ))
+});
+
+/// The end of the harmony format's final channel.
+static HARMONY_CLOSE: LazyLock<Regex> =
+    LazyLock::new(|| compiled(r"(?i)<\|(?:return|end)\|>\s*\z"));
+
+/// Tokens that end a model's turn.
+static TURN_END: LazyLock<Regex> = LazyLock::new(|| {
+    compiled(concat!(
+        r"(?i)<\|\s*(?:im_end|eot_id|eot|eom_id|end|endoftext|end[_▁]of[_▁](?:text|turn|sentence|message)|return|eos",
+        r"|end_response|end_of_turn_token|assistant_end|call)\s*\|>",
+        r"|</s>|<eos>|<end_of_turn>|<end_of_utterance>|<turn\|>|\[eos\]|\[end\]"
+    ))
+});
+
+/// Other tokens of chat templates, with the name of the role that follows them.
+static TOKEN: LazyLock<Regex> = LazyLock::new(|| {
+    compiled(concat!(
+        r"(?i)<\|(?:im_start|start_header_id|start|role)\|>\s*(?:assistant|model|system)?(?:\s*<\|end_header_id\|>)?",
+        r"|<start_of_turn>\s*(?:model|assistant)?",
+        r"|<\|[^|<>\s]{1,40}\|>|<s>|<bos>|<pad>|<unk>|<image>|\[/?inst\]|<</?sys>>"
+    ))
+});
+
+/// The beginning of the next question, which a model that does not stop asks itself.
+static NEXT_TURN: LazyLock<Regex> = LazyLock::new(|| {
+    compiled(concat!(
+        r"(?i)\n[#*>\s]*(?:(?:next |new )?question|q|user|human|instruction|frage|pregunta|pergunta|domanda|vraag",
+        r"|вопрос|问题|問題|質問|질문)\s*\d*\s*\**\s*:"
+    ))
+});
+
+/// The text after the last marker that ends reasoning, trimmed.
+///
+/// # Errors
+/// If nothing is left to read, the reason.
+pub(super) fn without_reasoning(reply: &str) -> Result<&str, UnreadReason> {
+    let (mut text, marker) = match END.find_iter(reply).last() {
+        Some(marker) => (&reply[marker.end()..], marker.as_str()),
+        None => (reply, ""),
+    };
+    if BEGIN.is_match(text) {
+        return Err(UnreadReason::Truncated);
+    }
+    if marker.ends_with("<|message|>")
+        && let Some(close) = HARMONY_CLOSE.find(text)
+    {
+        text = &text[..close.start()];
+    }
+    match text.trim_matches(is_blank) {
+        "" => Err(UnreadReason::Empty),
+        text => Ok(text),
+    }
+}
+
+/// The text in compatibility form (NFKC) without invisible characters and template tokens. It ends at the first token that
+/// ends a turn with text.
+pub(super) fn tidy(text: &str) -> String {
+    let mut text: String = if text.is_ascii() {
+        text.to_owned()
+    } else {
+        text.nfkc().filter(|&c| !is_invisible(c)).collect()
+    };
+    if text.contains(['\r', '\u{2028}', '\u{2029}']) {
+        text = text
+            .replace("\r\n", "\n")
+            .replace(['\r', '\u{2028}', '\u{2029}'], "\n");
+    }
+    // Every token has one of these.
+    if !text.contains(['<', '[']) {
+        return text.trim().to_owned();
+    }
+    let text = text
+        .replace("<|begin_of_box|>", "<answer>")
+        .replace("<|end_of_box|>", "</answer>");
+    let end = TURN_END
+        .find_iter(&text)
+        .map(|marker| marker.start())
+        .find(|&start| !text[..start].trim().is_empty());
+    let turn = &text[..end.unwrap_or(text.len())];
+    let turn = TURN_END.replace_all(turn, " ");
+    TOKEN.replace_all(&turn, " ").trim().to_owned()
+}
+
+/// The text before the next question that a model asks itself, if there is any.
+pub(super) fn before_next_turn(text: &str) -> Option<&str> {
+    let next = NEXT_TURN.find(text)?;
+    Some(text[..next.start()].trim()).filter(|text| !text.is_empty())
+}
+
+/// Whether a character has no width: joiners, direction and byte order marks, variation selectors.
+fn is_invisible(c: char) -> bool {
+    matches!(c, '\u{ad}' | '\u{34f}' | '\u{61c}' | '\u{180e}' | '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}'
+        | '\u{2060}'..='\u{206f}' | '\u{fe00}'..='\u{fe0f}' | '\u{feff}' | '\u{e0000}'..='\u{e01ef}')
+}
+
+fn is_blank(c: char) -> bool {
+    c.is_whitespace() || is_invisible(c)
+}
+
+/// A compiled literal pattern; the tests compile every one.
+#[expect(clippy::expect_used, reason = "a literal that the tests compile")]
+pub(super) fn compiled(pattern: &str) -> Regex {
+    Regex::new(pattern).expect("a literal pattern")
+}

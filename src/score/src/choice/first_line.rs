@@ -1,0 +1,44 @@
+//! A first line that is an answer by itself: [`first_line`].
+
+use super::names::{Delimiting, Name, State};
+use super::strict;
+use super::view::ReplyView;
+use super::words::Role;
+use darkqa_ground::types::question::{Answer, UnreadReason};
+
+/// The first line, if it reads strictly. Another line that reads strictly as another choice makes it ambiguous, and so does
+/// another choice behind words that take back what was said ("On reflection, it is C").
+pub(super) fn first_line(view: &ReplyView<'_>) -> Option<Answer> {
+    let (line, rest) = view.text.split_once('\n')?;
+    let read = |line: &str| match strict::read(line.trim(), &view.offered.texts) {
+        Some(Answer::Chosen(index)) => Some(index),
+        _ => None,
+    };
+    let index = read(line)?;
+    if view.state(0) == State::Repeated {
+        return None;
+    }
+    let mut at = line.len() + 1;
+    let mut differs = false;
+    for other in rest.lines() {
+        let listed = view.state(at) != State::Affirmed;
+        differs |= !listed && other != line && read(other).is_some_and(|other| other != index);
+        at += other.len() + 1;
+    }
+    let names_other = |name: &Name| {
+        name.choice != Some(index) && name.delimiting > Delimiting::Loose && name.is_affirmed()
+    };
+    let mut elements = view.clauses.elements.iter();
+    let taken_back = elements
+        .find(|element| element.start > line.len() && element.has(Role::Retraction))
+        .is_some_and(|back| {
+            view.names
+                .all()
+                .any(|name| name.start > back.start && names_other(name))
+        });
+    Some(if differs || taken_back {
+        Answer::Unparsed(UnreadReason::Ambiguous)
+    } else {
+        Answer::Chosen(index)
+    })
+}

@@ -1,0 +1,238 @@
+//! Groups of questions that are not independent: [`Clusters`].
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::fmt;
+
+use darkqa_ground::types::{FrameId, QuestionId};
+
+/// The unit that is treated as independent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ClusterUnit {
+    /// Scenes: frames of one scene share its furniture and its light.
+    Scene,
+    /// Frames: questions about one frame share its pixels.
+    Frame,
+    /// Questions: each is about a different frame, or all are about the same frame.
+    Question,
+}
+
+impl fmt::Display for ClusterUnit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Scene => "scene",
+            Self::Frame => "frame",
+            Self::Question => "question",
+        })
+    }
+}
+
+/// What ties frames to each other.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct FrameTies {
+    /// The scene of each frame for which it is known; empty if the data name none.
+    pub scenes: BTreeMap<FrameId, String>,
+    /// The images of each frame that stands for several.
+    pub images: BTreeMap<FrameId, Vec<FrameId>>,
+}
+
+/// The cluster of each frame.
+///
+/// Questions of a frame and frames of a scene are not independent. Intervals that treat them as independent are too
+/// narrow (Miller 2024, "Adding Error Bars to Evals", arXiv:2411.00640, section 2.2). The unit is the scene if every frame
+/// has one, there are at least [`MIN_SCENES`], and some have more than one frame. Otherwise it is the frame, or the
+/// question if there is only one frame. Questions that show several images are of one frame if they share an image with each other, or
+/// with a question about that image alone.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Clusters {
+    unit: ClusterUnit,
+    /// Cluster of each frame; empty if all questions are about one frame.
+    by_frame: HashMap<FrameId, u32>,
+    /// Cluster of each question, if all are about one frame.
+    by_question: HashMap<QuestionId, u32>,
+    count: usize,
+}
+
+/// Minimum number of scenes. With fewer, their spread is estimated too poorly, and frames are the clusters.
+pub const MIN_SCENES: usize = 8;
+
+impl Clusters {
+    /// Clusters of questions and their frames.
+    pub fn new<'a>(
+        pairs: impl IntoIterator<Item = (&'a QuestionId, &'a FrameId)>,
+        ties: &FrameTies,
+    ) -> Self {
+        let pairs: BTreeSet<(&FrameId, &QuestionId)> = pairs
+            .into_iter()
+            .map(|(question, frame)| (frame, question))
+            .collect();
+        let frames: BTreeSet<&FrameId> = pairs.iter().map(|(frame, _)| *frame).collect();
+        let scene_of = |frame: &FrameId| ties.scenes.get(frame).filter(|scene| !scene.is_empty());
+        let known: Option<Vec<&String>> = frames.iter().map(|frame| scene_of(frame)).collect();
+        let names: BTreeSet<&String> = known.iter().flatten().copied().collect();
+        if known.is_some() && names.len() >= MIN_SCENES && names.len() < frames.len() {
+            let numbers: BTreeMap<&String, u32> = names.into_iter().zip(0..).collect();
+            let by_frame = frames.iter().filter_map(|frame| {
+                let number = numbers.get(scene_of(frame)?)?;
+                Some(((*frame).clone(), *number))
+            });
+            return Self {
+                unit: ClusterUnit::Scene,
+                by_frame: by_frame.collect(),
+                count: numbers.len(),
+                by_question: HashMap::new(),
+            };
+        }
+        let (by_frame, count) = numbered(&frames, &ties.images);
+        if count == 1 {
+            return Self {
+                unit: ClusterUnit::Question,
+                count: pairs.len(),
+                by_frame: HashMap::new(),
+                by_question: pairs
+                    .iter()
+                    .map(|(_, question)| (*question).clone())
+                    .zip(0..)
+                    .collect(),
+            };
+        }
+        Self {
+            unit: if pairs.len() == count {
+                ClusterUnit::Question
+            } else {
+                ClusterUnit::Frame
+            },
+            count,
+            by_frame,
+            by_question: HashMap::new(),
+        }
+    }
+
+    /// The unit that forms a cluster.
+    #[must_use]
+    pub fn unit(&self) -> ClusterUnit {
+        self.unit
+    }
+
+    /// Number of clusters of all questions.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Index of the cluster of a question about a frame, from 0; `None` if that question was not asked.
+    #[must_use]
+    pub fn of(&self, frame: &FrameId, question: &QuestionId) -> Option<u32> {
+        self.by_frame
+            .get(frame)
+            .or_else(|| self.by_question.get(question))
+            .copied()
+    }
+}
+
+/// A number for each frame, and how many numbers there are. Frames that share an image, directly or through others, have one number.
+fn numbered(
+    frames: &BTreeSet<&FrameId>,
+    images: &BTreeMap<FrameId, Vec<FrameId>>,
+) -> (HashMap<FrameId, u32>, usize) {
+    /// The frame that stands for the frame at a place.
+    fn root(parents: &mut [usize], place: usize) -> usize {
+        let mut place = place;
+        while parents[place] != place {
+            parents[place] = parents[parents[place]];
+            place = parents[place];
+        }
+        place
+    }
+    let mut parents: Vec<usize> = (0..frames.len()).collect();
+    let mut holders = HashMap::<&FrameId, usize>::new();
+    for (place, frame) in frames.iter().enumerate() {
+        let shown = images.get(*frame);
+        let shown = shown.map_or(std::slice::from_ref(*frame), Vec::as_slice);
+        for image in shown {
+            let holder = *holders.entry(image).or_insert(place);
+            let [one, other] = [holder, place].map(|place| root(&mut parents, place));
+            parents[one.max(other)] = one.min(other);
+        }
+    }
+    let mut numbers = HashMap::<usize, u32>::new();
+    let mut by_frame = HashMap::with_capacity(frames.len());
+    for (place, frame) in frames.iter().enumerate() {
+        let next = numbers.len() as u32;
+        let number = *numbers.entry(root(&mut parents, place)).or_insert(next);
+        by_frame.insert((*frame).clone(), number);
+    }
+    (by_frame, numbers.len())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn clusters(frames: usize, scenes: usize, questions: usize) -> Clusters {
+        let frames: Vec<FrameId> = (0..frames).map(|i| FrameId(format!("f{i:03}"))).collect();
+        let ids: Vec<QuestionId> = (0..questions)
+            .map(|i| QuestionId(format!("q{i:03}")))
+            .collect();
+        let known = frames.iter().enumerate().filter(|_| scenes > 0);
+        let known = known.map(|(i, frame)| (frame.clone(), format!("s{}", i % scenes.max(1))));
+        let pairs = ids.iter().zip(frames.iter().cycle());
+        let scenes = known.collect();
+        Clusters::new(
+            pairs,
+            &FrameTies {
+                scenes,
+                ..FrameTies::default()
+            },
+        )
+    }
+
+    #[test]
+    fn frames_that_share_an_image_are_one_cluster() {
+        let name = |name: &str| FrameId(name.to_owned());
+        let ids: Vec<QuestionId> = (0..6).map(|i| QuestionId(format!("q{i}"))).collect();
+        let frames = ["ab", "bc", "c", "d", "ef", "a c"].map(name);
+        let several = frames.iter().filter(|frame| frame.0.len() > 1);
+        let images = several.map(|frame| {
+            let letters = frame.0.chars().filter(|letter| *letter != ' ');
+            let images = letters.map(|letter| name(&letter.to_string()));
+            (frame.clone(), images.collect())
+        });
+        let ties = FrameTies {
+            images: images.collect(),
+            ..FrameTies::default()
+        };
+        let found = Clusters::new(ids.iter().zip(&frames), &ties);
+        let of = |frame: usize| found.of(&frames[frame], &ids[frame]);
+        assert_eq!((found.count(), found.unit()), (3, ClusterUnit::Frame));
+        assert!([1, 2, 5].iter().all(|frame| of(*frame) == of(0)));
+        assert!(of(3) != of(0) && of(4) != of(0) && of(3) != of(4));
+        let apart = Clusters::new(ids.iter().zip(&frames), &FrameTies::default());
+        assert_eq!((apart.count(), apart.unit()), (6, ClusterUnit::Question));
+    }
+
+    #[test]
+    fn scenes_go_before_frames_if_there_are_enough() {
+        for (frames, scenes, questions, unit, count) in [
+            (20, 10, 60, ClusterUnit::Scene, 10),
+            (20, 4, 60, ClusterUnit::Frame, 20),
+            (20, 0, 60, ClusterUnit::Frame, 20),
+            (20, 20, 60, ClusterUnit::Frame, 20),
+            (20, 0, 20, ClusterUnit::Question, 20),
+            (1, 0, 20, ClusterUnit::Question, 20),
+        ] {
+            let found = clusters(frames, scenes, questions);
+            assert_eq!((found.unit(), found.count()), (unit, count));
+        }
+        let found = clusters(20, 10, 60);
+        let (first, second) = (FrameId("f003".into()), FrameId("f013".into()));
+        let question = QuestionId("q000".into());
+        assert_eq!(found.of(&first, &question), found.of(&second, &question));
+        assert_eq!(found.of(&FrameId("else".into()), &question), None);
+        let single = clusters(1, 0, 5);
+        let frame = FrameId("f000".into());
+        assert_ne!(
+            single.of(&frame, &question),
+            single.of(&frame, &QuestionId("q001".into()))
+        );
+    }
+}

@@ -1,0 +1,212 @@
+//! All results of a run: [`Findings`].
+
+use super::accuracy::{AccuracySummary, summarize};
+use super::agreement::{Agreement, agreements, light_agreements};
+use super::best::{BestInTheDark, best_in_the_dark};
+use super::bootstrap::Resamples;
+use super::by_reading::{FindingByReading, by_reading};
+use super::calibration::{Calibration, calibrations};
+use super::chance::OfferedChoices;
+use super::cluster::{ClusterUnit, Clusters, FrameTies};
+use super::common::CommonItems;
+use super::comparison::{Comparison, ComparisonKind, comparisons, lights_between};
+use super::confusion::{Confusion, Hallucination, confusions, hallucinations};
+use super::curve::{Curve, curves};
+use super::fidelity::FidelityFindings;
+use super::flips::{FirstFailure, first_failures};
+use super::grid::Grid;
+use super::health::{Health, healths};
+use super::observed::ObserverSummary;
+use super::pair_darkness::{self, PairDarkness};
+use super::photographed_set::PhotographedSet;
+use super::pooled::{LevelsLeftOut, PooledFinding, levels_left_out, pooled};
+use super::significance::Significance;
+use super::strict_score::StrictScore;
+use super::subject::{Subject, is_control, is_observer};
+use darkqa_ground::types::{
+    ChoiceDetail, Family, ImageFidelity, ModelListing, RunQuestion, Trials,
+};
+
+/// All results that are computed from the trials of a run.
+#[derive(Debug)]
+pub struct Findings<'a> {
+    /// The trials by subject and item.
+    pub grid: Grid<'a>,
+    /// The unit that is treated as independent.
+    pub unit: ClusterUnit,
+    /// Accuracies by subject, family and reading.
+    pub summary: AccuracySummary,
+    /// Counts of replies, unreadable replies and failures of each subject.
+    pub health: Vec<Health>,
+    /// Differences of all models together, ordered by kind, variant, enhancer, family and level.
+    pub pooled: Vec<PooledFinding>,
+    /// Levels that the pooled findings leave out, because some of their models were not asked there.
+    pub left_out: Vec<LevelsLeftOut>,
+    /// Whether each finding about noise holds under every light reading; empty with one reading.
+    pub by_reading: Vec<FindingByReading>,
+    /// The models by their mean accuracy in the dark, if there are two or more.
+    pub best: Option<BestInTheDark>,
+    /// Paired differences between subjects.
+    pub comparisons: Vec<Comparison>,
+    /// Thresholds and areas, for all families together and for each family.
+    pub curves: Vec<Curve>,
+    /// Confidence and accuracy of the subjects whose probabilities of choices are known.
+    pub calibrations: Vec<Calibration>,
+    /// Answers given against true answers.
+    pub confusions: Vec<Confusion>,
+    /// Rates of false positives and false negatives.
+    pub hallucinations: Vec<Hallucination>,
+    /// First level at which each item is answered wrongly, by curve.
+    pub first_failures: Vec<FirstFailure>,
+    /// Agreement of models in each condition.
+    pub agreements: Vec<Agreement>,
+    /// Agreement of each model with itself in two lights that show the same.
+    pub light_agreements: Vec<Agreement>,
+    /// The light in which the photographs of the set were taken.
+    pub set: PhotographedSet,
+    /// How dark the photographs in the dark are beside their frames, by name.
+    pub pairs: Vec<PairDarkness>,
+    /// What the similarity of images to their clean frames says about the answers; `None` if it was not measured.
+    pub fidelity: Option<FidelityFindings>,
+    /// What the models share; `None` if all were asked the same questions.
+    pub common: Option<CommonItems>,
+    /// Shares of groups of which all questions are right; `None` if questions have no groups.
+    pub strict: Option<StrictScore>,
+    /// Results of the observer and its controls. The controls are in no other result.
+    pub observer: ObserverSummary,
+    /// The results without the observer, if one of its controls is not at chance; these are shown then.
+    pub without_observer: Option<Box<Self>>,
+}
+
+impl<'a> Findings<'a> {
+    /// Results of the trials. `ties` says what ties frames to each other; `questions` are all questions
+    /// of the run, for the chance line; `measured` holds the images that were compared with their clean frames.
+    #[must_use]
+    pub fn new(
+        trials: &'a Trials<ChoiceDetail>,
+        ties: &FrameTies,
+        questions: impl IntoIterator<Item = OfferedChoices>,
+        measured: &[ImageFidelity],
+    ) -> Self {
+        let listing = ModelListing::default();
+        Self::listed(trials, ties, questions, measured, &listing)
+    }
+
+    /// The same results with the models as listed.
+    #[must_use]
+    pub fn listed(
+        trials: &'a Trials<ChoiceDetail>,
+        ties: &FrameTies,
+        questions: impl IntoIterator<Item = OfferedChoices>,
+        measured: &[ImageFidelity],
+        listing: &ModelListing,
+    ) -> Self {
+        let clusters = Clusters::new(trials.questions(), ties);
+        let questions: Vec<OfferedChoices> = questions.into_iter().collect();
+        let observer = ObserverSummary::of(trials, &clusters);
+        let is_model = |model: &str| !is_control(model);
+        let is_shown = |model: &str| is_model(model) && !is_observer(model);
+        let without_observer = observer.is_hidden().then(|| {
+            let grid = Grid::of_models(trials, &clusters, listing, is_shown);
+            Box::new(Self::of(
+                grid,
+                &clusters,
+                &questions,
+                observer.clone(),
+                measured,
+            ))
+        });
+        let grid = Grid::of_models(trials, &clusters, listing, is_model);
+        Self {
+            without_observer,
+            ..Self::of(grid, &clusters, &questions, observer, measured)
+        }
+    }
+
+    /// The same results of a set whose photographs were taken in this light.
+    #[must_use]
+    pub fn of_set(mut self, set: PhotographedSet) -> Self {
+        self.set = set;
+        let shown = self.without_observer.take();
+        self.without_observer = shown.map(|shown| Box::new(shown.of_set(set)));
+        self
+    }
+
+    /// The same results with the strict score of the groups that these questions name.
+    #[must_use]
+    pub fn of_groups(mut self, questions: &[RunQuestion]) -> Self {
+        self.strict = StrictScore::of(&self.grid, questions);
+        let shown = self.without_observer.take();
+        self.without_observer = shown.map(|shown| Box::new(shown.of_groups(questions)));
+        self
+    }
+
+    /// What is shown: without the observer, if one of its controls is not at chance or none was asked.
+    #[must_use]
+    pub fn shown(&self) -> &Self {
+        self.without_observer.as_deref().unwrap_or(self)
+    }
+
+    fn of(
+        grid: Grid<'a>,
+        clusters: &Clusters,
+        questions: &[OfferedChoices],
+        observer: ObserverSummary,
+        measured: &[ImageFidelity],
+    ) -> Self {
+        let draws = Resamples::new(clusters.count());
+        let health = healths(&grid);
+        Self {
+            unit: clusters.unit(),
+            summary: summarize(&grid, &health, questions.iter().cloned()),
+            health,
+            pooled: pooled(&grid),
+            left_out: levels_left_out(&grid),
+            by_reading: by_reading(&grid),
+            best: best_in_the_dark(&grid),
+            comparisons: comparisons(&grid),
+            curves: grid
+                .groups()
+                .into_iter()
+                .flat_map(|family| curves(&grid, &draws, family))
+                .collect(),
+            calibrations: calibrations(&grid, &draws),
+            confusions: confusions(&grid),
+            hallucinations: hallucinations(&grid),
+            first_failures: first_failures(&grid),
+            agreements: agreements(&grid),
+            light_agreements: light_agreements(&grid),
+            set: PhotographedSet::default(),
+            pairs: pair_darkness::of_grid(&grid),
+            fidelity: FidelityFindings::new(&grid, measured),
+            common: CommonItems::of(&grid),
+            strict: None,
+            observer,
+            without_observer: None,
+            grid,
+        }
+    }
+
+    /// Adds the comparisons of one light with another between different names of one model, which was asked in the same way under
+    /// each of them.
+    #[must_use]
+    pub fn with_lights_between(mut self, names: &[String]) -> Self {
+        self.comparisons.extend(lights_between(&self.grid, names));
+        let shown = self.without_observer.take();
+        self.without_observer = shown.map(|shown| Box::new(shown.with_lights_between(names)));
+        self
+    }
+
+    /// The models without images than which a subject is shown to be less accurate: itself, or any if it was not asked without
+    /// images. The paired test says so after Holm's correction over the conditions of the two models.
+    #[must_use]
+    pub fn below_blind(&self, subject: &Subject, family: Option<&Family>) -> Vec<&str> {
+        let below = self.comparisons.iter().filter(|comparison| {
+            comparison.kind == ComparisonKind::Blind
+                && comparison.family.as_ref() == family
+                && comparison.first == *subject
+                && comparison.significance == Significance::Worse
+        });
+        below.map(|comparison| &*comparison.second.model).collect()
+    }
+}

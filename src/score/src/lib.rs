@@ -1,0 +1,67 @@
+//! Stage 5, JUDGE: from a reply to a choice, and from records to numbers.
+//!
+//! [`findings`] is the entry point. It arranges the records as a [`grid`] and computes from it the accuracies
+//! ([`accuracy`]), the paired differences ([`comparison`]), the curves over the levels ([`curve`]), the answers given
+//! against the true ones ([`confusion`]) and the agreement of models ([`agreement`]).
+//!
+//! Intervals come from the clusters ([`cluster`]). Each was chosen because its 95 % intervals hold the truth in simulation
+//! (`tests/program/statistics.rs` and `coverage/`; `src/docs/numbers.md` says where they do so less than 93 times in a hundred).
+//! The plain percentile bootstrap does not do so with fewer than about 50 clusters, or near 0 and 1.
+//!
+//! - shares: Wilson's score interval at the clusters' effective number of replies ([`estimate::Estimate::clustered`]);
+//! - differences: Bonett and Price's adjusted interval with the clusters' variance ([`paired`]), and an exact test;
+//! - κ: its linear form in the clusters' counts, with the clusters' variance ([`agreement`]);
+//! - confidence: the cluster bootstrap, its bias subtracted for the calibration error ([`calibration`]);
+//! - thresholds: the cluster bootstrap ([`bootstrap`]).
+
+#![allow(
+    missing_docs,
+    reason = "fields and variants of this workspace's own use, whose names say what they are"
+)]
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
+
+pub mod accuracy;
+pub mod agreement;
+pub mod auc;
+pub mod baseline;
+pub mod best;
+pub mod bootstrap;
+pub mod by_reading;
+pub mod calibration;
+pub mod chance;
+pub mod checks;
+pub mod choice;
+pub mod cluster;
+pub mod common;
+pub mod comparison;
+pub mod confusion;
+pub mod curve;
+pub mod estimate;
+pub mod fidelity;
+pub mod findings;
+pub mod flips;
+pub mod grid;
+pub mod health;
+pub mod llm_match;
+pub mod observed;
+pub mod open;
+mod option_probabilities;
+pub mod pair_darkness;
+pub mod paired;
+pub mod photographed_set;
+pub mod pooled;
+pub mod pooled_kind;
+mod quantiles;
+pub mod ranks;
+pub mod realism;
+pub mod record;
+mod residuals;
+pub mod self_agreement;
+pub mod significance;
+mod split_mix;
+pub mod strict_score;
+pub mod subject;
+#[cfg(test)]
+mod tests;
+pub mod threshold;
+mod trapezoid;

@@ -1,0 +1,248 @@
+//! What the observer could still read in each condition, and whether its controls are at chance: [`ObserverSummary`].
+
+use std::collections::BTreeMap;
+
+use super::cluster::Clusters;
+use super::estimate::Estimate;
+use super::subject::{Subject, is_control, is_observer};
+use darkqa_ground::types::control::OBSERVER;
+use darkqa_ground::types::{
+    AnswerSource, ChoiceDetail, Control, FrameId, Observed, QuestionId, TrialOutcome, TrialRef,
+    Trials,
+};
+
+/// Results of the observer, or of one of its controls, in one condition.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ObserverCell {
+    /// The observer or the control, and the condition.
+    pub subject: Subject,
+    /// Expected score: 1 for a right answer from evidence, 1 / k for a guess among k choices.
+    pub score: Estimate,
+    /// Score of guessing every answer.
+    pub chance: f64,
+    /// Share of the answers that follow from what is seen.
+    pub evidence: f64,
+    /// Share of the things of all frames that are seen.
+    pub seen: f64,
+    /// Share of the things of all frames whose whole outline is detected.
+    pub detected: f64,
+    /// Mean over the frames of the share of the image's variance that the untouched frame explains.
+    pub explained: f64,
+}
+
+impl ObserverCell {
+    /// Whether this is a control of the observer.
+    #[must_use]
+    pub fn is_control(&self) -> bool {
+        is_control(&self.subject.model)
+    }
+
+    /// Whether this is the control that each run with the observer asks.
+    #[must_use]
+    pub fn is_standing(&self) -> bool {
+        Control::of_model(&self.subject.model)
+            .is_some_and(|control| Control::STANDING.contains(&control))
+    }
+
+    /// Whether this is a control whose interval excludes chance, so that the observer's lines prove nothing.
+    #[must_use]
+    pub fn refutes(&self) -> bool {
+        // The two means are sums in different orders.
+        let tolerance = 1e-9;
+        let excludes =
+            self.score.low > self.chance + tolerance || self.score.high < self.chance - tolerance;
+        Control::of_model(&self.subject.model).is_some_and(Control::leaves_nothing) && excludes
+    }
+}
+
+/// Results of the observer and its controls.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ObserverSummary {
+    /// By model and condition; empty if the observer was not asked with images.
+    pub cells: Vec<ObserverCell>,
+    /// Each control over all conditions together.
+    pub controls: Vec<ObserverCell>,
+}
+
+impl ObserverSummary {
+    /// The results of these trials.
+    #[must_use]
+    pub fn of(trials: &Trials<ChoiceDetail>, clusters: &Clusters) -> Self {
+        // Of two trials for the same item, the later one counts.
+        let mut items = BTreeMap::<Subject, BTreeMap<ItemKey<'_>, TrialRef<'_>>>::new();
+        for trial in trials.iter() {
+            if trial.observed().is_some() {
+                let key = trial.item().key();
+                let subject = items.entry(Subject::of(trial)).or_default();
+                subject.insert(key, trial);
+            }
+        }
+        let mut by_control = BTreeMap::<&str, Vec<TrialRef<'_>>>::new();
+        let mut cells = Vec::new();
+        for (subject, trials) in &items {
+            let trials: Vec<TrialRef<'_>> = trials.values().copied().collect();
+            if is_control(&subject.model) {
+                let all = by_control.entry(&subject.model).or_default();
+                all.extend(&trials);
+            }
+            cells.extend(cell(subject.clone(), &trials, clusters));
+        }
+        let controls = by_control
+            .into_iter()
+            .filter_map(|(model, trials)| cell(Subject::new(model, None), &trials, clusters));
+        Self {
+            controls: controls.collect(),
+            cells,
+        }
+    }
+
+    /// Whether the observer was asked with images.
+    #[must_use]
+    pub fn is_asked(&self) -> bool {
+        self.cells
+            .iter()
+            .any(|cell| is_observer(&cell.subject.model))
+    }
+
+    /// The controls that are not at chance, over all conditions or in one. The intervals of the conditions are not corrected for
+    /// their number: rather a sound observer is hidden than a broken one shown.
+    pub fn refutations(&self) -> impl Iterator<Item = &ObserverCell> {
+        let all = self.controls.iter().chain(&self.cells);
+        all.filter(|cell| cell.refutes())
+    }
+
+    /// Whether the observer's lines are not shown: a control is not at chance, or none was asked.
+    #[must_use]
+    pub fn is_hidden(&self) -> bool {
+        let is_controlled = self.cells.iter().any(ObserverCell::is_control);
+        self.is_asked() && (!is_controlled || self.refutations().next().is_some())
+    }
+
+    /// The standing control over all conditions, of each run that has its own.
+    #[must_use]
+    pub fn standing_controls(&self) -> Vec<&ObserverCell> {
+        let of = |standing| -> Vec<&ObserverCell> {
+            let is_it =
+                |cell: &&ObserverCell| Control::of_model(&cell.subject.model) == Some(standing);
+            self.controls.iter().filter(is_it).collect()
+        };
+        let mut all = Control::STANDING.into_iter().map(of);
+        all.find(|cells| !cells.is_empty()).unwrap_or_default()
+    }
+
+    /// The standing control in the condition of a cell.
+    #[must_use]
+    pub fn control_of(&self, cell: &ObserverCell) -> Option<&ObserverCell> {
+        // Where several runs are compared, each may have its own.
+        let run = cell
+            .subject
+            .model
+            .strip_prefix(OBSERVER)
+            .unwrap_or_default();
+        let mut names = Control::STANDING
+            .into_iter()
+            .map(Control::model_name)
+            .flat_map(|name| [format!("{name}{run}"), name]);
+        names.find_map(|model| {
+            let subject = Subject {
+                model,
+                ..cell.subject.clone()
+            };
+            self.cells.iter().find(|other| other.subject == subject)
+        })
+    }
+}
+
+/// What identifies an item: question, order of choices and repeat.
+type ItemKey<'a> = (&'a QuestionId, &'a [String], u32);
+
+/// The results of some trials; `None` without trials of frames that have a cluster.
+fn cell(subject: Subject, trials: &[TrialRef<'_>], clusters: &Clusters) -> Option<ObserverCell> {
+    let mut sums = vec![(0.0, 0.0); clusters.count()];
+    let mut frames = BTreeMap::<(&FrameId, String), &Observed>::new();
+    let (mut guesses, mut evidence, mut n) = (0.0, 0, 0);
+    for trial in trials {
+        let cluster = clusters.of(trial.frame(), trial.question());
+        let (Some(cluster), Some(observed)) = (cluster, trial.observed()) else {
+            continue;
+        };
+        let guess = 1.0 / trial.choices().len().max(1) as f64;
+        let score = match observed.from {
+            AnswerSource::Guess => guess,
+            AnswerSource::Evidence => f64::from(u8::from(trial.outcome() == TrialOutcome::Right)),
+        };
+        let (sum, count) = &mut sums[cluster as usize];
+        *sum += score;
+        *count += 1.0;
+        guesses += guess;
+        evidence += usize::from(observed.from == AnswerSource::Evidence);
+        n += 1;
+        let condition = trial.condition().map(ToString::to_string);
+        frames.insert((trial.frame(), condition.unwrap_or_default()), observed);
+    }
+    sums.retain(|(_, count)| *count > 0.0);
+    let sum = |of: fn(&Observed) -> usize| frames.values().map(|frame| of(frame)).sum::<usize>();
+    let things = sum(|frame| frame.things).max(1) as f64;
+    let explained = frames
+        .values()
+        .map(|frame| f64::from(frame.explained_ppm) / 1e6);
+    // A guess counts 1 / k and has no noise of its own: the noise of n answers is at least that of those from evidence.
+    let max_weight = n as f64 / f64::max(evidence as f64, 1.0);
+    Some(ObserverCell {
+        subject,
+        score: Estimate::scored(&sums, max_weight, n)?,
+        chance: guesses / n as f64,
+        evidence: evidence as f64 / n as f64,
+        seen: sum(|frame| frame.seen) as f64 / things,
+        detected: sum(|frame| frame.detected) as f64 / things,
+        explained: explained.sum::<f64>() / frames.len() as f64,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cell(model: &str, [value, low, high]: [f64; 3]) -> ObserverCell {
+        ObserverCell {
+            subject: Subject::new(model, None),
+            score: Estimate {
+                value,
+                low,
+                high,
+                n: 100,
+            },
+            chance: 0.3,
+            evidence: 0.0,
+            seen: 0.0,
+            detected: 0.0,
+            explained: 0.0,
+        }
+    }
+
+    /// The observer with one control, in one condition and over all.
+    fn summary(control: &str, in_one: [f64; 3], over_all: [f64; 3]) -> ObserverSummary {
+        ObserverSummary {
+            cells: vec![cell(OBSERVER, [0.9, 0.8, 1.0]), cell(control, in_one)],
+            controls: vec![cell(control, over_all)],
+        }
+    }
+
+    #[test]
+    fn a_control_that_is_not_at_chance_in_one_condition_or_over_all_hides_the_observer() {
+        let (chance, above) = ([0.32, 0.28, 0.36], [0.34, 0.31, 0.37]);
+        let hidden = |control, in_one, over_all| summary(control, in_one, over_all).is_hidden();
+        for control in ["observer:other-room", "observer:tiles (night)"] {
+            assert!(!hidden(control, chance, chance));
+            assert!(hidden(control, above, chance));
+            assert!(hidden(control, chance, above));
+        }
+        assert!(
+            !hidden("observer:shift-4", above, above),
+            "a limit refutes nothing"
+        );
+        let mut alone = summary("observer:tiles", chance, chance);
+        alone.cells.pop();
+        assert!(alone.is_hidden(), "without a control");
+    }
+}

@@ -1,0 +1,74 @@
+//! The score of a subject on a group of questions: [`OpenCell`].
+
+use std::collections::BTreeMap;
+
+use super::answer::{AnswerOutcome, ScoredAnswer};
+use super::group::Group;
+use crate::estimate::Estimate;
+use crate::subject::Subject;
+
+/// Maximum number of independent right-or-wrong replies that one mark may count for. A mark on a scale of five steps varies
+/// less than such a reply with the same mean, unless all marks are 1 or 5.
+const MAX_WEIGHT: f64 = 4.0;
+
+/// Score of a subject on a group of questions, with the counts behind it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OpenCell {
+    pub subject: Subject,
+    pub group: Group,
+    /// Number of answers that the run asks for.
+    pub planned: usize,
+    /// Number of answers that are not there yet or failed.
+    pub missing: usize,
+    /// Number of answers that are not judged yet.
+    pub unjudged: usize,
+    /// Number of answers without a mark in the judge's reply.
+    pub unmarked: usize,
+    /// Number of null answers, which score 0.
+    pub null: usize,
+    /// Number of answers that the protocol shortened before they were judged.
+    pub cut: usize,
+    /// Mean score, between 0 and 1; `None` if no answer is scored. Its `n` is the number of answers.
+    pub score: Option<Estimate>,
+}
+
+impl OpenCell {
+    /// Number of scored answers.
+    #[must_use]
+    pub fn scored(&self) -> usize {
+        self.score.map_or(0, |score| score.n)
+    }
+}
+
+/// The cell of a subject and a group; `cluster` returns the cluster of a question.
+pub(super) fn cell(
+    subject: &Subject,
+    group: &Group,
+    answers: &[&ScoredAnswer],
+    cluster: impl Fn(usize) -> usize,
+) -> OpenCell {
+    let count = |outcome| {
+        let same = answers.iter().filter(|answer| answer.outcome == outcome);
+        same.count()
+    };
+    let mut sums = BTreeMap::<usize, (f64, f64)>::new();
+    for answer in answers {
+        if let Some(points) = answer.outcome.points() {
+            let (sum, n) = sums.entry(cluster(answer.question)).or_default();
+            (*sum, *n) = (*sum + points, *n + 1.0);
+        }
+    }
+    let sums: Vec<(f64, f64)> = sums.into_values().collect();
+    let n = sums.iter().map(|(_, n)| n).sum::<f64>() as usize;
+    OpenCell {
+        subject: subject.clone(),
+        group: group.clone(),
+        planned: answers.len(),
+        missing: count(AnswerOutcome::Missing),
+        unjudged: count(AnswerOutcome::Unjudged),
+        unmarked: count(AnswerOutcome::Unmarked),
+        null: count(AnswerOutcome::Null),
+        cut: answers.iter().filter(|answer| answer.cut).count(),
+        score: Estimate::scored(&sums, MAX_WEIGHT, n),
+    }
+}

@@ -1,0 +1,80 @@
+//! The difference of two scores: [`ScoreChange`].
+
+use std::collections::BTreeMap;
+
+use super::answer::ScoredAnswer;
+use super::group::Group;
+use crate::estimate::Estimate;
+use crate::paired::difference;
+use crate::subject::Subject;
+use darkqa_ground::types::{AxisLevel, View};
+
+/// The subject to which a score is compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Baseline {
+    /// The same model on the clean frames.
+    Clean,
+    /// The same model at the same level without an enhancer.
+    Raw,
+}
+
+/// Score of a subject minus that of a baseline, on the questions for which both have a score.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScoreChange {
+    pub subject: Subject,
+    pub baseline: Baseline,
+    pub group: Group,
+    /// Difference of the unrounded means. Its `n` is the number of questions.
+    pub difference: Estimate,
+}
+
+/// The baselines of a subject; none for a subject without images.
+pub(super) fn baselines(subject: &Subject) -> Vec<(Baseline, Subject)> {
+    let Some(level) = subject.level.filter(|_| subject.view == Some(View::Image)) else {
+        return Vec::new();
+    };
+    let seeing =
+        |level, enhancer| Subject::seeing(&subject.model, level, &subject.variant, enhancer);
+    let is_clean = level == AxisLevel::L0 && subject.enhancer.is_none();
+    let clean = (!is_clean).then(|| (Baseline::Clean, seeing(AxisLevel::L0, None)));
+    let raw = subject
+        .enhancer
+        .is_some()
+        .then(|| (Baseline::Raw, seeing(level, None)));
+    clean.into_iter().chain(raw).collect()
+}
+
+/// Mean of the first answers minus mean of the second, on the questions for which both have a score. Several people's answers
+/// to one question count as their mean.
+pub(super) fn change(
+    first: &[&ScoredAnswer],
+    second: &[&ScoredAnswer],
+    in_group: impl Fn(usize) -> bool,
+    cluster: impl Fn(usize) -> usize,
+) -> Option<Estimate> {
+    let means = |answers: &[&ScoredAnswer]| {
+        let mut means = BTreeMap::<usize, (f64, f64)>::new();
+        for answer in answers.iter().filter(|answer| in_group(answer.question)) {
+            if let Some(points) = answer.outcome.points() {
+                let (sum, n) = means.entry(answer.question).or_default();
+                (*sum, *n) = (*sum + points, *n + 1.0);
+            }
+        }
+        means
+    };
+    let (first, second) = (means(first), means(second));
+    let mut sums = BTreeMap::<usize, (f64, f64)>::new();
+    let (mut squares, mut n) = (0.0, 0);
+    for (question, (sum, count)) in &first {
+        let Some((other, others)) = second.get(question) else {
+            continue;
+        };
+        let (net, pairs) = sums.entry(cluster(*question)).or_default();
+        let change = sum / count - other / others;
+        (*net, *pairs) = (*net + change, *pairs + 1.0);
+        squares += change * change;
+        n += 1;
+    }
+    let sums: Vec<(f64, f64)> = sums.into_values().collect();
+    (n > 0).then(|| difference(&sums, squares, n))
+}

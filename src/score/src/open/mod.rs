@@ -1,0 +1,142 @@
+//! Scores of open answers from the marks of a judge: [`OpenSummary`].
+//!
+//! A score is 100 · mean((clip(mark, 1, 5) − 1) / 4) (Majumdar et al. 2024, CVPR, section 4.2). Questions about one walk share
+//! its frames, so the walks are the clusters. If there is only one walk, the questions are.
+
+mod answer;
+mod cell;
+mod change;
+mod group;
+#[cfg(test)]
+mod tests;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use self::cell::cell;
+use self::change::{baselines, change};
+use self::group::groups;
+use super::subject::Subject;
+use darkqa_ground::types::ModelListing;
+
+pub use answer::{AnswerOutcome, ScoredAnswer};
+pub use cell::OpenCell;
+pub use change::Baseline;
+pub use change::ScoreChange;
+pub use group::{Group, QuestionGroups};
+
+/// All scores of a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OpenSummary {
+    /// Unit of the clusters: `episode`, or `question` if there is only one episode.
+    pub unit: &'static str,
+    /// Number of clusters of all questions.
+    pub clusters: usize,
+    /// Scores, ordered by subject with the models in their order, then by group.
+    pub cells: Vec<OpenCell>,
+    /// Differences of scores, ordered by subject, baseline and group.
+    pub changes: Vec<ScoreChange>,
+    /// The order, groups and marks of the models.
+    pub listing: ModelListing,
+}
+
+impl OpenSummary {
+    /// Score of a subject on a group.
+    #[must_use]
+    pub fn cell(&self, subject: &Subject, group: &Group) -> Option<&OpenCell> {
+        let mut cells = self.cells.iter();
+        cells.find(|cell| cell.subject == *subject && cell.group == *group)
+    }
+
+    /// Difference of a subject from a baseline on a group.
+    #[must_use]
+    pub fn change(
+        &self,
+        subject: &Subject,
+        baseline: Baseline,
+        group: &Group,
+    ) -> Option<&ScoreChange> {
+        self.changes.iter().find(|change| {
+            change.subject == *subject && change.baseline == baseline && change.group == *group
+        })
+    }
+
+    /// All groups that have a score, sorted.
+    #[must_use]
+    pub fn groups(&self) -> BTreeSet<&Group> {
+        self.cells.iter().map(|cell| &cell.group).collect()
+    }
+}
+
+/// Scores of the answers; `questions` holds the groups of each question.
+#[must_use]
+pub fn open_summary(answers: &[ScoredAnswer], questions: &[QuestionGroups]) -> OpenSummary {
+    open_summary_listed(answers, questions, &ModelListing::default())
+}
+
+/// The same scores with the models as listed.
+#[must_use]
+pub fn open_summary_listed(
+    answers: &[ScoredAnswer],
+    questions: &[QuestionGroups],
+    listing: &ModelListing,
+) -> OpenSummary {
+    let episodes: BTreeMap<&str, usize> = questions
+        .iter()
+        .map(|question| &*question.episode)
+        .collect::<BTreeSet<_>>()
+        .into_iter()
+        .zip(0..)
+        .collect();
+    let by_walk = episodes.len() > 1;
+    let cluster = |question: usize| {
+        if by_walk {
+            episodes[&*questions[question].episode]
+        } else {
+            question
+        }
+    };
+    let mut by_subject = BTreeMap::<&Subject, Vec<&ScoredAnswer>>::new();
+    for answer in answers {
+        by_subject.entry(&answer.subject).or_default().push(answer);
+    }
+    let groups = groups(questions);
+    let mut by_subject: Vec<(&Subject, Vec<&ScoredAnswer>)> = by_subject.into_iter().collect();
+    by_subject.sort_by_cached_key(|(subject, _)| listing.place(&subject.model));
+    let (mut cells, mut changes) = (Vec::new(), Vec::new());
+    for (subject, answers) in &by_subject {
+        for group in &groups {
+            let is_scored_here = |answer: &&&ScoredAnswer| group.has(&questions[answer.question]);
+            let in_group: Vec<&ScoredAnswer> =
+                answers.iter().filter(is_scored_here).copied().collect();
+            cells.push(cell(subject, group, &in_group, cluster));
+        }
+        for (baseline, other) in baselines(subject) {
+            let mut subjects = by_subject.iter();
+            let Some((_, baseline_answers)) = subjects.find(|(subject, _)| subject.is_for(&other))
+            else {
+                continue;
+            };
+            for group in &groups {
+                let in_group = |question: usize| group.has(&questions[question]);
+                let difference = change(answers, baseline_answers, in_group, cluster);
+                changes.extend(difference.map(|difference| ScoreChange {
+                    subject: (*subject).clone(),
+                    baseline,
+                    group: group.clone(),
+                    difference,
+                }));
+            }
+        }
+    }
+    OpenSummary {
+        unit: if by_walk { "episode" } else { "question" },
+        clusters: if by_walk {
+            episodes.len()
+        } else {
+            questions.len()
+        },
+        cells,
+        changes,
+        listing: listing.clone(),
+    }
+}

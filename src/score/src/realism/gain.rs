@@ -1,0 +1,316 @@
+//! The system gain K that the noise of a real pair speaks for: [`GainFit`], and over pairs [`ReadingFit`].
+//!
+//! The gain is estimated by indirect inference (Gourieroux, Monfort and Renault 1993, J. Appl. Econometrics 8:S85): the
+//! statistic of the real image, its [`SpreadCurve`], is compared with that of synthetic images over a ladder of K.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::CameraOrigin;
+use super::mean::{LEAST_VALUES, Mean};
+use super::quantile::quantile;
+use super::smooth::{BINS, SpreadCurve};
+use darkqa_ground::types::ReadingName;
+
+/// Number of gains that synthetic images are made with (chosen).
+pub const LADDER_STEPS: usize = 15;
+/// The least and the greatest of them, in ADU per electron (chosen; the built-in cameras lie between 0.09 and 29).
+pub const GAINS: [f64; 2] = [0.02, 30.0];
+/// Number of gains, evenly spaced in ln K, at which the curves are compared (chosen).
+const FINE: usize = 601;
+/// The greatest misfit of a fit, in ln spread (chosen: self-made pairs have up to 0.1, a pair whose low-light image was made
+/// without a sensor 0.9 and more).
+pub const MOST_MISFIT: f64 = 0.3;
+/// The number of bins that a fit needs (chosen): the shape of a curve of fewer says little.
+const LEAST_BINS: usize = 4;
+
+/// The gains of the synthetic images, in ascending order.
+#[must_use]
+pub fn ladder() -> [f64; LADDER_STEPS] {
+    std::array::from_fn(|step| libm::exp(log_gain(step, LADDER_STEPS)))
+}
+
+/// ln K of one of `n` gains, evenly spaced over the ladder.
+fn log_gain(index: usize, n: usize) -> f64 {
+    let [low, high] = GAINS.map(libm::log);
+    low + (high - low) * index as f64 / (n - 1) as f64
+}
+
+/// Fit of the gain to one pair under one light reading.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct GainFit {
+    /// The gain whose spread is nearest, in ADU per electron; `None` without enough smooth blocks.
+    pub gain: Option<f64>,
+    /// Root mean square over the bins of ln(synthetic spread / real spread) at that gain.
+    pub misfit: Option<f64>,
+    /// Whether the gain can be used.
+    pub outcome: FitOutcome,
+}
+
+/// Whether a gain was fitted, and if not, why.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FitOutcome {
+    /// The spreads agree.
+    Fitted,
+    /// The spreads do not agree at any gain.
+    Misfit,
+    /// The nearest gain is an end of the ladder.
+    EndOfLadder,
+    /// Too few blocks are smooth.
+    FewBlocks,
+}
+
+impl GainFit {
+    /// The gain at which the synthetic spreads, one curve for each gain of [`ladder`], are nearest to the real one.
+    #[must_use]
+    pub fn of(real: &SpreadCurve, synthetic: &[SpreadCurve; LADDER_STEPS]) -> Self {
+        let bins: Vec<(f64, [f64; LADDER_STEPS])> = (0..BINS)
+            .filter_map(|bin| {
+                let mut curve = [0.0; LADDER_STEPS];
+                for (value, spread) in curve.iter_mut().zip(synthetic) {
+                    *value = spread.bins[bin]?;
+                }
+                Some((real.bins[bin]?, curve))
+            })
+            .collect();
+        if bins.len() < LEAST_BINS {
+            return Self {
+                gain: None,
+                misfit: None,
+                outcome: FitOutcome::FewBlocks,
+            };
+        }
+        let misfit = |index: usize| {
+            let squares = bins.iter().map(|(real, curve)| {
+                let off = between(curve, index) - real;
+                off * off
+            });
+            (squares.sum::<f64>() / bins.len() as f64).sqrt()
+        };
+        let misfits = (0..FINE).map(misfit).enumerate();
+        let (index, misfit) = misfits.fold((0, f64::INFINITY), |best, next| {
+            if next.1 < best.1 { next } else { best }
+        });
+        Self {
+            gain: Some(libm::exp(log_gain(index, FINE))),
+            misfit: Some(misfit),
+            outcome: if index == 0 || index == FINE - 1 {
+                FitOutcome::EndOfLadder
+            } else if misfit > MOST_MISFIT {
+                FitOutcome::Misfit
+            } else {
+                FitOutcome::Fitted
+            },
+        }
+    }
+
+    /// The gain, if it can be used.
+    #[must_use]
+    pub fn fitted(&self) -> Option<f64> {
+        self.gain.filter(|_| self.outcome == FitOutcome::Fitted)
+    }
+}
+
+/// Value of a curve over the ladder at one of the fine gains, linear in ln K between its neighbours.
+fn between(curve: &[f64; LADDER_STEPS], index: usize) -> f64 {
+    let place = index as f64 * (LADDER_STEPS - 1) as f64 / (FINE - 1) as f64;
+    let below = (place as usize).min(LADDER_STEPS - 2);
+    let [low, high] = [curve[below], curve[below + 1]];
+    low + (place - below as f64) * (high - low)
+}
+
+impl FitOutcome {
+    /// The word in CSV and JSON.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Fitted => "fitted",
+            Self::Misfit => "misfit",
+            Self::EndOfLadder => "end-of-ladder",
+            Self::FewBlocks => "few-blocks",
+        }
+    }
+}
+
+impl fmt::Display for FitOutcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Fitted => "fitted",
+            Self::Misfit => "no fit: the low image's noise is not a sensor's under this reading",
+            Self::EndOfLadder => {
+                "no fit, as the ladder of K ends here: the low image's noise is not a sensor's under this reading"
+            }
+            Self::FewBlocks => "no fit: too few blocks of 8 × 8 pixels are smooth, and neither black nor white",
+        })
+    }
+}
+
+/// The gains of several pairs under one light reading.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PooledGain {
+    /// Geometric mean with its 95 % interval by Student's t distribution of ln K; `None` for fewer than 3 pairs.
+    pub mean: Option<Mean>,
+    /// The 10 % and the 90 % quantile of ln K, as K, in ADU per electron.
+    pub range: [f64; 2],
+    /// Number of pairs.
+    pub n: usize,
+}
+
+impl PooledGain {
+    /// The fitted gains of pairs as one; `None` without any.
+    #[must_use]
+    pub fn of(gains: &[f64]) -> Option<Self> {
+        let mut logs: Vec<f64> = gains.iter().map(|gain| libm::log(*gain)).collect();
+        logs.sort_by(f64::total_cmp);
+        let range = [quantile(&logs, 0.1)?, quantile(&logs, 0.9)?].map(libm::exp);
+        let mean = Mean::of(&logs).filter(|mean| mean.interval.is_some());
+        Some(Self {
+            mean: mean.map(|mean| Mean {
+                value: libm::exp(mean.value),
+                interval: mean.interval.map(|ends| ends.map(libm::exp)),
+                n: mean.n,
+            }),
+            range,
+            n: gains.len(),
+        })
+    }
+}
+
+/// Fits of the gain to all pairs under one light reading.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ReadingFit {
+    /// Name of the light reading.
+    pub reading: ReadingName,
+    /// Ratio r that the fit took, if images show only the product r · K; `None` if r is 2^ΔEV.
+    pub ratio: Option<f64>,
+    /// The gains of the fitted pairs; `None` if no pair was fitted.
+    pub pooled: Option<PooledGain>,
+    /// The fit to each pair, by the name of the pair.
+    pub pairs: Vec<PairFit>,
+}
+
+/// Fit of the gain to a named pair.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PairFit {
+    pub pair: String,
+    #[serde(flatten)]
+    pub fit: GainFit,
+}
+
+impl ReadingFit {
+    /// The fits to all pairs together.
+    #[must_use]
+    pub fn new(reading: ReadingName, ratio: Option<f64>, pairs: Vec<PairFit>) -> Self {
+        let gains: Vec<f64> = pairs.iter().filter_map(|pair| pair.fit.fitted()).collect();
+        Self {
+            reading,
+            ratio,
+            pooled: PooledGain::of(&gains),
+            pairs,
+        }
+    }
+
+    /// The gains that a pair is judged by, and where they come from: those of the other pairs if 3 or more are fitted, so that no
+    /// pair is judged by its own gain; else those of all. `None` if no pair is fitted.
+    #[must_use]
+    pub fn for_pair(&self, name: &str) -> Option<(PooledGain, CameraOrigin)> {
+        let all = self.pooled.clone()?;
+        if all.n < LEAST_VALUES {
+            return Some((all, CameraOrigin::SamePairs));
+        }
+        let others = self.pairs.iter().filter(|pair| pair.pair != name);
+        let gains: Vec<f64> = others.filter_map(|pair| pair.fit.fitted()).collect();
+        PooledGain::of(&gains).map(|gains| (gains, CameraOrigin::OtherPairs))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Spread ∝ √K in all bins, a bin higher than the one before, times `factor(bin)`.
+    fn curve(gain: f64, factor: impl Fn(usize) -> f64) -> SpreadCurve {
+        SpreadCurve {
+            bins: std::array::from_fn(|bin| {
+                Some(0.5 * libm::log(gain * (1.0 + bin as f64)) + libm::log(factor(bin)))
+            }),
+        }
+    }
+
+    fn synthetic() -> [SpreadCurve; LADDER_STEPS] {
+        ladder().map(|gain| curve(gain, |_| 1.0))
+    }
+
+    #[test]
+    fn the_gain_of_a_synthetic_curve_is_found() {
+        for gain in [0.03, 0.7746, 11.0] {
+            let fit = GainFit::of(&curve(gain, |_| 1.0), &synthetic());
+            assert!((fit.fitted().unwrap() / gain).ln().abs() < 0.01, "{fit:?}");
+            assert!(fit.misfit.unwrap() < 0.01);
+        }
+    }
+
+    #[test]
+    fn a_curve_of_another_shape_or_beyond_the_ladder_is_not_fitted() {
+        let wild = |bin: usize| if bin.is_multiple_of(2) { 1.0 } else { 2.0 };
+        let fit = GainFit::of(&curve(1.0, wild), &synthetic());
+        assert_eq!((fit.outcome, fit.fitted()), (FitOutcome::Misfit, None));
+        assert!((fit.misfit.unwrap() - f64::ln(2.0) / 2.0).abs() < 0.01);
+        for gain in [0.001, 900.0] {
+            let fit = GainFit::of(&curve(gain, |_| 1.0), &synthetic());
+            assert_eq!((fit.outcome, fit.fitted()), (FitOutcome::EndOfLadder, None));
+        }
+        let mut few = curve(1.0, |_| 1.0);
+        few.bins[..5].fill(None);
+        let fit = GainFit::of(&few, &synthetic());
+        assert_eq!((fit.outcome, fit.gain), (FitOutcome::FewBlocks, None));
+        few.bins[4] = Some(0.5 * f64::ln(5.0));
+        assert_eq!(GainFit::of(&few, &synthetic()).outcome, FitOutcome::Fitted);
+    }
+
+    #[test]
+    fn pairs_have_a_geometric_mean_from_three_on() {
+        assert_eq!(PooledGain::of(&[]), None);
+        let two = PooledGain::of(&[0.5, 2.0]).unwrap();
+        assert_eq!((two.mean, two.n), (None, 2));
+        assert!((two.range[0] * two.range[1] - 1.0).abs() < 1e-12);
+        let three = PooledGain::of(&[4.0, 0.25, 1.0]).unwrap();
+        let mean = three.mean.unwrap();
+        // Deviation ln 4 of ln K, t of 2 degrees of freedom 4.302653.
+        let half = 4.302_652_730 * f64::ln(4.0) / f64::sqrt(3.0);
+        let [low, high] = mean.interval.unwrap();
+        assert!((mean.value - 1.0).abs() < 1e-12);
+        assert!((low.ln() + half).abs() < 1e-6 && (high.ln() - half).abs() < 1e-6);
+        assert!((three.range[1] - f64::powf(4.0, 0.8)).abs() < 1e-9);
+    }
+
+    /// A pair's own gain is not among those that it is judged by, and with fewer than three fitted pairs it is said to be.
+    #[test]
+    fn no_pair_is_judged_by_its_own_gain() {
+        let fit = |gain: Option<f64>| GainFit {
+            gain,
+            misfit: Some(0.1),
+            outcome: gain.map_or(FitOutcome::Misfit, |_| FitOutcome::Fitted),
+        };
+        let reading = |gains: &[Option<f64>]| {
+            let pairs = gains.iter().enumerate().map(|(index, gain)| PairFit {
+                pair: index.to_string(),
+                fit: fit(*gain),
+            });
+            ReadingFit::new(ReadingName::PAPER, Some(200.0), pairs.collect())
+        };
+        let four = reading(&[Some(0.1), Some(0.2), None, Some(6.0)]);
+        assert_eq!(four.pooled.as_ref().unwrap().n, 3);
+        for (pair, n, most) in [("0", 2, 6.0), ("2", 3, 6.0), ("3", 2, 0.2)] {
+            let (gains, origin) = four.for_pair(pair).unwrap();
+            assert_eq!((gains.n, origin), (n, CameraOrigin::OtherPairs), "{pair}");
+            assert!(gains.range[1] < most, "{pair}: {gains:?}");
+            assert!((gains.range[1] > 1.0) == (pair != "3"), "{pair}: {gains:?}");
+        }
+        let (gains, origin) = reading(&[Some(0.1), Some(6.0)]).for_pair("0").unwrap();
+        assert_eq!((gains.n, origin), (2, CameraOrigin::SamePairs));
+        assert_eq!(reading(&[None, None]).for_pair("0"), None);
+    }
+}

@@ -1,0 +1,185 @@
+//! The agreement of one subject with its model's answers in the light: [`AgreementCell`].
+
+use std::collections::BTreeSet;
+
+use super::bank_index::BankIndex;
+use super::counts::BankCounts;
+use super::evidence::{Bounds, NoEvidence, evidence};
+use super::kappa::kappa;
+use super::light::{is_refused, is_way_out};
+use super::question_in_light::QuestionInLight;
+use crate::bootstrap::Resamples;
+use crate::choice::ReadingMode;
+use crate::estimate::Estimate;
+use crate::grid::{ClusterCount, Grid, TrialResult};
+use crate::subject::Subject;
+use darkqa_ground::types::{AxisLevel, Family, View};
+
+/// Agreement of one subject on one family in one reading, and what keeps it honest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AgreementCell {
+    pub subject: Subject,
+    /// Question family; `None` for all families together.
+    pub family: Option<Family>,
+    /// How the replies were read.
+    pub mode: ReadingMode,
+    /// Share of the replies with the same answer as in the light, of the questions that have one there. A reply that cannot be read
+    /// does not agree. `None` without a reply.
+    pub agreement: Option<Estimate>,
+    /// The same without the questions that can tell nothing.
+    pub informative: Option<Estimate>,
+    /// κ with the expected agreement by question; `None` if it is not defined.
+    pub kappa: Option<Estimate>,
+    /// Mean entropy of the answers by question, 0 to 1: in the light, and in this condition.
+    pub entropies: [Option<f64>; 2],
+    /// Share of the evidence that is left, or why it is not given; for conditions other than the floor and the ceiling.
+    pub evidence: Option<Result<Estimate, NoEvidence>>,
+    /// Share of the replies in which no answer could be read.
+    pub unread: Option<Estimate>,
+    /// Number of replies that refuse.
+    pub refused: usize,
+    /// Number of trials without a reply. They are not counted.
+    pub failed: usize,
+    /// Share of the replies that say that the image does not tell; `None` if the questions have no such choice.
+    pub cannot_tell: Option<Estimate>,
+}
+
+/// What a cell is to the others of its model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CellRole {
+    /// The floor: no image was shown.
+    Floor,
+    /// The ceiling: the same images were shown again.
+    Ceiling,
+    /// Other images were shown: darker, or enhanced.
+    Other,
+}
+
+impl AgreementCell {
+    /// What the cell is to the others of its model.
+    pub fn role(&self) -> CellRole {
+        let subject = &self.subject;
+        if subject.view == Some(View::Blind) {
+            CellRole::Floor
+        } else if subject.level == Some(AxisLevel::L0) && subject.enhancer.is_none() {
+            CellRole::Ceiling
+        } else {
+            CellRole::Other
+        }
+    }
+
+    /// Number of replies behind the agreement.
+    pub fn replies(&self) -> usize {
+        self.agreement.map_or(0, |agreement| agreement.n)
+    }
+}
+
+/// The cells of a model's grid, whose truths are its answers in the light: by subject, then by family.
+pub(super) fn cells(
+    grid: &Grid<'_>,
+    draws: &Resamples,
+    bank: &BankIndex<'_>,
+    questions: &[QuestionInLight],
+    mode: ReadingMode,
+) -> Vec<AgreementCell> {
+    let informative = questions
+        .iter()
+        .filter(|question| question.is_informative());
+    let informative: BTreeSet<usize> = informative.map(|question| question.index).collect();
+    let kept = grid.items.iter().map(|item| {
+        let question = bank.of(&item.asked.question);
+        question.is_some_and(|question| informative.contains(&question))
+    });
+    let restricted = grid.restricted(&kept.collect::<Vec<_>>());
+    let mut cells = Vec::new();
+    for subject in 0..grid.subjects.len() {
+        for family in grid.groups() {
+            let counts = grid.counts(subject, family, mode);
+            let part = Part {
+                grid,
+                subject,
+                family,
+                mode,
+            };
+            let mut cell = part.cell(bank, &counts);
+            let few = restricted.counts(subject, family, mode);
+            cell.informative = Estimate::clustered(&few);
+            if cell.role() == CellRole::Other {
+                let bounds = Bounds::of(grid, (&cell.subject, family), mode, draws);
+                let share = bounds.map(|bounds| evidence(&counts, &bounds, draws));
+                cell.evidence = share.transpose();
+            }
+            cells.push(cell);
+        }
+    }
+    // A family that a subject was not asked about has no cell.
+    cells.retain(|cell| cell.agreement.is_some() || cell.failed > 0);
+    cells
+}
+
+/// The items of a cell.
+struct Part<'g, 'r> {
+    grid: &'g Grid<'r>,
+    subject: usize,
+    family: Option<&'g Family>,
+    mode: ReadingMode,
+}
+
+impl Part<'_, '_> {
+    /// The cell without what follows from other cells.
+    fn cell(&self, bank: &BankIndex<'_>, counts: &[ClusterCount]) -> AgreementCell {
+        let (grid, subject, mode) = (self.grid, self.subject, self.mode);
+        let agreement = Estimate::clustered(counts);
+        let answers = BankCounts::of(grid, subject, self.family, mode, bank);
+        let items = grid.of_family(subject, self.family);
+        let failed = items.filter(|(_, result)| *result == TrialResult::Failed);
+        AgreementCell {
+            subject: grid.subjects[subject].clone(),
+            family: self.family.cloned(),
+            mode,
+            agreement,
+            informative: None,
+            kappa: agreement.and_then(|agreement| kappa(&answers, counts, agreement)),
+            entropies: answers.entropies(),
+            evidence: None,
+            unread: self.share(|chosen, _| chosen.is_none()),
+            refused: self.refused(),
+            failed: failed.count(),
+            cannot_tell: self.cannot_tell(),
+        }
+    }
+
+    /// Share of the replies of which something holds; it takes the answer, if one could be read, and the choices.
+    fn share(&self, holds: impl Fn(Option<&str>, &[String]) -> bool) -> Option<Estimate> {
+        let mut counts = vec![ClusterCount::default(); self.grid.clusters];
+        for (item, result) in self.grid.of_family(self.subject, self.family) {
+            let Some(reading) = result.reading(self.mode) else {
+                continue;
+            };
+            let choices = &*item.asked.choices;
+            let answer = reading.and_then(|index| choices.get(usize::from(index)));
+            let count = &mut counts[item.cluster as usize];
+            count.replies += 1;
+            count.right += u32::from(holds(answer.map(String::as_str), choices));
+        }
+        Estimate::clustered(&counts)
+    }
+
+    fn cannot_tell(&self) -> Option<Estimate> {
+        let mut items = self.grid.of_family(self.subject, self.family);
+        let has_way_out = items.any(|(item, _)| {
+            let mut choices = item.asked.choices.iter();
+            choices.any(|choice| is_way_out(choice))
+        });
+        let share = || self.share(|answer, _| answer.is_some_and(is_way_out));
+        has_way_out.then(share).flatten()
+    }
+
+    fn refused(&self) -> usize {
+        let items = self.grid.items.iter().enumerate();
+        let trials = items
+            .filter(|(_, item)| item.is_of(self.family))
+            .filter_map(|(index, _)| self.grid.trial(self.subject, index));
+        trials.filter(|trial| is_refused(*trial)).count()
+    }
+}

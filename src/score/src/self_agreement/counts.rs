@@ -1,0 +1,89 @@
+//! Answers in the light and in a condition, by question of the bank: [`BankCounts`].
+
+use std::collections::BTreeMap;
+
+use super::bank_index::BankIndex;
+use super::question_in_light::entropy;
+use crate::choice::ReadingMode;
+use crate::grid::Grid;
+use darkqa_ground::types::Family;
+
+/// Numbers of answers to one question of the bank, over the items that have an answer in the light and a reply in the condition.
+#[derive(Debug, Clone, Default)]
+pub(super) struct AnswerCounts<'g> {
+    /// Number of items.
+    pub(super) items: usize,
+    /// Number of items by the answer in the light, and by the answer in the condition. A reply that cannot be read is in neither.
+    pub(super) answers: BTreeMap<&'g str, [usize; 2]>,
+    /// Number of choices of the question.
+    choices: usize,
+}
+
+/// The answers of a subject, for all clusters together and for each.
+pub(super) struct BankCounts<'g> {
+    pub(super) whole: BTreeMap<usize, AnswerCounts<'g>>,
+    /// The same for each cluster, by question and cluster.
+    pub(super) by_cluster: BTreeMap<(u32, usize), AnswerCounts<'g>>,
+}
+
+impl<'g> BankCounts<'g> {
+    /// The answers of a subject to questions of a family.
+    pub(super) fn of(
+        grid: &'g Grid<'_>,
+        subject: usize,
+        family: Option<&Family>,
+        mode: ReadingMode,
+        bank: &BankIndex<'_>,
+    ) -> Self {
+        let mut counts = Self {
+            whole: BTreeMap::new(),
+            by_cluster: BTreeMap::new(),
+        };
+        for (index, item) in grid.items.iter().enumerate() {
+            let result = grid.result(subject, index);
+            let (Some(question), Some(reading)) =
+                (bank.of(&item.asked.question), result.reading(mode))
+            else {
+                continue;
+            };
+            if !item.is_of(family) {
+                continue;
+            }
+            let asked = item.asked;
+            let text = |index: usize| asked.choices.get(index).map(String::as_str);
+            let light = asked.truth.and_then(text);
+            let here = reading.and_then(|index| text(usize::from(index)));
+            let whole = counts.whole.entry(question).or_default();
+            let of_cluster = (item.cluster, question);
+            let of_cluster = counts.by_cluster.entry(of_cluster).or_default();
+            for counts in [whole, of_cluster] {
+                counts.items += 1;
+                counts.choices = asked.choices.len();
+                for (place, answer) in [light, here].into_iter().enumerate() {
+                    if let Some(answer) = answer {
+                        counts.answers.entry(answer).or_default()[place] += 1;
+                    }
+                }
+            }
+        }
+        counts
+    }
+
+    /// Number of items.
+    pub(super) fn items(&self) -> usize {
+        self.whole.values().map(|counts| counts.items).sum()
+    }
+
+    /// The mean over the questions of the entropy of the answers, 0 to 1: in the light, and in the condition. `None` without an
+    /// answer.
+    pub(super) fn entropies(&self) -> [Option<f64>; 2] {
+        [0, 1].map(|place| {
+            let questions = self.whole.values().filter_map(|counts| {
+                let answers = counts.answers.values().map(|answers| answers[place]);
+                entropy(answers, counts.choices)
+            });
+            let entropies: Vec<f64> = questions.collect();
+            (!entropies.is_empty()).then(|| entropies.iter().sum::<f64>() / entropies.len() as f64)
+        })
+    }
+}

@@ -1,0 +1,90 @@
+//! What a model says to each question of a bank in the light: [`QuestionInLight`].
+
+use std::collections::BTreeMap;
+
+use super::bank_index::BankIndex;
+use super::light::{LightAnswers, chosen};
+use crate::choice::ReadingMode;
+use darkqa_ground::types::Family;
+
+/// Share of the images at which the commonest answer makes a question uninformative; chosen.
+pub const UNINFORMATIVE: f64 = 0.95;
+
+/// The answers of a model to one question of the bank at L0, over all images.
+#[derive(Debug, Clone, PartialEq)]
+pub struct QuestionInLight {
+    pub model: String,
+    /// Index among the questions of the bank.
+    pub(super) index: usize,
+    /// The name of the question in the bank.
+    pub bank_id: String,
+    pub text: String,
+    pub family: Family,
+    /// Number of images with a readable answer.
+    pub images: usize,
+    /// The answer given most often; of several, the first by name. Empty without a readable answer.
+    pub top: String,
+    /// Share of the images with that answer; 0 without a readable answer.
+    pub top_share: f64,
+    /// Entropy of the answers, 0 to 1; `None` without a readable answer.
+    pub entropy: Option<f64>,
+}
+
+impl QuestionInLight {
+    /// Whether the answers differ from image to image, so that agreement says something.
+    pub fn is_informative(&self) -> bool {
+        self.images > 0 && self.top_share < UNINFORMATIVE
+    }
+}
+
+/// Every question of the bank that a model was asked in the light, in the order of the bank.
+pub(super) fn questions_in_light(
+    model: &str,
+    answers: &LightAnswers<'_>,
+    bank: &BankIndex<'_>,
+    mode: ReadingMode,
+) -> Vec<QuestionInLight> {
+    let mut counts = BTreeMap::<usize, BTreeMap<&str, usize>>::new();
+    for trial in answers.first().filter(|trial| !trial.failed()) {
+        let Some(question) = bank.of(trial.question()) else {
+            continue;
+        };
+        let counts = counts.entry(question).or_default();
+        let choice = chosen(trial, mode).and_then(|index| trial.choices().get(index));
+        if let Some(choice) = choice {
+            *counts.entry(choice).or_default() += 1;
+        }
+    }
+    let questions = counts.into_iter().map(|(index, counts)| {
+        let example = bank.examples[index];
+        let images = counts.values().sum();
+        let top = counts.iter().rev().max_by_key(|(_, count)| **count);
+        QuestionInLight {
+            model: model.to_owned(),
+            index,
+            bank_id: example.bank_id().to_owned(),
+            text: example.text.clone(),
+            family: example.family.clone(),
+            images,
+            top: top.map_or_else(String::new, |(top, _)| (*top).to_owned()),
+            top_share: top.map_or(0.0, |(_, count)| *count as f64 / images as f64),
+            entropy: entropy(counts.values().copied(), example.choices.len()),
+        }
+    });
+    questions.collect()
+}
+
+/// Shannon entropy of counts over that of `choices` equally frequent answers: 0 if all answers are the same, 1 if none is more
+/// frequent than another. `None` without a count.
+pub(super) fn entropy(counts: impl Iterator<Item = usize> + Clone, choices: usize) -> Option<f64> {
+    let all: usize = counts.clone().sum();
+    if all == 0 {
+        return None;
+    }
+    let terms = counts.filter(|count| *count > 0).map(|count| {
+        let share = count as f64 / all as f64;
+        -share * libm::log(share)
+    });
+    // The entropy of one answer is 0, and not −0.
+    Some((terms.sum::<f64>() + 0.0) / libm::log(choices as f64))
+}

@@ -1,0 +1,340 @@
+//! Tests of what is found over all models: [`super::pooled`] and [`super::best`], from made records.
+
+use super::best::best_in_the_dark;
+use super::choice::ReadingMode;
+use super::cluster::{Clusters, FrameTies};
+use super::confusion::{FalseAnswer, confusions};
+use super::findings::Findings;
+use super::grid::Grid;
+use super::paired::PairedComparison;
+use super::pooled::{PooledFinding, pooled};
+use super::pooled_kind::PooledKind;
+use super::significance::Significance;
+use super::subject::Subject;
+use darkqa_ground::types::{
+    AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, QuestionId, Record,
+    TrialOutcome,
+};
+
+/// Number of frames, each with two questions.
+const FRAMES: usize = 12;
+
+/// Whether a model is right about an item; `None` if the trial failed.
+pub(super) type Answers = fn(usize) -> Option<bool>;
+
+/// The records of a model in a condition; without images if the condition is empty.
+pub(super) fn records(model: &str, condition: &str, answers: Answers) -> Vec<Record> {
+    let condition: Option<Condition> = (!condition.is_empty()).then(|| condition.parse().unwrap());
+    let record = |item: usize| {
+        let right = answers(item);
+        let chosen = right.map(|right| AnswerReading {
+            chosen: Some(usize::from(!right)),
+            why: None,
+        });
+        let detail = ChoiceDetail {
+            frame: FrameId(format!("f{:02}", item / 2)),
+            family: [Family::Color, Family::RoomType][item % 2].clone(),
+            choices: ["a", "b", "c"].map(str::to_owned).to_vec(),
+            truth: Some(0),
+            repeat: 0,
+            strict: chosen,
+            lenient: chosen,
+            outcome: match right {
+                None => TrialOutcome::Failed,
+                Some(true) => TrialOutcome::Right,
+                Some(false) => TrialOutcome::Wrong,
+            },
+            image: None,
+            more_images: Vec::new(),
+            shown_frame: None,
+            observed: None,
+            options: None,
+        };
+        let key = Digest::of(format!("{item} {model} {condition:?}").as_bytes()).into();
+        let question = QuestionId(format!("q{item:02}"));
+        Record::blank(key, question, model, condition.clone(), detail)
+    };
+    (0..2 * FRAMES).map(record).collect()
+}
+
+/// Runs a check on the grid of records.
+pub(super) fn with_grid<T>(records: &[Record], check: impl FnOnce(&Grid<'_>) -> T) -> T {
+    let asked = records
+        .iter()
+        .map(|record| (&record.question, &record.detail.frame));
+    let clusters = Clusters::new(asked, &FrameTies::default());
+    check(&Grid::new(&records.iter().cloned().collect(), &clusters))
+}
+
+fn find<'f>(
+    findings: &'f [PooledFinding],
+    kind: PooledKind,
+    condition: &str,
+) -> Vec<&'f PooledFinding> {
+    let of_kind = findings.iter().filter(|finding| {
+        let name = format!("{}-{}", finding.level, finding.variant);
+        finding.kind == kind && finding.family.is_none() && name == condition
+    });
+    of_kind.collect()
+}
+
+#[test]
+fn one_model_pooled_is_its_own_comparison() {
+    let records = [
+        records("m", "L0", |item| Some(item % 7 != 0)),
+        records("m", "L3-noise", |item| (item != 5).then_some(item % 3 == 0)),
+        records("m", "L5-noise", |item| Some(item == 4)),
+        records("observer", "L0", |_| Some(true)),
+        records("observer", "L3-noise", |_| Some(true)),
+    ]
+    .concat();
+    with_grid(&records, |grid| {
+        let findings = pooled(grid);
+        let dark = find(&findings, PooledKind::Darkness, "L3-noise")[0];
+        // The subjects are sorted: L0, L3-noise, L5-noise of the model, then the observer.
+        let own = PairedComparison::new(grid, 1, 0, None, ReadingMode::Strict).unwrap();
+        assert_eq!(dark.models, ["m"]);
+        assert_eq!(dark.difference, own.difference);
+        assert!((dark.p - own.p).abs() < 1e-15 && (dark.first - own.first).abs() < 1e-12);
+        assert_eq!((dark.items, dark.dropped, dark.clusters), (23, 1, 12));
+        // Two levels: the smaller p counts twice.
+        let darkest = find(&findings, PooledKind::Darkness, "L5-noise")[0];
+        assert!((darkest.holm - 2.0 * darkest.p).abs() < 1e-15 && darkest.levels == 2);
+        assert_eq!(darkest.verdict, Significance::Worse);
+        // By family the clusters are the same, and the sets are corrected apart.
+        let by_family = findings.iter().filter(|finding| finding.family.is_some());
+        assert_eq!(by_family.count(), 4);
+    });
+}
+
+#[test]
+fn items_are_those_that_every_model_answered_on_both_sides() {
+    let records = [
+        records("a", "L3-ev", |_| Some(true)),
+        records("a", "L3-noise", |item| (item != 0).then_some(item > 11)),
+        records("b", "L3-ev", |item| (item != 1).then_some(true)),
+        records("b", "L3-noise", |item| Some(item > 11)),
+        // Asked of one model only: no finding of the pool.
+        records("b", "L5-noise", |_| Some(true)),
+        records("b", "L5-ev", |_| Some(true)),
+    ]
+    .concat();
+    with_grid(&records, |grid| {
+        let findings = pooled(grid);
+        let noise = find(&findings, PooledKind::Noise, "L3-noise")[0];
+        assert_eq!((noise.items, noise.dropped), (22, 2));
+        assert_eq!(noise.models, ["a", "b"]);
+        assert!((noise.difference.value + 10.0 / 22.0).abs() < 1e-12);
+        assert!((noise.second - 1.0).abs() < 1e-12);
+        // Frames 1 to 5 lose all, frame 0 has no item: 5 of 11 clusters differ, all in one direction.
+        assert!((noise.p - 2.0 / 32.0).abs() < 1e-12 && noise.clusters == 11);
+        assert!(find(&findings, PooledKind::Noise, "L5-noise").is_empty());
+    });
+}
+
+#[test]
+fn models_are_compared_with_their_own_words_if_some_were_asked() {
+    let right: Answers = |_| Some(true);
+    let base = [
+        records("a", "L3-noise", |item| Some(item % 2 == 0)),
+        records("b", "L3-noise", right),
+    ]
+    .concat();
+    let own = [
+        base.clone(),
+        records("a", "", right),
+        records("c", "", right),
+    ]
+    .concat();
+    with_grid(&own, |grid| {
+        let findings = pooled(grid);
+        let blind = find(&findings, PooledKind::Blind, "L3-noise")[0];
+        assert_eq!(
+            (&*blind.models, &*blind.blind_models),
+            (&["a".to_owned()][..], &["a".to_owned()][..])
+        );
+        assert_eq!(blind.verdict, Significance::Worse);
+    });
+    let other = [base, records("c", "", right), records("random", "", right)].concat();
+    with_grid(&other, |grid| {
+        let findings = pooled(grid);
+        let blind = find(&findings, PooledKind::Blind, "L3-noise")[0];
+        assert_eq!(blind.models, ["a", "b"]);
+        assert_eq!(blind.blind_models, ["c"]);
+        assert!((blind.difference.value + 0.25).abs() < 1e-12);
+    });
+}
+
+#[test]
+fn few_clusters_give_no_verdict() {
+    let mut all = [
+        records("m", "L0", |_| Some(true)),
+        records("m", "L3-noise", |_| Some(false)),
+    ]
+    .concat();
+    // Five frames: 2 / 2⁵ is above 0.05.
+    all.retain(|record| *record.detail.frame.0 < *"f05");
+    with_grid(&all, |grid| {
+        let findings = pooled(grid);
+        let dark = find(&findings, PooledKind::Darkness, "L3-noise")[0];
+        assert_eq!(dark.verdict, Significance::TooFewClusters);
+        assert!((dark.p - 0.0625).abs() < 1e-12 && (dark.least_p - dark.p).abs() < 1e-15);
+    });
+}
+
+#[test]
+fn the_best_is_shown_better_than_every_other() {
+    let mut all = Vec::new();
+    let models: [(&str, Answers, Answers); 4] = [
+        // At chance it loses nothing, and is not the best.
+        (
+            "guess",
+            |item| Some(item % 3 == 0),
+            |item| Some(item % 3 == 0),
+        ),
+        (
+            "good",
+            |_| Some(true),
+            |item| (item != 0).then_some(item % 8 != 0),
+        ),
+        ("same", |_| Some(true), |item| Some(item % 8 != 1)),
+        ("random", |_| Some(true), |_| Some(true)),
+    ];
+    for (name, clean, dark) in models {
+        all.extend(records(name, "L0", clean));
+        all.extend(records(name, "L5-ev", clean));
+        all.extend(records(name, "L5-noise", dark));
+    }
+    // Not asked of all models: not a level of the comparison.
+    all.extend(records("good", "L3-noise", |_| Some(true)));
+    with_grid(&all, |grid| {
+        let best = best_in_the_dark(grid).unwrap();
+        assert_eq!(best.variant.to_string(), "noise");
+        assert_eq!(best.levels.len(), 2);
+        assert_eq!((best.items, best.dropped, best.clusters), (23, 1, 12));
+        let names: Vec<&str> = best.models.iter().map(|model| &*model.model).collect();
+        assert_eq!(names, ["good", "same", "guess"]);
+        // Of 23 items 21 and 20 are right in the dark; L0 and L5 count for one half each.
+        let area = |index: usize| best.models[index].area.value;
+        assert!((area(0) - (23.0 + 21.0) / 46.0).abs() < 1e-12);
+        assert!((area(1) - (23.0 + 20.0) / 46.0).abs() < 1e-12);
+        let loss = best.models[0].loss.unwrap().value;
+        assert!((loss + 1.0 / 23.0).abs() < 1e-12);
+        assert_eq!(best.models[2].loss, None);
+        assert_eq!(best.not_shown_better_than, ["same"]);
+        assert!(!best.is_shown() && best.pairs.len() == 3);
+        assert_eq!(best.leader().model, "good");
+        assert_eq!(best.pairs[1].significance, Significance::Better);
+    });
+    all.retain(|record| record.model != "same");
+    with_grid(&all, |grid| {
+        let best = best_in_the_dark(grid).unwrap();
+        assert!(best.is_shown() && best.pairs.len() == 1);
+    });
+    all.retain(|record| record.model != "guess");
+    assert!(with_grid(&all, best_in_the_dark).is_none());
+}
+
+#[test]
+fn below_blind_is_what_the_corrected_test_shows() {
+    let records = [
+        records("m", "", |item| Some(item != 3)),
+        records("m", "L3-noise", |item| Some(item % 8 != 0)),
+        records("m", "L5-noise", |_| Some(false)),
+    ]
+    .concat();
+    let trials = records.iter().cloned().collect();
+    let findings = Findings::new(&trials, &FrameTies::default(), [], &[]);
+    let below = |condition: &str| {
+        let condition: Condition = condition.parse().unwrap();
+        findings.below_blind(&Subject::new("m", Some(&condition)), None)
+    };
+    // Two points less are below, and not shown to be.
+    assert!(below("L3-noise").is_empty());
+    assert_eq!(below("L5-noise"), ["m"]);
+}
+
+/// The records of a model about presence, two questions a frame: something is there in the first, and not in the second. `reply` gives
+/// the reply to a question, of which `true` says that something is there.
+fn presence(model: &str, condition: &str, reply: fn(usize, bool) -> Option<bool>) -> Vec<Record> {
+    let mut records = records(model, condition, |_| Some(true));
+    for (item, record) in records.iter_mut().enumerate() {
+        let detail = &mut record.detail;
+        let is_there = item % 2 == 0;
+        detail.family = Family::Presence;
+        detail.choices = ["Yes", "no"].map(str::to_owned).to_vec();
+        detail.truth = Some(usize::from(!is_there));
+        let chosen = reply(item / 2, is_there).map(|yes| usize::from(!yes));
+        detail.strict = Some(AnswerReading { chosen, why: None });
+    }
+    records
+}
+
+#[test]
+fn false_answers_are_the_other_word_and_not_a_missing_one() {
+    let all = [
+        presence("m", "L0", |frame, is_there| Some(is_there && frame != 0)),
+        // In the dark: “no” to eleven of twelve.
+        presence("m", "L3-noise", |frame, _| Some(frame == 3)),
+        // Nothing can be read: wrong, and no “no”.
+        presence("m", "L5-noise", |_, _| None),
+        records("m", "L0", |_| Some(true)),
+    ]
+    .concat();
+    with_grid(&all[..6 * FRAMES], |grid| {
+        let findings = pooled(grid);
+        let of = |answer: FalseAnswer| -> Vec<&PooledFinding> {
+            let kind = PooledKind::Hallucination(answer);
+            let of_kind = findings.iter().filter(|finding| finding.kind == kind);
+            of_kind.collect()
+        };
+        let said_no = of(FalseAnswer::No);
+        assert_eq!(said_no.len(), 2);
+        let (dark, darkest) = (said_no[0], said_no[1]);
+        assert_eq!(dark.family, Some(Family::Presence));
+        assert_eq!((dark.items, dark.clusters, dark.levels), (12, 12, 2));
+        assert!((dark.first - 11.0 / 12.0).abs() < 1e-12, "{dark:?}");
+        assert!((dark.second - 1.0 / 12.0).abs() < 1e-12, "{dark:?}");
+        // Ten frames change, all in one direction, and frame 0 does not; two levels.
+        assert!((dark.p - 2.0 / 1024.0).abs() < 1e-12 && (dark.holm - 2.0 * dark.p).abs() < 1e-12);
+        assert_eq!(dark.verdict, Significance::Worse);
+        assert!((darkest.first - 0.0).abs() < 1e-12 && darkest.verdict == Significance::NotShown);
+        let said_yes = of(FalseAnswer::Yes);
+        assert!((said_yes[0].first - 1.0 / 12.0).abs() < 1e-12 && said_yes[0].second < 1e-12);
+        assert_eq!(said_yes[0].verdict, Significance::NotShown);
+        // Accuracy counts what cannot be read as wrong.
+        let accuracy = find(&findings, PooledKind::Darkness, "L5-noise")[0];
+        assert_eq!(accuracy.verdict, Significance::Worse);
+    });
+    with_grid(&all[6 * FRAMES..], |grid| {
+        let findings = pooled(grid);
+        assert!(
+            findings
+                .iter()
+                .all(|finding| finding.kind.only_family().is_none())
+        );
+    });
+}
+
+#[test]
+fn a_collapse_is_more_than_its_truth_and_more_than_a_guess() {
+    let collapse = |reply: fn(usize, bool) -> Option<bool>| {
+        let mut all = presence("m", "L3-noise", reply);
+        // Something is there in four of 24 questions alone.
+        for (item, record) in all.iter_mut().enumerate() {
+            record.detail.truth = Some(usize::from(item % 2 == 1 || item > 7));
+        }
+        with_grid(&all, |grid| confusions(grid)[0].collapse.clone().unwrap())
+    };
+    let all = collapse(|_, _| Some(true));
+    assert_eq!((&*all.top, all.share.n, all.clusters), ("Yes", 24, 12));
+    assert!((all.share.value - 1.0).abs() < 1e-12 && (all.truth - 4.0 / 24.0).abs() < 1e-12);
+    assert!((all.guess - 0.5).abs() < 1e-12 && all.is_shown());
+    // Half of all: 33 points above the truth, and what a guess gives.
+    let half = collapse(|frame, first| Some(first == (frame % 2 == 0)));
+    assert!((half.share.value - 0.5).abs() < 1e-12 && !half.is_shown());
+    // Unreadable replies count in the share.
+    let some = collapse(|frame, _| (frame < 6).then_some(true));
+    assert!((some.share.value - 0.5).abs() < 1e-12 && !some.is_shown());
+    assert!(some.entropy.abs() < 1e-12);
+}
