@@ -60,9 +60,8 @@
 //!
 //! # The map
 //!
-//! Data flows one way. Each folder is a stage; the stages do not know each other (a model that takes noise has it drawn by the
-//! generator of synthesis). What is asked (words) and what is seen (light) meet
-//! only where a question is put to a model.
+//! The program is this crate. What it computes with are crates of their own, in `src/CRATE`; this crate names them `crate::types`,
+//! `crate::synthesis` and so on. Data flows one way, and the stages do not know each other:
 //!
 //! ```text
 //!                            ┌──────► questions ─────────────┐            (words: what is asked)
@@ -72,23 +71,23 @@
 //! types, error, files = the ground     job = the engine of everything asked     run = one folder or file a command     cli = words → calls
 //! ```
 //!
-//! - [`error`]: the one error type. `files`: files and folders, read with bounds and written whole. `internals`: what benchmarks and tests
-//!   of this repository use besides.
-//! - [`types`]: the vocabulary. [`Frame`](types::Frame)s are seen, [`Question`]s are asked, a
-//!   [`Degradation`] is what was done to a frame, a [`Condition`] is a degradation with or
-//!   without an enhancer, a [`Reply`](types::Reply) is what a model sent, and a [`Record`](types::Record) is what came of one trial:
-//!   one question to one model in one condition.
-//! - [`labels`]: the label spaces NYU40, mpcat40, ADE150 and NYU13.
-//! - [`rooms`]: the built-in rooms, drawn by a seed with all their maps.
+//! | crate | here | |
+//! |---|---|---|
+//! | `ground` | [`error`], `files`, [`types`], `labels` | the one error type; files read with bounds and written whole; the vocabulary; the label spaces NYU40, mpcat40, ADE150 and NYU13 |
+//! | `light` | [`synthesis`] | a clean image × a degradation → a degraded one; pure, given a noise key |
+//! | `scenes` | `rooms` | the built-in rooms, drawn by a seed with all their maps |
+//! | `questions` | [`questions`] | a frame with its maps → questions with one true answer, by rule; and the observer: what the rules could still answer from given pixels |
+//! | `enhance` | [`enhance`] | a degraded image → an enhanced one, by the user's ONNX model; `models` has the enhancers that the program carries |
+//! | `score` | [`score`] | a reply → a choice or a mark; records → numbers with their intervals |
+//!
+//! A [`Frame`](types::Frame) is seen, a [`Question`] is asked, a [`Degradation`] is what was done to a frame, a [`Condition`] is a
+//! degradation with or without an enhancer, a [`Reply`](types::Reply) is what a model sent, and a [`Record`](types::Record) is the result
+//! of one trial: one question to one model in one condition. The modules of this crate:
+//!
 //! - [`dataset`]: a folder, a ready-made set or the built-in rooms → images, their maps and questions.
 //! - [`import`]: other data sets → frames, one file a kind.
-//! - [`questions`]: a frame with its maps → questions with one true answer, by rule; pure integers. And the observer: what the rules
-//!   could still answer from given pixels.
-//! - [`synthesis`]: a clean image × a degradation → a degraded one; pure, given a noise key.
 //! - [`calibrate`]: frames of a sensor → the camera that the synthesis takes its noise from.
-//! - [`enhance`]: a degraded image → an enhanced one, by the user's ONNX model.
 //! - [`ask`]: a prompt and images → a reply; the only asynchronous stage. `ask/wire`: the APIs of endpoints, their requests and replies.
-//! - [`score`]: a reply → a choice or a mark; records → numbers with their intervals.
 //! - [`store`]: `results/<run>/`, append-only and resumable.
 //! - `image_store`: a folder of images that were made, shared by runs and processes; it may be deleted at any time.
 //! - [`report`]: tables, figures and one HTML file, from the records alone, and a leaderboard of many; figures of pictures that are handed in.
@@ -97,6 +96,7 @@
 //! - [`run`]: the commands; `run/evaluate` and `run/openeqa` are the two experiments.
 //! - [`cli`]: the commands. A flag is a field of a structure in the room that uses it, in that room's own types; the environment and
 //!   a file of flags are turned into words, and all words are parsed once.
+//! - `internals`: what benchmarks and tests of this repository use besides.
 //!
 //! # Where to add what
 //!

@@ -259,7 +259,7 @@ fn what_was_sent_is_made_again() {
         "run",
         id,
         "--data",
-        "rooms:frames=6,size=200x150,seed=8",
+        "rooms:frames=6,size=120x90,seed=8",
         "--out",
         "other",
     ]);

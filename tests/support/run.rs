@@ -69,7 +69,7 @@ impl Bench {
             }
         }
         // Where no data are named: few rooms, and small ones.
-        command.env("DARKQA_DATA", "rooms:frames=6,size=200x150");
+        command.env("DARKQA_DATA", "rooms:frames=6,size=120x90");
         // A wide terminal, so that a line of a table is one line.
         command.env("COLUMNS", "400");
         command.current_dir(self.folder.path()).args(words);

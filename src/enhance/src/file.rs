@@ -96,6 +96,7 @@ impl ModelFile {
     }
 
     /// The same file, of which the output at this place is read if nothing states another one.
+    #[must_use]
     pub fn with_output(mut self, place: usize) -> Self {
         let stated = &mut self.sidecar.output;
         *stated = stated.take().or(Some(OutputChoice::Index(place)));

@@ -42,7 +42,6 @@ impl TrialResult {
 
     /// The reading in one mode; `None` if there is no reply, `Some(None)` if no choice could be read.
     #[must_use]
-    #[expect(clippy::option_option, reason = "no reply, or no readable choice")]
     pub fn reading(self, mode: ReadingMode) -> Option<Option<u8>> {
         match (self, mode) {
             (Self::Absent | Self::Failed, _) => None,

@@ -133,7 +133,7 @@ impl FromStr for Degradation {
     }
 }
 
-/// A kind of degradation. A new kind is described in this `impl` and implemented in [`synthesis`](darkqa_light); no other
+/// A kind of degradation. A new kind is described in this `impl` and implemented in the crate `darkqa-light`; no other
 /// place lists the kinds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Kind {

@@ -88,6 +88,7 @@ impl SizeLog {
     }
 
     /// What was done since an earlier state of this log.
+    #[must_use]
     pub fn since(&self, earlier: &Self) -> Self {
         Self {
             images: self.images - earlier.images,

@@ -40,7 +40,7 @@ macro_rules! as_text {
 
         $(impl<'de> serde::Deserialize<'de> for $type {
             fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
-                deserializer.deserialize_str($crate::types::words::Text::new())
+                deserializer.deserialize_str($crate::types::words::Text::default())
             }
         })+
     };
@@ -50,9 +50,8 @@ pub use as_text;
 /// A serde visitor that reads a string through `FromStr`.
 pub struct Text<T>(PhantomData<T>);
 
-impl<T> Text<T> {
-    /// A visitor for `T`.
-    pub fn new() -> Self {
+impl<T> Default for Text<T> {
+    fn default() -> Self {
         Self(PhantomData)
     }
 }

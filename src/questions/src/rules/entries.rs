@@ -33,10 +33,6 @@ pub struct MeasureRule {
 /// Thresholds that a segment must pass to be evidence.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(
-    clippy::struct_field_names,
-    reason = "the names are those of rules.toml"
-)]
 pub struct EvidenceRule {
     pub area_ppm: u64,
     pub side_per_height_ppm: u64,
