@@ -366,7 +366,7 @@ fn a_file_of_flags_has_lists_and_names_its_mistakes() {
     let bench = Bench::new();
     bench.file(
         "lists.toml",
-        "levels = [\"L0\", \"L3\"]\nvariant = \"ev\"\nfamilies = [\"color\", \"presence\"]\n",
+        "levels = [\"L0\", \"L3\"]\nvariant = \"ev\"\nfamilies = [\"closest\", \"presence\"]\n",
     );
     let listed = bench.complete(&words(&format!("{SHORT} --config lists.toml")));
     assert_eq!(
