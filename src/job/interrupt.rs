@@ -85,8 +85,9 @@ mod tests {
             // As in a loop that does something else after each wait.
             let early = tokio::time::timeout(Duration::from_millis(1), interrupt.next()).await;
             assert!(early.is_err());
-            let pid = process::id().to_string();
-            let status = Command::new("kill").args([signal, &pid]).status().unwrap();
+            // Every shell has the command; the program of this name is a package of its own.
+            let line = format!("kill {signal} {}", process::id());
+            let status = Command::new("sh").args(["-c", &line]).status().unwrap();
             assert!(status.success());
             tokio::time::sleep(Duration::from_millis(50)).await;
             let late = tokio::time::timeout(Duration::from_secs(20), interrupt.next()).await;

@@ -21,8 +21,9 @@ impl Bench {
 
 /// Sends a signal to a process: `-INT`, `-TERM` or `-9`.
 pub fn signal(process: &Child, signal: &str) {
-    let id = process.id().to_string();
-    let status = Command::new("kill").args([signal, &id]).status();
+    // Every shell has the command; the program of this name is a package of its own.
+    let line = format!("kill {signal} {}", process.id());
+    let status = Command::new("sh").args(["-c", &line]).status();
     assert!(status.unwrap().success());
 }
 
