@@ -200,3 +200,21 @@ fn the_manual_says_what_the_help_says() {
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
+
+#[test]
+fn warnings_of_every_crate_are_shown() {
+    let log = tempfile::NamedTempFile::new().unwrap();
+    let subscriber = tracing_subscriber::fmt()
+        .with_env_filter(EnvFilter::new(LOGGED))
+        .with_writer(std::sync::Mutex::new(log.reopen().unwrap()))
+        .finish();
+    tracing::subscriber::with_default(subscriber, || {
+        tracing::warn!(target: "darkqa_eval::job", "of the program");
+        tracing::warn!(target: "darkqa_enhance::probe", "of a library");
+        tracing::info!(target: "darkqa_enhance::probe", "a detail");
+        tracing::warn!(target: "ort", "of a dependency");
+    });
+    let shown = fs::read_to_string(log.path()).unwrap();
+    assert!(shown.contains("of the program") && shown.contains("of a library"));
+    assert!(!shown.contains("a detail") && !shown.contains("of a dependency"));
+}
