@@ -60,7 +60,7 @@
 //!
 //! # The map
 //!
-//! The program is this crate. What it computes with are crates of their own, in `src/CRATE`; this crate names them `crate::types`,
+//! The program is this crate. Its libraries are crates of their own, in `src/CRATE`; this crate names them `crate::types`,
 //! `crate::synthesis` and so on. Data flows one way, and the stages do not know each other:
 //!
 //! ```text

@@ -379,7 +379,7 @@ fn check_flags_before_command(command: &Command, matches: &ArgMatches) -> Result
     });
     match misplaced.and_then(Arg::get_long) {
         Some(flag) => Err(Error::CommandLine(format!(
-            "--{flag} stands before the command {name}; only --quiet, --color and --config may; put flags of {name} after it"
+            "--{flag} stands before the command {name}; put its flags after it"
         ))),
         None => Ok(()),
     }

@@ -43,7 +43,7 @@ const OVER_BUDGET: u8 = 3;
 /// Exit code: interrupted; the same command continues.
 const INTERRUPTED: u8 = 130;
 
-/// What is logged by default. The names of all crates of this workspace begin with `darkqa_`.
+/// Default log filter. The names of all crates of this workspace begin with `darkqa_`.
 const LOGGED: &str = "darkqa_=warn";
 
 /// Printed after the error of a call without any word.

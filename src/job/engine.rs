@@ -23,9 +23,8 @@ use crate::enhance::ModelFile;
 use crate::error::Result;
 use crate::report::forecast::{Forecast, json, render};
 use crate::store::{self, Store};
-use crate::types::StoredDetail as _;
-use crate::types::TrialKey;
 use crate::types::manifest::Status;
+use crate::types::{StoredDetail as _, TrialKey};
 
 /// An experiment that is carried out in a run folder.
 pub(crate) struct Job<'a, E: Experiment> {

@@ -11,8 +11,7 @@ use super::plan::Plan;
 use super::settings::{JobSettings, RESULTS, RunPlace};
 use crate::error::{Error, Result};
 use crate::store::{self, AddressChange};
-use crate::types::Digest;
-use crate::types::StoredDetail as _;
+use crate::types::{Digest, StoredDetail as _};
 
 /// The folder of a run: the one named, else the newest of the same identity and plan, else a new one.
 pub(crate) fn find<E: Experiment>(experiment: &E) -> Result<PathBuf> {

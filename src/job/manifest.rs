@@ -13,9 +13,8 @@ use super::settings::JobSettings;
 use super::source::input_summary;
 use crate::error::Result;
 use crate::score::record::Detail as _;
-use crate::types::StoredDetail as _;
 use crate::types::manifest::{Counts, RunManifest, RunPart, Status};
-use crate::types::{InputSummary, ListedModel};
+use crate::types::{InputSummary, ListedModel, StoredDetail as _};
 
 /// The manifest of a run. A stored one passes on its date, columns and image flags; one of a complete run all but its identity.
 ///

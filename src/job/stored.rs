@@ -11,11 +11,10 @@ pub(crate) use super::run_texts::RunTexts;
 use crate::error::{Error, Result};
 use crate::score::record::Detail;
 use crate::store;
-use crate::types::StoredDetail as _;
 use crate::types::manifest::RunManifest;
 use crate::types::{
     ChoiceDetail, ImageFidelity, KeptTrial, ListedModel, ModelListing, OpenDetail, QuestionId,
-    Record, RunQuestion, TextPlace, Thumbnail, TrialRef, Trials,
+    Record, RunQuestion, StoredDetail as _, TextPlace, Thumbnail, TrialRef, Trials,
 };
 
 /// The models of a run that a report shows.

@@ -2,9 +2,8 @@ use super::*;
 use std::collections::BTreeMap;
 use std::fs;
 
-use crate::types::StoredDetail as _;
 use crate::types::manifest::{Counts, Status};
-use crate::types::{Digest, Family, FrameId, QuestionId, TrialOutcome};
+use crate::types::{Digest, Family, FrameId, QuestionId, StoredDetail as _, TrialOutcome};
 
 type Store = super::Store;
 

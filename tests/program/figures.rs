@@ -267,7 +267,7 @@ fn document(width: f64) -> String {
 
 #[test]
 fn tex_sets_figures_and_tables_in_their_columns() {
-    // The files of `document`, and that of its bold and italic letters.
+    // Packages that `document` loads, and the metrics of its font.
     let files = [
         "mathptmx.sty",
         "booktabs.sty",

@@ -14,15 +14,14 @@ use crate::files::reading;
 use crate::job::record_table;
 use crate::job::report::choice;
 use crate::job::stored::StoredRun;
-use crate::types::StoredDetail as _;
 
 use crate::job::{Outcome, ShowArgs, StdoutFormat, count, now};
 use crate::score::record::{Detail, answered};
 use crate::store::{AddressChange, Store, read_questions};
 use crate::types::manifest::{Counts, RunManifest, Status};
 use crate::types::{
-    ChoiceDetail, Condition, Decides, Digest, QuestionId, Record, Reply, TrialKey, TrialRef,
-    Trials, UnreadReason,
+    ChoiceDetail, Condition, Decides, Digest, QuestionId, Record, Reply, StoredDetail as _,
+    TrialKey, TrialRef, Trials, UnreadReason,
 };
 
 /// The flags of `study read`.
