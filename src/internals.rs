@@ -3,24 +3,25 @@
 pub mod ask {
     pub use crate::ask::{
         Access, AskError, BaseUrl, Call, Constrain, Endpoint, ExtraFields, ImageDetail, Message,
-        Model, Parameters, Payload, PayloadFormat, Prompts, Query, Quota, Random, Reach, Remote,
-        Script, Secret, Sending, Temperature, Thinking, TokenField, WireSetting,
+        Model, Parameters, Prompts, Query, Quota, Random, Reach, Remote, Script, Secret, Sending,
+        Temperature, Thinking, TokenField, WireSetting,
     };
 }
 
 pub mod dataset {
-    pub use crate::dataset::image_file::ImageFile;
     pub use crate::dataset::picture::Picture;
-    pub use crate::dataset::reading_rule::{ColourRule, MOST_PIXELS, ReadingRule, Transfer};
     pub use crate::dataset::{DataPlace, Dataset, SetArgs};
-}
-
-pub mod job {
-    pub use crate::job::bilinear::bilinear;
 }
 
 pub mod labels {
     pub use crate::labels::space;
+}
+
+pub mod picture {
+    pub use crate::picture::reading_rule::{ColourRule, MOST_PIXELS, Transfer};
+    pub use crate::picture::{
+        ImageFile, Payload, PayloadFormat, ReadingRule, Scaling, bilinear, fit, png,
+    };
 }
 
 pub mod questions {

@@ -75,6 +75,7 @@
 //! |---|---|---|
 //! | `ground` | [`error`], `files`, [`types`], `labels` | the one error type; files read with bounds and written whole; the vocabulary; the label spaces NYU40, mpcat40, ADE150 and NYU13 |
 //! | `light` | [`synthesis`] | a clean image × a degradation → a degraded one; pure, given a noise key |
+//! | `picture` | `picture` | image files with their colour profiles and orientation, maps of numbers, scaling, and images encoded for a request |
 //! | `scenes` | `rooms` | the built-in rooms, drawn by a seed with all their maps |
 //! | `questions` | [`questions`] | a frame with its maps → questions with one true answer, by rule; and the observer: what the rules could still answer from given pixels |
 //! | `enhance` | [`enhance`] | a degraded image → an enhanced one, by the user's ONNX model; `models` has the enhancers that the program carries |
@@ -120,17 +121,17 @@
 //!
 //! | module | may use |
 //! |---|---|
-//! | `dataset` | `rooms`, `labels`, `files`, `types`, `error` |
-//! | `import` | `dataset`, `labels`, `files`, `types`, `error` |
-//! | `ask` | `files`, `types`, `error` |
-//! | `calibrate` | `dataset`, `synthesis`, `files`, `types`, `error` |
+//! | `dataset` | `rooms`, `labels`, `files`, `picture`, `types`, `error` |
+//! | `import` | `dataset`, `labels`, `files`, `picture`, `types`, `error` |
+//! | `ask` | `files`, `picture`, `types`, `error` |
+//! | `calibrate` | `dataset`, `synthesis`, `files`, `picture`, `types`, `error` |
 //! | `store` | `score`, `files`, `types`, `error` |
 //! | `image_store` | `files`, `types`, `error` |
 //! | `report` | `types`, `error`, `score`, `questions`, `calibrate` |
-//! | `job` | `files`, `types`, `error`, `rooms`, `labels`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `image_store`, `report` |
-//! | `run` | `job`, `files`, `types`, `error`, `rooms`, `labels`, `import`, `dataset`, `calibrate`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `image_store`, `report` |
-//! | `internals` | `ask`, `dataset`, `enhance`, `job`, `labels`, `questions`, `report`, `rooms`, `score`, `synthesis`, `types`, `error` |
-//! | `cli` | `run`, `job`, `image_store`, `files`, `rooms`, `dataset`, `ask`, `enhance`, `score`, `synthesis`, `types`, `error` |
+//! | `job` | `files`, `picture`, `types`, `error`, `rooms`, `labels`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `image_store`, `report` |
+//! | `run` | `job`, `files`, `picture`, `types`, `error`, `rooms`, `labels`, `import`, `dataset`, `calibrate`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `image_store`, `report` |
+//! | `internals` | `picture`, `ask`, `dataset`, `enhance`, `job`, `labels`, `questions`, `report`, `rooms`, `score`, `synthesis`, `types`, `error` |
+//! | `cli` | `run`, `job`, `picture`, `image_store`, `files`, `rooms`, `dataset`, `ask`, `enhance`, `score`, `synthesis`, `types`, `error` |
 //! | `main` | `cli`, `enhance` |
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
@@ -153,6 +154,7 @@ pub use darkqa_enhance as enhance;
 pub use darkqa_ground::{error, types};
 pub(crate) use darkqa_ground::{files, labels};
 pub use darkqa_light as synthesis;
+pub(crate) use darkqa_picture as picture;
 pub use darkqa_questions as questions;
 pub(crate) use darkqa_scenes as rooms;
 pub use darkqa_score as score;

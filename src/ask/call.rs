@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::failure::{AskError, Reach};
 use serde::Serialize;
 
-use super::payload::Payload;
+use crate::picture::Payload;
 use crate::types::image_mark::{MarkedPiece, pieces};
 use crate::types::{Condition, FailureKind, Question, QuestionId};
 
@@ -152,7 +152,7 @@ pub struct Call<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ask::payload::PayloadFormat;
+    use crate::picture::PayloadFormat;
     use crate::types::Rgb;
 
     /// The parts of a message with images of 1, 2, … pixels width: words, and the widths of images.
@@ -160,7 +160,7 @@ mod tests {
         let images: Vec<Arc<Payload>> = (1..=images)
             .map(|width| {
                 let image = Rgb::black(1, width);
-                Arc::new(Payload::encode(&image, PayloadFormat::Png, None).unwrap())
+                Arc::new(Payload::encode(&image, PayloadFormat::Png).unwrap())
             })
             .collect();
         let message = Message {

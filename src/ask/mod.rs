@@ -1,7 +1,7 @@
 //! Stage 4, ask: sends a prompt and an image to a model and receives a [`Reply`](crate::types::Reply). The only asynchronous
 //! stage.
 //!
-//! [`Prompts`] turn a question into text, [`Payload`] an image into the text of a data URL; both are CPU work and done before.
+//! [`Prompts`] turn a question into text, [`Payload`](crate::picture::Payload) an image into the text of a data URL; both are CPU work and done before.
 //! A [`Model`] takes the two as the [`Message`] of a [`Call`]. [`Remote`] is a model at an [`Endpoint`]. The endpoint is one server,
 //! at one or several addresses: each replica has its key, connections and pauses. All models at that server share it. What is known
 //! of vendors is a table, `vendors.toml`. A [`Wire`](wire_kind::Wire) defines the form of requests and replies: files of one API in
@@ -34,8 +34,6 @@ pub(crate) mod openeqa;
 mod own_headers;
 mod pace;
 mod parameters;
-mod payload;
-mod plain_png;
 mod prices;
 mod prompt;
 mod random;
@@ -74,8 +72,6 @@ pub use model::Model;
 pub(crate) use pace::Bounds;
 pub use pace::Quota;
 pub use parameters::{Constrain, ImageDetail, Parameters, Temperature};
-pub(crate) use payload::{ImageArgs, pixels_of_url, png};
-pub use payload::{Payload, PayloadFormat};
 pub(crate) use prices::{Price, Prices};
 pub use prompt::Prompts;
 pub use random::Random;

@@ -7,13 +7,14 @@ use clap::{ArgMatches, Args, Command as Clap};
 
 use super::command::{BatchCommand, CheckCommand, Cli, Command};
 use super::layers;
-use crate::ask::{AccessArgs, ImageArgs, Parameters, RequestArgs, Sending};
+use crate::ask::{AccessArgs, Parameters, RequestArgs, Sending};
 use crate::dataset::{CodesArgs, SetArgs};
 use crate::enhance::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
 use crate::image_store::StoreArgs;
 use crate::job::batch::{BatchFileArgs, BatchRunArgs};
 use crate::job::models::ModelName;
 use crate::job::settings::JobArgs;
+use crate::picture::ImageArgs;
 use crate::run::evaluate::{EvaluateArgs, ShrinkArgs};
 use crate::run::import::ImportArgs;
 use crate::run::openeqa::{JudgeArgs, OpenEqaArgs};

@@ -1,21 +1,16 @@
 //! Writing frames into a folder of the common interface, which [`crate::dataset::frames`] reads: [`FramePaths`].
 
 use std::collections::BTreeMap;
-use std::io::Cursor;
 use std::path::Path;
 
-use exr::prelude::{
-    Encoding, Image, Layer, LayerAttributes, SpecificChannels, Vec2, WritableImage as _,
-};
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder as _};
 use ndarray::Array2;
 use serde_json::{Map, Value, json};
 
 use crate::error::{Error, Result};
 use crate::files::write;
 use crate::labels;
-use crate::types::{DepthKind, Labels, Light, Rgb, SegmentName, Segmentation};
+use crate::picture::grey_png;
+use crate::types::{DepthKind, Labels, Rgb, SegmentName, Segmentation};
 
 /// The file that lists the frames.
 pub(crate) const FRAMES: &str = "frames.jsonl";
@@ -140,39 +135,9 @@ fn npy(segments: &Array2<u32>) -> Vec<u8> {
     file
 }
 
-/// The bytes of an OpenEXR file of linear light: 32-bit floats, compressed without loss.
-pub(crate) fn exr(light: &Light) -> Result<Vec<u8>> {
-    let (width, height) = (light.width(), light.height());
-    let pixel = |at: Vec2<usize>| {
-        let samples = &light.samples()[3 * (at.y() * width + at.x())..];
-        (samples[0], samples[1], samples[2])
-    };
-    let layer = Layer::new(
-        (width, height),
-        LayerAttributes::default(),
-        Encoding::SMALL_LOSSLESS,
-        SpecificChannels::rgb(pixel),
-    );
-    let mut file = Cursor::new(Vec::new());
-    Image::from_layer(layer)
-        .write()
-        .to_buffered(&mut file)
-        .map_err(|e| Error::data("image", e))?;
-    Ok(file.into_inner())
-}
-
-/// The bytes of a 16-bit grey PNG.
+/// The bytes of a map as a 16-bit grey PNG.
 fn grey(map: &Array2<u16>) -> Result<Vec<u8>> {
     let (height, width) = map.dim();
-    let samples: Vec<u8> = map.iter().flat_map(|value| value.to_ne_bytes()).collect();
-    let mut file = Vec::new();
-    PngEncoder::new_with_quality(&mut file, CompressionType::Fast, FilterType::Adaptive)
-        .write_image(
-            &samples,
-            width as u32,
-            height as u32,
-            ExtendedColorType::L16,
-        )
-        .map_err(|e| Error::data("map", e))?;
-    Ok(file)
+    let samples: Vec<u16> = map.iter().copied().collect();
+    grey_png((width, height), &samples)
 }

@@ -24,7 +24,6 @@ use std::sync::Arc;
 use serde::Deserialize;
 
 use super::dark_photos::DarkField;
-use super::image_file::format::READ;
 use super::image_names::{ImageNames, is_image};
 use super::image_source::FrameFile;
 use super::maps::{DepthFile, MapPaths};
@@ -34,6 +33,7 @@ use super::{Dataset, ImageSource, Root, SetArgs, ready_made, stem};
 use crate::error::{Error, Result};
 use crate::files::reading::{entries, json, json_lines};
 use crate::labels;
+use crate::picture::image_file::format::READ;
 use crate::types::{DepthKind, FrameId, Intrinsics, Labels, SegmentName, Segmentation, SetLight};
 
 /// The file that lists the frames of the common interface.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::image_file::format::READ;
+use crate::picture::image_file::format::READ;
 use crate::types::frame::is_image_ending;
 
 /// Endings of the names of images in formats that are not read.

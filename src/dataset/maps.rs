@@ -7,11 +7,13 @@ use std::path::{Path, PathBuf};
 
 use ndarray::Array2;
 
-use super::npy::Npy;
-use super::raw_png::{RawPng, SampleForm};
-use super::reading_rule::MOST_PIXELS;
 use crate::error::{Error, Result};
 use crate::files::reading;
+use crate::picture::ImageFile;
+use crate::picture::image_file::StatedTurn;
+use crate::picture::npy::Npy;
+use crate::picture::raw_png::{RawPng, SampleForm};
+use crate::picture::reading_rule::MOST_PIXELS;
 use crate::types::Digest;
 
 /// The maximum depth of a pixel in millimetres: a kilometre (chosen). No room is as deep. A larger value means a wrong
@@ -132,6 +134,38 @@ impl MapPaths {
             Ok((path, in_file(path, size)?))
         });
         sizes.collect()
+    }
+
+    /// The image file that these maps belong to. Maps are not turned, so the image is not turned either if they have the size of the
+    /// image as stored.
+    ///
+    /// # Errors
+    /// If the file states a turn and a map has another size than the image as stored.
+    pub(super) fn beside(&self, image: ImageFile) -> Result<ImageFile> {
+        if self.is_empty() {
+            return Ok(image);
+        }
+        let Some(StatedTurn {
+            orientation,
+            stored,
+        }) = image.stated_turn()
+        else {
+            return Ok(image);
+        };
+        for (path, size) in self.sizes()? {
+            if size != stored {
+                let problem = format_args!(
+                    "{} × {} pixels (height × width), but its image {} is stored with {} × {} and turned by its EXIF orientation {orientation}; maps must have the size of the image as stored, which is then not turned, or the file no orientation",
+                    size.0,
+                    size.1,
+                    image.place(),
+                    stored.0,
+                    stored.1,
+                );
+                return Err(Error::data(path.display(), problem));
+            }
+        }
+        Ok(image.never_turned())
     }
 
     /// The bytes of the files, not decoded.

@@ -4,25 +4,20 @@
 //! ready-made multiple-choice set ([`ready_made`]). Without a path the data are the built-in rooms ([`rooms`]).
 
 mod bank;
-mod colour;
 mod dark_photos;
 mod family;
 pub(crate) mod frame_folder;
 pub(crate) mod frames;
-pub(crate) mod image_file;
 pub(crate) mod image_names;
 mod image_source;
 pub(crate) mod inputs;
 mod label_folders;
 pub(crate) mod maps;
-pub(crate) mod npy;
 pub(crate) mod openeqa;
 mod pair_frames;
 pub(crate) mod pairs;
 mod photographs;
 pub(crate) mod picture;
-pub(crate) mod raw_png;
-pub(crate) mod reading_rule;
 mod ready_made;
 mod root;
 mod scene_args;
@@ -34,17 +29,16 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use crate::error::{Error, Result};
+use crate::picture::{ImageFile, ReadingRule};
 use crate::rooms::{self, Rooms};
 use crate::types::{Frame, FrameId, Labels, PhotoName, Question};
 
 pub(crate) use bank::{Bank, BankPlace};
 use dark_photos::DarkPhoto;
-pub(crate) use image_file::ImageFile;
 pub(crate) use image_source::ImageSource;
 use maps::MapPaths;
 pub(crate) use photographs::Photographs;
 pub(crate) use picture::Picture;
-pub(crate) use reading_rule::ReadingRule;
 pub use ready_made::SetArgs;
 use ready_made::{Form, ReadQuestions, Series};
 pub(crate) use root::Root;
@@ -382,7 +376,7 @@ impl Dataset {
         match self.sources.get(frame) {
             Some(ImageSource::File(file)) => {
                 let image = ImageFile::open(&file.rgb, self.rule)?;
-                image.beside(&file.maps).map(Picture::Encoded)
+                file.maps.beside(image).map(Picture::Encoded)
             }
             Some(ImageSource::Embedded(image)) => image.image(self.rule).map(Picture::Encoded),
             Some(ImageSource::Member(archive)) => {

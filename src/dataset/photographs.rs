@@ -3,12 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use super::image_file::format::READ;
 use super::image_names::{ImageNames, is_image};
 use super::root::{LeadsTo, Root};
 use super::{DataPlace, Dataset, ImageSource, SetArgs, frames, stem};
 use crate::error::{Error, Result};
 use crate::files::reading::entries;
+use crate::picture::image_file::format::READ;
 use crate::types::FrameId;
 
 /// The images at a place, and what is to be said about how they were found.

@@ -1,8 +1,8 @@
 //! The image of a frame before decoding: [`Picture`].
 
-use super::image_file::ImageFile;
-use super::reading_rule::ReadingRule;
 use crate::error::Result;
+use crate::picture::ImageFile;
+use crate::picture::ReadingRule;
 use crate::rooms::Room;
 use crate::types::{Digest, InputNote, Pixels, Rgb};
 

@@ -8,9 +8,9 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::bank::BankPlace;
-use super::reading_rule::{ColourRule, MOST_PIXELS, ReadingRule, Transfer};
 use super::ready_made::{is_known_set, known_sets};
 use super::{DataPlace, SetArgs};
+use crate::picture::reading_rule::{ColourRule, MOST_PIXELS, ReadingRule, Transfer};
 use crate::rooms::Rooms;
 use crate::types::{Decides, Family, shell_word};
 

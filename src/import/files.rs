@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 use ndarray::Array2;
 
 use crate::dataset::maps::DepthFile;
-use crate::dataset::npy::Npy;
-use crate::dataset::raw_png::{RawPng, SampleForm};
-use crate::dataset::reading_rule::MOST_PIXELS;
-use crate::dataset::{ImageFile, ReadingRule};
 use crate::error::{Error, Result};
 use crate::files::reading::{bytes, entries, text};
+use crate::picture::npy::Npy;
+use crate::picture::raw_png::{RawPng, SampleForm};
+use crate::picture::reading_rule::MOST_PIXELS;
+use crate::picture::{ImageFile, ReadingRule};
 use crate::types::Rgb;
 
 /// The endings of the names of images.

@@ -10,9 +10,9 @@ use super::files::{
     IMAGES, check_same_size, depth_of, files, first_folder, folders, png, segments,
 };
 use crate::dataset::image_names::ImageNames;
-use crate::dataset::raw_png::SampleForm;
 use crate::error::{Error, Result};
 use crate::files::reading::entries;
+use crate::picture::raw_png::SampleForm;
 use crate::types::{Labels, Rgb};
 
 /// Names of the folders of images, depth, classes and segments.

@@ -15,11 +15,11 @@ use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs};
 use super::files::{
     IMAGES, check_same_size, depth, file_name, files, first_folder, folders, numbers, png,
 };
-use crate::dataset::raw_png::SampleForm;
 use crate::error::{Error, Result};
 use crate::files::reading::{bytes, json, text};
 use crate::labels::names::{UNKNOWN, overridden};
 use crate::labels::{canonical, space};
+use crate::picture::raw_png::SampleForm;
 use crate::types::{Intrinsics, Label, Labels, Rgb};
 
 /// File name of the table of ScanNet's label numbers.

@@ -15,11 +15,11 @@ use serde_json::Value;
 use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing};
 use super::files::{IMAGES, check_same_size, file_name, files, folders, numbers, png};
 use super::polygons::{Polygon, draw};
-use crate::dataset::raw_png::SampleForm;
 use crate::error::{Error, Result};
 use crate::files::reading::{json, text};
 use crate::labels::canonical;
 use crate::labels::names::class_of;
+use crate::picture::raw_png::SampleForm;
 use crate::types::{Intrinsics, Label, Labels, Rgb};
 
 /// The folders of depth, in the order in which they are looked for. `depth_bfx` is `depth` with its holes filled, which is what

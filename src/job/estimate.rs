@@ -169,7 +169,7 @@ fn lines<E: Experiment>(
                 let mut shown = source.order.iter().map(|place| source.frames[*place].size);
                 let charged = measured.image(index);
                 let of_request = shown.try_fold(0.0, |sum, size| {
-                    let (width, height) = experiment.recipe().scaling.of(size);
+                    let (width, height) = experiment.recipe().scaling.size(size);
                     let by_rule = || image_tokens(model, price, width, height);
                     Some(sum + charged.or_else(by_rule)?)
                 });

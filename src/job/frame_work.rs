@@ -7,18 +7,18 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::bilinear::bilinear;
 use super::image_steps::ImageSteps;
 use super::photograph::SourcePhotograph;
 use super::recipe::Recipe;
-use super::scaling::Scaling;
 use super::source::{Source, SourceFrame};
 use super::stored_images::{MadeNotes, StoredPlace};
 use super::timings::TimedStep;
 use super::walk::DegradedAt;
-use crate::ask::{Payload, PayloadFormat};
 use crate::dataset::Picture;
 use crate::error::{Error, Result};
+use crate::picture::Scaling;
+use crate::picture::bilinear;
+use crate::picture::{Payload, PayloadFormat};
 use crate::synthesis::{AppliedDegradation, Exposures, FrameView, NoiseKey};
 use crate::types::{
     Condition, Degradation, Digest, EnhancerName, ExposureFacts, FrameId, InputNote, PairFacts,
@@ -152,19 +152,21 @@ impl<'a> FrameWork<'a> {
         let Recipe {
             format, scaling, ..
         } = *self.steps.recipe;
-        let side = match scaling {
-            Scaling::Never => None,
-            Scaling::MaxSide(side) => Some(side),
-            Scaling::LongerSide(_) => return Ok(None),
-        };
-        if *condition != Condition::L0 || format != PayloadFormat::Png {
+        if *condition != Condition::L0
+            || format != PayloadFormat::Png
+            || matches!(scaling, Scaling::LongerSide(_))
+        {
             return Ok(None);
         }
         let Picture::Encoded(file) = self.picture()? else {
             return Ok(None);
         };
-        let payload = Payload::of_plain_png(file.bytes(), side);
+        let payload = Payload::from_plain_png(file.bytes());
         payload
+            .filter(|payload| {
+                let (width, height) = payload.size();
+                scaling.size((width as u32, height as u32)) == payload.size()
+            })
             .map(|payload| self.steps.checked(payload))
             .transpose()
     }

@@ -6,9 +6,9 @@ use serde_json::{Value, json};
 
 use super::models::ModelUnderTest;
 use super::recipe::Recipe;
-use super::scaling::Scaling;
 use super::settings::JobSettings;
 use crate::enhance::{self, SizeArgs, Tiling};
+use crate::picture::Scaling;
 use crate::synthesis::{KindSettings, Synthesis, version};
 use crate::types::degradation::Kind;
 use crate::types::{Degradation, Digest, PairDark, ReadingName};

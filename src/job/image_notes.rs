@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use super::stored_images::Similarity;
 use super::thumbnail::MissingThumbnails;
-use crate::ask::Payload;
 use crate::error::Result;
+use crate::picture::Payload;
 use crate::score::realism::{psnr, ssim::ssim};
 use crate::score::record::Detail;
 use crate::store::Store;

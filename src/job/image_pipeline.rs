@@ -29,9 +29,9 @@ use super::thumbnail::{ShownObjects, thumbnail_of_all};
 use super::timings::TimedStep;
 use super::trial::{Item, PreparedGroup, Stimulus};
 use super::workers::Workers;
-use crate::ask::Payload;
 use crate::enhance::{Enhancer, ImageUse, Implausible};
 use crate::error::{Error, Result};
+use crate::picture::Payload;
 use crate::types::{Condition, EnhancerName, FrameId, Rgb};
 
 /// The steps from a frame to an image, with the enhancement models that they need.
@@ -349,7 +349,7 @@ impl<'a> ImagePipeline<'a> {
                         similarity: None,
                     };
                     let took = took + started.elapsed();
-                    self.steps.store(&place, &payload, &notes, took)?;
+                    self.steps.store(&place, &payload, &notes, took);
                 }
                 Ok(paired(payload, pair))
             }

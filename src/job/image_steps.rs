@@ -4,14 +4,13 @@ use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::bilinear::bilinear;
 use super::recipe::Recipe;
-use super::scaling::Scaling;
 use super::source::Frames;
 use super::stored_images::{MadeNotes, Needed, Similarity, StoredImage, StoredImages, StoredPlace};
 use super::timings::{TimedStep, Timings};
-use crate::ask::{ImageLimit, Payload};
+use crate::ask::ImageLimit;
 use crate::error::Result;
+use crate::picture::Payload;
 use crate::types::{ExposureFacts, InputNote, Rgb};
 
 /// Files, settings and timings that all images share.
@@ -49,9 +48,9 @@ impl ImageSteps<'_> {
         image: &Payload,
         notes: &MadeNotes,
         took: Duration,
-    ) -> Result<()> {
+    ) {
         let write = || place.write(image, notes, took);
-        self.timings.time(TimedStep::Encode, write)
+        self.timings.time(TimedStep::Encode, write);
     }
 
     /// An image from the store as it is sent, with what the camera did. `note` says how the file of its frame was read.
@@ -75,7 +74,7 @@ impl ImageSteps<'_> {
     ) -> Result<(Arc<Payload>, Cow<'p, Rgb>)> {
         let (payload, encoded) = self.timings.time(TimedStep::Encode, || {
             let encoded = self.scaled(image)?;
-            let payload = Payload::encode(&encoded, self.recipe.format, None)?;
+            let payload = Payload::encode(&encoded, self.recipe.format)?;
             let payload = payload.turned_by(note.orientation);
             Ok((payload.exposed_by(exposure), encoded))
         })?;
@@ -84,13 +83,7 @@ impl ImageSteps<'_> {
 
     /// The image in the size sent.
     pub(super) fn scaled<'p>(&self, image: &'p Rgb) -> Result<Cow<'p, Rgb>> {
-        Ok(match self.recipe.scaling {
-            Scaling::MaxSide(side) => Payload::scaled(image, Some(side))?,
-            Scaling::LongerSide(side) if longer_side(image) != side => {
-                Cow::Owned(bilinear(image, side)?)
-            }
-            Scaling::Never | Scaling::LongerSide(_) => Cow::Borrowed(image),
-        })
+        self.recipe.scaling.scale(image)
     }
 
     pub(super) fn checked(&self, payload: Payload) -> Result<Arc<Payload>> {
@@ -99,8 +92,4 @@ impl ImageSteps<'_> {
         }
         Ok(Arc::new(payload))
     }
-}
-
-fn longer_side(image: &Rgb) -> usize {
-    image.height().max(image.width())
 }

@@ -9,10 +9,10 @@ use clap::{ArgAction, ArgMatches, CommandFactory as _, Parser};
 use serde_json::Value;
 
 use super::walk::Walk;
-use crate::ask::ImageArgs;
 use crate::dataset::{CodesArgs, DataArgs, PixelLimit, SceneArgs};
 use crate::enhance::SizeArgs;
 use crate::error::{Error, Result};
+use crate::picture::ImageArgs;
 use crate::synthesis::{CameraArgs, SensorArgs};
 use crate::types::Decides;
 

@@ -6,7 +6,6 @@
 
 pub(crate) mod batch;
 mod batch_system;
-pub(crate) mod bilinear;
 pub(crate) mod budget;
 mod circuit_breaker;
 pub(crate) mod conditions;
@@ -63,7 +62,6 @@ pub(crate) mod run_files;
 pub(crate) mod run_parts;
 pub(crate) mod run_plan;
 mod run_texts;
-pub(crate) mod scaling;
 pub(crate) mod settings;
 pub(crate) mod shard;
 pub(crate) mod source;

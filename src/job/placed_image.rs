@@ -11,10 +11,10 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::ask::png;
-use crate::dataset::{ImageFile, ReadingRule};
 use crate::error::{Error, Result};
 use crate::files::{reading, write};
+use crate::picture::png;
+use crate::picture::{ImageFile, ReadingRule};
 use crate::types::{Digest, Rgb};
 
 /// What an image was made from, as its JSON file holds it.

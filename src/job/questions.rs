@@ -7,11 +7,11 @@ use std::path::Path;
 use super::progress::Progress;
 use super::questions_by_rule::by_rule;
 use crate::dataset::{
-    Bank, BankArgs, BankPlace, DataPlace, Dataset, Photographs, ReadingRule, SceneArgs,
-    SelectionArgs, SetArgs,
+    Bank, BankArgs, BankPlace, DataPlace, Dataset, Photographs, SceneArgs, SelectionArgs, SetArgs,
 };
 use crate::error::{Error, Result};
 use crate::files::reading;
+use crate::picture::ReadingRule;
 use crate::questions::rules::Rules;
 use crate::report::words::counted;
 use crate::types::{Digest, Family, Question};

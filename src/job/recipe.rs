@@ -5,12 +5,12 @@ use std::num::NonZeroU32;
 
 use serde::Serialize;
 
-use super::scaling::Scaling;
 use super::source::{Source, SourceFrame};
 use super::walk::{CameraOf, DegradedAt, Walk};
-use crate::ask::PayloadFormat;
 use crate::enhance::{self, ModelFile};
 use crate::error::{Error, Result};
+use crate::picture::PayloadFormat;
+use crate::picture::Scaling;
 use crate::synthesis::{self, AppliedDegradation, FrameView, KindSettings, NoiseKey, Synthesis};
 use crate::types::degradation::Kind;
 use crate::types::{
@@ -184,7 +184,7 @@ impl Recipe {
         let own = size.0 as usize;
         let width = match self.degraded_at {
             DegradedAt::Native => own,
-            DegradedAt::Resized => self.scaling.of(size).0,
+            DegradedAt::Resized => self.scaling.size(size).0,
         };
         let scale = width as f64 / own as f64;
         FrameView {

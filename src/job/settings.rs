@@ -15,13 +15,12 @@ use super::models::{AskSettings, AskingArgs, KeyUse, ModelArgs, ResolveContext, 
 use super::money::{MoneyArgs, MoneySettings};
 use super::outcome::{RecordTable, ShowArgs, StdoutFormat};
 use super::shard::Shard;
-use crate::ask::{
-    AccessArgs, Bounds, Constrain, ImageArgs, Parameters, PayloadFormat, RequestArgs, Sending,
-};
+use crate::ask::{AccessArgs, Bounds, Constrain, Parameters, RequestArgs, Sending};
 use crate::enhance::{EnhancerArgs, ModelFile};
 use crate::error::{Error, Result};
 use crate::files::folder_access::FolderAccess;
 use crate::image_store::StoreArgs;
+use crate::picture::{ImageArgs, PayloadFormat};
 use crate::synthesis::{LightArgs, LightSettings};
 use crate::types::flag::seconds;
 use crate::types::{Decides, SetLight, View};

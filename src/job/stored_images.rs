@@ -10,10 +10,10 @@ use super::source::{Source, SourceFrame};
 use super::stored_findings::StoredFindings;
 use super::stored_thumbnails::ThumbnailPlace;
 use super::thumbnail::ShownObjects;
-use crate::ask::Payload;
 use crate::enhance::ImageUse;
 use crate::error::Result;
 use crate::image_store::{Content, Entry, EntryFacts, ImageStore, Key, Shown, StoredKinds};
+use crate::picture::Payload;
 use crate::types::{Condition, FrameId};
 
 /// A store, with what decides images besides their recipes.
@@ -190,7 +190,7 @@ impl<'a> StoredPlace<'a> {
         let entry = self.store.get(&self.image, Content::Image, is_enough)?;
         let [width, height] = entry.size;
         Some(StoredImage {
-            payload: Payload::of_file(&entry.image, width, height, recipe.format),
+            payload: Payload::from_file(entry.image, (width, height), recipe.format),
             notes: notes?,
         })
     }
@@ -218,10 +218,7 @@ impl<'a> StoredPlace<'a> {
     }
 
     /// Adds what is known of an image that took this time to make: with the image, if images like it are kept, else without it.
-    ///
-    /// # Errors
-    /// None in practice: the image was encoded here.
-    pub(crate) fn write(&self, image: &Payload, notes: &MadeNotes, took: Duration) -> Result<()> {
+    pub(crate) fn write(&self, image: &Payload, notes: &MadeNotes, took: Duration) {
         let facts = EntryFacts::new(
             self.shown.clone(),
             took.as_millis() as u64,
@@ -231,16 +228,15 @@ impl<'a> StoredPlace<'a> {
             if notes.similarity.is_some() {
                 self.store.put(measures, &Entry::of_facts(facts));
             }
-            return Ok(());
+            return;
         }
         let side = |pixels: usize| u32::try_from(pixels).unwrap_or(u32::MAX);
         let entry = Entry {
-            image: image.file()?,
+            image: image.file().to_vec(),
             size: [side(image.facts().width), side(image.facts().height)],
             facts,
         };
         self.store.put(&self.image, &entry);
-        Ok(())
     }
 }
 

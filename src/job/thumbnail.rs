@@ -6,8 +6,8 @@ use std::num::NonZeroU32;
 use std::sync::Arc;
 
 use super::montage::{columns, montage};
-use crate::ask::{Payload, PayloadFormat};
 use crate::error::{Error, Result};
+use crate::picture::{Payload, PayloadFormat, Scaling};
 use crate::types::outlines::PixelBox;
 use crate::types::{Condition, Digest, FrameId, ObjectCrop, Rgb, RunQuestion, Thumbnail};
 
@@ -203,7 +203,7 @@ fn url(image: &Rgb) -> Result<String> {
     let jpeg: PayloadFormat = FORMAT
         .parse()
         .map_err(|e| Error::data("the format of thumbnails", e))?;
-    let url = Payload::encode(image, jpeg, None)?.data_url();
+    let url = Payload::encode(image, jpeg)?.data_url();
     Ok(String::from_utf8_lossy(&url).into_owned())
 }
 
@@ -211,8 +211,8 @@ fn url(image: &Rgb) -> Result<String> {
 /// fast as `image::imageops::thumbnail`.
 fn small(image: &Rgb, side: u32) -> Result<Cow<'_, Rgb>> {
     let (height, width) = (image.height(), image.width());
-    let fitted = Payload::fitted(width as u32, height as u32, NonZeroU32::new(side));
-    let (columns, rows) = (fitted.0 as usize, fitted.1 as usize);
+    let scaling = NonZeroU32::new(side).map_or(Scaling::Never, Scaling::MaxSide);
+    let (columns, rows) = scaling.size((width as u32, height as u32));
     if (columns, rows) == (width, height) {
         return Ok(Cow::Borrowed(image));
     }
@@ -265,6 +265,7 @@ fn amplified(image: &Rgb, [top, left, height, width]: Place, ev: f32) -> Result<
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::picture::fit;
 
     #[test]
     fn a_small_pixel_is_the_mean_of_those_it_replaces() {
@@ -293,8 +294,8 @@ mod tests {
             ("jpeg:50", 400),
             ("jpeg:50", 301),
         ] {
-            let scaled = Payload::scaled(&image, NonZeroU32::new(side)).unwrap();
-            let sent = Payload::encode(&scaled, format.parse().unwrap(), None).unwrap();
+            let scaled = fit(&image, NonZeroU32::new(side).unwrap()).unwrap();
+            let sent = Payload::encode(&scaled, format.parse().unwrap()).unwrap();
             let copy = |encoded| thumbnail(&frame, &condition, &sent, encoded, None).unwrap();
             assert_eq!(copy(Some(&*scaled)), copy(None), "{format} {side}");
         }

@@ -6,8 +6,9 @@ use serde::Serialize;
 
 use super::image_notes::ImageNotes;
 use super::models::ModelUnderTest;
-use crate::ask::{ImagePlaces, Message, Payload, Query};
+use crate::ask::{ImagePlaces, Message, Query};
 use crate::error::{Error, Result};
+use crate::picture::Payload;
 use crate::score::record::Detail;
 use crate::types::{Condition, Digest, QuestionId, Record, TrialKey};
 

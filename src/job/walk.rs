@@ -9,11 +9,12 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::progress::Progress;
-use super::scaling::Scaling;
 use super::source::{Frames, Source, SourceFrame};
+use crate::dataset::Picture;
 use crate::dataset::openeqa::{sampled, walk};
-use crate::dataset::{ImageFile, Picture, ReadingRule};
 use crate::error::Result;
+use crate::picture::Scaling;
+use crate::picture::{ImageFile, ReadingRule};
 use crate::types::{Decides, FrameId};
 
 /// Flags that decide which frames of a walk are shown, and how.

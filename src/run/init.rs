@@ -6,13 +6,14 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::json;
 
-use crate::ask::png;
-use crate::dataset::{DataPlace, Dataset, ReadingRule, SceneArgs, SelectionArgs, SetArgs};
+use crate::dataset::{DataPlace, Dataset, SceneArgs, SelectionArgs, SetArgs};
 use crate::error::{Error, Result};
 use crate::files::{reading, write};
 use crate::job::Outcome;
 use crate::job::progress::Progress;
 use crate::job::questions::open_data;
+use crate::picture::ReadingRule;
+use crate::picture::png;
 use crate::questions::rules::Rules;
 use crate::report::words::counted;
 use crate::types::manifest::Status;

@@ -8,12 +8,12 @@ use clap::Args;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
-use crate::ask::png;
 use crate::dataset::frame_folder::{self, FRAMES, FramePaths};
 use crate::error::{Error, Result};
 use crate::job::Outcome;
 use crate::job::progress::Progress;
 use crate::job::workers::{ThreadArgs, pool};
+use crate::picture::{exr, png};
 use crate::rooms::{self, Room, Rooms};
 use crate::types::manifest::Status;
 use crate::types::{Decides, FrameId, Labels, SegmentName};
@@ -100,7 +100,7 @@ fn write_frame(args: &RoomsArgs, room: &Room) -> Result<WrittenFrame> {
     let codes = paths.write("rgb", "png", &png(&frame.rgb)?)?;
     // The frame is its light; the PNG file beside it is for looking at.
     let image = match room.light() {
-        Some(light) => paths.write("rgb", "exr", &frame_folder::exr(&light)?)?,
+        Some(light) => paths.write("rgb", "exr", &exr(&light)?)?,
         None => codes,
     };
     line.insert("rgb".to_owned(), json!(image));

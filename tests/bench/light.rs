@@ -6,8 +6,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use darkqa_eval::internals::ask::{Payload, PayloadFormat};
-use darkqa_eval::internals::job::bilinear;
+use darkqa_eval::internals::picture::{Payload, PayloadFormat, bilinear};
 use darkqa_eval::internals::score::{psnr, ssim};
 use darkqa_eval::internals::synthesis::{
     Negative, Term, add_noise, blur, blurred_codes, expose, expose_into, ladder as develop_ladder,
@@ -173,19 +172,13 @@ fn request(c: &mut Criterion) {
     group.bench_function("noise L3", |b| b.iter(noisy));
     let dark = noisy();
     group.bench_function("noise L3 to PNG body", |b| {
-        b.iter(|| Payload::encode(black_box(&dark), PayloadFormat::Png, None));
+        b.iter(|| Payload::encode(black_box(&dark), PayloadFormat::Png));
     });
     group.bench_function("frame to request, exposure L3", |b| {
-        b.iter(|| {
-            Payload::encode(
-                &expose(black_box(&clean), Severity::L3),
-                PayloadFormat::Png,
-                None,
-            )
-        });
+        b.iter(|| Payload::encode(&expose(black_box(&clean), Severity::L3), PayloadFormat::Png));
     });
     group.bench_function("frame to request, noise L3", |b| {
-        b.iter(|| Payload::encode(&noisy(), PayloadFormat::Png, None));
+        b.iter(|| Payload::encode(&noisy(), PayloadFormat::Png));
     });
     group.finish();
 }
@@ -201,7 +194,7 @@ fn walk(c: &mut Criterion) {
     group.bench_function("noise L4, scaled to 512, to PNG body", |b| {
         b.iter(|| {
             let dark = Negative::new(&clean, &key, &paper, Severity::L4).develop(Severity::L4);
-            Payload::encode(&bilinear(&dark, 512)?, PayloadFormat::Png, None)
+            Payload::encode(&bilinear(&dark, 512)?, PayloadFormat::Png)
         });
     });
     group.finish();

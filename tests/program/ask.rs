@@ -9,9 +9,10 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use darkqa_eval::internals::ask::{
     Access, BaseUrl, Call, Constrain, Endpoint, ExtraFields, ImageDetail, Message, Model,
-    Parameters, Payload, PayloadFormat, Prompts, Query, Random, Remote, Script, Secret, Sending,
-    Temperature, TokenField, WireSetting,
+    Parameters, Prompts, Query, Random, Remote, Script, Secret, Sending, Temperature, TokenField,
+    WireSetting,
 };
+use darkqa_eval::internals::picture::{Payload, PayloadFormat};
 use darkqa_eval::types::{
     Choices, Digest, FailureKind, Family, Finish, FrameId, Question, QuestionId, Reply, Rgb, View,
 };
@@ -41,7 +42,7 @@ fn model_at(mock: &MockEndpoint, sending: Sending) -> Remote {
 
 fn image() -> Payload {
     let samples = (0..6 * 4 * 3).map(|i| i * 3).collect();
-    Payload::encode(&Rgb::new(4, 6, samples).unwrap(), PayloadFormat::Png, None).unwrap()
+    Payload::encode(&Rgb::new(4, 6, samples).unwrap(), PayloadFormat::Png).unwrap()
 }
 
 fn question(id: &str, text: &str) -> Question {

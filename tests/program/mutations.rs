@@ -9,7 +9,7 @@ use std::io::Cursor;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use darkqa_eval::internals::dataset::{ImageFile, MOST_PIXELS, ReadingRule};
+use darkqa_eval::internals::picture::{ImageFile, MOST_PIXELS, ReadingRule};
 use image::{DynamicImage, ImageFormat, Rgb};
 
 use exr::prelude::Compression;

@@ -8,9 +8,9 @@ mod pgm;
 
 use std::path::Path;
 
-use crate::dataset::raw_png::{RawPng, RawPngError, SampleForm};
 use crate::error::{Error, Result};
 use crate::files::reading;
+use crate::picture::raw_png::{RawPng, RawPngError, SampleForm};
 use crate::types::Digest;
 use decoded::{Decoded, EXPORT, MosaicForm, developed};
 

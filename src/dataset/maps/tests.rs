@@ -4,9 +4,32 @@ use ndarray::array;
 use png::{BitDepth, ColorType};
 use proptest::prelude::*;
 
-use super::super::npy::tests::array as npy_file;
-use super::super::raw_png::tests::png as png_file;
 use super::*;
+
+/// A PNG file of height and width with these packed rows.
+fn png_file((height, width): (u32, u32), color: ColorType, bits: BitDepth, data: &[u8]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    encoder.set_color(color);
+    encoder.set_depth(bits);
+    if color == ColorType::Indexed {
+        encoder.set_palette(vec![200; 3 << (bits as u8)]);
+    }
+    let mut writer = encoder.write_header().unwrap();
+    writer.write_image_data(data).unwrap();
+    writer.finish().unwrap();
+    bytes
+}
+
+/// A `.npy` file of version 1 as `numpy.save` writes it.
+fn npy_file(descr: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+    let header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}   \n");
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((header.len() as u16).to_le_bytes());
+    bytes.extend(header.as_bytes());
+    bytes.extend(data);
+    bytes
+}
 
 fn deep(size: (u32, u32), values: &[u16]) -> Vec<u8> {
     let data: Vec<u8> = values.iter().flat_map(|v| v.to_be_bytes()).collect();

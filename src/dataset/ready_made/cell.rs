@@ -8,7 +8,7 @@ use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
 
 use super::text_list::list;
-use crate::dataset::image_file::format::FileFormat;
+use crate::picture::image_file::format::FileFormat;
 use crate::types::Digest;
 
 /// The maximum length of a text that may be a path or the id of a row. A longer one of the base64 alphabet is a file (the rule of

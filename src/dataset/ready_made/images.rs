@@ -8,9 +8,9 @@ use super::roles::{Images, Roles, braces};
 use super::row::{Row, RowPlace, Table};
 use super::step::Step;
 use super::text_list::list;
-use crate::dataset::image_file::format::FileFormat;
-use crate::dataset::{ImageFile, ReadingRule};
 use crate::error::{Error, Result};
+use crate::picture::image_file::format::FileFormat;
+use crate::picture::{ImageFile, ReadingRule};
 
 /// An image of a row.
 #[derive(Debug, Clone)]

@@ -4,11 +4,11 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::{FrameWork, StagedFrame};
-use crate::ask::Payload;
 use crate::error::{Error, Result};
 use crate::job::photograph::matched;
 use crate::job::stored_images::{MadeNotes, Needed};
 use crate::job::timings::TimedStep;
+use crate::picture::Payload;
 use crate::types::{Condition, FrameId, PairDark, PairFacts, PhotoName, Treatment};
 
 /// A condition of one frame, without the darkness of a pair: its photograph is an untouched frame of its own, and a synthetic image as
@@ -58,7 +58,7 @@ impl<'a> FrameWork<'a> {
             None => {
                 let payload = steps.payload(degraded, &note, exposure)?.0;
                 if let Some(place) = place {
-                    steps.store(&place, &payload, &MadeNotes::default(), started.elapsed())?;
+                    steps.store(&place, &payload, &MadeNotes::default(), started.elapsed());
                 }
                 Ok(StagedFrame::Ready(paired(payload, pair)))
             }

@@ -4,7 +4,6 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::{ImagePipeline, or_warning};
-use crate::ask::Payload;
 use crate::error::Result;
 use crate::job::frame_work::FrameWork;
 use crate::job::frame_work::pairs::{Resolved, paired};
@@ -14,6 +13,7 @@ use crate::job::stored_images::{MadeNotes, Needed, Similarity, StoredPlace};
 use crate::job::stored_thumbnails::ThumbnailPlace;
 use crate::job::thumbnail::{ShownObjects, thumbnail};
 use crate::job::timings::TimedStep;
+use crate::picture::Payload;
 use crate::types::{Condition, EnhancerName, FrameId, PairFacts, Rgb};
 
 /// What an image is called and shows, for the notes about it.
@@ -154,7 +154,7 @@ impl ImagePipeline<'_> {
             } else {
                 measuring
             };
-            steps.store(place, &image, &notes, since.elapsed())?;
+            steps.store(place, &image, &notes, since.elapsed());
         }
         writer.noted(steps, image, (place, similarity), || Ok(Some(&encoded)))
     }

@@ -3,13 +3,13 @@
 use std::num::NonZeroU32;
 
 use super::*;
-use crate::ask::PayloadFormat;
 use crate::dataset::Dataset;
 use crate::job::image_notes::WantedNotes;
 use crate::job::recipe::Recipe;
-use crate::job::scaling::Scaling;
 use crate::job::timings::Timings;
 use crate::job::walk::{CameraOf, DegradedAt};
+use crate::picture::PayloadFormat;
+use crate::picture::Scaling;
 use crate::synthesis::KindSettings;
 
 /// A folder with one frame as a plain PNG file, and the frame as a source.
@@ -17,10 +17,8 @@ fn frame() -> (tempfile::TempDir, Dataset, Source) {
     let folder = tempfile::tempdir().unwrap();
     let samples = (0..40 * 60 * 3).map(|i| (i * i % 251) as u8).collect();
     let pixels = Rgb::new(40, 60, samples).unwrap();
-    let file = Payload::encode(&pixels, PayloadFormat::Png, None)
-        .unwrap()
-        .file();
-    std::fs::write(folder.path().join("a.png"), file.unwrap()).unwrap();
+    let payload = Payload::encode(&pixels, PayloadFormat::Png).unwrap();
+    std::fs::write(folder.path().join("a.png"), payload.file()).unwrap();
     let dataset = Dataset::of_images(folder.path(), &[]).unwrap();
     let name = dataset.frames().next().unwrap().clone();
     let source = Source::of_questions(&dataset, &name).unwrap();
@@ -70,7 +68,7 @@ fn a_file_that_is_sent_as_it_is_is_decoded_only_for_a_thumbnail() {
     assert!(notes.thumbnail.is_none() && !decoded);
     let (folder, ..) = frame();
     let file = std::fs::read(folder.path().join("a.png")).unwrap();
-    assert_eq!(image.file().unwrap(), file);
+    assert_eq!(image.file(), file);
     let (image, notes, decoded) = pipeline_output("L0", ("png", None), true);
     assert!(decoded);
     assert_eq!(notes.thumbnail.unwrap().image, image.facts().digest);

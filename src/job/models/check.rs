@@ -4,10 +4,11 @@ use std::sync::Arc;
 
 use super::describe::opened;
 use super::settings::AskSettings;
-use crate::ask::{Call, ImagePlaces, Message, Payload, PayloadFormat, Query};
+use crate::ask::{Call, ImagePlaces, Message, Query};
 use crate::error::Result;
 use crate::job::progress::Progress;
 use crate::job::workers::unstarted;
+use crate::picture::{Payload, PayloadFormat};
 use crate::types::{Condition, QuestionId, Rgb, View};
 
 /// What a model without images is asked.
@@ -37,7 +38,7 @@ pub(crate) fn check(
         .build();
     let runtime = runtime.map_err(|e| unstarted(&e))?;
     let image = Rgb::new(SIDE, SIDE, RED.repeat(SIDE * SIDE))?;
-    let images = [Arc::new(Payload::encode(&image, PayloadFormat::Png, None)?)];
+    let images = [Arc::new(Payload::encode(&image, PayloadFormat::Png)?)];
     let (mut outcomes, mut seen) = (Vec::new(), Vec::new());
     for model in &ask.models {
         if seen.contains(&(&*model.name, model.view)) || model.server.is_none() {

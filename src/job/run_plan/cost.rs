@@ -74,7 +74,7 @@ fn add_group<E: Experiment>(
     let models = experiment.models(0);
     let shown: Vec<(usize, usize)> = if group.condition.is_some() {
         let frames = source.order.iter().map(|place| source.frames[*place].size);
-        let sent = frames.map(|size| experiment.recipe().scaling.of(size));
+        let sent = frames.map(|size| experiment.recipe().scaling.size(size));
         sent.collect()
     } else {
         Vec::new()

@@ -3,9 +3,9 @@ use std::num::NonZeroUsize;
 use super::*;
 use crate::enhance::SizeArgs;
 use crate::files::folder_access::FolderAccess;
-use crate::job::scaling::Scaling;
 use crate::job::source::SourceFrame;
 use crate::job::walk::{CameraOf, DegradedAt};
+use crate::picture::Scaling;
 use crate::synthesis::KindSettings;
 use crate::types::{Digest, EnhancerName, InputNote};
 

@@ -5,11 +5,11 @@ use std::path::Path;
 
 use clap::Args;
 
-use crate::ask::{Payload, PayloadFormat, png};
 use crate::enhance::{Enhancer, Examination, ImageOutput, Settled};
 use crate::error::{Error, Result};
 use crate::files::write;
 use crate::job::Outcome;
+use crate::picture::{Payload, PayloadFormat, png};
 use crate::report::doctor::{DoctorCell, DoctorColumn, DoctorPage, page};
 use crate::report::sheet::{ContactColumn, contact};
 use crate::types::manifest::Status;
@@ -136,7 +136,7 @@ fn html(
 }
 
 fn data_url(image: &Rgb) -> Result<String> {
-    let payload = Payload::encode(image, PayloadFormat::Png, None)?;
+    let payload = Payload::encode(image, PayloadFormat::Png)?;
     Ok(String::from_utf8_lossy(&payload.data_url()).into_owned())
 }
 

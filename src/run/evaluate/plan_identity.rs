@@ -3,11 +3,12 @@
 use serde_json::{Value, json};
 
 use super::settings::Evaluation;
-use crate::dataset::{DataPlace, Dataset, ReadingRule};
+use crate::dataset::{DataPlace, Dataset};
 use crate::error::Result;
 use crate::job::identity::{self, Identity};
 use crate::job::questions::ASK;
 use crate::job::recipe::Recipe;
+use crate::picture::ReadingRule;
 use crate::questions::rules::Rules;
 use crate::types::{AxisLevel, Family, SetLight};
 

@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use super::plan::ChoiceItem;
-use crate::ask::{Payload, Query};
+use crate::ask::Query;
 use crate::job::trial::{Item, Stimulus, Trial};
+use crate::picture::Payload;
 use crate::types::{ChoiceDetail, Record, TrialOutcome};
 
 impl Item for ChoiceItem {

@@ -8,14 +8,14 @@ use clap::Args;
 use super::choice_order::{ChoiceOrder, Repeats};
 use crate::ask::{Constrain, Prompts};
 use crate::dataset::{
-    BankArgs, CodesArgs, DataArgs, DataPlace, PixelLimit, ReadingRule, SceneArgs, SelectionArgs,
-    SetArgs,
+    BankArgs, CodesArgs, DataArgs, DataPlace, PixelLimit, SceneArgs, SelectionArgs, SetArgs,
 };
 use crate::error::{Error, Result};
 use crate::job::models::{ModelName, TextBaseline};
 use crate::job::questions::{QuestionBank, rules};
 use crate::job::run_plan::RunPlan;
 use crate::job::settings::{ExperimentSettings, JobArgs, JobSettings};
+use crate::picture::ReadingRule;
 use crate::questions::rules::Rules;
 use crate::types::{Decides, SetLight, Truths, View};
 

@@ -8,7 +8,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::ask::png;
 use crate::dataset::{
     self, CodesArgs, DataPlace, Dataset, PixelLimit, SceneArgs, SelectionArgs, SetArgs,
 };
@@ -29,6 +28,7 @@ use crate::job::shard::Shard;
 use crate::job::source::{Source, input_summary, inspect_all, warn_of_inputs};
 use crate::job::timings::Timings;
 use crate::job::workers::pool;
+use crate::picture::png;
 use crate::report::words::counted;
 use crate::synthesis::{LightArgs, LightSettings};
 use crate::types::manifest::Status;

@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
-use crate::ask::{pixels_of_url, png};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::job::Outcome;
 use crate::job::report::FigureRuns;
+use crate::picture::{pixels_of_url, png};
 use crate::report::chart::drawn::Drawn;
 use crate::report::figures::{
     Drawing, FIGURES, KnownNames, Names, PaperTable, drawings, overview, paper_tables,

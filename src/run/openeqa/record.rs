@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use crate::ask::{Payload, Query};
+use crate::ask::Query;
 use crate::dataset::openeqa::OpenQuestion;
 use crate::job::trial::{Item, Stimulus, Trial};
+use crate::picture::Payload;
 use crate::types::{ExposureFacts, OpenDetail, Record, Step, WalkFacts};
 
 /// The subject of one trial.

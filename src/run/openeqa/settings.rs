@@ -7,12 +7,13 @@ use clap::{Arg, Args};
 
 use super::judge::{Judge, JudgeArgs};
 use super::questions::OpenSelectionArgs;
-use crate::dataset::{CodesArgs, PixelLimit, ReadingRule};
+use crate::dataset::{CodesArgs, PixelLimit};
 use crate::error::{Error, Result};
 use crate::job::batch::{BatchFileArgs, BatchRunArgs};
 use crate::job::models::ModelName;
 use crate::job::settings::{ExperimentSettings, JobArgs, JobSettings};
 use crate::job::walk::Walk;
+use crate::picture::ReadingRule;
 use crate::score::llm_match::Protocol;
 use crate::types::Decides;
 

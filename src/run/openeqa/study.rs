@@ -4,7 +4,6 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::setup::OpenSetup;
-use crate::ask::Payload;
 use crate::enhance::ModelFile;
 use crate::error::Result;
 use crate::files::write;
@@ -16,6 +15,7 @@ use crate::job::stored_images::StoredImages;
 use crate::job::timings::Timings;
 use crate::job::workers::pool;
 use crate::job::{Outcome, limit, pipeline};
+use crate::picture::Payload;
 use crate::report::study::{StudyImage, StudyQuestion, page};
 use crate::report::words::counted;
 use crate::types::manifest::Status;
@@ -56,7 +56,7 @@ pub(super) fn pack(
             let mut names = Vec::with_capacity(payloads.len());
             for (place, payload) in payloads.iter().enumerate() {
                 let name = image(&walk.name.0, condition, place, payload);
-                write(&folder.join(&name), &payload.file()?)?;
+                write(&folder.join(&name), payload.file())?;
                 names.push(name);
             }
             written += names.len();

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use super::settings::RealismArgs;
 use super::workers::PairWorkers;
-use crate::dataset::ImageFile;
 use crate::dataset::pairs::Pair;
 use crate::error::{Error, Result};
 use crate::job::input_tally::InputTally;
+use crate::picture::ImageFile;
 use crate::report::realism::LeftOut;
 use crate::score::realism::scene::{LEAST_CORRELATION, SceneMatch};
 use crate::score::realism::{exposure_drop, same_size};

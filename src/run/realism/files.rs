@@ -6,9 +6,9 @@ use std::path::Path;
 
 use super::compare::PairWork;
 use super::fit::fitted_camera;
-use crate::ask::png;
 use crate::error::{Error, Result};
 use crate::files::write;
+use crate::picture::png;
 use crate::report::realism as report;
 use crate::report::realism::{PooledResiduals, RealismSummary};
 use crate::score::realism::PairComparison;

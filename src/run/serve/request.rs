@@ -8,8 +8,8 @@ use base64::engine::general_purpose::STANDARD;
 use serde::Deserialize;
 
 use super::completion::{ReplyForm, RequestFault};
-use crate::ask::{Payload, PayloadFormat};
-use crate::dataset::{ImageFile, ReadingRule};
+use crate::picture::{ImageFile, ReadingRule};
+use crate::picture::{Payload, PayloadFormat};
 use crate::types::Rgb;
 
 /// The fields of a request that are used. Other fields are ignored.
@@ -119,7 +119,6 @@ fn pixels(url: &str) -> Result<(Rgb, Arc<Payload>), RequestFault> {
         .map_err(|e| wrong(format!("the image is not base64: {e}")))?;
     let file = ImageFile::new(bytes, "image_url".to_owned(), ReadingRule::default());
     let rgb = file.decode().map_err(|e| wrong(e.to_string()))?;
-    let payload =
-        Payload::encode(&rgb, PayloadFormat::Png, None).map_err(|e| wrong(e.to_string()))?;
+    let payload = Payload::encode(&rgb, PayloadFormat::Png).map_err(|e| wrong(e.to_string()))?;
     Ok((rgb, Arc::new(payload)))
 }

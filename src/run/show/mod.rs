@@ -9,13 +9,13 @@ use std::fmt::Write;
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::ask::Payload;
 use crate::dataset::inputs::stem;
 use crate::error::{Error, Result};
 use crate::files::write;
 use crate::job::Outcome;
 use crate::job::rebuild::ImageRebuilder;
 use crate::job::run_parts::any_run;
+use crate::picture::Payload;
 use crate::types::manifest::Status;
 use crate::types::{Condition, Digest, FrameId};
 
@@ -125,7 +125,7 @@ fn written(
         };
         let name = format!("{}_{condition}{place}.{}", stem(source)?, image.extension());
         let path = out.join(name);
-        write(&path, &image.file()?)?;
+        write(&path, image.file())?;
         let _ = writeln!(text, "{condition}: {}", path.display());
     }
     Ok(text)

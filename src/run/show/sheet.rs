@@ -6,7 +6,6 @@ use std::sync::Arc;
 
 use super::item::choice_text;
 use super::settings::ShowArgs;
-use crate::ask::{Payload, PayloadFormat};
 use crate::error::{Error, Result};
 use crate::files::write;
 use crate::job::Outcome;
@@ -14,6 +13,7 @@ use crate::job::montage::montage;
 use crate::job::rebuild::ImageRebuilder;
 use crate::job::report::story_curves;
 use crate::job::run_parts::choice_run;
+use crate::picture::{Payload, PayloadFormat};
 use crate::report::figures::StoryCurves;
 use crate::report::sheet::{Story, StoryCell, StoryMark, StoryRow, story};
 use crate::score::subject::is_control;
@@ -51,7 +51,7 @@ pub(super) fn sheet(args: &ShowArgs, path: &Path) -> Result<Outcome> {
         lines: item.curves.lines.clone(),
         note: item.curves.note.clone(),
     });
-    write(path, &Payload::encode(&picture, format, None)?.file()?)?;
+    write(path, Payload::encode(&picture, format)?.file())?;
     let left_out = item
         .asked()
         .filter(|condition| !images.contains_key(condition));

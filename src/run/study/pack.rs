@@ -6,13 +6,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::ask::Payload;
 use crate::error::{Error, Result};
 use crate::files::write;
 use crate::job::Outcome;
 use crate::job::progress::Progress;
 use crate::job::rebuild::{ImageRebuilder, RebuildArgs};
 use crate::job::stored::StoredRun;
+use crate::picture::Payload;
 use crate::report::study::{StudyImage, StudyQuestion, page};
 use crate::report::words::counted;
 use crate::types::manifest::Status;
@@ -95,7 +95,7 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
                     _ => format!("-{}", place + 1),
                 };
                 let name = format!("{stem}{place}.{}", image.extension());
-                write(&args.out.join(&name), &image.file()?)?;
+                write(&args.out.join(&name), image.file())?;
                 Ok(name)
             });
             shots.push(StudyImage {

@@ -17,11 +17,12 @@ use files::Files;
 use map::Map;
 
 /// The crates that the program uses under these names of its root.
-const CRATES: [&str; 9] = [
+const CRATES: [&str; 10] = [
     "enhance",
     "error",
     "files",
     "labels",
+    "picture",
     "questions",
     "rooms",
     "score",
@@ -30,17 +31,18 @@ const CRATES: [&str; 9] = [
 ];
 
 /// The folders of the other crates of the workspace, in `src/`.
-const MEMBERS: [&str; 6] = [
+const MEMBERS: [&str; 7] = [
     "enhance/src/",
     "ground/src/",
     "light/src/",
+    "picture/src/",
     "questions/src/",
     "scenes/src/",
     "score/src/",
 ];
 
 /// The libraries that the program uses in some places (folders or files in `src/`) alone. Test code may use them anywhere.
-const LIBRARIES: [(&str, &[&str]); 16] = [
+const LIBRARIES: [(&str, &[&str]); 12] = [
     ("anstream", &["cli"]),
     ("anstyle", &["report"]),
     ("axum", &["run/serve"]),
@@ -51,11 +53,7 @@ const LIBRARIES: [(&str, &[&str]); 16] = [
     ("unicode_width", &["report"]),
     ("tokio", &["ask", "job", "run/serve"]),
     ("reqwest", &["ask"]),
-    ("image", &["dataset", "ask/payload.rs"]),
-    ("png", &["dataset/raw_png.rs"]),
     ("tiff", &["calibrate/mosaic"]),
-    ("exr", &["dataset/frame_folder.rs", "dataset/image_file"]),
-    ("moxcms", &["dataset/colour"]),
     (
         "parquet",
         &["dataset/ready_made/container", "store/column_file"],

@@ -13,9 +13,9 @@ use std::time::{Duration, Instant};
 
 use crate::support::endpoint::{Answer, MockEndpoint, Request};
 use darkqa_eval::internals::ask::{
-    Access, AskError, Endpoint, Message, Parameters, Payload, PayloadFormat, Remote, Secret,
-    Sending,
+    Access, AskError, Endpoint, Message, Parameters, Remote, Secret, Sending,
 };
+use darkqa_eval::internals::picture::{Payload, PayloadFormat};
 use darkqa_eval::types::{Reply, Rgb};
 use serde_json::Value;
 
@@ -29,7 +29,7 @@ fn sending() -> Sending {
 
 fn image() -> Payload {
     let samples = (0..6 * 4 * 3).map(|i| i * 3).collect();
-    Payload::encode(&Rgb::new(4, 6, samples).unwrap(), PayloadFormat::Png, None).unwrap()
+    Payload::encode(&Rgb::new(4, 6, samples).unwrap(), PayloadFormat::Png).unwrap()
 }
 
 /// The outcome of one question.

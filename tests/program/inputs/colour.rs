@@ -9,7 +9,7 @@ use crate::support::image_files::{
 };
 use crate::support::run::{Bench, words};
 use crate::support::tiff_files::{Order, Page, tiff};
-use darkqa_eval::internals::dataset::{ColourRule, ImageFile, ReadingRule};
+use darkqa_eval::internals::picture::{ColourRule, ImageFile, ReadingRule};
 use image::{Rgb, RgbImage};
 use serde_json::{Value, json};
 

@@ -6,7 +6,7 @@ use crate::support::icc_files::{DISPLAY_P3, rgb_profile, srgb_curve};
 use crate::support::image_files::{chunk, profile_chunk, with_chunks};
 use crate::support::run::{Bench, words};
 use crate::support::tiff_files::{Order, Page, tiff};
-use darkqa_eval::internals::dataset::{ImageFile, ReadingRule, Transfer};
+use darkqa_eval::internals::picture::{ImageFile, ReadingRule, Transfer};
 use darkqa_eval::internals::synthesis::expose;
 use darkqa_eval::types::{Pixels, Severity};
 use image::{ImageBuffer, Rgb, RgbImage};

@@ -2,7 +2,7 @@
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use darkqa_eval::internals::dataset::{ImageFile, ReadingRule};
+use darkqa_eval::internals::picture::{ImageFile, ReadingRule};
 use image::{ImageFormat, Rgb, RgbImage};
 use serde_json::json;
 

@@ -6,7 +6,7 @@ use crate::support::exr_files::{
     compressed, cropped, exr, with_channels, with_primaries, with_two_layers,
 };
 use crate::support::run::{Bench, records, words};
-use darkqa_eval::internals::dataset::{ColourRule, ImageFile, ReadingRule};
+use darkqa_eval::internals::picture::{ColourRule, ImageFile, ReadingRule};
 use darkqa_eval::internals::synthesis::{Negative, expose};
 use darkqa_eval::synthesis::{CameraModel, LightReading, NoiseKey, Synthesis};
 use darkqa_eval::types::{FrameId, Light, Pixels, Severity};

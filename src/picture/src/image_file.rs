@@ -2,7 +2,7 @@
 
 mod exr_layers;
 mod facts;
-pub(super) mod format;
+pub mod format;
 mod jpeg_markers;
 mod png_chunks;
 mod tiff_tags;
@@ -20,12 +20,11 @@ use self::exr_layers::ExrFile;
 use self::facts::{Depth, FileFacts, fault, unshowable};
 use self::format::FileFormat;
 use super::colour::{CodeDepth, ColourSpace, ColourTag, Meaning};
-use super::maps::MapPaths;
 use super::reading_rule::{ColourRule, ReadingRule, Transfer};
-use crate::error::{Error, Result};
-use crate::files::guarded::guarded;
-use crate::files::reading;
-use crate::types::{
+use darkqa_ground::error::{Error, Result};
+use darkqa_ground::files::guarded::guarded;
+use darkqa_ground::files::reading;
+use darkqa_ground::types::{
     Codes16, ColourHandling, ColourNote, DepthNote, Digest, InputNote, Light, Pixels, Rgb,
 };
 
@@ -46,6 +45,15 @@ enum Turning {
     Never,
 }
 
+/// A turn that an image file states.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StatedTurn {
+    /// EXIF orientation, 2 to 8.
+    pub orientation: u8,
+    /// Height and width of the image before it is turned, in pixels.
+    pub stored: (usize, usize),
+}
+
 impl ImageFile {
     /// The image file with these bytes. `place` is its path and line, for messages.
     #[must_use]
@@ -62,14 +70,14 @@ impl ImageFile {
     ///
     /// # Errors
     /// If it cannot be read.
-    pub(crate) fn open(path: &Path, rule: ReadingRule) -> Result<Self> {
+    pub fn open(path: &Path, rule: ReadingRule) -> Result<Self> {
         let bytes = reading::bytes(path)?;
         Ok(Self::new(bytes, path.display().to_string(), rule))
     }
 
     /// The same file, whose image is never turned.
     #[must_use]
-    pub(crate) fn never_turned(self) -> Self {
+    pub fn never_turned(self) -> Self {
         Self {
             turning: Turning::Never,
             ..self
@@ -78,41 +86,33 @@ impl ImageFile {
 
     /// The same file, whose image is turned as it states.
     #[must_use]
-    pub(crate) fn turned_as_stated(self) -> Self {
+    pub fn turned_as_stated(self) -> Self {
         Self {
             turning: Turning::AsStated,
             ..self
         }
     }
 
-    /// The same file with maps beside it. Maps are not turned, so the image is not turned either if they have the size of
-    /// the image as stored.
-    ///
-    /// # Errors
-    /// If the file states a turn and a map has another size than the image as stored.
-    pub(super) fn beside(self, maps: &MapPaths) -> Result<Self> {
-        let stated = self.facts().orientation;
-        if maps.is_empty() || stated == Orientation::NoTransforms {
-            return Ok(self);
+    /// The turn that the file states, and its size as it is stored; `None` if it states none or is broken. Formats of light state no
+    /// turn.
+    #[must_use]
+    pub fn stated_turn(&self) -> Option<StatedTurn> {
+        let orientation = self.facts().orientation;
+        if orientation == Orientation::NoTransforms {
+            return None;
         }
-        // A broken image is named when it is decoded. Formats of light state no turn.
-        let Ok((width, height)) = self.decoder().map(|decoder| decoder.dimensions()) else {
-            return Ok(self);
-        };
-        let stored = (height as usize, width as usize);
-        for (path, size) in maps.sizes()? {
-            if size != stored {
-                let problem = format_args!(
-                    "{} × {} pixels (height × width), but its image {} is stored with {height} × {width} and turned by its EXIF orientation {}; maps must have the size of the image as stored, which is then not turned, or the file no orientation",
-                    size.0,
-                    size.1,
-                    self.place,
-                    stated.to_exif()
-                );
-                return Err(Error::data(path.display(), problem));
-            }
-        }
-        Ok(self.never_turned())
+        // A broken image is named when it is decoded.
+        let (width, height) = self.decoder().ok()?.dimensions();
+        Some(StatedTurn {
+            orientation: orientation.to_exif(),
+            stored: (height as usize, width as usize),
+        })
+    }
+
+    /// The path and line of the file, for messages.
+    #[must_use]
+    pub fn place(&self) -> &str {
+        &self.place
     }
 
     /// The bytes of the file.
@@ -210,7 +210,7 @@ impl ImageFile {
 
     /// The usual ending of a name for the file: by its content, not by its own name.
     #[must_use]
-    pub(crate) fn ending(&self) -> &'static str {
+    pub fn ending(&self) -> &'static str {
         FileFormat::of(&self.bytes).map_or("", FileFormat::ending)
     }
 

@@ -4,17 +4,23 @@ use image::ImageFormat;
 
 /// A format that is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::dataset) enum FileFormat {
+pub enum FileFormat {
+    /// PNG, of its frames the first.
     Png,
+    /// JPEG.
     Jpeg,
+    /// WebP, of its frames the first.
     WebP,
+    /// TIFF, of its pages the first.
     Tiff,
+    /// Windows bitmap.
     Bmp,
+    /// OpenEXR, linear light.
     OpenExr,
 }
 
 /// The names of the formats that are read, for messages.
-pub(in crate::dataset) const READ: &str = "PNG, JPEG, WebP, TIFF, BMP or OpenEXR";
+pub const READ: &str = "PNG, JPEG, WebP, TIFF, BMP or OpenEXR";
 
 /// What to do with images of formats that are not read.
 const CONVERT: &str = "convert it to PNG, TIFF or JPEG first";
@@ -59,7 +65,7 @@ impl FileFormat {
     ///
     /// # Errors
     /// If it is not one that is read. The error names the format if it is known, and says what to do.
-    pub(in crate::dataset) fn of(file: &[u8]) -> Result<Self, String> {
+    pub fn of(file: &[u8]) -> Result<Self, String> {
         let has =
             |at: usize, mark: &[u8]| file.get(at..).is_some_and(|rest| rest.starts_with(mark));
         if let Some((.., name, remedy)) = UNREAD.iter().find(|(at, mark, ..)| has(*at, mark)) {
@@ -97,7 +103,7 @@ impl FileFormat {
     }
 
     /// The name of the format, for messages.
-    pub(in crate::dataset) fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::Png => "PNG",
             Self::Jpeg => "JPEG",

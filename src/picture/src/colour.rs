@@ -17,8 +17,8 @@ pub(super) use self::conversion::Conversion;
 use self::curve::ToneCurve;
 use self::icc::Profile;
 use self::primaries::Primaries;
-use crate::types::recent::Recent;
-use crate::types::{ColourHandling, ColourNote, Digest};
+use darkqa_ground::types::recent::Recent;
+use darkqa_ground::types::{ColourHandling, ColourNote, Digest};
 
 /// The most bytes of an ICC profile; chosen. Profiles of curves and a matrix have a few thousand, tables for printers up to a
 /// few million.

@@ -1,7 +1,7 @@
 //! Bilinear scaling of images, as OpenCV does it: [`bilinear`].
 
-use crate::error::Result;
-use crate::types::Rgb;
+use darkqa_ground::error::Result;
+use darkqa_ground::types::Rgb;
 
 /// The weight 1.0 in OpenCV's fixed point (`INTER_RESIZE_COEF_SCALE`).
 const ONE: f32 = 2048.0;
@@ -60,7 +60,7 @@ pub fn bilinear(image: &Rgb, side: usize) -> Result<Rgb> {
 
 /// The height and width of an image after its longer side is scaled to `side` pixels.
 #[must_use]
-pub(crate) fn size(height: usize, width: usize, side: usize) -> [usize; 2] {
+pub(crate) fn bilinear_size(height: usize, width: usize, side: usize) -> [usize; 2] {
     let factor = side as f64 / height.max(width) as f64;
     [height, width].map(|length| scaled(length, factor))
 }

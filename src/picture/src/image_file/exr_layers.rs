@@ -8,8 +8,8 @@ use exr::meta::attribute::{Chromaticities, SampleType, Text};
 use exr::meta::header::Header;
 use exr::prelude::{ReadChannels as _, ReadLayers as _, Vec2, read as read_image};
 
-use crate::dataset::colour::primaries::Primaries;
-use crate::dataset::reading_rule::ReadingRule;
+use crate::colour::primaries::Primaries;
+use crate::reading_rule::ReadingRule;
 
 /// The first four bytes of every OpenEXR file.
 pub(super) const SIGNATURE: &[u8] = b"\x76\x2F\x31\x01";

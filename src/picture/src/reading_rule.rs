@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use clap::ValueEnum;
 
-use crate::types::flag::flag_words;
-use crate::types::{DepthNote, InputNote, Light};
+use darkqa_ground::types::flag::flag_words;
+use darkqa_ground::types::{DepthNote, InputNote, Light};
 
 /// The default of the maximum number of pixels in an image (chosen).
 pub const MOST_PIXELS: u64 = 100_000_000;
@@ -59,7 +59,8 @@ impl ReadingRule {
     }
 
     /// What reading does to an image besides its colours and its orientation: of light, or of codes of 8 bits.
-    pub(super) fn note_of(&self, is_light: bool) -> InputNote {
+    #[must_use]
+    pub fn note_of(&self, is_light: bool) -> InputNote {
         InputNote {
             depth: is_light.then_some(DepthNote::Light),
             exposure_ev: self.exposure_ev.filter(|_| is_light),
@@ -73,7 +74,8 @@ impl ReadingRule {
     }
 
     /// Light after `--exposure`.
-    pub(super) fn scaled(&self, light: Arc<Light>) -> Arc<Light> {
+    #[must_use]
+    pub fn scaled(&self, light: Arc<Light>) -> Arc<Light> {
         let Some(ev) = self.exposure_ev else {
             return light;
         };

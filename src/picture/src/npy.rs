@@ -54,18 +54,18 @@ fn sized<const N: usize>(chunk: &[u8]) -> [u8; N] {
 
 /// A two-dimensional array in the bytes of a file.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Npy<'a> {
+pub struct Npy<'a> {
     numbers: NumberForm,
     /// The size of a number in bytes.
     width: usize,
     /// Height and width of the array (rows, columns).
-    pub(crate) size: (usize, usize),
+    pub size: (usize, usize),
     data: &'a [u8],
 }
 
 impl<'a> Npy<'a> {
     /// Reads the header and checks that no number is missing.
-    pub(crate) fn parse(bytes: &'a [u8]) -> Result<Self, String> {
+    pub fn parse(bytes: &'a [u8]) -> Result<Self, String> {
         let rest = bytes
             .strip_prefix(MAGIC)
             .ok_or("not a .npy file: it does not begin with \\x93NUMPY")?;
@@ -102,7 +102,7 @@ impl<'a> Npy<'a> {
     }
 
     /// The floating-point numbers, row by row; an error if the file holds integers.
-    pub(crate) fn floats(self) -> Result<impl Iterator<Item = f64>, String> {
+    pub fn floats(self) -> Result<impl Iterator<Item = f64>, String> {
         match self.numbers {
             NumberForm::Floats(read) => Ok(self.data.chunks_exact(self.width).map(read)),
             NumberForm::Integers(_) => {
@@ -112,7 +112,7 @@ impl<'a> Npy<'a> {
     }
 
     /// The integers, row by row; an error if the file holds floating-point numbers.
-    pub(crate) fn integers(self) -> Result<impl Iterator<Item = i128>, String> {
+    pub fn integers(self) -> Result<impl Iterator<Item = i128>, String> {
         match self.numbers {
             NumberForm::Integers(read) => Ok(self.data.chunks_exact(self.width).map(read)),
             NumberForm::Floats(_) => Err("it holds floats; integers expected".to_owned()),
@@ -152,4 +152,4 @@ fn fields(header: &str) -> Option<(&str, &str, Vec<usize>)> {
 }
 
 #[cfg(test)]
-pub(crate) mod tests;
+mod tests;

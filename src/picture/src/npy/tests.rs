@@ -3,7 +3,7 @@ use proptest::prelude::*;
 use super::*;
 
 /// A `.npy` file of the given version, as `numpy.save` writes it.
-pub(crate) fn file(major: u8, header: &str, data: &[u8]) -> Vec<u8> {
+fn file(major: u8, header: &str, data: &[u8]) -> Vec<u8> {
     let mut bytes = MAGIC.to_vec();
     bytes.extend([major, 0]);
     if major == 1 {
@@ -16,7 +16,7 @@ pub(crate) fn file(major: u8, header: &str, data: &[u8]) -> Vec<u8> {
     bytes
 }
 
-pub(crate) fn array(descr: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+fn array(descr: &str, shape: &str, data: &[u8]) -> Vec<u8> {
     let header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}   \n");
     file(1, &header, data)
 }

@@ -19,10 +19,10 @@ const BRADFORD: Matrix = [
 /// x and y of the primaries and of white (CIE 1931).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Primaries {
-    pub(crate) red: [f64; 2],
-    pub(crate) green: [f64; 2],
-    pub(crate) blue: [f64; 2],
-    pub(crate) white: [f64; 2],
+    pub red: [f64; 2],
+    pub green: [f64; 2],
+    pub blue: [f64; 2],
+    pub white: [f64; 2],
 }
 
 impl Primaries {

@@ -10,7 +10,7 @@ use super::srgb::{EIGHT, SIXTEEN, SrgbCodes};
 /// It is computed here in double precision, because a library takes what instructions a machine has, and then its codes differ
 /// by one between machines.
 #[derive(Debug)]
-pub(in crate::dataset) struct Conversion {
+pub(crate) struct Conversion {
     curves: [ToneCurve; 3],
     matrix: Matrix,
 }
@@ -40,7 +40,7 @@ impl Conversion {
     }
 
     /// Converts 8-bit samples, red, green and blue of each pixel.
-    pub(in crate::dataset) fn convert_8(&self, samples: &mut [u8]) {
+    pub(crate) fn convert_8(&self, samples: &mut [u8]) {
         let tables = self.tables(255);
         let convert = |pixel: [u8; 3]| {
             let lights = [0, 1, 2].map(|i| tables[i][usize::from(pixel[i])]);
@@ -52,7 +52,7 @@ impl Conversion {
     }
 
     /// Converts 16-bit samples, red, green and blue of each pixel.
-    pub(in crate::dataset) fn convert_16(&self, samples: &mut [u16]) {
+    pub(crate) fn convert_16(&self, samples: &mut [u16]) {
         let tables = self.tables(65_535);
         let convert = |pixel: [u16; 3]| {
             let lights = [0, 1, 2].map(|i| tables[i][usize::from(pixel[i])]);
@@ -64,7 +64,7 @@ impl Conversion {
     }
 
     /// Converts linear light, red, green and blue of each pixel. Colours that the primaries of sRGB do not reach are clipped.
-    pub(in crate::dataset) fn convert_light(&self, samples: &mut [f32]) {
+    pub(crate) fn convert_light(&self, samples: &mut [f32]) {
         for pixel in samples.as_chunks_mut::<3>().0 {
             let light = times(self.matrix, pixel.map(f64::from));
             *pixel = light.map(|light| light.clamp(0.0, f64::from(f32::MAX)) as f32);

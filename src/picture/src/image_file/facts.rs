@@ -10,9 +10,9 @@ use super::jpeg_markers::{self, JpegOutline};
 use super::png_chunks::{self, PngFault, PngOutline};
 use super::tiff_tags::TiffOutline;
 use super::webp_chunks::{self, WebpOutline};
-use crate::dataset::colour::ColourTag;
-use crate::dataset::reading_rule::ReadingRule;
-use crate::files::guarded::guarded;
+use crate::colour::ColourTag;
+use crate::reading_rule::ReadingRule;
+use darkqa_ground::files::guarded::guarded;
 
 /// The facts of a file beside its pixels.
 pub(super) struct FileFacts<'a> {

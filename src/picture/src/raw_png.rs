@@ -8,26 +8,29 @@ use std::io::Cursor;
 
 use png::{BitDepth, ColorType, Decoder, DecodingError, Reader, Transformations};
 
-use crate::types::words::words;
+use darkqa_ground::types::words::words;
 
 /// The form of the samples of a PNG file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum SampleForm {
+pub enum SampleForm {
+    /// Grey of 8 bits.
     Grey8,
+    /// Grey of 16 bits.
     Grey16,
     /// Palette indices of 1 to 8 bits.
     Palette,
 }
 
 impl SampleForm {
-    pub(super) const ALL: [Self; 3] = [Self::Grey8, Self::Grey16, Self::Palette];
+    /// Each of the forms.
+    pub const ALL: [Self; 3] = [Self::Grey8, Self::Grey16, Self::Palette];
 }
 
 words!(SampleForm { Grey8 = "8-bit grey", Grey16 = "16-bit grey", Palette = "palette" });
 
 /// Why a PNG file is not read. The texts do not name the file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum RawPngError {
+pub enum RawPngError {
     /// The bytes are no PNG file, or are damaged.
     Broken(String),
     /// The image has too many pixels.
@@ -50,10 +53,10 @@ impl From<RawPngError> for String {
 }
 
 /// A PNG file with one number per pixel, not yet decompressed.
-pub(crate) struct RawPng<'a> {
+pub struct RawPng<'a> {
     reader: Reader<Cursor<&'a [u8]>>,
     /// Height and width in pixels.
-    pub(crate) size: (usize, usize),
+    pub size: (usize, usize),
 }
 
 impl<'a> RawPng<'a> {
@@ -61,7 +64,7 @@ impl<'a> RawPng<'a> {
     ///
     /// # Errors
     /// If the file is no PNG, has another form than `forms`, or more than `most_pixels`.
-    pub(crate) fn open(
+    pub fn open(
         bytes: &'a [u8],
         forms: &[SampleForm],
         most_pixels: u64,
@@ -97,7 +100,7 @@ impl<'a> RawPng<'a> {
     }
 
     /// The samples, row by row, each converted by `of`.
-    pub(crate) fn samples<T: Clone>(mut self, of: impl Fn(u16) -> T) -> Result<Vec<T>, String> {
+    pub fn samples<T: Clone>(mut self, of: impl Fn(u16) -> T) -> Result<Vec<T>, String> {
         let not_whole = |e: DecodingError| format!("not a whole PNG: {e}");
         let bits = self.reader.info().bit_depth;
         let (height, width) = self.size;
@@ -163,4 +166,4 @@ fn color(color: ColorType) -> &'static str {
 }
 
 #[cfg(test)]
-pub(crate) mod tests;
+mod tests;

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use crate::dataset::colour::{ColourTag, Gamma};
+use crate::colour::{ColourTag, Gamma};
 
 /// The first eight bytes of every PNG file.
 pub(super) const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";

@@ -4,12 +4,7 @@ use super::super::reading_rule::MOST_PIXELS;
 use super::*;
 
 /// A PNG file with the given packed rows.
-pub(crate) fn png(
-    (height, width): (u32, u32),
-    color: ColorType,
-    bits: BitDepth,
-    data: &[u8],
-) -> Vec<u8> {
+fn png((height, width): (u32, u32), color: ColorType, bits: BitDepth, data: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(color);
