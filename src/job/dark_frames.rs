@@ -74,7 +74,7 @@ pub(super) fn dark_frames(steps: ImageSteps<'_>, frames: &DarkFrames<'_>) -> Res
                 let resolved = work.resolved(condition)?;
                 let image = resolved.work.degraded(resolved.condition.degradation())?;
                 if brightness(image) <= DARK {
-                    found.push(image.clone());
+                    found.push(Rgb::clone(image));
                 }
             }
         }

@@ -1,17 +1,16 @@
 //! The steps from one frame to its images: [`FrameWork`].
 
 pub(crate) mod pairs;
+pub(crate) mod staged;
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::time::Duration;
 
 use super::image_steps::ImageSteps;
 use super::photograph::SourcePhotograph;
 use super::recipe::Recipe;
 use super::source::{Source, SourceFrame};
-use super::stored_images::{MadeNotes, StoredPlace};
+use super::stored_images::StoredPlace;
 use super::timings::TimedStep;
 use super::walk::DegradedAt;
 use crate::dataset::Picture;
@@ -21,37 +20,8 @@ use crate::picture::bilinear;
 use crate::picture::{Payload, PayloadFormat};
 use crate::synthesis::{AppliedDegradation, Exposures, FrameView, NoiseKey};
 use crate::types::{
-    Condition, Degradation, Digest, EnhancerName, ExposureFacts, FrameId, InputNote, PairFacts,
-    PhotoName, Pixels, Rgb,
+    Condition, Degradation, Digest, ExposureFacts, FrameId, InputNote, PhotoName, Pixels, Rgb,
 };
-
-/// A frame in one condition, before enhancement.
-#[expect(clippy::large_enum_variant, reason = "few are alive at a time")]
-pub(crate) enum StagedFrame<'a> {
-    /// The image as it is sent.
-    Ready(Arc<Payload>),
-    /// The pixels to enhance.
-    ToEnhance {
-        degraded: Rgb,
-        /// How the file of the frame was read.
-        note: InputNote,
-        /// What the camera did; `None` for a kind that leaves it open.
-        exposure: Option<ExposureFacts>,
-        /// How dark the photograph of the frame is; `None` without a darkness of pairs.
-        pair: Option<PairFacts>,
-        enhancer: EnhancerName,
-        /// Place in the store; `None` if it is not kept there.
-        place: Option<StoredPlace<'a>>,
-        /// Time that the pixels took so far.
-        took: Duration,
-    },
-    /// An image of an enhancer from the store, as it is sent.
-    Stored {
-        payload: Arc<Payload>,
-        enhancer: EnhancerName,
-        notes: MadeNotes,
-    },
-}
 
 /// Cached steps of one frame. Each is computed once, when it is first needed.
 pub(crate) struct FrameWork<'a> {
@@ -71,7 +41,7 @@ pub(crate) struct FrameWork<'a> {
     /// The clean frame in the size sent.
     clean_as_sent: Option<Arc<Rgb>>,
     exposures: Exposures,
-    degraded: Option<(Option<Degradation>, Rgb)>,
+    degraded: Option<(Degradation, Arc<Rgb>)>,
     /// Photographs of the scene in the dark.
     photographs: Vec<SourcePhotograph>,
     /// Work on these photographs, by name.
@@ -229,11 +199,7 @@ impl<'a> FrameWork<'a> {
             return Ok(Arc::clone(clean));
         }
         let steps = self.steps;
-        let clean = self.clean()?;
-        let scaled = match steps.scaled(clean)? {
-            Cow::Borrowed(_) => Arc::clone(clean),
-            Cow::Owned(scaled) => Arc::new(scaled),
-        };
+        let scaled = steps.scaled(self.clean()?)?;
         Ok(Arc::clone(self.clean_as_sent.insert(scaled)))
     }
 
@@ -274,40 +240,31 @@ impl<'a> FrameWork<'a> {
         self.pixels.is_some()
     }
 
-    /// The frame in one degradation. The last one is cached for the enhancers that follow.
-    pub(crate) fn degraded(&mut self, how: Option<&Degradation>) -> Result<&Rgb> {
-        match how {
-            None => drop(self.clean()?),
-            Some(_) => drop(self.pixels()?),
-        }
-        let applied = how.map(|how| self.applied(how)).transpose()?;
+    /// The frame in one degradation, or clean. The last one is cached for the enhancers that follow.
+    pub(crate) fn degraded(&mut self, how: Option<&Degradation>) -> Result<&Arc<Rgb>> {
+        let Some(how) = how else {
+            return self.clean();
+        };
+        let applied = self.applied(how)?;
+        self.pixels()?;
         let Self {
             steps,
             frame,
             key,
             pixels,
-            clean,
             exposures,
             degraded,
             ..
         } = self;
-        if degraded
-            .as_ref()
-            .is_some_and(|(cached, _)| cached.as_ref() != how)
-        {
+        if degraded.as_ref().is_some_and(|(cached, _)| cached != how) {
             *degraded = None;
         }
         let (_, image) = once(degraded, || {
-            let degrade = || match (&applied, &*pixels, &*clean) {
-                (Some(applied), Some(pixels), _) => {
-                    Some(exposures.degrade(pixels.into(), applied, key))
-                }
-                (None, _, Some(clean)) => Some((**clean).clone()),
-                _ => None,
-            };
+            let pixels = pixels.as_ref();
+            let pixels = pixels.ok_or_else(|| Error::data(&*frame, "the frame was not read"))?;
+            let degrade = || exposures.degrade(pixels.into(), &applied, key);
             let image = steps.timings.time(TimedStep::Degrade, degrade);
-            let image = image.ok_or_else(|| Error::data(&*frame, "the frame was not read"))?;
-            Ok((how.cloned(), image))
+            Ok((how.clone(), Arc::new(image)))
         })?;
         Ok(image)
     }

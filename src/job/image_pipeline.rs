@@ -9,7 +9,6 @@ mod preparation;
 
 pub(crate) use opening::EnhancerStopper;
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
@@ -17,14 +16,15 @@ use std::time::Instant;
 use rayon::prelude::*;
 use tokio::sync::mpsc::Sender;
 
-use super::frame_work::pairs::{Resolved, paired};
-use super::frame_work::{FrameWork, StagedFrame};
+use super::frame_work::FrameWork;
+use super::frame_work::pairs::Resolved;
+use super::frame_work::staged::{MadeImage, StagedImage};
 use super::image_notes::{ImageNotes, MissingNotes};
 use super::image_steps::ImageSteps;
 use super::plan::{SourcePlan, TrialGroup};
 use super::resting_enhancer::RestingEnhancer;
 use super::source::Source;
-use super::stored_images::MadeNotes;
+use super::stored_images::{MadeNotes, Needed};
 use super::thumbnail::{ShownObjects, thumbnail_of_all};
 use super::timings::TimedStep;
 use super::trial::{Item, PreparedGroup, Stimulus};
@@ -247,15 +247,15 @@ impl<'a> ImagePipeline<'a> {
                 let mut work = FrameWork::planned(steps, source, frame);
                 let mut staged = Vec::with_capacity(conditions.len());
                 for condition in conditions {
-                    staged.push(work.stage(condition)?);
+                    staged.push(work.stage(condition, Needed::Image)?);
                 }
                 Ok(staged)
             });
-            let staged = staged.collect::<Result<Vec<Vec<StagedFrame<'_>>>>>()?;
+            let staged = staged.collect::<Result<Vec<Vec<StagedImage<'_>>>>>()?;
             for (frame, staged) in frames.iter().zip(staged) {
                 let conditions = conditions.iter().zip(&mut images);
                 for (staged, (condition, images)) in staged.into_iter().zip(conditions) {
-                    images.push(self.finish(staged, &frame.id, condition)?);
+                    images.push(self.finished(staged, &frame.id, condition)?.payload);
                 }
             }
         }
@@ -266,93 +266,80 @@ impl<'a> ImagePipeline<'a> {
         Ok(images.into_iter().map(in_order).collect())
     }
 
-    /// A frame in a condition, as it is sent.
-    pub(crate) fn image(
+    /// A frame in a condition as it is sent, with what is needed besides.
+    pub(crate) fn image<'w>(
         &mut self,
-        work: &mut FrameWork<'_>,
+        work: &mut FrameWork<'w>,
         condition: &Condition,
-    ) -> Result<Arc<Payload>> {
-        let Resolved {
-            work,
-            condition,
-            pair,
-        } = work.resolved(condition)?;
-        if let Some(image) = work.unchanged_file(&condition)? {
-            return Ok(paired(image, pair));
-        }
-        let (steps, note) = (work.steps, work.note()?);
-        let exposure = work.exposure(&condition)?;
-        let pixels = self.pixels(work, &condition)?;
-        Ok(paired(steps.payload(&pixels, &note, exposure)?.0, pair))
+        needed: Needed,
+    ) -> Result<MadeImage<'w>> {
+        let staged = work.stage(condition, needed)?;
+        self.finished(staged, work.frame(), condition)
     }
 
     /// The pixels of a frame in a condition, in the size of the frame.
-    pub(crate) fn pixels<'w>(
+    pub(crate) fn pixels(
         &mut self,
-        work: &'w mut FrameWork<'_>,
+        work: &mut FrameWork<'_>,
         condition: &Condition,
-    ) -> Result<Cow<'w, Rgb>> {
-        Ok(self.pixels_noted(work, condition)?.0)
-    }
-
-    /// The same, with what the note of the enhancer got from it; `None` without one.
-    fn pixels_noted<'w>(
-        &mut self,
-        work: &'w mut FrameWork<'_>,
-        condition: &Condition,
-    ) -> Result<(Cow<'w, Rgb>, Option<ImageUse>)> {
+    ) -> Result<Arc<Rgb>> {
         let Resolved {
             work, condition, ..
         } = work.resolved(condition)?;
-        let frame = work.frame().clone();
-        let degraded = work.degraded(condition.degradation())?;
+        let degraded = Arc::clone(work.degraded(condition.degradation())?);
         match &condition.enhancer {
-            None => Ok((Cow::Borrowed(degraded), None)),
+            None => Ok(degraded),
             Some(name) => {
-                let (image, used) = self.enhanced(degraded, name, [&frame, &condition])?;
-                Ok((Cow::Owned(image), Some(used)))
+                let enhanced = self.enhanced(&degraded, name, [work.frame(), &condition])?;
+                Ok(Arc::new(enhanced.0))
             }
         }
     }
 
-    fn finish(
+    /// An image after its enhancer.
+    fn finished<'w>(
         &mut self,
-        staged: StagedFrame<'_>,
+        staged: StagedImage<'w>,
         frame: &FrameId,
         condition: &Condition,
-    ) -> Result<Arc<Payload>> {
+    ) -> Result<MadeImage<'w>> {
         match staged {
-            StagedFrame::Ready(payload) => Ok(payload),
-            StagedFrame::Stored {
-                payload,
+            StagedImage::Ready(image) => Ok(image),
+            StagedImage::Stored {
+                image,
                 enhancer,
                 notes,
             } => {
                 self.note_stored(&notes, &enhancer, [frame, condition])?;
-                Ok(payload)
+                Ok(image)
             }
-            StagedFrame::ToEnhance {
+            StagedImage::ToEnhance {
                 degraded,
-                note,
-                exposure,
-                pair,
                 enhancer,
-                place,
-                took,
+                mut finish,
             } => {
                 let started = Instant::now();
                 let (image, used) = self.enhanced(&degraded, &enhancer, [frame, condition])?;
-                let payload = self.steps.payload(&image, &note, exposure)?.0;
-                if let Some(place) = place {
-                    let notes = MadeNotes {
-                        enhanced: Some(used),
-                        similarity: None,
-                    };
-                    let took = took + started.elapsed();
-                    self.steps.store(&place, &payload, &notes, took);
-                }
-                Ok(paired(payload, pair))
+                finish.took += started.elapsed();
+                finish.image(&Arc::new(image), Some(used))
             }
+        }
+    }
+
+    /// Notes an image of the store as its enhancer would.
+    fn note_stored(
+        &mut self,
+        notes: &MadeNotes,
+        name: &EnhancerName,
+        place: [&dyn ToString; 2],
+    ) -> Result<()> {
+        let implausible = self.implausible;
+        let Some(used) = &notes.enhanced else {
+            return Ok(());
+        };
+        match self.resting(name) {
+            Some(resting) => used.note_in(resting.usage(), resting.path(), place, implausible),
+            None => self.enhancer(name)?.note_stored(used, place, implausible),
         }
     }
 

@@ -26,6 +26,14 @@ pub(crate) struct ImageSteps<'a> {
 }
 
 impl ImageSteps<'_> {
+    /// The same steps without the image store.
+    pub(crate) fn without_store(self) -> Self {
+        Self {
+            stored: None,
+            ..self
+        }
+    }
+
     /// The image of a place in the store, if it is there with all that is needed.
     pub(crate) fn stored_image(
         &self,
@@ -66,12 +74,12 @@ impl ImageSteps<'_> {
 
     /// The image as it is sent, with what the camera did, and the pixels that were encoded. `note` says how the file of its frame was
     /// read.
-    pub(crate) fn payload<'p>(
+    pub(crate) fn payload(
         &self,
-        image: &'p Rgb,
+        image: &Arc<Rgb>,
         note: &InputNote,
         exposure: Option<ExposureFacts>,
-    ) -> Result<(Arc<Payload>, Cow<'p, Rgb>)> {
+    ) -> Result<(Arc<Payload>, Arc<Rgb>)> {
         let (payload, encoded) = self.timings.time(TimedStep::Encode, || {
             let encoded = self.scaled(image)?;
             let payload = Payload::encode(&encoded, self.recipe.format)?;
@@ -81,9 +89,12 @@ impl ImageSteps<'_> {
         Ok((self.checked(payload)?, encoded))
     }
 
-    /// The image in the size sent.
-    pub(super) fn scaled<'p>(&self, image: &'p Rgb) -> Result<Cow<'p, Rgb>> {
-        self.recipe.scaling.scale(image)
+    /// The image in the size sent; shared, not copied, if that is its own.
+    pub(super) fn scaled(&self, image: &Arc<Rgb>) -> Result<Arc<Rgb>> {
+        Ok(match self.recipe.scaling.scale(image)? {
+            Cow::Borrowed(_) => Arc::clone(image),
+            Cow::Owned(scaled) => Arc::new(scaled),
+        })
     }
 
     pub(super) fn checked(&self, payload: Payload) -> Result<Arc<Payload>> {

@@ -8,6 +8,7 @@ use super::frame_work::FrameWork;
 use super::image_pipeline::ImagePipeline;
 use super::plan::Plan;
 use super::source::Source;
+use super::stored_images::Needed;
 use crate::error::Result;
 use crate::image_store::ImageSet;
 use crate::types::{Condition, ImageFacts};
@@ -128,12 +129,12 @@ impl SampledImages {
         let shown: Vec<_> = shown.collect();
         let step = shown.len().div_ceil(SAMPLED).max(1);
         for (i, (part, source, frame)) in shown.into_iter().step_by(step).enumerate() {
-            let mut work = FrameWork::planned(pipeline.steps, source, frame);
+            let mut work = FrameWork::planned(pipeline.steps.without_store(), source, frame);
             let conditions = part.conditions();
             for condition in conditions.filter(|condition| i == 0 || condition.enhancer.is_none()) {
                 let started = Instant::now();
-                let image = pipeline.image(&mut work, condition)?;
-                let facts = image.facts();
+                let image = pipeline.image(&mut work, condition, Needed::Image)?;
+                let facts = image.payload.facts();
                 let (bytes, seconds, n) = sample.sums.entry(condition.clone()).or_default();
                 *bytes += facts.bytes as f64;
                 *seconds += started.elapsed().as_secs_f64();

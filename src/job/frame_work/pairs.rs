@@ -1,12 +1,10 @@
 //! Work in the darkness of a pair: on the photograph of the frame, or with the exposure drop that it has ([`Resolved`]).
 
 use std::sync::Arc;
-use std::time::Instant;
 
-use super::{FrameWork, StagedFrame};
+use super::FrameWork;
 use crate::error::{Error, Result};
 use crate::job::photograph::matched;
-use crate::job::stored_images::{MadeNotes, Needed};
 use crate::job::timings::TimedStep;
 use crate::picture::Payload;
 use crate::types::{Condition, FrameId, PairDark, PairFacts, PhotoName, Treatment};
@@ -23,57 +21,6 @@ pub(crate) struct Resolved<'w, 'a> {
 }
 
 impl<'a> FrameWork<'a> {
-    /// The frame in a condition: as it is sent, or as the enhancer takes it.
-    pub(crate) fn stage(&mut self, condition: &Condition) -> Result<StagedFrame<'a>> {
-        let Resolved {
-            work,
-            condition,
-            pair,
-        } = self.resolved(condition)?;
-        if let Some(payload) = work.unchanged_file(&condition)? {
-            return Ok(StagedFrame::Ready(paired(payload, pair)));
-        }
-        let steps = work.steps;
-        let note = work.note()?;
-        let exposure = work.exposure(&condition)?;
-        let place = work.stored_place(&condition)?;
-        let found = place
-            .as_ref()
-            .and_then(|place| steps.stored_image(place, Needed::Image));
-        if let Some(stored) = found {
-            let payload = steps.stored_payload(stored.payload, &note, exposure)?;
-            let payload = paired(payload, pair);
-            return Ok(match condition.enhancer {
-                None => StagedFrame::Ready(payload),
-                Some(enhancer) => StagedFrame::Stored {
-                    payload,
-                    enhancer,
-                    notes: stored.notes,
-                },
-            });
-        }
-        let started = Instant::now();
-        let degraded = work.degraded(condition.degradation())?;
-        match &condition.enhancer {
-            None => {
-                let payload = steps.payload(degraded, &note, exposure)?.0;
-                if let Some(place) = place {
-                    steps.store(&place, &payload, &MadeNotes::default(), started.elapsed());
-                }
-                Ok(StagedFrame::Ready(paired(payload, pair)))
-            }
-            Some(name) => Ok(StagedFrame::ToEnhance {
-                degraded: degraded.clone(),
-                note,
-                exposure,
-                pair,
-                enhancer: name.clone(),
-                place,
-                took: started.elapsed(),
-            }),
-        }
-    }
-
     /// A condition of this frame without the darkness of a pair.
     ///
     /// # Errors

@@ -11,6 +11,7 @@ use crate::job::dark_frames::{darkened, evenly};
 use crate::job::frame_work::FrameWork;
 use crate::job::plan::SourcePlan;
 use crate::job::source::{Source, SourceFrame};
+use crate::job::stored_images::Needed;
 use crate::job::workers::Workers;
 use crate::types::{ImageFacts, Rgb};
 
@@ -44,8 +45,9 @@ impl ImagePipeline<'_> {
                     && self.resting(name).is_none()
                     && tried.insert(name)
                 {
-                    let mut work = FrameWork::planned(self.steps, source, frame);
-                    self.image(&mut work, condition)?;
+                    let steps = self.steps.without_store();
+                    let mut work = FrameWork::planned(steps, source, frame);
+                    self.image(&mut work, condition, Needed::Image)?;
                 }
             }
         }
@@ -94,16 +96,16 @@ impl ImagePipeline<'_> {
         let Some((part, source, frame)) = frames.max_by_key(|(.., frame)| pixels(frame)) else {
             return Ok(None);
         };
-        let mut work = FrameWork::planned(self.steps, source, frame);
+        let mut work = FrameWork::planned(self.steps.without_store(), source, frame);
         let mut largest: Option<ImageFacts> = None;
         for condition in part
             .conditions()
             .filter(|condition| condition.enhancer.is_none())
         {
             let image = self
-                .image(&mut work, condition)
+                .image(&mut work, condition, Needed::Image)
                 .map_err(|e| e.at(format!("frame {} at {condition}", frame.id)))?;
-            let facts = image.facts();
+            let facts = image.payload.facts();
             if largest
                 .as_ref()
                 .is_none_or(|known| facts.bytes > known.bytes)

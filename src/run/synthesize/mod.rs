@@ -28,7 +28,7 @@ use crate::job::workers::{ThreadArgs, pool};
 use crate::report::words::counted;
 use crate::synthesis::{LightArgs, LightSettings, NoiseKey};
 use crate::types::manifest::Status;
-use crate::types::{Condition, Decides, Degradation, FrameId, SetLight};
+use crate::types::{Condition, Decides, Degradation, FrameId, Rgb, SetLight};
 
 pub(crate) use sheet::Sheet;
 use sheet::SheetRecipe;
@@ -275,7 +275,7 @@ impl SynthesisWork<'_> {
         let picture = self.frame.picture()?;
         let recipe = ImageRecipe::new(&self.entry.id, picture, how, applied.as_ref(), &key, seed);
         let place = Placed::new(self.making.out, &name, self.making.args.force);
-        place.put(&recipe, || Ok(self.frame.degraded(how)?.clone()))
+        place.put(&recipe, || Ok(Rgb::clone(self.frame.degraded(how)?)))
     }
 
     fn sheet(&mut self, kind: Sheet) -> Result<ImageOutcome> {

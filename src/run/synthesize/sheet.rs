@@ -162,7 +162,7 @@ fn levels(frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> {
         let rows = of_rows.into_iter().map(|(row, all)| {
             let images = all.into_iter().map(|how| {
                 let dark_ev = frame.applied(how)?.drop_ev();
-                let image = frame.degraded(Some(how))?.clone();
+                let image = Rgb::clone(frame.degraded(Some(how))?);
                 Ok(LevelImage { image, dark_ev })
             });
             let name = match row.kind {
