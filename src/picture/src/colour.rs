@@ -9,7 +9,6 @@ mod icc;
 pub(super) mod primaries;
 mod srgb;
 
-use std::borrow::Cow;
 use std::io::Read as _;
 use std::sync::{Arc, LazyLock};
 
@@ -32,15 +31,15 @@ const REMEDY: &str = "convert it to sRGB first, or take its codes as sRGB with -
 
 /// The colour information of a file that counts.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) enum ColourTag<'a> {
+pub(super) enum ColourTag {
     #[default]
     None,
     /// The four code points of H.273: primaries, transfer, matrix, and 1 for the full range.
     CodePoints([u8; 4]),
     /// An ICC profile.
-    Profile(Cow<'a, [u8]>),
+    Profile(Vec<u8>),
     /// A PNG chunk with a compressed ICC profile: its name, a zero, a zero for the method, the data.
-    DeflatedProfile(&'a [u8]),
+    DeflatedProfile(Vec<u8>),
     /// The mark that codes are sRGB.
     Srgb,
     Gamma(Gamma),
@@ -107,7 +106,7 @@ impl ColourSpace {
     }
 }
 
-impl ColourTag<'_> {
+impl ColourTag {
     /// The meaning of the codes.
     ///
     /// # Errors

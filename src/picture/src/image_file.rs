@@ -11,13 +11,13 @@ mod webp_chunks;
 use std::borrow::Cow;
 use std::io::Cursor;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use image::metadata::Orientation;
 use image::{ColorType, DynamicImage, ImageDecoder, ImageReader, Limits};
 
 use self::exr_layers::ExrFile;
-use self::facts::{Depth, FileFacts, fault, unshowable};
+use self::facts::{Depth, FileFacts, fault};
 use self::format::FileFormat;
 use super::colour::{CodeDepth, ColourSpace, ColourTag, Meaning};
 use super::reading_rule::{ColourRule, ReadingRule, Transfer};
@@ -35,6 +35,8 @@ pub struct ImageFile {
     place: String,
     rule: ReadingRule,
     turning: Turning,
+    /// Read from the header when they are first needed.
+    facts: OnceLock<FileFacts>,
 }
 
 /// Whether an image is turned as the EXIF orientation of its file states.
@@ -63,6 +65,7 @@ impl ImageFile {
             place,
             rule,
             turning: Turning::AsStated,
+            facts: OnceLock::new(),
         }
     }
 
@@ -144,7 +147,7 @@ impl ImageFile {
             Turning::AsStated => (stated, None),
             Turning::Never => (None, stated),
         };
-        let samples = self.samples(&facts);
+        let samples = self.samples(facts);
         let depth = match (&samples, facts.depth) {
             (Ok(Samples::Light(_)), _) => Some(DepthNote::Light),
             (Ok(Samples::Codes(_)), Depth::Sixteen) => Some(DepthNote::Codes16),
@@ -155,14 +158,14 @@ impl ImageFile {
             orientation,
             orientation_ignored,
             first_of: facts.first_of.map(str::to_owned),
-            colour: self.colour_note(&facts),
+            colour: self.colour_note(facts),
             depth,
             ..self.rule.note_of(is_light)
         }
     }
 
     /// What is done about the colours of the file; `None` if they are sRGB, or cannot be shown.
-    fn colour_note(&self, facts: &FileFacts<'_>) -> Option<ColourNote> {
+    fn colour_note(&self, facts: &FileFacts) -> Option<ColourNote> {
         let FileFacts { colour, depth, .. } = facts;
         match (self.rule.colour, colour.meaning(depth.of_codes())) {
             (ColourRule::Convert, Err(_) | Ok(Meaning::Linear)) | (_, Ok(Meaning::Srgb)) => None,
@@ -184,7 +187,7 @@ impl ImageFile {
     ///
     /// # Errors
     /// If it cannot be known, or the two contradict each other.
-    fn samples(&self, facts: &FileFacts<'_>) -> Result<Samples, String> {
+    fn samples(&self, facts: &FileFacts) -> Result<Samples, String> {
         let ReadingRule {
             colour, transfer, ..
         } = self.rule;
@@ -301,7 +304,7 @@ impl ImageFile {
     fn light_of_layers(&self) -> Result<Pixels> {
         let read = || {
             let file = guarded(|| ExrFile::open(&self.bytes, &self.rule))?;
-            let samples = self.samples(&self.facts())?;
+            let samples = self.samples(self.facts())?;
             let mut light = guarded(|| file.light(&self.bytes))?;
             if let Samples::Light(Some(space)) = samples {
                 space.conversion.convert_light(&mut light);
@@ -321,7 +324,7 @@ impl ImageFile {
 
     /// What the samples are, after a check that an image with colours has no profile of grey.
     fn samples_of(&self, is_grey: bool) -> Result<Samples> {
-        let samples = self.samples(&self.facts()).and_then(|samples| {
+        let samples = self.samples(self.facts()).and_then(|samples| {
             if let Samples::Codes(Some(space)) = &samples {
                 space.check(is_grey)?;
             }
@@ -343,15 +346,18 @@ impl ImageFile {
     }
 
     /// The facts of the file beside its pixels; of a file that is no image, none.
-    fn facts(&self) -> FileFacts<'_> {
-        FileFormat::of(&self.bytes)
-            .map_or(FileFacts::NONE, |format| FileFacts::of(&self.bytes, format))
+    fn facts(&self) -> &FileFacts {
+        let read = || match FileFormat::of(&self.bytes) {
+            Ok(format) => FileFacts::of(&self.bytes, format),
+            Err(_) => FileFacts::NONE,
+        };
+        self.facts.get_or_init(read)
     }
 
     /// The decoder of a file of codes.
     fn decoder(&self) -> Result<impl ImageDecoder + '_> {
         let format = FileFormat::of(&self.bytes).map_err(|problem| self.wrong(problem))?;
-        if let Some(problem) = unshowable(&self.bytes, format) {
+        if let Some(problem) = &self.facts().unshowable {
             return Err(self.wrong(problem));
         }
         let samples = match format {
@@ -379,7 +385,7 @@ impl ImageFile {
 
     /// Checks that the file reaches its end, and that the checksums of a PNG are right.
     fn check_complete(&self) -> Result<()> {
-        match FileFormat::of(&self.bytes).map(|format| fault(&self.bytes, format)) {
+        match FileFormat::of(&self.bytes).map(|format| fault(&self.bytes, format, self.facts())) {
             Ok(Some(fault)) => Err(self.wrong(format_args!(
                 "not a whole image: {fault}; copy or export it again"
             ))),
@@ -406,7 +412,7 @@ impl Depth {
     }
 }
 
-fn contradiction(colour: &ColourTag<'_>) -> String {
+fn contradiction(colour: &ColourTag) -> String {
     format!(
         "the file states what its codes mean ({}), and --transfer linear states something else; leave the flag out, or make the flag \
          decide with --colour ignore",

@@ -1,10 +1,10 @@
 use super::*;
 
-fn is_srgb(tag: &ColourTag<'_>) -> bool {
+fn is_srgb(tag: &ColourTag) -> bool {
     matches!(tag.meaning(CodeDepth::Eight), Ok(Meaning::Srgb))
 }
 
-fn gamma(exponent: Option<u32>, primaries: Option<[u32; 8]>) -> ColourTag<'static> {
+fn gamma(exponent: Option<u32>, primaries: Option<[u32; 8]>) -> ColourTag {
     ColourTag::Gamma(Gamma {
         exponent,
         primaries,
@@ -146,7 +146,7 @@ fn profiles_that_cannot_be_read_are_refused_by_name() {
         assert!(problem.contains("ICC profile") && problem.contains("--colour ignore"));
     }
     for chunk in [&b"no end of the name"[..], b"name\0", b"name\0\0no deflate"] {
-        let problem = ColourTag::DeflatedProfile(chunk)
+        let problem = ColourTag::DeflatedProfile(chunk.to_vec())
             .meaning(CodeDepth::Eight)
             .unwrap_err();
         assert!(problem.contains("cannot be decompressed"), "{problem}");

@@ -1,7 +1,5 @@
 //! The facts of an image file beside its pixels: [`FileFacts`]; what cannot be shown, and what is cut or damaged.
 
-use std::borrow::Cow;
-
 use image::metadata::Orientation;
 
 use super::exr_layers::ExrFile;
@@ -15,13 +13,18 @@ use crate::reading_rule::ReadingRule;
 use darkqa_ground::files::guarded::guarded;
 
 /// The facts of a file beside its pixels.
-pub(super) struct FileFacts<'a> {
+#[derive(Debug)]
+pub(super) struct FileFacts {
     /// The orientation that the file states; no turn if it states none, or none of the eight values.
     pub(super) orientation: Orientation,
     /// The kind of file, if it has several pictures of which the first is read.
     pub(super) first_of: Option<&'static str>,
-    pub(super) colour: ColourTag<'a>,
+    pub(super) colour: ColourTag,
     pub(super) depth: Depth,
+    /// Why the file cannot be shown as it is; `None` if nothing is known before it is decoded.
+    pub(super) unshowable: Option<String>,
+    /// The bytes that the file has at least if it is whole; `None` if its header does not tell.
+    whole: Option<u64>,
 }
 
 /// The numbers that the samples of a file are.
@@ -35,19 +38,21 @@ pub(super) enum Depth {
     Float,
 }
 
-impl<'a> FileFacts<'a> {
+impl FileFacts {
     pub(super) const NONE: Self = Self {
         orientation: Orientation::NoTransforms,
         first_of: None,
         colour: ColourTag::None,
         depth: Depth::Eight,
+        unshowable: None,
+        whole: None,
     };
 
-    pub(super) fn of(file: &'a [u8], format: FileFormat) -> Self {
+    pub(super) fn of(file: &[u8], format: FileFormat) -> Self {
         let of_exif = |exif: Option<&[u8]>| exif.and_then(Orientation::from_exif_chunk);
         let several = |pictures: usize, kind| (pictures > 1).then_some(kind);
         let profile =
-            |profile: Option<Cow<'a, [u8]>>| profile.map_or(ColourTag::None, ColourTag::Profile);
+            |profile: Option<Vec<u8>>| profile.map_or(ColourTag::None, ColourTag::Profile);
         let turn = |stated: Option<Orientation>| stated.unwrap_or(Orientation::NoTransforms);
         let deep = |bits| {
             if bits == 16 {
@@ -64,13 +69,16 @@ impl<'a> FileFacts<'a> {
                     first_of: several(outline.frames, "animated PNG"),
                     colour: outline.colour,
                     depth: deep(outline.bits.into()),
+                    ..Self::NONE
                 }
             }
             FileFormat::Jpeg => {
                 let outline = JpegOutline::of(file);
+                let unshowable = (outline.components == Some(4)).then(|| CMYK.to_owned());
                 Self {
                     orientation: turn(of_exif(outline.exif)),
-                    colour: profile(outline.profile().map(Cow::Owned)),
+                    colour: profile(outline.profile()),
+                    unshowable,
                     ..Self::NONE
                 }
             }
@@ -79,7 +87,7 @@ impl<'a> FileFacts<'a> {
                 Self {
                     orientation: turn(of_exif(outline.exif)),
                     first_of: several(outline.frames, "animated WebP"),
-                    colour: profile(outline.profile.map(Cow::Borrowed)),
+                    colour: profile(outline.profile.map(<[u8]>::to_vec)),
                     ..Self::NONE
                 }
             }
@@ -89,8 +97,10 @@ impl<'a> FileFacts<'a> {
                 Self {
                     orientation: turn(stated.and_then(Orientation::from_exif)),
                     first_of: several(outline.pages, "TIFF of several pages"),
-                    colour: profile(outline.profile.map(Cow::Borrowed)),
+                    colour: profile(outline.profile.map(<[u8]>::to_vec)),
                     depth: deep(outline.bits),
+                    unshowable: unshowable(&outline),
+                    whole: Some(outline.end),
                 }
             }
             FileFormat::Bmp => Self::NONE,
@@ -109,31 +119,25 @@ impl<'a> FileFacts<'a> {
     }
 }
 
-/// Why a file cannot be shown as it is, before it is decoded; `None` if nothing is known.
-pub(super) fn unshowable(file: &[u8], format: FileFormat) -> Option<String> {
-    match format {
-        FileFormat::Jpeg if JpegOutline::of(file).components == Some(4) => {
-            Some("a CMYK image (four components: CMYK or YCCK); convert it to RGB first".to_owned())
-        }
-        FileFormat::Tiff => {
-            let outline = TiffOutline::of(file);
-            if outline.is_raw {
-                let problem = "a camera's RAW file, of which only a preview could be read; develop it to a 16-bit TIFF or PNG first";
-                return Some(problem.to_owned());
-            }
-            if outline.is_float {
-                let problem = "a TIFF of floating-point samples; 8 or 16 bits expected, or OpenEXR for linear light: convert it first";
-                return Some(problem.to_owned());
-            }
-            let colours = outline.colours?;
-            Some(format!("{colours}; convert it to RGB first"))
-        }
-        _ => None,
+/// Why a JPEG of four components cannot be shown.
+const CMYK: &str = "a CMYK image (four components: CMYK or YCCK); convert it to RGB first";
+
+/// Why a TIFF cannot be shown as it is; `None` if nothing is known before it is decoded.
+fn unshowable(outline: &TiffOutline<'_>) -> Option<String> {
+    if outline.is_raw {
+        let problem = "a camera's RAW file, of which only a preview could be read; develop it to a 16-bit TIFF or PNG first";
+        return Some(problem.to_owned());
     }
+    if outline.is_float {
+        let problem = "a TIFF of floating-point samples; 8 or 16 bits expected, or OpenEXR for linear light: convert it first";
+        return Some(problem.to_owned());
+    }
+    let colours = outline.colours?;
+    Some(format!("{colours}; convert it to RGB first"))
 }
 
 /// The first fault of a file that is cut or damaged; `None` if there is none.
-pub(super) fn fault(file: &[u8], format: FileFormat) -> Option<String> {
+pub(super) fn fault(file: &[u8], format: FileFormat, facts: &FileFacts) -> Option<String> {
     let cut = || format!("the file ends before its end mark, at byte {}", file.len());
     let short = |whole: u64| format!("the file ends at byte {} of {whole}", file.len());
     match format {
@@ -144,8 +148,8 @@ pub(super) fn fault(file: &[u8], format: FileFormat) -> Option<String> {
         FileFormat::Jpeg => (!jpeg_markers::ends(file)).then(cut),
         FileFormat::WebP => webp_chunks::missing(file).map(short),
         FileFormat::Tiff => {
-            let end = TiffOutline::of(file).end;
-            (end > file.len() as u64).then(|| short(end))
+            let whole = facts.whole?;
+            (whole > file.len() as u64).then(|| short(whole))
         }
         FileFormat::Bmp => {
             // The length of the file stands behind its mark; some programs leave it at 0.

@@ -17,7 +17,7 @@ pub(super) struct PngOutline<'a> {
     /// The number of bits of a sample.
     pub(super) bits: u8,
     /// The colour information that counts.
-    pub(super) colour: ColourTag<'a>,
+    pub(super) colour: ColourTag,
 }
 
 /// What is wrong with the chunks of a file.
@@ -81,10 +81,10 @@ impl<'a> ColourChunks<'a> {
     }
 
     /// The first of them in the order in which they count.
-    fn tag(self) -> ColourTag<'a> {
+    fn tag(self) -> ColourTag {
         match (self.code_points, self.profile) {
             (Some(points), _) => ColourTag::CodePoints(points),
-            (None, Some(profile)) => ColourTag::DeflatedProfile(profile),
+            (None, Some(profile)) => ColourTag::DeflatedProfile(profile.to_vec()),
             (None, None) if self.is_srgb => ColourTag::Srgb,
             (None, None) if self.gamma != Gamma::default() => ColourTag::Gamma(self.gamma),
             (None, None) => ColourTag::None,
