@@ -68,7 +68,7 @@
 //! labels ► rooms ► dataset ──┤                               ├─► ask → store → score → report
 //!             import ──┘     └──────► synthesis ──► enhance ─┘            (light: what is seen)
 //!
-//! types, error, files = the ground     job = the engine of everything asked     run = one folder or file a command     cli = words → calls
+//! types, error, files = the ground    images → engine = all that is asked    runs, run_reports = what was asked    run = one folder a command    cli = words → calls
 //! ```
 //!
 //! | crate | here | |
@@ -92,8 +92,11 @@
 //! - [`store`]: `results/<run>/`, append-only and resumable.
 //! - `image_store`: a folder of images that were made, shared by runs and processes; it may be deleted at any time.
 //! - [`report`]: tables, figures and one HTML file, from the records alone, and a leaderboard of many; figures of pictures that are handed in.
-//! - [`job`]: the engine. A `Job` carries out an `Experiment`: it plans, has the one image pipeline make images, asks, keeps, and
-//!   has the experiment score. Questions with choices and open ones differ in their `Experiment` alone.
+//! - `images`: from a frame to the images of a request, made once by one pipeline for everything that is asked or written.
+//! - `runs`: runs on disk, read from their folders, joined from parts, and tabled.
+//! - `run_reports`: reports on one run or several, from their records alone.
+//! - [`engine`]: a `Job` carries out an `Experiment`: it plans, has images made, asks, keeps, and has the experiment score. Questions
+//!   with choices and open ones differ in their `Experiment` alone.
 //! - [`run`]: the commands; `run/evaluate` and `run/openeqa` are the two experiments.
 //! - [`cli`]: the commands. A flag is a field of a structure in the room that uses it, in that room's own types; the environment and
 //!   a file of flags are turned into words, and all words are parsed once.
@@ -128,10 +131,13 @@
 //! | `store` | `score`, `files`, `types`, `error` |
 //! | `image_store` | `files`, `types`, `error` |
 //! | `report` | `types`, `error`, `score`, `questions`, `calibrate` |
-//! | `job` | `files`, `picture`, `types`, `error`, `rooms`, `labels`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `image_store`, `report` |
-//! | `run` | `job`, `files`, `picture`, `types`, `error`, `rooms`, `labels`, `import`, `dataset`, `calibrate`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `image_store`, `report` |
-//! | `internals` | `picture`, `ask`, `dataset`, `enhance`, `job`, `labels`, `questions`, `report`, `rooms`, `score`, `synthesis`, `types`, `error` |
-//! | `cli` | `run`, `job`, `picture`, `image_store`, `files`, `rooms`, `dataset`, `ask`, `enhance`, `score`, `synthesis`, `types`, `error` |
+//! | `images` | `report`, `files`, `picture`, `types`, `error`, `rooms`, `labels`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `image_store` |
+//! | `runs` | `images`, `ask`, `synthesis`, `files`, `picture`, `types`, `error`, `dataset`, `enhance`, `score`, `store`, `image_store`, `report` |
+//! | `run_reports` | `runs`, `images`, `ask`, `files`, `types`, `error`, `questions`, `score`, `store`, `report` |
+//! | `engine` | `run_reports`, `runs`, `images`, `files`, `picture`, `types`, `error`, `rooms`, `labels`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `image_store`, `report` |
+//! | `run` | `engine`, `run_reports`, `runs`, `images`, `files`, `picture`, `types`, `error`, `rooms`, `labels`, `import`, `dataset`, `calibrate`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `image_store`, `report` |
+//! | `internals` | `picture`, `ask`, `dataset`, `enhance`, `labels`, `questions`, `report`, `rooms`, `score`, `synthesis`, `types`, `error` |
+//! | `cli` | `run`, `engine`, `run_reports`, `runs`, `images`, `picture`, `image_store`, `files`, `rooms`, `dataset`, `ask`, `enhance`, `score`, `synthesis`, `types`, `error` |
 //! | `main` | `cli`, `enhance` |
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
@@ -141,13 +147,16 @@ mod calibrate;
 #[doc(hidden)]
 pub mod cli;
 mod dataset;
+mod engine;
 mod image_store;
+mod images;
 mod import;
 #[doc(hidden)]
 pub mod internals;
-mod job;
 mod report;
 mod run;
+mod run_reports;
+mod runs;
 mod store;
 
 pub use darkqa_enhance as enhance;

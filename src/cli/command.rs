@@ -5,9 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, CommandFactory as _, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 
-use crate::job::batch::{BatchFileArgs, BatchRunArgs};
-use crate::job::merge::MergeArgs;
-use crate::job::report::ReportArgs;
+use crate::engine::batch::{BatchFileArgs, BatchRunArgs};
 use crate::run::batch::{BatchFolderArgs, BatchImportArgs, BatchStatusArgs};
 use crate::run::bundle::BundleArgs;
 use crate::run::cache::CacheArgs;
@@ -18,6 +16,7 @@ use crate::run::export::ExportArgs;
 use crate::run::figures::FiguresArgs;
 use crate::run::import::ImportArgs;
 use crate::run::init::InitArgs;
+use crate::run::merge::MergeArgs;
 use crate::run::models::ModelsArgs;
 use crate::run::openeqa::OpenEqaArgs;
 use crate::run::questions::QuestionsArgs;
@@ -28,6 +27,7 @@ use crate::run::show::ShowArgs;
 use crate::run::site::SiteArgs;
 use crate::run::study;
 use crate::run::synthesize::SynthesizeArgs;
+use crate::run_reports::ReportArgs;
 use crate::types::Decides;
 
 pub(super) const NAME: &str = "darkqa-eval";

@@ -19,13 +19,14 @@ use clap_complete::Shell;
 use tracing_subscriber::EnvFilter;
 
 use crate::error::{Error, Result};
-use crate::job::merge::merge;
-use crate::job::progress::{Progress, Verbosity};
-use crate::job::report::report;
-use crate::job::{Outcome, image_words};
+use crate::images::image_words;
+use crate::images::progress::{Progress, Verbosity};
 use crate::run::evaluate::{check, evaluate, export_batch, plan, run_batch};
+use crate::run::merge::merge;
 use crate::run::openeqa::openeqa;
 use crate::run::{self, study};
+use crate::run_reports::report;
+use crate::runs::Outcome;
 use crate::types::manifest::Status;
 use crate::types::shown_text::{shown, shown_in_colours};
 

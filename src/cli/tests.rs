@@ -209,7 +209,7 @@ fn warnings_of_every_crate_are_shown() {
         .with_writer(std::sync::Mutex::new(log.reopen().unwrap()))
         .finish();
     tracing::subscriber::with_default(subscriber, || {
-        tracing::warn!(target: "darkqa_eval::job", "of the program");
+        tracing::warn!(target: "darkqa_eval::engine", "of the program");
         tracing::warn!(target: "darkqa_enhance::probe", "of a library");
         tracing::info!(target: "darkqa_enhance::probe", "a detail");
         tracing::warn!(target: "ort", "of a dependency");

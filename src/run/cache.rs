@@ -6,7 +6,7 @@ use clap::Args;
 
 use crate::error::Result;
 use crate::image_store::{clear, listing};
-use crate::job::Outcome;
+use crate::runs::Outcome;
 use crate::types::Decides;
 use crate::types::manifest::Status;
 

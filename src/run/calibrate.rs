@@ -11,10 +11,10 @@ use crate::calibrate::{
 use crate::dataset::PixelLimit;
 use crate::error::{Error, Result};
 use crate::files::write;
-use crate::job::Outcome;
-use crate::job::progress::Progress;
-use crate::job::workers::{ThreadArgs, pool};
+use crate::images::progress::Progress;
+use crate::images::workers::{ThreadArgs, pool};
 use crate::report::calibration;
+use crate::runs::Outcome;
 use crate::types::Decides;
 use crate::types::manifest::Status;
 

@@ -1,4 +1,4 @@
-//! One folder or file per command. Shared parts are in [`job`](crate::job) or below; no command uses the folder of another.
+//! One folder or file per command. Shared parts are in [`engine`](crate::engine), [`run_reports`](crate::run_reports) or below; no command uses the folder of another.
 
 pub(crate) mod batch;
 pub(crate) mod bundle;
@@ -10,6 +10,7 @@ pub(crate) mod export;
 pub(crate) mod figures;
 pub(crate) mod import;
 pub(crate) mod init;
+pub(crate) mod merge;
 pub(crate) mod models;
 pub(crate) mod openeqa;
 pub(crate) mod questions;

@@ -6,13 +6,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::error::Result;
-use crate::job::Outcome;
-use crate::job::models::{
+use crate::engine::models::{
     AskSettings, AskingArgs, KeyUse, ModelArgs, ResolveContext, TextBaseline, check, describe,
 };
-use crate::job::progress::Progress;
-use crate::job::shard::Shard;
+use crate::error::Result;
+use crate::images::progress::Progress;
+use crate::runs::Outcome;
+use crate::runs::shard::Shard;
 use crate::types::Decides;
 use crate::types::manifest::Status;
 

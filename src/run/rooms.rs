@@ -10,11 +10,11 @@ use serde_json::{Map, Value, json};
 
 use crate::dataset::frame_folder::{self, FRAMES, FramePaths};
 use crate::error::{Error, Result};
-use crate::job::Outcome;
-use crate::job::progress::Progress;
-use crate::job::workers::{ThreadArgs, pool};
+use crate::images::progress::Progress;
+use crate::images::workers::{ThreadArgs, pool};
 use crate::picture::{exr, png};
 use crate::rooms::{self, Room, Rooms};
+use crate::runs::Outcome;
 use crate::types::manifest::Status;
 use crate::types::{Decides, FrameId, Labels, SegmentName};
 

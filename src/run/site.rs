@@ -12,10 +12,10 @@ use serde_json::Value;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::files::reading;
-use crate::job::Outcome;
-use crate::job::report::site as collected;
-use crate::job::run_parts::any_run;
 use crate::report::site::{DATA, PAGES, SCHEMA, products};
+use crate::run_reports::site as collected;
+use crate::runs::Outcome;
+use crate::runs::run_parts::any_run;
 use crate::types::Decides;
 use crate::types::manifest::Status;
 

@@ -10,6 +10,8 @@ use rayon::slice::ParallelSliceMut;
 use super::lines::{StoredLine, each_line, each_placed_line, lines};
 use super::pieces::{LinePlace, open_if_there};
 use super::stored_trial::StoredTrial;
+use jiff::Timestamp;
+
 use crate::error::{Error, Result};
 use crate::files::folder_access::FolderAccess;
 use crate::files::{self, is_unfinished, reading};
@@ -17,6 +19,11 @@ use crate::score::record::Detail;
 use crate::types::manifest::{ColumnDifference, JUDGES, RunManifest, differences, judge_flag};
 use crate::types::recorded_names::RecordedNames;
 use crate::types::{Distinct, ImageFidelity, Record, RunQuestion, Thumbnail, TrialKey};
+
+/// The current time in UTC, to the second, as a manifest states it.
+pub(crate) fn now() -> String {
+    Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ").to_string()
+}
 
 pub(super) const MANIFEST: &str = "manifest.json";
 pub(super) const RECORDS: &str = "records.jsonl";

@@ -53,7 +53,7 @@ pub(crate) use stored_trial::StoredTrial;
 
 pub(crate) use folder::{
     AddressChange, BATCH, PLAN, each_placed_question, each_question, find, holds_run, is_locked,
-    read_fidelity, read_manifest, read_questions, read_records, read_thumbnails, read_trials,
+    now, read_fidelity, read_manifest, read_questions, read_records, read_thumbnails, read_trials,
     schema,
 };
 

@@ -4,8 +4,8 @@ use std::ffi::OsString;
 use std::path::Path;
 
 use super::value_text::text_of;
+use crate::engine::models::{RunDefault, run_defaults};
 use crate::error::{Error, Result};
-use crate::job::models::{RunDefault, run_defaults};
 
 /// The flags of the run that a file of models sets, each with its place and its text; `flags` are those of the command.
 ///

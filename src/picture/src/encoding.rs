@@ -1,4 +1,4 @@
-//! Image files written to memory: [`png`] and [`jpeg`] of pixels, [`grey_png`] of maps, [`exr`] of linear light.
+//! Image files written to memory: [`png()`] and [`jpeg`] of pixels, [`grey_png`] of maps, [`exr()`] of linear light.
 
 use std::fmt;
 use std::io::Cursor;

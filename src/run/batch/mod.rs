@@ -6,14 +6,17 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use crate::engine::batch::replies;
 use crate::error::Result;
-use crate::job::batch::replies;
-use crate::job::record_table;
-use crate::job::report::{choice, open};
-use crate::job::stored::{ExperimentKind, StoredRun, manifest};
-use crate::job::{Outcome, ShowArgs, StdoutFormat, count};
+use crate::run_reports::{choice, open};
+use crate::runs::Outcome;
+use crate::runs::ShowArgs;
+use crate::runs::StdoutFormat;
+use crate::runs::record_table;
+use crate::runs::stored::{ExperimentKind, StoredRun, manifest};
 use crate::score::record::Detail;
 use crate::store::{AddressChange, Store};
+use crate::types::manifest::Counts;
 use crate::types::manifest::RunManifest;
 use crate::types::{ChoiceDetail, Decides, OpenDetail, TrialRef};
 
@@ -65,7 +68,7 @@ fn reported<D: Detail>(
     let mut run = StoredRun::reread(store.folder(), manifest)?;
     let trials = run.manifest.counts.trials.max(run.trials.len());
     let failed = run.trials.iter().map(TrialRef::failed);
-    run.manifest.count(count(trials, failed));
+    run.manifest.count(Counts::new(trials, failed));
     let mut outcome = write(store, run, show.format())?;
     record_table::update(store.folder(), show.table())?;
     if show.format() != StdoutFormat::Json {

@@ -13,10 +13,10 @@ use clap::Args;
 
 use crate::error::{Error, Result};
 use crate::files;
-use crate::job::Outcome;
-use crate::job::record_table::RECORDS_PARQUET;
-use crate::job::report::whole;
-use crate::job::stored::name;
+use crate::run_reports::whole;
+use crate::runs::Outcome;
+use crate::runs::record_table::RECORDS_PARQUET;
+use crate::runs::stored::name;
 use crate::types::Decides;
 use crate::types::manifest::Status;
 

@@ -9,9 +9,9 @@ use serde_json::Value;
 
 use super::redact::{Paths, Redactor};
 use crate::error::{Error, Result};
-use crate::job::run_files::RunFiles;
-use crate::job::stored::{AnyRun, ExperimentKind, StoredRun, manifest};
 use crate::report::page::shown_thumbnails;
+use crate::runs::run_files::RunFiles;
+use crate::runs::stored::{AnyRun, ExperimentKind, StoredRun, manifest};
 use crate::score::record::Detail;
 use crate::store;
 use crate::types::manifest::RunManifest;

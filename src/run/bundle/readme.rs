@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use serde_json::{Value, json};
 
-use crate::job::stored::AnyRun;
+use crate::runs::stored::AnyRun;
 use crate::score::record::Detail;
 use crate::types::manifest::{RunManifest, judge_flag};
 use crate::types::{AxisLevel, Trials, shell_word};

@@ -4,9 +4,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::dataset::Picture;
+use crate::engine::identity;
 use crate::enhance::SizeArgs;
-use crate::job::identity;
-use crate::job::placed_image::ImageOrigin;
+use crate::images::placed_image::ImageOrigin;
 use crate::types::{Digest, FrameId, InputNote};
 
 /// Everything that decides the pixels of an enhanced image.

@@ -1,10 +1,10 @@
 //! The controls of the observer that a run asks although no flag names them: [`AddedControls`].
 
 use super::settings::Evaluation;
+use crate::engine::models::{ModelName, ModelUnderTest};
 use crate::error::{Error, Result};
-use crate::job::models::{ModelName, ModelUnderTest};
 
-use crate::job::progress::Progress;
+use crate::images::progress::Progress;
 use crate::types::Control;
 
 /// Whether a model is the control that is shown the image of another scene; the plan gives it that image.

@@ -7,21 +7,23 @@ use serde_json::{Value, json};
 use super::plan::{ChoiceItem, trials};
 use super::settings::ImagePlace;
 use super::setup::ChoiceSetup;
+use crate::engine::experiment::Experiment;
+use crate::engine::identity;
+use crate::engine::models::ModelUnderTest;
+use crate::engine::settings::JobSettings;
 use crate::error::Result;
-use crate::job::experiment::Experiment;
-use crate::job::identity::{self, Columns, Identity};
-use crate::job::models::ModelUnderTest;
-use crate::job::plan::SourcePlan;
-use crate::job::questions::ASK;
-use crate::job::recipe::Recipe;
-use crate::job::report;
-use crate::job::settings::JobSettings;
-use crate::job::source::{Frames, Source};
-use crate::job::stored::StoredRun;
-use crate::job::{Outcome, StdoutFormat};
+use crate::images::plan::SourcePlan;
+use crate::images::questions::ASK;
+use crate::images::recipe::Recipe;
+use crate::images::source::{Frames, Source};
 use crate::questions::rules::Rules;
+use crate::run_reports;
+use crate::runs::Outcome;
+use crate::runs::StdoutFormat;
+use crate::runs::stored::StoredRun;
 use crate::store::Store;
 use crate::types::manifest::PartPlace;
+use crate::types::manifest::{Columns, Identity};
 use crate::types::{ChoiceDetail, QuestionId, Record, RunQuestion, SetLight};
 
 impl Experiment for ChoiceSetup<'_> {
@@ -138,6 +140,6 @@ impl Experiment for ChoiceSetup<'_> {
         run: StoredRun<ChoiceDetail>,
         show: StdoutFormat,
     ) -> Result<Outcome> {
-        report::choice::write(store, run, show)
+        run_reports::choice::write(store, run, show)
     }
 }

@@ -12,10 +12,11 @@ mod settings;
 mod setup;
 mod write_plan;
 
+use crate::engine::Job;
+use crate::engine::batch::{BatchFileArgs, BatchRunArgs};
 use crate::error::Result;
-use crate::job::batch::{BatchFileArgs, BatchRunArgs};
-use crate::job::progress::Progress;
-use crate::job::{Job, Outcome};
+use crate::images::progress::Progress;
+use crate::runs::Outcome;
 
 pub(crate) use check::{CheckArgs, check};
 pub(crate) use settings::{EvaluateArgs, ShrinkArgs};

@@ -7,10 +7,11 @@ use super::controls::is_other_room;
 use super::settings::ImagePlace;
 use super::setup::ChoiceSetup;
 use crate::ask::ImagePlaces;
+use crate::engine::key_facts::KeyFacts;
+use crate::engine::models::{ModelUnderTest, asked_in};
 use crate::error::Result;
-use crate::job::models::{ModelUnderTest, asked_in};
-use crate::job::plan::{SourcePlan, TrialGroup};
-use crate::job::trial::{KeyFacts, Prompt, Trial};
+use crate::images::plan::{SourcePlan, TrialGroup};
+use crate::images::trial::{Prompt, Trial};
 use crate::types::{Condition, Digest, FrameId, Question, View};
 
 /// A question with its choices in one order.

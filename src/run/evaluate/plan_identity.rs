@@ -4,12 +4,13 @@ use serde_json::{Value, json};
 
 use super::settings::Evaluation;
 use crate::dataset::{DataPlace, Dataset};
+use crate::engine::identity;
 use crate::error::Result;
-use crate::job::identity::{self, Identity};
-use crate::job::questions::ASK;
-use crate::job::recipe::Recipe;
+use crate::images::questions::ASK;
+use crate::images::recipe::Recipe;
 use crate::picture::ReadingRule;
 use crate::questions::rules::Rules;
+use crate::types::manifest::Identity;
 use crate::types::{AxisLevel, Family, SetLight};
 
 /// The settings of data, questions and light. Models, enhancers and what is sent besides are not among them: they may be added to a

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::plan::ChoiceItem;
 use crate::ask::Query;
-use crate::job::trial::{Item, Stimulus, Trial};
+use crate::images::trial::{Item, Stimulus, Trial};
 use crate::picture::Payload;
 use crate::types::{ChoiceDetail, Record, TrialOutcome};
 

@@ -10,13 +10,13 @@ use crate::ask::{Constrain, Prompts};
 use crate::dataset::{
     BankArgs, CodesArgs, DataArgs, DataPlace, PixelLimit, SceneArgs, SelectionArgs, SetArgs,
 };
+use crate::engine::models::{ModelName, TextBaseline};
+use crate::engine::settings::{ExperimentSettings, JobArgs, JobSettings};
 use crate::error::{Error, Result};
-use crate::job::models::{ModelName, TextBaseline};
-use crate::job::questions::{QuestionBank, rules};
-use crate::job::run_plan::RunPlan;
-use crate::job::settings::{ExperimentSettings, JobArgs, JobSettings};
+use crate::images::questions::{QuestionBank, rules};
 use crate::picture::ReadingRule;
 use crate::questions::rules::Rules;
+use crate::runs::run_plan::RunPlan;
 use crate::types::{Decides, SetLight, Truths, View};
 
 /// The flags of an evaluation, by help heading.
@@ -142,7 +142,7 @@ impl EvaluateArgs {
         let truths = bank.as_ref().map_or(Truths::Known, |_| Truths::Unknown);
         let max_cost = self.job.money.max_cost;
         let mut job = self.job.resolve(&experiment)?;
-        let plan = RunPlan::at(&job.place)?;
+        let plan = job.place.plan()?;
         if let (Some(plan), Some(whole), true) = (&plan, max_cost, job.shard.is_part()) {
             job.money.max_cost = Some(whole * plan.share(job.shard));
         }

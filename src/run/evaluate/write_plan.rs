@@ -3,14 +3,16 @@
 use super::plan_identity::plan_identity;
 use super::settings::EvaluateArgs;
 use super::setup::ChoiceSetup;
+use crate::engine::Job;
+use crate::engine::experiment::Experiment as _;
+use crate::engine::plan_costs::costs;
 use crate::error::{Error, Result};
 use crate::files::folder_access::FolderAccess;
-use crate::job::experiment::Experiment as _;
-use crate::job::plan::Plan;
-use crate::job::progress::Progress;
-use crate::job::run_plan::{NewPlan, PlannedFrame, costs, recorded_command};
-use crate::job::{Job, Outcome};
+use crate::images::plan::Plan;
+use crate::images::progress::Progress;
 use crate::report::words::counted;
+use crate::runs::Outcome;
+use crate::runs::run_plan::{NewPlan, PlannedFrame, recorded_command};
 use crate::types::manifest::Status;
 
 /// Writes the plan of a run into its folder. Nothing is asked.

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
 use crate::files::write;
-use crate::job::shard::Shard;
+use crate::runs::shard::Shard;
 use crate::types::question::letter;
 use crate::types::{Choices, Condition, Question};
 

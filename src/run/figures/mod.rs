@@ -9,8 +9,6 @@ use clap::{Args, ValueEnum};
 
 use crate::error::{Error, Result};
 use crate::files;
-use crate::job::Outcome;
-use crate::job::report::FigureRuns;
 use crate::picture::{pixels_of_url, png};
 use crate::report::chart::drawn::Drawn;
 use crate::report::figures::{
@@ -20,6 +18,8 @@ use crate::report::figures::{
 use crate::report::paper::{
     Look, OverviewSheet, Palette, Sheet, overview_sheet, pdf, sheet, svg, tables, tex,
 };
+use crate::run_reports::FigureRuns;
+use crate::runs::Outcome;
 use crate::types::Decides;
 use crate::types::manifest::Status;
 

@@ -10,20 +10,23 @@ use super::marks::{marks, prompt};
 use super::plan::answers;
 use super::record::OpenItem;
 use super::setup::OpenSetup;
+use crate::engine::budget::text_tokens;
+use crate::engine::experiment::{ExpectedRequest, Experiment};
+use crate::engine::identity;
+use crate::engine::models::ModelUnderTest;
+use crate::engine::settings::JobSettings;
 use crate::error::Result;
-use crate::job::budget::text_tokens;
-use crate::job::experiment::{ExpectedRequest, Experiment};
-use crate::job::identity::{self, Columns, Identity};
-use crate::job::models::ModelUnderTest;
-use crate::job::plan::SourcePlan;
-use crate::job::recipe::Recipe;
-use crate::job::report::{judges, open};
-use crate::job::settings::JobSettings;
-use crate::job::source::{Frames, Source};
-use crate::job::stored::StoredRun;
-use crate::job::trial::Item as _;
-use crate::job::{Outcome, StdoutFormat};
+use crate::images::plan::SourcePlan;
+use crate::images::recipe::Recipe;
+use crate::images::source::{Frames, Source};
+use crate::images::trial::Item as _;
+use crate::run_reports::open;
+use crate::runs::Outcome;
+use crate::runs::StdoutFormat;
+use crate::runs::mark_index::{JUDGE, PROTOCOL};
+use crate::runs::stored::StoredRun;
 use crate::store::Store;
+use crate::types::manifest::{Columns, Identity};
 use crate::types::manifest::{JUDGES, PartPlace};
 use crate::types::{Family, FrameId, OpenDetail, Record, RunQuestion};
 
@@ -129,8 +132,8 @@ impl Experiment for OpenSetup<'_> {
         let judge = self.judge.as_ref().map(|judge| &*judge.name);
         let answers: Vec<&str> = self.config.answers.iter().map(|file| &*file.name).collect();
         vec![
-            (judges::JUDGE, json!(judge)),
-            (judges::PROTOCOL, json!(self.config.protocol.to_string())),
+            (JUDGE, json!(judge)),
+            (PROTOCOL, json!(self.config.protocol.to_string())),
             ("--frames", json!(self.config.walk.folder)),
             ("--answers", json!(answers)),
         ]

@@ -7,9 +7,9 @@ use std::sync::Arc;
 use clap::Args;
 
 use crate::ask::{AccessArgs, KeyHeader, Parameters, Server, Temperature};
+use crate::engine::models::ModelName;
+use crate::engine::settings::JobArgs;
 use crate::error::Result;
-use crate::job::models::ModelName;
-use crate::job::settings::JobArgs;
 use crate::score::llm_match::Protocol;
 use crate::types::Decides;
 

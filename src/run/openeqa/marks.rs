@@ -7,11 +7,11 @@ use super::record::OpenItem;
 use super::setup::OpenSetup;
 use crate::ask::openeqa::judge_prompt;
 use crate::dataset::openeqa::OpenQuestion;
+use crate::engine::models::ModelUnderTest;
 use crate::error::Result;
-use crate::job::models::ModelUnderTest;
-use crate::job::plan::{SourcePlan, TrialGroup};
-use crate::job::predictions::{AnswerState, predictions};
-use crate::job::trial::{Prompt, Trial};
+use crate::images::plan::{SourcePlan, TrialGroup};
+use crate::images::trial::{Prompt, Trial};
+use crate::runs::predictions::{AnswerState, predictions};
 use crate::types::{Digest, OpenDetail, QuestionId, Record, TrialKey};
 
 /// The prompt that asks the judge to mark an answer.

@@ -14,9 +14,10 @@ mod settings;
 mod setup;
 mod study;
 
+use crate::engine::Job;
 use crate::error::Result;
-use crate::job::progress::Progress;
-use crate::job::{Job, Outcome};
+use crate::images::progress::Progress;
+use crate::runs::Outcome;
 
 pub(crate) use judge::JudgeArgs;
 pub(crate) use settings::OpenEqaArgs;

@@ -4,9 +4,9 @@ use rayon::prelude::*;
 
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
-use crate::job::input_tally::InputTally;
-use crate::job::progress::Progress;
-use crate::job::workers::{ThreadArgs, pool};
+use crate::images::input_tally::InputTally;
+use crate::images::progress::Progress;
+use crate::images::workers::{ThreadArgs, pool};
 use crate::questions::colors::Palette;
 use crate::questions::look::FrameLook;
 use crate::report::questions::against::LookComparison;

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
-use crate::job::shard::Shard;
+use crate::runs::shard::Shard;
 
 /// How the name of each file ends.
 const ENDING: &str = ".statistics.jsonl";

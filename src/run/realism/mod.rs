@@ -20,10 +20,10 @@ use workers::PairWorkers;
 
 use crate::dataset::pairs::Pairs;
 use crate::error::{Error, Result};
-use crate::job::Outcome;
-use crate::job::progress::Progress;
-use crate::job::workers::pool;
+use crate::images::progress::Progress;
+use crate::images::workers::pool;
 use crate::report::realism::{ComparedData, RealismSummary, ResidualRules};
+use crate::runs::Outcome;
 use crate::score::realism::PairComparison;
 use crate::score::realism::gain::ReadingFit;
 use crate::synthesis::SensorSettings;

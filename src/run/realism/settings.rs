@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::dataset::{CodesArgs, PixelLimit};
-use crate::job::workers::ThreadArgs;
+use crate::images::workers::ThreadArgs;
 use crate::score::realism::residual::{Bins, EmptyBins};
 use crate::synthesis::SensorArgs;
 use crate::types::Decides;

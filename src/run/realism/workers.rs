@@ -3,7 +3,7 @@
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use crate::job::progress::Progress;
+use crate::images::progress::Progress;
 
 /// Threads that work on the pairs, with the display of their progress.
 pub(super) struct PairWorkers<'a> {

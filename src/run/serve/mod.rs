@@ -30,12 +30,12 @@ use tokio::sync::Semaphore;
 
 use crate::ask::{Call, Message, Model, Query, Random};
 use crate::dataset::{self, DataPlace, Dataset, RootArgs};
+use crate::engine::interrupt::Interrupt;
+use crate::engine::observer::Observer;
 use crate::error::{Error, Result};
-use crate::job::Outcome;
-use crate::job::interrupt::Interrupt;
-use crate::job::observer::Observer;
-use crate::job::progress::Progress;
+use crate::images::progress::Progress;
 use crate::questions::rules::Rules;
+use crate::runs::Outcome;
 use crate::types::manifest::Status;
 use crate::types::{Choices, Decides, Digest, Family, FrameId, Question, QuestionId};
 

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::dataset::Dataset;
 use crate::error::Result;
-use crate::job::progress::Progress;
+use crate::images::progress::Progress;
 use crate::types::{FrameId, Rgb};
 
 /// The number of grid cells, horizontally and vertically (chosen).

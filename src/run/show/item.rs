@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use crate::error::Result;
-use crate::job::stored::AnyRun;
 use crate::report::outcome_words;
+use crate::runs::stored::AnyRun;
 use crate::types::manifest::RunManifest;
 use crate::types::question::letter;
 use crate::types::{Condition, Digest, FrameId, OpenDetail, Record, RunQuestion};

@@ -12,10 +12,10 @@ use std::sync::Arc;
 use crate::dataset::inputs::stem;
 use crate::error::{Error, Result};
 use crate::files::write;
-use crate::job::Outcome;
-use crate::job::rebuild::ImageRebuilder;
-use crate::job::run_parts::any_run;
 use crate::picture::Payload;
+use crate::runs::Outcome;
+use crate::runs::rebuild::ImageRebuilder;
+use crate::runs::run_parts::any_run;
 use crate::types::manifest::Status;
 use crate::types::{Condition, Digest, FrameId};
 

@@ -8,13 +8,13 @@ use clap::Args;
 
 use crate::error::{Error, Result};
 use crate::files::write;
-use crate::job::Outcome;
-use crate::job::progress::Progress;
-use crate::job::rebuild::{ImageRebuilder, RebuildArgs};
-use crate::job::stored::StoredRun;
+use crate::images::progress::Progress;
 use crate::picture::Payload;
 use crate::report::study::{StudyImage, StudyQuestion, page};
 use crate::report::words::counted;
+use crate::runs::Outcome;
+use crate::runs::rebuild::{ImageRebuilder, RebuildArgs};
+use crate::runs::stored::StoredRun;
 use crate::types::manifest::Status;
 use crate::types::{
     ChoiceDetail, Condition, Decides, Digest, FrameId, QuestionId, RunQuestion, Trials,

@@ -11,12 +11,15 @@ use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
 use crate::files::reading;
-use crate::job::record_table;
-use crate::job::report::choice;
-use crate::job::stored::StoredRun;
+use crate::run_reports::choice;
+use crate::runs::record_table;
+use crate::runs::stored::StoredRun;
 
-use crate::job::{Outcome, ShowArgs, StdoutFormat, count, now};
+use crate::runs::Outcome;
+use crate::runs::ShowArgs;
+use crate::runs::StdoutFormat;
 use crate::score::record::{Detail, answered};
+use crate::store::now;
 use crate::store::{AddressChange, Store, read_questions};
 use crate::types::manifest::{Counts, RunManifest, Status};
 use crate::types::{
@@ -129,7 +132,7 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
     warn_about(&counts.no_choice);
     let mut run = StoredRun::reread(&args.out, people_manifest)?;
     let failed = run.trials.iter().map(TrialRef::failed);
-    run.manifest.count(count(run.trials.len(), failed));
+    run.manifest.count(Counts::new(run.trials.len(), failed));
     let mut outcome = choice::write(&store, run, args.show.format())?;
     record_table::update(&args.out, args.show.table())?;
     if args.show.format() != StdoutFormat::Json {

@@ -7,8 +7,8 @@ use serde::Deserialize;
 
 use crate::error::{Error, Result};
 use crate::files::reading;
-use crate::job::Outcome;
-use crate::job::placed_image::OutputFile;
+use crate::images::placed_image::OutputFile;
+use crate::runs::Outcome;
 use crate::types::manifest::Status;
 
 /// The schemas of JSON files that vouch for an image. Other JSON files of the folder are left alone.

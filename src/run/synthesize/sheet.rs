@@ -10,8 +10,8 @@ use serde_json::Value;
 
 use crate::dataset::Picture;
 use crate::error::Result;
-use crate::job::frame_work::FrameWork;
-use crate::job::placed_image::ImageOrigin;
+use crate::images::frame_work::FrameWork;
+use crate::images::placed_image::ImageOrigin;
 use crate::report::sheet::{self, LevelBlock, LevelImage, LevelRow, Signal};
 use crate::synthesis::bayer::Bayer;
 use crate::synthesis::noise::{self, Term};

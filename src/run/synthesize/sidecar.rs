@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::dataset::Picture;
 use crate::error::{Error, Result};
-use crate::job::placed_image::{ImageOrigin, Sidecar};
+use crate::images::placed_image::{ImageOrigin, Sidecar};
 use crate::synthesis::blur::{blur, blurred_codes};
 use crate::synthesis::{
     self, Amplify, AppliedDegradation, CameraState, Clean, Coupling, Draws, NoiseKey, Streak, Tone,

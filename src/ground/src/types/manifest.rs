@@ -48,6 +48,23 @@ pub struct Counts {
     pub failed: usize,
 }
 
+impl Counts {
+    /// Counts of trials, of which those that are stored have `failed` or not.
+    #[must_use]
+    pub fn new(trials: usize, failed: impl IntoIterator<Item = bool>) -> Self {
+        let (mut all, mut failures) = (0, 0);
+        for has_failed in failed {
+            all += 1;
+            failures += usize::from(has_failed);
+        }
+        Self {
+            trials,
+            answered: all - failures,
+            failed: failures,
+        }
+    }
+}
+
 /// The fields in which two identities differ, with both values as text; a missing value is `unset`.
 pub fn differences<'a>(
     one: &'a BTreeMap<String, Value>,
@@ -169,6 +186,12 @@ pub struct RunPart {
 /// The version of the lenient reading in runs whose manifest names none.
 pub const FIRST_REPLY_READING: &str = "lenient/1";
 
+/// The settings that all trials of a run share and no column tells apart, by flag.
+pub type Identity = BTreeMap<String, Value>;
+
+/// The definition of each value in a column of the tables, by column and value.
+pub type Columns = BTreeMap<String, BTreeMap<String, Value>>;
+
 /// The content of `manifest.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunManifest {
@@ -185,11 +208,11 @@ pub struct RunManifest {
     /// The platform, and the versions of the libraries that process pixels.
     pub platform: BTreeMap<String, String>,
     /// The settings that all trials share and no column shows, by flag. A run can only be resumed with the same identity.
-    pub identity: BTreeMap<String, Value>,
+    pub identity: Identity,
     /// The meaning of each value in a column of the tables, by column and value: models, enhancers, light readings. A run may
     /// get further values; the meaning of an existing value never changes.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub columns: BTreeMap<String, BTreeMap<String, Value>>,
+    pub columns: Columns,
     /// The models of the file of models, in its order; empty without a file.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub models: Vec<ListedModel>,

@@ -139,7 +139,7 @@ fn profiles_that_cannot_be_read_are_refused_by_name() {
         (header(b"RGB ", b"XYZ ", b"rXYZ"), "broken"),
         (vec![0; 100], "ends too early"),
     ] {
-        let problem = ColourTag::Profile(profile.into())
+        let problem = ColourTag::Profile(profile)
             .meaning(CodeDepth::Eight)
             .unwrap_err();
         assert!(problem.contains(says), "{says}: {problem}");

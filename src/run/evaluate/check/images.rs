@@ -6,11 +6,11 @@ use rayon::prelude::*;
 
 use super::findings::{Findings, Mark};
 use crate::dataset::{Dataset, Picture};
+use crate::engine::dark_already::{DarkImages, advice};
 use crate::enhance::brightness;
 use crate::error::Result;
-use crate::job::dark_already::{DarkImages, advice};
-use crate::job::progress::Progress;
-use crate::job::source::first_asked;
+use crate::images::progress::Progress;
+use crate::images::source::first_asked;
 use crate::report::words::counted;
 use crate::types::{Digest, FrameId, InputNote, InputSummary, Question};
 

@@ -7,9 +7,9 @@ use super::findings::Findings;
 use crate::ask::Prompts;
 use crate::enhance::{Install, RuntimeSearch};
 use crate::error::Result;
-use crate::job::conditions::check_used;
-use crate::job::enhancers::{self, EnhancerRunArgs, OpenEnhancers};
-use crate::job::questions::rules;
+use crate::images::conditions::check_used;
+use crate::images::enhancers::{self, EnhancerRunArgs, OpenEnhancers};
+use crate::images::questions::rules;
 use crate::synthesis::LightSettings;
 use crate::types::Rgb;
 

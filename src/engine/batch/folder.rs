@@ -1,0 +1,201 @@
+//! The batches of a run, without the run's settings: [`FolderBatches`].
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
+use std::path::Path;
+
+use tokio::runtime;
+
+use super::driver::{Driver, Notes, Until};
+use super::journal::Journal;
+use super::part::Stage;
+use super::recover::recover;
+use super::servers::Servers;
+use super::settings::{BatchRunArgs, CollectArgs};
+use super::stopped::Stopped;
+use super::summary;
+use crate::ask::{AccessArgs, Endpoint, Sending};
+use crate::error::{Error, Result};
+use crate::images::progress::Progress;
+use crate::images::workers::unstarted;
+use crate::score::record::Detail;
+use crate::store::Store;
+use crate::types::manifest::RunManifest;
+
+/// What is done with the batches of a folder.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum FolderTask {
+    /// Take over the replies of those that have ended.
+    Fetch,
+    /// Cancel them, wait until they have ended, and take over what is there.
+    Cancel,
+}
+
+/// The batches of a run folder, and their server.
+pub(crate) struct FolderBatches<'a> {
+    journal: Journal,
+    manifest: &'a RunManifest,
+    servers: Servers,
+}
+
+impl<'a> FolderBatches<'a> {
+    /// The batches of a run. Without an address in the flags, they are looked for where they were made.
+    ///
+    /// # Errors
+    /// If the program submitted no batch of this run, or its server is not known.
+    pub(crate) fn open(
+        folder: &Path,
+        manifest: &'a RunManifest,
+        access: &AccessArgs,
+    ) -> Result<Self> {
+        let journal = Journal::open(folder, manifest)?;
+        if journal.parts.is_empty() {
+            return Err(Error::Run {
+                path: folder.to_owned(),
+                problem: "batch run has submitted no batch of this run".to_owned(),
+            });
+        }
+        let mut servers = Servers::default();
+        if let Some(base) = address(&journal, access)? {
+            let access = AccessArgs {
+                base_url: vec![base],
+                ..access.clone()
+            };
+            let sending = Sending::default();
+            let endpoint = Endpoint::of(access.server(sending)?.replicas, sending)?;
+            servers = Servers::at(endpoint.base().to_string(), endpoint.batch_server()?);
+        }
+        Ok(Self {
+            journal,
+            manifest,
+            servers,
+        })
+    }
+
+    /// One line a part, with what the server says of its batch.
+    pub(crate) fn status(&self) -> Result<String> {
+        let runtime = start()?;
+        let mut counts = BTreeMap::new();
+        let mut problems = String::new();
+        for part in &self.journal.parts {
+            let (Stage::Created, Some(id)) = (&part.stage, &part.batch) else {
+                continue;
+            };
+            let looked = match self.servers.of(&part.facts) {
+                Ok(server) => runtime
+                    .block_on(server.batch(id))
+                    .map_err(|e| e.to_string()),
+                Err(error) => Err(error.to_string()),
+            };
+            match looked {
+                Ok(batch) => {
+                    let (done, total) = (batch.counts.done, batch.counts.total);
+                    let state = format!("{}, {done} of {total}", batch.state.word());
+                    counts.insert(part.name.clone(), state);
+                }
+                Err(problem) => {
+                    let _ = writeln!(problems, "{}: {problem}", part.name);
+                }
+            }
+        }
+        Ok(summary::lines(&self.journal, &counts) + &problems)
+    }
+
+    /// Refuses batches of several accounts at the address: the flags name one key, with which the others are not found.
+    fn refuse_several_accounts(&self) -> Result<()> {
+        let open = self.journal.parts.iter();
+        let open = open.filter(|part| part.stage != Stage::Ended);
+        let here = open.filter(|part| self.servers.has(&part.facts.base));
+        let accounts = here.map(|part| &*part.facts.account);
+        // Journals of earlier versions name none.
+        let accounts: BTreeSet<&str> = accounts.filter(|account| !account.is_empty()).collect();
+        if accounts.len() < 2 {
+            return Ok(());
+        }
+        let accounts: Vec<&str> = accounts.into_iter().collect();
+        let problem = format_args!(
+            "the batches of this run were made with several keys or headers, among them those of {}, and these flags have one key; batch \
+             run with the file of models imports the replies of all, and the server's own page cancels them",
+            accounts.join(" and ")
+        );
+        Err(Error::usage("--api-key-env", problem))
+    }
+
+    /// Carries out a task in the open folder; a text about the batches.
+    ///
+    /// # Errors
+    /// If the server refuses what every further call would ask.
+    pub(crate) fn carry_out<D: Detail>(
+        mut self,
+        task: FolderTask,
+        store: &mut Store<D>,
+        collect: &CollectArgs,
+        progress: &Progress,
+    ) -> Result<String> {
+        self.refuse_several_accounts()?;
+        recover(&mut self.journal, store)?;
+        let args = BatchRunArgs::collecting(collect);
+        let mut stopped = Stopped::default();
+        let mut driver = Driver {
+            store,
+            manifest: self.manifest,
+            journal: &mut self.journal,
+            servers: &self.servers,
+            models: &[],
+            args: &args,
+            money: None,
+            progress,
+            until: match task {
+                FolderTask::Fetch => Until::LookedAt,
+                FolderTask::Cancel => Until::Cancelled,
+            },
+            refused: &mut BTreeSet::new(),
+            stopped: &mut stopped,
+            notes: Notes::default(),
+        };
+        start()?.block_on(driver.drive())?;
+        if let Some(first) = stopped.take_errors().into_iter().next() {
+            return Err(first);
+        }
+        Ok(summary::lines(&self.journal, &BTreeMap::new()))
+    }
+}
+
+fn start() -> Result<runtime::Runtime> {
+    let mut builder = runtime::Builder::new_current_thread();
+    builder.enable_all().build().map_err(|e| unstarted(&e))
+}
+
+/// The address of the server: as the flags name it, else where the parts were made; `None` if nothing is left to do at a server.
+fn address(journal: &Journal, access: &AccessArgs) -> Result<Option<String>> {
+    match &access.base_url[..] {
+        [] => {}
+        [base] => return Ok(Some(base.clone())),
+        _ => {
+            return Err(Error::usage(
+                "--base-url",
+                "batches are at one address; name one",
+            ));
+        }
+    }
+    let open = journal
+        .parts
+        .iter()
+        .filter(|part| part.stage != Stage::Ended);
+    let bases: BTreeSet<&str> = open.map(|part| part.facts.base.as_str()).collect();
+    let mut bases = bases.into_iter();
+    let (Some(base), None) = (bases.next(), bases.next()) else {
+        if journal.has_open_parts() {
+            let problem = "the batches of this run are at several addresses; name one of them, with its key, and then the other";
+            return Err(Error::usage("--base-url", problem));
+        }
+        return Ok(None);
+    };
+    // The journal has no query string, which the variable may have.
+    let variable = std::env::var("OPENAI_BASE_URL").ok();
+    let same = variable.filter(|text| {
+        let url = text.parse::<crate::ask::BaseUrl>();
+        url.is_ok_and(|url| url.to_string() == base)
+    });
+    Ok(Some(same.unwrap_or_else(|| base.to_owned())))
+}

@@ -1,0 +1,201 @@
+//! The state file of a run's batches, `batch/state.jsonl`: [`Journal`].
+//!
+//! One line an event, forced to the disk before and after each call that changes something at the server. So what a killed process
+//! did is known, but for its last call; that one is looked for at the server.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File, OpenOptions};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::event::{Event, PartFacts};
+use super::part::{Part, Stage};
+use crate::error::{Error, Result};
+use crate::files::reading;
+use crate::store::BATCH;
+use crate::store::now;
+use crate::types::Digest;
+use crate::types::manifest::RunManifest;
+
+/// Name of the state file in the batch folder.
+const STATE: &str = "state.jsonl";
+
+/// Number of digits of a run's hash.
+const HASH_DIGITS: usize = 16;
+
+/// One line of the state file.
+#[derive(Debug, Serialize, Deserialize)]
+struct Line {
+    /// Name of the part's file.
+    file: String,
+    #[serde(flatten)]
+    event: Event,
+    /// Time in UTC.
+    at: String,
+}
+
+/// The parts of a run and what happened to them.
+#[derive(Debug)]
+pub(crate) struct Journal {
+    folder: PathBuf,
+    /// Names this run in the names of files and in the marks of batches at the server.
+    pub(super) run: String,
+    pub(super) parts: Vec<Part>,
+    /// Numbers of tokens that may wait for batches, by address and model, as far as a server has stated them.
+    pub(super) limits: BTreeMap<(String, String), u64>,
+}
+
+impl Journal {
+    /// The state of the batches of a run; empty if there are none.
+    ///
+    /// # Errors
+    /// If the state file cannot be read.
+    pub(crate) fn open(run_folder: &Path, manifest: &RunManifest) -> Result<Self> {
+        let facts = (&manifest.identity, &manifest.created);
+        let hash = Digest::canonical("darkqa.batch/1", &facts)?.to_string();
+        let mut journal = Self {
+            folder: run_folder.join(BATCH),
+            run: hash[..HASH_DIGITS].to_owned(),
+            parts: Vec::new(),
+            limits: BTreeMap::new(),
+        };
+        let path = journal.path();
+        let text = match reading::read(&path) {
+            Ok(text) => text,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(journal),
+            Err(e) => return Err(Error::file(path, "read", e)),
+        };
+        for (index, line) in text.split_inclusive(|byte| *byte == b'\n').enumerate() {
+            // A killed process may leave the last line incomplete.
+            if line.last() != Some(&b'\n') {
+                break;
+            }
+            let line: Line =
+                serde_json::from_slice(line).map_err(|e| Error::json_line(&path, index + 1, &e))?;
+            journal.apply(&line.file, &line.event, &line.at);
+        }
+        Ok(journal)
+    }
+
+    /// The batch folder of the run.
+    pub(super) fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    fn path(&self) -> PathBuf {
+        self.folder.join(STATE)
+    }
+
+    /// The path of a part's file.
+    pub(super) fn file(&self, part: usize) -> PathBuf {
+        self.folder.join(&self.parts[part].name)
+    }
+
+    /// The first number that no file of this stem has or had.
+    pub(super) fn free_number(&self, stem: &str) -> u32 {
+        let numbers = self.parts.iter().filter_map(|part| {
+            let rest = part.name.strip_prefix(stem)?.strip_prefix('-')?;
+            rest.strip_suffix(".jsonl")?.parse::<u32>().ok()
+        });
+        numbers.max().unwrap_or(0) + 1
+    }
+
+    /// Whether something is left to do for a part.
+    pub(super) fn has_open_parts(&self) -> bool {
+        self.parts.iter().any(|part| part.stage != Stage::Ended)
+    }
+
+    /// Whether a batch may be at work at a server.
+    pub(super) fn has_batches(&self) -> bool {
+        let at_work = |stage: &Stage| matches!(stage, Stage::Creating | Stage::Created);
+        self.parts.iter().any(|part| at_work(&part.stage))
+    }
+
+    /// Number of requests of parts whose replies are not taken over.
+    pub(super) fn open_requests(&self) -> usize {
+        let open = |part: &&Part| !matches!(part.stage, Stage::TakenOver | Stage::Ended);
+        let open = self.parts.iter().filter(open);
+        open.map(|part| part.facts.requests).sum()
+    }
+
+    /// Records that a file was written as a part.
+    pub(super) fn add(&mut self, name: &str, facts: PartFacts) -> Result<()> {
+        self.write(name, Event::Written(facts))
+    }
+
+    /// Records an event of a part.
+    pub(super) fn record(&mut self, part: usize, event: Event) -> Result<()> {
+        let name = self.parts[part].name.clone();
+        self.write(&name, event)
+    }
+
+    /// Appends an event and forces it to the disk.
+    fn write(&mut self, file: &str, event: Event) -> Result<()> {
+        let path = self.path();
+        let line = Line {
+            file: file.to_owned(),
+            event,
+            at: now(),
+        };
+        let mut text =
+            serde_json::to_vec(&line).map_err(|e| Error::file(&path, "write", e.into()))?;
+        text.push(b'\n');
+        append(&path, &text).map_err(|e| Error::file(&path, "write", e))?;
+        tracing::info!("{file}: {}", String::from_utf8_lossy(&text).trim_end());
+        self.apply(file, &line.event, &line.at);
+        Ok(())
+    }
+
+    fn apply(&mut self, file: &str, event: &Event, at: &str) {
+        let place = self.parts.iter().position(|part| part.name == file);
+        let part = match (place, event) {
+            (Some(place), _) => &mut self.parts[place],
+            (None, Event::Written(facts)) => {
+                self.parts.push(Part::new(file, facts.clone()));
+                return;
+            }
+            (None, _) => return,
+        };
+        if let Event::QuotaReached { limit: Some(limit) } = event {
+            self.limits.insert(part.facts.place(), *limit);
+        }
+        part.apply(event, at);
+        if let Event::Split { into } = event {
+            let pieces = into
+                .iter()
+                .map(|piece| Part::new(&piece.file, piece.facts.clone()));
+            self.parts.extend(pieces);
+        }
+    }
+}
+
+/// Appends to a file that may end in an incomplete line, and forces it to the disk.
+fn append(path: &Path, text: &[u8]) -> std::io::Result<()> {
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder)?;
+    }
+    cut_incomplete_line(path)?;
+    let mut file = OpenOptions::new().append(true).create(true).open(path)?;
+    file.write_all(text)?;
+    file.sync_all()
+}
+
+/// Cuts off what follows the last line end.
+fn cut_incomplete_line(path: &Path) -> std::io::Result<()> {
+    let text = match reading::read(path) {
+        Ok(text) => text,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()),
+        Err(e) => return Err(e),
+    };
+    let complete = text.iter().rposition(|byte| *byte == b'\n');
+    let complete = complete.map_or(0, |last| last + 1);
+    if complete == text.len() {
+        return Ok(());
+    }
+    File::options()
+        .write(true)
+        .open(path)?
+        .set_len(complete as u64)
+}

@@ -1,0 +1,55 @@
+//! Runs through the files of a Batch API, which takes a day and costs half.
+//!
+//! The remaining requests are written as input files into `RUN/batch/`, with the records of their trials, still without an outcome. Until
+//! their replies are there, the run does not ask those trials. Either the user uploads the files to the API and imports its output; or
+//! the program does ([`run`]): each file is a [`part`] then, a [`driver`] moves the parts on, and a [`journal`] holds how far they are.
+
+mod collect;
+mod driver;
+mod event;
+pub(crate) mod export;
+mod file;
+mod folder;
+mod journal;
+mod part;
+mod quota;
+mod recover;
+pub(crate) mod replies;
+mod requests;
+pub(crate) mod run;
+mod servers;
+mod settings;
+mod split;
+mod stopped;
+mod submit;
+mod summary;
+mod take_over;
+
+pub(crate) use folder::{FolderBatches, FolderTask};
+pub(crate) use settings::{BatchRunArgs, CollectArgs};
+
+use crate::types::Decides;
+use std::num::{NonZeroU64, NonZeroUsize};
+
+use clap::Args;
+
+/// Flags of the input files of a Batch API. The default limits are those of the vendor, else those of OpenAI and Azure.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Batch")]
+pub(crate) struct BatchFileArgs {
+    /// The largest size of a file, in MB; default: what is known of the endpoint, else 200
+    #[arg(long, value_name = "MB", add = Decides::Nothing)]
+    pub file_size: Option<NonZeroU64>,
+    /// The largest number of requests in a file; default: what is known of the endpoint, else 50000
+    #[arg(long, value_name = "N", add = Decides::Nothing)]
+    pub file_requests: Option<NonZeroUsize>,
+    /// The URL path of each request; default: what is known of the endpoint, else that of the model's API, /v1/chat/completions
+    #[arg(long, value_name = "PATH", value_parser = path, add = Decides::Nothing)]
+    pub url: Option<String>,
+}
+
+/// Reads the path of a URL.
+fn path(text: &str) -> Result<String, String> {
+    let path = text.starts_with('/').then(|| text.to_owned());
+    path.ok_or_else(|| "a path expected, as /v1/chat/completions".to_owned())
+}

@@ -1,0 +1,362 @@
+//! A run through batches that the program submits itself: [`run`].
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use tokio::runtime;
+
+use super::BatchFileArgs;
+use super::driver::{Driven, Driver, Notes, Until};
+use super::export;
+use super::file::RequestCost;
+use super::journal::Journal;
+use super::recover::recover;
+use super::requests::{require_files, require_remote};
+use super::servers::Servers;
+use super::settings::BatchRunArgs;
+use super::stopped::Stopped;
+use super::summary;
+use crate::engine::budget::{Answering, Budget};
+use crate::engine::circuit_breaker::EndReason;
+use crate::engine::experiment::Experiment;
+use crate::engine::interrupt::Interrupt;
+use crate::engine::models;
+use crate::engine::open_run::{OpenRun, Remaining, answered, every_model};
+use crate::error::{Error, Result};
+use crate::images::enhancers::{self, OpenEnhancers};
+use crate::images::trial::Item as _;
+use crate::images::workers::unstarted;
+use crate::report::forecast::money;
+use crate::runs::outcome::Outcome;
+use crate::types::TrialKey;
+use crate::types::manifest::Status;
+
+/// How often what a batch did not answer is asked again in another one; chosen.
+const MOST_REPEATS: usize = 3;
+
+/// How a phase ended.
+enum PhaseEnd {
+    /// All was asked, as far as batches go.
+    Asked,
+    /// The batches are made, and the command returns.
+    Detached,
+    /// The command ends early.
+    Early(EndReason),
+}
+
+/// Asks the remaining trials in batches, phase by phase, and waits for their replies.
+///
+/// # Errors
+/// If a model is built in, or a server refuses what every further call would ask. The batches stay, and the same command goes on.
+pub(crate) fn run<E: Experiment>(
+    run: OpenRun<'_, E>,
+    files: &BatchFileArgs,
+    args: &BatchRunArgs,
+) -> Result<Outcome> {
+    let journal = Journal::open(run.store.folder(), &run.manifest)?;
+    let mut batches = BatchRun {
+        run,
+        journal,
+        files,
+        args,
+        refused: BTreeSet::new(),
+        stopped: Stopped::default(),
+        enhancers_taken: false,
+    };
+    recover(&mut batches.journal, &batches.run.store)?;
+    let mut end = EndReason::AllAsked;
+    for phase in 0..E::PHASES.len() {
+        match batches.phase(phase)? {
+            PhaseEnd::Asked => {}
+            PhaseEnd::Detached => return Ok(batches.detached()),
+            PhaseEnd::Early(reason) => {
+                end = reason;
+                break;
+            }
+        }
+    }
+    if matches!(end, EndReason::AllAsked) && !batches.stopped.errors().is_empty() {
+        end = EndReason::ModelsStopped(batches.stopped.take_errors());
+    }
+    batches.finish(end)
+}
+
+/// An open run with its batches.
+struct BatchRun<'a, 'b, E: Experiment> {
+    run: OpenRun<'a, E>,
+    journal: Journal,
+    files: &'b BatchFileArgs,
+    args: &'b BatchRunArgs,
+    /// Trials that were refused in a way in which they would be again.
+    refused: BTreeSet<TrialKey>,
+    /// The models that cannot be asked any further.
+    stopped: Stopped,
+    enhancers_taken: bool,
+}
+
+impl<E: Experiment> BatchRun<'_, '_, E> {
+    fn phase(&mut self, phase: usize) -> Result<PhaseEnd> {
+        for repeat in 0..=MOST_REPEATS {
+            let mut remaining = self.remaining(phase)?;
+            if repeat == 0 {
+                self.warn_of_other_batches(&remaining);
+            }
+            let has_parts = self.journal.has_open_parts();
+            if remaining.plan.remaining() == 0 && !has_parts {
+                break;
+            }
+            if remaining.plan.remaining() > 0 {
+                let models = self.run.experiment.models(phase);
+                require_remote(models)?;
+                require_files(models)?;
+                if repeat == 0 && !self.args.no_scout {
+                    match self.scout(phase, remaining)? {
+                        EndReason::AllAsked => {}
+                        early => return Ok(PhaseEnd::Early(early)),
+                    }
+                    remaining = self.remaining(phase)?;
+                }
+                self.write(phase, remaining)?;
+            }
+            let driven = self.drive();
+            self.note_adapted()?;
+            let driven = driven?;
+            if let Some(first) = self.stopped_phase(phase) {
+                return Ok(PhaseEnd::Early(EndReason::Stopped(first)));
+            }
+            match driven {
+                Some(Driven::Reached) if self.args.detach && self.journal.has_open_parts() => {
+                    return Ok(PhaseEnd::Detached);
+                }
+                Some(Driven::Reached) => {}
+                Some(Driven::OverBudget) => {
+                    self.warn_of_budget();
+                    return Ok(PhaseEnd::Early(EndReason::OverBudget));
+                }
+                None => return Ok(PhaseEnd::Early(EndReason::Interrupted)),
+            }
+        }
+        Ok(PhaseEnd::Asked)
+    }
+
+    /// The trials of a phase that are to be asked in a batch.
+    fn remaining(&mut self, phase: usize) -> Result<Remaining<E>> {
+        let mut remaining = self.run.remaining(phase)?;
+        let models = self.run.experiment.models(phase);
+        let mut left_out = BTreeSet::new();
+        for (_, group) in remaining.plan.groups() {
+            let trials = group.trials.iter();
+            let of_stopped = trials.filter(|trial| {
+                self.stopped
+                    .has_model(phase, (trial.model, &models[trial.model]))
+            });
+            left_out.extend(of_stopped.map(|trial| trial.key));
+        }
+        let is_left_out = |key: &TrialKey| self.refused.contains(key) || left_out.contains(key);
+        remaining.plan.exclude(is_left_out);
+        Ok(remaining)
+    }
+
+    /// The first error, if all models of a phase are stopped; `None` if one may still be asked.
+    fn stopped_phase(&mut self, phase: usize) -> Option<Error> {
+        let mut models = self.run.experiment.models(phase).iter().enumerate();
+        let is_stopped = models.all(|model| self.stopped.has_model(phase, model));
+        let errors = is_stopped.then(|| self.stopped.take_errors())?;
+        errors.into_iter().next()
+    }
+
+    /// Warns about trials in files that the user submits.
+    fn warn_of_other_batches(&self, remaining: &Remaining<E>) {
+        let own = self.journal.open_requests();
+        if remaining.in_batch > own {
+            tracing::warn!(
+                "{} trials are in files of batch export and not asked here; import their replies with batch import",
+                remaining.in_batch - own
+            );
+        }
+    }
+
+    /// Asks one trial of each model directly, so that what the server refuses is found out before a batch is made. A model that cannot
+    /// be asked any further is stopped alone.
+    fn scout(&mut self, phase: usize, mut remaining: Remaining<E>) -> Result<EndReason> {
+        let mut scouts = BTreeMap::new();
+        for (_, group) in remaining.plan.groups() {
+            for trial in &group.trials {
+                scouts.entry(trial.model).or_insert(trial.key);
+            }
+        }
+        let keys: BTreeSet<TrialKey> = scouts.values().copied().collect();
+        remaining.plan.exclude(|key| !keys.contains(key));
+        self.reload_enhancers()?;
+        let end = self.run.ask_phase(phase, remaining);
+        self.note_adapted()?;
+        let end = end?;
+        if let EndReason::ModelsStopped(errors) = end {
+            self.stop_unanswered(phase, &scouts, errors)?;
+            return Ok(EndReason::AllAsked);
+        }
+        Ok(end)
+    }
+
+    /// Stops the models whose question had no reply, for one of these errors.
+    fn stop_unanswered(
+        &mut self,
+        phase: usize,
+        scouts: &BTreeMap<usize, TrialKey>,
+        errors: Vec<Error>,
+    ) -> Result<()> {
+        let answered = answered(&self.run.store.trials()?);
+        let models = self.run.experiment.models(phase);
+        for (model, _) in scouts.iter().filter(|(_, key)| !answered.contains(key)) {
+            // Each error begins with the name of its model. Another failure is that of the question alone.
+            let name = format!("{}: ", models[*model].name);
+            let is_of_model = |error: &Error| matches!(error, Error::Endpoint { problem, .. } if problem.starts_with(&name));
+            if errors.iter().any(is_of_model) {
+                self.stopped.add_model(phase, *model);
+            }
+        }
+        self.stopped.add_errors(errors);
+        Ok(())
+    }
+
+    /// Writes the remaining trials as parts.
+    fn write(&mut self, phase: usize, remaining: Remaining<E>) -> Result<()> {
+        if remaining.plan.remaining() == 0 {
+            return Ok(());
+        }
+        self.reload_enhancers()?;
+        self.run.write_counts(&remaining.stored)?;
+        let experiment = self.run.experiment;
+        let (models, money) = (experiment.models(phase), &experiment.settings().money);
+        let all = every_model(experiment);
+        let answering = Answering {
+            models: &all,
+            manifest: Some(&self.run.manifest),
+        };
+        let budget = Budget::of_run(money, models, answering, &remaining.stored)?;
+        let cost = |trial: &_, stimulus: &crate::images::trial::Stimulus| {
+            let trial: &crate::images::trial::Trial<E::Item> = trial;
+            let images = stimulus.images.iter().map(|image| image.facts());
+            let tokens = budget.expected_tokens(&models[trial.model], trial, images);
+            let reply = trial.item.reply_tokens();
+            let dollars = budget.expected_cost(trial.model, tokens, reply);
+            RequestCost {
+                tokens,
+                dollars: dollars.map(|dollars| money.prices.batch * dollars),
+            }
+        };
+        let quota = self.args.enqueued_tokens.map(std::num::NonZeroU64::get);
+        let target = export::Target {
+            files: self.files,
+            quota,
+            journal: Some(&mut self.journal),
+            cost: &cost,
+        };
+        export::write(&mut self.run, phase, remaining.plan, target)?;
+        Ok(())
+    }
+
+    /// Reads the enhancers again if they have been used.
+    fn reload_enhancers(&mut self) -> Result<()> {
+        let settings = self.run.experiment.settings();
+        if self.enhancers_taken {
+            let files = enhancers::read(&settings.enhancers.llie)?;
+            self.run.enhancers = OpenEnhancers::deferred(files, &settings.loading);
+        }
+        self.enhancers_taken = true;
+        Ok(())
+    }
+
+    /// Moves all parts on; `None` if the user interrupted it.
+    fn drive(&mut self) -> Result<Option<Driven>> {
+        let experiment = self.run.experiment;
+        let models = every_model(experiment);
+        let servers = Servers::of_models(&models)?;
+        let mut driver = Driver {
+            store: &mut self.run.store,
+            manifest: &self.run.manifest,
+            journal: &mut self.journal,
+            servers: &servers,
+            models: &models,
+            args: self.args,
+            money: Some(&experiment.settings().money),
+            progress: self.run.progress,
+            until: if self.args.detach {
+                Until::Submitted
+            } else {
+                Until::TakenOver
+            },
+            refused: &mut self.refused,
+            stopped: &mut self.stopped,
+            notes: Notes::default(),
+        };
+        let runtime = runtime::Builder::new_current_thread()
+            .enable_all()
+            .build()
+            .map_err(|e| unstarted(&e))?;
+        runtime.block_on(async {
+            let mut interrupt = Interrupt::listen()?;
+            tokio::select! {
+                biased;
+                () = interrupt.next() => Ok(None),
+                driven = driver.drive() => driven.map(Some),
+            }
+        })
+    }
+
+    fn warn_of_budget(&self) {
+        if let Some(max_cost) = self.run.experiment.settings().money.max_cost {
+            tracing::warn!(
+                "stopped: one more batch could exceed the {} of --max-cost; the same command with a higher limit continues, and batch \
+                 cancel frees the requests that wait",
+                money(max_cost)
+            );
+        }
+    }
+
+    /// What is out, for a command that does not wait.
+    fn detached(self) -> Outcome {
+        let folder = self.run.store.folder().display().to_string();
+        let parts = summary::lines(&self.journal, &BTreeMap::new());
+        let output = format!(
+            "{parts}the same command, or batch fetch {folder}, imports the replies; the same command also submits what waits\n"
+        );
+        for error in self.stopped.errors() {
+            tracing::warn!("not asked any further: {error}");
+        }
+        let status = match self.stopped.errors() {
+            [] => Status::Complete,
+            _ => Status::Stopped,
+        };
+        Outcome::text(status, output)
+    }
+
+    fn finish(self, end: EndReason) -> Result<Outcome> {
+        if let EndReason::Interrupted = end {
+            let folder = self.run.store.folder().display();
+            let line = if self.journal.has_batches() {
+                format!(
+                    "interrupted: the batches continue at the server; the same command continues the run, and batch cancel {folder} ends \
+                     them"
+                )
+            } else {
+                "interrupted: no batch is at the server; the same command continues the run"
+                    .to_owned()
+            };
+            self.run.progress.note(&line);
+        }
+        self.run.finish(end)
+    }
+
+    /// Writes into the manifest how requests were changed, so that it is known however the command ends.
+    fn note_adapted(&mut self) -> Result<()> {
+        let before = self.run.manifest.settings.clone();
+        for phase in 0..E::PHASES.len() {
+            let adapted = models::adapted(self.run.experiment.models(phase));
+            self.run.manifest.settings.extend(adapted);
+        }
+        if self.run.manifest.settings == before {
+            return Ok(());
+        }
+        self.run.store.write_manifest(&self.run.manifest)
+    }
+}

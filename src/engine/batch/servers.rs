@@ -1,0 +1,112 @@
+//! The servers of a run's parts: [`Servers`].
+
+use std::collections::BTreeSet;
+
+use super::event::PartFacts;
+use crate::ask::batch_api::BatchServer;
+use crate::engine::models::ModelUnderTest;
+use crate::error::{Error, Result};
+
+/// Servers with files and batches, each with the key and headers of a model.
+#[derive(Debug, Default)]
+pub(crate) struct Servers(Vec<ModelServer>);
+
+/// The server of a model.
+#[derive(Debug)]
+struct ModelServer {
+    base: String,
+    /// The model's name in tables; empty if the server is that of any model.
+    name: String,
+    /// The model as the endpoint names it.
+    id: String,
+    /// The name of the first model with the same address, key and headers.
+    account: String,
+    server: BatchServer,
+}
+
+impl Servers {
+    /// The servers of these models.
+    ///
+    /// # Errors
+    /// If a header value has characters that HTTP does not allow.
+    pub(super) fn of_models(models: &[&ModelUnderTest]) -> Result<Self> {
+        let mut servers = Vec::new();
+        for model in models {
+            let Some(server) = model.model.batch_server()? else {
+                continue;
+            };
+            servers.push(ModelServer {
+                base: model.model.batch_base().unwrap_or_default(),
+                name: model.name.to_string(),
+                id: model.model.name().to_owned(),
+                account: account(model, models)?,
+                server,
+            });
+        }
+        Ok(Self(servers))
+    }
+
+    /// The server at one address, for all models.
+    pub(super) fn at(base: String, server: BatchServer) -> Self {
+        let [name, id, account] = [(); 3].map(|()| String::new());
+        Self(vec![ModelServer {
+            base,
+            name,
+            id,
+            account,
+            server,
+        }])
+    }
+
+    /// Whether there is a server at an address.
+    pub(super) fn has(&self, base: &str) -> bool {
+        self.0.iter().any(|one| one.base == base)
+    }
+
+    /// The server of a part: with the key of its model. The server of a model that has another name now is known only if all models at
+    /// its address have one key.
+    ///
+    /// # Errors
+    /// If no flag names it.
+    pub(super) fn of(&self, facts: &PartFacts) -> Result<&BatchServer> {
+        let PartFacts { base, name, .. } = facts;
+        let at_base: Vec<&ModelServer> = self.0.iter().filter(|one| one.base == *base).collect();
+        let own = at_base.iter().find(|one| facts.asks(&one.name, &one.id));
+        let accounts: BTreeSet<&str> = at_base.iter().map(|one| &*one.account).collect();
+        match (own, &at_base[..]) {
+            // A part of an earlier version has no name.
+            (Some(own), _) if !name.is_empty() || accounts.len() == 1 => Ok(&own.server),
+            (_, [first, ..]) if accounts.len() == 1 => Ok(&first.server),
+            (_, []) => {
+                let known: BTreeSet<&str> = self.0.iter().map(|one| &*one.base).collect();
+                let known: Vec<&str> = known.into_iter().collect();
+                let problem = format_args!(
+                    "this run has batches at {base}, and the flags name {} alone; name that address, with its key",
+                    known.join(" and ")
+                );
+                Err(Error::usage("--base-url", problem))
+            }
+            _ => {
+                let of = if name.is_empty() { &facts.model } else { name };
+                let problem = format_args!(
+                    "this run has batches of {of} at {base}, where the models have several keys or headers, and it is not known which of \
+                     them made the batches; name the models as they were when the batches were made"
+                );
+                Err(Error::usage("--models", problem))
+            }
+        }
+    }
+}
+
+/// The account that is charged for the batches of a model: the name of the first model with the same address, key and headers.
+///
+/// # Errors
+/// If a header value has characters that HTTP does not allow.
+pub(super) fn account(model: &ModelUnderTest, models: &[&ModelUnderTest]) -> Result<String> {
+    for other in models {
+        if other.model.has_account_of(&model.model)? {
+            return Ok(other.name.to_string());
+        }
+    }
+    Ok(model.name.to_string())
+}

@@ -1,0 +1,363 @@
+//! Reasons to stop asking before the plan ends: [`CircuitBreaker`], [`EndReason`].
+
+use std::collections::BTreeSet;
+
+use crate::ask::{AskError, Reach};
+use crate::engine::models::ModelUnderTest;
+use crate::error::Error;
+use crate::types::manifest::{Counts, Status};
+use crate::types::{Failure, FailureKind};
+
+/// Failed trials after which a model is stopped if none has succeeded: the next would fail, too.
+const FAILURES_AT_START: usize = 5;
+
+/// Minimum of failures in a row after which a model is stopped if a trial has succeeded: servers recover from shorter outages.
+const FAILURES_IN_A_ROW: usize = 20;
+
+/// How the asking ended.
+#[derive(Debug)]
+pub(crate) enum EndReason {
+    /// All trials of the plan were asked.
+    AllAsked,
+    /// The user or the batch system interrupted it.
+    Interrupted,
+    /// The next question would have gone beyond `--max-cost`.
+    OverBudget,
+    /// No model could be asked any further, or too much had failed.
+    Stopped(Error),
+    /// These models could not be asked any further; the others were.
+    ModelsStopped(Vec<Error>),
+}
+
+impl EndReason {
+    pub(crate) fn status(&self, counts: Counts) -> Status {
+        match self {
+            _ if counts.answered == counts.trials => Status::Complete,
+            Self::AllAsked => Status::Incomplete,
+            Self::Interrupted => Status::Cancelled,
+            Self::OverBudget => Status::OverBudget,
+            Self::Stopped(_) | Self::ModelsStopped(_) => Status::Stopped,
+        }
+    }
+}
+
+/// Successes and failures of one model so far.
+#[derive(Debug, Default)]
+struct ModelHealth {
+    succeeded: bool,
+    /// Failures since the last success that the server or the network caused.
+    outage: usize,
+    /// Requests that the server refused, in the whole run.
+    refusals: usize,
+    /// Frames or walks of the refused requests. A single one does not count, because it may be the cause.
+    refused_sources: BTreeSet<String>,
+    /// Whether the model is asked nothing more.
+    stopped: bool,
+}
+
+/// One model with its endpoint and its health.
+#[derive(Debug)]
+struct ModelState {
+    name: String,
+    /// Name of the endpoint, for messages.
+    endpoint: String,
+    health: ModelHealth,
+}
+
+/// Checks each outcome for a reason to stop asking one model, or all.
+#[derive(Debug)]
+pub(crate) struct CircuitBreaker {
+    max_failures: Option<usize>,
+    /// Whether the first model that is stopped ends the run.
+    fails_fast: bool,
+    /// Failures in a row after which a model that has succeeded is stopped.
+    max_outage: usize,
+    models: Vec<ModelState>,
+    failures: usize,
+    /// Whether nothing more is asked of any model.
+    stopped: bool,
+    end: Option<EndReason>,
+    /// Why each of the stopped models was stopped.
+    model_errors: Vec<Error>,
+}
+
+impl CircuitBreaker {
+    /// A circuit breaker for these models. `concurrency` requests may fail together, for one cause.
+    pub(crate) fn new(
+        models: &[ModelUnderTest],
+        concurrency: usize,
+        max_failures: Option<usize>,
+    ) -> Self {
+        let states = models.iter().map(|model| ModelState {
+            name: model.name.to_string(),
+            endpoint: model.endpoint_name(),
+            health: ModelHealth::default(),
+        });
+        Self {
+            max_failures,
+            fails_fast: false,
+            max_outage: FAILURES_IN_A_ROW.max(3 * concurrency),
+            models: states.collect(),
+            failures: 0,
+            stopped: false,
+            end: None,
+            model_errors: Vec::new(),
+        }
+    }
+
+    /// The same circuit breaker; if `fails_fast`, the first model that is stopped ends the run.
+    pub(crate) fn failing_fast(self, fails_fast: bool) -> Self {
+        Self { fails_fast, ..self }
+    }
+
+    /// Whether nothing more is asked of any model.
+    pub(crate) fn stopped(&self) -> bool {
+        self.stopped
+    }
+
+    /// Whether a model is asked nothing more.
+    pub(crate) fn is_stopped(&self, model: usize) -> bool {
+        self.models[model].health.stopped
+    }
+
+    /// Number of failed trials.
+    pub(crate) fn failures(&self) -> usize {
+        self.failures
+    }
+
+    pub(crate) fn into_end(self) -> EndReason {
+        match self.end {
+            Some(EndReason::Stopped(_)) if !self.stopped => {
+                EndReason::ModelsStopped(self.model_errors)
+            }
+            end => end.unwrap_or(EndReason::AllAsked),
+        }
+    }
+
+    pub(crate) fn interrupted(&mut self) {
+        self.stop(EndReason::Interrupted);
+    }
+
+    /// Stops the run because an enhancer cannot be used any further.
+    pub(crate) fn enhancer_ended(&mut self, error: Error) {
+        self.stop(EndReason::Stopped(error));
+    }
+
+    /// Stops the run because one more question could exceed `--max-cost`.
+    pub(crate) fn over_budget(&mut self) {
+        self.stop(EndReason::OverBudget);
+    }
+
+    /// Ends the run. The first reason counts; that one of several models was stopped before is not the end of the run.
+    fn stop(&mut self, reason: EndReason) {
+        if !self.stopped {
+            self.stopped = true;
+            self.end = Some(reason);
+        }
+    }
+
+    pub(crate) fn succeeded(&mut self, model: usize) {
+        let health = &mut self.models[model].health;
+        (health.succeeded, health.outage) = (true, 0);
+    }
+
+    /// Records a failure about a frame or walk.
+    pub(crate) fn failed(&mut self, model: usize, error: &AskError, source: &str) {
+        if error.reach == Reach::Interrupted {
+            return;
+        }
+        self.failures += 1;
+        let ModelState {
+            name,
+            endpoint,
+            health,
+        } = &mut self.models[model];
+        let Failure { kind, message, .. } = &error.failure;
+        // The error that ends the run begins with the endpoint.
+        let message = message
+            .strip_prefix(endpoint.as_str())
+            .and_then(|rest| rest.strip_prefix(": "))
+            .unwrap_or(message);
+        match kind {
+            // The images or their content are the cause; the next may succeed.
+            FailureKind::Image | FailureKind::Filtered => {}
+            FailureKind::Request => {
+                health.refusals += 1;
+                health.refused_sources.insert(source.to_owned());
+            }
+            _ => health.outage += 1,
+        }
+        let refused = health.refusals >= FAILURES_AT_START && health.refused_sources.len() > 1;
+        let max_outage = if health.succeeded {
+            self.max_outage
+        } else {
+            FAILURES_AT_START
+        };
+        let problem = if error.reach == Reach::Endpoint {
+            Some(format!("{name}: {message}"))
+        } else if refused && !health.succeeded {
+            Some(format!(
+                "{name}: the first {} trials were all refused: {message}",
+                health.refusals
+            ))
+        } else if health.outage >= max_outage {
+            Some(format!(
+                "{name}: {} trials in a row failed: {message}",
+                health.outage
+            ))
+        } else {
+            None
+        };
+        // Replies that were in flight may fail after the model was stopped.
+        let newly = problem.is_some() && !health.stopped;
+        health.stopped |= problem.is_some();
+        let too_many = self.max_failures.is_some_and(|max| self.failures >= max);
+        let too_many = too_many.then(|| {
+            format!(
+                "the limit of failed trials is reached (--max-failures {}); the last: {message}",
+                self.failures
+            )
+        });
+        let endpoint = endpoint.clone();
+        self.stopped |= self.fails_fast && newly;
+        self.stopped |= too_many.is_some() || self.models.iter().all(|model| model.health.stopped);
+        if let Some(problem) = problem.or(too_many) {
+            let problem =
+                format!("{problem} (replies so far are stored; the same command continues)");
+            if newly {
+                let (endpoint, problem) = (endpoint.clone(), problem.clone());
+                self.model_errors
+                    .push(Error::Endpoint { endpoint, problem });
+            }
+            self.end
+                .get_or_insert(EndReason::Stopped(Error::Endpoint { endpoint, problem }));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ask::{Model, Random};
+    use crate::types::View;
+
+    fn breaker(models: usize, max_failures: Option<usize>) -> CircuitBreaker {
+        let model =
+            |_| ModelUnderTest::new(Model::Random(Random { seed: 0 }), View::Image, None).unwrap();
+        let models: Vec<ModelUnderTest> = (0..models).map(model).collect();
+        CircuitBreaker::new(&models, 2, max_failures)
+    }
+
+    fn error(kind: FailureKind, reach: Reach) -> AskError {
+        let failure = Failure {
+            kind,
+            status: None,
+            message: "no".into(),
+        };
+        AskError {
+            failure,
+            attempts: 1,
+            reach,
+            refused_field: None,
+        }
+    }
+
+    /// Whether one of two models is stopped after it has failed `times` times, over `frames` frames.
+    fn stopped_after(kind: FailureKind, times: usize, frames: usize, succeeded: bool) -> bool {
+        let mut breaker = breaker(2, None);
+        if succeeded {
+            breaker.succeeded(0);
+        }
+        for i in 0..times {
+            breaker.succeeded(1);
+            breaker.failed(0, &error(kind, Reach::Trial), &(i % frames).to_string());
+        }
+        assert!(!breaker.stopped(), "the other model continues");
+        breaker.is_stopped(0)
+    }
+
+    #[test]
+    fn an_interrupt_after_one_model_was_stopped_is_the_end() {
+        let mut breaker = breaker(2, None);
+        for i in 0..5 {
+            breaker.succeeded(1);
+            let failure = error(FailureKind::Server, Reach::Trial);
+            breaker.failed(0, &failure, &i.to_string());
+        }
+        assert!(breaker.is_stopped(0) && !breaker.stopped());
+        breaker.interrupted();
+        breaker.over_budget();
+        assert!(matches!(breaker.into_end(), EndReason::Interrupted));
+    }
+
+    #[test]
+    fn a_model_that_cannot_be_asked_is_stopped_and_the_others_continue() {
+        use FailureKind::{Connection, Image, Request, Server};
+        for kind in [Connection, Server] {
+            assert!(
+                stopped_after(kind, 5, 1, false),
+                "one frame is enough: {kind:?}"
+            );
+            assert!(!stopped_after(kind, 4, 4, false));
+            assert!(stopped_after(kind, 20, 1, true) && !stopped_after(kind, 19, 19, true));
+        }
+        assert!(stopped_after(Request, 5, 2, false));
+        assert!(
+            !stopped_after(Request, 9, 1, false),
+            "one frame may be the cause"
+        );
+        assert!(!stopped_after(Request, 99, 99, true), "others succeeded");
+        assert!(
+            !stopped_after(Image, 99, 99, false),
+            "the images are the cause"
+        );
+    }
+
+    #[test]
+    fn a_success_ends_an_outage() {
+        let mut breaker = breaker(1, None);
+        for i in 0..100 {
+            if i % 10 == 0 {
+                breaker.succeeded(0);
+            }
+            breaker.failed(0, &error(FailureKind::Server, Reach::Trial), &i.to_string());
+        }
+        assert!(!breaker.is_stopped(0));
+    }
+
+    #[test]
+    fn the_run_stops_when_no_model_remains_or_too_much_has_failed() {
+        let mut breaker = breaker(2, None);
+        breaker.failed(0, &error(FailureKind::Request, Reach::Endpoint), "a");
+        assert!(breaker.is_stopped(0) && !breaker.stopped());
+        breaker.failed(1, &error(FailureKind::Request, Reach::Endpoint), "a");
+        assert!(breaker.stopped());
+
+        let mut breaker = self::breaker(1, Some(2));
+        breaker.failed(0, &error(FailureKind::Image, Reach::Trial), "a");
+        assert!(!breaker.stopped());
+        breaker.failed(0, &error(FailureKind::Image, Reach::Trial), "b");
+        assert!(breaker.stopped() && matches!(breaker.into_end(), EndReason::Stopped(_)));
+    }
+
+    #[test]
+    fn aborted_requests_do_not_count_as_failures() {
+        let mut breaker = breaker(1, Some(1));
+        breaker.failed(0, &error(FailureKind::Connection, Reach::Interrupted), "a");
+        assert!(!breaker.stopped() && breaker.failures() == 0);
+    }
+
+    #[test]
+    fn an_interrupt_after_the_last_reply_changes_nothing() {
+        let all = Counts {
+            trials: 2,
+            answered: 2,
+            failed: 0,
+        };
+        assert_eq!(EndReason::Interrupted.status(all), Status::Complete);
+        let some = Counts { answered: 1, ..all };
+        assert_eq!(EndReason::Interrupted.status(some), Status::Cancelled);
+        assert_eq!(EndReason::OverBudget.status(some), Status::OverBudget);
+        assert_eq!(EndReason::AllAsked.status(some), Status::Incomplete);
+    }
+}

@@ -1,0 +1,392 @@
+//! The asynchronous part: asks about the images from the pipeline, and stores every reply when it arrives.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use tokio::runtime;
+use tokio::sync::mpsc::{self, Receiver, Sender};
+use tokio::task::{JoinError, JoinSet};
+use tokio::time::timeout;
+
+use crate::ask::{AskError, Call, Reach};
+use crate::engine::budget::{Budget, text_tokens};
+use crate::engine::circuit_breaker::{CircuitBreaker, EndReason};
+use crate::engine::interrupt::Interrupt;
+use crate::engine::lanes::{Lanes, PreparedTrial};
+use crate::engine::measured_tokens::MeasuredTokens;
+use crate::engine::models::ModelUnderTest;
+use crate::engine::settings::JobSettings;
+use crate::engine::truncation::TruncationCheck;
+use crate::error::{Error, Result};
+use crate::images::image_pipeline::EnhancerStopper;
+use crate::images::progress::{Progress, StepBar};
+use crate::images::timings::{TimedStep, Timings};
+use crate::images::trial::{Item, PreparedGroup};
+use crate::images::workers::unstarted;
+use crate::score::record::answered;
+use crate::store::Store;
+use crate::types::{Failure, FailureKind, Reply};
+
+/// Number of finished groups that may wait until they are asked about.
+const GROUPS_AHEAD: usize = 2;
+
+/// Models and settings that one phase of a run is asked with.
+pub(crate) struct Dispatcher<'a> {
+    pub(crate) models: &'a [ModelUnderTest],
+    pub(crate) progress: &'a Progress,
+    pub(crate) settings: &'a JobSettings,
+    pub(crate) timings: &'a Timings,
+}
+
+/// The numbers of all trials and of those answered, in one phase.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TrialCounts {
+    /// Number of trials, answered or not.
+    pub(crate) trials: usize,
+    /// Number of trials with a reply.
+    pub(crate) answered: usize,
+}
+
+/// One trial, with its reply or error.
+type Finished<I> = (PreparedTrial<I>, Result<Reply, AskError>);
+
+impl Dispatcher<'_> {
+    /// Asks about the groups that `make` sends. `make` runs on a separate thread until the channel is closed. `stoppers` end an
+    /// enhancement in progress.
+    pub(crate) fn run<I: Item>(
+        &self,
+        counts: TrialCounts,
+        budget: Budget,
+        store: &mut Store<I::Detail>,
+        stoppers: Vec<EnhancerStopper>,
+        make: impl FnOnce(&Sender<PreparedGroup<I>>) + Send,
+    ) -> Result<EndReason> {
+        let runtime = runtime::Builder::new_multi_thread()
+            .enable_all()
+            .build()
+            .map_err(|e| unstarted(&e))?;
+        let (sender, groups) = mpsc::channel(GROUPS_AHEAD);
+        let sink = ReplySink::<I> {
+            dispatcher: self,
+            store,
+            bar: self.progress.trials(counts.trials, counts.answered),
+            breaker: self.breaker(),
+            budget,
+            stoppers,
+            answered: counts.answered,
+            truncation: TruncationCheck::default(),
+            measured: MeasuredTokens::new(self.models.len()),
+            said_difference: vec![Said::NotYet; self.models.len()],
+        };
+        std::thread::scope(|scope| {
+            scope.spawn(move || make(&sender));
+            runtime.block_on(sink.ask(groups))
+        })
+    }
+
+    fn breaker(&self) -> CircuitBreaker {
+        let servers = self.models.iter().filter_map(|model| model.server.as_ref());
+        let most = servers.map(|server| server.most_in_flight()).max();
+        CircuitBreaker::new(
+            self.models,
+            most.unwrap_or(self.settings.concurrency.most()),
+            self.settings.money.max_failures,
+        )
+        .failing_fast(self.settings.money.fail_fast)
+    }
+}
+
+/// How long trials that wait may take to end after their models are closed; chosen: they need microseconds.
+const CLOSING: Duration = Duration::from_millis(50);
+
+/// Asks trials, and stores their replies.
+struct ReplySink<'a, I: Item> {
+    dispatcher: &'a Dispatcher<'a>,
+    store: &'a mut Store<I::Detail>,
+    bar: StepBar,
+    breaker: CircuitBreaker,
+    budget: Budget,
+    stoppers: Vec<EnhancerStopper>,
+    /// Number of trials with a reply, including those of earlier calls.
+    answered: usize,
+    truncation: TruncationCheck,
+    /// What the images of the replies were charged.
+    measured: MeasuredTokens,
+    /// Of each model, whether the user knows how far the estimate is from what is charged.
+    said_difference: Vec<Said>,
+}
+
+/// Whether something was said, or need not be said any more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Said {
+    NotYet,
+    Done,
+}
+
+impl<I: Item> ReplySink<'_, I> {
+    async fn ask(mut self, mut groups: Receiver<PreparedGroup<I>>) -> Result<EndReason> {
+        let concurrency = self.dispatcher.settings.concurrency.most();
+        let mut lanes = Lanes::<I>::new(self.dispatcher.models, concurrency);
+        let mut in_flight = JoinSet::<Finished<I>>::new();
+        let mut interrupt = Interrupt::listen()?;
+        let mut grace = None;
+        let mut more_groups = true;
+        loop {
+            while let Some(ready) = lanes.next(|model| self.breaker.is_stopped(model)) {
+                if self.can_afford(&lanes, &ready) {
+                    let model = &self.dispatcher.models[ready.trial.model];
+                    in_flight.spawn(send(model.clone(), ready));
+                } else {
+                    lanes.put_back(ready);
+                }
+            }
+            if in_flight.is_empty() && !lanes.is_empty() {
+                self.breaker.over_budget();
+            }
+            let all_asked = !more_groups && lanes.is_empty() && in_flight.is_empty();
+            if all_asked || self.breaker.stopped() {
+                break;
+            }
+            let state = match in_flight.len() {
+                0 => Some(TimedStep::Idle),
+                _ if lanes.is_full() => Some(TimedStep::Full),
+                _ => None,
+            };
+            let since = Instant::now();
+            let wants_more =
+                more_groups && lanes.wants_more(|model| self.breaker.is_stopped(model));
+            tokio::select! {
+                () = interrupt.next() => {
+                    grace = Some(self.dispatcher.settings.grace);
+                    self.breaker.interrupted();
+                }
+                Some(done) = in_flight.join_next() => {
+                    self.record_wait(state, since);
+                    if let Ok((ready, _)) = &done {
+                        lanes.ended(ready.trial.model);
+                    }
+                    self.store_result(done)?;
+                }
+                group = groups.recv(), if wants_more => match group {
+                    Some(group) => {
+                        self.record_wait(state, since);
+                        lanes.extend(self.accept(group)?);
+                    }
+                    None => more_groups = false,
+                },
+            }
+        }
+        // The image pipeline ends as soon as this channel is closed.
+        drop(groups);
+        if self.breaker.stopped() {
+            self.stoppers.iter().for_each(EnhancerStopper::stop);
+            self.drain(in_flight, interrupt, grace).await?;
+        }
+        self.store.sync()?;
+        Ok(self.breaker.into_end())
+    }
+
+    /// Whether `--max-cost` allows a trial, which is counted in its lane already.
+    fn can_afford(&self, lanes: &Lanes<'_, I>, ready: &PreparedTrial<I>) -> bool {
+        let (model, prompt_tokens) = (ready.trial.model, self.expected_tokens(ready));
+        let paid = lanes.in_flight(|model| self.budget.is_paid(model));
+        let others = paid.saturating_sub(1);
+        let reply_tokens = ready.trial.item.reply_tokens();
+        self.budget
+            .can_afford(others, model, prompt_tokens, reply_tokens)
+    }
+
+    /// Adds the time waited in a state to the timings.
+    fn record_wait(&self, state: Option<TimedStep>, since: Instant) {
+        if let Some(state) = state {
+            self.dispatcher.timings.add(state, since.elapsed());
+        }
+    }
+
+    /// Waits for the requests in flight, because they may be paid for already, for as long as `grace` at most, if there is one. A further
+    /// interrupt aborts them. Requests that wait for their turn or for a retry are aborted at once.
+    async fn drain(
+        &mut self,
+        mut in_flight: JoinSet<Finished<I>>,
+        mut interrupt: Interrupt,
+        grace: Option<Duration>,
+    ) -> Result<()> {
+        let progress = self.dispatcher.progress;
+        for model in self.dispatcher.models {
+            model.model.close();
+        }
+        // Those that have only waited end now, and are not counted.
+        while let Ok(Some(done)) = timeout(CLOSING, in_flight.join_next()).await {
+            self.store_result(done)?;
+        }
+        if !in_flight.is_empty() {
+            let (at_most, again) = match grace {
+                Some(grace) => (
+                    format!(", after {} s (--grace) at the latest", grace.as_secs_f64()),
+                    " again",
+                ),
+                None => (String::new(), ""),
+            };
+            progress.say(&format!(
+                "stopping when the requests in flight ({}) have ended{at_most}; interrupt{again} to abort them",
+                in_flight.len()
+            ));
+        }
+        let out_of_grace = async {
+            match grace {
+                Some(grace) => tokio::time::sleep(grace).await,
+                None => std::future::pending().await,
+            }
+        };
+        tokio::pin!(out_of_grace);
+        let mut given_up = false;
+        while !in_flight.is_empty() {
+            let gives_up = tokio::select! {
+                () = interrupt.next() => true,
+                () = &mut out_of_grace, if !given_up => true,
+                Some(done) = in_flight.join_next() => {
+                    self.store_result(done)?;
+                    false
+                }
+            };
+            if gives_up && !given_up {
+                given_up = true;
+                tracing::warn!(
+                    "requests given up while in flight: {}; they may be paid for, and the same command asks them again",
+                    in_flight.len()
+                );
+                in_flight.abort_all();
+            }
+        }
+        Ok(())
+    }
+
+    /// Expected tokens of a trial's prompt.
+    fn expected_tokens(&self, ready: &PreparedTrial<I>) -> f64 {
+        let model = &self.dispatcher.models[ready.trial.model];
+        let images = ready.stimulus.images.iter().map(|image| image.facts());
+        self.budget.expected_tokens(model, &ready.trial, images)
+    }
+
+    /// The trials of a group, ready to be asked. If the images could not be made, all of them fail instead.
+    fn accept(&mut self, group: PreparedGroup<I>) -> Result<Vec<PreparedTrial<I>>> {
+        let PreparedGroup {
+            stimulus,
+            trials,
+            problem,
+            notes,
+        } = group;
+        notes.store(self.store)?;
+        let stimulus = Arc::new(stimulus);
+        let ready = trials.into_iter().map(|trial| PreparedTrial {
+            trial,
+            stimulus: Arc::clone(&stimulus),
+        });
+        let Some(problem) = problem else {
+            return Ok(ready.collect());
+        };
+        // Its trials are asked when the command is given again.
+        if let Error::EnhancerEnded { .. } = problem {
+            self.breaker.enhancer_ended(problem);
+            return Ok(Vec::new());
+        }
+        let message = problem.to_string();
+        let error = AskError {
+            failure: Failure {
+                kind: FailureKind::Image,
+                status: None,
+                message,
+            },
+            attempts: 0,
+            reach: Reach::Trial,
+            refused_field: None,
+        };
+        for ready in ready {
+            self.store_result(Ok((ready, Err(error.clone()))))?;
+        }
+        Ok(Vec::new())
+    }
+
+    /// Compares what the images of a prompt were charged with the estimate. Says once of each model if they differ.
+    fn compare_with_estimate(&mut self, ready: &PreparedTrial<I>, reply: &Reply) {
+        let model = ready.trial.model;
+        let charged = reply.usage.and_then(|usage| usage.prompt_tokens);
+        let Some(charged) = charged.filter(|_| !ready.stimulus.images.is_empty()) else {
+            return;
+        };
+        if self.said_difference[model] == Said::Done {
+            return;
+        }
+        let text = text_tokens(&ready.trial.prompt);
+        let shown = ready.stimulus.images.len();
+        self.measured.add(model, charged, text, shown);
+        if self.measured.image(model).is_none() {
+            return;
+        }
+        self.said_difference[model] = Said::Done;
+        let images = ready.stimulus.images.iter().map(|image| image.facts());
+        let of_model = (model, &self.dispatcher.models[model]);
+        let expected = self.budget.expected_image_tokens(of_model, images);
+        let difference =
+            expected.and_then(|tokens| self.measured.difference(model, text, (shown, tokens)));
+        if let Some(difference) = difference {
+            tracing::warn!(
+                "{}: a prompt is charged {:.0} tokens, where {:.0} were estimated (median of the first 10 with images); --dry-run \
+                 estimates the rest of this run by what is charged",
+                self.dispatcher.models[model].name,
+                difference.charged,
+                difference.estimated
+            );
+        }
+    }
+
+    /// Stores the reply or the failure of one trial.
+    fn store_result(&mut self, done: Result<Finished<I>, JoinError>) -> Result<()> {
+        let (ready, result) = match done {
+            Ok(done) => done,
+            Err(aborted) if aborted.is_cancelled() => return Ok(()),
+            Err(panic) => std::panic::resume_unwind(panic.into_panic()),
+        };
+        let trial = &ready.trial;
+        match &result {
+            Ok(_) => self.breaker.succeeded(trial.model),
+            Err(error) => {
+                self.breaker.failed(trial.model, error, trial.item.source());
+                // If the endpoint is the cause or the run ends, the trial does not count as asked.
+                if error.reach != Reach::Trial {
+                    return Ok(());
+                }
+            }
+        }
+        if let Ok(reply) = &result {
+            self.answered += 1;
+            self.truncation.count(reply);
+            self.compare_with_estimate(&ready, reply);
+            let (model, prompt_tokens) = (ready.trial.model, self.expected_tokens(&ready));
+            let reply_tokens = ready.trial.item.reply_tokens();
+            self.budget
+                .record(model, reply.usage, prompt_tokens, reply_tokens);
+        }
+        self.bar
+            .count(self.answered, self.breaker.failures(), self.budget.spent());
+        let model = &self.dispatcher.models[ready.trial.model];
+        let blank = I::blank(&ready.trial, &ready.stimulus, &model.name);
+        self.store.append(&match result {
+            Ok(reply) => answered(blank, reply)?,
+            Err(error) => blank.failed_by(error.failure, error.attempts),
+        })
+    }
+}
+
+/// Sends one trial to its model; the trial with its reply or error.
+async fn send<I: Item>(model: ModelUnderTest, ready: PreparedTrial<I>) -> Finished<I> {
+    let PreparedTrial { trial, stimulus } = &ready;
+    let call = Call {
+        query: trial.item.query(),
+        condition: stimulus.condition.as_ref(),
+        message: trial.prompt.message(&stimulus.images),
+        turn: trial.item.turn(),
+    };
+    let result = model.model.ask(call).await;
+    (ready, result)
+}

@@ -1,0 +1,175 @@
+//! The settings that define a run: those that all trials share ([`images`]), and those behind each value of a column ([`columns`]).
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde_json::{Value, json};
+
+use crate::engine::models::ModelUnderTest;
+use crate::engine::settings::JobSettings;
+use crate::enhance::{self, SizeArgs, Tiling};
+use crate::images::recipe::Recipe;
+use crate::picture::Scaling;
+use crate::synthesis::{KindSettings, Synthesis, version};
+use crate::types::degradation::Kind;
+use crate::types::manifest::Columns;
+use crate::types::{Degradation, Digest, PairDark, ReadingName};
+
+/// The kinds of the paper, whose versions stand in the identity. Those of the others stand in the column of variants, where they
+/// are asked, so that a run may get them later.
+const PAPER: [Kind; 2] = [Kind::Exposure, Kind::Sensor];
+
+/// Settings of this recipe that all trials share.
+pub(crate) fn images(recipe: &Recipe) -> impl Iterator<Item = (String, Value)> {
+    let scaling = match recipe.scaling {
+        Scaling::Never => None,
+        Scaling::MaxSide(side) => Some(("--max-side", json!(side))),
+        Scaling::LongerSide(side) => Some(("--image-size", json!(side))),
+    };
+    let fields = [
+        ("--image", json!(recipe.format.to_string())),
+        ("--seed", json!(recipe.seed)),
+        ("synthesis", json!(PAPER.map(version))),
+        ("enhancement", json!(enhance::VERSION)),
+    ];
+    let fields = fields.into_iter().chain(scaling);
+    fields.map(|(field, value)| (field.to_owned(), value))
+}
+
+/// Definitions of the models, enhancers, light readings and further variants of a run.
+pub(crate) fn columns<'a>(
+    models: impl IntoIterator<Item = &'a ModelUnderTest>,
+    recipe: &Recipe,
+    settings: &JobSettings,
+) -> Columns {
+    let models = models.into_iter();
+    let models = models.map(|entry| (entry.name.to_string(), model(entry)));
+    let enhancers = recipe.enhancers.iter();
+    let enhancers = enhancers.map(|(name, digest)| {
+        let content = enhancer(digest, &settings.loading.size);
+        (name.as_str().to_owned(), content)
+    });
+    let degradations = settings.light.degradations();
+    let readings = degradations
+        .iter()
+        .flatten()
+        .filter_map(Degradation::reading)
+        .chain(settings.light.matches.iter().filter_map(PairDark::reading));
+    let readings: BTreeSet<&ReadingName> = readings.collect();
+    let kinds: BTreeSet<Kind> = degradations
+        .iter()
+        .flatten()
+        .map(Degradation::kind)
+        .chain(settings.light.matches.iter().filter_map(PairDark::kind))
+        .collect();
+    let kinds = kinds.into_iter().filter(|kind| !PAPER.contains(kind));
+    let kinds = kinds.map(|kind| (kind.word().to_owned(), variant(kind, &recipe.kinds)));
+    let noise = recipe.kinds.sensor.readings.iter();
+    let noise = noise.filter(|(name, _)| readings.contains(name));
+    let noise = noise.map(|(name, content)| (name.to_string(), reading(content)));
+    let columns: [(&str, BTreeMap<String, Value>); 4] = [
+        ("model", models.collect()),
+        ("enhancer", enhancers.collect()),
+        ("reading", noise.collect()),
+        ("variant", kinds.collect()),
+    ];
+    let filled = columns.into_iter().filter(|(_, values)| !values.is_empty());
+    filled
+        .map(|(column, values)| (column.to_owned(), values))
+        .collect()
+}
+
+/// Settings that decide the replies of a model besides question and images, by flag; with the address of its endpoint.
+pub(crate) fn model(model: &ModelUnderTest) -> Value {
+    let mut content = model.model.content();
+    if let (Some(address), Some(fields)) = (model.address(), content.as_object_mut()) {
+        let own = std::mem::take(fields).into_iter();
+        fields.extend(own.map(|(name, value)| (flag(&name), value)));
+        fields.insert("--base-url".to_owned(), json!(address));
+    }
+    content
+}
+
+/// The flag that sets a parameter.
+fn flag(parameter: &str) -> String {
+    match parameter {
+        "seed" => "--sampling-seed".to_owned(),
+        // Keys of a file of models that are no flags.
+        "deployment" => "deployment".to_owned(),
+        "reply_headers" => "reply-headers".to_owned(),
+        name => format!("--{}", name.replace('_', "-")),
+    }
+}
+
+/// Settings that decide the pixels of an enhancer. Automatic tiles are not among them: at most one sample in a thousand differs from
+/// those of the whole image.
+pub(crate) fn enhancer(digest: &Digest, size: &SizeArgs) -> Value {
+    let tile = (size.tile != Tiling::Auto).then(|| size.tile.to_string());
+    let mut content = json!({
+        "--llie": digest,
+        "--tile": tile,
+        "--llie-max-side": size.llie_max_side,
+    });
+    // Left out if unset, so that runs from before the flag go on.
+    if size.llie_resize {
+        content["--llie-resize"] = json!(true);
+    }
+    content
+}
+
+/// Settings of a light reading, by flag.
+fn reading(synthesis: &Synthesis) -> Value {
+    json!({
+        "--amplify": synthesis.amplify,
+        "--tone": synthesis.tone,
+        "--draws": synthesis.draws,
+        "--coupling": synthesis.coupling,
+        "--camera, --gain, --ratio or --fixed": synthesis.camera,
+    })
+}
+
+/// Settings of a kind that the paper does not have, by flag.
+fn variant(kind: Kind, kinds: &KindSettings) -> Value {
+    let mut content = json!({"synthesis": version(kind), "--motion": kinds.motion.to_string()});
+    if kind == Kind::Auto {
+        content["--auto"] = json!(kinds.auto.to_string());
+        content["--camera or --fixed"] = json!(kinds.sensor.readings.camera());
+    }
+    content
+}
+
+/// Settings that do not decide a reply, but may explain how a run went.
+pub(crate) fn settings(job: &JobSettings) -> BTreeMap<String, Value> {
+    let mut settings = vec![
+        ("--concurrency", json!(job.concurrency.to_string())),
+        ("--max-failures", json!(job.money.max_failures)),
+        ("--threads", json!(job.loading.threads.threads)),
+    ];
+    if let Some(models) = &job.ask.file {
+        settings.push(("models", models.resolved.clone()));
+    } else if let Some(server) = job.ask.servers().first() {
+        let sending = server.sending;
+        settings.extend([
+            ("--timeout", json!(sending.timeout.as_secs_f64())),
+            ("--retries", json!(sending.retries)),
+            ("--max-wait", json!(sending.max_wait.as_secs_f64())),
+            ("--patience", json!(sending.patience.as_secs_f64())),
+            ("--rpm", json!(sending.quota.requests)),
+            ("--tpm", json!(sending.quota.tokens)),
+        ]);
+    }
+    let settings = settings.into_iter();
+    settings
+        .map(|(field, value)| (field.to_owned(), value))
+        .collect()
+}
+
+/// Operating system and processor of this machine.
+pub(crate) fn platform() -> BTreeMap<String, String> {
+    let facts = [
+        ("system", std::env::consts::OS),
+        ("processor", std::env::consts::ARCH),
+    ];
+    facts
+        .map(|(fact, value)| (fact.to_owned(), value.to_owned()))
+        .into()
+}

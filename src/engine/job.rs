@@ -1,0 +1,184 @@
+//! The engine that carries out an experiment: [`Job`].
+
+use std::collections::HashSet;
+use std::path::PathBuf;
+
+use crate::engine::batch::{self, BatchFileArgs, BatchRunArgs};
+use crate::engine::dark_already;
+use crate::engine::estimate;
+use crate::engine::experiment::{DetailOf, Experiment};
+use crate::engine::folder;
+use crate::engine::manifest;
+use crate::engine::measured_tokens::MeasuredTokens;
+use crate::engine::open_run::{OpenRun, answered, pipeline};
+use crate::enhance::ModelFile;
+use crate::error::Result;
+use crate::images::enhancers::OpenEnhancers;
+use crate::images::image_maker::Maker;
+use crate::images::plan::Plan;
+use crate::images::progress::Progress;
+use crate::images::source::{input_summary, warn_of_inputs};
+use crate::images::stored_findings::StoredFindings;
+use crate::images::timings::Timings;
+use crate::report::forecast::{Forecast, json, render};
+use crate::runs::outcome::{Outcome, StdoutFormat};
+use crate::store::{self, Store};
+use crate::types::manifest::Status;
+use crate::types::{StoredDetail as _, TrialKey};
+
+/// An experiment that is carried out in a run folder.
+pub(crate) struct Job<'a, E: Experiment> {
+    experiment: &'a E,
+    /// Files of the enhancement models, not yet loaded.
+    files: Vec<ModelFile>,
+    /// Run folder, which may not exist yet.
+    folder: PathBuf,
+    progress: &'a Progress,
+}
+
+impl<'a, E: Experiment> Job<'a, E> {
+    /// A job in the run folder of the experiment. Nothing is written.
+    pub(crate) fn new(
+        experiment: &'a E,
+        files: Vec<ModelFile>,
+        progress: &'a Progress,
+    ) -> Result<Self> {
+        Ok(Self {
+            folder: folder::find(experiment)?,
+            experiment,
+            files,
+            progress,
+        })
+    }
+
+    /// Asks the remaining trials, or only estimates them (`--dry-run`).
+    ///
+    /// # Errors
+    /// If nothing can be asked, or no further trial could succeed. Replies that had arrived are kept.
+    pub(crate) fn run(self) -> Result<Outcome> {
+        warn_of_inputs(&input_summary(self.experiment.sources()));
+        if self.experiment.settings().money.dry_run {
+            self.estimate()
+        } else {
+            self.open()?.ask()
+        }
+    }
+
+    /// Writes the remaining requests as files of a Batch API, and records in the run that these trials are sent.
+    ///
+    /// # Errors
+    /// If a model is built in, an image is larger than the endpoint takes, or a file cannot be written.
+    pub(crate) fn export_batch(self, files: &BatchFileArgs) -> Result<Outcome> {
+        warn_of_inputs(&input_summary(self.experiment.sources()));
+        batch::export::export(self.open()?, files)
+    }
+
+    /// Asks the remaining requests in batches that are submitted here, and waits for their replies.
+    ///
+    /// # Errors
+    /// If a model is built in, or a server refuses what every further call would ask. The batches stay, and the same command goes on.
+    pub(crate) fn run_batch(self, files: &BatchFileArgs, args: &BatchRunArgs) -> Result<Outcome> {
+        warn_of_inputs(&input_summary(self.experiment.sources()));
+        if self.experiment.settings().money.dry_run {
+            return self.estimate();
+        }
+        batch::run::run(self.open()?, files, args)
+    }
+
+    /// An estimate of the remaining requests and their cost, printed. Sends nothing and writes no file.
+    fn estimate(self) -> Result<Outcome> {
+        let show = self.experiment.settings().show;
+        let forecast = self.forecast()?;
+        Ok(Outcome::text(
+            Status::Complete,
+            match show {
+                StdoutFormat::Json => json(&forecast)?,
+                _ => render(&forecast),
+            },
+        ))
+    }
+
+    /// An estimate of the remaining requests and their cost. Sends nothing and writes no file.
+    ///
+    /// # Errors
+    /// If an enhancer cannot be opened, or an image cannot be made.
+    pub(crate) fn forecast(self) -> Result<Forecast> {
+        let experiment = self.experiment;
+        let settings = experiment.settings();
+        let stored = store::read_trials(&self.folder)?;
+        let answered = answered(&stored);
+        let (mut plans, mut measured) = (Vec::new(), Vec::new());
+        for phase in 0..E::PHASES.len() {
+            let mut plan = Plan::new(experiment.plan(phase, || store::read_records(&self.folder))?);
+            let models = experiment.models(phase).len();
+            measured.push(MeasuredTokens::of_stored(
+                models,
+                &plan,
+                experiment.sources(),
+                &stored,
+            ));
+            plan.exclude(|key| answered.contains(key));
+            plans.push(plan);
+        }
+        if plans.iter().any(|plan| !plan.conditions().is_empty()) {
+            dark_already::warn(experiment);
+        }
+        let timings = Timings::default();
+        let enhancers = OpenEnhancers::load(self.files, &settings.loading)?.take()?;
+        let mut pipeline = pipeline(experiment, enhancers, None, &timings);
+        for plan in &plans {
+            pipeline.probe(experiment.sources(), &plan.sources)?;
+        }
+        estimate::estimate(experiment, &plans, &measured, &stored, &mut pipeline)
+    }
+
+    /// Opens the run folder.
+    fn open(self) -> Result<OpenRun<'a, E>> {
+        let Self {
+            experiment,
+            files,
+            folder,
+            progress,
+        } = self;
+        let settings = experiment.settings();
+        let stored = store::read_manifest(&folder, DetailOf::<E>::SCHEMA)?;
+        let complete = stored
+            .as_ref()
+            .is_some_and(|stored| stored.status == Status::Complete);
+        let images = settings.images.open(settings.access)?;
+        let mut enhancers = OpenEnhancers::deferred(files, &settings.loading);
+        if !complete {
+            // Loaded before the folder is created, so that a broken enhancer leaves no folder; one that was loaded before is not broken.
+            enhancers.open_runtime()?;
+            let maker = Maker::new(enhancers.version(), &settings.loading.size);
+            let known = images.as_ref();
+            let known = known.map(|store| StoredFindings::new(store, &maker).know_all(&enhancers));
+            if !known.unwrap_or(Ok(false))? {
+                enhancers.open()?;
+            }
+        }
+        let manifest = manifest::of(experiment, stored)?;
+        folder::make(&folder, settings)?;
+        let mut store = Store::open(&folder, &manifest, folder::address_change(&settings.place))?;
+        store.add_questions(experiment.questions())?;
+        let present: HashSet<TrialKey> = if experiment.imported_records().is_empty() {
+            HashSet::new()
+        } else {
+            store.trials()?.iter().map(|trial| trial.key).collect()
+        };
+        for record in experiment.imported_records() {
+            if !present.contains(&record.key) {
+                store.append(record)?;
+            }
+        }
+        Ok(OpenRun {
+            experiment,
+            progress,
+            enhancers,
+            store,
+            manifest,
+            keys: HashSet::new(),
+            images,
+        })
+    }
+}

@@ -1,0 +1,69 @@
+//! All that decides a reply, whose digest is the key of its trial: [`KeyFacts`].
+
+use serde::Serialize;
+
+use crate::ask::ImagePlaces;
+use crate::engine::models::ModelUnderTest;
+use crate::error::Result;
+use crate::images::trial::Prompt;
+use crate::types::{Condition, Digest, QuestionId, TrialKey};
+
+/// All that decides a reply, as it enters the key of a trial. Question and condition are included, because built-in models answer by
+/// their names.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(crate) struct KeyFacts<'a> {
+    model: &'a str,
+    /// Digest of the settings that decide the model's replies.
+    parameters: &'a str,
+    question: &'a QuestionId,
+    before: &'a str,
+    behind: Option<&'a str>,
+    /// Where the images stand; `None` if they stand together.
+    places: Option<ImagePlaces>,
+    /// Choices in the order shown; `None` for an open question.
+    choices: Option<&'a [String]>,
+    /// Number of earlier trials with the same question; `None` for the first.
+    repeat: Option<u32>,
+    /// Condition of the images; `None` if only text is sent.
+    condition: Option<&'a Condition>,
+    /// Digest of all that decides the images; `None` if only text is sent.
+    image: Option<Digest>,
+}
+
+impl<'a> KeyFacts<'a> {
+    /// The facts of an open question that is asked for the first time.
+    pub(crate) fn new(
+        model: &'a ModelUnderTest,
+        question: &'a QuestionId,
+        prompt: &'a Prompt,
+        condition: Option<&'a Condition>,
+        image: Option<Digest>,
+    ) -> Self {
+        Self {
+            model: model.model.name(),
+            parameters: &model.digest,
+            question,
+            before: &prompt.before,
+            behind: prompt.behind.as_deref(),
+            places: Some(prompt.places).filter(|places| *places != ImagePlaces::Together),
+            choices: None,
+            repeat: None,
+            condition,
+            image,
+        }
+    }
+
+    /// The facts of a question with these choices in the order shown, asked `repeat` times before.
+    pub(crate) fn with_choices(self, choices: &'a [String], repeat: u32) -> Self {
+        Self {
+            choices: Some(choices),
+            repeat: (repeat > 0).then_some(repeat),
+            ..self
+        }
+    }
+
+    /// The digest of all these facts, which is the key of the trial.
+    pub(crate) fn key(&self) -> Result<TrialKey> {
+        Digest::canonical("darkqa.trial/2", self).map(Into::into)
+    }
+}

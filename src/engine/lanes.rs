@@ -1,0 +1,157 @@
+//! The trials that wait for their turn, one queue for each endpoint: [`Lanes`].
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Weak};
+
+use crate::engine::models::ModelUnderTest;
+use crate::images::trial::{Stimulus, Trial};
+
+/// The most bytes of images that may wait ahead of the slowest endpoint; chosen: some fifty images of 1280×720 as PNG.
+const BYTES_AHEAD: usize = 64 << 20;
+
+/// One trial, with the stimulus that its group shares.
+pub(crate) struct PreparedTrial<I> {
+    pub(crate) trial: Trial<I>,
+    pub(crate) stimulus: Arc<Stimulus>,
+}
+
+/// The trials of the models that share an endpoint. The built-in models are one lane, too.
+struct Lane<I> {
+    /// Indexes of the models.
+    models: Vec<usize>,
+    waiting: VecDeque<PreparedTrial<I>>,
+    in_flight: usize,
+    /// The budget does not allow its next trial now.
+    is_held: bool,
+}
+
+/// The trials that wait, and the number in flight, by endpoint: a slow endpoint does not hold up the others. The images of a group
+/// are made once for all of them.
+pub(crate) struct Lanes<'a, I> {
+    models: &'a [ModelUnderTest],
+    all: Vec<Lane<I>>,
+    /// Index of the lane of each model.
+    of_model: Vec<usize>,
+    /// Width of a lane of models that have none.
+    default_width: usize,
+    /// The images that were accepted, with their bytes, until all their trials have ended.
+    held: VecDeque<(Weak<Stimulus>, usize)>,
+}
+
+impl<'a, I> Lanes<'a, I> {
+    pub(crate) fn new(models: &'a [ModelUnderTest], default_width: usize) -> Self {
+        let mut lanes: Vec<Lane<I>> = Vec::new();
+        let mut of_model = Vec::new();
+        for (index, model) in models.iter().enumerate() {
+            let shares =
+                |lane: &Lane<I>| models[lane.models[0]].model.shares_endpoint(&model.model);
+            let lane = lanes.iter().position(shares).unwrap_or_else(|| {
+                lanes.push(Lane {
+                    models: Vec::new(),
+                    waiting: VecDeque::new(),
+                    in_flight: 0,
+                    is_held: false,
+                });
+                lanes.len() - 1
+            });
+            lanes[lane].models.push(index);
+            of_model.push(lane);
+        }
+        Self {
+            models,
+            all: lanes,
+            of_model,
+            default_width,
+            held: VecDeque::new(),
+        }
+    }
+
+    /// The maximum number of requests in flight in a lane now.
+    fn width(&self, lane: &Lane<I>) -> usize {
+        let widths = lane
+            .models
+            .iter()
+            .filter_map(|model| self.models[*model].model.width());
+        widths.max().unwrap_or(self.default_width)
+    }
+
+    /// Adds the trials of a group.
+    pub(crate) fn extend(&mut self, ready: Vec<PreparedTrial<I>>) {
+        if let Some(first) = ready.first() {
+            let images = first.stimulus.images.iter();
+            let bytes = images.map(|image| image.facts().bytes).sum();
+            self.held
+                .push_back((Arc::downgrade(&first.stimulus), bytes));
+        }
+        for ready in ready {
+            let lane = self.of_model[ready.trial.model];
+            self.all[lane].waiting.push_back(ready);
+        }
+    }
+
+    /// Takes the next trial of a lane that has room and is not held; trials of models that `is_stopped` names are dropped.
+    pub(crate) fn next(&mut self, is_stopped: impl Fn(usize) -> bool) -> Option<PreparedTrial<I>> {
+        for index in 0..self.all.len() {
+            let lane = &self.all[index];
+            if lane.is_held || lane.in_flight >= self.width(lane) {
+                continue;
+            }
+            let lane = &mut self.all[index];
+            while let Some(ready) = lane.waiting.pop_front() {
+                if !is_stopped(ready.trial.model) {
+                    lane.in_flight += 1;
+                    return Some(ready);
+                }
+            }
+        }
+        None
+    }
+
+    /// Puts back a trial that the budget does not allow now; its lane is held until something ends.
+    pub(crate) fn put_back(&mut self, ready: PreparedTrial<I>) {
+        let lane = &mut self.all[self.of_model[ready.trial.model]];
+        lane.in_flight -= 1;
+        lane.is_held = true;
+        lane.waiting.push_front(ready);
+    }
+
+    /// Notes that a trial of a model has ended.
+    pub(crate) fn ended(&mut self, model: usize) {
+        let lane = &mut self.all[self.of_model[model]];
+        lane.in_flight = lane.in_flight.saturating_sub(1);
+        self.all.iter_mut().for_each(|lane| lane.is_held = false);
+    }
+
+    /// The number of trials in flight of models for which `is_counted` holds, by lane.
+    pub(crate) fn in_flight(&self, is_counted: impl Fn(usize) -> bool) -> usize {
+        let lanes = self
+            .all
+            .iter()
+            .filter(|lane| lane.models.iter().any(|model| is_counted(*model)));
+        lanes.map(|lane| lane.in_flight).sum()
+    }
+
+    /// Whether no trial waits.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.all.iter().all(|lane| lane.waiting.is_empty())
+    }
+
+    /// Whether more trials wait than may be sent.
+    pub(crate) fn is_full(&self) -> bool {
+        !self.is_empty()
+    }
+
+    /// Whether a lane has nothing to do, and the images that wait for the others are few enough for one group more.
+    pub(crate) fn wants_more(&mut self, is_stopped: impl Fn(usize) -> bool) -> bool {
+        if self.is_empty() {
+            return true;
+        }
+        let mut idle = self.all.iter().filter(|lane| lane.waiting.is_empty());
+        if !idle.any(|lane| lane.models.iter().any(|model| !is_stopped(*model))) {
+            return false;
+        }
+        self.held
+            .retain(|(stimulus, _)| stimulus.strong_count() > 0);
+        self.held.iter().map(|(_, bytes)| bytes).sum::<usize>() < BYTES_AHEAD
+    }
+}

@@ -1,0 +1,145 @@
+//! The manifest of a run that starts or continues: [`of`].
+
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+
+use crate::engine::experiment::{DetailOf, Experiment};
+use crate::engine::identity;
+use crate::engine::settings::JobSettings;
+use crate::error::Result;
+use crate::images::image_words::ImageWords;
+use crate::images::source::input_summary;
+use crate::runs::renamed::{self, OtherSettings};
+use crate::score::record::Detail as _;
+use crate::store::now;
+use crate::types::manifest::{Counts, RunManifest, RunPart, Status};
+use crate::types::{InputSummary, ListedModel, StoredDetail as _};
+
+/// The manifest of a run. A stored one passes on its date, columns and image flags; one of a complete run all but its identity.
+///
+/// # Errors
+/// If a number in the settings of a model is not finite.
+pub(crate) fn of<E: Experiment>(
+    experiment: &E,
+    stored: Option<RunManifest>,
+) -> Result<RunManifest> {
+    let job = experiment.settings();
+    let mut settings = identity::settings(job);
+    let notes = experiment.notes().into_iter();
+    let notes = notes.map(|(field, value)| (field.to_owned(), value));
+    let notes: BTreeMap<String, Value> = notes.collect();
+    settings.extend(notes.clone());
+    let mut columns = stored
+        .as_ref()
+        .map_or_else(Default::default, |stored| stored.columns.clone());
+    for (column, values) in experiment.columns() {
+        columns.entry(column).or_default().extend(values);
+    }
+    let mut manifest = RunManifest {
+        schema: DetailOf::<E>::SCHEMA.to_owned(),
+        status: Status::Started,
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        created: now(),
+        updated: now(),
+        platform: identity::platform(),
+        identity: experiment.identity(),
+        columns,
+        models: listed(job, stored.as_ref()),
+        enhancers: BTreeMap::new(),
+        inputs: inputs(experiment),
+        shard: job.shard.is_part().then(|| job.shard.to_string()),
+        part: experiment.part().map(|place| RunPart {
+            place,
+            trials: vec![0; place.count],
+        }),
+        settings,
+        images: job.image_flags.clone(),
+        reply_reading: DetailOf::<E>::REPLY_READING.map(str::to_owned),
+        counts: Counts::default(),
+    };
+    let Some(mut stored) = stored else {
+        return Ok(manifest);
+    };
+    let other_settings = match job.ask.file {
+        Some(_) => OtherSettings::Allowed,
+        None => OtherSettings::Refused,
+    };
+    let before = stored.clone();
+    let now = experiment.columns().remove("model").unwrap_or_default();
+    let views = job.ask.views();
+    let now = renamed::Now {
+        models: &now,
+        views: &views,
+        settings: other_settings,
+    };
+    renamed::note(&mut manifest, &before, now)?;
+    let images = merged_flags(&stored.images, manifest.images);
+    if stored.status != Status::Complete {
+        return Ok(RunManifest {
+            created: stored.created,
+            enhancers: stored.enhancers,
+            inputs: manifest.inputs.or(stored.inputs),
+            images,
+            // Stored records keep their readings until they are read again.
+            reply_reading: stored.reply_reading,
+            ..manifest
+        });
+    }
+    stored.settings.extend(notes);
+    stored.models.clone_from(&manifest.models);
+    renamed::note(&mut stored, &before, now)?;
+    Ok(RunManifest {
+        identity: manifest.identity,
+        columns: manifest.columns,
+        models: manifest.models,
+        inputs: manifest.inputs.or(stored.inputs),
+        shard: manifest.shard,
+        part: manifest.part,
+        images,
+        ..stored
+    })
+}
+
+/// The models of the file of models; without one those of the command before.
+fn listed(job: &JobSettings, stored: Option<&RunManifest>) -> Vec<ListedModel> {
+    match &job.ask.file {
+        Some(file) => file.listed.clone(),
+        None => stored.map_or_else(Vec::new, |stored| stored.models.clone()),
+    }
+}
+
+/// What was done to the frames when they were read; `None` if nothing was.
+fn inputs<E: Experiment>(experiment: &E) -> Option<InputSummary> {
+    let summary = input_summary(experiment.sources());
+    (!summary.is_plain()).then_some(summary)
+}
+
+/// Records that a run continues, with the settings of this command and this version.
+pub(crate) fn mark_started<E: Experiment>(experiment: &E, manifest: &mut RunManifest) {
+    manifest.status = Status::Started;
+    manifest.updated = now();
+    env!("CARGO_PKG_VERSION").clone_into(&mut manifest.version);
+    let settings = identity::settings(experiment.settings());
+    manifest.settings.extend(settings);
+}
+
+/// The image flags of this call, with the stored ones. A list has the stored values first.
+fn merged_flags(stored: &ImageWords, now: ImageWords) -> ImageWords {
+    let mut all = stored.clone();
+    for (flag, value) in now {
+        let value = match (all.remove(&flag), value) {
+            (Some(Value::Array(mut known)), Value::Array(more)) => {
+                let more: Vec<Value> = more
+                    .into_iter()
+                    .filter(|value| !known.contains(value))
+                    .collect();
+                known.extend(more);
+                Value::Array(known)
+            }
+            (_, value) => value,
+        };
+        all.insert(flag, value);
+    }
+    all
+}

@@ -1,0 +1,93 @@
+//! One small request to each model, to see that it answers: [`check`].
+
+use std::sync::Arc;
+
+use super::describe::opened;
+use super::settings::AskSettings;
+use crate::ask::{Call, ImagePlaces, Message, Query};
+use crate::error::Result;
+use crate::images::progress::Progress;
+use crate::images::workers::unstarted;
+use crate::picture::{Payload, PayloadFormat};
+use crate::types::{Condition, QuestionId, Rgb, View};
+
+/// What a model without images is asked.
+const WORDS: &str = "Is snow cold?\nA. yes\nB. no\nAnswer with the letter of one choice.";
+
+/// What a model with images is asked about an image of one colour, [`RED`].
+const ABOUT_IMAGE: &str =
+    "Which colour has the image?\nA. blue\nB. red\nAnswer with the letter of one choice.";
+
+/// The colour of the image that is sent.
+const RED: [u8; 3] = [220, 30, 30];
+
+/// Its side in pixels; chosen: some servers refuse images below 28 pixels.
+const SIDE: usize = 64;
+
+/// Sends one small request to each model that is asked at an endpoint, with an image if it is asked with images; its reply, or why
+/// there is none.
+///
+/// # Errors
+/// If a model cannot be opened.
+pub(crate) fn check(
+    ask: &AskSettings,
+    progress: &Progress,
+) -> Result<Vec<(String, Result<String, String>)>> {
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build();
+    let runtime = runtime.map_err(|e| unstarted(&e))?;
+    let image = Rgb::new(SIDE, SIDE, RED.repeat(SIDE * SIDE))?;
+    let images = [Arc::new(Payload::encode(&image, PayloadFormat::Png)?)];
+    let (mut outcomes, mut seen) = (Vec::new(), Vec::new());
+    for model in &ask.models {
+        if seen.contains(&(&*model.name, model.view)) || model.server.is_none() {
+            continue;
+        }
+        seen.push((&model.name, model.view));
+        let Some(opened) = opened(model)? else {
+            continue;
+        };
+        progress.say(&format!("asking {} ({})", model.name, model.view));
+        let (condition, message, sent) = match model.view {
+            View::Blind => (None, Message::words(WORDS), "without an image"),
+            View::Image => {
+                let message = Message {
+                    before: ABOUT_IMAGE,
+                    images: &images,
+                    behind: "",
+                    places: ImagePlaces::Together,
+                };
+                let sent = "about a red image, of which B is true";
+                (Some(&Condition::L0), message, sent)
+            }
+        };
+        let id = QuestionId("check".to_owned());
+        let call = Call {
+            query: Query::Open(&id),
+            condition,
+            message,
+            turn: 0,
+        };
+        let reply = runtime.block_on(opened.ask(call));
+        let outcome = reply.map_err(|error| error.to_string()).map(|reply| {
+            let served = reply
+                .served_model
+                .map_or_else(String::new, |name| format!(" (served by {name})"));
+            let text = reply.text.trim();
+            let mut words = text.split(|c: char| !c.is_alphanumeric());
+            let is_true = words.any(|word| word == "B" || word.eq_ignore_ascii_case("red"));
+            let doubt = if model.view == View::Image && !is_true {
+                "; that is not the true answer: perhaps it does not see images"
+            } else {
+                ""
+            };
+            format!(
+                "{text:?} {sent}, in {:.1} s{served}{doubt}",
+                reply.latency_ms as f64 / 1e3
+            )
+        });
+        outcomes.push((model.name.clone(), outcome));
+    }
+    Ok(outcomes)
+}

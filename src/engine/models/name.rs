@@ -1,0 +1,165 @@
+//! A model as flags and files name it: [`ModelName`].
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use strsim::damerau_levenshtein;
+
+use crate::ask::Prices;
+use crate::engine::observer;
+use crate::error::{Error, Result};
+use crate::types::Control;
+
+/// A model as flags and files name it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum ModelName {
+    /// Built-in model that guesses.
+    Random,
+    /// Built-in model that answers what can still be read from the pixels by one who knows the frame; or one of its controls.
+    Observer(Option<Control>),
+    /// Built-in model that answers from this file.
+    Script(PathBuf),
+    /// Model of this name at the endpoint.
+    Remote(String),
+}
+
+/// The words that begin the names of built-in models.
+const BUILT_IN: [&str; 3] = ["random", "observer", "script"];
+
+/// The longest word for which one edit makes another word; longer ones take two. Chosen.
+const SHORT: usize = 6;
+
+impl ModelName {
+    /// Checks that the model can answer an open question.
+    ///
+    /// # Errors
+    /// If it can only choose.
+    pub(crate) fn require_open_answers(&self) -> Result<()> {
+        let name = match self {
+            Self::Random => "random",
+            Self::Observer(_) => "observer",
+            Self::Script(_) | Self::Remote(_) => return Ok(()),
+        };
+        let problem = format_args!("{name} can only choose, and these questions are open");
+        Err(Error::usage("--model", problem))
+    }
+
+    /// Refuses the name of a remote model that is almost that of a built-in one, or a list of names: it would be sent to an endpoint,
+    /// with images.
+    ///
+    /// # Errors
+    /// If it is, and the table of prices has no model of this name.
+    pub(crate) fn refuse_near_miss(&self) -> Result<()> {
+        let Self::Remote(name) = self else {
+            return Ok(());
+        };
+        let several: Vec<&str> = name.split(',').map(str::trim).collect();
+        if several.len() > 1 {
+            let flags: Vec<String> = several.iter().map(|one| format!("--model {one}")).collect();
+            let problem = format_args!(
+                "{name}: several models are several flags: {}. To ask an endpoint for a model of this name: --models FILE, or --base-url",
+                flags.join(" ")
+            );
+            return Err(Error::usage("--model", problem));
+        }
+        let word = name.split(':').next().unwrap_or(name).to_lowercase();
+        let mut near = BUILT_IN.into_iter().filter(|built_in| {
+            let most = if built_in.len() <= SHORT { 1 } else { 2 };
+            damerau_levenshtein(built_in, &word) <= most
+        });
+        match near.next() {
+            Some(built_in) if Prices::built_in()?.of(name).is_none() => {
+                let hint = if built_in == "script" {
+                    "script:FILE"
+                } else {
+                    built_in
+                };
+                let problem = format_args!(
+                    "{name}: did you mean {hint}? To ask an endpoint for a model of this name: --models FILE, or --base-url"
+                );
+                Err(Error::usage("--model", problem))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// A short name for tables and folders.
+    pub(crate) fn label(&self) -> String {
+        match self {
+            Self::Random => "random".to_owned(),
+            Self::Observer(control) => observer::name(*control),
+            Self::Script(path) => path.file_stem().map_or_else(
+                || "script".to_owned(),
+                |stem| stem.to_string_lossy().into_owned(),
+            ),
+            Self::Remote(name) => name.clone(),
+        }
+    }
+}
+
+/// The most bytes of a model's name. Chosen: the longest paths of published models have half of it.
+const LONGEST: usize = 200;
+
+impl FromStr for ModelName {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let text = text.trim();
+        if let Some(control) = text.strip_prefix("observer:") {
+            return Ok(Self::Observer(Some(control.parse()?)));
+        }
+        match text {
+            "" => Err("the name of a model is empty".to_owned()),
+            "random" => Ok(Self::Random),
+            "observer" => Ok(Self::Observer(None)),
+            "script" => Err("script:FILE expected, a file of replies".to_owned()),
+            name => match name.strip_prefix("script:") {
+                Some(path) => Ok(Self::Script(path.into())),
+                None if name.len() > LONGEST || name.contains(char::is_control) => Err(format!(
+                    "the name of a model has at most {LONGEST} bytes and no control characters"
+                )),
+                None => Ok(Self::Remote(name.to_owned())),
+            },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn near_misses_of_built_in_names_are_refused() {
+        let near = |name: &str| name.parse::<ModelName>().unwrap().refuse_near_miss();
+        for wrong in [
+            "rndom",
+            "Random",
+            "randmo",
+            "obsrver",
+            "observr:tiles",
+            "scrip:a.jsonl",
+            "Script:x",
+        ] {
+            let error = near(wrong).unwrap_err().to_string();
+            assert!(error.contains("did you mean"), "{wrong}: {error}");
+        }
+        let error = near("random,gpt-4o").unwrap_err().to_string();
+        assert!(error.contains("--model random --model gpt-4o"), "{error}");
+        for name in [
+            "random", "observer", "script:a", "gpt-4o", "qwen:7b", "rando-vl", "o3",
+        ] {
+            assert!(near(name).is_ok(), "{name}");
+        }
+    }
+
+    #[test]
+    fn names_are_short_and_can_be_shown() {
+        for name in ["m".repeat(200), "org/Qwen3-VL-8B é".to_owned()] {
+            assert_eq!(name.parse(), Ok(ModelName::Remote(name.clone())));
+        }
+        for name in ["m".repeat(201), "a\u{1b}[31m".to_owned(), "a\nb".to_owned()] {
+            let error = name.parse::<ModelName>().unwrap_err();
+            assert!(error.contains("at most 200 bytes"), "{error}");
+        }
+    }
+}

@@ -1,0 +1,414 @@
+//! The models of a run, resolved: [`AskSettings`], one [`ModelSettings`] a model.
+
+use std::collections::BTreeSet;
+use std::num::NonZeroU32;
+use std::path::Path;
+use std::sync::Arc;
+
+use serde_json::{Value, json};
+
+use super::args::ModelArgs;
+use super::asking::AskingArgs;
+use super::entry::{Entry, check_keys, flag_of};
+use super::file::{Keys, ModelsFile};
+use super::name::ModelName;
+use super::selection::{select, set};
+use super::trust::{self, Trust};
+use crate::ask::{AccessArgs, Parameters, Price, Sending, Server};
+use crate::error::{Error, Result};
+use crate::runs::shard::Shard;
+use crate::types::model_views::Views;
+use crate::types::{ListedModel, View};
+
+/// One model of a run, with all that its requests need.
+#[derive(Debug, Clone)]
+pub(crate) struct ModelSettings {
+    /// The name in records and tables.
+    pub(crate) name: String,
+    pub(crate) id: ModelName,
+    /// Whether it sees the images.
+    pub(crate) view: View,
+    /// Parameters of every request.
+    pub(crate) parameters: Parameters,
+    /// The endpoint; `None` if the model is built in. Models with the same endpoint and pace share one.
+    pub(crate) server: Option<Arc<Server>>,
+    /// The price, if it is not that of the table of prices.
+    pub(crate) price: Option<Price>,
+    /// The number of questions that it is asked; `None` for all.
+    pub(crate) limit: Option<usize>,
+}
+
+/// The models of a run.
+#[derive(Debug)]
+pub(crate) struct AskSettings {
+    /// The models: those of the file in its order, then those that flags name.
+    pub(crate) models: Vec<ModelSettings>,
+    /// What the file of models comes to; `None` without one.
+    pub(crate) file: Option<FileNote>,
+}
+
+/// What a file of models comes to, for the manifest.
+#[derive(Debug)]
+pub(crate) struct FileNote {
+    /// The models that are asked, as resolved, without secrets.
+    pub(crate) resolved: Value,
+    /// All models of the file in its order, then those that flags name.
+    pub(crate) listed: Vec<ListedModel>,
+}
+
+/// What the resolution of models needs besides their flags.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ResolveContext<'a> {
+    /// The flags of the call itself, by long name: those of variables and files are not among them.
+    pub(crate) typed: &'a BTreeSet<String>,
+    pub(crate) shard: Shard,
+    /// How many shards run at once; `None` for all.
+    pub(crate) workers: Option<NonZeroU32>,
+    /// Whether keys are read.
+    pub(crate) keys: KeyUse,
+    /// The file or folder of the data, if a file of models may have come with it.
+    pub(crate) data: Option<&'a Path>,
+    /// Which models are asked without images, too.
+    pub(crate) text_baseline: TextBaseline,
+}
+
+/// Which of the models that see images are asked without any, too.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum TextBaseline {
+    /// Those of which flags or the file of models say it.
+    #[default]
+    AsSaid,
+    /// All of them.
+    Always,
+}
+
+/// Whether the keys of endpoints are needed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum KeyUse {
+    /// Requests are sent: a key that is missing is an error.
+    Needed,
+    /// Nothing is sent.
+    NotNeeded,
+}
+
+impl AskSettings {
+    /// What each model is shown, by name.
+    pub(crate) fn views(&self) -> Views {
+        let mut views = Views::new();
+        for model in &self.models {
+            views
+                .entry(model.name.clone())
+                .or_default()
+                .insert(model.view);
+        }
+        views
+    }
+
+    /// The models of these flags and of the file that they name. The keys are read if a model needs one.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the flag, or the line of the file, that cannot be used.
+    pub(crate) fn resolve(
+        args: &ModelArgs,
+        asking: &AskingArgs,
+        context: ResolveContext<'_>,
+    ) -> Result<Self> {
+        let view = if args.blind { View::Blind } else { View::Image };
+        let file = args.models.as_deref().map(ModelsFile::read).transpose()?;
+        let mut entries = match &file {
+            Some(file) => of_file(file, view, asking, context.typed)?,
+            None => Vec::new(),
+        };
+        if let Some(file) = &file {
+            let trust = if args.trust_models {
+                Trust::Own
+            } else {
+                Trust::ByPlace
+            };
+            trust::check(file, &entries, asking, context.data, trust)?;
+        }
+        refuse_models_of_file(&entries, &args.blind_model)?;
+        let flag = |name: &ModelName, view| Entry::of_flag(name.clone(), view, asking.clone());
+        entries.extend(args.model.iter().map(|name| flag(name, view)));
+        entries.extend(args.blind_model.iter().map(|name| flag(name, View::Blind)));
+        for text in &args.set {
+            set(&mut entries, text)?;
+        }
+        if context.text_baseline == TextBaseline::Always {
+            add_text_baselines(&mut entries);
+        }
+        let listed = entries.iter().map(|entry| ListedModel {
+            name: entry.name.clone(),
+            group: entry.group.clone(),
+        });
+        let listed: Vec<ListedModel> = listed.collect();
+        select(&mut entries, &args.only)?;
+        if asking.access.base_url.is_empty() {
+            let of_flags = entries.iter().filter(|entry| entry.place.is_none());
+            of_flags
+                .map(|entry| &entry.id)
+                .try_for_each(ModelName::refuse_near_miss)?;
+        }
+        let (mut models, mut servers, mut notes) = (Vec::new(), Servers::default(), Vec::new());
+        for entry in &entries {
+            let resolved = resolve(entry, context, &mut servers)?;
+            notes.push(note(entry, &resolved));
+            models.extend(entry.views.iter().map(|view| ModelSettings {
+                view: *view,
+                ..resolved.clone()
+            }));
+        }
+        refuse_same_names(&models)?;
+        Ok(Self {
+            models,
+            file: file.map(|_| FileNote {
+                resolved: json!(notes),
+                listed,
+            }),
+        })
+    }
+
+    /// Whether a model of this name is shown images.
+    pub(crate) fn shows_images_to(&self, id: &ModelName) -> bool {
+        let mut models = self.models.iter();
+        models.any(|model| model.id == *id && model.view == View::Image)
+    }
+
+    /// The endpoints, each once.
+    pub(crate) fn servers(&self) -> Vec<&Arc<Server>> {
+        let mut servers: Vec<&Arc<Server>> = Vec::new();
+        for server in self.models.iter().filter_map(|model| model.server.as_ref()) {
+            if !servers.iter().any(|known| Arc::ptr_eq(known, server)) {
+                servers.push(server);
+            }
+        }
+        servers
+    }
+}
+
+/// Has every model that sees images be asked without any, too, unless it is already.
+fn add_text_baselines(entries: &mut [Entry]) {
+    let blind = entries
+        .iter()
+        .filter(|entry| entry.views.contains(&View::Blind));
+    let blind: BTreeSet<String> = blind.map(|entry| entry.name.clone()).collect();
+    let seeing = entries.iter_mut();
+    for entry in seeing.filter(|entry| !blind.contains(&entry.name)) {
+        entry.views.push(View::Blind);
+    }
+}
+
+/// The models of a file: the flags of the call above its defaults, its tables above the flags.
+fn of_file(
+    file: &ModelsFile,
+    view: View,
+    asking: &AskingArgs,
+    typed: &BTreeSet<String>,
+) -> Result<Vec<Entry>> {
+    check_keys(&file.defaults, true)?;
+    let is_typed = |key: &str| match key {
+        "view" => typed.contains("blind"),
+        "seed" => typed.contains("sampling-seed"),
+        "headers" => typed.contains("header") || typed.contains("header-env"),
+        "key-env" | "key-file" => typed.contains("api-key-env") || typed.contains("api-key-file"),
+        key => flag_of(key).is_some_and(|flag| typed.contains(flag)),
+    };
+    // A key of the flags is not sent to an address of the file, so that it is above no key of [defaults] there.
+    let holds = |key: &str, keys: &Keys| {
+        let is_key = matches!(key, "key-env" | "key-file");
+        !is_typed(key) || (is_key && keys.contains_key("endpoints"))
+    };
+    let mut entries = Vec::new();
+    let mut overridden = BTreeSet::new();
+    for keys in &file.models {
+        check_keys(keys, false)?;
+        let defaults = file.defaults.clone().into_iter();
+        let defaults: Keys = defaults.filter(|(key, _)| holds(key, keys)).collect();
+        overridden.extend(keys.keys().filter(|key| is_typed(key)).cloned());
+        entries.push(Entry::of_file(
+            keys,
+            &[&defaults, keys],
+            view,
+            asking.clone(),
+        )?);
+    }
+    if !overridden.is_empty() {
+        let keys: Vec<String> = overridden.into_iter().collect();
+        tracing::warn!(
+            "{}: models with their own {} are not changed; the flag applies to the others (--set NAME.KEY=VALUE overrides both)",
+            file.path.display(),
+            keys.join(", ")
+        );
+    }
+    Ok(entries)
+}
+
+/// The endpoints of a run, each made once for its flags.
+#[derive(Debug, Default)]
+struct Servers(Vec<(AccessArgs, Sending, Arc<Server>)>);
+
+impl Servers {
+    /// The endpoint with these flags; a new one only if no model had the same.
+    fn get(&mut self, access: &AccessArgs, sending: Sending) -> Result<Arc<Server>> {
+        let known = self.0.iter().find(|(a, s, _)| (a, *s) == (access, sending));
+        if let Some((_, _, server)) = known {
+            return Ok(Arc::clone(server));
+        }
+        let server = Arc::new(access.server(sending)?);
+        self.0.push((access.clone(), sending, Arc::clone(&server)));
+        Ok(server)
+    }
+}
+
+/// A model with its endpoint and parameters; the view is that of its first line in tables.
+fn resolve(
+    entry: &Entry,
+    context: ResolveContext<'_>,
+    servers: &mut Servers,
+) -> Result<ModelSettings> {
+    let AskingArgs {
+        parameters,
+        request,
+        access,
+        sending,
+        constrain,
+        probabilities,
+        seed,
+        reply_headers,
+    } = entry.asking.clone();
+    let placed = |e: Error| match (&entry.place, e) {
+        (Some(place), Error::Usage { origin, problem }) => {
+            Error::usage(place, format_args!("{}: {origin}: {problem}", entry.name))
+        }
+        (_, e) => e,
+    };
+    let mut extra = request.resolve().map_err(placed)?;
+    for name in reply_headers {
+        let value = plain_header(&access.header, &name);
+        let problem =
+            "no header of this name with a value in headers: only such a one can decide replies";
+        let missing = || {
+            placed(Error::usage(
+                "reply-headers",
+                format_args!("{name}: {problem}"),
+            ))
+        };
+        let value = value.ok_or_else(missing)?;
+        extra.reply_headers.insert(name.to_lowercase(), value);
+    }
+    extra.deployment.clone_from(&entry.deployment);
+    let parameters = Parameters {
+        seed,
+        constrain,
+        probabilities,
+        extra,
+        ..parameters
+    };
+    if probabilities {
+        parameters.require_greedy().map_err(placed)?;
+    }
+    let sending = Sending {
+        quota: context.shard.quota(sending.quota, context.workers),
+        ..sending
+    };
+    // A dry run sends nothing, so it needs no key.
+    let access = match context.keys {
+        KeyUse::Needed => access,
+        KeyUse::NotNeeded => access.without_key(),
+    };
+    let remote = matches!(entry.id, ModelName::Remote(_));
+    let server = remote.then(|| servers.get(&access, sending)).transpose();
+    Ok(ModelSettings {
+        name: entry.name.clone(),
+        id: entry.id.clone(),
+        view: entry.views[0],
+        parameters,
+        server: server.map_err(placed)?,
+        price: entry.price,
+        limit: entry.limit.map(std::num::NonZeroUsize::get),
+    })
+}
+
+/// The value of a header that is not secret.
+fn plain_header(headers: &[String], name: &str) -> Option<String> {
+    let mut headers = headers.iter().filter_map(|text| text.split_once(':'));
+    let found = headers.find(|(other, _)| other.trim().eq_ignore_ascii_case(name));
+    found.map(|(_, value)| value.trim().to_owned())
+}
+
+/// What a model comes to, for the manifest: without keys, passwords and values of secret headers.
+fn note(entry: &Entry, resolved: &ModelSettings) -> Value {
+    let access = &entry.asking.access;
+    let views: Vec<String> = entry.views.iter().map(ToString::to_string).collect();
+    let names = |headers: &[String]| -> Vec<String> {
+        let name = |text: &String| {
+            text.split([':', '='])
+                .next()
+                .unwrap_or_default()
+                .trim()
+                .to_owned()
+        };
+        headers.iter().map(name).collect()
+    };
+    let mut note = json!({
+        "name": entry.name,
+        "id": entry.id.label(),
+        "group": entry.group,
+        "view": views,
+        "wire": resolved.parameters.wire.to_string(),
+        "settings": resolved.parameters,
+        "price": entry.price.map(|price| json!({"input": price.input, "output": price.output, "cached-input": price.cached_input})),
+        "limit": entry.limit,
+    });
+    if let Some(server) = &resolved.server {
+        let sending = &server.sending;
+        note["endpoints"] = json!(server.addresses());
+        note["key"] = json!(access.key_source(&server.replicas[0]));
+        note["headers"] = json!([names(&access.header), names(&access.header_env)].concat());
+        note["pace"] = json!({
+            "concurrency": sending.concurrency.to_string(), "rpm": sending.quota.requests, "tpm": sending.quota.tokens,
+            "timeout": sending.timeout.as_secs_f64(), "retries": sending.retries, "max-wait": sending.max_wait.as_secs_f64(),
+            "patience": sending.patience.as_secs_f64(),
+        });
+    }
+    if let Some(fields) = note["settings"].as_object_mut() {
+        fields.remove("model");
+        fields.retain(|_, value| !value.is_null());
+    }
+    if let Some(fields) = note.as_object_mut() {
+        fields.retain(|_, value| !value.is_null());
+    }
+    note
+}
+
+/// Refuses `--blind-model` with a model of the file: it would be asked at another address, and with other settings than with images.
+fn refuse_models_of_file(entries: &[Entry], blind: &[ModelName]) -> Result<()> {
+    for name in blind.iter().map(ModelName::label) {
+        let mut entries = entries.iter();
+        let known = entries.find(|entry| entry.name == name || entry.id.label() == name);
+        if let Some(Entry { name, id, .. }) = known
+            && matches!(id, ModelName::Remote(_))
+        {
+            let problem = format_args!(
+                "{name} is a model of the file, and the flag would ask for it elsewhere; view = \"both\" in its table, or --set {name:?}.view=both, asks it without images, too"
+            );
+            return Err(Error::usage("--blind-model", problem));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses two models of one name and view: their replies could not be told apart in tables.
+fn refuse_same_names(models: &[ModelSettings]) -> Result<()> {
+    for (i, model) in models.iter().enumerate() {
+        let mut before = models[..i].iter();
+        if before.any(|other| other.view == model.view && other.name == model.name) {
+            let problem = format_args!(
+                "{} is named twice; in a file of models, give each its own name",
+                model.name
+            );
+            return Err(Error::usage("--model", problem));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,392 @@
+//! A run that is open for writing: [`OpenRun`].
+
+use std::collections::HashSet;
+use std::fmt::Write as _;
+use std::path::Path;
+use std::time::Instant;
+
+use crate::ask::ImageLimit;
+use crate::engine::budget::{Answering, Budget};
+use crate::engine::circuit_breaker::EndReason;
+use crate::engine::dark_already;
+use crate::engine::dispatch::{Dispatcher, TrialCounts};
+use crate::engine::experiment::{DetailOf, Experiment};
+use crate::engine::manifest;
+use crate::engine::models::{self, ModelUnderTest};
+use crate::engine::settings::JobSettings;
+use crate::enhance::{Enhancer, Usage};
+use crate::error::Result;
+use crate::image_store::ImageStore;
+use crate::images::enhancers::OpenEnhancers;
+use crate::images::image_maker::Maker;
+use crate::images::image_notes::MissingNotes;
+use crate::images::image_pipeline::ImagePipeline;
+use crate::images::image_steps::ImageSteps;
+use crate::images::plan::Plan;
+use crate::images::progress::Progress;
+use crate::images::stored_images::StoredImages;
+use crate::images::thumbnail::MissingThumbnails;
+use crate::images::timings::Timings;
+use crate::images::workers::Workers;
+use crate::report::forecast::money;
+use crate::runs::first_source::first_source;
+use crate::runs::other_parts::OtherParts;
+use crate::runs::outcome::Outcome;
+use crate::runs::part_cost::PartCost;
+use crate::runs::record_table;
+use crate::runs::stored::StoredRun;
+use crate::store::now;
+use crate::store::{self, Store, StoredTrial};
+use crate::types::manifest::{Counts, RunManifest};
+use crate::types::{EnhancerName, TrialKey, View};
+
+/// A run folder that no other process writes to, with all that asking needs.
+pub(crate) struct OpenRun<'a, E: Experiment> {
+    pub(crate) experiment: &'a E,
+    pub(crate) progress: &'a Progress,
+    pub(crate) enhancers: OpenEnhancers<'a>,
+    pub(crate) store: Store<DetailOf<E>>,
+    pub(crate) manifest: RunManifest,
+    /// Keys of all trials planned so far, in all phases.
+    pub(crate) keys: HashSet<TrialKey>,
+    /// The image store; `None` without one.
+    pub(crate) images: Option<ImageStore>,
+}
+
+/// The trials of a phase that still have to be asked.
+pub(crate) struct Remaining<E: Experiment> {
+    pub(crate) plan: Plan<E::Item>,
+    pub(crate) stored: Vec<StoredTrial>,
+    /// Number of trials that wait for a batch, and are not in `plan`.
+    pub(crate) in_batch: usize,
+}
+
+impl<E: Experiment> OpenRun<'_, E> {
+    /// Asks the remaining trials, phase by phase.
+    pub(crate) fn ask(mut self) -> Result<Outcome> {
+        let (mut end, mut stopped) = (EndReason::AllAsked, Vec::new());
+        for phase in 0..E::PHASES.len() {
+            let remaining = self.remaining(phase)?;
+            self.warn_of_batches(remaining.in_batch);
+            if remaining.plan.remaining() == 0 {
+                continue;
+            }
+            match self.ask_phase(phase, remaining)? {
+                EndReason::AllAsked => {}
+                // The next phases go on with the answers of the other models.
+                EndReason::ModelsStopped(errors) => stopped.extend(errors),
+                early => {
+                    end = early;
+                    break;
+                }
+            }
+        }
+        if matches!(end, EndReason::AllAsked) && !stopped.is_empty() {
+            end = EndReason::ModelsStopped(stopped);
+        }
+        let settings = self.experiment.settings();
+        if let (EndReason::OverBudget, Some(max_cost)) = (&end, settings.money.max_cost) {
+            tracing::warn!(
+                "stopped: one more question could exceed the {} of --max-cost; the same command with a higher limit continues",
+                money(max_cost)
+            );
+        }
+        for phase in 0..E::PHASES.len() {
+            let adapted = models::adapted(self.experiment.models(phase));
+            self.manifest.settings.extend(adapted);
+        }
+        let models = every_model(self.experiment);
+        let answering = Answering {
+            models: &models,
+            manifest: Some(&self.manifest),
+        };
+        if let Some(share) = settings.money.max_cost.filter(|_| settings.shard.is_part()) {
+            let trials = self.store.trials()?;
+            let budget = Budget::of_run(&settings.money, &[], answering, &trials)?;
+            let cost = PartCost::new(share, budget.charged());
+            cost.note(&mut self.manifest);
+            let shard = settings.shard;
+            self.progress
+                .note(&format!("shard {shard}: {}", cost.words()));
+        }
+        self.finish(end)
+    }
+
+    /// The trials of a phase that have no reply and wait for no batch. Replies that parts of another division have are copied first.
+    pub(crate) fn remaining(&mut self, phase: usize) -> Result<Remaining<E>> {
+        let mut stored = self.store.trials()?;
+        let mut plan = Plan::new(self.experiment.plan(phase, || self.store.records())?);
+        self.keys.extend(&plan.keys);
+        if let Some(part) = &mut self.manifest.part {
+            for (source, trials) in &plan.by_source {
+                part.trials[*source] += trials;
+            }
+        }
+        let mut answered = answered(&stored);
+        if self.copy_from_other_parts(&plan.keys, &answered)? {
+            stored = self.store.trials()?;
+            answered = self::answered(&stored);
+        }
+        plan.exclude(|key| answered.contains(key));
+        let sent = self.store.pending_in_batches()?;
+        let in_batch = plan.exclude(|key| sent.contains(key));
+        Ok(Remaining {
+            plan,
+            stored,
+            in_batch,
+        })
+    }
+
+    /// Copies the replies to these trials that parts of another division have; returns whether there are any.
+    fn copy_from_other_parts(
+        &mut self,
+        keys: &[TrialKey],
+        answered: &HashSet<TrialKey>,
+    ) -> Result<bool> {
+        let others = OtherParts::beside::<DetailOf<E>>(self.store.folder(), &self.manifest)?;
+        let wanted = keys.iter().filter(|key| !answered.contains(key));
+        let sources = self.experiment.sources().iter();
+        let copied = others.copy_into(
+            &mut self.store,
+            &self.manifest,
+            &wanted.copied().collect(),
+            &sources.map(|source| &source.name).collect(),
+        )?;
+        if copied > 0 {
+            self.progress.note(&format!(
+                "{}: {copied} replies copied from parts of another division",
+                self.store.folder().display()
+            ));
+        }
+        Ok(copied > 0)
+    }
+
+    /// Warns about trials that wait for a batch. If they were asked here as well, they would be paid for twice.
+    fn warn_of_batches(&self, in_batch: usize) {
+        if in_batch > 0 {
+            let verb = if in_batch == 1 { " is" } else { "s are" };
+            tracing::warn!(
+                "{in_batch} trial{verb} waiting for a batch and not asked here; import the replies with batch run, batch fetch or batch \
+                 import; batch cancel {} ends what batch run has submitted, and frees it; or delete {} to ask here",
+                self.store.folder().display(),
+                self.store.folder().join(store::BATCH).display()
+            );
+        }
+    }
+
+    pub(crate) fn ask_phase(&mut self, phase: usize, remaining: Remaining<E>) -> Result<EndReason> {
+        let Remaining {
+            mut plan, stored, ..
+        } = remaining;
+        let experiment = self.experiment;
+        let settings = experiment.settings();
+        let models = experiment.models(phase);
+        let all = every_model(experiment);
+        let answering = Answering {
+            models: &all,
+            manifest: Some(&self.manifest),
+        };
+        let budget = Budget::of_run(&settings.money, models, answering, &stored)?;
+        let counts = TrialCounts {
+            trials: plan.keys.len(),
+            answered: plan.keys.len() - plan.remaining(),
+        };
+        let shows_images = !plan.conditions().is_empty();
+        let enhancers = if shows_images {
+            self.enhancers.take_models()?
+        } else {
+            Vec::new()
+        };
+        self.begin(counts, &stored)?;
+        drop(stored);
+        let workers = Workers::start(settings.loading.threads.threads)?;
+        let timings = Timings::default();
+        let limit = limit(settings);
+        let sources = experiment.sources();
+        let maker = Maker::new(self.enhancers.version(), &settings.loading.size);
+        let images = self.images.as_ref();
+        let mut pipeline = pipeline(experiment, Vec::new(), limit, &timings);
+        pipeline.steps.stored = images.map(|images| StoredImages::new(images, &maker));
+        workers.all.install(|| {
+            if shows_images {
+                dark_already::warn(experiment);
+            }
+            pipeline.open_enhancers(enhancers, &settings.loading, sources, &plan.sources)?;
+            pipeline.check(sources, &plan.sources)
+        })?;
+        let usages = pipeline.usages();
+        pipeline.open_sets(sources, &plan.sources, &workers)?;
+        if self.images.is_some() {
+            let names = models.iter().map(|model| model.name.as_ref());
+            let first = first_source(names, settings.shard, plan.sources.len());
+            plan.sources.rotate_left(first);
+        }
+        let stoppers = pipeline.stoppers();
+        let dispatcher = Dispatcher {
+            models,
+            progress: self.progress,
+            settings,
+            timings: &timings,
+        };
+        let missing = missing_notes(experiment, self.store.folder())?;
+        let started = Instant::now();
+        let end = dispatcher.run(counts, budget, &mut self.store, stoppers, |groups| {
+            pipeline.develop(sources, plan.sources, &missing, &workers, groups);
+        })?;
+        self.note_enhancers(usages);
+        if settings.show_timings {
+            let threads = workers.each.len();
+            let line = timings.summary(started.elapsed(), threads);
+            let line = match E::PHASES {
+                [_] => line,
+                phases => format!("{}: {line}", phases[phase]),
+            };
+            self.progress.note(&line);
+            if let Some(images) = self.images.as_ref().filter(|_| shows_images) {
+                self.progress.note(&images.summary());
+            }
+        }
+        Ok(end)
+    }
+
+    /// Adds to the manifest how the enhancers were used.
+    pub(crate) fn note_enhancers(&mut self, usages: Vec<(EnhancerName, Usage)>) {
+        for (name, usage) in usages {
+            let name = name.to_string();
+            let earlier = self.manifest.enhancers.remove(&name);
+            let note = usage.note().after(earlier);
+            self.manifest.enhancers.insert(name, note);
+        }
+    }
+
+    /// Writes the numbers of trials into the manifest, so that those of a killed run are known.
+    pub(crate) fn write_counts(&mut self, stored: &[StoredTrial]) -> Result<()> {
+        self.manifest.counts = Counts {
+            failed: 0,
+            ..self.counts(stored.iter().map(|trial| (trial.key, trial.failed())))
+        };
+        self.store.write_manifest(&self.manifest)
+    }
+
+    /// Writes the start of a phase into the manifest, and prints how many of its trials are answered.
+    fn begin(&mut self, counts: TrialCounts, stored: &[StoredTrial]) -> Result<()> {
+        let TrialCounts { trials, answered } = counts;
+        manifest::mark_started(self.experiment, &mut self.manifest);
+        self.manifest.platform.extend(self.enhancers.version());
+        self.write_counts(stored)?;
+        if answered > 0 {
+            self.progress.say(&format!(
+                "{}: {answered} of {trials} trials already answered",
+                self.store.folder().display()
+            ));
+        }
+        Ok(())
+    }
+
+    /// Numbers of trials of the run: those planned, and those answered under an earlier command. A failed trial that is no longer
+    /// planned, because its images have changed, does not count.
+    /// The stored trials are given by their keys, and whether they failed.
+    fn counts(&self, stored: impl Iterator<Item = (TrialKey, bool)>) -> Counts {
+        let (mut keys, mut answered, mut failed) = (self.keys.clone(), 0, 0);
+        for (key, has_failed) in stored {
+            if !has_failed {
+                keys.insert(key);
+                answered += 1;
+            } else if keys.contains(&key) {
+                failed += 1;
+            }
+        }
+        Counts {
+            trials: keys.len(),
+            answered,
+            failed,
+        }
+    }
+
+    /// Scores the run, and writes the report into its folder.
+    pub(crate) fn finish(self, end: EndReason) -> Result<Outcome> {
+        let mut run = StoredRun::reread(self.store.folder(), self.manifest.clone())?;
+        let trials = run.trials.iter();
+        let counts = self.counts(trials.map(|trial| (trial.key(), trial.failed())));
+        let status = end.status(counts);
+        let manifest = &mut run.manifest;
+        if (status, counts) != (manifest.status, manifest.counts) {
+            (manifest.status, manifest.counts) = (status, counts);
+            manifest.updated = now();
+        }
+        let settings = self.experiment.settings();
+        let mut outcome = self.experiment.report(&self.store, run, settings.show)?;
+        record_table::update(self.store.folder(), settings.table)?;
+        match end {
+            EndReason::Stopped(error) => Err(error),
+            EndReason::ModelsStopped(errors) => {
+                // The last lines, below results that may be long.
+                for error in errors {
+                    if settings.show.is_document() {
+                        tracing::warn!("not asked any further: {error}");
+                    } else {
+                        let _ = writeln!(outcome.output, "! not asked any further: {error}");
+                    }
+                }
+                Ok(outcome)
+            }
+            _ => Ok(outcome),
+        }
+    }
+}
+
+/// The models of all phases of an experiment.
+pub(crate) fn every_model<E: Experiment>(experiment: &E) -> Vec<&ModelUnderTest> {
+    let phases = 0..E::PHASES.len();
+    phases.flat_map(|phase| experiment.models(phase)).collect()
+}
+
+/// The image pipeline of an experiment, without an image store.
+pub(crate) fn pipeline<'a, E: Experiment>(
+    experiment: &'a E,
+    enhancers: Vec<Enhancer>,
+    limit: Option<ImageLimit>,
+    timings: &'a Timings,
+) -> ImagePipeline<'a> {
+    let steps = ImageSteps {
+        frames: experiment.frames(),
+        recipe: experiment.recipe(),
+        limit,
+        timings,
+        stored: None,
+    };
+    let implausible = experiment.settings().loading.probe.implausible();
+    ImagePipeline::new(steps, enhancers, implausible)
+}
+
+/// Largest image that all endpoints take; `None` if all models are built in. Each image is made once, for all of them.
+pub(crate) fn limit(settings: &JobSettings) -> Option<ImageLimit> {
+    let servers = settings.ask.servers().into_iter();
+    let limits = servers.map(|server| {
+        let stated = server.sending.max_image;
+        let stated = stated.map(|megabytes| ImageLimit::stated((megabytes * 1e6) as usize));
+        let known = server.replicas.iter().map(ImageLimit::of);
+        stated.or_else(|| known.reduce(ImageLimit::stricter))
+    });
+    let limit = limits.flatten().reduce(ImageLimit::stricter)?;
+    // A model that is shown none may have any.
+    let models = settings.ask.models.iter();
+    let seeing = models.filter(|model| model.view == View::Image);
+    let servers = seeing.filter_map(|model| model.server.as_ref());
+    let replicas = servers.flat_map(|server| &server.replicas);
+    Some(replicas.fold(limit, ImageLimit::with_requests_to))
+}
+
+/// The notes about images that a run folder does not have yet.
+pub(crate) fn missing_notes<E: Experiment>(experiment: &E, folder: &Path) -> Result<MissingNotes> {
+    let names = experiment.sources().iter().map(|source| &source.name);
+    let thumbnails = MissingThumbnails::new(names, store::read_thumbnails(folder)?);
+    let thumbnails = thumbnails.with_objects(&experiment.questions());
+    Ok(MissingNotes::new(thumbnails, store::read_fidelity(folder)?))
+}
+
+/// Keys of the trials that have a reply.
+pub(crate) fn answered(stored: &[StoredTrial]) -> HashSet<TrialKey> {
+    let answered = stored.iter().filter(|record| !record.failed());
+    answered.map(|record| record.key).collect()
+}

@@ -1,0 +1,369 @@
+//! The settings that every experiment has: their flags ([`JobArgs`]) and the validated settings ([`JobSettings`]).
+
+use std::collections::BTreeSet;
+use std::fmt::Display;
+use std::num::NonZeroU32;
+use std::path::{self, Path, PathBuf};
+use std::time::Duration;
+
+use clap::Args;
+
+use crate::ask::{AccessArgs, Bounds, Constrain, Parameters, RequestArgs, Sending};
+use crate::engine::models::{
+    AskSettings, AskingArgs, KeyUse, ModelArgs, ResolveContext, TextBaseline,
+};
+use crate::engine::money::{MoneyArgs, MoneySettings};
+use crate::enhance::{EnhancerArgs, ModelFile};
+use crate::error::{Error, Result};
+use crate::files::folder_access::FolderAccess;
+use crate::image_store::StoreArgs;
+use crate::images::conditions::check_used;
+use crate::images::enhancers::{self, EnhancerRunArgs};
+use crate::images::image_words::ImageWords;
+use crate::picture::{ImageArgs, PayloadFormat};
+use crate::runs::outcome::{RecordTable, ShowArgs, StdoutFormat};
+use crate::runs::run_plan::RunPlan;
+use crate::runs::shard::Shard;
+use crate::synthesis::{LightArgs, LightSettings};
+use crate::types::flag::seconds;
+use crate::types::{Decides, SetLight, View};
+
+/// The flags that every experiment has.
+#[derive(Debug, Args)]
+pub(crate) struct JobArgs {
+    /// Levels and kinds of degradation.
+    #[command(flatten)]
+    pub light: LightArgs,
+    /// Enhancers, and the images they are for.
+    #[command(flatten)]
+    pub enhancers: EnhancerArgs,
+    /// Running of the enhancers.
+    #[command(flatten)]
+    pub loading: EnhancerRunArgs,
+    /// Models that are asked.
+    #[command(flatten)]
+    pub models: ModelArgs,
+    /// Parameters of the models.
+    #[command(flatten)]
+    pub parameters: Parameters,
+    /// What is added to requests or left out.
+    #[command(flatten)]
+    pub request: RequestArgs,
+    /// Endpoint and its key.
+    #[command(flatten)]
+    pub access: AccessArgs,
+    /// Concurrency, timeouts, retries and rate limits.
+    #[command(flatten)]
+    pub sending: Sending,
+    /// Format and size of images.
+    #[command(flatten)]
+    pub images: ImageArgs,
+    /// Limits of cost and failures.
+    #[command(flatten)]
+    pub money: MoneyArgs,
+    /// Shard of this process, and timings.
+    #[command(flatten)]
+    pub scale: ScaleArgs,
+    /// Folder of images that are shared with other runs.
+    #[command(flatten)]
+    pub stored: StoreArgs,
+    /// Run folder and output.
+    #[command(flatten)]
+    pub output: OutputArgs,
+    /// Flags that decide the images, as typed.
+    #[arg(skip)]
+    pub image_flags: ImageWords,
+    /// Flags of the call itself, by long name: those that variables and files set are not among them.
+    #[arg(skip)]
+    pub typed: BTreeSet<String>,
+    /// Words of the call, without the name of the program.
+    #[arg(skip)]
+    pub words: Vec<String>,
+}
+
+/// Flags that distribute a job over processes.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Scale")]
+pub(crate) struct ScaleArgs {
+    /// Do one of N parts, by frames or walks: I/N; auto/N or auto as the batch system states (Slurm arrays, indexed Kubernetes jobs);
+    /// none for everything. --rpm, --tpm and --max-cost are for all parts together. With another N, replies that parts of the first N have
+    /// are copied; default: auto in a Slurm array, else none
+    #[arg(long, value_name = "I/N|auto/N|auto|none", add = Decides::Trials)]
+    pub shard: Option<String>,
+    /// How many parts run at once, so that each may send that share of --rpm and --tpm; default: all of them
+    #[arg(long, value_name = "N", add = Decides::Nothing)]
+    pub workers: Option<NonZeroU32>,
+    /// Seconds for which an interrupted run (Ctrl-C, SIGTERM, SIGHUP) waits for requests in flight before it gives them up; less than
+    /// the time that a batch system leaves it
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "120", add = Decides::Nothing)]
+    pub grace: Duration,
+    /// Print at the end how long each step took, what limits the speed and what would help
+    #[arg(long, add = Decides::Nothing)]
+    pub timings: bool,
+}
+
+/// Flags of the run folder and of the output.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Output")]
+pub(crate) struct OutputArgs {
+    /// The run folder; default: results/TIME-MODEL-DATA-HASH, found again by the same command
+    #[arg(long, value_name = "DIR", conflicts_with = "resume", add = Decides::Nothing)]
+    pub out: Option<PathBuf>,
+    /// Continue the run in this folder; takes the same flags as the run had; default: none
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
+    pub resume: Option<PathBuf>,
+    /// Let other users of this machine read new folders of runs and of --images-cache, as the system's umask says; else they are for
+    /// you alone, as replies and pictures of homes are in them
+    #[arg(long, add = Decides::Nothing)]
+    pub shared: bool,
+    /// How the report is printed.
+    #[command(flatten)]
+    pub show: ShowArgs,
+}
+
+/// The settings that every experiment has, validated. Files, environment and keys are read for them and nowhere later.
+#[derive(Debug)]
+pub(crate) struct JobSettings {
+    /// Levels and kinds of degradation.
+    pub light: LightSettings,
+    /// The light in which the photographs of the data were taken.
+    pub set_light: SetLight,
+    /// Enhancers, and the images they are for.
+    pub enhancers: EnhancerArgs,
+    /// Running of the enhancers.
+    pub loading: EnhancerRunArgs,
+    /// Models that are asked, and their endpoint.
+    pub ask: AskSettings,
+    pub format: PayloadFormat,
+    /// Longest side of an image as sent, in pixels; `None` for no limit.
+    pub max_side: Option<NonZeroU32>,
+    /// Bounds of the number of requests in flight.
+    pub concurrency: Bounds,
+    /// Limits of cost and failures.
+    pub money: MoneySettings,
+    /// Part of the run that this process does.
+    pub shard: Shard,
+    /// The longest wait for the requests in flight after an interrupt.
+    pub grace: Duration,
+    /// Print at the end how long each step took.
+    pub show_timings: bool,
+    /// Folder of images that are shared with other runs.
+    pub images: StoreArgs,
+    /// Folder of the run.
+    pub place: RunPlace,
+    /// Who may enter new folders.
+    pub access: FolderAccess,
+    /// Format of the results on standard output.
+    pub show: StdoutFormat,
+    /// Whether the table of records is written.
+    pub table: RecordTable,
+    /// Flags that decide the images, as typed.
+    pub image_flags: ImageWords,
+}
+
+/// Settings that not every experiment has.
+#[derive(Debug, Default)]
+pub(crate) struct ExperimentSettings {
+    /// Constraint on the replies that the server enforces.
+    pub constrain: Constrain,
+    /// Whether the probabilities of choices are asked for.
+    pub probabilities: bool,
+    /// Seed of the server's sampling; `None` if none is sent.
+    pub sampling_seed: Option<u64>,
+    /// Longest side of an image as sent, in pixels; `None` for no limit.
+    pub max_side: Option<NonZeroU32>,
+    /// The file or folder of the data; `None` for the built-in rooms.
+    pub data: Option<PathBuf>,
+    /// Which models are asked without images, too.
+    pub text_baseline: TextBaseline,
+    /// The light in which the photographs of the data were taken.
+    pub set_light: SetLight,
+}
+
+impl JobSettings {
+    /// Whether a model of the run is shown images.
+    pub(crate) fn shows_images(&self) -> bool {
+        let mut models = self.ask.models.iter();
+        models.any(|model| model.view == View::Image)
+    }
+
+    /// The files of the enhancement models, each of which works on some images of the run. ONNX Runtime is opened, too, so that an
+    /// error is found before anything that takes time. An existing run may not need the runtime any more.
+    pub(crate) fn enhancers(&self) -> Result<Vec<ModelFile>> {
+        check_used(&self.light, &self.enhancers)?;
+        let files = enhancers::read(&self.enhancers.llie)?;
+        let exists = match &self.place {
+            RunPlace::Automatic => false,
+            RunPlace::Named(path) | RunPlace::Resume(path) => path.exists(),
+        };
+        if !files.is_empty() && !exists {
+            self.loading.runtime.search().open()?;
+        }
+        Ok(files)
+    }
+}
+
+impl JobArgs {
+    /// The error for a call that names no model.
+    pub(crate) fn no_model_error(&self) -> Error {
+        let remedy = if self.output.resume.is_some() {
+            "--resume takes the same flags as the run had, the model's name among them"
+        } else {
+            "a model's name at the endpoint, or observer or random to try without one; it would be asked about 48 built-in rooms from \
+             L0 to L5, and --help lists what can be set"
+        };
+        Error::usage("--model", format_args!("no model is named: {remedy}"))
+    }
+
+    /// How models are asked that no file of models says it of.
+    fn asking(&self, experiment: &ExperimentSettings) -> AskingArgs {
+        AskingArgs {
+            parameters: self.parameters.clone(),
+            request: self.request.clone(),
+            access: self.access.clone(),
+            sending: self.sending,
+            constrain: experiment.constrain,
+            seed: experiment.sampling_seed,
+            probabilities: experiment.probabilities,
+            reply_headers: Vec::new(),
+        }
+    }
+
+    /// The names of the models, after a check that each has an address and the key that it needs. Nothing is sent.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the flag, variable or file that cannot be used.
+    pub(crate) fn check_models(&self, experiment: &ExperimentSettings) -> Result<Vec<String>> {
+        let context = ResolveContext {
+            typed: &self.typed,
+            shard: Shard::WHOLE,
+            workers: None,
+            keys: KeyUse::Needed,
+            data: experiment.data.as_deref(),
+            text_baseline: experiment.text_baseline,
+        };
+        let asking = self.asking(experiment);
+        let settings = AskSettings::resolve(&self.models, &asking, context)?;
+        let models = settings.models.iter();
+        Ok(models
+            .map(|model| format!("{} ({})", model.name, model.view))
+            .collect())
+    }
+
+    /// The settings of these flags. Files and variables that they name are read.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the flag that cannot be used.
+    pub(crate) fn resolve(self, experiment: &ExperimentSettings) -> Result<JobSettings> {
+        let shard = Shard::resolve(self.scale.shard.as_deref(), |name| std::env::var(name).ok())?;
+        let asking = self.asking(experiment);
+        let context = ResolveContext {
+            typed: &self.typed,
+            shard,
+            workers: self.scale.workers,
+            keys: if self.money.dry_run {
+                KeyUse::NotNeeded
+            } else {
+                KeyUse::Needed
+            },
+            data: experiment.data.as_deref(),
+            text_baseline: experiment.text_baseline,
+        };
+        Ok(JobSettings {
+            light: LightSettings::resolve(&self.light, experiment.set_light)?,
+            set_light: experiment.set_light,
+            ask: AskSettings::resolve(&self.models, &asking, context)?,
+            enhancers: self.enhancers.for_set(experiment.set_light),
+            loading: self.loading,
+            format: self.images.image,
+            max_side: experiment.max_side,
+            concurrency: self.sending.concurrency,
+            money: MoneySettings::resolve(&self.money, shard)?,
+            shard,
+            grace: self.scale.grace,
+            show_timings: self.scale.timings,
+            images: self.stored,
+            show: self.output.show.format(),
+            table: self.output.show.table(),
+            access: FolderAccess::new(self.output.shared),
+            place: RunPlace::from(self.output).checked()?,
+            image_flags: self.image_flags,
+        })
+    }
+}
+
+/// Parent of the run folders that the user does not name.
+pub(crate) const RESULTS: &str = "results";
+
+/// The choice of the run folder.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum RunPlace {
+    /// Folder of the same command, else a new one.
+    Automatic,
+    /// This folder, which may be new.
+    Named(PathBuf),
+    /// This folder, which must hold a run.
+    Resume(PathBuf),
+}
+
+impl From<OutputArgs> for RunPlace {
+    fn from(args: OutputArgs) -> Self {
+        match (args.out, args.resume) {
+            (Some(path), _) => Self::Named(path),
+            (None, Some(path)) => Self::Resume(path),
+            (None, None) => Self::Automatic,
+        }
+    }
+}
+
+impl RunPlace {
+    /// The plan in the folder that is named; `None` if none is, or there is no plan.
+    ///
+    /// # Errors
+    /// As of [`RunPlan::of`].
+    pub(crate) fn plan(&self) -> Result<Option<RunPlan>> {
+        match self {
+            Self::Named(folder) | Self::Resume(folder) => RunPlan::of(folder),
+            Self::Automatic => Ok(None),
+        }
+    }
+
+    /// The choice itself, if the folder can be written to: an error here costs nothing, one after the images are made does.
+    fn checked(self) -> Result<Self> {
+        let (flag, path) = match &self {
+            Self::Automatic => ("--out", Path::new(RESULTS)),
+            Self::Named(path) => ("--out", path.as_path()),
+            Self::Resume(path) if path.is_dir() => ("--resume", path.as_path()),
+            Self::Resume(path) => {
+                let path = path.display();
+                let remedy = "it must hold a run, and --out DIR begins a new one";
+                let problem = format_args!("{path}: no such folder; {remedy}");
+                return Err(Error::usage("--resume", problem));
+            }
+        };
+        let problem = |folder: &Path, e: &dyn Display| {
+            let folder = folder.display();
+            let remedy = "--out DIR names another folder";
+            Error::usage(
+                flag,
+                format_args!("cannot write to {folder}: {e}; {remedy}"),
+            )
+        };
+        let absolute = path::absolute(path).map_err(|e| problem(path, &e))?;
+        let existing = absolute.ancestors().find(|folder| folder.exists());
+        let existing = existing.unwrap_or(&absolute);
+        // A file without a name: it is gone when it is closed.
+        tempfile::tempfile_in(existing).map_err(|e| problem(existing, &e))?;
+        Ok(self)
+    }
+
+    /// The choice for a shard: a subfolder of the whole run's folder.
+    #[must_use]
+    pub(crate) fn for_shard(&self, shard: Shard) -> Self {
+        match self {
+            Self::Named(path) if shard.is_part() => Self::Named(path.join(shard.folder())),
+            Self::Resume(path) if shard.is_part() => Self::Resume(path.join(shard.folder())),
+            place => place.clone(),
+        }
+    }
+}

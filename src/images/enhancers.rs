@@ -1,0 +1,196 @@
+//! The enhancement models of a command, loaded when they are needed: `OpenEnhancers`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use crate::enhance::{Enhancer, ModelFile, ProbeArgs, Runtime, RuntimeArgs, SizeArgs};
+use crate::error::{Error, Result};
+use crate::images::workers::ThreadArgs;
+use crate::types::{Digest, EnhancerName};
+
+/// Flags for running enhancement models.
+#[derive(Debug, Clone, Default, Args)]
+pub(crate) struct EnhancerRunArgs {
+    /// Size of the images and tiles that models take.
+    #[command(flatten)]
+    pub size: SizeArgs,
+    /// Whether their images can be enhanced images.
+    #[command(flatten)]
+    pub probe: ProbeArgs,
+    /// The ONNX Runtime that runs them.
+    #[command(flatten)]
+    pub runtime: RuntimeArgs,
+    /// Number of threads that run them.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
+}
+
+impl EnhancerRunArgs {
+    /// The model in a file, in a session with these settings.
+    ///
+    /// # Errors
+    /// If ONNX Runtime is not found, or the file is not a model that it can run.
+    pub(crate) fn open(&self, file: ModelFile) -> Result<Enhancer> {
+        let runtime = self.runtime.search().open()?;
+        let enhancer = Enhancer::open(file, &runtime, self.threads.threads)?
+            .with_tiling(self.size.tile)
+            .with_max_side(self.size.llie_max_side)
+            .with_fitting(self.size.fitting())
+            .with_time_limit(self.runtime.llie_timeout)
+            .with_memory_limit(self.runtime.memory_limit());
+        Ok(enhancer)
+    }
+}
+
+/// The files of the enhancement models. Two files of the same name are an error.
+pub(crate) fn read(models: &[PathBuf]) -> Result<Vec<ModelFile>> {
+    let mut enhancers: Vec<ModelFile> = Vec::new();
+    for path in models {
+        let file = ModelFile::read(path)?;
+        if enhancers.iter().any(|other| other.name() == file.name()) {
+            let problem = format_args!(
+                "two models are named {}; rename one of the files",
+                file.name()
+            );
+            return Err(Error::usage("--llie", problem));
+        }
+        enhancers.push(file);
+    }
+    Ok(enhancers)
+}
+
+/// An enhancement model of a command.
+#[expect(clippy::large_enum_variant, reason = "few are alive at a time")]
+pub(crate) enum Model {
+    /// Its file is read.
+    Read(ModelFile),
+    /// It is open; with the digest of what its file stated ([`ModelFile::stated`]).
+    Open(Enhancer, Digest),
+}
+
+impl Model {
+    pub(crate) fn name(&self) -> &EnhancerName {
+        match self {
+            Self::Read(file) => file.name(),
+            Self::Open(enhancer, _) => enhancer.name(),
+        }
+    }
+
+    /// Path of the file, as messages call it.
+    pub(crate) fn path(&self) -> &Path {
+        match self {
+            Self::Read(file) => file.path(),
+            Self::Open(enhancer, _) => enhancer.path(),
+        }
+    }
+
+    /// Digest of all that decides what is found when the model is opened and tried.
+    ///
+    /// # Errors
+    /// If a number of the sidecar is infinite or NaN.
+    pub(crate) fn stated(&self) -> Result<Digest> {
+        match self {
+            Self::Read(file) => file.stated(),
+            Self::Open(_, stated) => Ok(*stated),
+        }
+    }
+
+    /// The model in a session with these settings.
+    ///
+    /// # Errors
+    /// If ONNX Runtime is not found, or the file is not a model that it can run.
+    pub(crate) fn open(self, settings: &EnhancerRunArgs) -> Result<Enhancer> {
+        match self {
+            Self::Read(file) => settings.open(file),
+            Self::Open(enhancer, _) => Ok(enhancer),
+        }
+    }
+}
+
+/// Enhancement models, loaded or still to be loaded.
+pub(crate) struct OpenEnhancers<'a> {
+    settings: &'a EnhancerRunArgs,
+    models: Vec<Model>,
+    /// ONNX Runtime; `None` if it is not open.
+    runtime: Option<Runtime>,
+}
+
+impl<'a> OpenEnhancers<'a> {
+    /// The models in these files, to be loaded later.
+    pub(crate) fn deferred(files: Vec<ModelFile>, settings: &'a EnhancerRunArgs) -> Self {
+        Self {
+            settings,
+            models: files.into_iter().map(Model::Read).collect(),
+            runtime: None,
+        }
+    }
+
+    /// The models in these files, loaded.
+    ///
+    /// # Errors
+    /// If ONNX Runtime is not found, or a file is not a model that it can run.
+    pub(crate) fn load(files: Vec<ModelFile>, settings: &'a EnhancerRunArgs) -> Result<Self> {
+        let mut models = Self::deferred(files, settings);
+        models.open()?;
+        Ok(models)
+    }
+
+    /// Loads the models that are not loaded yet.
+    ///
+    /// # Errors
+    /// If ONNX Runtime is not found, or a file is not a model that it can run.
+    pub(crate) fn open(&mut self) -> Result<()> {
+        self.open_runtime()?;
+        let models = std::mem::take(&mut self.models).into_iter();
+        let opened = models.map(|model| match model {
+            Model::Read(file) => {
+                let stated = file.stated()?;
+                Ok(Model::Open(self.settings.open(file)?, stated))
+            }
+            open @ Model::Open(..) => Ok(open),
+        });
+        self.models = opened.collect::<Result<_>>()?;
+        Ok(())
+    }
+
+    /// Opens ONNX Runtime if there are models and it is not open.
+    ///
+    /// # Errors
+    /// If it is not found.
+    pub(crate) fn open_runtime(&mut self) -> Result<()> {
+        if self.runtime.is_none() && !self.models.is_empty() {
+            self.runtime = Some(self.settings.runtime.search().open()?);
+        }
+        Ok(())
+    }
+
+    /// The models, all of them loaded.
+    ///
+    /// # Errors
+    /// As by [`Self::open`].
+    pub(crate) fn take(&mut self) -> Result<Vec<Enhancer>> {
+        let models = self.take_models()?.into_iter();
+        models.map(|model| model.open(self.settings)).collect()
+    }
+
+    /// The models as they are; ONNX Runtime is open then.
+    ///
+    /// # Errors
+    /// If it is not found.
+    pub(crate) fn take_models(&mut self) -> Result<Vec<Model>> {
+        self.open_runtime()?;
+        Ok(std::mem::take(&mut self.models))
+    }
+
+    /// The models, loaded or not.
+    pub(crate) fn models(&self) -> &[Model] {
+        &self.models
+    }
+
+    /// Name and version of ONNX Runtime for the manifest; `None` if it was not opened.
+    pub(crate) fn version(&self) -> Option<(String, String)> {
+        let runtime = self.runtime.as_ref()?;
+        Some(("onnxruntime".to_owned(), runtime.version().to_owned()))
+    }
+}

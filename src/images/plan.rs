@@ -1,0 +1,95 @@
+//! The trials to ask: [`Plan`].
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::images::trial::Trial;
+use crate::types::{Condition, TrialKey};
+
+/// All trials that share their images, or that have none.
+#[derive(Debug)]
+pub(crate) struct TrialGroup<I> {
+    /// Condition of the images; `None` if only text is sent.
+    pub(crate) condition: Option<Condition>,
+    pub(crate) trials: Vec<Trial<I>>,
+}
+
+/// All groups about one source.
+#[derive(Debug)]
+pub(crate) struct SourcePlan<I> {
+    /// Index of the source among those of the run.
+    pub(crate) source: usize,
+    pub(crate) groups: Vec<TrialGroup<I>>,
+}
+
+impl<I> SourcePlan<I> {
+    /// The conditions in which the source is shown.
+    pub(crate) fn conditions(&self) -> impl Iterator<Item = &Condition> {
+        let groups = self.groups.iter();
+        groups.filter_map(|group| group.condition.as_ref())
+    }
+
+    fn trials(&self) -> usize {
+        self.groups.iter().map(|group| group.trials.len()).sum()
+    }
+}
+
+/// The trials of one phase of a run, and those of them that have no reply yet.
+#[derive(Debug)]
+pub(crate) struct Plan<I> {
+    /// Every trial, answered or not, source by source.
+    pub(crate) keys: Vec<TrialKey>,
+    /// Numbers of trials, answered or not, by index of their source.
+    pub(crate) by_source: BTreeMap<usize, usize>,
+    /// Groups of the trials that remain to be asked, in the same order.
+    pub(crate) sources: Vec<SourcePlan<I>>,
+}
+
+impl<I> Plan<I> {
+    /// A plan of all these trials, none of them answered.
+    pub(crate) fn new(sources: Vec<SourcePlan<I>>) -> Self {
+        let groups = sources.iter().flat_map(|source| &source.groups);
+        let trials = groups.flat_map(|group| &group.trials);
+        let keys = trials.map(|trial| trial.key).collect();
+        let mut by_source = BTreeMap::new();
+        for part in &sources {
+            *by_source.entry(part.source).or_default() += part.trials();
+        }
+        let mut plan = Self {
+            keys,
+            by_source,
+            sources,
+        };
+        plan.exclude(|_| false);
+        plan
+    }
+
+    /// Removes the trials that need not be asked; returns their number.
+    pub(crate) fn exclude(&mut self, is_excluded: impl Fn(&TrialKey) -> bool) -> usize {
+        let before = self.remaining();
+        for source in &mut self.sources {
+            for group in &mut source.groups {
+                group.trials.retain(|trial| !is_excluded(&trial.key));
+            }
+            source.groups.retain(|group| !group.trials.is_empty());
+        }
+        self.sources.retain(|source| !source.groups.is_empty());
+        before - self.remaining()
+    }
+
+    /// Number of trials that remain to be asked.
+    pub(crate) fn remaining(&self) -> usize {
+        self.sources.iter().map(SourcePlan::trials).sum()
+    }
+
+    /// The conditions of the remaining trials.
+    pub(crate) fn conditions(&self) -> BTreeSet<&Condition> {
+        let sources = self.sources.iter();
+        sources.flat_map(SourcePlan::conditions).collect()
+    }
+
+    /// The groups of the remaining trials, each with the index of its source.
+    pub(crate) fn groups(&self) -> impl Iterator<Item = (usize, &TrialGroup<I>)> {
+        let sources = self.sources.iter();
+        sources.flat_map(|part| part.groups.iter().map(|group| (part.source, group)))
+    }
+}

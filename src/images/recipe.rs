@@ -1,0 +1,228 @@
+//! The settings that decide the pixels that are sent: [`Recipe`].
+
+use std::collections::BTreeSet;
+use std::num::NonZeroU32;
+
+use serde::Serialize;
+
+use crate::enhance::{self, ModelFile};
+use crate::error::{Error, Result};
+use crate::images::source::{Source, SourceFrame};
+use crate::images::walk::{CameraOf, DegradedAt, Walk};
+use crate::picture::PayloadFormat;
+use crate::picture::Scaling;
+use crate::synthesis::{self, AppliedDegradation, FrameView, KindSettings, NoiseKey, Synthesis};
+use crate::types::degradation::Kind;
+use crate::types::{
+    Condition, Degradation, Digest, EnhancerName, ExposureFacts, FrameId, Severity,
+};
+
+/// All settings that decide an image, except its frame and its condition.
+#[derive(Debug)]
+pub(crate) struct Recipe {
+    pub(crate) seed: u64,
+    pub(crate) kinds: KindSettings,
+    pub(crate) format: PayloadFormat,
+    pub(crate) scaling: Scaling,
+    /// Whether light is reduced before or after scaling.
+    pub(crate) degraded_at: DegradedAt,
+    /// The frames that share one state of the camera.
+    pub(crate) camera_of: CameraOf,
+    pub(crate) enhancers: Vec<(EnhancerName, Digest)>,
+}
+
+impl Recipe {
+    pub(crate) fn new(
+        kinds: &KindSettings,
+        format: PayloadFormat,
+        max_side: Option<NonZeroU32>,
+        files: &[ModelFile],
+    ) -> Self {
+        Self {
+            format,
+            scaling: max_side.map_or(Scaling::Never, Scaling::MaxSide),
+            ..Self::lossless(kinds, files)
+        }
+    }
+
+    /// The recipe for PNG images in the size of their frames.
+    pub(crate) fn lossless(kinds: &KindSettings, files: &[ModelFile]) -> Self {
+        let enhancers = files.iter();
+        Self {
+            seed: kinds.sensor.seed,
+            kinds: kinds.clone(),
+            format: PayloadFormat::Png,
+            scaling: Scaling::Never,
+            degraded_at: DegradedAt::Native,
+            camera_of: CameraOf::Frame,
+            enhancers: enhancers
+                .map(|file| (file.name().clone(), file.digest()))
+                .collect(),
+        }
+    }
+
+    /// The recipe for frames of walks.
+    pub(crate) fn of_walks(self, walk: &Walk) -> Self {
+        Self {
+            scaling: walk.side,
+            degraded_at: walk.degraded_at,
+            camera_of: walk.camera,
+            ..self
+        }
+    }
+
+    /// The key that the noise of a frame is drawn from.
+    pub(crate) fn noise(&self, source: &FrameId, frame: &FrameId) -> NoiseKey {
+        let own = NoiseKey::new(self.seed, frame);
+        match self.camera_of {
+            CameraOf::Frame => own,
+            CameraOf::Episode => own.with_camera_of(&NoiseKey::new(self.seed, source)),
+        }
+    }
+
+    /// The digest of all that decides the images of a source in a condition, and of nothing else. For example, the seed enters only if
+    /// the degradation is random, so exposure drops have the same digest in runs with different seeds.
+    ///
+    /// # Errors
+    /// If the condition has a reading that the recipe lacks.
+    pub(crate) fn stimulus(&self, source: &Source, condition: &Condition) -> Result<Digest> {
+        let images: Vec<ImageKeyFacts<'_>> = source
+            .frames
+            .iter()
+            .map(|frame| self.facts(&source.name, frame, condition))
+            .collect::<Result<_>>()?;
+        let in_order: Vec<&ImageKeyFacts<'_>> =
+            source.order.iter().map(|index| &images[*index]).collect();
+        Digest::canonical("darkqa.images/2", &in_order)
+    }
+
+    /// All that decides the image of a frame in a condition.
+    ///
+    /// # Errors
+    /// If the condition has a reading that the recipe lacks.
+    pub(crate) fn facts<'a>(
+        &'a self,
+        source: &'a FrameId,
+        frame: &'a SourceFrame,
+        condition: &Condition,
+    ) -> Result<ImageKeyFacts<'a>> {
+        let how = frame.degradation(condition)?;
+        let degradation = how.map(|how| self.degradation(source, frame, &how));
+        let enhancer = condition.enhancer.as_ref();
+        let enhancer =
+            enhancer.and_then(|name| self.enhancers.iter().find(|(known, _)| known == name));
+        Ok(ImageKeyFacts {
+            picture: frame.picture(condition)?,
+            degradation: degradation.transpose()?,
+            enhancer: enhancer.map(|(_, digest)| EnhancerFacts {
+                digest: *digest,
+                version: enhance::VERSION,
+            }),
+            format: self.format.to_string(),
+            scaling: self.scaling,
+            scaled_before: (self.degraded_at == DegradedAt::Resized).then_some(true),
+        })
+    }
+}
+
+impl Recipe {
+    /// Checks that the camera can make each image, which depends on the sizes of the frames.
+    ///
+    /// # Errors
+    /// If a picture would move too far during an exposure; names the frame.
+    pub(crate) fn check(&self, sources: &[Source], conditions: &[Condition]) -> Result<()> {
+        for source in sources {
+            for frame in &source.frames {
+                let shown = conditions.iter().filter(|of| frame.can_show(of));
+                let how = shown.map(|condition| frame.degradation(condition));
+                let how = how.collect::<Result<BTreeSet<Option<Degradation>>>>()?;
+                for how in how.iter().flatten().filter(|how| how.kind().has_motion()) {
+                    self.applied(&source.name, frame, how)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn applied(
+        &self,
+        source: &FrameId,
+        frame: &SourceFrame,
+        how: &Degradation,
+    ) -> Result<AppliedDegradation> {
+        let key = self.noise(source, &frame.id);
+        let view = self.view(frame.size, frame.focal);
+        let applied = self.kinds.apply(how, view, &key);
+        applied.map_err(|e| Error::data(format_args!("{} at {how}", frame.id), e))
+    }
+
+    fn degradation<'a>(
+        &'a self,
+        source: &'a FrameId,
+        frame: &'a SourceFrame,
+        how: &Degradation,
+    ) -> Result<DegradationFacts<'a>> {
+        let kind = how.kind();
+        let applied = self.applied(source, frame, how)?;
+        let random = kind.has_noise();
+        let of_source = random && self.camera_of == CameraOf::Episode;
+        Ok(DegradationFacts {
+            kind,
+            severity: how.severity(),
+            version: synthesis::version(kind),
+            reading: applied.synthesis().cloned(),
+            seed: random.then_some(self.seed),
+            frame: random.then_some(&frame.id),
+            camera_of: of_source.then_some(source),
+            exposure: applied.exposure(),
+        })
+    }
+
+    /// A frame of this width and height as the camera saw it, in the size in which it is degraded. `focal` is in pixels of the
+    /// frame.
+    pub(crate) fn view(&self, size: (u32, u32), focal: Option<f64>) -> FrameView {
+        let own = size.0 as usize;
+        let width = match self.degraded_at {
+            DegradedAt::Native => own,
+            DegradedAt::Resized => self.scaling.size(size).0,
+        };
+        let scale = width as f64 / own as f64;
+        FrameView {
+            width,
+            focal: focal.map(|focal| focal * scale),
+        }
+    }
+}
+
+/// All that decides an image, as it enters the digest.
+#[derive(Serialize)]
+pub(crate) struct ImageKeyFacts<'a> {
+    picture: Digest,
+    degradation: Option<DegradationFacts<'a>>,
+    enhancer: Option<EnhancerFacts>,
+    format: String,
+    scaling: Scaling,
+    /// `Some(true)` if the frame is scaled before its light is reduced; else `None`.
+    scaled_before: Option<bool>,
+}
+
+/// All that decides a degraded frame, except the frame's content. Seed and frame are set only if the kind is random.
+#[derive(Serialize)]
+struct DegradationFacts<'a> {
+    kind: Kind,
+    severity: Severity,
+    version: u32,
+    reading: Option<Synthesis>,
+    seed: Option<u64>,
+    frame: Option<&'a FrameId>,
+    /// Source whose frames share one state of the camera; `None` if each frame has its own.
+    camera_of: Option<&'a FrameId>,
+    /// What the camera does for this frame: it decides the pixels of kinds with motion blur.
+    exposure: Option<ExposureFacts>,
+}
+
+#[derive(Serialize)]
+struct EnhancerFacts {
+    digest: Digest,
+    version: u32,
+}

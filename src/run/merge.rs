@@ -1,0 +1,101 @@
+//! `merge`: joins the shards of a run into one run.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::error::{Error, Result};
+use crate::files::folder_access::FolderAccess;
+use crate::images::thumbnail::MissingThumbnails;
+use crate::run_reports::{choice, open};
+use crate::runs::Outcome;
+use crate::runs::ShowArgs;
+use crate::runs::StdoutFormat;
+use crate::runs::placed_trials::append;
+use crate::runs::record_table;
+use crate::runs::run_parts::{MissingParts, RunParts, one_kind, runs_in};
+use crate::runs::stored::{ExperimentKind, StoredRun};
+use crate::score::record::Detail;
+use crate::store::{self, AddressChange, Store};
+use crate::types::{ChoiceDetail, Decides, OpenDetail};
+
+/// The flags of `merge`.
+#[derive(Debug, Args)]
+pub(crate) struct MergeArgs {
+    /// The folders of the shards, or a folder that holds them
+    #[arg(value_name = "RUN", required = true, add = Decides::Nothing)]
+    pub runs: Vec<PathBuf>,
+    /// The folder of the whole run
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
+    pub out: PathBuf,
+    /// Let other users of this machine read the new folder, as the system's umask says; else it is for you alone
+    #[arg(long, add = Decides::Nothing)]
+    pub shared: bool,
+    /// Merge the shards that there are, even if others are missing
+    #[arg(long, add = Decides::Nothing)]
+    pub partial: bool,
+    /// How the report is printed.
+    #[command(flatten)]
+    pub show: ShowArgs,
+}
+
+/// Merges shards: the records of all in the order of the questions, with the report that one run would have written.
+///
+/// # Errors
+/// If a folder holds no shard, two folders hold the same, one is of another run, or shards are missing without `--partial`.
+pub(crate) fn merge(args: &MergeArgs) -> Result<Outcome> {
+    let folders = folders(&args.runs)?;
+    match one_kind(&folders)? {
+        ExperimentKind::Open => merge_all::<OpenDetail>(args, &folders, open::write),
+        ExperimentKind::Choice => merge_all::<ChoiceDetail>(args, &folders, choice::write),
+    }
+}
+
+fn merge_all<D: Detail>(
+    args: &MergeArgs,
+    folders: &[PathBuf],
+    write: impl FnOnce(&Store<D>, StoredRun<D>, StdoutFormat) -> Result<Outcome>,
+) -> Result<Outcome> {
+    let missing = if args.partial {
+        MissingParts::Accepted
+    } else {
+        MissingParts::Refused
+    };
+    let parts = RunParts::<D>::read(folders, missing)?;
+    FolderAccess::new(args.shared).create(&args.out)?;
+    let mut store = Store::<D>::open(&args.out, &parts.manifest, AddressChange::Refused)?;
+    let folders = parts.folders();
+    parts.questions.write(&store, &folders)?;
+    let records = parts.trials.iter().map(|trial| (trial.key(), trial.text()));
+    append(&mut store, &parts.manifest, &parts.manifests(), records)?;
+    store.sync()?;
+    let wanted = MissingThumbnails::new(parts.questions.frames(), Vec::new());
+    store.add_thumbnails_of(&folders, |frame| wanted.wants(frame))?;
+    store.add_fidelity_of(&folders, |_| true)?;
+    drop(folders);
+    // The trials are read again from the folder of the run.
+    let manifest = parts.into_manifest();
+    let run = StoredRun::reread(&args.out, manifest)?;
+    let outcome = write(&store, run, args.show.format())?;
+    record_table::update(&args.out, args.show.table())?;
+    Ok(outcome)
+}
+
+/// The run folders among those named, and directly in them.
+fn folders(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    let mut folders = Vec::new();
+    for path in named {
+        if store::schema(path)?.is_some() {
+            folders.push(path.clone());
+            continue;
+        }
+        let inside = runs_in(path)?;
+        if inside.is_empty() {
+            let problem = "neither a run nor a folder of runs".to_owned();
+            let path = path.clone();
+            return Err(Error::Run { path, problem });
+        }
+        folders.extend(inside);
+    }
+    Ok(folders)
+}

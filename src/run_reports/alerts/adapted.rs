@@ -1,0 +1,32 @@
+//! The line about requests that were changed because a server refused a field: [`of_adaptations`].
+
+use serde_json::Value;
+
+use crate::report::alert::{Alert, AlertKind};
+use crate::run_reports::join::JoinedRun;
+use crate::run_reports::settings::listed;
+use crate::runs::renamed::ADAPTED_FOR;
+
+/// One alert for each model whose requests were changed in a run.
+pub(super) fn of_adaptations(runs: &[JoinedRun]) -> Vec<Alert> {
+    let mut alerts = Vec::new();
+    for run in runs {
+        for (field, changes) in &run.manifest.settings {
+            let Some(model) = field.strip_prefix(ADAPTED_FOR) else {
+                continue;
+            };
+            let changes = changes.as_array().into_iter().flatten();
+            let changes: Vec<&str> = changes.filter_map(Value::as_str).collect();
+            let place = match runs {
+                [_] => String::new(),
+                _ => format!(" in {}", run.name),
+            };
+            let text = format!(
+                "Requests to {model} were changed{place}, because the server refused what was sent first: {}.",
+                listed(&changes)
+            );
+            alerts.push(Alert::new(AlertKind::Parameters, text));
+        }
+    }
+    alerts
+}

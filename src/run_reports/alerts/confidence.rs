@@ -1,0 +1,34 @@
+//! The line about models whose probabilities were asked for and not stated: [`of_confidence`].
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde_json::Value;
+
+use crate::report::alert::{Alert, AlertKind};
+use crate::run_reports::join::JoinedRun;
+use crate::types::{ChoiceDetail, TrialRef, Trials};
+
+/// One alert for each model that was asked with `--probabilities` and has no reply with any.
+pub(super) fn of_confidence(runs: &[JoinedRun], trials: &Trials<ChoiceDetail>) -> Vec<Alert> {
+    let columns = runs
+        .iter()
+        .filter_map(|run| run.manifest.columns.get("model"));
+    let models = columns.flat_map(BTreeMap::iter);
+    let asked = models.filter(|(_, content)| content["--probabilities"] == Value::Bool(true));
+    let asked: BTreeSet<&String> = asked.map(|(name, _)| name).collect();
+    let stated = trials.iter().filter(|trial| trial.options().is_some());
+    let stated: BTreeSet<&str> = stated.map(TrialRef::model).collect();
+    let replied = trials.iter().filter(|trial| !trial.failed());
+    let replied: BTreeSet<&str> = replied.map(TrialRef::model).collect();
+    let without = asked
+        .into_iter()
+        .filter(|name| replied.contains(&***name) && !stated.contains(&***name));
+    let alerts = without.map(|name| {
+        let text = format!(
+            "The confidence of {name} is not available: its server states no probabilities of tokens, or its replies do not begin \
+             with a choice."
+        );
+        Alert::new(AlertKind::Parameters, text)
+    });
+    alerts.collect()
+}

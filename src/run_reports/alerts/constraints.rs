@@ -1,0 +1,38 @@
+//! The line about replies that do not keep the constraint that was asked for: [`of_constraints`].
+
+use std::collections::BTreeMap;
+
+use crate::report::alert::{Alert, AlertKind};
+use crate::report::words::plural;
+use crate::run_reports::join::JoinedRun;
+use crate::types::{ChoiceDetail, Trials};
+
+/// One alert for each model that was asked with `--constrain` and has replies of another form. A reply that keeps it is stored as its
+/// letter alone.
+pub(super) fn of_constraints(runs: &[JoinedRun], trials: &Trials<ChoiceDetail>) -> Vec<Alert> {
+    let columns = runs
+        .iter()
+        .filter_map(|run| run.manifest.columns.get("model"));
+    let models = columns.flat_map(BTreeMap::iter);
+    let constrained: BTreeMap<&String, &str> = models
+        .filter_map(|(name, content)| Some((name, content["--constrain"].as_str()?)))
+        .filter(|(_, constraint)| *constraint != "none")
+        .collect();
+    let alerts = constrained.iter().filter_map(|(model, constraint)| {
+        let replied = trials
+            .iter()
+            .filter(|trial| trial.model() == **model && !trial.failed());
+        let (all, other) = replied.fold((0_usize, 0_usize), |(all, other), trial| {
+            (all + 1, other + usize::from(!trial.is_letter()))
+        });
+        (other > 0).then(|| {
+            let replies = plural(all, "reply", "replies");
+            let text = format!(
+                "Constraint not followed: {other} of {replies} of {model} have another form than --constrain {constraint} asks for, \
+                 and are read as any reply."
+            );
+            Alert::new(AlertKind::Constrain, text)
+        })
+    });
+    alerts.collect()
+}

@@ -1,0 +1,89 @@
+//! What the levels of runs do to the signal-to-noise ratio of images with sensor noise, and to their codes: [`of_noise`],
+//! [`of_rounding`].
+
+use std::collections::{BTreeMap, BTreeSet, HashSet};
+
+use serde_json::Value;
+
+use crate::report::alert::{Alert, AlertKind};
+use crate::run_reports::join::Joined;
+use crate::score::record::Detail;
+use crate::types::degradation::Kind;
+use crate::types::{Condition, Degradation, Severity, TrialRef};
+
+/// The exposure drop in hundredths of EV above which at most nine codes are left: white has code
+/// 255 · 2^(−EV/2.2) = 8 there.
+const FEW_CODES: u16 = 1100;
+
+/// The light readings whose levels all have the same signal-to-noise ratio, where a run has several levels with noise.
+pub(super) fn of_noise<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
+    let mut of_draws = BTreeMap::<&str, BTreeSet<&str>>::new();
+    for run in &joined.runs {
+        let mut levels = BTreeMap::<String, BTreeSet<Severity>>::new();
+        for condition in conditions(joined.of(run)) {
+            let Some(degradation) = condition.degradation() else {
+                continue;
+            };
+            if let Some(reading) = degradation.reading() {
+                let levels = levels.entry(reading.to_string()).or_default();
+                levels.insert(degradation.severity());
+            }
+        }
+        let contents = run.manifest.columns.get("reading").into_iter().flatten();
+        for (reading, content) in contents {
+            let several = levels.get(reading).is_some_and(|levels| levels.len() > 1);
+            if several && content["--coupling"] == "independent" {
+                let names = of_draws.entry(same_noise(content)).or_default();
+                names.insert(reading);
+            }
+        }
+    }
+    let alerts = of_draws.into_iter().map(|(why, names)| {
+        let names: Vec<&str> = names.into_iter().collect();
+        let text = format!(
+            "With noise ({}) the signal-to-noise ratio is the same at every level: {why}. --profile physical loses photons with the light.",
+            names.join(", ")
+        );
+        Alert::new(AlertKind::Noise, text)
+    });
+    alerts.collect()
+}
+
+/// In which way the levels of a light reading have the same noise, if its light ratio r does not depend on the level.
+fn same_noise(reading: &Value) -> &'static str {
+    if reading["--draws"] == "shared" {
+        "the levels are one noisy image at several brightnesses"
+    } else {
+        "each level has other noise of the same strength"
+    }
+}
+
+/// The levels at which an image has so few codes that their rounding decides.
+pub(super) fn of_rounding<D: Detail>(joined: &Joined<D>) -> Option<Alert> {
+    let shown = conditions(joined.trials.iter()).into_iter();
+    let shown = shown.filter_map(Condition::degradation);
+    let darkest = shown.filter(|degradation| {
+        matches!(degradation.kind(), Kind::Exposure | Kind::Sensor)
+            && degradation.severity().in_hundredths() > FEW_CODES
+    });
+    let levels: BTreeSet<Severity> = darkest.map(Degradation::severity).collect();
+    if levels.is_empty() {
+        return None;
+    }
+    let names: Vec<String> = levels
+        .iter()
+        .map(|level| format!("{} EV", level.value()))
+        .collect();
+    let text = format!(
+        "Above 11 EV an image has at most nine codes ({}): such levels test the rounding to 8 bits more than the model.",
+        names.join(", ")
+    );
+    Some(Alert::new(AlertKind::Noise, text))
+}
+
+/// The different conditions of some trials.
+fn conditions<'t, D: Detail + 't>(
+    trials: impl Iterator<Item = TrialRef<'t, D>>,
+) -> HashSet<&'t Condition> {
+    trials.filter_map(TrialRef::condition).collect()
+}

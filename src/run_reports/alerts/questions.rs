@@ -1,0 +1,150 @@
+//! Questions that differ between runs, and models that were not asked the same: [`of_questions`], [`of_repeats`], [`of_items`].
+
+use std::collections::{BTreeMap, BTreeSet, HashSet};
+
+use crate::report::alert::{Alert, AlertKind};
+use crate::report::words::counted;
+use crate::run_reports::combine::Combined;
+use crate::run_reports::join::{Joined, JoinedRun};
+use crate::run_reports::settings::{is_of_people, listed};
+use crate::score::findings::Findings;
+use crate::score::record::Detail;
+use crate::score::subject::is_control;
+use crate::types::{QuestionId, RunQuestion, TrialRef};
+
+/// What differs between the questions of the runs, and between the files that they are about.
+pub(super) fn of_questions<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
+    let mut asked = Vec::<BTreeMap<&QuestionId, Option<&RunQuestion>>>::new();
+    for run in &joined.runs {
+        // A control is shown frames of its own choice, in a shard others than the models.
+        let trials = joined.of(run).filter(|trial| !is_control(trial.model()));
+        let ids: HashSet<&QuestionId> = trials.map(TrialRef::question).collect();
+        let mut ids: BTreeMap<&QuestionId, Option<&RunQuestion>> =
+            ids.into_iter().map(|id| (id, None)).collect();
+        for question in &run.questions {
+            if let Some(place) = ids.get_mut(&question.id) {
+                *place = Some(question);
+            }
+        }
+        asked.push(ids);
+    }
+    let mut alerts = Vec::new();
+    let shared = asked[0]
+        .keys()
+        .filter(|id| asked.iter().all(|ids| ids.contains_key(*id)));
+    let shared: Vec<&&QuestionId> = shared.collect();
+    if asked.iter().any(|ids| ids.len() != shared.len()) {
+        let counts = joined.runs.iter().zip(&asked);
+        let counts: Vec<String> = counts
+            .map(|(run, ids)| format!("{} of {}", ids.len(), run.name))
+            .collect();
+        let text = format!(
+            "The questions differ: {} share {}.",
+            listed(&counts),
+            counted(shared.len(), "question")
+        );
+        alerts.push(Alert::new(AlertKind::Questions, text));
+    }
+    // A question is compared with that of the first run that has it.
+    let mut firsts = BTreeMap::<&QuestionId, &RunQuestion>::new();
+    let mut pairs = Vec::<(&QuestionId, &RunQuestion, &RunQuestion)>::new();
+    for (id, question) in asked.iter().flatten() {
+        if let Some(question) = question {
+            match firsts.get(id) {
+                Some(first) => pairs.push((id, first, question)),
+                None => {
+                    firsts.insert(id, question);
+                }
+            }
+        }
+    }
+    let differ = |differs: &dyn Fn(&RunQuestion, &RunQuestion) -> bool| {
+        let pairs = pairs.iter().filter(|(_, one, other)| differs(one, other));
+        let ids: BTreeSet<&QuestionId> = pairs.map(|(id, ..)| *id).collect();
+        ids.len()
+    };
+    let words = differ(&|one, other| one.text != other.text);
+    if words > 0 {
+        let text = format!("The words of {} differ.", counted(words, "shared question"));
+        alerts.push(Alert::new(AlertKind::Questions, text));
+    }
+    let files = differ(&|one, other| one.image.zip(other.image).is_some_and(|(a, b)| a != b));
+    if files > 0 {
+        let text = format!(
+            "The frames of {} are other files under the same names.",
+            counted(files, "shared question")
+        );
+        alerts.push(Alert::new(AlertKind::Data, text));
+    }
+    let groups = differ(&|one, other| {
+        let groups = one.group.as_ref().zip(other.group.as_ref());
+        groups.is_some_and(|(group, other)| group != other)
+    });
+    if groups > 0 {
+        let text = format!(
+            "The groups of {} differ; those of the first run by name count.",
+            counted(groups, "shared question")
+        );
+        alerts.push(Alert::new(AlertKind::Questions, text));
+    }
+    alerts
+}
+
+/// Runs that asked the same questions a different number of times.
+pub(super) fn of_repeats(combined: &Combined) -> Option<Alert> {
+    let people = |run: &&JoinedRun| !is_of_people(&run.manifest);
+    let times = combined.runs.iter().filter(people).map(|run| {
+        let times = combined.of(run).map(|trial| trial.repeat() + 1).max();
+        (&run.name, times.unwrap_or(1))
+    });
+    let times: Vec<(&String, u32)> = times.collect();
+    let differs = times
+        .iter()
+        .any(|(_, times_here)| *times_here != times[0].1);
+    differs.then(|| {
+        let times: Vec<String> = times
+            .iter()
+            .map(|(run, times)| format!("{times} in {run}"))
+            .collect();
+        let text = format!(
+            "Questions were asked a different number of times: --repeats is {}.",
+            listed(&times)
+        );
+        Alert::new(AlertKind::Questions, text)
+    })
+}
+
+/// Models that did not answer the same questions.
+pub(super) fn of_items(findings: &Findings<'_>) -> Vec<Alert> {
+    let Some(common) = &findings.common else {
+        return Vec::new();
+    };
+    let short = common
+        .asked
+        .iter()
+        .filter(|asked| asked.questions < common.questions);
+    let short: Vec<String> = short
+        .enumerate()
+        .map(|(place, asked)| {
+            let blind = if asked.is_blind {
+                " without images"
+            } else {
+                ""
+            };
+            let of = match place {
+                0 => format!(" of {} questions", common.questions),
+                _ => String::new(),
+            };
+            format!("{}{blind} was asked {}{of}", asked.model, asked.questions)
+        })
+        .collect();
+    if short.is_empty() {
+        return Vec::new();
+    }
+    let text = format!(
+        "Models were asked different questions: {}. Compare by the {} shared: the second table has them, --common leaves out all others.",
+        listed(&short),
+        common.shared_questions
+    );
+    vec![Alert::new(AlertKind::Items, text)]
+}

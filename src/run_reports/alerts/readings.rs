@@ -1,0 +1,31 @@
+//! Replies that were read by another version of the lenient reading: [`of_readings`].
+
+use crate::report::alert::{Alert, AlertKind};
+use crate::run_reports::combine::Combined;
+use crate::run_reports::rereading::LenientChange;
+use crate::types::TrialRef;
+
+/// How the lenient reading of each run would change by the rules of this version.
+pub(super) fn of_readings(combined: &Combined) -> Vec<Alert> {
+    let alerts = combined.runs.iter().filter_map(|run| {
+        let change = LenientChange::of(&run.manifest);
+        if change.is_current() {
+            return None;
+        }
+        let places = combined.of(run).map(TrialRef::text);
+        let records = places.map(|place| combined.texts[place.log()].record(place));
+        let text = match change.through(records) {
+            Ok(change) if change.has_changed() => {
+                format!(
+                    "{}: {}. --rescore stores what it reads now.",
+                    run.name,
+                    change.words()
+                )
+            }
+            Ok(_) => return None,
+            Err(error) => format!("{}: its replies cannot be read again: {error}", run.name),
+        };
+        Some(Alert::new(AlertKind::Reading, text))
+    });
+    alerts.collect()
+}

@@ -1,0 +1,146 @@
+//! `--baseline`: new runs against an old one ([`Baseline`]).
+
+use std::collections::BTreeMap;
+
+use super::alerts::of_runs;
+use super::combine::{Combined, check_comparable, clusters};
+use super::cost::dollars;
+use super::join::join;
+use crate::error::{Error, Result};
+use crate::report::alert::Alert;
+use crate::report::choice_report::ChoiceReport;
+use crate::report::sentences::{against_baseline, no_verdict};
+use crate::report::tables::baseline;
+use crate::runs::stored::StoredRun;
+use crate::score::baseline::{BaselineRow, baseline_rows};
+use crate::score::cluster::ClusterUnit;
+use crate::score::grid::Grid;
+use crate::score::health::healths;
+use crate::score::significance::Significance;
+use crate::score::subject::{Subject, is_control, is_observer};
+use crate::types::{ChoiceDetail, TrialRef};
+
+/// The flag that makes a worse model a failure.
+pub(super) const FAIL_IF_WORSE: &str = "--fail-if-worse";
+
+/// New runs against an old one.
+pub(super) struct Baseline {
+    rows: Vec<BaselineRow>,
+    /// The name of the old run.
+    old: String,
+    /// What differs between the new runs and the old one.
+    alerts: Vec<Alert>,
+}
+
+impl Baseline {
+    /// The new runs, which `combined` joins, against the old one.
+    ///
+    /// # Errors
+    /// If they share no question, or one has other choices or another truth.
+    pub(super) fn new(
+        combined: &Combined,
+        new: Vec<StoredRun<ChoiceDetail>>,
+        old: StoredRun<ChoiceDetail>,
+    ) -> Result<Self> {
+        let name = old.name();
+        let mut runs = new;
+        runs.push(old.clone());
+        check_comparable(&runs)?;
+        // The names of models and conditions tell nothing apart here: a new model is held against the old one of its name.
+        let alerts = of_runs(&join(runs, |_| true)?);
+        let mark = |model: &str| format!("{model} (baseline {name})");
+        let (mut trials, mut old_trials) = (combined.trials.clone(), old.trials);
+        old_trials.rename(|model| Some(mark(model)));
+        let logs = trials.logs();
+        for trial in old_trials.iter() {
+            trials.copy(trial, logs);
+        }
+        let questions = combined.questions.iter().chain(&old.questions);
+        let clusters = clusters(&trials, questions);
+        let grid = Grid::of_models(&trials, &clusters, &combined.listing, |_| true);
+        let pairs = grid
+            .subjects
+            .iter()
+            .enumerate()
+            // A control says whether the observer can be trusted, not whether a model got worse.
+            .filter(|(_, subject)| !is_control(&subject.model))
+            .filter_map(|(index, subject)| {
+                let old = Subject {
+                    model: mark(combined.models.asked(&subject.model)),
+                    ..subject.in_any_light()
+                };
+                Some((index, grid.find(&old)?))
+            });
+        let pairs: Vec<(usize, usize)> = pairs.collect();
+        let mut by_subject = BTreeMap::<Subject, Vec<TrialRef<'_>>>::new();
+        for trial in trials.iter() {
+            by_subject
+                .entry(Subject::of(trial))
+                .or_default()
+                .push(trial);
+        }
+        let cost = |index: usize| {
+            let subject = &grid.subjects[index];
+            let unmarked = subject
+                .model
+                .strip_suffix(&mark(""))
+                .unwrap_or(&subject.model);
+            let trials = by_subject.get(subject).into_iter().flatten().copied();
+            dollars(combined.models.asked(unmarked), trials)
+                .ok()
+                .flatten()
+        };
+        Ok(Self {
+            rows: baseline_rows(&grid, &healths(&grid), &pairs, cost),
+            old: name,
+            alerts,
+        })
+    }
+
+    /// Puts the comparison first among the sentences of a report, and below its table of levels. The observer is left out where a
+    /// control shows that it proves nothing.
+    pub(super) fn add_to(&self, report: &mut ChoiceReport<'_>) {
+        let is_hidden = report.findings.observer.is_hidden();
+        let rows = self.rows.iter();
+        let rows = rows.filter(|row| !(is_hidden && is_observer(&row.subject.model)));
+        let rows: Vec<BaselineRow> = rows.cloned().collect();
+        let sentences = against_baseline(&rows, &self.old, report.findings.unit);
+        report.sentences.splice(..0, sentences);
+        let place = report.tables.len().min(2);
+        report.tables.insert(place, baseline(&rows, &self.old));
+        for alert in &self.alerts {
+            if !report.alerts.contains(alert) {
+                report.alerts.push(alert.clone());
+            }
+        }
+        report.alerts.sort_by_key(|alert| alert.kind);
+    }
+
+    /// Whether any model is shown to be worse. `random`, the observer and its controls are no models.
+    ///
+    /// # Errors
+    /// If no model can be compared, or no verdict is possible about any.
+    pub(super) fn is_worse(&self, unit: ClusterUnit) -> Result<bool> {
+        let rows = self.rows.iter();
+        let models: Vec<&BaselineRow> = rows.filter(|row| !row.subject.is_reference()).collect();
+        let old = &self.old;
+        let none = |problem: String| {
+            let problem = format!("{problem}; leave the flag out to see the report");
+            Err(Error::usage(FAIL_IF_WORSE, problem))
+        };
+        if models.is_empty() {
+            return none(format!(
+                "no model can be compared with {old}: none answered the same question about the same image in both (random and the \
+                 observer do not count)"
+            ));
+        }
+        if !models.iter().any(|row| row.significance.is_possible()) {
+            return none(format!(
+                "no verdict against {old} is possible: {}",
+                no_verdict(&models, unit)
+            ));
+        }
+        let mut verdicts = models.iter().map(|row| row.significance);
+        Ok(verdicts.any(|verdict| verdict == Significance::Worse))
+    }
+}

@@ -1,0 +1,109 @@
+//! The report of a run of questions with choices, from its records alone.
+
+use std::path::Path;
+
+use super::alerts::alerts;
+use super::combine::{Combined, combine};
+use super::report_folder::ReportFolder;
+use super::whole_report::with_summary;
+use super::{enhancers, own_answers};
+use crate::error::Result;
+use crate::files::write_with;
+use crate::report::choice_report::ChoiceReport;
+use crate::report::json::{RunList, summary};
+use crate::report::markdown::MarkdownReport;
+use crate::report::products::{PAGE, products};
+use crate::report::short::{findings, full, short};
+use crate::report::tables::{FLIPS, write_flips};
+use crate::runs::outcome::Outcome;
+use crate::runs::outcome::StdoutFormat;
+use crate::runs::stored::{ShownModels, StoredRun, name};
+use crate::score::findings::Findings;
+use crate::store::Store;
+use crate::types::manifest::RunManifest;
+use crate::types::{ChoiceDetail, Truths};
+
+/// Writes the report and the manifest of a run into its folder.
+pub(crate) fn write(
+    store: &Store,
+    mut run: StoredRun<ChoiceDetail>,
+    show: StdoutFormat,
+) -> Result<Outcome> {
+    let manifest = run.manifest.clone();
+    run.leave_out(ShownModels::Current);
+    Ok(Outcome::wrote(
+        store.folder(),
+        manifest.status,
+        in_its_folder(
+            &ReportFolder::Run(store),
+            &manifest,
+            &combine(vec![run])?,
+            show,
+        )?,
+    )
+    .in_format(show))
+}
+
+/// Writes the report of one run; returns the text for standard output.
+///
+/// # Errors
+/// If a file cannot be written.
+pub(super) fn in_its_folder(
+    target: &ReportFolder<'_, ChoiceDetail>,
+    manifest: &RunManifest,
+    combined: &Combined,
+    show: StdoutFormat,
+) -> Result<String> {
+    if combined.truths() == Truths::Unknown {
+        return own_answers::in_its_folder(target, manifest, combined, show);
+    }
+    let (folder, findings) = (target.path(), combined.findings());
+    let report = ChoiceReport::new(&findings, alerts(combined, &findings))
+        .with_enhancers(&enhancers::rows(&combined.runs));
+    let files = files(&report, combined, RunList::One(manifest, None))?;
+    write_rows(&findings, folder)?;
+    target.write(&files, manifest)?;
+    if show == StdoutFormat::Json {
+        return summary(&report, RunList::One(manifest, Some(folder)));
+    }
+    if show.is_document() {
+        return Ok(text(&report, &[(manifest, folder)], show));
+    }
+    let page = folder.join(PAGE);
+    Ok(text(&report, &[(manifest, folder)], show) + &format!("report: {}\n", page.display()))
+}
+
+/// The files of a report by name.
+pub(super) fn files(
+    report: &ChoiceReport<'_>,
+    combined: &Combined,
+    runs: RunList<'_>,
+) -> Result<Vec<(String, Vec<u8>)>> {
+    let products = products(report, &combined.shown())?;
+    Ok(with_summary(products, summary(report, runs)?))
+}
+
+/// Writes the file that has a row for each item into a folder.
+pub(super) fn write_rows(findings: &Findings<'_>, folder: &Path) -> Result<()> {
+    if findings.first_failures.is_empty() {
+        return Ok(());
+    }
+    write_with(&folder.join(FLIPS), |out| write_flips(findings, out))
+}
+
+/// The text of a report in a format other than JSON.
+pub(super) fn text(
+    report: &ChoiceReport<'_>,
+    runs: &[(&RunManifest, &Path)],
+    show: StdoutFormat,
+) -> String {
+    match show {
+        StdoutFormat::Findings => findings(report),
+        StdoutFormat::Full => full(report, runs),
+        StdoutFormat::Markdown => {
+            let names = runs.iter().map(|(_, folder)| name(folder)).collect();
+            MarkdownReport::of_choices(report, names).text()
+        }
+        StdoutFormat::Short | StdoutFormat::Json => short(report, runs),
+    }
+}

@@ -1,0 +1,261 @@
+//! Joining several runs of questions with choices: [`combine`].
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::path::Path;
+
+use serde_json::json;
+
+use super::join::{Joined, JoinedRun, join};
+use super::listing::listing;
+use crate::error::{Error, Result};
+use crate::report::page::{self, PageInputs};
+use crate::runs::stored::StoredRun;
+use crate::score::chance::OfferedChoices;
+use crate::score::cluster::{ClusterUnit, Clusters, FrameTies};
+use crate::score::findings::Findings;
+use crate::score::grid::Grid;
+use crate::score::photographed_set::PhotographedSet;
+use crate::score::subject::without_run;
+use crate::types::manifest::RunManifest;
+use crate::types::{
+    ChoiceDetail, QuestionId, RunQuestion, SetLight, TextPlace, Trials, Truths, shell_word,
+};
+
+/// Several runs of questions with choices, joined.
+pub(super) type Combined = Joined<ChoiceDetail>;
+
+impl Combined {
+    /// The results that follow from the records.
+    pub(super) fn findings(&self) -> Findings<'_> {
+        let offers = offers(&self.trials, &self.questions);
+        let findings = Findings::listed(
+            &self.trials,
+            &ties(&self.questions),
+            offers,
+            &self.fidelity,
+            &self.listing,
+        );
+        let findings = findings.of_set(self.set()).of_groups(&self.questions);
+        // Replies differ from time to time: that is no other model.
+        let apart = self.models.apart.iter();
+        let by_replies = apart.filter(|apart| apart.differs_by_replies_alone());
+        by_replies.fold(findings, |findings, apart| {
+            findings.with_lights_between(&apart.names)
+        })
+    }
+
+    /// The light of the set of these runs: dark if all say so, with the brightness that the first of them measured.
+    pub(super) fn set(&self) -> PhotographedSet {
+        let is_dark =
+            |run: &JoinedRun| run.manifest.settings.get("--light") == Some(&json!(SetLight::Dark));
+        if self.runs.is_empty() || !self.runs.iter().all(is_dark) {
+            return PhotographedSet::default();
+        }
+        let brightness = self.runs.iter().find_map(|run| {
+            let measured = run.manifest.settings.get("brightness")?;
+            Some((
+                measured.get("mean")?.as_f64()?,
+                measured.get("frames")?.as_u64()? as usize,
+            ))
+        });
+        PhotographedSet {
+            light: SetLight::Dark,
+            brightness,
+        }
+    }
+
+    /// Whether the true answers are known; [`combine`] has checked that they are known of all questions or of none.
+    pub(super) fn truths(&self) -> Truths {
+        match self.trials.first() {
+            Some(trial) if trial.truth().is_none() => Truths::Unknown,
+            _ => Truths::Known,
+        }
+    }
+
+    /// The unit that is treated as independent.
+    pub(super) fn unit(&self) -> ClusterUnit {
+        clusters(&self.trials, &self.questions).unit()
+    }
+
+    /// The trials by subject and item.
+    pub(super) fn grid(&self) -> Grid<'_> {
+        Grid::new(&self.trials, &clusters(&self.trials, &self.questions))
+    }
+
+    /// Further inputs of the HTML page.
+    pub(super) fn shown(&self) -> PageInputs<'_> {
+        let runs = self.runs.iter().map(|run| page::PageRun {
+            folder: typed(&run.folder),
+            name: run.name.clone(),
+            manifest: &run.manifest,
+            usage: page::RunUsage::of(self.of(run), |model| {
+                run.manifest.is_built_in(without_run(model))
+            }),
+            cost: run.cost.clone(),
+        });
+        PageInputs {
+            runs: runs.collect(),
+            questions: Box::new(|wanted| {
+                let mut found = HashMap::new();
+                for texts in &self.texts {
+                    texts.questions(wanted, &mut found)?;
+                }
+                Ok(found)
+            }),
+            thumbnails: &self.thumbnails,
+            texts: Box::new(|place: TextPlace| self.texts[place.log()].text(place)),
+        }
+    }
+
+    /// The manifest and the folder of each run.
+    pub(super) fn manifests(&self) -> Vec<(&RunManifest, &Path)> {
+        let runs = self.runs.iter();
+        runs.map(|run| (&run.manifest, &*run.folder)).collect()
+    }
+}
+
+/// A folder as a command on it names it. An absolute path says where somebody's files lie: of it the page has the name alone.
+pub(super) fn typed(folder: &Path) -> String {
+    let name = folder.file_name().filter(|_| folder.is_absolute());
+    let shown = name.map_or_else(|| folder.to_owned(), |name| Path::new("DIR").join(name));
+    shell_word(&shown.display().to_string()).into_owned()
+}
+
+/// What these questions say of their frames.
+pub(super) fn ties<'a>(questions: impl IntoIterator<Item = &'a RunQuestion>) -> FrameTies {
+    let mut ties = FrameTies::default();
+    for question in questions {
+        let frame = &question.frame;
+        ties.scenes.insert(frame.clone(), question.scene.clone());
+        if !question.images.is_empty() {
+            ties.images.insert(frame.clone(), question.images.clone());
+        }
+    }
+    ties
+}
+
+/// The clusters of trials, with what these questions say of their frames.
+pub(super) fn clusters<'a>(
+    trials: &Trials<ChoiceDetail>,
+    questions: impl IntoIterator<Item = &'a RunQuestion>,
+) -> Clusters {
+    Clusters::new(trials.questions(), &ties(questions))
+}
+
+/// Joins runs that can be compared.
+///
+/// # Errors
+/// If a run shares no question with the others, a question has other choices or another truth in two runs, or the true answers are known
+/// of some questions and not of others.
+pub(super) fn combine(runs: Vec<StoredRun<ChoiceDetail>>) -> Result<Combined> {
+    check_one_measure(&runs)?;
+    if runs.len() > 1 {
+        check_comparable(&runs)?;
+    }
+    let mut combined = join(runs, |_| true)?;
+    combined.listing = listing(&combined);
+    Ok(combined)
+}
+
+/// The choices of all questions, for the chance line. A question is repeated for each order of its choices, since the answer to each
+/// order counts separately. Questions that are not asked yet are included once. Without stored questions, those in the trials count.
+fn offers(trials: &Trials<ChoiceDetail>, questions: &[RunQuestion]) -> Vec<OfferedChoices> {
+    let mut orders = BTreeMap::<&QuestionId, BTreeSet<&[String]>>::new();
+    let mut all = BTreeMap::<&QuestionId, OfferedChoices>::new();
+    for item in trials.items().into_iter().flatten() {
+        orders
+            .entry(&item.question)
+            .or_default()
+            .insert(&item.choices);
+        all.entry(&item.question).or_insert_with(|| OfferedChoices {
+            family: item.family.as_ref().clone(),
+            choices: item.choices.len(),
+        });
+    }
+    for question in questions {
+        all.entry(&question.id).or_insert_with(|| OfferedChoices {
+            family: question.family.clone(),
+            choices: question.choices.len(),
+        });
+    }
+    let offers = all.into_iter().flat_map(|(question, offer)| {
+        let times = orders.get(question).map_or(1, BTreeSet::len);
+        std::iter::repeat_n(offer, times)
+    });
+    offers.collect()
+}
+
+/// Checks that the true answers are known of all questions, or of none: an accuracy and an agreement are not the same measure.
+fn check_one_measure(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
+    let mut first: Option<(&Path, bool)> = None;
+    for run in runs {
+        for item in run.trials.items().into_iter().flatten() {
+            let is_known = item.truth.is_some();
+            let (folder, known) = *first.get_or_insert((&run.folder, is_known));
+            if known == is_known {
+                continue;
+            }
+            let problem = if folder == run.folder {
+                format!(
+                    "nobody knows the true choice of the question {} or of others, and that of the rest is known: these are not the records of one \
+                     run",
+                    item.question
+                )
+            } else {
+                format!(
+                    "the true answers are known of the questions of one run and not of the other, {}: accuracy and agreement are different \
+                     measures; report each run alone",
+                    folder.display()
+                )
+            };
+            let path = run.folder.clone();
+            return Err(Error::Run { path, problem });
+        }
+    }
+    Ok(())
+}
+
+/// Checks that runs can be compared.
+pub(super) fn check_comparable(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
+    check_one_measure(runs)?;
+    let mut questions = BTreeMap::<&QuestionId, (usize, BTreeSet<&String>, Option<&String>)>::new();
+    let wrong = |run: &StoredRun<ChoiceDetail>, problem: String| {
+        let path = run.folder.clone();
+        Err(Error::Run { path, problem })
+    };
+    for (index, run) in runs.iter().enumerate() {
+        let (mut shared, others) = (false, !questions.is_empty());
+        for item in run.trials.items().into_iter().flatten() {
+            let choices: BTreeSet<&String> = item.choices.iter().collect();
+            let truth = item.truth.map(|truth| item.choices.get(truth));
+            if truth == Some(None) {
+                let problem = format!(
+                    "a record of the question {} has no true choice",
+                    item.question
+                );
+                return wrong(run, problem);
+            }
+            let truth = truth.flatten();
+            let (first, known, known_truth) = questions
+                .entry(&item.question)
+                .or_insert_with(|| (index, choices.clone(), truth));
+            shared |= *first != index;
+            if (&*known, *known_truth) != (&choices, truth) {
+                let problem = format!(
+                    "the question {} has other choices or another true choice in {}; report each run alone",
+                    item.question,
+                    runs[*first].folder.display()
+                );
+                return wrong(run, problem);
+            }
+        }
+        if others && !shared {
+            let problem = format!(
+                "the run shares no question with {}; report each run alone",
+                runs[0].folder.display()
+            );
+            return wrong(run, problem);
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,57 @@
+//! The models of a report as tables list them: [`listing`].
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde_json::Value;
+
+use super::join::{Joined, JoinedRun};
+use crate::runs::renamed::ADAPTED_FOR;
+use crate::score::record::Detail;
+use crate::types::{ModelColumn, ModelListing};
+
+/// The order and the groups of the files of models of all runs, one after the other by the runs' names; and what is known of each
+/// model.
+pub(super) fn listing<D: Detail>(joined: &Joined<D>) -> ModelListing {
+    let mut runs: Vec<(usize, &JoinedRun)> = joined.runs.iter().enumerate().collect();
+    runs.sort_by_key(|(_, run)| (&run.name, &run.folder));
+    let listed = runs.iter().flat_map(|(_, run)| run.manifest.models.clone());
+    let mut listing = ModelListing::new(listed);
+    let mut facts = BTreeMap::<(ModelColumn, String), BTreeSet<String>>::new();
+    for (index, run) in runs {
+        // The name under which a model stands in the report.
+        let shown = |model: &str| {
+            let group = joined.models.group(model, index);
+            group.map_or_else(|| model.to_owned(), |(_, name)| name.clone())
+        };
+        for (field, changes) in &run.manifest.settings {
+            if let Some(model) = field.strip_prefix(ADAPTED_FOR) {
+                let changes = changes.as_array().into_iter().flatten();
+                let changes = changes.filter_map(Value::as_str).map(str::to_owned);
+                listing.adapted(&shown(model), changes);
+            }
+        }
+        for (model, content) in run.manifest.columns.get("model").into_iter().flatten() {
+            let known = [
+                (ModelColumn::Id, content.get("--model")),
+                (ModelColumn::Deployment, content.get("deployment")),
+            ];
+            for (column, value) in known {
+                if let Some(value) = value.and_then(Value::as_str) {
+                    let values = facts.entry((column, shown(model))).or_default();
+                    values.insert(value.to_owned());
+                }
+            }
+        }
+        for (model, names) in &run.served {
+            let values = facts
+                .entry((ModelColumn::Served, shown(model)))
+                .or_default();
+            values.extend(names.iter().cloned());
+        }
+    }
+    for ((column, model), values) in facts {
+        let values: Vec<String> = values.into_iter().collect();
+        listing.note(column, model, values.join(", "));
+    }
+    listing
+}

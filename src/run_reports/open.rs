@@ -1,0 +1,390 @@
+//! The report of a run of open questions: scored from its records, and written into its folder.
+
+use std::collections::{BTreeMap, HashMap};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use super::alerts::{of_joining, of_runs};
+use super::combine::typed;
+use super::enhancers;
+use super::join::join;
+use super::judges;
+use super::listing::listing;
+use super::report_folder::ReportFolder;
+use super::whole_report::{WholeReport, with_summary};
+use crate::error::{Error, Result};
+use crate::report::alert::{Alert, AlertKind};
+use crate::report::markdown::MarkdownReport;
+use crate::report::openeqa::{OpenReport, ReportedAnswer, products, render, summary_json, tables};
+use crate::report::outcome_words;
+use crate::report::products::PAGE;
+use crate::report::table::Table;
+use crate::report::tables::EnhancerRow;
+use crate::runs::mark_index::MarkIndex;
+use crate::runs::mark_index::{JUDGE, PROTOCOL};
+use crate::runs::outcome::Outcome;
+use crate::runs::outcome::StdoutFormat;
+use crate::runs::predictions::{AnswerState, Prediction, predictions};
+use crate::runs::stored::{RunLayout, ShownModels, StoredRun, sort};
+use crate::score::llm_match::{Protocol, mark};
+use crate::score::open::{
+    AnswerOutcome, OpenSummary, QuestionGroups, ScoredAnswer, open_summary_listed,
+};
+use crate::score::subject::Subject;
+use crate::store::Store;
+use crate::types::flag::read_word;
+use crate::types::manifest::{RunManifest, Status};
+use crate::types::{
+    ModelListing, OpenDetail, QuestionId, Record, RunQuestion, Step, Thumbnail, TrialRef,
+};
+
+/// The answers of a run, with their scores.
+pub(crate) struct Scores {
+    pub(crate) run: OpenRun,
+    judge: Option<String>,
+    protocol: Protocol,
+    summary: OpenSummary,
+    answers: Vec<ReportedAnswer>,
+    alerts: Vec<Alert>,
+    enhancers: Vec<EnhancerRow>,
+}
+
+impl Scores {
+    /// The scores of a run, from the marks of the judge in its manifest.
+    pub(super) fn new(joined: JoinedRuns) -> Result<Self> {
+        let JoinedRuns {
+            run,
+            alerts,
+            enhancers,
+            listing,
+        } = joined;
+        let setting = |name| run.manifest.settings.get(name).and_then(Value::as_str);
+        let judge = setting(JUDGE).map(str::to_owned);
+        let protocol = setting(PROTOCOL).map_or(Ok(Protocol::Upstream), read_word)?;
+        let ids: Vec<&QuestionId> = run.questions.iter().map(|question| &question.id).collect();
+        let predictions = predictions(&run.records, &ids, protocol);
+        let marks = marks(&run, judge.as_deref());
+        let failures = failures(&run.records);
+        let (mut scored, mut answers) = (Vec::new(), Vec::new());
+        for prediction in predictions {
+            let question = ids[prediction.question];
+            let record = match &prediction.state {
+                AnswerState::Text { answer, .. } => marks.get(question, answer).copied(),
+                AnswerState::Missing | AnswerState::Null => None,
+            };
+            let outcome = outcome(&prediction, record, protocol);
+            let failure = failures.get(&(question, prediction.subject.clone()));
+            let failure = failure.filter(|_| outcome == AnswerOutcome::Missing);
+            scored.push(ScoredAnswer {
+                subject: prediction.subject.clone(),
+                question: prediction.question,
+                outcome,
+                cut: matches!(prediction.state, AnswerState::Text { cut: true, .. }),
+            });
+            answers.push(ReportedAnswer {
+                subject: prediction.subject,
+                question: prediction.question,
+                answer: prediction.full_answer,
+                outcome,
+                judgement: record.and_then(|record| record.reply.clone()),
+                failure: failure.cloned(),
+            });
+        }
+        let topics: Vec<QuestionGroups> = run.questions.iter().map(topic).collect();
+        Ok(Self {
+            summary: open_summary_listed(&scored, &topics, &listing),
+            run,
+            judge,
+            protocol,
+            answers,
+            alerts,
+            enhancers,
+        })
+    }
+
+    /// Whether the mark of an answer cannot be read.
+    fn has_unmarked(&self) -> bool {
+        let mut answers = self.answers.iter();
+        answers.any(|answer| answer.outcome == AnswerOutcome::Unmarked)
+    }
+
+    /// The scores.
+    pub(super) fn summary(&self) -> &OpenSummary {
+        &self.summary
+    }
+
+    fn report(&self) -> OpenReport<'_> {
+        OpenReport {
+            summary: &self.summary,
+            manifest: &self.run.manifest,
+            alerts: &self.alerts,
+            enhancers: &self.enhancers,
+            judge: self.judge.as_deref(),
+            protocol: self.protocol,
+            runs: self.run.runs(),
+            folder: typed(&self.run.folder),
+            questions: &self.run.questions,
+            answers: &self.answers,
+            thumbnails: &self.run.thumbnails,
+        }
+    }
+
+    /// The files of the report by name.
+    pub(crate) fn products(&self) -> Result<Vec<(String, Vec<u8>)>> {
+        let report = self.report();
+        products(&report, &tables(&report))
+    }
+
+    /// The whole report of the run.
+    pub(super) fn whole(&self) -> Result<WholeReport> {
+        let report = self.report();
+        let tables = tables(&report);
+        Ok(WholeReport {
+            files: files(&report, &tables)?,
+            markdown: self.show(&report, &tables, StdoutFormat::Markdown)?,
+        })
+    }
+
+    /// The text for standard output.
+    pub(crate) fn shown(&self, show: StdoutFormat) -> Result<String> {
+        let report = self.report();
+        self.show(&report, &tables(&report), show)
+    }
+
+    fn show(
+        &self,
+        report: &OpenReport<'_>,
+        tables: &[Table],
+        show: StdoutFormat,
+    ) -> Result<String> {
+        let folder = &self.run.folder;
+        match show {
+            StdoutFormat::Json => summary_json(report, tables, Some(folder)),
+            StdoutFormat::Markdown => Ok(MarkdownReport::of_open(report, tables).text()),
+            _ => Ok(render(report, tables, &self.run.folders())),
+        }
+    }
+
+    /// Writes the report of the run; returns the text for standard output.
+    pub(super) fn write(
+        &self,
+        target: &ReportFolder<'_, OpenDetail>,
+        show: StdoutFormat,
+    ) -> Result<String> {
+        let report = self.report();
+        let tables = tables(&report);
+        target.write(&files(&report, &tables)?, &self.run.manifest)?;
+        let mut text = self.show(&report, &tables, show)?;
+        if !show.is_document() {
+            let page = target.path().join(PAGE);
+            let _ = writeln!(text, "report: {}", page.display());
+        }
+        Ok(text)
+    }
+}
+
+/// The files of the report of one run, by name.
+fn files(report: &OpenReport<'_>, tables: &[Table]) -> Result<Vec<(String, Vec<u8>)>> {
+    let products = products(report, tables)?;
+    Ok(with_summary(products, summary_json(report, tables, None)?))
+}
+
+/// A run of open questions, or several joined to one, with its whole records.
+pub(crate) struct OpenRun {
+    /// The name of the run, or of the first of several.
+    name: String,
+    pub(crate) folder: PathBuf,
+    pub(crate) layout: RunLayout,
+    pub(crate) manifest: RunManifest,
+    /// In the order of the questions, conditions and models.
+    pub(crate) records: Vec<Record<OpenDetail>>,
+    pub(crate) questions: Vec<RunQuestion>,
+    pub(crate) thumbnails: Vec<Thumbnail>,
+    /// The runs after the first, if there are several.
+    others: Vec<OtherRun>,
+}
+
+/// A run that was joined to the first one.
+struct OtherRun {
+    name: String,
+    folder: PathBuf,
+    manifest: RunManifest,
+}
+
+impl OpenRun {
+    /// The names and manifests of all runs.
+    fn runs(&self) -> Vec<(&str, &RunManifest)> {
+        let first = std::iter::once((&*self.name, &self.manifest));
+        let others = self.others.iter().map(|run| (&*run.name, &run.manifest));
+        first.chain(others).collect()
+    }
+
+    /// The folders of all runs.
+    fn folders(&self) -> Vec<&Path> {
+        let others = self.others.iter().map(|run| &*run.folder);
+        std::iter::once(&*self.folder).chain(others).collect()
+    }
+}
+
+/// Several runs, joined to one.
+pub(super) struct JoinedRuns {
+    pub(super) run: OpenRun,
+    /// What differs between the runs, and what is wrong with their numbers.
+    pub(super) alerts: Vec<Alert>,
+    /// How their enhancers were used.
+    enhancers: Vec<EnhancerRow>,
+    /// The order, groups and marks of the models.
+    pub(super) listing: ModelListing,
+}
+
+/// Several runs, joined to one by [`join`], with what differs between them.
+///
+/// # Errors
+/// If the runs have different judges or protocols, or different questions under the same name.
+pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
+    judges::check(&runs)?;
+    let mut questions = HashMap::<QuestionId, RunQuestion>::new();
+    for run in &runs {
+        for question in &run.questions {
+            let known = questions
+                .entry(question.id.clone())
+                .or_insert_with(|| question.clone());
+            if !known.is_same(&RunQuestion {
+                image: None,
+                ..question.clone()
+            }) {
+                let problem = format!(
+                    "the question {} is different in the other runs; report each run alone",
+                    question.id
+                );
+                let path = run.folder.clone();
+                return Err(Error::Run { path, problem });
+            }
+        }
+    }
+    let joined = join(runs, is_answer)?;
+    let mut alerts = of_runs(&joined);
+    alerts.extend(of_joining(&joined));
+    if joined.runs.len() == 1 {
+        // The text and the page of one run say more about what is missing.
+        alerts.retain(|alert| alert.kind != AlertKind::NotComplete);
+    }
+    let enhancers = enhancers::rows(&joined.runs);
+    let listing = listing(&joined);
+    let mut runs = joined.runs.into_iter();
+    let first = runs.next();
+    let first = first.ok_or_else(|| Error::usage("RUN", "no run is named"))?;
+    let mut trials = joined.trials;
+    let ids = joined.questions.iter().map(|question| &question.id);
+    sort(&mut trials, ids, &first.manifest.models);
+    let mut records: Vec<Record<OpenDetail>> = trials.iter().map(TrialRef::record).collect();
+    // A model that stands under two names may be the judge, who has one.
+    let is_mark = |record: &&mut Record<OpenDetail>| record.detail.step == Step::Mark;
+    for record in records.iter_mut().filter(is_mark) {
+        record.model = joined.models.asked(&record.model).to_owned();
+    }
+    let run = OpenRun {
+        records,
+        others: runs
+            .map(|run| OtherRun {
+                name: run.name,
+                folder: run.folder,
+                manifest: run.manifest,
+            })
+            .collect(),
+        name: first.name,
+        folder: first.folder,
+        layout: first.layout,
+        manifest: first.manifest,
+        questions: joined.questions,
+        thumbnails: joined.thumbnails,
+    };
+    Ok(JoinedRuns {
+        run,
+        alerts,
+        enhancers,
+        listing,
+    })
+}
+
+/// Scores a run, and writes its report and manifest into its folder. The run is incomplete if a mark cannot be read.
+pub(crate) fn write(
+    store: &Store<OpenDetail>,
+    mut run: StoredRun<OpenDetail>,
+    show: StdoutFormat,
+) -> Result<Outcome> {
+    run.leave_out(ShownModels::Current);
+    let mut scores = Scores::new(combine(vec![run])?)?;
+    if scores.run.manifest.status == Status::Complete && scores.has_unmarked() {
+        scores.run.manifest.status = Status::Incomplete;
+    }
+    Ok(Outcome::wrote(
+        store.folder(),
+        scores.run.manifest.status,
+        scores.write(&ReportFolder::Run(store), show)?,
+    )
+    .in_format(show))
+}
+
+/// Whether an answer was asked for, and no mark.
+fn is_answer(trial: TrialRef<'_, OpenDetail>) -> bool {
+    trial.is_answer()
+}
+
+/// The marks of the judge of a run.
+fn marks<'a>(run: &'a OpenRun, judge: Option<&str>) -> MarkIndex<&'a Record<OpenDetail>> {
+    let mut marks = MarkIndex::of(&run.questions);
+    for record in &run.records {
+        let is_of_judge = Some(&*record.model) == judge && record.failure.is_none();
+        if let (Step::Mark, Some(answer)) = (record.detail.step, &record.detail.judged)
+            && is_of_judge
+        {
+            marks.add(&record.question, answer, record);
+        }
+    }
+    marks
+}
+
+/// Why trials have no answer, in words with what the error says, by question and subject.
+fn failures(records: &[Record<OpenDetail>]) -> BTreeMap<(&QuestionId, Subject), String> {
+    let answers = records
+        .iter()
+        .filter(|record| record.detail.step == Step::Answer);
+    let failed = answers.filter_map(|record| {
+        let failure = record.failure.as_ref()?;
+        let why = outcome_words::failed(failure.kind, failure.status);
+        let subject = Subject::new(&record.model, record.condition.as_ref());
+        let why = format!("{why}: {}", failure.message);
+        Some(((&record.question, subject), why))
+    });
+    failed.collect()
+}
+
+/// The outcome of an answer, from the record of its mark.
+fn outcome(
+    prediction: &Prediction,
+    mark_record: Option<&Record<OpenDetail>>,
+    protocol: Protocol,
+) -> AnswerOutcome {
+    match (&prediction.state, mark_record) {
+        (AnswerState::Missing, _) => AnswerOutcome::Missing,
+        (AnswerState::Null, _) => AnswerOutcome::Null,
+        (AnswerState::Text { .. }, None) => AnswerOutcome::Unjudged,
+        (AnswerState::Text { .. }, Some(record)) => {
+            // Marks of earlier versions are read again, so that all tables use the same reading.
+            let reply = record.reply.as_deref().unwrap_or_default();
+            mark(reply, protocol).map_or(AnswerOutcome::Unmarked, AnswerOutcome::Marked)
+        }
+    }
+}
+
+fn topic(question: &RunQuestion) -> QuestionGroups {
+    let episode = question.frame.0.clone();
+    QuestionGroups {
+        split: episode.split('/').next().unwrap_or_default().to_owned(),
+        category: question.family.name().to_owned(),
+        episode,
+    }
+}

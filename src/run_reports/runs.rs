@@ -1,0 +1,400 @@
+//! The command `report`, for one run or several: [`report`].
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::alerts::{alerts, named_again};
+use super::baseline::{Baseline, FAIL_IF_WORSE};
+use super::choice::{files as report_files, in_its_folder, text, write_rows};
+use super::combine::{Combined, combine};
+use super::common::restrict;
+use super::enhancers;
+use super::report_folder::write_in_place;
+use super::rereading::LenientChange;
+use super::whole_report::no_records;
+use super::{open, own_answers};
+use crate::error::{Error, Result};
+use crate::files;
+use crate::report::alert::Alert;
+use crate::report::choice_report::ChoiceReport;
+use crate::report::json::{RunList, summary};
+use crate::report::products::PAGE;
+use crate::runs::Outcome;
+use crate::runs::ShowArgs;
+use crate::runs::StdoutFormat;
+use crate::runs::record_table;
+use crate::runs::run_parts::{any_run, choice_run};
+use crate::runs::stored::{AnyRun, RunLayout, ShownModels, StoredRun, name};
+use crate::score::record::{self, Detail as _};
+use crate::store::now;
+use crate::store::{AddressChange, Store};
+use crate::types::manifest::Counts;
+use crate::types::manifest::Status;
+use crate::types::{ChoiceDetail, Decides, ModelColumn, OpenDetail, TrialRef, Truths};
+
+/// The flags of `report`.
+#[derive(Debug, Args)]
+pub(crate) struct ReportArgs {
+    /// The folders of the runs, or of all parts of a run; several runs are compared
+    #[arg(value_name = "RUN", required = true, add = Decides::Nothing)]
+    pub runs: Vec<PathBuf>,
+    /// Read all stored replies again by the rules of this version; asks nothing, and stores the readings that changed
+    #[arg(long, add = Decides::Nothing)]
+    pub rescore: bool,
+    /// Where the report goes: report.html, tables as CSV and LaTeX, figures as SVG; default: the folder of the run if it
+    /// is one, else nowhere
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
+    pub out: Option<PathBuf>,
+    /// Report only on the items that all models with images answered
+    #[arg(long, add = Decides::Nothing)]
+    pub common: bool,
+    /// Show also the models that the file of models no longer has, and those that it had with other settings
+    #[arg(long, add = Decides::Nothing)]
+    pub all: bool,
+    /// Further columns about models in tables, separated by commas; default: none
+    #[arg(long, value_name = "COLUMNS", value_enum, value_delimiter = ',', add = Decides::Nothing)]
+    pub columns: Vec<ModelColumn>,
+    /// An old run to compare with.
+    #[command(flatten)]
+    pub baseline: BaselineArgs,
+    /// How the report is printed.
+    #[command(flatten)]
+    pub show: ReportShowArgs,
+}
+
+/// The flags that say how a report of stored runs is printed.
+#[derive(Debug, Args)]
+pub(crate) struct ReportShowArgs {
+    /// The formats that every report has.
+    #[command(flatten)]
+    pub show: ShowArgs,
+    /// Print the findings and the table by level as Markdown, for an issue or a README
+    #[arg(long, conflicts_with_all = ["full", "findings", "json"], help_heading = "Output", add = Decides::Nothing)]
+    pub markdown: bool,
+}
+
+/// The flags of a comparison with an old run.
+#[derive(Debug, Args)]
+pub(crate) struct BaselineArgs {
+    /// Compare each model and condition with the same ones of an old run: new less old, on the items and images that both have;
+    /// default: no comparison
+    #[arg(long, value_name = "OLD", add = Decides::Nothing)]
+    pub baseline: Option<PathBuf>,
+    /// Exit with 1 if any model is shown to be worse than the baseline in any condition, and with 2 if no verdict about any is possible;
+    /// random and the observer are no models
+    #[arg(long, add = Decides::Nothing)]
+    pub fail_if_worse: bool,
+}
+
+impl ReportArgs {
+    fn shown(&self) -> ShownModels {
+        if self.all {
+            ShownModels::All
+        } else {
+            ShownModels::Current
+        }
+    }
+
+    /// Whether the report goes into the folder of its one run.
+    pub(crate) fn writes_into_run(&self) -> bool {
+        let is_of_one = self.runs.len() == 1 && self.baseline.baseline.is_none();
+        is_of_one && self.out.is_none() && !self.common
+    }
+
+    /// How the report is printed.
+    fn format(&self) -> StdoutFormat {
+        if self.show.markdown {
+            StdoutFormat::Markdown
+        } else {
+            self.show.show.format()
+        }
+    }
+}
+
+/// The report of a run, or a comparison of several of the same kind. With `--rescore`, changed readings are stored in their run.
+///
+/// # Errors
+/// If a folder holds no run, a record is broken, or the runs asked different questions.
+pub(crate) fn report(args: &ReportArgs) -> Result<Outcome> {
+    if args.baseline.fail_if_worse && args.baseline.baseline.is_none() {
+        let problem = "compares with an old run: name it with --baseline OLD";
+        return Err(Error::usage(FAIL_IF_WORSE, problem));
+    }
+    let (folders, again) = distinct(&args.runs);
+    let (mut choice, mut open) = (Vec::new(), Vec::new());
+    for folder in folders {
+        match any_run(folder)? {
+            AnyRun::Choice(run) => choice.push(run),
+            AnyRun::Open(run) => open.push(run),
+        }
+    }
+    let outcome = match (choice.is_empty(), open.is_empty()) {
+        (_, true) => of_choices(args, choice, &again)?,
+        (true, false) => of_open(args, open, &again)?,
+        (false, false) => {
+            return Err(Error::usage(
+                "RUN",
+                "runs of questions with choices and of open questions cannot be compared; report each kind alone",
+            ));
+        }
+    };
+    Ok(outcome.in_format(args.format()))
+}
+
+/// The folders without those that are named before, and the alerts about these.
+pub(super) fn distinct(folders: &[PathBuf]) -> (Vec<&PathBuf>, Vec<Alert>) {
+    let mut times = Vec::<(PathBuf, &PathBuf, usize)>::new();
+    for folder in folders {
+        // A folder that cannot be read is named when it is opened.
+        let place = folder.canonicalize().unwrap_or_else(|_| folder.clone());
+        match times.iter_mut().find(|(known, ..)| *known == place) {
+            Some((.., times)) => *times += 1,
+            None => times.push((place, folder, 1)),
+        }
+    }
+    let again = times.iter().filter(|(.., times)| *times > 1);
+    let again: Vec<(String, usize)> = again
+        .map(|(_, folder, times)| (name(folder), *times))
+        .collect();
+    let folders = times.into_iter().map(|(_, folder, _)| folder);
+    (folders.collect(), named_again(&again))
+}
+
+fn of_choices(
+    args: &ReportArgs,
+    mut runs: Vec<StoredRun<ChoiceDetail>>,
+    again: &[Alert],
+) -> Result<Outcome> {
+    let mut reread_lines = String::new();
+    for run in &mut runs {
+        if run.trials.is_empty() {
+            return Err(no_records(run.folder.clone()));
+        }
+        if args.rescore {
+            reread_lines += &reread(run)?;
+            let failed = run.trials.iter().map(TrialRef::failed);
+            run.manifest.counts = Counts::new(run.manifest.counts.trials, failed);
+        }
+        run.leave_out(args.shown());
+    }
+    if args.format().is_document() {
+        reread_lines.clear();
+    }
+    let old = args.baseline.baseline.as_ref().map(|folder| {
+        let mut old = choice_run(folder, "--baseline compares runs of questions with choices")?;
+        old.leave_out(args.shown());
+        Ok::<_, Error>((runs.clone(), old))
+    });
+    let old = old.transpose()?;
+    let mut combined = combine(runs)?;
+    if combined.truths() == Truths::Unknown {
+        refuse_without_truths(args)?;
+    }
+    if args.common {
+        combined = restrict(combined)?;
+    }
+    combined.listing.show(&args.columns);
+    let baseline = old.map(|(new, old)| Baseline::new(&combined, new, old));
+    let baseline = baseline.transpose()?;
+    let judged = baseline.as_ref().filter(|_| args.baseline.fail_if_worse);
+    let is_worse = judged.map(|baseline| baseline.is_worse(combined.unit()));
+    let is_worse = is_worse.transpose()?.unwrap_or(false);
+    let in_folder = args.out.is_none() && !args.common && baseline.is_none() && again.is_empty();
+    let place = match &*combined.runs {
+        [run] if in_folder => Some((run.folder.clone(), run.layout)),
+        _ => None,
+    };
+    let written = place.as_ref().map(|(folder, layout)| {
+        let manifest = &combined.runs[0].manifest;
+        write_in_place((folder, *layout), manifest, |target| {
+            in_its_folder(target, manifest, &combined, args.format())
+        })
+    });
+    let text = written.transpose()?.flatten();
+    let place = place.filter(|_| text.is_some());
+    let reported = match (&place, text) {
+        (Some((folder, _)), Some(text)) => Outcome::wrote(folder, Status::Complete, text),
+        _ => compare(&combined, baseline.as_ref(), args, again)?,
+    };
+    // The table takes as much memory as the trials.
+    drop(combined);
+    // Each part has a table of its own records.
+    if let Some((folder, RunLayout::Whole)) = place {
+        record_table::update(&folder, args.show.show.table())?;
+    }
+    // A command whose outcome is not what was asked for ends with 1.
+    let status = if is_worse {
+        Status::Incomplete
+    } else {
+        Status::Complete
+    };
+    Ok(Outcome {
+        status,
+        output: reread_lines + &reported.output,
+        written: reported.written,
+    })
+}
+
+/// Refuses what compares accuracies, for runs whose questions have no true answers.
+fn refuse_without_truths(args: &ReportArgs) -> Result<()> {
+    let flags = [
+        (
+            "--common",
+            args.common,
+            "each model is compared with its own answers, on the questions that it answered at L0",
+        ),
+        (
+            "--baseline",
+            args.baseline.baseline.is_some(),
+            "it compares accuracies, and nobody knows the true answers (--ask)",
+        ),
+    ];
+    match flags.iter().find(|(_, is_set, _)| *is_set) {
+        Some((flag, _, why)) => Err(Error::usage(*flag, format_args!("{why}: leave it out"))),
+        None => Ok(()),
+    }
+}
+
+/// The text of several runs, joined. Writes the report if `--out` is set.
+fn compare(
+    combined: &Combined,
+    baseline: Option<&Baseline>,
+    args: &ReportArgs,
+    again: &[Alert],
+) -> Result<Outcome> {
+    if combined.truths() == Truths::Unknown {
+        let show = args.format();
+        let output = own_answers::compared(combined, again, show, args.out.is_some())?;
+        return write_files(args, output.text, output.files);
+    }
+    let findings = combined.findings();
+    let runs = combined.manifests();
+    let mut above = again.to_vec();
+    above.extend(alerts(combined, &findings));
+    let mut report =
+        ChoiceReport::new(&findings, above).with_enhancers(&enhancers::rows(&combined.runs));
+    if let Some(baseline) = baseline {
+        baseline.add_to(&mut report);
+    }
+    let list = RunList::Several(&runs);
+    let shown = match args.format() {
+        StdoutFormat::Json => summary(&report, list)?,
+        show => text(&report, &runs, show),
+    };
+    let files = match &args.out {
+        Some(out) => {
+            let files = report_files(&report, combined, list)?;
+            write_rows(&findings, out)?;
+            files
+        }
+        None => Vec::new(),
+    };
+    write_files(args, shown, files)
+}
+
+/// The text, with a line about the report. Writes the files of the report into `--out` if it is set.
+fn write_files(
+    args: &ReportArgs,
+    mut text: String,
+    contents: Vec<(String, Vec<u8>)>,
+) -> Result<Outcome> {
+    let Some(out) = &args.out else {
+        if !args.format().is_document() {
+            text += "report: not written; --out DIR writes one\n";
+        }
+        return Ok(Outcome::text(Status::Complete, text));
+    };
+    for (name, content) in contents {
+        files::write(&out.join(name), &content)?;
+    }
+    if !args.format().is_document() {
+        let _ = writeln!(text, "report: {}", out.join(PAGE).display());
+    }
+    Ok(Outcome::wrote(out, Status::Complete, text))
+}
+
+fn of_open(
+    args: &ReportArgs,
+    mut runs: Vec<StoredRun<OpenDetail>>,
+    again: &[Alert],
+) -> Result<Outcome> {
+    let flags = [
+        ("--common", args.common),
+        ("--baseline", args.baseline.baseline.is_some()),
+    ];
+    if let Some((flag, _)) = flags.iter().find(|(_, is_set)| *is_set) {
+        let problem = "compares runs of questions with choices; marks of open questions have no such test: leave it out";
+        return Err(Error::usage(*flag, problem));
+    }
+    if let Some(run) = runs.iter().find(|run| run.trials.is_empty()) {
+        return Err(no_records(run.folder.clone()));
+    }
+    for run in &mut runs {
+        run.leave_out(args.shown());
+    }
+    let is_single = runs.len() == 1 && again.is_empty();
+    let mut joined = open::combine(runs)?;
+    joined.alerts.splice(..0, again.iter().cloned());
+    joined.listing.show(&args.columns);
+    let scores = open::Scores::new(joined)?;
+    let run = &scores.run;
+    if is_single && args.out.is_none() {
+        let place = (&*run.folder, run.layout);
+        let text = write_in_place(place, &run.manifest, |target| {
+            scores.write(target, args.format())
+        })?;
+        if let Some(text) = text {
+            if run.layout == RunLayout::Whole {
+                record_table::update(&run.folder, args.show.show.table())?;
+            }
+            return Ok(Outcome::wrote(&run.folder, Status::Complete, text));
+        }
+    }
+    let files = match args.out {
+        Some(_) => scores.products()?,
+        None => Vec::new(),
+    };
+    write_files(args, scores.shown(args.format())?, files)
+}
+
+/// Reads all stored replies again, and stores the readings that changed, with the version of the reading; returns lines about the
+/// change.
+///
+/// # Errors
+/// If the run is in parts, or one of its files cannot be read or written.
+fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<String> {
+    if run.layout == RunLayout::Parts {
+        let problem = format!(
+            "{} holds the parts of a run, and their readings are stored in each: name the parts, or merge them, which reads all replies again",
+            run.folder.display()
+        );
+        return Err(Error::usage("--rescore", problem));
+    }
+    let mut store = Store::open(&run.folder, &run.manifest, AddressChange::Allowed)?;
+    let mut changed = 0;
+    let mut lenient = LenientChange::of(&run.manifest);
+    for trial in run.trials.iter() {
+        let record = run.record(trial)?;
+        let now = record::reread(record.clone())?;
+        lenient.add(&record.detail, &now.detail);
+        if now != record {
+            store.append(&now)?;
+            changed += 1;
+        }
+    }
+    store.sync()?;
+    let records = run.trials.len();
+    let mut lines = format!("{changed} of {records} records now read differently\n");
+    if !lenient.is_current() {
+        let _ = writeln!(lines, "{}", lenient.words());
+        run.manifest.reply_reading = ChoiceDetail::REPLY_READING.map(str::to_owned);
+        run.manifest.updated = now();
+        store.write_manifest(&run.manifest)?;
+    }
+    if changed > 0 {
+        *run = StoredRun::reread(&run.folder, run.manifest.clone())?;
+    }
+    Ok(lines)
+}

@@ -1,0 +1,129 @@
+//! The ranks of the models of one table: [`ranked`].
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use super::member::ChoiceMember;
+use crate::report::site::{ChoiceRow, GroupRows, Ranking};
+use crate::run_reports::combine::clusters;
+use crate::score::best::{BestInTheDark, best_in_the_dark};
+use crate::score::grid::Grid;
+use crate::score::ranks::rank_ranges;
+use crate::types::{ChoiceDetail, ModelListing, RunQuestion, Trials};
+
+/// The rows of runs that can be compared, in the order of their ranks. Models are compared by area on the items that all of them answered
+/// at all levels, as in the report; those that stand for comparison only are not.
+pub(super) fn ranked(members: Vec<ChoiceMember>) -> GroupRows {
+    let names = names(&members);
+    let (mut trials, mut questions, mut rows) = (Trials::default(), Vec::new(), Vec::new());
+    for member in members {
+        let name = |model: &str| names[&(member.run.page.clone(), model.to_owned())].clone();
+        let is_named =
+            |model: &str| names.contains_key(&(member.run.page.clone(), model.to_owned()));
+        let mut own = member.trials;
+        own.retain(|trial| is_named(trial.model()));
+        own.rename(|model| is_named(model).then(|| name(model)));
+        for trial in own.iter() {
+            trials.copy(trial, 0);
+        }
+        rows.extend(member.rows.into_iter().map(|row| (name(&row.model), row)));
+        questions.extend(member.questions);
+    }
+    let models = rows.iter().filter(|(_, row)| !row.is_reference()).count();
+    let (best, unit) = best(&trials, &questions);
+    // References alone are ranked by no test.
+    let best = best.filter(|_| models > 1);
+    let ranks: BTreeMap<String, _> = best
+        .iter()
+        .flat_map(|best| best.models.iter().zip(rank_ranges(best)))
+        .map(|(model, rank)| (model.model.clone(), rank))
+        .collect();
+    let rows = rows.into_iter().map(|(name, mut row)| {
+        row.rank = ranks.get(&name).copied();
+        row
+    });
+    let mut rows: Vec<ChoiceRow> = rows.collect();
+    rows.sort_by_key(ChoiceRow::order);
+    let words = words(best.as_ref(), models, &unit);
+    GroupRows::Choices(rows, Ranking { words })
+}
+
+/// The name of each model of each run, by page and model: with the run behind it, if another run has a model of that name.
+fn names(members: &[ChoiceMember]) -> BTreeMap<(String, String), String> {
+    let mut times = BTreeMap::<&str, usize>::new();
+    for row in members.iter().flat_map(|member| &member.rows) {
+        *times.entry(&row.model).or_default() += 1;
+    }
+    let rows = members.iter().flat_map(|member| &member.rows);
+    let named = rows.map(|row| {
+        let name = match times[&*row.model] {
+            1 => row.model.clone(),
+            _ => format!("{} ({})", row.model, row.run.page),
+        };
+        ((row.run.page.clone(), row.model.clone()), name)
+    });
+    named.collect()
+}
+
+/// The comparison of all models, and the unit that is treated as independent.
+fn best(
+    trials: &Trials<ChoiceDetail>,
+    questions: &[RunQuestion],
+) -> (Option<BestInTheDark>, String) {
+    let clusters = clusters(trials, questions);
+    let grid = Grid::of_models(trials, &clusters, &ModelListing::default(), |_| true);
+    (best_in_the_dark(&grid), clusters.unit().to_string())
+}
+
+/// On what the ranks are based.
+fn words(best: Option<&BestInTheDark>, models: usize, unit: &str) -> String {
+    let Some(best) = best else {
+        return match models {
+            0 => "No model is ranked: random and the observer stand for comparison.".to_owned(),
+            1 => "One model: there is no other to rank it with.".to_owned(),
+            _ => "The models are not ranked: no two of them answered the same questions at L0 and at a darker level.".to_owned(),
+        };
+    };
+    let levels = best.levels.iter().map(ToString::to_string);
+    let mut words = format!(
+        "Ranks are by mean accuracy over {}, on the {} items that {} models answered at all of these levels ({} {unit}s): \
+         swaps of whole {unit}s, corrected by Holm over {}.",
+        levels.collect::<Vec<_>>().join(", "),
+        best.items,
+        match best.models.len() {
+            2 => "both".to_owned(),
+            models => format!("all {models}"),
+        },
+        best.clusters,
+        match best.pairs.len() {
+            1 => "1 pair".to_owned(),
+            pairs => format!("all {pairs} pairs"),
+        },
+    );
+    if best.dropped > 0 {
+        let _ = write!(
+            words,
+            " {} more items are left out, because a model has no reply to them.",
+            best.dropped
+        );
+    }
+    if !best.without.is_empty() {
+        let ends = if best.without.len() == 1 {
+            " is"
+        } else {
+            "s are"
+        };
+        let _ = write!(
+            words,
+            " {} model{ends} not ranked: not asked at L0 and at a darker level.",
+            best.without.len()
+        );
+    }
+    if !best.is_possible() {
+        let _ = write!(
+            words,
+            " With so few {unit}s no model can be shown to be better than another."
+        );
+    }
+    words
+}

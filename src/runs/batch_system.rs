@@ -1,0 +1,85 @@
+//! The batch system that started this process: [`BatchSystem`].
+
+use std::fmt;
+use std::num::NonZeroU32;
+
+use crate::error::{Error, Result};
+
+/// The batch system that started this process, with its variables.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum BatchSystem {
+    /// A task of a job array: its index from 0, and the number of tasks.
+    Slurm { index: u32, count: NonZeroU32 },
+    /// A pod of an indexed job: its index from 0. The number of pods is in no variable.
+    Kubernetes { index: u32 },
+}
+
+impl BatchSystem {
+    pub(crate) fn of(variable: &impl Fn(&str) -> Option<String>) -> Result<Option<Self>> {
+        let value = |name: &str| -> Result<Option<u32>> {
+            let parse = |text: String| {
+                text.trim()
+                    .parse()
+                    .map_err(|_| Error::usage(name, format_args!("{text:?} is not a number")))
+            };
+            variable(name).map(parse).transpose()
+        };
+        if let Some(id) = value("SLURM_ARRAY_TASK_ID")? {
+            let first = value("SLURM_ARRAY_TASK_MIN")?.unwrap_or(id);
+            let step = value("SLURM_ARRAY_TASK_STEP")?.unwrap_or(1).max(1);
+            let count = value("SLURM_ARRAY_TASK_COUNT")?.unwrap_or(1);
+            return Ok(Some(Self::Slurm {
+                index: id.saturating_sub(first) / step,
+                count: NonZeroU32::new(count).unwrap_or(NonZeroU32::MIN),
+            }));
+        }
+        let index = value("JOB_COMPLETION_INDEX")?;
+        Ok(index.map(|index| Self::Kubernetes { index }))
+    }
+
+    /// The index of this process among all of the batch system, and their number. `parts` is the number of shards, if `--shard auto/N`
+    /// sets it.
+    ///
+    /// # Errors
+    /// If the numbers do not fit together, or one is missing.
+    pub(crate) fn place(self, parts: Option<NonZeroU32>) -> Result<(u32, NonZeroU32)> {
+        let wrong = |problem: String| Err(Error::usage("--shard", problem));
+        let (index, count) = match (self, parts) {
+            (Self::Slurm { count, .. }, Some(parts)) if count != parts => {
+                return wrong(format!(
+                    "the Slurm array has {count} tasks, not {parts}: name the shard itself, as --shard 2/{parts}"
+                ));
+            }
+            (Self::Slurm { index, count }, _) | (Self::Kubernetes { index }, Some(count)) => {
+                (index, count)
+            }
+            (Self::Kubernetes { .. }, None) => {
+                return wrong(
+                    "JOB_COMPLETION_INDEX is the index of this pod, but the number of pods is unknown: set it with --shard auto/N, or do \
+                     everything in each pod with --shard none"
+                        .to_owned(),
+                );
+            }
+        };
+        if index >= count.get() {
+            return wrong(format!(
+                "{self} is beyond the {count} parts: an index from 0 to {} expected",
+                count.get() - 1
+            ));
+        }
+        Ok((index, count))
+    }
+}
+
+impl fmt::Display for BatchSystem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Slurm { index, count } => {
+                write!(f, "task {} of a Slurm array of {count}", index + 1)
+            }
+            Self::Kubernetes { index } => {
+                write!(f, "pod {index} of an indexed Kubernetes job")
+            }
+        }
+    }
+}

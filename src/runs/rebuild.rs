@@ -1,0 +1,183 @@
+//! Rebuilding the images of a run: `ImageRebuilder`.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use clap::Args;
+
+use crate::dataset::{DataArgs, DataPlace, Dataset, Photographs, place};
+use crate::enhance::{Enhancer, Implausible, ProbeArgs, RuntimeArgs};
+use crate::error::{Error, Result};
+use crate::images::enhancers::{self, EnhancerRunArgs, OpenEnhancers};
+use crate::images::image_pipeline::ImagePipeline;
+use crate::images::image_steps::ImageSteps;
+use crate::images::image_words::ImageFlags;
+use crate::images::photographs;
+use crate::images::questions::ASK;
+use crate::images::recipe::Recipe;
+use crate::images::source::{Frames, Source};
+use crate::images::timings::Timings;
+use crate::images::walk::{Walk, WalkFolder};
+use crate::images::workers::ThreadArgs;
+use crate::picture::Payload;
+use crate::synthesis::KindSettings;
+use crate::types::manifest::RunManifest;
+use crate::types::{Condition, Decides, FrameId};
+
+/// Flags for the current paths of a run's data and enhancers, and for running them.
+///
+/// The variables are `DARKQA_MOVED_DATA` and `DARKQA_MOVED_LLIE`, because `DARKQA_DATA` is for new runs and not for this one.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct RebuildArgs {
+    /// The data, if they were moved; default: where they were
+    #[arg(id = "moved_data", long = "data", value_name = "DIR|FILE|rooms:…", add = Decides::Nothing)]
+    pub data: Option<PathBuf>,
+    /// The enhancement models, if they were moved; repeatable; default: where they were
+    #[arg(id = "moved_llie", long = "llie", value_name = "FILE", add = Decides::Nothing)]
+    pub llie: Vec<PathBuf>,
+    /// The ONNX Runtime that runs enhancers.
+    #[command(flatten)]
+    pub runtime: RuntimeArgs,
+    /// The number of threads.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
+}
+
+/// Rebuilds the images of a run with the settings in its manifest.
+pub(crate) struct ImageRebuilder {
+    folder: FrameFolder,
+    recipe: Recipe,
+    enhancers: Vec<Enhancer>,
+}
+
+/// The frames of a data set or of walks.
+enum FrameFolder {
+    Frames(Dataset),
+    Walks(WalkFolder, Walk),
+}
+
+impl ImageRebuilder {
+    /// A rebuilder with the data and the enhancers of these conditions opened.
+    pub(crate) fn open(
+        args: RebuildArgs,
+        manifest: &RunManifest,
+        folder: &Path,
+        conditions: &[Condition],
+    ) -> Result<Self> {
+        let wrong = |problem: String| {
+            let path = folder.to_owned();
+            Error::Run { path, problem }
+        };
+        if manifest.images.is_empty() {
+            return Err(wrong(
+                "the manifest of the run has no image flags, so its images cannot be made again"
+                    .to_owned(),
+            ));
+        }
+        let flags = ImageFlags::read(&manifest.images).map_err(wrong)?;
+        let flags = with_new_paths(flags, &args).map_err(wrong)?;
+        let mut conditions = conditions.iter();
+        let enhanced = conditions.any(|condition| condition.enhancer.is_some());
+        let models = if enhanced { &*flags.llie } else { &[] };
+        let files = enhancers::read(models)?;
+        let kinds = KindSettings::resolve(&flags.sensor, &flags.camera)?;
+        let recipe = Recipe::new(&kinds, flags.images.image, flags.max_side, &files);
+        let (frames, recipe) = if let Some(walk) = flags.walk {
+            let recipe = recipe.of_walks(&walk);
+            let folder = WalkFolder::new(&walk, flags.codes.rule(flags.limit));
+            (FrameFolder::Walks(folder, walk), recipe)
+        } else {
+            let dataset = if manifest.identity.contains_key(ASK) {
+                Photographs::at(&flags.data.place(), &flags.data.set)?.dataset
+            } else if let Some(dataset) = flags.scene.apart(&flags.data.place())? {
+                dataset
+            } else {
+                frames(&flags.data)?
+            };
+            let dataset = dataset.with_rule(flags.codes.rule(flags.limit));
+            (FrameFolder::Frames(dataset), recipe)
+        };
+        let loading = EnhancerRunArgs {
+            size: flags.size,
+            probe: ProbeArgs::default(),
+            runtime: args.runtime,
+            threads: args.threads,
+        };
+        Ok(Self {
+            folder: frames,
+            recipe,
+            enhancers: OpenEnhancers::load(files, &loading)?.take()?,
+        })
+    }
+
+    /// The images of a frame or walk in each of these conditions, in the order shown, as they would be sent.
+    pub(crate) fn images(
+        &mut self,
+        name: &FrameId,
+        conditions: &[Condition],
+    ) -> Result<Vec<Vec<Arc<Payload>>>> {
+        let mut source = self.source(name).map_err(|e| {
+            let problem =
+                format_args!("{e}; if the data were moved, name their folder with --data");
+            Error::data(name, problem)
+        })?;
+        let frames: &dyn Frames = match &self.folder {
+            FrameFolder::Frames(dataset) => dataset,
+            FrameFolder::Walks(folder, _) => folder,
+        };
+        if conditions
+            .iter()
+            .any(|condition| condition.pair().is_some())
+        {
+            photographs::measure(frames, std::slice::from_mut(&mut source))?;
+        }
+        let timings = Timings::default();
+        let steps = ImageSteps {
+            frames,
+            recipe: &self.recipe,
+            limit: None,
+            timings: &timings,
+            stored: None,
+        };
+        let enhancers = std::mem::take(&mut self.enhancers);
+        let mut pipeline = ImagePipeline::new(steps, enhancers, Implausible::NotLookedFor);
+        let conditions: Vec<&Condition> = conditions.iter().collect();
+        let images = pipeline.images(&source, &conditions);
+        self.enhancers = pipeline.enhancers;
+        images
+    }
+
+    fn source(&self, name: &FrameId) -> Result<Source> {
+        match &self.folder {
+            FrameFolder::Frames(dataset) => Source::of_questions(dataset, name),
+            FrameFolder::Walks(folder, walk) => folder.source(&name.0, walk),
+        }
+    }
+}
+
+/// The image flags with the paths of moved data and enhancers. `--data` also replaces the folder of walks.
+fn with_new_paths(mut flags: ImageFlags, args: &RebuildArgs) -> Result<ImageFlags, String> {
+    if let Some(data) = &args.data {
+        match &mut flags.walk {
+            Some(walk) => walk.folder.clone_from(data),
+            None => flags.data.data = vec![place(&data.to_string_lossy())?],
+        }
+    }
+    if !args.llie.is_empty() {
+        flags.llie.clone_from(&args.llie);
+    }
+    Ok(flags)
+}
+
+/// The frames of a data set. Its questions are ignored.
+fn frames(data: &DataArgs) -> Result<Dataset> {
+    match &data.place() {
+        DataPlace::Path(path) if path.join("frames.jsonl").is_file() => {
+            Dataset::of_frames(path, &data.set.root.data_root)
+        }
+        place @ (DataPlace::Path(_) | DataPlace::Files(_) | DataPlace::Known { .. }) => {
+            Dataset::open(place, None, &data.set)
+        }
+        place @ DataPlace::Rooms(_) => Dataset::open_without_questions(place, &[]),
+    }
+}

@@ -1,0 +1,171 @@
+//! The table of records of open questions: a row is an answer, with its mark.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use serde_json::Value;
+
+use super::common::{column, head, image, last, reply};
+use super::row::{Row, SentImage, Tabled};
+use crate::error::Result;
+use crate::runs::mark_index::{JUDGE, MarkIndex, PROTOCOL};
+use crate::runs::predictions::{AnswerState, answer_state};
+use crate::score::llm_match::{Protocol, mark};
+use crate::score::open::AnswerOutcome;
+use crate::store::CellKind::{Double, Int32, LongText, Text};
+use crate::store::Presence::{Always, MayBeNull};
+use crate::store::{Cell, Column, each_record};
+use crate::types::flag::read_word;
+use crate::types::manifest::RunManifest;
+use crate::types::recorded_names::RecordedNames;
+use crate::types::{OpenDetail, Record, RunQuestion, Step};
+
+/// The marks of a run.
+pub(super) struct Marks {
+    judge: Option<String>,
+    protocol: Protocol,
+    /// The mark of an answer; `None` if none is read in the judge's reply.
+    by_answer: MarkIndex<Option<i64>>,
+}
+
+/// An answer with its mark.
+pub(super) struct MarkedAnswer {
+    /// The answer that is judged; `None` if the reply has none.
+    answer: Option<Arc<str>>,
+    outcome: AnswerOutcome,
+    /// The judge, if it was asked about the answer.
+    judge: Option<String>,
+}
+
+impl Tabled for OpenDetail {
+    const TABLE: &'static str = "darkqa.openeqa-records/1";
+
+    type Context = Marks;
+
+    type Further = MarkedAnswer;
+
+    fn columns() -> Vec<Column<Row<Self>>> {
+        let own = vec![
+            column("image_count", Int32, MayBeNull, |row: &Row<Self>| {
+                let images = row.record.detail.images.as_ref();
+                Cell::int(images.map(|images| images.images))
+            }),
+            column("person", Text, MayBeNull, |row| {
+                Cell::text(row.record.detail.person.as_deref())
+            }),
+        ];
+        let parts = [head(), marked(), reply(), image(), last(), own];
+        parts.into_iter().flatten().collect()
+    }
+
+    fn context(folder: &Path, manifest: &RunManifest, questions: &[RunQuestion]) -> Result<Marks> {
+        let setting = |name| manifest.settings.get(name).and_then(Value::as_str);
+        let judge = setting(JUDGE).map(str::to_owned);
+        let protocol = setting(PROTOCOL).map_or(Ok(Protocol::Upstream), read_word)?;
+        let names = RecordedNames::of(manifest);
+        let mut marks = MarkIndex::of(questions);
+        each_record(folder, |record: Record<Self>, _| {
+            let is_of_judge = Some(names.shown(&record.model)) == judge.as_deref();
+            let detail = &record.detail;
+            if let (Step::Mark, Some(answer)) = (detail.step, &detail.judged)
+                && is_of_judge
+                && !record.failed()
+            {
+                let reply = record.reply.as_deref().unwrap_or_default();
+                marks.add(&record.question, answer, mark(reply, protocol));
+            }
+        })?;
+        Ok(Marks {
+            judge,
+            protocol,
+            by_answer: marks,
+        })
+    }
+
+    fn further(context: &Marks, record: &Record<Self>) -> Option<MarkedAnswer> {
+        (record.detail.step == Step::Answer).then(|| context.marked(record))
+    }
+
+    fn frame(&self) -> &str {
+        &self.episode
+    }
+
+    fn family(&self) -> &str {
+        &self.category
+    }
+
+    fn image(&self) -> Option<SentImage<'_>> {
+        self.images.as_ref().map(|images| SentImage {
+            digest: &images.digest,
+            bytes: images.bytes,
+            width: images.width,
+            height: images.height,
+            format: &images.format,
+        })
+    }
+}
+
+impl Marks {
+    /// The answer of a record, with its mark.
+    fn marked(&self, record: &Record<OpenDetail>) -> MarkedAnswer {
+        let unmarked = |outcome| MarkedAnswer {
+            answer: None,
+            outcome,
+            judge: None,
+        };
+        let state = if record.failed() {
+            AnswerState::Missing
+        } else {
+            answer_state(record, self.protocol)
+        };
+        let answer = match state {
+            AnswerState::Missing => return unmarked(AnswerOutcome::Missing),
+            AnswerState::Null => return unmarked(AnswerOutcome::Null),
+            AnswerState::Text { answer, .. } => answer,
+        };
+        let known = self.by_answer.get(&record.question, &answer);
+        let outcome = match known {
+            None => AnswerOutcome::Unjudged,
+            Some(None) => AnswerOutcome::Unmarked,
+            Some(Some(mark)) => AnswerOutcome::Marked(*mark),
+        };
+        MarkedAnswer {
+            answer: Some(answer),
+            outcome,
+            judge: self.judge.clone().filter(|_| known.is_some()),
+        }
+    }
+}
+
+/// The true answer, the answer that was given, and its mark.
+fn marked() -> Vec<Column<Row<OpenDetail>>> {
+    vec![
+        column("answer", Text, MayBeNull, |row: &Row<OpenDetail>| {
+            let question = row.question.as_ref();
+            Cell::text(question.and_then(|question| question.answer.as_deref()))
+        }),
+        column("predicted", LongText, MayBeNull, |row| {
+            Cell::text(row.further.answer.as_deref())
+        }),
+        column("outcome", Text, Always, |row| {
+            Cell::text(Some(match row.further.outcome {
+                AnswerOutcome::Missing => "failed",
+                AnswerOutcome::Null => "null",
+                AnswerOutcome::Unjudged => "unjudged",
+                AnswerOutcome::Unmarked => "unmarked",
+                AnswerOutcome::Marked(_) => "marked",
+            }))
+        }),
+        column("judge", Text, MayBeNull, |row| {
+            Cell::text(row.further.judge.as_deref())
+        }),
+        column("mark", Int32, MayBeNull, |row| match row.further.outcome {
+            AnswerOutcome::Marked(mark) => Cell::int(Some(mark)),
+            _ => Cell::Null,
+        }),
+        column("score", Double, MayBeNull, |row| {
+            let points = row.further.outcome.points();
+            points.map_or(Cell::Null, Cell::Double)
+        }),
+    ]
+}

@@ -1,0 +1,225 @@
+//! Which sources of a run some parts have: [`Coverage`].
+
+use std::collections::BTreeSet;
+use std::fmt::Write;
+use std::num::NonZeroU32;
+use std::ops::Range;
+use std::path::Path;
+
+use crate::error::{Error, Result};
+use crate::runs::shard::Shard;
+use crate::types::manifest::RunManifest;
+
+/// The sources (frames or walks) of a run that some parts have, which may be of several divisions.
+pub(super) struct Coverage {
+    /// The number of trials about each source; `None` for a source in no part.
+    trials: Vec<Option<usize>>,
+    /// The number of trials that were answered under an earlier command, and that the last command of their part did not plan.
+    more: usize,
+    shards: Vec<Shard>,
+    /// Whether a source is in several parts.
+    overlaps: bool,
+}
+
+impl Coverage {
+    /// What these parts have, each with its folder.
+    ///
+    /// # Errors
+    /// If a part does not say what it has, or is of a run with another number of sources.
+    pub(super) fn of<'a>(
+        parts: impl Iterator<Item = (Shard, &'a Path, &'a RunManifest)>,
+    ) -> Result<Self> {
+        let mut coverage = Self {
+            trials: Vec::new(),
+            more: 0,
+            shards: Vec::new(),
+            overlaps: false,
+        };
+        for (shard, folder, manifest) in parts {
+            let wrong = |problem: String| {
+                let path = folder.to_owned();
+                Err(Error::Run { path, problem })
+            };
+            let Some(part) = &manifest.part else {
+                return wrong(
+                    "the part does not say which frames it has: an earlier version made it; run it again".to_owned(),
+                );
+            };
+            let place = part.place;
+            if coverage.shards.is_empty() {
+                coverage.trials.resize(place.of, None);
+            } else if coverage.trials.len() != place.of {
+                return wrong(format!(
+                    "shard {shard} is of a run about {} frames or walks, the others of one about {}",
+                    place.of,
+                    coverage.trials.len()
+                ));
+            }
+            let own = coverage.trials.iter_mut().skip(place.first);
+            for (known, trials) in own.zip(&part.trials) {
+                coverage.overlaps |= known.is_some();
+                *known = (*known).max(Some(*trials));
+            }
+            let planned: usize = part.trials.iter().sum();
+            coverage.more += manifest.counts.trials.saturating_sub(planned);
+            coverage.shards.push(shard);
+        }
+        Ok(coverage)
+    }
+
+    /// The number of trials about all these sources.
+    pub(super) fn trials(&self) -> usize {
+        self.more + self.trials.iter().flatten().sum::<usize>()
+    }
+
+    /// The number of sources of the run.
+    pub(super) fn sources(&self) -> usize {
+        self.trials.len()
+    }
+
+    /// The places of the sources that are in no part.
+    pub(super) fn gaps(&self) -> impl Iterator<Item = usize> {
+        let places = self.trials.iter().enumerate();
+        places.filter_map(|(place, trials)| trials.is_none().then_some(place))
+    }
+
+    /// The shards that no part is of and that have what is missing. Of several divisions it is the one with the fewest such shards;
+    /// `part` returns the places of the sources of a shard. None if `part` knows none.
+    pub(super) fn absent(&self, part: impl Fn(Shard) -> Option<Range<usize>>) -> Vec<Shard> {
+        let counts: BTreeSet<NonZeroU32> = self.shards.iter().map(|shard| shard.count()).collect();
+        let is_needed = |shard: &Shard| match part(*shard) {
+            None => counts.len() == 1 && !self.shards.contains(shard),
+            Some(mut places) => places.any(|place| self.trials.get(place) == Some(&None)),
+        };
+        let absent = counts
+            .iter()
+            .map(|count| Shard::all(*count).filter(is_needed).collect::<Vec<Shard>>());
+        let absent = absent.filter(|absent| !absent.is_empty());
+        absent.min_by_key(Vec::len).unwrap_or_default()
+    }
+
+    /// What is missing, in words; `None` if nothing is. `absent` are the shards that have it, as far as they are known.
+    pub(super) fn missing(&self, absent: &[Shard]) -> Option<String> {
+        if self.trials.iter().all(Option::is_some) {
+            return None;
+        }
+        if !absent.is_empty() {
+            let verb = if absent.len() == 1 { " is" } else { "s are" };
+            let names: Vec<String> = absent.iter().map(Shard::to_string).collect();
+            return Some(format!(
+                "{} shard{verb} missing: {}",
+                absent.len(),
+                names.join(", ")
+            ));
+        }
+        let mut gaps = String::new();
+        let mut start = 0;
+        for run in self
+            .trials
+            .chunk_by(|one, next| one.is_some() == next.is_some())
+        {
+            if run[0].is_none() {
+                let comma = if gaps.is_empty() { "" } else { ", " };
+                let _ = match run.len() {
+                    1 => write!(gaps, "{comma}{}", start + 1),
+                    length => write!(gaps, "{comma}{} to {}", start + 1, start + length),
+                };
+            }
+            start += run.len();
+        }
+        Some(format!(
+            "frames or walks {gaps} of {} are in no part",
+            self.trials.len()
+        ))
+    }
+
+    /// The parts whose sources together are those of the run, each once, if there are such parts of one division; otherwise all parts.
+    pub(super) fn once(&self) -> impl Iterator<Item = bool> {
+        let counts: BTreeSet<NonZeroU32> = self.shards.iter().map(|shard| shard.count()).collect();
+        let is_whole =
+            |count: &NonZeroU32| Shard::all(*count).all(|shard| self.shards.contains(&shard));
+        let whole = counts.into_iter().rev().find(is_whole);
+        if whole.is_none() && self.overlaps {
+            tracing::warn!(
+                "the parts overlap: what was done to images when they were read is counted once for each part"
+            );
+        }
+        let mut seen = BTreeSet::new();
+        self.shards.iter().map(move |shard| match whole {
+            Some(count) => shard.count() == count && seen.insert(*shard),
+            None => true,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    /// A part with its shard, the place of its first source, and the trials about each.
+    fn coverage(parts: &[(&str, usize, &[usize])]) -> Coverage {
+        let parts = parts.iter().map(|(shard, first, trials)| {
+            let total: usize = trials.iter().sum();
+            let manifest = json!({
+                "schema": "", "status": "complete", "version": "", "created": "", "updated": "", "platform": {}, "identity": {},
+                "settings": {}, "counts": {"trials": total, "answered": total, "failed": 0},
+                "part": {"first": first, "count": trials.len(), "of": 6, "trials": trials},
+            });
+            let manifest: RunManifest = serde_json::from_value(manifest).unwrap();
+            (shard.parse().unwrap(), manifest)
+        });
+        let parts: Vec<(Shard, RunManifest)> = parts.collect();
+        let parts = parts.iter();
+        Coverage::of(parts.map(|(shard, manifest)| (*shard, Path::new("run"), manifest))).unwrap()
+    }
+
+    #[test]
+    fn missing_sources_are_named() {
+        let whole = coverage(&[("1/2", 0, &[4, 4, 4]), ("2/2", 3, &[4, 4, 2])]);
+        assert_eq!((whole.missing(&[]), whole.trials()), (None, 22));
+        let one = coverage(&[("1/3", 0, &[4, 4])]);
+        let said = one.missing(&one.absent(|_| None)).unwrap();
+        assert_eq!(said, "2 shards are missing: 2/3, 3/3");
+        // The end of one division and the beginning of another.
+        let mixed = coverage(&[("1/3", 0, &[4, 4]), ("5/6", 4, &[4])]);
+        assert_eq!(mixed.absent(|_| None), []);
+        let said = mixed.missing(&[]).unwrap();
+        assert!(
+            said.starts_with("frames or walks 3 to 4, 6 of 6 are in no part"),
+            "{said}"
+        );
+        assert_eq!(mixed.trials(), 12);
+        assert_eq!(mixed.gaps().collect::<Vec<_>>(), [2, 3, 5]);
+        // Where it is known which sources a shard has, the division with the fewest shards for them.
+        let equal = |shard: Shard| {
+            let each = 6 / shard.count().get() as usize;
+            let first = shard.index() as usize * each;
+            Some(first..first + each)
+        };
+        let absent: Vec<String> = mixed.absent(equal).iter().map(Shard::to_string).collect();
+        assert_eq!(absent, ["2/3", "3/3"]);
+    }
+
+    #[test]
+    fn what_parts_share_counts_once() {
+        let parts = [
+            ("1/2", 0, &[4, 4, 4][..]),
+            ("2/2", 3, &[4, 4, 2]),
+            // A part that was stopped before it knew of all marks.
+            ("1/3", 0, &[3, 4]),
+        ];
+        let overlapping = coverage(&parts);
+        assert_eq!((overlapping.missing(&[]), overlapping.trials()), (None, 22));
+        let once: Vec<bool> = overlapping.once().collect();
+        assert_eq!(once, [true, true, false]);
+        let together = coverage(&[
+            ("1/2", 0, &[4, 4, 4]),
+            ("2/3", 2, &[5, 4]),
+            ("3/3", 4, &[4, 2]),
+        ]);
+        assert_eq!((together.missing(&[]), together.trials()), (None, 23));
+        assert!(together.once().all(|is_taken| is_taken));
+    }
+}

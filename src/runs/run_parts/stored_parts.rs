@@ -1,0 +1,80 @@
+//! The run in a folder, or that of the parts in it: [`any_run`], [`choice_run`].
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::joined::RunParts;
+use super::missing::MissingParts;
+use super::part_folders::{one_kind, runs_in};
+use crate::error::Result;
+use crate::images::thumbnail::MissingThumbnails;
+use crate::runs::run_texts::RunTexts;
+use crate::runs::stored::{AnyRun, ExperimentKind, RunLayout, StoredRun, manifest, open_questions};
+use crate::score::record::Detail;
+use crate::store;
+use crate::types::{ChoiceDetail, Trials};
+
+/// The run in a folder; that of all parts in it if the folder itself holds none. What is in no part is said.
+///
+/// # Errors
+/// If the folder holds neither, or the parts are not of one run.
+pub(crate) fn any_run(folder: &Path) -> Result<AnyRun> {
+    let Some(parts) = parts_in(folder)? else {
+        return AnyRun::open(folder);
+    };
+    Ok(match one_kind(&parts)? {
+        ExperimentKind::Choice => AnyRun::Choice(of_parts(folder, &parts)?),
+        ExperimentKind::Open => AnyRun::Open(of_parts(folder, &parts)?),
+    })
+}
+
+/// The run of questions with choices in a folder, as [`any_run`].
+///
+/// # Errors
+/// Also if the questions are open. That error tells the user what to do `instead`.
+pub(crate) fn choice_run(folder: &Path, instead: &str) -> Result<StoredRun<ChoiceDetail>> {
+    let Some(parts) = parts_in(folder)? else {
+        return StoredRun::of_choices(folder, instead);
+    };
+    match one_kind(&parts)? {
+        ExperimentKind::Choice => of_parts(folder, &parts),
+        ExperimentKind::Open => Err(open_questions(folder, instead)),
+    }
+}
+
+/// The run folders in a folder that holds no run itself, if any of them is a part.
+///
+/// # Errors
+/// If the manifest of one cannot be read.
+fn parts_in(folder: &Path) -> Result<Option<Vec<PathBuf>>> {
+    let is_folder = fs::metadata(folder).is_ok_and(|entry| entry.is_dir());
+    if !is_folder || store::schema(folder)?.is_some() {
+        return Ok(None);
+    }
+    let inside = runs_in(folder)?;
+    for run in &inside {
+        if manifest(run)?.shard.is_some() {
+            return Ok(Some(inside));
+        }
+    }
+    Ok(None)
+}
+
+/// The run of these parts, which are in `folder`, as reports need it.
+fn of_parts<D: Detail>(folder: &Path, parts: &[PathBuf]) -> Result<StoredRun<D>> {
+    let parts = RunParts::<D>::read(parts, MissingParts::Accepted)?;
+    let folders = parts.folders();
+    let texts: Result<Vec<RunTexts<D>>> = folders.iter().map(|part| RunTexts::of(part)).collect();
+    let wanted = MissingThumbnails::new(parts.questions.frames(), Vec::new());
+    Ok(StoredRun {
+        folder: folder.to_owned(),
+        layout: RunLayout::Parts,
+        texts: RunTexts::Parts(texts?),
+        thumbnails: store::more_thumbnails(&[], &folders, |frame| wanted.wants(frame))?,
+        fidelity: store::more_fidelity(&[], &folders, |_| true)?,
+        left_out: Trials::default(),
+        manifest: parts.manifest,
+        trials: parts.trials,
+        questions: parts.questions.into_questions(),
+    })
+}

@@ -1,0 +1,265 @@
+//! The plan of a run, which `plan` writes once and every shard reads: [`RunPlan`].
+//!
+//! It holds the questions and the digests of the frames, so that a shard measures no frame to make its questions, and opens none that
+//! it does not ask about. Its folder stands in that of the run.
+
+mod cost;
+mod file;
+mod frame;
+mod write;
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+use serde::de::DeserializeOwned;
+
+use crate::dataset::Dataset;
+use crate::error::{Error, Result};
+use crate::files::reading;
+use crate::images::source::Source;
+use crate::runs::part::{Divided, own_sources};
+use crate::runs::shard::Shard;
+use crate::store::PLAN;
+use crate::types::manifest::Identity;
+use crate::types::manifest::differences;
+use crate::types::{Digest, FrameId, Question, RunQuestion, shell_word};
+
+pub(crate) use cost::FrameCost;
+pub(crate) use file::recorded_command;
+use file::{FRAMES, PLAN_FILE, PlanFile, QUESTIONS, SCHEMA};
+pub(crate) use frame::PlannedFrame;
+pub(crate) use write::NewPlan;
+
+/// The plan of a run, read from its folder.
+#[derive(Debug)]
+pub(crate) struct RunPlan {
+    folder: PathBuf,
+    identity: Identity,
+    /// The questions that are asked, in order.
+    questions: Vec<RunQuestion>,
+    /// The frames that questions are about, in the order of their first question.
+    frames: Vec<PlannedFrame>,
+    /// The index of each frame in `frames`.
+    places: HashMap<FrameId, usize>,
+    command: Option<Vec<String>>,
+    models: Vec<String>,
+}
+
+impl RunPlan {
+    /// The plan in the folder of a run; `None` if there is none.
+    ///
+    /// # Errors
+    /// If it cannot be read, another version wrote it, or one of its files is not the one that it was written with.
+    pub(crate) fn of(run: &Path) -> Result<Option<Self>> {
+        let folder = run.join(PLAN);
+        let path = folder.join(PLAN_FILE);
+        if !path.exists() {
+            return Ok(None);
+        }
+        let file: PlanFile = reading::json(&path)?;
+        if file.schema != SCHEMA {
+            let problem = format!(
+                "the plan has the schema {:?}, this version reads {SCHEMA:?}; write it again with `darkqa-eval plan`",
+                file.schema
+            );
+            return Err(Error::Run { path, problem });
+        }
+        let questions: Vec<RunQuestion> = lines(&folder.join(QUESTIONS), &file.files)?;
+        let frames: Vec<PlannedFrame> = lines(&folder.join(FRAMES), &file.files)?;
+        let names = frames.iter().map(|frame| frame.frame.clone());
+        Ok(Some(Self {
+            places: names.zip(0..).collect(),
+            folder,
+            identity: file.identity,
+            questions,
+            frames,
+            command: file.command,
+            models: file.models,
+        }))
+    }
+
+    /// Checks that a run has the data, questions and light of the plan.
+    ///
+    /// # Errors
+    /// Names the setting that differs.
+    pub(crate) fn check_identity(&self, run: &Identity) -> Result<()> {
+        // A flag is said before what it is made of: the variant before the light readings that it has.
+        let differences = differences(&self.identity, run);
+        match differences.min_by_key(|(field, ..)| field.contains(" of the ")) {
+            None => Ok(()),
+            Some((field, planned, now)) => Err(self.error(format!(
+                "the plan is of another run: its {field} is {planned}, now it is {now}; use the same {field}, or another --out, or write the \
+                 plan again with the new flags (`darkqa-eval plan`)"
+            ))),
+        }
+    }
+
+    /// The planned questions. Those that the data have themselves must be the same.
+    ///
+    /// # Errors
+    /// If a question of the data is not the planned one, or its frame is missing.
+    pub(crate) fn questions(&self, dataset: &Dataset, own: &[Question]) -> Result<Vec<Question>> {
+        if !own.is_empty() {
+            self.check_questions(dataset, own)?;
+        }
+        if let Some(lost) = self.frames.iter().find(|frame| !dataset.has(&frame.frame)) {
+            return Err(self.error(format!(
+                "the frame {:?} of the plan is not among the data any more; restore it, or write the plan again into another --out",
+                lost.frame.0
+            )));
+        }
+        let questions = self.questions.par_iter();
+        questions.map(RunQuestion::to_question).collect()
+    }
+
+    /// Checks that the questions of the data are the planned ones.
+    fn check_questions(&self, dataset: &Dataset, own: &[Question]) -> Result<()> {
+        let remedy = "use the questions of the plan, or write the plan again into another --out";
+        if own.len() != self.questions.len() {
+            return Err(self.error(format!(
+                "{} questions are planned, and the data have {}; {remedy}",
+                self.questions.len(),
+                own.len()
+            )));
+        }
+        let other = own.iter().zip(&self.questions).find(|(own, planned)| {
+            !planned.is_same(&RunQuestion {
+                images: dataset.several(&own.frame).to_vec(),
+                ..RunQuestion::new(own, 0, &dataset.scene(&own.frame))
+            })
+        });
+        match other {
+            None => Ok(()),
+            Some((own, planned)) => Err(self.error(format!(
+                "the question {:?} of the data is not the planned one ({:?}); {remedy}",
+                own.id.0, planned.id.0
+            ))),
+        }
+    }
+
+    /// The index of each planned question among all questions of the data.
+    pub(crate) fn question_places(&self) -> impl Iterator<Item = usize> {
+        self.questions.iter().map(|question| question.place)
+    }
+
+    /// Checks that the frames of these sources are those of the plan.
+    ///
+    /// # Errors
+    /// If a frame has another content; names the frame.
+    pub(crate) fn check_sources(&self, sources: &[Source]) -> Result<()> {
+        for source in sources {
+            let Some(digest) = source.digest() else {
+                continue;
+            };
+            let planned = self.frame(&source.name).map(|frame| frame.digest);
+            let problem = match planned {
+                Some(Some(planned)) if planned == digest => continue,
+                Some(Some(_)) => "its image is not the one that was planned",
+                Some(None) => {
+                    "the plan was written for models that see no image, and has no digest of it"
+                }
+                None => "no question about it is planned",
+            };
+            return Err(Error::data(
+                format_args!("frame {:?}", source.name.0),
+                format_args!(
+                    "{problem} ({}); restore it, or write the plan again into another --out",
+                    self.folder.display()
+                ),
+            ));
+        }
+        Ok(())
+    }
+
+    fn frame(&self, name: &FrameId) -> Option<&PlannedFrame> {
+        Some(&self.frames[*self.places.get(name)?])
+    }
+
+    /// The digest of a frame; `None` if it is not planned, or no model of the plan sees images.
+    pub(crate) fn digest(&self, name: &FrameId) -> Option<Digest> {
+        self.frame(name)?.digest
+    }
+
+    /// The estimated cost of the requests and images about a frame, in millionths of a second, by which a run is divided.
+    pub(crate) fn cost(&self, name: &str) -> u64 {
+        let frame = self.frame(&FrameId(name.to_owned()));
+        frame.map_or(1, |frame| frame.cost.weight())
+    }
+
+    /// Number of frames that questions are about.
+    pub(crate) fn frames(&self) -> usize {
+        self.frames.len()
+    }
+
+    /// Number of requests about the frames at these places, by the models of the plan.
+    pub(crate) fn requests(&self, places: impl Iterator<Item = usize>) -> usize {
+        let frames = places.filter_map(|place| self.frames.get(place));
+        frames.map(|frame| frame.cost.requests).sum()
+    }
+
+    /// The places of the frames of a shard.
+    pub(crate) fn part(&self, shard: Shard) -> Range<usize> {
+        let divided = self.frames.iter().map(|frame| Divided {
+            scene: frame.scene.clone(),
+            cost: frame.cost.weight(),
+        });
+        own_sources(&divided.collect::<Vec<_>>(), shard)
+    }
+
+    /// The share of the estimated cost that a shard has: in dollars if all are known, else in tokens, else in requests.
+    pub(crate) fn share(&self, shard: Shard) -> f64 {
+        let own = self.part(shard);
+        let share = |of: &dyn Fn(&PlannedFrame) -> Option<f64>| {
+            let sum = |frames: &[PlannedFrame]| {
+                let mut frames = frames.iter();
+                frames.try_fold(0.0, |sum, frame| Some(sum + of(frame)?))
+            };
+            let whole = sum(&self.frames)?;
+            Some(sum(&self.frames[own.clone()])? / whole).filter(|_| whole > 0.0)
+        };
+        share(&|frame| frame.cost.dollars)
+            .or_else(|| share(&|frame| frame.cost.tokens))
+            .or_else(|| share(&|frame| Some(frame.cost.requests as f64)))
+            .unwrap_or(0.0)
+    }
+
+    /// The command of the run without `--shard`; `None` if the plan does not hold it, or other models than its own were asked.
+    pub(crate) fn command<'a>(&self, asked: impl Iterator<Item = &'a str>) -> Option<String> {
+        let planned: BTreeSet<&str> = self.models.iter().map(|name| &**name).collect();
+        let words = self.command.as_ref()?;
+        let words = words.iter().map(|word| shell_word(word));
+        let command = words.collect::<Vec<_>>().join(" ");
+        (planned == asked.collect()).then(|| format!("darkqa-eval {command}"))
+    }
+
+    fn error(&self, problem: String) -> Error {
+        let path = self.folder.clone();
+        Error::Run { path, problem }
+    }
+}
+
+/// The lines of a file of a plan, which must be the one that its digest is of.
+fn lines<T: DeserializeOwned + Send>(
+    path: &Path,
+    digests: &BTreeMap<String, Digest>,
+) -> Result<Vec<T>> {
+    let bytes = reading::bytes(path)?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    if digests.get(&*name) != Some(&Digest::of(&bytes)) {
+        let problem = format!(
+            "the file is not the one that {PLAN_FILE} was written with; write the plan again with `darkqa-eval plan`"
+        );
+        let path = path.to_owned();
+        return Err(Error::Run { path, problem });
+    }
+    let lines: Vec<&[u8]> = bytes.split(|byte| *byte == b'\n').collect();
+    let lines = lines.par_iter().enumerate();
+    let lines = lines.filter(|(_, line)| !line.is_empty());
+    lines
+        .map(|(index, line)| {
+            serde_json::from_slice(line).map_err(|e| Error::json_line(path, index + 1, &e))
+        })
+        .collect()
+}

@@ -1,0 +1,132 @@
+//! Writing of a plan: [`NewPlan`].
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, File};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::file::{FRAMES, PLAN_FILE, PlanCounts, PlanEstimate, PlanFile, QUESTIONS, SCHEMA};
+use super::{PlannedFrame, RunPlan};
+use crate::error::{Error, Result};
+use crate::files::{UNFINISHED, reading};
+use crate::report::forecast::Forecast;
+use crate::store::{self, PLAN};
+use crate::types::manifest::Identity;
+use crate::types::{Digest, RunQuestion};
+
+/// All that a plan is written from.
+pub(crate) struct NewPlan {
+    pub(crate) identity: Identity,
+    pub(crate) questions: Vec<RunQuestion>,
+    pub(crate) frames: Vec<PlannedFrame>,
+    pub(crate) models: Vec<String>,
+    pub(crate) command: Option<Vec<String>>,
+    /// Number of trials of the whole run.
+    pub(crate) trials: usize,
+}
+
+impl NewPlan {
+    /// Writes the plan into the folder of a run: beside its place, then renamed. If the run has an earlier plan of the same questions
+    /// and frames, its costs stay, so that parts keep their frames.
+    ///
+    /// Returns the folder of the plan.
+    ///
+    /// # Errors
+    /// If the run has parts whose plan has other questions or frames, or a file cannot be written.
+    pub(crate) fn write(mut self, run: &Path, forecast: &Forecast) -> Result<PathBuf> {
+        let place = run.join(PLAN);
+        let earlier = RunPlan::of(run)?;
+        if let Some(earlier) = &earlier {
+            if self.has_content_of(earlier) {
+                self.frames.clone_from(&earlier.frames);
+            } else if let Some(part) = part_of(run)? {
+                let problem = format!(
+                    "the run has parts of another plan, with other questions or frames ({}); use another --out, or delete the parts",
+                    part.display()
+                );
+                let path = place;
+                return Err(Error::Run { path, problem });
+            }
+        }
+        let questions = lines(&self.questions)?;
+        let frames = lines(&self.frames)?;
+        let file = serde_json::to_vec_pretty(&self.file(&questions, &frames, forecast));
+        let file = file.map_err(|e| Error::data(PLAN_FILE, e))?;
+        let unfinished = run.join(format!(".{PLAN}{UNFINISHED}"));
+        if unfinished.exists() {
+            remove(&unfinished)?;
+        }
+        fs::create_dir_all(&unfinished).map_err(|e| Error::file(&unfinished, "create", e))?;
+        for (name, content) in [
+            (QUESTIONS, &questions),
+            (FRAMES, &frames),
+            (PLAN_FILE, &file),
+        ] {
+            let path = unfinished.join(name);
+            let written = File::create(&path).and_then(|mut file| {
+                file.write_all(content)?;
+                file.sync_all()
+            });
+            written.map_err(|e| Error::file(&path, "write", e))?;
+        }
+        if place.exists() {
+            remove(&place)?;
+        }
+        fs::rename(&unfinished, &place).map_err(|e| Error::file(&place, "write", e))?;
+        Ok(place)
+    }
+
+    fn has_content_of(&self, earlier: &RunPlan) -> bool {
+        let mut frames = self.frames.iter().zip(&earlier.frames);
+        self.questions == earlier.questions
+            && self.frames.len() == earlier.frames.len()
+            && frames.all(|(now, before)| now.is_same(before))
+    }
+
+    fn file(&self, questions: &[u8], frames: &[u8], forecast: &Forecast) -> PlanFile {
+        let files = [(QUESTIONS, questions), (FRAMES, frames)];
+        let files = files.map(|(name, content)| (name.to_owned(), Digest::of(content)));
+        let scenes: BTreeSet<&str> = self.frames.iter().map(|frame| &*frame.scene).collect();
+        let seconds = self.frames.iter().map(|frame| frame.cost.seconds);
+        PlanFile {
+            schema: SCHEMA.to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            identity: self.identity.clone(),
+            files: BTreeMap::from(files),
+            counts: PlanCounts {
+                questions: self.questions.len(),
+                frames: self.frames.len(),
+                scenes: scenes.into_iter().filter(|scene| !scene.is_empty()).count(),
+                trials: self.trials,
+            },
+            estimate: PlanEstimate::new(forecast, seconds.sum()),
+            models: self.models.clone(),
+            command: self.command.clone(),
+        }
+    }
+}
+
+/// A part in the folder of a run; `None` if there is none.
+fn part_of(run: &Path) -> Result<Option<PathBuf>> {
+    for path in reading::entries(run)? {
+        if path.is_dir() && store::schema(&path)?.is_some() {
+            return Ok(Some(path));
+        }
+    }
+    Ok(None)
+}
+
+fn remove(folder: &Path) -> Result<()> {
+    fs::remove_dir_all(folder).map_err(|e| Error::file(folder, "remove", e))
+}
+
+fn lines<T: Serialize>(values: &[T]) -> Result<Vec<u8>> {
+    let mut lines = Vec::new();
+    for value in values {
+        serde_json::to_writer(&mut lines, value).map_err(|e| Error::data("plan", e))?;
+        lines.push(b'\n');
+    }
+    Ok(lines)
+}

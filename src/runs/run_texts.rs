@@ -1,0 +1,127 @@
+//! What reports read of a run where they show it: [`RunTexts`].
+
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use crate::error::{Error, Result};
+use crate::score::record::Detail;
+use crate::store::{RecordLog, each_question};
+use crate::types::{QuestionId, Record, RunQuestion, TextPlace};
+
+/// Where the texts of a run's replies, and the evidence of its questions, are read.
+#[derive(Debug, Clone)]
+pub(crate) enum RunTexts<D> {
+    /// In the files of the run.
+    Stored(Arc<StoredTexts>),
+    /// In the files of its parts, by the number of the file in the place of a text.
+    Parts(Vec<Self>),
+    /// In records that are held, by their numbers.
+    Held(Arc<HeldTexts<D>>),
+}
+
+/// The files of a run.
+#[derive(Debug)]
+pub(crate) struct StoredTexts {
+    folder: PathBuf,
+    log: RecordLog,
+}
+
+/// Records and questions that are held in memory.
+#[derive(Debug)]
+pub(crate) struct HeldTexts<D> {
+    records: Vec<Record<D>>,
+    questions: Vec<RunQuestion>,
+}
+
+impl<D> HeldTexts<D> {
+    pub(crate) fn new(records: Vec<Record<D>>, questions: Vec<RunQuestion>) -> Self {
+        Self { records, questions }
+    }
+}
+
+impl<D: Detail> RunTexts<D> {
+    /// The texts in the folder of a run.
+    ///
+    /// # Errors
+    /// If its file cannot be opened.
+    pub(crate) fn of(folder: &Path) -> Result<Self> {
+        Ok(match RecordLog::open_if_there(folder)? {
+            None => Self::Held(HeldTexts::new(Vec::new(), Vec::new()).into()),
+            Some(log) => {
+                let folder = folder.to_owned();
+                Self::Stored(StoredTexts { folder, log }.into())
+            }
+        })
+    }
+
+    /// The texts in each file of a run, by the number of the file.
+    pub(crate) fn by_file(self) -> Vec<Self> {
+        match self {
+            Self::Parts(parts) => parts,
+            one => vec![one],
+        }
+    }
+
+    /// The record of a trial.
+    ///
+    /// # Errors
+    /// If the file of the run cannot be read any more, or was changed.
+    pub(crate) fn record(&self, place: TextPlace) -> Result<Record<D>> {
+        match self {
+            Self::Stored(texts) => {
+                let line = texts.log.line_from(place.start())?;
+                texts.log.record(&line)
+            }
+            Self::Parts(parts) => match parts.get(place.log()) {
+                Some(part) => part.record(place),
+                None => Err(Error::data(
+                    "records",
+                    format_args!("there is no part {}", place.log()),
+                )),
+            },
+            Self::Held(texts) => {
+                let record = texts.records.get(place.start() as usize);
+                record.cloned().ok_or_else(|| {
+                    let problem = format_args!("there is none at {}", place.start());
+                    Error::data("records", problem)
+                })
+            }
+        }
+    }
+
+    /// What stands in the place of a reply: its text; else that of a refusal, else what the error says.
+    ///
+    /// # Errors
+    /// As for [`record`](Self::record).
+    pub(crate) fn text(&self, place: TextPlace) -> Result<String> {
+        let record = self.record(place)?;
+        Ok(record.text_or_error().unwrap_or_default().to_owned())
+    }
+
+    /// Adds those of the wanted questions that are not found yet, with their evidence.
+    ///
+    /// # Errors
+    /// If the questions of the run cannot be read.
+    pub(crate) fn questions(
+        &self,
+        wanted: &HashSet<&QuestionId>,
+        found: &mut HashMap<QuestionId, RunQuestion>,
+    ) -> Result<()> {
+        let mut add = |question: RunQuestion| {
+            if wanted.contains(&question.id) {
+                found.entry(question.id.clone()).or_insert(question);
+            }
+        };
+        match self {
+            Self::Stored(texts) => each_question(&texts.folder, add),
+            Self::Parts(parts) => parts
+                .iter()
+                .try_for_each(|part| part.questions(wanted, found)),
+            Self::Held(texts) => {
+                texts.questions.iter().cloned().for_each(&mut add);
+                Ok(())
+            }
+        }
+    }
+}
