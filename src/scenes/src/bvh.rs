@@ -1,16 +1,20 @@
-//! Intersection of rays with triangles: [`Bvh`], a binary tree of boxes (bounding volume hierarchy).
+//! Intersection of rays with triangles: [`Bvh`], a tree of boxes (bounding volume hierarchy).
+//!
+//! A node has four boxes, which are tested at once (Wald, Benthin and Boulos, 2008). It is a binary tree without every second level,
+//! and visits boxes in the order of that tree, because the order decides between equally near triangles.
 
-use glam::{Vec3, Vec3A};
+use std::ops::Range;
 
-/// A ray. `start` and `invert` (1 / direction) repeat it in the form that box tests need.
+use glam::{Vec3, Vec4, vec3};
+
+/// A ray. `invert` is 1 / direction, which box tests need.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ray {
     pub(super) from: Vec3,
     pub(super) direction: Vec3,
     /// The width of the ray per metre of its length.
     pub(super) spread: f32,
-    start: Vec3A,
-    invert: Vec3A,
+    invert: Vec3,
 }
 
 impl Ray {
@@ -26,8 +30,7 @@ impl Ray {
             from,
             direction,
             spread: COARSE,
-            start: from.into(),
-            invert: Vec3A::new(part(direction.x), part(direction.y), part(direction.z)),
+            invert: vec3(part(direction.x), part(direction.y), part(direction.z)),
         }
     }
 }
@@ -55,14 +58,23 @@ struct Leaf {
     clear: bool,
 }
 
-/// A box. The first child of an inner node follows it and the second is at `next`. A leaf has `count` triangles from `next`.
+/// Four boxes with their contents.
 #[derive(Debug, Clone, Copy)]
 struct Node {
-    low: Vec3A,
-    high: Vec3A,
-    next: u32,
+    /// The lowest coordinates of the boxes by axis.
+    low: [Vec4; 3],
+    /// The highest coordinates of the boxes by axis.
+    high: [Vec4; 3],
+    children: [Child; BOXES],
+    /// The axes of three splits: between the first two boxes and the last two, within the first two, and within the last two.
+    axes: [u8; 3],
+}
+
+/// The content of a box: `count` triangles from `place` on, or, if `count` is 0, the node at `place`.
+#[derive(Debug, Clone, Copy)]
+struct Child {
+    place: u32,
     count: u32,
-    axis: usize,
 }
 
 /// A tree of boxes over all triangles of a scene.
@@ -74,9 +86,14 @@ pub(super) struct Bvh {
 
 /// The maximum number of triangles in a leaf (chosen).
 const LEAF_SIZE: usize = 4;
+/// The number of boxes of a node.
+const BOXES: usize = 4;
+/// The maximum number of boxes that wait for a visit: three on each level. The trees of rooms have fewer levels.
+const WAITING: usize = 64;
 /// The number of bins along an axis for splitting a node (chosen).
 const BINS: usize = 12;
 
+#[derive(Debug, Clone, Copy)]
 struct BuildItem {
     leaf: Leaf,
     low: Vec3,
@@ -112,101 +129,206 @@ impl Bvh {
         tree
     }
 
-    fn build(&mut self, items: &mut [BuildItem]) {
-        let (low, high) = bounds(items);
-        let index = self.nodes.len();
-        self.nodes.push(Node {
-            low: low.into(),
-            high: high.into(),
-            next: self.leaves.len() as u32,
-            count: items.len() as u32,
-            axis: 0,
-        });
-        if items.len() <= LEAF_SIZE {
-            self.leaves.extend(items.iter().map(|item| item.leaf));
-            return;
+    /// Adds a node over items, and all nodes below it. Returns its place.
+    fn build(&mut self, items: &mut [BuildItem]) -> u32 {
+        let place = self.nodes.len();
+        self.nodes.push(Node::EMPTY);
+        let mut axes = [0; 3];
+        for (half, items) in halves(items, &mut axes[0]).into_iter().enumerate() {
+            for (part, items) in halves(items, &mut axes[half + 1]).into_iter().enumerate() {
+                if !items.is_empty() {
+                    let (low, high) = bounds(items);
+                    let child = self.child(items);
+                    self.nodes[place].set(half * 2 + part, [low, high], child);
+                }
+            }
         }
-        let (axis, middle) = split(items);
-        let (first, second) = items.split_at_mut(middle);
-        self.build(first);
-        let next = self.nodes.len() as u32;
-        self.build(second);
-        let node = &mut self.nodes[index];
-        (node.next, node.count, node.axis) = (next, 0, axis);
+        self.nodes[place].axes = axes;
+        place as u32
+    }
+
+    /// Adds the triangles or the nodes of a box.
+    fn child(&mut self, items: &mut [BuildItem]) -> Child {
+        if items.len() > LEAF_SIZE {
+            let place = self.build(items);
+            return Child { place, count: 0 };
+        }
+        let place = self.leaves.len() as u32;
+        self.leaves.extend(items.iter().map(|item| item.leaf));
+        Child {
+            place,
+            count: items.len() as u32,
+        }
     }
 
     /// The first triangle that a ray hits within a distance.
     pub(super) fn first(&self, ray: &Ray, max_distance: f32) -> Option<Hit> {
+        let tester = BoxTester::new(ray);
         let mut found: Option<Hit> = None;
         let mut distance = max_distance;
-        self.visit(ray, &mut distance, |leaf, distance| {
-            if let Some((at, weights)) = leaf.hit_by(ray, *distance) {
-                *distance = at;
-                found = Some(Hit {
-                    distance: at,
-                    face: leaf.face as usize,
-                    weights,
-                });
+        let mut waiting = [(0.0, Child::ROOT); WAITING];
+        let mut count = 1;
+        while count > 0 {
+            count -= 1;
+            let (near, child) = waiting[count];
+            if near > distance {
+                continue;
             }
-            false
-        });
+            let Some(place) = child.node() else {
+                for leaf in &self.leaves[child.leaves()] {
+                    if let Some((at, weights)) = leaf.hit_by(ray, distance) {
+                        distance = at;
+                        found = Some(Hit {
+                            distance: at,
+                            face: leaf.face as usize,
+                            weights,
+                        });
+                    }
+                }
+                continue;
+            };
+            let node = &self.nodes[place];
+            let (near, hit) = tester.test(node, distance);
+            if hit == 0 {
+                continue;
+            }
+            // The farthest box first, because the last one that waits is visited next.
+            for slot in tester.far_to_near(node) {
+                if hit >> slot & 1 == 1 {
+                    waiting[count] = (near[slot], node.children[slot]);
+                    count += 1;
+                }
+            }
+        }
         found
     }
 
     /// Whether a ray hits anything that casts a shadow within a distance.
     pub(super) fn blocked(&self, ray: &Ray, max_distance: f32) -> bool {
-        let (mut blocked, mut distance) = (false, max_distance);
-        self.visit(ray, &mut distance, |leaf, distance| {
-            blocked = !leaf.clear && leaf.hit_by(ray, *distance).is_some();
-            blocked
-        });
-        blocked
-    }
-
-    /// Visits the triangles in the boxes that a ray hits, near boxes first, until `stop` returns `true`.
-    fn visit(&self, ray: &Ray, distance: &mut f32, mut stop: impl FnMut(&Leaf, &mut f32) -> bool) {
-        let mut stack = [0_u32; 64];
-        let (mut depth, mut at) = (0, 0_usize);
-        loop {
-            let node = &self.nodes[at];
-            if node.hits(ray, *distance) {
-                if node.count > 0 {
-                    let from = node.next as usize;
-                    for leaf in &self.leaves[from..from + node.count as usize] {
-                        if stop(leaf, distance) {
-                            return;
-                        }
-                    }
-                } else {
-                    let (near, other) = if ray.invert[node.axis] < 0.0 {
-                        (node.next as usize, at as u32 + 1)
-                    } else {
-                        (at + 1, node.next)
-                    };
-                    stack[depth] = other;
-                    depth += 1;
-                    at = near;
+        let tester = BoxTester::new(ray);
+        let mut waiting = [0; WAITING];
+        let mut count = 1;
+        while count > 0 {
+            count -= 1;
+            let node = &self.nodes[waiting[count]];
+            let (_, hit) = tester.test(node, max_distance);
+            for (slot, child) in node.children.iter().enumerate() {
+                if hit >> slot & 1 == 0 {
                     continue;
                 }
+                if let Some(place) = child.node() {
+                    waiting[count] = place;
+                    count += 1;
+                } else if self.leaves[child.leaves()]
+                    .iter()
+                    .any(|leaf| !leaf.clear && leaf.hit_by(ray, max_distance).is_some())
+                {
+                    return true;
+                }
             }
-            if depth == 0 {
-                return;
-            }
-            depth -= 1;
-            at = stack[depth] as usize;
         }
+        false
+    }
+}
+
+#[cfg(test)]
+impl Bvh {
+    /// The number of levels.
+    pub(super) fn depth(&self) -> usize {
+        // A node stands behind its parent.
+        let mut depths = vec![1; self.nodes.len()];
+        for place in 0..self.nodes.len() {
+            let children = self.nodes[place].children.iter();
+            for child in children
+                .filter_map(|child| child.node())
+                .filter(|child| *child > place)
+            {
+                depths[child] = depths[place] + 1;
+            }
+        }
+        depths.into_iter().max().unwrap_or(0)
+    }
+
+    /// The maximum number of levels that can be visited.
+    pub(super) const MAX_DEPTH: usize = (WAITING - 1) / (BOXES - 1);
+}
+
+impl Child {
+    const ROOT: Self = Self { place: 0, count: 0 };
+
+    /// The place of the node; `None` if there are triangles.
+    fn node(self) -> Option<usize> {
+        (self.count == 0).then_some(self.place as usize)
+    }
+
+    /// The places of the triangles.
+    fn leaves(self) -> Range<usize> {
+        let from = self.place as usize;
+        from..from + self.count as usize
+    }
+}
+
+/// A ray in the form that the test of four boxes needs.
+struct BoxTester {
+    start: [Vec4; 3],
+    invert: [Vec4; 3],
+    /// A bit for each axis along which the ray runs backwards.
+    backwards: u8,
+}
+
+impl BoxTester {
+    fn new(ray: &Ray) -> Self {
+        let backwards = |axis: usize| u8::from(ray.invert[axis] < 0.0) << axis;
+        Self {
+            start: ray.from.to_array().map(Vec4::splat),
+            invert: ray.invert.to_array().map(Vec4::splat),
+            backwards: backwards(0) | backwards(1) | backwards(2),
+        }
+    }
+
+    /// The distances to the boxes, and a bit for each that the ray hits within a distance (Kay and Kajiya, SIGGRAPH 1986).
+    fn test(&self, node: &Node, distance: f32) -> ([f32; BOXES], u32) {
+        let (mut near, mut out) = (Vec4::ZERO, Vec4::splat(distance));
+        for axis in 0..3 {
+            let a = (node.low[axis] - self.start[axis]) * self.invert[axis];
+            let b = (node.high[axis] - self.start[axis]) * self.invert[axis];
+            near = near.max(a.min(b));
+            out = out.min(a.max(b));
+        }
+        (near.to_array(), near.cmple(out).bitmask())
+    }
+
+    /// The boxes of a node from the farthest to the nearest, by the axes of its splits.
+    fn far_to_near(&self, node: &Node) -> [usize; BOXES] {
+        let [both, first, last] = node
+            .axes
+            .map(|axis| usize::from(self.backwards >> axis & 1));
+        let [first, last] = [[1 - first, first], [3 - last, 2 + last]];
+        let [[a, b], [c, d]] = if both == 0 {
+            [last, first]
+        } else {
+            [first, last]
+        };
+        [a, b, c, d]
     }
 }
 
 impl Node {
-    /// Whether a ray hits the box within a distance (Kay and Kajiya, SIGGRAPH 1986).
-    fn hits(&self, ray: &Ray, distance: f32) -> bool {
-        let (a, b) = (
-            (self.low - ray.start) * ray.invert,
-            (self.high - ray.start) * ray.invert,
-        );
-        let (near, out) = (a.min(b), a.max(b));
-        near.max_element().max(0.0) <= out.min_element().min(distance)
+    /// Four points that no ray reaches.
+    const EMPTY: Self = Self {
+        low: [Vec4::MAX; 3],
+        high: [Vec4::MAX; 3],
+        children: [Child { place: 0, count: 0 }; BOXES],
+        axes: [0; 3],
+    };
+
+    /// Puts a box into the node.
+    fn set(&mut self, slot: usize, [low, high]: [Vec3; 2], child: Child) {
+        for axis in 0..3 {
+            self.low[axis][slot] = low[axis];
+            self.high[axis][slot] = high[axis];
+        }
+        self.children[slot] = child;
     }
 }
 
@@ -242,9 +364,48 @@ fn bounds(items: &[BuildItem]) -> (Vec3, Vec3) {
     )
 }
 
+/// Splits items into two parts and sets the axis of the split. All are in the first part if they fit into a leaf.
+fn halves<'a>(items: &'a mut [BuildItem], axis: &mut u8) -> [&'a mut [BuildItem]; 2] {
+    let mut count = items.len();
+    if count > LEAF_SIZE {
+        let split = split(items);
+        (*axis, count) = (split.0 as u8, split.1);
+    }
+    items.split_at_mut(count).into()
+}
+
 fn area(low: Vec3, high: Vec3) -> f32 {
     let size = (high - low).max(Vec3::ZERO);
     size.x * size.y + size.y * size.z + size.z * size.x
+}
+
+/// The bounds and the number of some items.
+#[derive(Debug, Clone, Copy)]
+struct Bin {
+    low: Vec3,
+    high: Vec3,
+    count: usize,
+}
+
+impl Bin {
+    const EMPTY: Self = Self {
+        low: Vec3::MAX,
+        high: Vec3::MIN,
+        count: 0,
+    };
+
+    fn joined(self, other: Self) -> Self {
+        Self {
+            low: self.low.min(other.low),
+            high: self.high.max(other.high),
+            count: self.count + other.count,
+        }
+    }
+
+    /// The cost of a ray that visits all items.
+    fn cost(self) -> f32 {
+        area(self.low, self.high) * self.count as f32
+    }
 }
 
 /// Sorts items for the split with the lowest cost for rays (binned surface area heuristic; Wald, 2007). Returns the axis and
@@ -261,26 +422,29 @@ fn split(items: &mut [BuildItem]) -> (usize, usize) {
     };
     let mut best: Option<(f32, usize, usize)> = None;
     for axis in (0..3).filter(|axis| size[*axis] > 1e-6) {
-        let mut bins = [(Vec3::splat(f32::MAX), Vec3::splat(f32::MIN), 0_usize); BINS];
+        let mut bins = [Bin::EMPTY; BINS];
         for item in items.iter() {
-            let (low, high, count) = &mut bins[bin(item, axis)];
-            (*low, *high, *count) = (low.min(item.low), high.max(item.high), *count + 1);
-        }
-        let sum = |bins: &[(Vec3, Vec3, usize)]| {
-            let start = (Vec3::splat(f32::MAX), Vec3::splat(f32::MIN), 0);
-            let (low, high, count) = bins.iter().fold(start, |(low, high, count), bin| {
-                (low.min(bin.0), high.max(bin.1), count + bin.2)
+            let bin = &mut bins[bin(item, axis)];
+            *bin = bin.joined(Bin {
+                low: item.low,
+                high: item.high,
+                count: 1,
             });
-            (area(low, high) * count as f32, count)
-        };
+        }
+        // All bins from each one on.
+        let mut right = bins;
+        for index in (0..BINS - 1).rev() {
+            right[index] = right[index].joined(right[index + 1]);
+        }
+        let mut left = Bin::EMPTY;
         for index in 1..BINS {
-            let ((left, left_count), (right, right_count)) =
-                (sum(&bins[..index]), sum(&bins[index..]));
-            if left_count > 0
-                && right_count > 0
-                && best.is_none_or(|(lowest, ..)| left + right < lowest)
+            left = left.joined(bins[index - 1]);
+            let cost = left.cost() + right[index].cost();
+            if left.count > 0
+                && right[index].count > 0
+                && best.is_none_or(|(lowest, ..)| cost < lowest)
             {
-                best = Some((left + right, axis, index));
+                best = Some((cost, axis, index));
             }
         }
     }
@@ -288,10 +452,13 @@ fn split(items: &mut [BuildItem]) -> (usize, usize) {
         // All items are at the same point.
         return (0, items.len() / 2);
     };
-    // The sort is stable, so that the tree depends only on the scene.
-    items.sort_by_key(|item| bin(item, axis) >= index);
-    let first = items.iter().filter(|item| bin(item, axis) < index).count();
-    (axis, first)
+    // The order within a part stays, so that the tree depends only on the scene.
+    let (mut first, second): (Vec<_>, Vec<_>) =
+        items.iter().partition(|item| bin(item, axis) < index);
+    let count = first.len();
+    first.extend(second);
+    items.copy_from_slice(&first);
+    (axis, count)
 }
 
 #[cfg(test)]

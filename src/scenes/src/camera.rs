@@ -1,6 +1,6 @@
 //! The camera of a frame: [`Camera`].
 
-use glam::{Vec3, vec3};
+use glam::{Vec2, Vec3, vec3};
 
 use super::bvh::Ray;
 use super::mesh::cos_sin;
@@ -10,10 +10,10 @@ use darkqa_ground::types::Intrinsics;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Camera {
     pub(super) at: Vec3,
-    /// The rotation about y in radians; at 0 the camera looks along −z.
-    pub(super) angle: f32,
-    /// The downward tilt in radians.
-    pub(super) tilt: f32,
+    /// Cosine and sine of the rotation about y; at an angle of 0 the camera looks along −z.
+    turn: Vec2,
+    /// Cosine and sine of the upward tilt.
+    tilt: Vec2,
     /// Width and height of the image in pixels.
     pub(super) size: [usize; 2],
     /// The focal length in pixels.
@@ -30,12 +30,12 @@ pub(super) fn focal(size: [usize; 2]) -> f32 {
 }
 
 impl Camera {
-    /// A camera at a place, for images of a size in pixels.
+    /// A camera at a place, rotated about y and tilted downwards by angles in radians, for images of a size in pixels.
     pub(super) fn new(at: Vec3, angle: f32, tilt: f32, size: [usize; 2]) -> Self {
         Self {
             at,
-            angle,
-            tilt,
+            turn: cos_sin(angle),
+            tilt: cos_sin(-tilt),
             size,
             focal: focal(size),
         }
@@ -43,7 +43,11 @@ impl Camera {
 
     /// The same view with another image size.
     pub(super) fn sized(&self, size: [usize; 2]) -> Self {
-        Self::new(self.at, self.angle, self.tilt, size)
+        Self {
+            size,
+            focal: focal(size),
+            ..*self
+        }
     }
 
     fn middle(&self) -> [f32; 2] {
@@ -67,16 +71,16 @@ impl Camera {
     }
 
     fn to_room(self, v: Vec3) -> Vec3 {
-        let (tilt, angle) = (cos_sin(-self.tilt), cos_sin(self.angle));
+        let (tilt, turn) = (self.tilt, self.turn);
         let v = vec3(
             v.x,
             v.y * tilt.x - v.z * tilt.y,
             v.y * tilt.y + v.z * tilt.x,
         );
         vec3(
-            v.x * angle.x + v.z * angle.y,
+            v.x * turn.x + v.z * turn.y,
             v.y,
-            v.z * angle.x - v.x * angle.y,
+            v.z * turn.x - v.x * turn.y,
         )
     }
 

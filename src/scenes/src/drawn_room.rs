@@ -5,10 +5,9 @@ use std::sync::Arc;
 
 use ndarray::Array2;
 
+use super::camera::Camera;
 use darkqa_ground::error::{Error, Result};
-use darkqa_ground::types::{
-    DepthKind, Frame, FrameId, Intrinsics, Light, Rgb, SegmentName, Segmentation,
-};
+use darkqa_ground::types::{DepthKind, Frame, FrameId, Light, Rgb, SegmentName, Segmentation};
 
 /// A drawn frame. The frames of the default data set fit into the cache, so that each is drawn once for its questions and its images.
 #[derive(Debug)]
@@ -16,7 +15,7 @@ pub(super) struct DrawnRoom {
     pub(super) id: FrameId,
     pub(super) scene: String,
     pub(super) room: &'static str,
-    pub(super) intrinsics: Intrinsics,
+    pub(super) camera: Camera,
     pub(super) rgb: Arc<Rgb>,
     /// Linear light; `None` if only codes of a display are drawn.
     pub(super) light: Option<Arc<Light>>,
@@ -48,7 +47,7 @@ impl DrawnRoom {
             scene: self.scene.clone(),
             depth: Some(self.map(shape, self.depth.iter().copied().map(u32::from))?),
             depth_kind: DepthKind::Planar,
-            intrinsics: Some(self.intrinsics),
+            intrinsics: Some(self.camera.intrinsics()),
             semantic: Some(self.map(shape, self.things.iter().map(class))?),
             segments: Some(self.map(shape, self.things.iter().copied().map(u32::from))?),
             segmentation: Segmentation::Instances,

@@ -35,6 +35,8 @@ use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::sync::{Arc, LazyLock};
 
+use self::bvh::Bvh;
+use self::camera::Camera;
 use self::dice::Dice;
 use self::drawn_room::DrawnRoom;
 use self::kinds::RoomKind;
@@ -196,17 +198,16 @@ impl Room {
             .furnish(Dice::new(self.rooms.seed, &[&scene, "furniture"]))
     }
 
-    fn camera(&self, plan: &FloorPlan) -> camera::Camera {
+    fn camera(&self, plan: &FloorPlan, tree: &Bvh) -> Camera {
         let scene = self.scene();
         let mut dice = Dice::new(self.rooms.seed, &[&scene, self.view(), "camera"]);
-        viewpoint::camera(plan, self.height(), self.rooms.size, &mut dice)
+        viewpoint::camera(plan, tree, self.height(), self.rooms.size, &mut dice)
     }
 
     /// The ground truth of the frame.
     #[must_use]
     pub fn truth(&self) -> RoomTruth {
-        let plan = self.plan();
-        let camera = self.camera(&plan);
+        let (plan, camera) = (self.plan(), self.drawn().camera);
         let mut near = vec![f32::MAX; plan.scene.things.len()];
         for (face, owner) in plan.scene.mesh.faces.iter().zip(&plan.scene.owners) {
             let visible = face.points(SPACING).filter(|point| camera.sees(*point));
@@ -275,8 +276,9 @@ impl Room {
 
     fn draw(&self) -> DrawnRoom {
         let plan = self.plan();
-        let camera = self.camera(&plan);
-        let view = render::render(&plan.scene, &camera, self.rooms.light);
+        let tree = plan.scene.tree();
+        let camera = self.camera(&plan, &tree);
+        let view = render::render(&plan.scene, &tree, &camera, self.rooms.light);
         let things = &plan.scene.things;
         let classes = things.iter().map(|thing| number(thing.kind.class));
         let names = things.iter().zip(1..).map(|(thing, number)| {
@@ -291,7 +293,7 @@ impl Room {
             id: self.id(),
             scene: self.scene(),
             room: self.kind().name(),
-            intrinsics: camera.intrinsics(),
+            camera,
             rgb: view.pixels.codes(),
             light: match view.pixels {
                 Pixels::Light(light) => Some(light),
@@ -307,7 +309,7 @@ impl Room {
     /// The camera pose in metres: a matrix from the camera (x right, y up, z backwards) to the room, row by row.
     #[must_use]
     pub fn pose(&self) -> [f32; 16] {
-        self.camera(&self.plan()).pose()
+        self.drawn().camera.pose()
     }
 }
 
@@ -356,6 +358,17 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn the_trees_of_rooms_are_not_too_deep() {
+        let rooms = Rooms {
+            frames: 120,
+            ..Rooms::default()
+        };
+        let trees = rooms.all().map(|(_, room)| room.plan().scene.tree());
+        let deepest = trees.step_by(2).map(|tree| tree.depth()).max().unwrap();
+        assert!((5..Bvh::MAX_DEPTH - 4).contains(&deepest), "{deepest}");
     }
 
     #[test]

@@ -44,11 +44,10 @@ const EXPOSURE: f32 = 0.98;
 const EDGE: f32 = 0.06;
 
 /// The image and the maps of a scene, as a camera sees it. The image has the codes of a display, or linear light.
-pub(super) fn render(scene: &Scene, camera: &Camera, shown: RoomLight) -> RenderedView {
-    let tree = scene.tree();
+pub(super) fn render(scene: &Scene, tree: &Bvh, camera: &Camera, shown: RoomLight) -> RenderedView {
     let [width, height] = camera.size;
-    let spots = spots(scene, &tree, camera);
-    let lighting = lighting(scene, &tree, &spots);
+    let spots = spots(scene, tree, camera);
+    let lighting = lighting(scene, tree, &spots);
     let radiances = match shown {
         RoomLight::Display => Vec::new(),
         RoomLight::Linear => scene.radiances(),
@@ -72,7 +71,7 @@ pub(super) fn render(scene: &Scene, camera: &Camera, shown: RoomLight) -> Render
         if is_edge(&spots, &colors, camera.size, at, exposure) {
             let rays = SUBPIXELS.map(|[dx, dy]| [at[0] as f32 + dx, at[1] as f32 + dy]);
             let colors = rays.map(|[x, y]| {
-                let spot = Spot::through_mirror(scene, &tree, &camera.ray(x, y));
+                let spot = Spot::through_mirror(scene, tree, &camera.ray(x, y));
                 let color = spot.map_or(color, |spot| light.shade(&spot, camera.at, [x, y]));
                 curve(color * exposure)
             });

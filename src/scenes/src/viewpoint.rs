@@ -2,6 +2,7 @@
 
 use glam::{Vec3, vec3};
 
+use super::bvh::Bvh;
 use super::camera::Camera;
 use super::dice::Dice;
 use super::plan::FloorPlan;
@@ -40,11 +41,11 @@ const PREVIEW: [usize; 2] = [64, 40];
 /// The camera of a frame. If no place is suitable, it stands in the middle of the room.
 pub(super) fn camera(
     plan: &FloorPlan,
+    tree: &Bvh,
     height: Height,
     size: [usize; 2],
     dice: &mut Dice,
 ) -> Camera {
-    let tree = plan.scene.tree();
     let up = height.metres(dice);
     let mut best: Option<(f32, Camera)> = None;
     let mut tries = 0;
@@ -67,7 +68,7 @@ pub(super) fn camera(
         let angle = libm::atan2f(-offset.x, -offset.z);
         let tilt = libm::atan2f((-offset.y).max(0.0), distance.max(1.5)) * 0.55;
         let camera = Camera::new(place, angle, tilt, size);
-        let score = score(plan, &preview(&plan.scene, &tree, &camera.sized(PREVIEW)));
+        let score = score(plan, &preview(&plan.scene, tree, &camera.sized(PREVIEW)));
         if best.as_ref().is_none_or(|(highest, _)| score > *highest) {
             best = Some((score, camera));
         }
