@@ -159,10 +159,10 @@ fn wrong(asked: &GeneratedQuestion, seen: &Seen) -> Option<String> {
     })
 }
 
-/// Frames enough for fifteen hundred questions, as many of each kind of room as of any other.
+/// Frames enough for five hundred questions, as many of each kind of room as of any other.
 fn many(seed: u64) -> Rooms {
     Rooms {
-        frames: 468,
+        frames: 168,
         seed,
         size: [240, 180],
         ..Rooms::default()
@@ -172,10 +172,10 @@ fn many(seed: u64) -> Rooms {
 #[test]
 fn the_questions_are_right_and_even() {
     let (made, mut seen, (colors, lit_wrong)) = asked(many(7));
-    assert!(made.asked.len() >= 1500, "{}", made.asked.len());
+    assert!(made.asked.len() >= 500, "{}", made.asked.len());
     // Every colour that passes the rules is that of the paint, in light and in shade.
     assert!(
-        lit_wrong.is_empty() && colors >= 200,
+        lit_wrong.is_empty() && colors >= 70,
         "{colors}: {lit_wrong:?}"
     );
     let faults: Vec<String> = made
@@ -197,7 +197,7 @@ fn the_questions_are_right_and_even() {
         let total: usize = counts.values().sum();
         let most = counts.values().max().unwrap();
         let binary = counts.len() == 2;
-        assert!(total >= 40, "{family}: {total}");
+        assert!(total >= 15, "{family}: {total}");
         let share = 100 * most / total;
         assert!(
             share <= if binary { 55 } else { 45 },
@@ -211,7 +211,7 @@ fn the_questions_are_right_and_even() {
     let chance = chances.sum::<f64>() / made.asked.len() as f64;
     assert!((0.30..0.37).contains(&chance), "{chance}");
 
-    // Every class that is asked about is there in at least ten frames.
+    // Every class that is asked about is there in at least five frames.
     let rules = Rules::built_in().unwrap();
     let classes = rules.book().class.iter();
     for (class, _) in classes.filter(|(_, class)| class.flags.contains(&ClassFlag::Asked)) {
@@ -219,7 +219,7 @@ fn the_questions_are_right_and_even() {
             .values()
             .filter(|seen| !seen.of_class(class).is_empty());
         let count = frames.count();
-        assert!(count >= 10, "{class}: in {count} frames");
+        assert!(count >= 5, "{class}: in {count} frames");
     }
 
     // No colour is the answer so often that naming it always would pay.

@@ -25,8 +25,8 @@ mod requests;
 mod seeds;
 mod trial;
 
-/// The number of runs of the short form: about a minute on two cores.
-const SHORT: usize = 900;
+/// The number of runs of the short form: about ten seconds on two cores.
+const SHORT: usize = 450;
 
 #[test]
 fn damaged_files_are_read_or_refused() {
