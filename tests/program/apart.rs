@@ -157,11 +157,12 @@ fn a_row_that_pools_fewer_models_says_so() {
 }
 
 /// A run of the observer on a few small rooms.
-const ROOMS: &str = "--model observer --levels L0,L3 --data rooms:frames=4,size=160x120";
+const ROOMS: &str = "--model observer --levels L0,L3 --data frames";
 
 #[test]
 fn shards_of_the_observer_are_one_light() {
     let bench = Bench::new();
+    bench.rooms("frames", 4, "160x120");
     for shard in ["1/2", "2/2"] {
         bench.complete(&words(&format!("{ROOMS} --shard {shard} --out s")));
     }
@@ -176,6 +177,7 @@ fn runs_by_other_rules_say_so_and_keep_their_controls() {
     let own = rules.replace("detail_ppm = 500 ", "detail_ppm = 501 ");
     assert_ne!(own, rules);
     bench.file("own.toml", own);
+    bench.rooms("frames", 4, "160x120");
     bench.complete(&words(&format!("{ROOMS} --out a")));
     bench.complete(&words(&format!("{ROOMS} --rules own.toml --out b")));
     let full = bench.complete(&words("report a b --full"));

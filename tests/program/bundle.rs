@@ -48,8 +48,9 @@ fn texts(folder: &Path) -> Vec<(String, String)> {
 #[test]
 fn a_bundle_is_the_run_again_and_the_same_bytes_each_time() {
     let bench = Bench::new();
+    bench.rooms("frames", 4, "160x120");
     bench.complete(&words(
-        "--model observer --model random --blind-model random --data rooms:frames=4,size=160x120 --levels L0,L5 --out run",
+        "--model observer --model random --blind-model random --data frames --levels L0,L5 --out run",
     ));
     bench.file("run/notes.txt", "mine");
     let said = bench.complete(&words("bundle run --out one.zip"));
@@ -86,7 +87,7 @@ fn a_bundle_is_the_run_again_and_the_same_bytes_each_time() {
     let readme = fs::read_to_string(bench.path("unpacked/run/README.md")).unwrap();
     for part in [
         "darkqa-eval report run",
-        "--data rooms:frames=4,size=160x120",
+        "--data frames",
         "--blind-model random",
         "--levels L0,L5",
     ] {

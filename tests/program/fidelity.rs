@@ -105,10 +105,10 @@ fn two_frames_with_the_same_dark_image_have_their_own_fidelity() {
 #[test]
 fn a_run_keeps_the_fidelity_of_its_images_and_reports_it() {
     let bench = Bench::new();
+    bench.rooms("frames", 8, "160x120");
     let run = |variant: &str| {
-        let line = format!(
-            "--model random --data rooms:frames=8,size=160x120 --out run --levels L0,L1,L5 --variant {variant}"
-        );
+        let line =
+            format!("--model random --data frames --out run --levels L0,L1,L5 --variant {variant}");
         bench.complete(&words(&line))
     };
     run("ev");
@@ -175,7 +175,7 @@ fn the_page_draws_the_numbers_of_the_file(bench: &Bench, table: &str) {
             assert!((drawn - filed).abs() < 1e-4, "{drawn} {filed}");
         }
     }
-    let line = "--model random --data rooms:frames=8,size=160x120 --out light --levels L0";
+    let line = "--model random --data frames --out light --levels L0";
     bench.complete(&words(line));
     assert!(!page("light").contains(r#"id="fidelity""#));
 }

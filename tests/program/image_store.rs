@@ -21,7 +21,7 @@ const OPENED: &str = "one: opened, because the store lacks an image";
 /// A run about small rooms with an enhancer; `--timings` says what the store gave.
 fn evaluate(bench: &Bench, model: &str, more: &str) -> Called {
     let line = format!(
-        "--model {model} --data rooms:frames=3,size=96x64 --levels L3,L5 --variant both --llie one.onnx --llie-on both --llie-anyway --timings {more}"
+        "--model {model} --data frames --levels L3,L5 --variant both --llie one.onnx --llie-on both --llie-anyway --timings {more}"
     );
     let mut command = bench.command(&words(&line));
     let called = called(command.env("RUST_LOG", "darkqa_eval=debug"));
@@ -31,6 +31,7 @@ fn evaluate(bench: &Bench, model: &str, more: &str) -> Called {
 
 fn bench() -> Bench {
     let bench = Bench::new();
+    bench.rooms("frames", 3, "96x64");
     onnx::gamma(0.5).write(&bench.path(""), "one.onnx");
     bench
 }
@@ -193,8 +194,9 @@ fn an_enhancer_is_opened_if_an_image_is_missing_and_tried_again_on_other_frames(
 #[test]
 fn an_enhancer_that_is_refused_is_refused_with_its_images_in_the_store() {
     let bench = Bench::new();
+    bench.rooms("frames", 3, "96x64");
     onnx::gamma(0.0).write(&bench.path(""), "one.onnx");
-    let line = "--model random --data rooms:frames=3,size=96x64 --levels L3 --llie one.onnx --images-cache images";
+    let line = "--model random --data frames --levels L3 --llie one.onnx --images-cache images";
     let overruled = bench.call(&words(&format!("{line} --llie-anyway --out anyway")));
     assert_eq!(overruled.code, Some(0), "{overruled:?}");
     let warned = bench.call(&words(&format!("{line} --llie-anyway --out warned")));
@@ -210,7 +212,7 @@ fn an_enhancer_that_is_refused_is_refused_with_its_images_in_the_store() {
 #[test]
 fn a_dry_run_says_how_many_images_find_room_and_makes_no_store() {
     let bench = bench();
-    let line = "--model random --data rooms:frames=3,size=96x64 --levels L3,L5 --llie one.onnx --llie-anyway --dry-run --out run";
+    let line = "--model random --data frames --levels L3,L5 --llie one.onnx --llie-anyway --dry-run --out run";
     let without = bench.complete(&words(line));
     assert!(!without.contains("image store"), "{without}");
     let roomy = bench.complete(&words(&format!("{line} --images-cache images")));

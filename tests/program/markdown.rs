@@ -15,9 +15,10 @@ fn table(text: &str) -> Vec<&str> {
 #[test]
 fn findings_are_the_words_of_the_summary_and_cells_cannot_break_the_table() {
     let bench = Bench::new();
+    bench.rooms("frames", 8, "160x120");
     bench.file("a|`b`<b>.jsonl", "{\"default\": \"A\"}\n");
     bench.complete(&words(
-        "--model random --model observer --model script:a|`b`<b>.jsonl --data rooms:frames=8,size=160x120 --levels L0,L5 --out run",
+        "--model random --model observer --model script:a|`b`<b>.jsonl --data frames --levels L0,L5 --out run",
     ));
     let text = bench.complete(&words("report run --markdown"));
     let summary = fs::read(bench.path("run/summary.json")).unwrap();
@@ -55,8 +56,9 @@ fn findings_are_the_words_of_the_summary_and_cells_cannot_break_the_table() {
 #[test]
 fn runs_without_true_answers_and_open_questions_have_it_too() {
     let bench = Bench::new();
+    bench.rooms("frames", 2, "96x64");
     bench.complete(&words(
-        "--model random --data rooms:frames=2,size=96x64 --ask home --levels L0,L3 --out own",
+        "--model random --data frames --ask home --levels L0,L3 --out own",
     ));
     let text = bench.complete(&words("report own --markdown"));
     assert!(text.contains("without answers"), "{text}");

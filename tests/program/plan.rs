@@ -15,7 +15,7 @@ const FLAGS: &str = "--model random --blind-model random --levels L0,L2 --data f
 /// A folder of frames of built-in rooms.
 fn with_frames() -> Bench {
     let bench = Bench::new();
-    bench.complete(&words("rooms --out frames --frames 12 --size 160x120"));
+    bench.rooms("frames", 12, "160x120");
     bench
 }
 

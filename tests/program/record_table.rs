@@ -126,8 +126,9 @@ fn assert_rows_are_records(run: &Path) {
 #[test]
 fn the_table_has_every_record_and_counts_as_the_summary_does() {
     let bench = Bench::new();
+    bench.rooms("frames", 4, "120x90");
     bench.complete(&words(
-        "--model observer --model random --blind-model random --data rooms:frames=4,size=120x90 --levels L0,L3 \
+        "--model observer --model random --blind-model random --data frames --levels L0,L3 \
          --profile paper,physical --repeats 2 --out run",
     ));
     let run = bench.path("run");
@@ -161,8 +162,8 @@ fn the_table_has_every_record_and_counts_as_the_summary_does() {
 #[test]
 fn written_again_and_from_parts_it_is_the_same() {
     let bench = Bench::new();
-    let args =
-        "--model random --blind-model random --levels L0,L2 --data rooms:frames=6,size=120x90";
+    bench.rooms("frames", 6, "120x90");
+    let args = "--model random --blind-model random --levels L0,L2 --data frames";
     bench.complete(&words(&format!("{args} --out whole")));
     let path = bench.path("whole/records.parquet");
     let first = fs::read(&path).unwrap();
@@ -263,7 +264,8 @@ fn failures_refusals_and_odd_texts_are_as_in_the_records() {
 #[test]
 fn a_table_that_is_not_as_new_as_the_records_is_noticed() {
     let bench = Bench::new();
-    let args = "--model random --levels L0 --data rooms:frames=2,size=120x90 --out run";
+    bench.rooms("frames", 2, "120x90");
+    let args = "--model random --levels L0 --data frames --out run";
     bench.complete(&words(&format!("{args} --no-parquet")));
     let path = bench.path("run/records.parquet");
     assert!(!path.exists());
@@ -358,8 +360,9 @@ fn duckdb_counts_as_the_summary_does() {
         return;
     }
     let bench = Bench::new();
+    bench.rooms("frames", 4, "120x90");
     bench.complete(&words(
-        "--model random --blind-model random --data rooms:frames=4,size=120x90 --levels L0,L3 --out run",
+        "--model random --blind-model random --data frames --levels L0,L3 --out run",
     ));
     let output = Command::new(python)
         .args(["-c", &script])

@@ -17,9 +17,7 @@ const OWN_FILES: [&str; 6] = [
 
 /// The command of an evaluation with images of six rooms, and more flags.
 fn evaluation(more: &str) -> Vec<&str> {
-    let flags = words(
-        "--model observer --blind-model random --levels L0,L3 --data rooms:frames=6,size=120x90",
-    );
+    let flags = words("--model observer --blind-model random --levels L0,L3");
     [flags, words(more)].concat()
 }
 
@@ -114,10 +112,8 @@ fn parts_report_what_the_merged_run_does() {
 #[test]
 fn what_parts_lack_is_said_with_the_command_that_asks_it() {
     let bench = Bench::new();
-    bench.complete(&words(
-        "plan --model observer --levels L0,L3 --data rooms:frames=6,size=120x90 --out a",
-    ));
-    let flags = "--model observer --levels L0,L3 --data rooms:frames=6,size=120x90";
+    bench.complete(&words("plan --model observer --levels L0,L3 --out a"));
+    let flags = "--model observer --levels L0,L3";
     for part in ["1/3", "3/3"] {
         bench.complete(&words(&format!("{flags} --out a --shard {part}")));
     }

@@ -11,7 +11,7 @@ use serde_json::Value;
 /// The arguments of every evaluation here, and more of them.
 fn args(more: &str) -> Vec<&str> {
     let models = words("--model random --blind-model random");
-    let trials = words("--levels L0,L2 --data rooms:frames=6,size=120x90");
+    let trials = words("--levels L0,L2");
     [models, trials, words(more)].concat()
 }
 
@@ -139,10 +139,7 @@ fn missing_double_and_foreign_parts_are_named() {
 
 /// A mock that gives the same reply to the same request, and the arguments of an evaluation with it.
 fn asked_of(mock: &MockEndpoint) -> String {
-    format!(
-        "--model a --base-url {} --levels L0,L2 --data rooms:frames=6,size=120x90",
-        mock.base_url()
-    )
+    format!("--model a --base-url {} --levels L0,L2", mock.base_url())
 }
 
 #[test]

@@ -117,7 +117,7 @@ fn a_model_is_added_to_the_parts_of_a_run() {
     let mock = MockEndpoint::start([Answer::text("B")]);
     let flags = |models: &str, more: &str| {
         format!(
-            "{models} --base-url {} --levels L0,L2 --data rooms:frames=6,size=120x90 {more}",
+            "{models} --base-url {} --levels L0,L2 {more}",
             mock.base_url()
         )
     };

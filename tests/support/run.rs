@@ -8,6 +8,8 @@ use assert_cmd::Command;
 use serde_json::Value;
 use tempfile::TempDir;
 
+use super::rooms::rooms;
+
 /// An empty folder in which the program is called.
 pub struct Bench {
     folder: TempDir,
@@ -69,7 +71,7 @@ impl Bench {
             }
         }
         // Where no data are named: few rooms, and small ones.
-        command.env("DARKQA_DATA", "rooms:frames=6,size=120x90");
+        command.env("DARKQA_DATA", rooms(6, "120x90"));
         // A wide terminal, so that a line of a table is one line.
         command.env("COLUMNS", "400");
         command.current_dir(self.folder.path()).args(words);

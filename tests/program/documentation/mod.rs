@@ -15,6 +15,7 @@ use std::process::{Command, Output, Stdio};
 
 use crate::support::batches::{Course, MockBatches};
 use crate::support::endpoint::Answer;
+use crate::support::rooms::rooms;
 use crate::support::run::Bench;
 use crate::support::table::check_rows;
 use clap::error::ErrorKind;
@@ -140,7 +141,7 @@ fn run(page: &Page, folder: &Path) -> Output {
         .current_dir(folder)
         .env("PATH", path)
         .env("OPENAI_BASE_URL", mock.base_url())
-        .env("DARKQA_DATA", "rooms:frames=2,size=96x64")
+        .env("DARKQA_DATA", rooms(2, "96x64"))
         .env("MODELS", root().join("models"))
         .stdin(Stdio::null())
         .output()

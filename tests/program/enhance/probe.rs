@@ -8,17 +8,17 @@ use serde_json::Value;
 use crate::support::onnx::{self, Graph};
 use crate::support::run::{Bench, Called, words};
 
-/// An evaluation of the built-in rooms with the enhancer `model.onnx`.
-const ASK: &str =
-    "--model random --data rooms:frames=3,size=144x96 --levels L3 --limit 9 --out run";
+/// An evaluation of the rooms with the enhancer `model.onnx`.
+const ASK: &str = "--model random --data rooms --levels L3 --limit 9 --out run";
 
 const UNIT: [f32; 2] = [0.0, 1.0];
 const BYTES: [f32; 2] = [0.0, 255.0];
 const SIGNED: [f32; 2] = [-1.0, 1.0];
 
-/// A bench with a model, and with a sidecar if it is not empty.
+/// A bench with three rooms and a model, and with a sidecar if it is not empty.
 fn bench(graph: &Graph, sidecar: &str) -> Bench {
     let bench = Bench::new();
+    bench.rooms("rooms", 3, "144x96");
     graph.write(&bench.path(""), "model.onnx");
     if !sidecar.is_empty() {
         bench.file("model.onnx.toml", sidecar);
@@ -127,7 +127,6 @@ fn images_that_cannot_be_enhanced_ones_stop_the_run_with_what_was_seen() {
 #[test]
 fn sets_for_other_tools_are_not_made_with_it_either() {
     let bench = bench(&onnx::negative(), "");
-    bench.complete(&words("rooms --out rooms --frames 3 --size 144x96"));
     let line = "export llava rooms --out sets --llie model.onnx --levels L3 --limit 3";
     let called = bench.call(&words(line));
     assert_eq!(called.code, Some(2), "{called:?}");
@@ -155,7 +154,6 @@ fn a_wrong_statement_is_found_too() {
         let called = ask(&bench, "");
         assert_eq!(called.code, Some(2), "{wrong}: {called:?}");
         assert!(called.stderr.contains(right), "{wrong}: {called:?}");
-        bench.complete(&words("rooms --out rooms --frames 3 --size 144x96"));
         bench.call(&words("enhance --doctor model.onnx rooms --out doctor"));
         let page = fs::read_to_string(bench.path("doctor/doctor.html")).unwrap();
         assert!(page.contains(" out, as stated"), "{wrong}");
@@ -185,7 +183,7 @@ fn the_doctor_finds_a_wrong_order_of_colours_beside_stated_ranges() {
     fs::copy(models.join("lift.onnx"), bench.path("model.onnx")).unwrap();
     let right = fs::read_to_string(models.join("lift.onnx.toml")).unwrap();
     bench.file("model.onnx.toml", right + "\ncolor_out = \"bgr\"\n");
-    bench.complete(&words("rooms --out rooms --frames 6 --size 144x96"));
+    bench.rooms("rooms", 6, "144x96");
     let called = bench.call(&words("enhance model.onnx rooms --out enhanced"));
     assert_eq!(called.code, Some(2), "{called:?}");
     assert!(
@@ -215,7 +213,6 @@ fn the_doctor_proposes_a_sidecar_that_mends_the_model() {
         (onnx::gain(4.0), false),
     ] {
         let bench = bench(&graph, "");
-        bench.complete(&words("rooms --out rooms --frames 3 --size 144x96"));
         let line = "enhance --doctor model.onnx rooms --out doctor --write";
         let called = bench.call(&words(line));
         assert_eq!(called.code, Some(i32::from(!settled)), "{called:?}");

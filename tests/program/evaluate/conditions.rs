@@ -119,9 +119,10 @@ fn threads_and_order_change_no_byte() {
 #[test]
 fn several_images_enhanced_at_once_are_the_same_images() {
     let bench = Bench::new();
+    bench.rooms("frames", 8, "160x96");
     let images = |run: &str, threads: &str| -> BTreeMap<String, String> {
         bench.complete(&words(&format!(
-            "--data rooms:frames=8,size=160x96 --model random --levels L3 --llie lift --llie gray-gain \
+            "--data frames --model random --levels L3 --llie lift --llie gray-gain \
              --threads {threads} --out {run}"
         )));
         let records = records(&bench.path(run));

@@ -7,6 +7,8 @@ use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use crate::support::rooms::rooms;
+
 /// The most bytes of a stream that are looked at.
 const MOST_BYTES: usize = 16 << 20;
 
@@ -30,7 +32,7 @@ pub(crate) fn program(work: &Path) -> Command {
             command.env(name, value);
         }
     }
-    command.env("DARKQA_DATA", "rooms:frames=2,size=32x32");
+    command.env("DARKQA_DATA", rooms(2, "32x32"));
     command
 }
 

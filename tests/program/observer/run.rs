@@ -7,7 +7,7 @@ use std::path::Path;
 use crate::support::run::{Bench, assert_same_products, records, words};
 use serde_json::Value;
 
-const RUN: &str = "--model observer --data rooms:frames=6,size=160x120 --levels L0,L3";
+const RUN: &str = "--model observer --data frames --levels L0,L3";
 
 fn text<'a>(record: &'a Value, field: &str) -> &'a str {
     record[field].as_str().unwrap()
@@ -25,6 +25,7 @@ fn by_key(run: &Path) -> BTreeMap<String, Value> {
 #[test]
 fn it_is_asked_with_the_image_of_another_scene_too() {
     let bench = Bench::new();
+    bench.rooms("frames", 6, "160x120");
     let table = bench.complete(&words(&format!("{RUN} --out run --full")));
     assert!(table.contains("Known-signal observer (given the untouched frame; not a model)"));
     let all = records(&bench.path("run"));
@@ -90,6 +91,7 @@ fn it_is_asked_with_the_image_of_another_scene_too() {
 #[test]
 fn parts_and_interruptions_change_nothing() {
     let bench = Bench::new();
+    bench.rooms("frames", 6, "160x120");
     bench.complete(&words(&format!("{RUN} --observer-controls --out whole")));
     for part in ["1/3", "2/3", "3/3"] {
         let line = format!("{RUN} --observer-controls --out parts --shard {part} --threads 1");
@@ -154,6 +156,7 @@ fn with_one_scene_the_control_is_shown_the_tiles_in_another_order() {
 #[test]
 fn the_rules_make_the_questions_and_the_answers_alike() {
     let bench = Bench::new();
+    bench.rooms("frames", 6, "160x120");
     let rules = include_str!("../../../src/questions/src/rules.toml");
     let own = rules.replace(
         "Is there {article} {object} in the image?",
@@ -171,7 +174,6 @@ fn the_rules_make_the_questions_and_the_answers_alike() {
     let questions = fs::read_to_string(bench.path("own/questions.jsonl")).unwrap();
     assert!(questions.contains(" be seen?") && !questions.contains("Is there a"));
     assert_eq!(evidence("own"), evidence("built-in"));
-    bench.complete(&words("rooms --out frames --frames 6 --size 160x120"));
     bench.complete(&words("questions frames --rules own.toml --out own.jsonl"));
     let line = "--model observer --data frames --questions own.jsonl --levels L0 --out again";
     let called = bench.call(&words(line));
@@ -185,6 +187,7 @@ fn the_rules_make_the_questions_and_the_answers_alike() {
 #[test]
 fn a_control_that_is_not_at_chance_hides_the_observer() {
     let bench = Bench::new();
+    bench.rooms("frames", 6, "160x120");
     bench.complete(&words(&format!("{RUN} --model random --out run")));
     let path = bench.path("run/records.jsonl");
     let lines = fs::read_to_string(&path).unwrap();

@@ -32,7 +32,8 @@ fn rules() -> Option<String> {
 /// A page with every section that the built-in rooms can fill.
 fn choices() -> (Bench, String) {
     let bench = Bench::new();
-    let line = "--data rooms:frames=8,size=160x120 --model observer --model random --blind-model random --llie lift \
+    bench.rooms("frames", 8, "160x120");
+    let line = "--data frames --model observer --model random --blind-model random --llie lift \
                 --levels L0,L3,L5 --out run";
     let called = bench.call(&words(line));
     assert_eq!(called.code, Some(0), "{called:?}");
