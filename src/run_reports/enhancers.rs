@@ -59,6 +59,14 @@ pub(super) fn of_enhancers(runs: &[JoinedRun]) -> Vec<Alert> {
             }
             _ => {}
         }
+        for remark in &note.remarks {
+            add(format!("{name}: {remark}."));
+        }
+        if let Some(ranges) = assumed(note) {
+            add(format!(
+                "{name}: {ranges} assumed. Neither sidecar nor preset states its value ranges, and its images of dark frames are plausible with {ranges}."
+            ));
+        }
         if note.resized {
             add(format!(
                 "Images were resized for {name}, so its results are not those of the model at their own size."
@@ -103,6 +111,15 @@ fn how(note: &EnhancerNote) -> String {
     ];
     let parts: Vec<String> = parts.into_iter().flatten().collect();
     parts.join("; ")
+}
+
+/// The value ranges that are assumed; `None` if they are stated.
+fn assumed(note: &EnhancerNote) -> Option<String> {
+    let lines = note.convention.iter();
+    let assumed = lines.filter(|line| line.key.starts_with("range_") && line.source == "assumed");
+    let ranges: BTreeSet<&str> = assumed.map(|line| &*line.value).collect();
+    let ranges: Vec<&str> = ranges.into_iter().collect();
+    (!ranges.is_empty()).then(|| ranges.join(" and "))
 }
 
 /// The outputs of the graph that are not read; `None` if all are.

@@ -666,6 +666,105 @@ pub fn luma_gain(factor: f32) -> Graph {
         .output("output", Type::Float, &image(1))
 }
 
+/// An enhancer that adds a little noise of its own.
+pub fn noisy() -> Graph {
+    after_enhancing(|graph| {
+        graph
+            .constant("small", &[], &[0.01])
+            .node("RandomNormalLike", &["enhanced"], "noise")
+            .node("Mul", &["noise", "small"], "little")
+            .node("Add", &["enhanced", "little"], "output")
+    })
+}
+
+/// What an enhancer adds to the image.
+pub fn residual() -> Graph {
+    after_enhancing(|graph| graph.node("Sub", &["enhanced", "input"], "output"))
+}
+
+/// An enhanced image, and a light map of its size.
+pub fn light_beside() -> Graph {
+    let axes = [("axes", Attribute::Ints(&[1]))];
+    after_enhancing(|graph| {
+        graph.node("Identity", &["enhanced"], "output").node_with(
+            "ReduceMax",
+            &["input"],
+            "L",
+            &axes,
+        )
+    })
+    .output("L", Type::Float, &image(1))
+}
+
+/// An enhancer that takes values with a mean and a deviation for each channel.
+pub fn normalised(mean: [f32; 3], std: [f32; 3]) -> Graph {
+    Graph::new()
+        .constant("mean", &[1, 3, 1, 1], &mean)
+        .constant("std", &[1, 3, 1, 1], &std)
+        .constant("zero", &[], &[0.0])
+        .constant("exponent", &[], &[0.4])
+        .node("Mul", &["input", "std"], "scaled")
+        .node("Add", &["scaled", "mean"], "unit")
+        .node("Max", &["unit", "zero"], "light")
+        .node("Pow", &["light", "exponent"], "output")
+        .giving_image()
+}
+
+/// The image as elements of another type.
+pub fn cast(to: Type) -> Graph {
+    Graph::new()
+        .constant("white", &[], &[255.0])
+        .node("Mul", &["input", "white"], "codes")
+        .node_with(
+            "Cast",
+            &["codes"],
+            "output",
+            &[("to", Attribute::Int(to as u64))],
+        )
+        .output("output", to, &image(3))
+}
+
+/// Black planes around the image: seven channels, of which 4, 5 and 6 are the image.
+pub fn seven_channels() -> Graph {
+    let axis = [("axis", Attribute::Int(1))];
+    let axes = [("axes", Attribute::Ints(&[1]))];
+    Graph::new()
+        .node_with("ReduceMax", &["input"], "light", &axes)
+        .node_with("Concat", &["input", "light", "input"], "x", &axis)
+        .output("x", Type::Float, &image(7))
+}
+
+/// The image times three numbers, a further input.
+pub fn times_vector() -> Graph {
+    Graph::new()
+        .input("alpha", Type::Float, &[Known(3)])
+        .shape("shape", &[1, 3, 1, 1])
+        .node("Reshape", &["alpha", "shape"], "factors")
+        .node("Mul", &["input", "factors"], "output")
+        .giving_image()
+}
+
+/// A network of a fixed size that sees 2 × 2 blocks: each pixel the mean of its block, so that tiles must start at even places.
+pub fn pooled(height: u64, width: u64) -> Graph {
+    let pool = [
+        ("kernel_shape", Attribute::Ints(&[2, 2])),
+        ("strides", Attribute::Ints(&[2, 2])),
+    ];
+    let blocks = [("blocksize", Attribute::Int(2))];
+    let shape = [Known(1), Known(3), Known(height), Known(width)];
+    Graph::empty()
+        .input("input", Type::Float, &shape)
+        .node_with("AveragePool", &["input"], "small", &pool)
+        .node_with(
+            "Concat",
+            &["small"; 4],
+            "deep",
+            &[("axis", Attribute::Int(1))],
+        )
+        .node_with("DepthToSpace", &["deep"], "output", &blocks)
+        .output("output", Type::Float, &shape)
+}
+
 /// Light, which is the largest of the three channels, and reflectance, which is the image divided by it.
 pub fn light_and_reflectance() -> Graph {
     let axes = [("axes", Attribute::Ints(&[1]))];

@@ -96,9 +96,13 @@ impl Composition {
         self.outputs[0].range
     }
 
-    /// Whether the only output is the image.
+    /// Whether the only output is the image, all of it in a plain range.
     fn is_plain(&self) -> bool {
-        self.image.is_none() && self.channels == Channels::Rgb
+        let output = &self.outputs[0];
+        self.image.is_none()
+            && self.channels == Channels::Rgb
+            && output.slice.is_none()
+            && output.mean_and_std.is_none()
     }
 
     /// Whether the dark image is a part of the result.

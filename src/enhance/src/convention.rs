@@ -1,5 +1,5 @@
 //! Parts of a model's convention, which its graph may not state: [`TensorLayout`], [`Channels`], [`ChannelOrder`],
-//! [`ValueRange`], [`Padding`], [`Tile`], [`Rounding`].
+//! [`ValueRange`], [`ValueScale`], [`Padding`], [`Tile`], [`Rounding`].
 //!
 //! The words are those of the sidecar, `MODEL.onnx.toml`.
 
@@ -163,6 +163,64 @@ impl fmt::Display for ValueRange {
     }
 }
 
+/// Mean and deviation that networks for other tasks were trained with, on values of 0..1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Normalisation {
+    /// Those of ImageNet, as `torchvision.models` takes them.
+    ImageNet,
+    /// Mean 0.5, deviation 1: values of −0.5..0.5.
+    Centred,
+}
+
+impl Normalisation {
+    pub(super) const ALL: [Self; 2] = [Self::ImageNet, Self::Centred];
+
+    /// Mean and deviation of red, green and blue.
+    pub(super) fn mean_and_std(self) -> [[f32; 3]; 2] {
+        match self {
+            Self::ImageNet => [[0.485, 0.456, 0.406], [0.229, 0.224, 0.225]],
+            Self::Centred => [[0.5; 3], [1.0; 3]],
+        }
+    }
+}
+
+/// Values of an image in a tensor: a range, or 0..1 with a mean and a deviation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ValueScale {
+    Range(ValueRange),
+    Normalised(Normalisation),
+}
+
+impl ValueScale {
+    /// The range that a mean and a deviation, if any, are applied to.
+    pub(super) fn range(self) -> ValueRange {
+        match self {
+            Self::Range(range) => range,
+            Self::Normalised(_) => ValueRange::Unit,
+        }
+    }
+
+    /// Mean and deviation; `None` for a plain range.
+    pub(super) fn mean_and_std(self) -> Option<[[f32; 3]; 2]> {
+        match self {
+            Self::Range(_) => None,
+            Self::Normalised(normalisation) => Some(normalisation.mean_and_std()),
+        }
+    }
+}
+
+impl fmt::Display for ValueScale {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Range(range) => range.fmt(f),
+            Self::Normalised(Normalisation::ImageNet) => {
+                f.write_str("0..1 with the mean and std of ImageNet")
+            }
+            Self::Normalised(Normalisation::Centred) => f.write_str("-0.5..0.5 (mean 0.5, std 1)"),
+        }
+    }
+}
+
 /// Pixels that fill an image up to the model's multiple, to the right and below.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -285,14 +343,19 @@ impl ElementType {
     /// Value range that images of this type usually have.
     pub(super) fn usual_range(&self) -> ValueRange {
         match self {
-            Self::Uint8 => ValueRange::Bytes,
+            Self::Uint8 | Self::Int32 | Self::Int64 => ValueRange::Bytes,
             _ => ValueRange::Unit,
         }
     }
 
-    /// Whether images of this type can be fed and read.
-    pub(super) fn holds_images(&self) -> bool {
+    /// Whether images of this type can be fed.
+    pub(super) fn is_fed(&self) -> bool {
         matches!(self, Self::Float32 | Self::Float16 | Self::Uint8)
+    }
+
+    /// Whether images of this type can be read.
+    pub(super) fn is_read(&self) -> bool {
+        self.is_fed() || matches!(self, Self::Float64 | Self::Int32 | Self::Int64)
     }
 }
 

@@ -11,6 +11,9 @@ use super::size_plan::SizeRule;
 use super::size_search::MULTIPLES;
 use darkqa_ground::types::enhancer_note::ConventionLine;
 
+/// Source of ranges that nothing states.
+const ASSUMED: &str = "assumed";
+
 /// Source of values that the graph itself states.
 const GRAPH: &str = "graph";
 
@@ -21,8 +24,10 @@ pub(super) struct Description {
     pub(super) sidecar: ModelSidecar,
     /// The preset, if one was named.
     pub(super) preset: Option<Preset>,
-    /// Whether the probe confirmed the ranges that nothing states.
-    pub(super) probed: bool,
+    /// Whether nothing states the ranges and the usual ones, which are plausible, are assumed.
+    pub(super) assumed: bool,
+    /// What a reader of the results must know, in sentences that follow the model's name.
+    pub(super) remarks: Vec<String>,
     /// Number of subnormal weights that were set to zero.
     pub(super) flushed: usize,
 }
@@ -46,6 +51,9 @@ impl Description {
         let mut lines = Lines(Vec::new());
         if let Some(preset) = &self.preset {
             lines.add("preset", &preset.name, preset.content.to_string());
+        }
+        for remark in &self.remarks {
+            lines.add("remark", remark, GRAPH);
         }
         if let Some(differing) = &graph.differing {
             lines.add("warning", differing, "graph");
@@ -187,13 +195,17 @@ impl Description {
         let checked = "as the input; the actual output is checked";
         let source = self.source(|s| s.range_out.is_some(), self.range_source(checked));
         lines.add("range_out", reading.range, source);
+        if let Some([mean, std]) = reading.mean_and_std {
+            let source = self.source(|s| s.mean_out.is_some() || s.std_out.is_some(), "usual");
+            lines.add("mean_out, std_out", format!("{mean:?}, {std:?}"), source);
+        }
         let source = self.source(|s| s.rounding.is_some(), "usual");
         lines.add("rounding", composition.rounding, source);
     }
 
     /// Source of a range that nothing states.
     fn range_source(&self, otherwise: &'static str) -> &'static str {
-        if self.probed { "probed" } else { otherwise }
+        if self.assumed { ASSUMED } else { otherwise }
     }
 
     /// Source of a value: sidecar or preset if they state it, else `otherwise`.

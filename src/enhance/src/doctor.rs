@@ -7,8 +7,9 @@ mod proposal;
 
 use std::collections::BTreeSet;
 
-use super::convention::ChannelOrder;
+use super::convention::{ChannelOrder, ValueScale};
 use super::enhancer::Enhancer;
+use super::output::in_expression;
 use super::plausible::{Codes, Facts};
 use super::port::Port;
 use super::probe::{PairTrial, Probe, RangePair};
@@ -83,7 +84,7 @@ impl Enhancer {
             frames,
             probes: [probe, swapped],
         } = trials;
-        let others = self.other_outputs(&frames, probe.best())?;
+        let mut others = self.other_outputs(&frames, probe.best())?;
         let plausible = others.iter().filter(|output| output.problem.is_none());
         let plausible: Vec<String> = plausible.map(|output| output.title.clone()).collect();
         let stated = self.stated_pair();
@@ -98,6 +99,14 @@ impl Enhancer {
         }
         if image == ImageOutput::Known {
             found.mention(&plausible);
+        }
+        if image == ImageOutput::Known && self.may_be_residual(probe.best())? {
+            let sums = self.sums(&frames, probe.best())?;
+            if sums.iter().any(|sum| sum.problem.is_none()) {
+                found.settled = Settled::No;
+                found.conclusion += " Its output of a white image is nearly black, so it may have to be added to the input; both are possible and are drawn below.";
+            }
+            others.extend(sums);
         }
         let convention = self.convention();
         let is_stated = convention.color.is_some()
@@ -141,7 +150,11 @@ impl Enhancer {
         let Some(trials) = self.trials_of_all(dark)? else {
             return Ok(None);
         };
-        let [probe, swapped] = trials.probes;
+        let [mut probe, mut swapped] = trials.probes;
+        // A pair is advised only if no frame speaks against it.
+        for probe in [&mut probe, &mut swapped] {
+            probe.leave_out_mixed();
+        }
         let found = propose(&probe, self.stated_pair(), &swapped, self.other_order());
         let lines: Vec<String> = found
             .lines
@@ -166,8 +179,8 @@ impl Enhancer {
     fn stated_pair(&self) -> Option<RangePair> {
         let [input, output] = self.stated_ranges();
         Some(RangePair {
-            input: input?,
-            output: output?,
+            input: ValueScale::Range(input?),
+            output: ValueScale::Range(output?),
         })
     }
 
@@ -194,6 +207,30 @@ impl Enhancer {
         Some(ProposedLine { line, reason })
     }
 
+    /// The sum of the input and of the output that is read.
+    fn sums(&self, frames: &[Rgb], ranges: RangePair) -> Result<Vec<ExaminedConvention>> {
+        let name = &self.graph().signature.outputs[0].port.name;
+        let text = format!("input + {}", in_expression(name));
+        let convention = ModelSidecar {
+            output: None,
+            image: Some(
+                text.parse()
+                    .map_err(|problem: String| self.fault(problem))?,
+            ),
+            ..self.convention().clone()
+        };
+        let convention = convention.fed(ranges.input).read(ranges.output);
+        let graph = self.graph().with_convention(convention);
+        let graph = graph.map_err(|problem| self.fault(problem))?;
+        let seen: Vec<Codes> = frames.iter().map(Codes::of).collect();
+        let made = made(&[graph], frames)?.unwrap_or_default();
+        let columns = made.into_iter().map(|made| {
+            let pair = PairTrial::new(ranges, &seen, made);
+            column(&pair, format!("image = \"{text}\", {ranges}"))
+        });
+        Ok(columns.collect())
+    }
+
     /// The images of the outputs that are not read.
     fn other_outputs(&self, frames: &[Rgb], ranges: RangePair) -> Result<Vec<ExaminedConvention>> {
         let seen: Vec<Codes> = frames.iter().map(Codes::of).collect();
@@ -202,10 +239,9 @@ impl Enhancer {
             let convention = ModelSidecar {
                 output: Some(OutputChoice::Name(name.clone())),
                 image: None,
-                range_in: Some(ranges.input),
-                range_out: Some(ranges.output),
                 ..self.convention().clone()
             };
+            let convention = convention.fed(ranges.input).read(ranges.output);
             // An output that is no image, such as curves, is left out.
             let Ok(graph) = self.graph().with_convention(convention) else {
                 continue;

@@ -19,7 +19,8 @@ use super::graph::{Graph, RunResult};
 use super::memory_check::{MemoryCheck, no_memory};
 use super::memory_limit::MemoryLimit;
 use super::planes::Planes;
-use super::reach::Context;
+use super::random_operators::RandomOperators;
+use super::reach::{self, Context};
 use super::reading::OutOfRange;
 use super::runtime::Runtime;
 use super::session::{GraphSource, Stopper};
@@ -40,6 +41,20 @@ pub enum Fitting {
     /// It is resized to the fixed size, and the result back (`--llie-resize`): its shape is not kept, and it is blurred.
     Resize,
 }
+
+/// The remark on a graph with random operators.
+fn random_words(random: &RandomOperators) -> Option<String> {
+    let names: Vec<&str> = random.names.iter().map(String::as_str).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "its graph draws random numbers ({}): its images depend on the order in which they are made and are not reproducible; export it without them to compare it",
+            names.join(", ")
+        )
+    })
+}
+
+/// Side, in pixels, of an image for which any model should get its memory; chosen.
+const SMALL: usize = 64;
 
 /// Result of one attempt at an image: the enhanced image, or what another size may change.
 type Attempt = std::result::Result<Rgb, RunFailure>;
@@ -82,9 +97,10 @@ impl Enhancer {
     ) -> Result<Self> {
         let flushed = file.weights.flush_subnormals(&mut file.bytes);
         let traced = traced_sizes(&file.bytes);
+        let random = RandomOperators::find(&file.bytes).unwrap_or_default();
         // ONNX Runtime finds external data only from the model's path.
         let source = if file.weights.external.is_empty() {
-            GraphSource::Memory(file.bytes)
+            GraphSource::Memory(random.seeded(file.bytes))
         } else {
             GraphSource::Path(file.path.clone())
         };
@@ -100,6 +116,12 @@ impl Enhancer {
             let problem = sidecar::named(&problem, &path);
             Error::Enhancer { path, problem }
         })?;
+        let remarks = graph
+            .unread_images()
+            .into_iter()
+            .chain(random_words(&random));
+        let remarks = remarks.map(|words| sidecar::named(&words, &file.path));
+        let remarks = remarks.collect();
         let enhancer = Self {
             named: file.named,
             digest: file.digest,
@@ -118,7 +140,8 @@ impl Enhancer {
             description: Description {
                 sidecar: file.sidecar,
                 preset: file.preset,
-                probed: false,
+                assumed: false,
+                remarks,
                 flushed,
             },
             usage: Usage::default(),
@@ -282,7 +305,7 @@ impl Enhancer {
     }
 
     /// Enhances an image by a rule of sizes.
-    fn attempt(&mut self, image: &Rgb, rule: SizeRule) -> Result<Attempt> {
+    fn attempt(&mut self, image: &Rgb, mut rule: SizeRule) -> Result<Attempt> {
         let size = [image.height(), image.width()];
         if let Some(smaller) = rule.reduced(size, self.max_side) {
             let attempt = self.resized(image, rule, smaller)?;
@@ -303,12 +326,41 @@ impl Enhancer {
             let found = self.context.of(&self.graph, rule)?;
             self.log.reach = self.context.reach();
             context = found.map_err(|why| self.fault(global(rule, size, &why)))?;
+            let tile = rule.whole([reach::FREE_SIDE; 2]);
+            let alignment = self.alignment(rule, tile, context)?;
+            if alignment > 1 && rule.tile.is_none() {
+                // A pixel at another place of its block may see farther.
+                context += alignment - 1;
+            }
+            rule.multiple = alignment;
         }
-        let plan = SizePlan::of(size, rule, self.tiling, context).map_err(|e| self.no_plan(e))?;
+        let mut plan =
+            SizePlan::of(size, rule, self.tiling, context).map_err(|e| self.no_plan(e))?;
+        if rule.takes_any_size() && plan.seams == SeamRule::MustHold && plan.tiles.count() > 1 {
+            rule.multiple = self.alignment(rule, plan.fed(), plan.cut.context)?;
+            plan = SizePlan::of(size, rule, self.tiling, context).map_err(|e| self.no_plan(e))?;
+        }
         if rule.takes_any_size() {
             self.check_memory(rule, plan.fed(), size)?;
         }
         self.planned(image, rule, &plan)
+    }
+
+    /// The multiple at which tiles start: the stated one, or that which is found by trial.
+    fn alignment(&mut self, rule: SizeRule, tile: [usize; 2], context: usize) -> Result<usize> {
+        if rule.multiple > 1 {
+            return Ok(rule.multiple);
+        }
+        let is_new = self.context.is_unaligned();
+        let found = self.context.alignment(&self.graph, tile, context)?;
+        if is_new && found > 1 {
+            let words = format!(
+                "by trial its tiles must start at multiples of {found} pixels, and do; state it in MODEL.onnx.toml beside it: `multiple = {found}`"
+            );
+            let words = sidecar::named(&words, &self.path);
+            tracing::warn!("{}: {words}", self.path.display());
+        }
+        Ok(found)
     }
 
     /// Refuses a large run that would need more memory than is available.
@@ -378,6 +430,11 @@ impl Enhancer {
     fn failed(&self, failure: &RunFailure, size: [usize; 2]) -> Error {
         let rule = self.rule(size);
         self.fault(match failure {
+            RunFailure::NoMemory { requested, .. } if self.fails_when_small(rule, *requested) => format!(
+                "{}, nor for one of {}: its graph needs that memory at any size; export it again, or use a smaller model",
+                failure.words(),
+                by(rule.whole([SMALL; 2]))
+            ),
             RunFailure::NoMemory { .. } => no_memory(failure, rule, size),
             RunFailure::TooLong(_) | RunFailure::TooLarge(_) => failure.words(),
             _ if !rule.takes_any_size() => format!(
@@ -387,6 +444,20 @@ impl Enhancer {
             ),
             _ => not_found(failure, &self.search),
         })
+    }
+
+    /// Whether it needs as many bytes at once for a small image, and does not get them.
+    fn fails_when_small(&self, rule: SizeRule, bytes: Option<u64>) -> bool {
+        let size = rule.whole([SMALL; 2]);
+        self.graph.restart_clock();
+        let image = Rgb::black(size[0], size[1]);
+        let ran = self.graph.probe(&image, TileWindow::whole(size));
+        match ran {
+            Ok(RunResult::Failed(RunFailure::NoMemory { requested, .. })) => {
+                requested.is_some() && requested == bytes
+            }
+            _ => false,
+        }
     }
 
     pub(super) fn fault(&self, problem: impl AsRef<str>) -> Error {

@@ -1,7 +1,8 @@
 //! An expression of a sidecar, as `L ^ 0.2 * R`, computed at each pixel: [`Expression`].
 //!
 //! It has numbers, names (those that are not made of letters, digits and `_` in backticks), `+ - * / ^ ( )`, and the functions
-//! `min`, `max`, `clip(x, low, high)` and `mean(x)`, the mean over the channels. `^` binds to the right, and a negative base
+//! `min`, `max`, `clip(x, low, high)`, `mean(x)`, the mean over the channels, and `curves(x, a, b, …)`, the curves of Zero-DCE. `x[4:7]`
+//! are three channels of the output `x`. `^` binds to the right, and a negative base
 //! counts as 0. One channel is spread to three where the other argument has three. All is computed in 32-bit floats.
 
 use std::fmt;
@@ -164,6 +165,10 @@ mod tests {
             ("min(3, 1, 2) + max(1, 2)", 3.0),
             ("clip(5, 0, 1) + clip(0 - 5, 0, 1)", 1.0),
             ("mean(c * 4 - 1)", 4.0 / 3.0),
+            (
+                "curves(x, 0 - 1, 2)",
+                0.25 + 0.1875 + 2.0 * (0.4375 * 0.4375 - 0.4375),
+            ),
             ("max(c) - min(c)", 0.75),
             ("mean(3)", 3.0),
         ] {
@@ -209,6 +214,8 @@ mod tests {
             ("1 & 2", "'&'"),
             ("sqrt(2)", "clip(x, low, high)"),
             ("clip(1, 2)", "clip(x, low, high)"),
+            ("curves(x)", "curves(x, a, …)"),
+            ("x[4]", "[4:7]"),
             ("mean(1, 2)", "mean(x)"),
             ("`a", "backtick"),
             ("``", "backtick"),

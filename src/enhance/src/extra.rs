@@ -3,16 +3,21 @@
 use std::fmt;
 
 use serde::de::value::MapAccessDeserializer;
-use serde::de::{Error, MapAccess, Visitor};
+use serde::de::{Error, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::expression::Expression;
+
+/// Most numbers of a list; chosen.
+const MOST_NUMBERS: usize = 4096;
 
 /// What a further input is given.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum ExtraValue {
     /// One number: `ratio = 3`.
     Number(Number),
+    /// A vector: `alpha = [1, 2, 3]`.
+    List(Vec<Number>),
     /// A tensor of the image's size in which each sample is this number: `ratio = { map = 5.0 }`.
     Map(Number),
     /// Normal noise: `z = { noise = "normal", std = 0.9, seed = 0, divide = 8 }`.
@@ -117,6 +122,7 @@ impl Serialize for ExtraValue {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
             Self::Number(number) => number.serialize(serializer),
+            Self::List(numbers) => numbers.serialize(serializer),
             Self::Map(number) => Table {
                 map: Some(*number),
                 ..Table::default()
@@ -146,7 +152,7 @@ impl<'de> Visitor<'de> for AnyValue {
     type Value = ExtraValue;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "a number, true, false, {FORMS}")
+        write!(f, "a number, true, false, a list of them, {FORMS}")
     }
 
     fn visit_bool<E: Error>(self, value: bool) -> Result<ExtraValue, E> {
@@ -159,6 +165,19 @@ impl<'de> Visitor<'de> for AnyValue {
 
     fn visit_f64<E: Error>(self, value: f64) -> Result<ExtraValue, E> {
         Ok(ExtraValue::Number(Number::Float(value)))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<ExtraValue, A::Error> {
+        let mut numbers = Vec::new();
+        while let Some(number) = list.next_element()? {
+            numbers.push(number);
+            if numbers.len() > MOST_NUMBERS {
+                return Err(A::Error::custom(format!(
+                    "a list of more than {MOST_NUMBERS} numbers"
+                )));
+            }
+        }
+        Ok(ExtraValue::List(numbers))
     }
 
     fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<ExtraValue, A::Error> {
@@ -194,6 +213,14 @@ impl ExtraValue {
             {
                 Err(format!("extra.{name} is {value}; expected a finite number"))
             }
+            Self::List(numbers) => {
+                let mut numbers = numbers.iter();
+                let wrong =
+                    numbers.find(|n| matches!(n, Number::Float(value) if !value.is_finite()));
+                wrong.map_or(Ok(()), |value| {
+                    Err(format!("extra.{name} has {value}; expected finite numbers"))
+                })
+            }
             Self::From(expression) => {
                 expression.check_names(&format!("extra.{name}.from"), &["image"])
             }
@@ -206,6 +233,10 @@ impl fmt::Display for ExtraValue {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Number(number) => number.fmt(f),
+            Self::List(numbers) => {
+                let numbers: Vec<String> = numbers.iter().map(Number::to_string).collect();
+                write!(f, "[{}]", numbers.join(", "))
+            }
             Self::Map(number) => write!(f, "map of {number}"),
             Self::Noise(NoiseStatement { std, seed, divide }) => {
                 write!(f, "normal noise, std {std}, seed {seed}, divide {divide}")
@@ -234,6 +265,10 @@ mod tests {
             ("3", ExtraValue::Number(Number::Integer(3))),
             ("0.8", ExtraValue::Number(Number::Float(0.8))),
             ("true", ExtraValue::Number(Number::Bool(true))),
+            (
+                "[1, 2.5]",
+                ExtraValue::List(vec![Number::Integer(1), Number::Float(2.5)]),
+            ),
             ("{ map = 5.0 }", ExtraValue::Map(Number::Float(5.0))),
             (
                 "{ noise = \"normal\", std = 0.9, seed = 7, divide = 8 }",

@@ -93,15 +93,25 @@ impl RunFailure {
     /// What went wrong, without a remedy; it follows the file's name. Memory has words of its own.
     pub(super) fn words(&self) -> String {
         match self {
-            Self::OtherSize { fed, dims, .. } => match self.enlarges_by() {
+            Self::OtherSize { fed, dims, given } => match self.enlarges_by() {
                 Some(factor) => format!(
                     "enlarges by {factor}: it gave {dims:?} for an image of {}; an enhancer keeps the size",
                     by(*fed)
                 ),
-                None => format!(
-                    "gave {dims:?} for an image of {}, and the output must have the size of the input",
-                    by(*fed)
-                ),
+                None => match given {
+                    Some(given) => format!(
+                        "gave an image of {} for one of {}, and both must have the same size: {}",
+                        by(*given),
+                        by(*fed),
+                        other_size_remedy(*fed, *given)
+                    ),
+                    None => format!(
+                        "gave a tensor of {dims:?} for an image of {}, which is no image of that size; export it so that it gives [1, 3, {}, {}]",
+                        by(*fed),
+                        fed[0],
+                        fed[1]
+                    ),
+                },
             },
             Self::Refused { fed, message } => {
                 format!("failed on an image of {} ({message})", by(*fed))
@@ -140,6 +150,20 @@ pub(super) fn unusable(values: OutOfRange, range: ValueRange, size: [usize; 2]) 
     }
 }
 
+/// What to export if the output of a model has another size than its input.
+fn other_size_remedy(fed: [usize; 2], given: [usize; 2]) -> &'static str {
+    let lost = [0, 1].map(|side| fed[side].checked_sub(given[side]));
+    match lost {
+        [Some(rows), Some(columns)] if rows == columns && rows <= 64 => {
+            "its convolutions cut off the edges; export it with padding that keeps the size"
+        }
+        [Some(_), Some(_)] => {
+            "it makes the image smaller; export it with the upsampling back to the size of the input"
+        }
+        _ => "export it so that it gives the size of the input",
+    }
+}
+
 /// Width × height, as users write sizes.
 pub(super) fn by([height, width]: [usize; 2]) -> String {
     format!("{width} × {height}")
@@ -173,6 +197,13 @@ pub(super) fn load_problem(message: &str, version: &str) -> String {
     match (ir, opset) {
         ((Some(needed), Some(most)), _) => newer("IR version", needed, most, PINNED_IR),
         (_, (Some(needed), Some(most))) => newer("operator set", needed, most, PINNED_OPSET),
+        _ if message.contains("is not a registered function/op")
+            || message.contains("No Op registered for") =>
+        {
+            format!(
+                "has an operator that is not part of ONNX; export it with standard operators alone ({message})"
+            )
+        }
         _ => format!("ONNX Runtime cannot load it: {message}"),
     }
 }
@@ -202,6 +233,12 @@ mod tests {
             "{}",
             twice.words()
         );
+        let cut = other([6, 16]).words();
+        assert!(
+            cut.contains("16 × 6 for one of 20 × 10") && cut.contains("padding"),
+            "{cut}"
+        );
+        assert!(other([5, 10]).words().contains("upsampling"));
         for given in [[20, 60], [8, 16], [50, 100]] {
             let failure = other(given);
             assert!(failure.is_of_size() && !failure.words().contains("enlarges"));

@@ -64,7 +64,10 @@ impl ModelFile {
             );
         }
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        let name = EnhancerName::new(&stem)?;
+        let name = name_of(&stem)?;
+        if name.as_str() != stem {
+            tracing::warn!("{} is called {name} in tables and records", path.display());
+        }
         let text = sidecar::text_for(&path)?;
         let file = Self::of(path, name, preset, bytes, &text)?;
         Ok(Self {
@@ -132,6 +135,26 @@ impl ModelFile {
     }
 }
 
+/// Name of an enhancer whose file has this stem: other characters than letters, digits, `_`, `-` and `.` become `-`. If letters were
+/// lost, the begin of the stem's digest tells such files apart.
+fn name_of(stem: &str) -> Result<EnhancerName> {
+    let fits = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
+    if stem.chars().all(fits) {
+        return EnhancerName::new(stem);
+    }
+    let words = stem
+        .split(|c: char| !fits(c))
+        .filter(|word| !word.is_empty());
+    let mut name = words.collect::<Vec<_>>().join("-");
+    if !stem.is_ascii() {
+        let digest: String = Digest::of(stem.as_bytes()).to_string();
+        let digest = digest.rsplit(':').next().unwrap_or_default();
+        let digest: String = digest.chars().take(6).collect();
+        name = [name, digest].join("-");
+    }
+    EnhancerName::new(name.trim_matches('-'))
+}
+
 /// Content of an enhancer's digest: all that decides an enhanced image, except the degraded one.
 #[derive(Serialize)]
 struct EnhancementFacts<'a> {
@@ -153,9 +176,9 @@ fn digest(
     preset: Option<&Preset>,
 ) -> Result<Digest> {
     let mut external = BTreeMap::new();
-    for location in &weights.external {
+    for (location, size) in &weights.external {
         let file = external_path(path, location)?;
-        let content = reading::at_most(&file, MOST_WEIGHTS)?;
+        let content = read_weights(path, &file, *size)?;
         external.insert(location.as_ref(), Digest::of(&content));
     }
     let sidecar = sidecar.clone();
@@ -203,6 +226,31 @@ fn external_path(model: &Path, location: &str) -> Result<PathBuf> {
         });
     }
     Ok(model.with_file_name("").join(relative))
+}
+
+/// The bytes of a file of weights that has at least this size.
+fn read_weights(model: &Path, file: &Path, least: u64) -> Result<Vec<u8>> {
+    let fault = |problem: String| Error::Enhancer {
+        path: model.to_owned(),
+        problem,
+    };
+    let size = match std::fs::metadata(file) {
+        Ok(data) => data.len(),
+        Err(e) if e.kind() == ErrorKind::NotFound => {
+            return Err(fault(format!(
+                "the weights of the model are missing: {}; copy this file to the same folder, or export the model as one file",
+                file.display()
+            )));
+        }
+        Err(e) => return Err(Error::file(file, "read", e)),
+    };
+    if size < least {
+        return Err(fault(format!(
+            "the weights of the model are cut short: {} has {size} of {least} bytes; copy or download it again",
+            file.display()
+        )));
+    }
+    reading::at_most(file, MOST_WEIGHTS)
 }
 
 /// Most bytes of a file of weights. Chosen: the largest published enhancers have a hundredth.
@@ -345,6 +393,19 @@ mod tests {
     }
 
     #[test]
+    fn any_file_name_gives_a_name() {
+        let name = |stem: &str| name_of(stem).unwrap().to_string();
+        assert_eq!(name("zero-dce_v1.2"), "zero-dce_v1.2");
+        assert_eq!(name("zero dce (1)"), "zero-dce-1");
+        let [one, other] = ["低光", "增强"].map(name);
+        assert!(
+            one.len() == 6 && other.len() == 6 && one != other,
+            "{one} {other}"
+        );
+        assert!(name("模型 v2").starts_with("v2-"));
+    }
+
+    #[test]
     fn outputs_are_counted() {
         let field = |number: u8, content: &[u8]| {
             [&[number << 3 | 2, content.len() as u8], content].concat()
@@ -358,7 +419,7 @@ mod tests {
     #[test]
     fn a_file_that_cannot_be_used_is_refused_with_the_reason() {
         let folder = tempfile::tempdir().unwrap();
-        let cases: [(&str, &[u8], &str); 5] = [
+        let cases: [(&str, &[u8], &str); 4] = [
             ("text.onnx", b"not a model", "is not a complete ONNX model"),
             (
                 "lfs.onnx",
@@ -366,8 +427,11 @@ mod tests {
                 "git lfs pull",
             ),
             ("out.onnx", &model("../secret"), "outside its folder"),
-            ("gone.onnx", &model("gone.bin"), "gone.bin: cannot read"),
-            ("a b.onnx", &model("x"), "rename the file"),
+            (
+                "gone.onnx",
+                &model("gone.bin"),
+                "weights of the model are missing: ",
+            ),
         ];
         for (name, content, part) in cases {
             let path = folder.path().join(name);

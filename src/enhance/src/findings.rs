@@ -18,6 +18,9 @@ pub struct Findings {
     convention: Vec<ConventionLine>,
     /// What the probe found; `None` if the model takes none of its sizes.
     probe: Option<ProbeNote>,
+    /// What a reader of the results must know.
+    #[serde(default)]
+    remarks: Vec<String>,
     /// The sizes that the model takes, in words, if they were found by trial.
     sizes: Option<String>,
 }
@@ -36,6 +39,7 @@ impl Findings {
         usage.update(|note| {
             note.convention.clone_from(&self.convention);
             note.probe.clone_from(&self.probe);
+            note.remarks.clone_from(&self.remarks);
         });
         usage
     }
@@ -44,6 +48,9 @@ impl Findings {
     pub fn warn(&self, name: &EnhancerName, path: &Path) {
         if let Some(sizes) = &self.sizes {
             tracing::warn!("{}: {sizes}", path.display());
+        }
+        for remark in &self.remarks {
+            tracing::warn!("{name}: {remark}");
         }
         match &self.probe {
             None => warn_of_untried(name),
@@ -77,6 +84,7 @@ impl Enhancer {
         Findings {
             convention: note.convention,
             probe: note.probe,
+            remarks: note.remarks,
             sizes: self.found_sizes().map(TakenSizes::words),
         }
     }
@@ -87,6 +95,7 @@ impl Enhancer {
     /// If the graph contradicts its own convention, which is a bug.
     pub fn tried_before(self, findings: &Findings, usage: Usage) -> Result<Self> {
         let mut enhancer = self.with_usage(usage);
+        enhancer.set_remarks(&findings.remarks);
         if let Some(probe) = &findings.probe {
             enhancer.set_probed(probe.clone())?;
         }

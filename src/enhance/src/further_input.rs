@@ -31,7 +31,7 @@ impl Places {
     /// The places in a tensor of the image's size. Its layout is the one in which it has one or three channels, first of all
     /// the image's own.
     fn of(port: &Port, image: TensorLayout) -> Option<Self> {
-        if port.is_scalar() {
+        if port.is_scalar() || vector_length(port).is_some() {
             return None;
         }
         if port.dims.len() == 2 {
@@ -107,6 +107,24 @@ impl FurtherInput {
             (ExtraValue::Number(number), None) | (ExtraValue::Map(number), Some(_)) => {
                 TensorData::filled(&self.port.element, *number, 1).map(drop)
             }
+            (ExtraValue::List(numbers), None) => {
+                let length = vector_length(&self.port).unwrap_or(1);
+                if numbers.len() != length {
+                    return Err(format!("it takes {length}: {}", list_line(&key, length)));
+                }
+                TensorData::listed(&self.port.element, numbers).map(drop)
+            }
+            (_, None) if vector_length(&self.port).is_some_and(|length| length > 1) => {
+                let length = vector_length(&self.port).unwrap_or(1);
+                Err(format!(
+                    "it is a list of {length}: {}",
+                    list_line(&key, length)
+                ))
+            }
+            (ExtraValue::List(_), Some(_)) => Err(
+                "it has the image's size; `{ map = NUMBER }` gives each of its samples a number"
+                    .to_owned(),
+            ),
             (ExtraValue::Number(number), Some(_)) => Err(format!(
                 "it is not a single number; `{key} = {{ map = {number} }}` gives each of its samples this value"
             )),
@@ -147,11 +165,19 @@ impl FurtherInput {
     /// Its tensor in a run on an image; `None` if the sidecar's expression gives values that are not finite.
     pub(super) fn tensor(&self, fed: &FedImage<'_>) -> Option<Tensor> {
         let Some(places) = self.places else {
+            if let ExtraValue::List(numbers) = &self.value {
+                let free = self.port.dims.iter().map(|dim| dim.known().unwrap_or(1));
+                let data = TensorData::listed(&self.port.element, numbers).ok()?;
+                return Some(Tensor {
+                    dims: free.collect(),
+                    data,
+                });
+            }
             return self.filled(vec![1; self.port.dims.len()]);
         };
         let channels = places.channels(&self.port);
         match &self.value {
-            ExtraValue::Number(_) | ExtraValue::Map(_) => {
+            ExtraValue::Number(_) | ExtraValue::List(_) | ExtraValue::Map(_) => {
                 self.filled(self.dims(places, channels.unwrap_or(1), fed.size()))
             }
             ExtraValue::Noise(noise) => {
@@ -223,6 +249,21 @@ impl FurtherInput {
     }
 }
 
+/// Number of elements of an input of fixed dimensions, of which at most one is not 1; `None` for another.
+fn vector_length(port: &Port) -> Option<usize> {
+    let sizes = port.dims.iter().map(Dim::known);
+    let sizes = sizes.collect::<Option<Vec<usize>>>()?;
+    let long = sizes.iter().filter(|size| **size > 1).count();
+    (long == 1 && sizes.len() <= 2).then(|| sizes.iter().product())
+}
+
+/// The line of a sidecar for a list.
+fn list_line(key: &str, length: usize) -> String {
+    let some = vec!["NUMBER"; length.min(4)].join(", ");
+    let rest = if length > 4 { ", …" } else { "" };
+    format!("`{key} = [{some}{rest}]`")
+}
+
 /// What a sidecar must say of an input that has no value.
 fn missing(port: &Port, places: Option<Places>) -> String {
     let key = quoted(&port.name);
@@ -236,6 +277,10 @@ fn missing(port: &Port, places: Option<Places>) -> String {
             );
         }
         let line = match (known, &port.element) {
+            _ if vector_length(port).is_some_and(|length| length > 1) => {
+                let length = vector_length(port).unwrap_or(1);
+                format!("{}, its authors' values", list_line(&key, length))
+            }
             (Some((value, preset)), _) => format!("`{key} = {value}`, as preset {preset} has it"),
             (None, ElementType::Bool) => format!("`{key} = true` or `{key} = false`"),
             (None, _) => format!("`{key} = NUMBER`, its authors' value"),

@@ -163,6 +163,29 @@ impl Graph {
         Ok(graph)
     }
 
+    /// The remark on outputs that have the image's size and are not read; `None` if there are none, or a statement or a preset says
+    /// what the image is made of.
+    pub(super) fn unread_images(&self) -> Option<String> {
+        let is_stated = self.convention.image.is_some() || self.convention.output.is_some();
+        let unread: Vec<String> = self
+            .signature
+            .unread
+            .iter()
+            .filter(|port| self.signature.has_image_size(port))
+            .map(|port| format!("{:?}", port.name))
+            .collect();
+        (!unread.is_empty() && !is_stated).then(|| {
+            format!(
+                "of its outputs {:?} is read as the image, and {}, which {} the image's size, {} not read: if its authors make the image of several, state their formula in MODEL.onnx.toml beside it, `image = \"EXPRESSION\"`, else `output = {:?}`",
+                self.signature.outputs[0].port.name,
+                unread.join(", "),
+                if unread.len() == 1 { "has" } else { "have" },
+                if unread.len() == 1 { "is" } else { "are" },
+                self.signature.outputs[0].port.name
+            )
+        })
+    }
+
     /// The ONNX Runtime that runs it.
     pub(super) fn runtime(&self) -> &Runtime {
         &self.runtime

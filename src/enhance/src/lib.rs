@@ -32,6 +32,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
 mod built_in;
+mod channel_slice;
 mod composition;
 mod control_group;
 mod convention;
@@ -64,6 +65,7 @@ mod preset;
 mod probe;
 mod probe_run;
 mod protobuf;
+mod random_operators;
 mod reach;
 mod reading;
 mod receipt;

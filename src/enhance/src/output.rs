@@ -1,6 +1,7 @@
 //! Choice of the outputs of a graph that are the enhanced image, or from which it is made: [`Output`].
 
-use super::convention::{Channels, TensorLayout};
+use super::channel_slice::ChannelSlice;
+use super::convention::{Channels, ElementType, TensorLayout};
 use super::expression::Expression;
 use super::port::{Dim, Port, list};
 use super::preset;
@@ -26,7 +27,9 @@ pub(super) struct Output {
     /// Order of its dimensions; `None` if only a run shows it.
     pub(super) layout: Option<TensorLayout>,
     /// Numbers of channels that it may have.
-    pub(super) channels: &'static [usize],
+    pub(super) channels: Vec<usize>,
+    /// The channels that are read; `None` for all.
+    pub(super) slice: Option<ChannelSlice>,
     /// Reason for the choice, for users; `stated` if sidecar or preset state it.
     pub(super) reason: &'static str,
 }
@@ -43,7 +46,20 @@ impl Output {
         channels: Channels,
         fits: impl Fn(&Port, usize) -> bool,
     ) -> Result<Self, String> {
-        let fits = |port: &Port| fits(port, channels.count());
+        if let Some(OutputChoice::Name(name)) = stated
+            && let Some((port, slice)) = sliced(outputs, name)
+        {
+            if slice.count() != channels.count() {
+                return Err(format!(
+                    "its sidecar or preset states output = {name:?}, {} channels; expected {}",
+                    slice.count(),
+                    channels.words()
+                ));
+            }
+            return Self::of_slice(port, slice, fits);
+        }
+        let fits_count = &fits;
+        let fits = |port: &Port| fits_count(port, channels.count());
         let images: Vec<usize> = (0..outputs.len()).filter(|&i| fits(&outputs[i])).collect();
         let (index, reason) = match (images.as_slice(), stated) {
             ([only], None) => (*only, "the only output that can be the image"),
@@ -52,16 +68,7 @@ impl Output {
                 (*only, "the only output")
             }
             (_, Some(choice)) => (stated_output(outputs, choice, fits)?, "stated"),
-            ([], None) => {
-                let what = match channels {
-                    Channels::Rgb => "an image",
-                    Channels::Y => "an image of one channel (channels = \"y\")",
-                };
-                return Err(format!(
-                    "has no output that is {what} of the input's size; it has {}",
-                    list(outputs)
-                ));
-            }
+            ([], None) => return Err(no_image(outputs, channels, fits_count)),
             (several, None) => match (by_name(outputs, several), by_structure(outputs)) {
                 (Some(name), None) => (name, "its name"),
                 (None, Some(structure)) => (structure, "the second of Zero-DCE's three outputs"),
@@ -73,10 +80,8 @@ impl Output {
         Ok(Self {
             layout: port.layout(channels.count()),
             port,
-            channels: match channels {
-                Channels::Rgb => &[3],
-                Channels::Y => &[1],
-            },
+            channels: vec![channels.count()],
+            slice: None,
             reason,
         })
     }
@@ -91,37 +96,47 @@ impl Output {
         channels: Channels,
         fits: impl Fn(&Port, usize) -> bool,
     ) -> Result<Vec<Self>, String> {
-        let channels: &'static [usize] = match channels {
+        let channels: &[usize] = match channels {
             Channels::Rgb => &[3, 1],
             Channels::Y => &[1],
         };
         let names = outputs.iter().map(|port| port.name.as_str());
         let known: Vec<&str> = names.chain([INPUT]).collect();
+        let slices = image.names().iter();
+        let slices = slices.filter(|name| sliced(outputs, name).is_some());
+        let slices: Vec<&str> = slices.map(String::as_str).collect();
+        let known_names = [&known[..], &slices].concat();
         let unknown = |problem| {
             format!(
                 "cannot be read: {problem}; its outputs are {}",
                 list(outputs)
             )
         };
-        image.check_names("image", &known).map_err(unknown)?;
+        image.check_names("image", &known_names).map_err(unknown)?;
         let names = image.names().iter().filter(|name| *name != INPUT);
-        let outputs = names.filter_map(|name| outputs.iter().find(|port| port.name == *name));
-        let outputs: Vec<Self> = outputs
-            .map(|port| {
-                if !channels.iter().any(|count| fits(port, *count)) {
-                    return Err(format!(
-                        "gives {port}, which image = \"{image}\" names, but which is not an image of {}",
-                        if channels == [1] { "one channel (channels = \"y\")" } else { "one or three channels" }
-                    ));
+        let outputs: Vec<Self> = names
+            .map(|name| {
+                if let Some((port, slice)) = sliced(outputs, name) {
+                    return Self::of_slice(port, slice, &fits);
                 }
+                let port = outputs.iter().find(|port| port.name == *name);
+                let port = port.filter(|port| channels.iter().any(|count| fits(port, *count)));
+                let port = port.ok_or_else(|| {
+                    format!(
+                        "gives {name:?}, which image = \"{image}\" names, but which is not an image of {}; it has {}",
+                        if channels == [1] { "one channel (channels = \"y\")" } else { "one or three channels" },
+                        list(outputs)
+                    )
+                })?;
                 Ok(Self {
                     layout: channels.iter().find_map(|count| port.layout(*count)),
                     port: port.clone(),
-                    channels,
+                    channels: channels.to_vec(),
+                    slice: None,
                     reason: "stated",
                 })
             })
-            .collect::<Result<_, _>>()?;
+            .collect::<Result<_, String>>()?;
         if outputs.is_empty() {
             return Err(format!(
                 "is not used: image = \"{image}\" names none of its outputs, which are {}",
@@ -130,6 +145,122 @@ impl Output {
         }
         Ok(outputs)
     }
+}
+
+impl Output {
+    /// Some channels of an output.
+    ///
+    /// # Errors
+    /// If it has not so many channels, or not the size of the input.
+    fn of_slice(
+        port: &Port,
+        slice: ChannelSlice,
+        fits: impl Fn(&Port, usize) -> bool,
+    ) -> Result<Self, String> {
+        let mut counts = port.channel_counts().into_iter();
+        let count = counts.find(|count| *count >= slice.end && fits(port, *count));
+        let count = count.ok_or_else(|| {
+            format!(
+                "has no channels {} to {} (counted from 0) of the input's size in {port}",
+                slice.first,
+                slice.end - 1
+            )
+        })?;
+        Ok(Self {
+            layout: port.layout(count),
+            port: port.clone(),
+            channels: vec![count],
+            slice: Some(slice),
+            reason: "stated",
+        })
+    }
+}
+
+/// The output and the channels that a name such as `x[4:7]` means; `None` if it means no channels of an output.
+fn sliced<'a>(outputs: &'a [Port], name: &str) -> Option<(&'a Port, ChannelSlice)> {
+    if outputs.iter().any(|port| port.name == name) {
+        return None;
+    }
+    let (name, slice) = ChannelSlice::split(name)?;
+    let port = outputs.iter().find(|port| port.name == name)?;
+    Some((port, slice))
+}
+
+/// A name as expressions write it, in backticks if needed.
+pub(super) fn in_expression(name: &str) -> String {
+    let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    if name.chars().all(is_word) && !name.starts_with(|c: char| c.is_ascii_digit()) {
+        name.to_owned()
+    } else {
+        format!("`{name}`")
+    }
+}
+
+/// Why none of the outputs is the image, and what to state or export.
+fn no_image(outputs: &[Port], channels: Channels, fits: impl Fn(&Port, usize) -> bool) -> String {
+    let wide = |port: &&Port| {
+        let counts = port.channel_counts().into_iter();
+        counts
+            .filter(|count| *count > 1 && *count != 3)
+            .find(|count| fits(port, *count))
+    };
+    if channels == Channels::Rgb
+        && let Some((port, count)) = outputs.iter().find_map(|port| Some((port, wide(&port)?)))
+    {
+        let name = &port.name;
+        return match count {
+            4 => format!(
+                "gives {port}, 4 channels, and an image has 3; if the fourth is opacity, state in MODEL.onnx.toml beside it: `output = \"{name}[0:3]\"`"
+            ),
+            24 => format!(
+                "gives {port}, 24 channels, and an image has 3; if they are the curves of Zero-DCE, state in MODEL.onnx.toml beside it: `image = \"curves(input, {0}[0:3], {0}[3:6], {0}[6:9], {0}[9:12], {0}[12:15], {0}[15:18], {0}[18:21], {0}[21:24])\"`",
+                in_expression(name)
+            ),
+            _ => format!(
+                "gives {port}, {count} channels, and an image has 3; state which are the image in MODEL.onnx.toml beside it, from 0 and without the last: `output = \"{name}[{}:{count}]\"`",
+                count.saturating_sub(3)
+            ),
+        };
+    }
+    if channels == Channels::Rgb
+        && let Some(port) = outputs.iter().find(|port| fits(port, 1))
+    {
+        return format!(
+            "gives {port}, one channel, which is no image: perhaps a light map, which its authors divide by; state their formula in MODEL.onnx.toml beside it: `image = \"clip(input / {}, 0, 1)\"`",
+            in_expression(&port.name)
+        );
+    }
+    if let [port] = outputs {
+        let problem = match (&port.element, port.dims.len()) {
+            (ElementType::Other(_), _) => Some(
+                "which is no tensor of numbers; export it so that it gives one image as float32"
+                    .to_owned(),
+            ),
+            (element, _) if !element.is_read() => Some(
+                "a type that is not read; export it so that it gives float32 or uint8".to_owned(),
+            ),
+            (_, 1 | 2) => Some(
+                "flat values; export it so that it gives an image of [1, 3, height, width]"
+                    .to_owned(),
+            ),
+            (_, 5..) => Some(
+                "several frames at a time; export it for single images of [1, 3, height, width]"
+                    .to_owned(),
+            ),
+            _ => None,
+        };
+        if let Some(problem) = problem {
+            return format!("gives {port}, {problem}");
+        }
+    }
+    let what = match channels {
+        Channels::Rgb => "an image",
+        Channels::Y => "an image of one channel (channels = \"y\")",
+    };
+    format!(
+        "has no output that is {what} of the input's size; it has {}",
+        list(outputs)
+    )
 }
 
 /// Name of the dark image in an expression of the image.

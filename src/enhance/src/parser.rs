@@ -5,9 +5,10 @@
 //! product = signed { ("*" | "/") signed }
 //! signed  = "-" signed | power
 //! power   = atom [ "^" signed ]
-//! atom    = number | name | function "(" sum { "," sum } ")" | "(" sum ")"
+//! atom    = number | name [ "[" first ":" end "]" ] | function "(" sum { "," sum } ")" | "(" sum ")"
 //! ```
 
+use super::channel_slice::ChannelSlice;
 use super::term::Term;
 
 /// Largest number of characters of an expression; chosen.
@@ -109,8 +110,7 @@ impl Parser {
                     return Err(self.wrong("a name that ends with a backtick"));
                 }
                 self.at += 1;
-                self.name(name);
-                Ok(())
+                self.name(name)
             }
             Some(c) if c.is_ascii_digit() || c == '.' => self.number(),
             Some(c) if c.is_ascii_alphabetic() || c == '_' => {
@@ -119,8 +119,7 @@ impl Parser {
                 if self.taken('(') {
                     self.function(&word, start)
                 } else {
-                    self.name(word);
-                    Ok(())
+                    self.name(word)
                 }
             }
             _ => Err(self.wrong("a number, a name or an opening parenthesis")),
@@ -166,16 +165,27 @@ impl Parser {
             ("max", count) => Term::Max(count),
             ("clip", 3) => Term::Clip,
             ("mean", 1) => Term::Mean,
+            ("curves", 2..) => Term::Curves(arguments),
             _ => {
                 self.at = start;
-                return Err(self.wrong("min(…), max(…), clip(x, low, high) or mean(x)"));
+                return Err(
+                    self.wrong("min(…), max(…), clip(x, low, high), mean(x) or curves(x, a, …)")
+                );
             }
         };
         self.parsed.terms.push(term);
         Ok(())
     }
 
-    fn name(&mut self, name: String) {
+    /// A name, with the channels in brackets behind it, if there are any.
+    fn name(&mut self, mut name: String) -> Result<(), String> {
+        if self.taken('[') {
+            let slice = self.word(|c| c != ']');
+            name = format!("{name}[{slice}]");
+            if !self.taken(']') || ChannelSlice::split(&name).is_none() {
+                return Err(self.wrong("channels such as [4:7], from 0, without the last"));
+            }
+        }
         let names = &mut self.parsed.names;
         let index = names.iter().position(|known| *known == name);
         let index = index.unwrap_or_else(|| {
@@ -183,6 +193,7 @@ impl Parser {
             names.len() - 1
         });
         self.parsed.terms.push(Term::Name(index));
+        Ok(())
     }
 
     fn close(&mut self) -> Result<(), String> {

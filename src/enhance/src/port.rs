@@ -4,6 +4,9 @@ use std::fmt;
 
 use super::convention::{ElementType, TensorLayout};
 
+/// Most channels of an output; chosen, Zero-DCE's curves have 24.
+const MOST_CHANNELS: usize = 64;
+
 /// An input or output of a graph.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Port {
@@ -94,8 +97,28 @@ impl Port {
                 && self.dims[channels].can_be(count)
                 && self.dims[rows].can_equal(height)
                 && self.dims[columns].can_equal(width)
+                && !self.has_channels_as_side([rows, columns], [height, width])
                 && (layout.rank() == 3 || self.dims[0].can_be(1));
-        shape && self.element.holds_images()
+        shape && self.element.is_read()
+    }
+
+    /// Whether one of two sides is a small number while the other, and those of the input, are free: a number of channels, not of
+    /// pixels.
+    fn has_channels_as_side(&self, sides: [usize; 2], input: [&Dim; 2]) -> bool {
+        let [one, other] = sides.map(|side| self.dims[side].known());
+        let is_free = input.iter().all(|side| side.known().is_none());
+        let small = |side: Option<usize>| side.is_some_and(|size| size <= MOST_CHANNELS);
+        is_free && (small(one) && other.is_none() || small(other) && one.is_none())
+    }
+
+    /// Sizes of the dimensions that can be channels, as far as the graph fixes them.
+    pub(super) fn channel_counts(&self) -> Vec<usize> {
+        let layouts = TensorLayout::ALL.into_iter();
+        let fitting = layouts.filter(|layout| layout.rank() == self.dims.len());
+        fitting
+            .filter_map(|layout| self.dims[layout.places()[0]].known())
+            .filter(|count| *count <= MOST_CHANNELS)
+            .collect()
     }
 
     /// Number of channels that the graph states for an image; `None` if it does not.

@@ -42,6 +42,9 @@ pub(super) struct PresetContent {
     paper: String,
     /// Names of the output that is the image, the first one first.
     names: Vec<String>,
+    /// All outputs of the repository's own export, by name; the first is the image.
+    #[serde(default)]
+    own_export: Vec<String>,
     /// Lists of outputs of which the image is known by its place.
     #[serde(default)]
     signatures: Vec<OutputList>,
@@ -65,6 +68,8 @@ struct OutputList {
 #[derive(Serialize)]
 pub(super) struct PresetOutputs<'a> {
     names: &'a [String],
+    #[serde(skip_serializing_if = "<[String]>::is_empty")]
+    own_export: &'a [String],
     signatures: &'a [OutputList],
     image: Option<&'a Expression>,
 }
@@ -79,7 +84,7 @@ pub(super) fn number_of(input: &str) -> Option<(Number, String)> {
     let mut presets = all().ok()?.into_iter();
     presets.find_map(|(name, content)| match content.sidecar.extra.get(input)? {
         ExtraValue::Number(number) | ExtraValue::Map(number) => Some((*number, name)),
-        ExtraValue::Noise(_) | ExtraValue::From(_) => None,
+        ExtraValue::List(_) | ExtraValue::Noise(_) | ExtraValue::From(_) => None,
     })
 }
 
@@ -109,6 +114,9 @@ impl PresetContent {
     /// The image, by the names of the outputs. The name of a first output counts only if the others were named too: see
     /// [`Port::is_numbered`].
     fn by_name(&self, outputs: &[Port]) -> Option<usize> {
+        if outputs.iter().map(|port| &port.name).eq(&self.own_export) {
+            return Some(0);
+        }
         let place = |name: &String| outputs.iter().position(|port| port.name == *name);
         let numbered = outputs.iter().any(Port::is_numbered);
         let mut places = self.names.iter().filter_map(place);
@@ -197,6 +205,7 @@ impl Preset {
     pub(super) fn outputs(&self) -> PresetOutputs<'_> {
         PresetOutputs {
             names: &self.content.names,
+            own_export: &self.content.own_export,
             signatures: &self.content.signatures,
             image: self.content.image.as_ref(),
         }
@@ -233,14 +242,14 @@ impl Preset {
             stated.image = Some(image.clone());
             return Ok(stated);
         }
-        let may_be_image = |port: &&Port| port.channels().is_none_or(|channels| channels == 3);
         let found = self.content.by_name(outputs);
         match found.or_else(|| self.content.by_channels(outputs)) {
             Some(index) if index < outputs.len() => {
                 stated.output = Some(OutputChoice::Name(outputs[index].name.clone()));
                 Ok(stated)
             }
-            _ if outputs.iter().filter(may_be_image).count() == 1 => Ok(stated),
+            // Another output, such as curves, cannot be a part of the image.
+            _ if self.is_only_image(outputs) => Ok(stated),
             _ => Err(format!(
                 "is not as preset {} knows it: {}; it has {}; say which in MODEL.onnx.toml beside it: `output = \"NAME\"`",
                 self.name,
@@ -248,6 +257,12 @@ impl Preset {
                 list(outputs)
             )),
         }
+    }
+
+    /// Whether one output alone has three channels or one, or may have.
+    fn is_only_image(&self, outputs: &[Port]) -> bool {
+        let may_be = |port: &&Port| port.channels().is_none_or(|count| matches!(count, 1 | 3));
+        self.content.image.is_none() && outputs.iter().filter(may_be).count() == 1
     }
 
     /// What of a graph is not as the authors' model has it; `None` if nothing is.

@@ -5,7 +5,7 @@
 
 use std::fmt;
 
-use super::convention::ValueRange;
+use super::convention::{Normalisation, ValueRange, ValueScale};
 use super::plausible::{Codes, Gravity, Verdict, judge};
 use darkqa_ground::types::Flaw;
 
@@ -15,8 +15,8 @@ pub const FRAMES: usize = 6;
 /// The range in which a model is fed, and the one in which it is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct RangePair {
-    pub(super) input: ValueRange,
-    pub(super) output: ValueRange,
+    pub(super) input: ValueScale,
+    pub(super) output: ValueScale,
 }
 
 impl RangePair {
@@ -25,10 +25,46 @@ impl RangePair {
         let of = |stated: Option<ValueRange>| {
             let all = ValueRange::ALL.into_iter();
             all.filter(move |range| stated.is_none_or(|stated| stated == *range))
+                .map(ValueScale::Range)
         };
         of(input)
             .flat_map(|input| of(output).map(move |output| Self { input, output }))
             .collect()
+    }
+
+    /// The pairs with an input that has a mean and a deviation; the output is in 0..1, or has them too, unless its range is stated.
+    pub(super) fn normalised(output: Option<ValueRange>) -> Vec<Self> {
+        let pairs = Normalisation::ALL.into_iter().flat_map(|normalisation| {
+            let input = ValueScale::Normalised(normalisation);
+            let outputs = match output {
+                Some(range) => vec![ValueScale::Range(range)],
+                None => vec![ValueScale::Range(ValueRange::Unit), input],
+            };
+            outputs
+                .into_iter()
+                .map(move |output| Self { input, output })
+        });
+        pairs.collect()
+    }
+
+    /// The lines of a sidecar that state it.
+    pub(super) fn lines(self) -> Vec<String> {
+        let side = |scale: ValueScale, keys: [&str; 3]| match scale.mean_and_std() {
+            None => vec![format!("{} = \"{}\"", keys[0], scale.range())],
+            Some([mean, std]) => vec![
+                format!("{} = {mean:?}", keys[1]),
+                format!("{} = {std:?}", keys[2]),
+            ],
+        };
+        let mut lines = side(self.input, ["range_in", "mean", "std"]);
+        lines.extend(side(self.output, ["range_out", "mean_out", "std_out"]));
+        lines
+    }
+
+    /// These lines in a sentence.
+    fn stated(self) -> String {
+        let lines = self.lines().into_iter().map(|line| format!("`{line}`"));
+        lines.collect::<Vec<_>>().join(" and ")
     }
 }
 
@@ -58,13 +94,20 @@ impl PairTrial {
         }
     }
 
+    /// Whether no frame has a flaw.
+    fn is_clean(&self) -> bool {
+        self.verdicts.iter().all(Option::is_none)
+    }
+
     /// The verdict on the model: the most frequent flaw, if at least half of the frames have one.
     pub(super) fn verdict(&self) -> Option<FlawedFrames> {
+        self.seen().filter(|seen| 2 * seen.flawed >= seen.frames)
+    }
+
+    /// The most frequent flaw, if a frame has one.
+    fn seen(&self) -> Option<FlawedFrames> {
         let flawed: Vec<Verdict> = self.verdicts.iter().flatten().copied().collect();
         let half = |count: usize| 2 * count >= self.verdicts.len().max(1);
-        if !half(flawed.len()) {
-            return None;
-        }
         let count = |flaw: Flaw| flawed.iter().filter(|one| one.flaw == flaw).count();
         // Of equally frequent flaws the first.
         let example = flawed.iter().rev().max_by_key(|one| count(one.flaw))?;
@@ -133,16 +176,18 @@ pub(super) struct Probe {
 /// What follows from a probe.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Conclusion {
-    /// The ranges are stated or usual, and the images can be enhanced images.
+    /// The ranges are stated, and the images can be enhanced images.
     Plausible,
+    /// The images can be enhanced images with the usual ranges, which nothing states.
+    Assumed,
     /// The ranges are stated, and the images are odd, but some models do that.
     Doubtful(FlawedFrames),
     /// The ranges are stated or all were tried, and the images cannot be enhanced images.
     Implausible(FlawedFrames),
     /// Only these ranges give plausible images, and they are not the usual ones.
     Other(RangePair, FlawedFrames),
-    /// Several pairs of ranges give plausible images.
-    Several(Vec<RangePair>),
+    /// Several pairs of ranges give plausible images, but not the usual ones.
+    Several(Vec<RangePair>, FlawedFrames),
 }
 
 impl Probe {
@@ -155,16 +200,45 @@ impl Probe {
     /// What follows.
     pub(super) fn conclusion(&self) -> Conclusion {
         let usual = self.pairs.iter().find(|pair| pair.ranges == self.usual);
-        let seen = usual.and_then(PairTrial::verdict);
-        match (self.ranges, seen, self.plausible().as_slice()) {
-            (Ranges::Stated, None, _) | (_, None, [] | [_]) => Conclusion::Plausible,
+        let advised = self.advised();
+        let seen = usual.and_then(|usual| {
+            // With a flaw on some frames, other than dim images, it gives way to a pair without any.
+            let mixed = usual.seen().filter(|seen| {
+                let is_open = self.ranges != Ranges::Stated && !advised.is_empty();
+                is_open && seen.example.flaw != Flaw::Unlit
+            });
+            usual.verdict().or(mixed)
+        });
+        match (self.ranges, seen, advised.as_slice()) {
+            (Ranges::Stated, None, _) => Conclusion::Plausible,
+            (_, None, _) => Conclusion::Assumed,
             (Ranges::Stated, Some(seen), _) if seen.gravity == Gravity::Doubtful => {
                 Conclusion::Doubtful(seen)
             }
             (_, Some(seen), []) | (Ranges::Stated, Some(seen), _) => Conclusion::Implausible(seen),
             (_, Some(seen), [other]) => Conclusion::Other(*other, seen),
-            (_, _, several) => Conclusion::Several(several.to_vec()),
+            (_, Some(seen), several) => Conclusion::Several(several.to_vec(), seen),
         }
+    }
+
+    /// The pairs that may be advised in place of the usual one: those whose images of all frames are plausible.
+    fn advised(&self) -> Vec<RangePair> {
+        let pairs = self.pairs.iter();
+        let others = pairs.filter(|pair| pair.ranges != self.usual && pair.is_clean());
+        others.map(|pair| pair.ranges).collect()
+    }
+
+    /// Leaves out pairs that are plausible on most frames, but not on all.
+    pub(super) fn leave_out_mixed(&mut self) {
+        self.pairs
+            .retain(|pair| pair.is_clean() || pair.verdict().is_some());
+    }
+
+    /// Whether the images in the usual ranges are merely not brighter.
+    fn is_dim(&self, seen: &FlawedFrames) -> bool {
+        self.ranges != Ranges::Stated
+            && seen.example.flaw == Flaw::Unlit
+            && seen.gravity == Gravity::Doubtful
     }
 
     /// The first plausible pair, else the usual one.
@@ -175,48 +249,52 @@ impl Probe {
     /// What was seen and the lines of the sidecar that would repair it, as it follows the file's name; `None` if the images are
     /// plausible.
     pub(super) fn problem(&self) -> Option<String> {
-        let stated = |pair: &RangePair| {
-            format!(
-                "`range_in = \"{}\"` and `range_out = \"{}\"`",
-                pair.input, pair.output
-            )
+        let usual = self.usual.stated();
+        let dim = |seen: &FlawedFrames| {
+            if self.is_dim(seen) {
+                format!(
+                    "If it is meant to be so dim, state the usual ranges in MODEL.onnx.toml beside it: {usual}. "
+                )
+            } else {
+                String::new()
+            }
         };
         Some(match self.conclusion() {
-            Conclusion::Plausible => return None,
+            Conclusion::Plausible | Conclusion::Assumed => return None,
             Conclusion::Doubtful(seen) => format!("{seen}"),
             Conclusion::Implausible(seen) => {
-                format!("{seen}. {}", remedy(seen.example.flaw, self.ranges))
+                format!("{seen}. {}", self.remedy(&seen))
             }
             Conclusion::Other(pair, seen) => format!(
-                "{seen}. With {pair} they can be enhanced images; if its authors use these ranges, state both in MODEL.onnx.toml beside it: {}",
-                stated(&pair)
+                "{seen}. {}With {pair} they can be enhanced images; if its authors use these values, state in MODEL.onnx.toml beside it: {}",
+                dim(&seen),
+                pair.stated()
             ),
-            Conclusion::Several(pairs) => {
+            Conclusion::Several(pairs, seen) => {
                 let list: Vec<String> = pairs.iter().map(ToString::to_string).collect();
-                let likely = bytes_of_units(&pairs).map_or_else(String::new, |pair| {
-                    format!(
-                        "; perhaps {}: of 9 trained models for 0..1, none was plausible with these",
-                        stated(&pair)
-                    )
-                });
                 format!(
-                    "its images are plausible with several value ranges ({}), so the right ones cannot be found; state those that its authors use in MODEL.onnx.toml beside it: `range_in = \"…\"` and `range_out = \"…\"`{likely}",
-                    list.join("; ")
+                    "{seen}. {}With other value ranges they can be enhanced images ({}); state those that its authors use in MODEL.onnx.toml beside it, as {}",
+                    dim(&seen),
+                    list.join("; "),
+                    pairs[0].stated()
                 )
             }
         })
     }
-}
 
-/// 0..255 in and out, if that and 0..1 in and out are the only plausible pairs: of 9 trained models for 0..1, none was plausible with
-/// 0..255 in and out, but models for 0..255 are with both.
-fn bytes_of_units(pairs: &[RangePair]) -> Option<RangePair> {
-    let both = |range| RangePair {
-        input: range,
-        output: range,
-    };
-    let [unit, bytes] = [ValueRange::Unit, ValueRange::Bytes].map(both);
-    (pairs == [unit, bytes]).then_some(bytes)
+    /// What may repair a flaw that no other range explains.
+    fn remedy(&self, seen: &FlawedFrames) -> String {
+        match (seen.example.flaw, self.ranges) {
+            (Flaw::Unlit, Ranges::Open | Ranges::OneStated) => format!(
+                "If it is meant to be so dim, state its ranges in MODEL.onnx.toml beside it: {}",
+                self.usual.stated()
+            ),
+            (Flaw::White | Flaw::Haze, Ranges::Open | Ranges::OneStated) => {
+                "Its values are none of 0..1, 0..255 and -1..1, with and without the mean and std of ImageNet; take those of its authors' code, `range_in`, `mean`, `std` and `range_out`, into MODEL.onnx.toml beside it".to_owned()
+            }
+            (flaw, ranges) => remedy(flaw, ranges).to_owned(),
+        }
+    }
 }
 
 /// What may repair a flaw that no other range explains.
@@ -230,9 +308,6 @@ fn remedy(flaw: Flaw, ranges: Ranges) -> &'static str {
         }
         (Flaw::Shuffled, _) => {
             "Perhaps another output is the image, or the dimensions have another order: `layout_in`, `layout_out` and `output` in MODEL.onnx.toml beside it"
-        }
-        (Flaw::Unlit | Flaw::White | Flaw::Haze, Ranges::Open | Ranges::OneStated) => {
-            "If it is meant to do that, state its ranges in MODEL.onnx.toml beside it: `range_in = \"0..1\"` and `range_out = \"0..1\"`, or those that its authors use"
         }
         (Flaw::Nan, Ranges::Open) => "Check its weights and its divisions by zero",
         (Flaw::Nan, _) => {
@@ -255,12 +330,12 @@ mod tests {
     use super::*;
 
     const UNIT: RangePair = RangePair {
-        input: ValueRange::Unit,
-        output: ValueRange::Unit,
+        input: ValueScale::Range(ValueRange::Unit),
+        output: ValueScale::Range(ValueRange::Unit),
     };
     const BYTES: RangePair = RangePair {
-        input: ValueRange::Bytes,
-        output: ValueRange::Bytes,
+        input: ValueScale::Range(ValueRange::Bytes),
+        output: ValueScale::Range(ValueRange::Bytes),
     };
 
     fn pair(ranges: RangePair, flaws: &[Option<(Flaw, Gravity)>]) -> PairTrial {
@@ -286,15 +361,22 @@ mod tests {
 
     const FLAT: Option<(Flaw, Gravity)> = Some((Flaw::Flat, Gravity::Impossible));
     const WHITE: Option<(Flaw, Gravity)> = Some((Flaw::White, Gravity::Doubtful));
+    const UNLIT: Option<(Flaw, Gravity)> = Some((Flaw::Unlit, Gravity::Doubtful));
 
     #[test]
-    fn open_ranges_follow_the_only_plausible_pair() {
-        let usual = probe(
-            Ranges::Open,
-            vec![pair(UNIT, &[None; 6]), pair(BYTES, &[FLAT; 6])],
-        );
-        assert_eq!(usual.conclusion(), Conclusion::Plausible);
-        assert_eq!(usual.problem(), None);
+    fn usual_ranges_are_assumed_if_they_are_plausible() {
+        for bytes in [None, FLAT] {
+            let usual = probe(
+                Ranges::Open,
+                vec![pair(UNIT, &[None; 6]), pair(BYTES, &[bytes; 6])],
+            );
+            assert_eq!(usual.conclusion(), Conclusion::Assumed);
+            assert_eq!(usual.problem(), None);
+        }
+    }
+
+    #[test]
+    fn another_pair_is_advised_if_the_usual_one_is_implausible() {
         let other = probe(
             Ranges::Open,
             vec![pair(UNIT, &[FLAT; 6]), pair(BYTES, &[None; 6])],
@@ -312,28 +394,56 @@ mod tests {
     }
 
     #[test]
-    fn several_plausible_pairs_stop_even_if_the_usual_one_is_among_them() {
-        let both = probe(
+    fn usual_ranges_with_a_flaw_give_way_to_a_pair_without() {
+        let mut flaws = [None; 6];
+        flaws[2] = WHITE;
+        let one_white = vec![pair(UNIT, &flaws), pair(BYTES, &[None; 6])];
+        let other = probe(Ranges::Open, one_white.clone()).conclusion();
+        assert!(matches!(other, Conclusion::Other(BYTES, _)), "{other:?}");
+        let alone = probe(Ranges::Open, one_white[..1].to_vec());
+        assert_eq!(alone.conclusion(), Conclusion::Assumed);
+        flaws[2] = UNLIT;
+        let dim = vec![pair(UNIT, &flaws), pair(BYTES, &[None; 6])];
+        assert_eq!(probe(Ranges::Open, dim).conclusion(), Conclusion::Assumed);
+    }
+
+    #[test]
+    fn a_pair_with_a_flaw_on_one_frame_is_not_advised() {
+        let mut flaws = [None; 6];
+        flaws[2] = WHITE;
+        let dim = probe(
             Ranges::Open,
-            vec![pair(UNIT, &[None; 6]), pair(BYTES, &[None; 6])],
+            vec![pair(UNIT, &[UNLIT; 6]), pair(BYTES, &flaws)],
         );
-        assert_eq!(both.conclusion(), Conclusion::Several(vec![UNIT, BYTES]));
-        let problem = both.problem().unwrap();
-        assert!(
-            problem.contains("perhaps `range_in = \"0..255\"`"),
-            "{problem}"
-        );
-        let signed = RangePair {
-            input: ValueRange::Signed,
-            ..UNIT
-        };
-        let other = probe(
+        let problem = dim.problem().unwrap();
+        assert!(!problem.contains("0..255"), "{problem}");
+        assert!(problem.contains("`range_in = \"0..1\"`"), "{problem}");
+    }
+
+    #[test]
+    fn the_usual_ranges_are_named_first_if_the_images_are_dim() {
+        let dim = probe(
             Ranges::Open,
-            vec![pair(UNIT, &[None; 6]), pair(signed, &[None; 6])],
+            vec![pair(UNIT, &[UNLIT; 6]), pair(BYTES, &[None; 6])],
         );
-        let problem = other.problem().unwrap();
-        assert!(problem.contains("-1..1 in and 0..1 out"), "{problem}");
-        assert!(!problem.contains("perhaps"), "{problem}");
+        let problem = dim.problem().unwrap();
+        let place = |words: &str| problem.find(words).unwrap();
+        assert!(place("range_in = \"0..1\"") < place("range_in = \"0..255\""));
+    }
+
+    #[test]
+    fn a_mean_and_a_deviation_are_lines_of_a_sidecar() {
+        let pairs = RangePair::normalised(None);
+        assert_eq!(pairs.len(), 4);
+        assert_eq!(
+            pairs[0].lines(),
+            [
+                "mean = [0.485, 0.456, 0.406]",
+                "std = [0.229, 0.224, 0.225]",
+                "range_out = \"0..1\""
+            ]
+        );
+        assert_eq!(pairs[3].lines()[2], "mean_out = [0.5, 0.5, 0.5]");
     }
 
     #[test]

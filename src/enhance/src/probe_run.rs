@@ -4,14 +4,15 @@ use super::convention::{Rounding, ValueRange};
 use super::enhancer::Enhancer;
 use super::findings::warn_of_untried;
 use super::graph::{Graph, RunResult};
+use super::output::in_expression;
 use super::planes::Planes;
 use super::plausible::Codes;
 use super::probe::{Conclusion, PairTrial, Probe, RangePair, Ranges};
 use super::sidecar::{self, ModelSidecar};
 use super::usage::{ImageUse, Implausible, Seen};
 use darkqa_ground::error::Result;
-use darkqa_ground::types::Rgb;
 use darkqa_ground::types::enhancer_note::{ProbeNote, ProbeOutcome};
+use darkqa_ground::types::{EnhancerName, Rgb};
 
 /// Sizes that are tried one after another, longer and shorter side in pixels: most multiples that models need divide one of them.
 const SIZES: [[usize; 2]; 3] = [[144, 96], [160, 120], [128, 128]];
@@ -45,7 +46,7 @@ impl Enhancer {
             return Ok(());
         };
         let outcome = match probe.conclusion() {
-            Conclusion::Plausible => ProbeOutcome::Plausible,
+            Conclusion::Plausible | Conclusion::Assumed => ProbeOutcome::Plausible,
             Conclusion::Doubtful(_) => ProbeOutcome::Doubtful,
             _ => ProbeOutcome::Overruled,
         };
@@ -60,6 +61,16 @@ impl Enhancer {
             (Some(problem), ..) => tracing::warn!("{}: {problem}", self.name()),
             (None, ..) => {}
         }
+        if problem.is_none() && self.may_be_residual(probe.usual)? {
+            let name = in_expression(&self.graph().signature.outputs[0].port.name);
+            self.remark(&format!(
+                "its output of a white image is nearly black, as if it had to be added to the input; if its authors add it, state in MODEL.onnx.toml beside it: `image = \"input + {name}\"`; `darkqa-eval enhance --doctor` draws both"
+            ));
+        }
+        self.warn_of_remarks();
+        if probe.conclusion() == Conclusion::Assumed {
+            warn_of_assumed(self.name(), probe.usual);
+        }
         let note = ProbeNote {
             frames: dark.len(),
             plausible: probe.plausible().iter().map(ToString::to_string).collect(),
@@ -73,7 +84,10 @@ impl Enhancer {
     /// that are right are found by trial.
     fn problem(&self, probe: &Probe, dark: &[Rgb]) -> Result<Option<String>> {
         let problem = match probe.conclusion() {
-            Conclusion::Implausible(seen) | Conclusion::Doubtful(seen) => {
+            // What the authors of a preset do is not contradicted.
+            Conclusion::Implausible(seen) | Conclusion::Doubtful(seen)
+                if !self.follows_preset() =>
+            {
                 let better = self.better_lines(dark)?;
                 better.map(|better| format!("{seen}. {better}"))
             }
@@ -164,6 +178,21 @@ impl Enhancer {
                     pairs.extend(trials.map(|(ranges, made)| PairTrial::new(*ranges, &seen, made)));
                 }
             }
+            if !pairs[0].iter().any(|pair| pair.verdict().is_none())
+                && self.may_be_normalised(input)
+            {
+                for pair in RangePair::normalised(output) {
+                    let graphs = conventions
+                        .iter()
+                        .map(|convention| self.read_by(convention, pair));
+                    let graphs: Vec<Graph> = graphs.collect::<Result<_>>()?;
+                    // The sizes are those of the plain ranges, so what fails here is no reason to try others.
+                    let made = made(&graphs, &frames)?.unwrap_or_default();
+                    for (pairs, made) in pairs.iter_mut().zip(made) {
+                        pairs.push(PairTrial::new(pair, &seen, made));
+                    }
+                }
+            }
             let probes = pairs.map(|pairs| Probe {
                 ranges,
                 usual,
@@ -176,11 +205,7 @@ impl Enhancer {
 
     /// The model, fed and read by a convention with these ranges.
     fn read_by(&self, convention: &ModelSidecar, ranges: RangePair) -> Result<Graph> {
-        let convention = ModelSidecar {
-            range_in: Some(ranges.input),
-            range_out: Some(ranges.output),
-            ..convention.clone()
-        };
+        let convention = convention.clone().fed(ranges.input).read(ranges.output);
         let graph = self.graph().with_convention(convention);
         graph.map_err(|problem| self.fault(problem))
     }
@@ -199,6 +224,13 @@ impl Enhancer {
             .to_rgb(Rounding::Round)
             .ok_or_else(|| self.fault("a frame of the probe has no pixel"))
     }
+}
+
+/// Says that nothing states the value ranges.
+fn warn_of_assumed(name: &EnhancerName, usual: RangePair) {
+    tracing::warn!(
+        "{name}: {usual} assumed, because neither sidecar nor preset states its value ranges; its images of dark frames are plausible with them"
+    );
 }
 
 /// What a model makes of each frame, read by each of these graphs of it, which feed it alike; `None` if it fails on a frame.

@@ -50,6 +50,11 @@ impl Iterator for FieldsOf<'_> {
 }
 
 impl FieldsOf<'_> {
+    /// Position of the next field in the buffer.
+    pub(super) fn position(&self) -> usize {
+        self.at
+    }
+
     fn field(&mut self) -> Option<(u64, FieldValue)> {
         let key = self.varint()?;
         let value = match key & 7 {

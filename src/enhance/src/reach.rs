@@ -9,6 +9,7 @@ use super::planes::Planes;
 use super::size_plan::SizeRule;
 use super::texture::{CODES, texture};
 use darkqa_ground::error;
+use darkqa_ground::types::Rgb;
 
 /// Difference of an output of 0..1 that counts as movement; above the last bits of 32-bit floats, below a thousandth of a
 /// code. Chosen.
@@ -18,11 +19,21 @@ const MOVED: f32 = 1e-6;
 const LEAST_CONTEXT: usize = 8;
 
 /// Side of the trial image where the model takes any, in pixels; chosen.
-const FREE_SIDE: usize = 128;
+pub(super) const FREE_SIDE: usize = 128;
 
-/// Context of the tiles of a model of a fixed size, measured once if nothing states it.
+/// Steps of pixels that tiles may have to start at, the smallest first: networks that halve an image up to five times.
+const ALIGNMENTS: [usize; 6] = [1, 2, 4, 8, 16, 32];
+
+/// Largest difference of outputs of 0..1 that count as the same; a tenth of a code. Chosen: above the rounding of other sums.
+const SAME: f32 = 4e-4;
+
+/// Context and alignment of the tiles of a model, measured once if nothing states them.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Context(Option<Result<Reach, String>>);
+pub(super) struct Context {
+    reach: Option<Result<Reach, String>>,
+    /// Tiles start at multiples of this number of pixels.
+    alignment: Option<usize>,
+}
 
 impl Context {
     /// The context in pixels; the inner error says why the model counts as global.
@@ -42,11 +53,11 @@ impl Context {
             None => {}
         }
         let size = rule.whole([FREE_SIDE; 2]);
-        if self.0.is_none() {
-            self.0 = Some(Reach::probe(graph, size)?);
+        if self.reach.is_none() {
+            self.reach = Some(Reach::probe(graph, size)?);
             graph.restart_clock();
         }
-        let reach = self.0.clone().unwrap_or_else(|| Err(String::new()));
+        let reach = self.reach.clone().unwrap_or_else(|| Err(String::new()));
         Ok(reach.and_then(|reach| {
             reach.context(size).ok_or_else(|| {
                 format!(
@@ -59,9 +70,82 @@ impl Context {
 
     /// The measured reach in pixels; `None` if it was not measured.
     pub(super) fn reach(&self) -> Option<usize> {
-        let reach = self.0.as_ref()?.as_ref().ok()?;
+        let reach = self.reach.as_ref()?.as_ref().ok()?;
         Some(reach.0)
     }
+
+    /// Whether the alignment was not measured yet.
+    pub(super) fn is_unaligned(&self) -> bool {
+        self.alignment.is_none()
+    }
+
+    /// The multiple at which tiles of this height and width must start, so that they give what the whole image gives: 2 to the power of
+    /// the number of poolings. 1 if none is found; the comparison of seams then speaks.
+    pub(super) fn alignment(
+        &mut self,
+        graph: &Graph,
+        tile: [usize; 2],
+        context: usize,
+    ) -> error::Result<usize> {
+        if let Some(alignment) = self.alignment {
+            return Ok(alignment);
+        }
+        let found = alignment(graph, tile, context)?.unwrap_or(1);
+        graph.restart_clock();
+        self.alignment = Some(found);
+        Ok(found)
+    }
+}
+
+/// The smallest of [`ALIGNMENTS`] by which an image may be moved without a change of the result, farther than the context from its
+/// edges; `None` if there is none.
+fn alignment(graph: &Graph, tile: [usize; 2], context: usize) -> error::Result<Option<usize>> {
+    let largest = ALIGNMENTS[ALIGNMENTS.len() - 1];
+    let scene = texture(tile.map(|side| side + largest), &CODES[0]);
+    let Ok(still) = output(graph, &part(&scene, tile, 0))? else {
+        return Ok(None);
+    };
+    for shift in ALIGNMENTS {
+        let Ok(moved) = output(graph, &part(&scene, tile, shift))? else {
+            return Ok(None);
+        };
+        if same_interior(&still, &moved, shift, context) {
+            return Ok(Some(shift));
+        }
+    }
+    Ok(None)
+}
+
+/// The part of an image that begins at this row and column.
+fn part(scene: &Rgb, [height, width]: [usize; 2], start: usize) -> Planes {
+    let mut part = Rgb::black(height, width);
+    let rows = scene.samples().chunks_exact(3 * scene.width()).skip(start);
+    let lines = part.samples_mut().chunks_exact_mut(3 * width);
+    for (line, row) in lines.zip(rows) {
+        line.copy_from_slice(&row[3 * start..][..3 * width]);
+    }
+    Planes::of(&part)
+}
+
+/// Whether an output and that of the moved image agree where both are farther than `margin` from their edges.
+fn same_interior(still: &Planes, moved: &Planes, shift: usize, margin: usize) -> bool {
+    let (height, width) = (still.height, still.width);
+    let rows = margin..(height - shift.min(height)).saturating_sub(margin);
+    let columns = margin..(width - shift.min(width)).saturating_sub(margin);
+    let plane = height * width;
+    let channels = still.samples.len() / plane.max(1);
+    !rows.is_empty()
+        && !columns.is_empty()
+        && (0..channels).all(|channel| {
+            rows.clone().all(|row| {
+                columns.clone().all(|column| {
+                    let at = |row: usize, column: usize| channel * plane + row * width + column;
+                    let was = still.samples[at(row + shift, column + shift)];
+                    let is = moved.samples[at(row, column)];
+                    (was - is).abs() <= SAME
+                })
+            })
+        })
 }
 
 /// Farthest pixels, along a side, on which a pixel of the output depends.
@@ -146,6 +230,23 @@ mod tests {
         moved[70 + 2 * 7 + 4] -= 0.1;
         assert_eq!(farthest_moved(&before, &planes(moved), [2, 3]), 2);
         assert_eq!(farthest_moved(&before, &before, [2, 3]), 0);
+    }
+
+    #[test]
+    fn an_output_that_moves_with_the_image_is_the_same() {
+        let planes = |phase: usize| Planes {
+            height: 12,
+            width: 12,
+            samples: (0..144)
+                .map(|i| ((i / 12 + phase) * 7 % 5 + (i % 12 + phase) * 3 % 11) as f32)
+                .collect(),
+        };
+        assert!(same_interior(&planes(0), &planes(2), 2, 3));
+        assert!(!same_interior(&planes(0), &planes(3), 2, 3));
+        assert!(
+            !same_interior(&planes(0), &planes(2), 2, 6),
+            "nothing is compared"
+        );
     }
 
     #[test]

@@ -2,8 +2,11 @@
 //!
 //! One pass checks the values, another clamps and rounds them.
 
+use std::borrow::Cow;
+
 use half::f16;
 
+use super::channel_slice::ChannelSlice;
 use super::convention::{ChannelOrder, ElementType, Rounding, TensorLayout, ValueRange};
 use super::output::Output;
 use super::planes::Planes;
@@ -19,9 +22,13 @@ pub(super) struct OutputReading {
     /// Layout that is chosen if several fit: that of the input.
     pub(super) preferred: TensorLayout,
     /// Numbers of channels that it may have, the likely one first.
-    pub(super) channels: &'static [usize],
+    pub(super) channels: Vec<usize>,
+    /// The channels that are read; `None` for all.
+    pub(super) slice: Option<ChannelSlice>,
     pub(super) color: ChannelOrder,
     pub(super) range: ValueRange,
+    /// Added to each channel after it was multiplied by the second; `None` for neither.
+    pub(super) mean_and_std: Option<[[f32; 3]; 2]>,
     /// Whether the range is known or must be checked against the values.
     pub(super) certainty: Certainty,
     pub(super) rounding: Rounding,
@@ -57,15 +64,36 @@ pub(super) enum OutOfRange {
 pub(super) enum TensorSamples<'a> {
     Float32(&'a [f32]),
     Float16(&'a [f16]),
+    Float64(&'a [f64]),
+    Int32(&'a [i32]),
+    Int64(&'a [i64]),
     Uint8(&'a [u8]),
+}
+
+impl<'a> TensorSamples<'a> {
+    /// The elements as 32-bit floats.
+    fn floats(self) -> Cow<'a, [f32]> {
+        match self {
+            Self::Float32(values) => Cow::Borrowed(values),
+            Self::Float16(values) => values.iter().map(|value| value.to_f32()).collect(),
+            Self::Float64(values) => values.iter().map(|value| *value as f32).collect(),
+            Self::Int32(values) => values.iter().map(|value| *value as f32).collect(),
+            Self::Int64(values) => values.iter().map(|value| *value as f32).collect(),
+            Self::Uint8(values) => values.iter().map(|value| f32::from(*value)).collect(),
+        }
+    }
 }
 
 impl OutputReading {
     /// The conversion that an output, the input and the convention define.
     pub(super) fn of(output: &Output, input: &ImageInput, convention: &ModelSidecar) -> Self {
+        let mean_and_std = convention.mean_and_std_out();
         let (range, certainty) = match (convention.range_out, &output.port.element) {
             (Some(range), _) => (range, Certainty::Known),
-            (None, ElementType::Uint8) => (ValueRange::Bytes, Certainty::Known),
+            (None, _) if mean_and_std.is_some() => (ValueRange::Unit, Certainty::Known),
+            (None, ElementType::Uint8 | ElementType::Int32 | ElementType::Int64) => {
+                (ValueRange::Bytes, Certainty::Known)
+            }
             // Without a statement, the output has the range of the input.
             (None, _) => (
                 convention
@@ -77,7 +105,9 @@ impl OutputReading {
         Self {
             layout: convention.layout_out.or(output.layout),
             preferred: input.layout,
-            channels: output.channels,
+            channels: output.channels.clone(),
+            slice: output.slice,
+            mean_and_std,
             color: convention
                 .color_out
                 .or(convention.color)
@@ -118,24 +148,19 @@ impl OutputReading {
         size: [usize; 2],
         part: TileWindow,
     ) -> Result<Vec<u8>, OutOfRange> {
-        match samples {
-            TensorSamples::Uint8(bytes) => Ok(self.gather(bytes, layout, size, part, |byte| byte)),
-            TensorSamples::Float16(values) => {
-                let values: Vec<f32> = values.iter().map(|value| value.to_f32()).collect();
-                self.bytes(TensorSamples::Float32(&values), layout, size, part)
-            }
-            TensorSamples::Float32(values) => {
-                check(values, self.range, self.certainty)?;
-                let (range, rounding) = (self.range, self.rounding);
-                Ok(self.gather(values, layout, size, part, |value| {
-                    let code = range.code(value).clamp(0.0, 255.0);
-                    match rounding {
-                        Rounding::Round => nearest(code),
-                        Rounding::Truncate => code as u8,
-                    }
-                }))
-            }
+        if let TensorSamples::Uint8(bytes) = samples {
+            return Ok(self.gather(bytes, layout, size, part, |byte| byte));
         }
+        let values = samples.floats();
+        check(&values, self.range, self.certainty)?;
+        let (range, rounding) = (self.range, self.rounding);
+        Ok(self.gather(&values, layout, size, part, |value| {
+            let code = range.code(value).clamp(0.0, 255.0);
+            match rounding {
+                Rounding::Round => nearest(code),
+                Rounding::Truncate => code as u8,
+            }
+        }))
     }
 
     /// A part of an output as floats in 0..1; `size` is that of the whole output. Of the values nothing is checked but `certainty`.
@@ -147,23 +172,30 @@ impl OutputReading {
         part: TileWindow,
         certainty: Certainty,
     ) -> Result<Planes, OutOfRange> {
-        let values: Vec<f32> = match samples {
-            TensorSamples::Uint8(bytes) => bytes.iter().map(|byte| f32::from(*byte)).collect(),
-            TensorSamples::Float16(values) => values.iter().map(|value| value.to_f32()).collect(),
-            TensorSamples::Float32(values) => values.to_vec(),
-        };
-        check(&values, self.range, certainty)?;
+        let values = samples.floats();
+        // Other channels than those that are read may have any values.
+        if self.slice.is_none() {
+            check(&values, self.range, certainty)?;
+        }
+        let all = channels;
+        let (first, channels) = self
+            .slice
+            .map_or((0, all), |slice| (slice.first, slice.count()));
         let at = |channel: usize, row: usize, column: usize| {
             let pixel = row * width + column;
             let channel = match channels {
                 3 => self.color.rgb_channel(channel),
                 _ => channel,
             };
-            let value = if layout.is_planar() {
-                values[channel * height * width + pixel]
+            let place = first + channel;
+            let mut value = if layout.is_planar() {
+                values[place * height * width + pixel]
             } else {
-                values[channels * pixel + channel]
+                values[all * pixel + place]
             };
+            if let (Some([mean, std]), 3) = (self.mean_and_std, channels) {
+                value = value * std[channel] + mean[channel];
+            }
             match self.range {
                 ValueRange::Unit => value,
                 ValueRange::Bytes | ValueRange::Signed => self.range.code(value) / 255.0,
@@ -174,6 +206,9 @@ impl OutputReading {
             for row in part.top..part.bottom {
                 samples.extend((part.left..part.right).map(|column| at(channel, row, column)));
             }
+        }
+        if samples.iter().any(|sample| sample.is_nan()) {
+            return Err(OutOfRange::NotNumbers);
         }
         Ok(Planes {
             height: part.size()[0],

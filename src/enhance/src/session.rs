@@ -131,6 +131,21 @@ fn output_tensor<'a>(
             let (dims, samples) = first_of(batch, dims, samples);
             (dims, TensorSamples::Float16(samples))
         }
+        ElementType::Float64 => {
+            let (dims, samples) = value.try_extract_tensor::<f64>()?;
+            let (dims, samples) = first_of(batch, dims, samples);
+            (dims, TensorSamples::Float64(samples))
+        }
+        ElementType::Int32 => {
+            let (dims, samples) = value.try_extract_tensor::<i32>()?;
+            let (dims, samples) = first_of(batch, dims, samples);
+            (dims, TensorSamples::Int32(samples))
+        }
+        ElementType::Int64 => {
+            let (dims, samples) = value.try_extract_tensor::<i64>()?;
+            let (dims, samples) = first_of(batch, dims, samples);
+            (dims, TensorSamples::Int64(samples))
+        }
         _ => {
             let (dims, samples) = value.try_extract_tensor::<f32>()?;
             let (dims, samples) = first_of(batch, dims, samples);

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::convention::{
-    ChannelOrder, Channels, Padding, Rounding, TensorLayout, Tile, ValueRange,
+    ChannelOrder, Channels, Padding, Rounding, TensorLayout, Tile, ValueRange, ValueScale,
 };
 use super::expression::Expression;
 use super::extra::ExtraValue;
@@ -44,6 +44,12 @@ pub(super) struct ModelSidecar {
     pub(super) mean: Option<[f32; 3]>,
     /// Number that each channel is then divided by.
     pub(super) std: Option<[f32; 3]>,
+    /// Number added to each channel of the output, in its channel order and range.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) mean_out: Option<[f32; 3]>,
+    /// Number that each channel of the output is multiplied by before.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) std_out: Option<[f32; 3]>,
     /// Number of pixels of which height and width must be multiples.
     pub(super) multiple: Option<NonZeroUsize>,
     /// Pixels that fill an image up to a multiple.
@@ -173,10 +179,47 @@ impl ModelSidecar {
         Ok(sidecar)
     }
 
+    /// Mean and deviation of the output; `None` if neither is stated.
+    pub(super) fn mean_and_std_out(&self) -> Option<[[f32; 3]; 2]> {
+        let is_stated = self.mean_out.is_some() || self.std_out.is_some();
+        is_stated.then(|| {
+            [
+                self.mean_out.unwrap_or([0.0; 3]),
+                self.std_out.unwrap_or([1.0; 3]),
+            ]
+        })
+    }
+
+    /// The same statements with an input of these values.
+    pub(super) fn fed(self, scale: ValueScale) -> Self {
+        let [mean, std] = scale
+            .mean_and_std()
+            .map_or([self.mean, self.std], |both| both.map(Some));
+        Self {
+            range_in: Some(scale.range()),
+            mean,
+            std,
+            ..self
+        }
+    }
+
+    /// The same statements with an output of these values.
+    pub(super) fn read(self, scale: ValueScale) -> Self {
+        let stated = [self.mean_out, self.std_out];
+        let [mean_out, std_out] = scale.mean_and_std().map_or(stated, |both| both.map(Some));
+        Self {
+            range_out: Some(scale.range()),
+            mean_out,
+            std_out,
+            ..self
+        }
+    }
+
     /// Checks that no number makes an image too large or a value unusable.
     fn check_bounds(&self) -> Result<(), String> {
-        let means = self.mean.into_iter().flatten();
-        let mut deviations = self.std.into_iter().flatten();
+        let means = [self.mean, self.mean_out].into_iter().flatten().flatten();
+        let deviations = [self.std, self.std_out].into_iter();
+        let mut deviations = deviations.flatten().flatten();
         let is_scale = |number: f32| (1.0 / MOST_SCALE..=MOST_SCALE).contains(&number);
         if !means.map(f32::abs).all(|mean| mean <= MOST_SCALE) || !deviations.all(is_scale) {
             return Err(format!(
@@ -217,6 +260,8 @@ impl ModelSidecar {
             input: self.input.filter(|input| !input.is_name("image")),
             mean: unless(self.mean, &[0.0; 3]),
             std: unless(self.std, &[1.0; 3]),
+            mean_out: unless(self.mean_out, &[0.0; 3]),
+            std_out: unless(self.std_out, &[1.0; 3]),
             multiple: unless(self.multiple, &NonZeroUsize::MIN),
             pad: unless(self.pad, &Padding::default()),
             pad_always: unless(self.pad_always, &false),
@@ -246,6 +291,8 @@ impl ModelSidecar {
             range_out: self.range_out.or(preset.range_out),
             mean: self.mean.or(preset.mean),
             std: self.std.or(preset.std),
+            mean_out: self.mean_out.or(preset.mean_out),
+            std_out: self.std_out.or(preset.std_out),
             multiple: self.multiple.or(preset.multiple),
             pad: self.pad.or(preset.pad),
             pad_always: self.pad_always.or(preset.pad_always),
@@ -272,6 +319,8 @@ mod tests {
             range_out = "-1..1"
             mean = [0.5, 0.5, 0.5]
             std = [1, 1, 1]
+            mean_out = [0.5, 0.5, 0.5]
+            std_out = [0.5, 0.5, 0.5]
             multiple = 8
             pad = "replicate"
             pad_always = true

@@ -101,6 +101,18 @@ impl Signature {
     }
 }
 
+impl Signature {
+    /// Whether an output can be an image of one or three channels of the input's size.
+    pub(super) fn has_image_size(&self, port: &Port) -> bool {
+        let layout = self.input.layout;
+        let [_, height, width] = layout.places().map(|place| &self.input.port.dims[place]);
+        [1, 3].into_iter().any(|count| {
+            let layout = port.layout(count).unwrap_or(layout);
+            port.channels().is_some() && port.can_be_image(layout, count, [height, width])
+        })
+    }
+}
+
 /// The input that is the image, and its layout.
 fn image_input<'a>(
     inputs: &'a [Port],
@@ -115,12 +127,20 @@ fn image_input<'a>(
         port.layout(channels.count()).is_some() && !ATTENTION.iter().any(|word| name.contains(word))
     };
     let Some(image) = images.iter().find(likely).or(images.first()).copied() else {
+        if let Some(port) = inputs
+            .iter()
+            .find(|port| port.dims.is_empty() && port.element.is_fed())
+        {
+            return Err(format!(
+                "takes {port}, without dimensions; export it with the input's shape, such as [1, 3, height, width]"
+            ));
+        }
         return Err(format!(
             "has no image among its inputs; it has {}",
             list(inputs)
         ));
     };
-    if !image.element.holds_images() {
+    if !image.element.is_fed() {
         return Err(format!(
             "takes {image}; export it with float32, float16 or uint8"
         ));
@@ -131,6 +151,9 @@ fn image_input<'a>(
         return Err(format!(
             "takes {image}, several images at a time; export it for a batch of 1 or of any size"
         ));
+    }
+    if let Some(problem) = unusable_shape(image) {
+        return Err(format!("takes {image}, {problem}"));
     }
     let layout = match (convention.layout_in, image.layout(channels.count())) {
         (Some(stated), Some(found)) if stated != found => None,
@@ -165,6 +188,30 @@ fn image_input<'a>(
         }
         _ => Err(format!(
             "takes {image}, which contradicts layout_in in its sidecar or preset"
+        )),
+    }
+}
+
+/// Why an input of these dimensions cannot be the image, and what to export instead; `None` if it can be one.
+fn unusable_shape(port: &Port) -> Option<String> {
+    let several = |count: usize| {
+        format!(
+            "{count} channels, and an image has 3; export it so that it takes the image alone and makes the other channels inside the graph"
+        )
+    };
+    let [three, one] = [3, 1].map(|count| port.layout(count).is_some());
+    match port.dims.len() {
+        ..3 => Some(
+            "flat values; export it so that it takes an image of [1, 3, height, width]".to_owned(),
+        ),
+        3 | 4 if three || one => None,
+        3 | 4 => {
+            let counts = port.channel_counts();
+            let mut counts = counts.into_iter().filter(|count| (2..=16).contains(count));
+            counts.find(|count| *count != 3).map(several)
+        }
+        rank => Some(format!(
+            "{rank} dimensions: several frames at a time; export it for single images of [1, 3, height, width]"
         )),
     }
 }

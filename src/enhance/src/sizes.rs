@@ -37,6 +37,7 @@ pub(super) fn count_planned(
         log.tile = log.tile.max(Some([width, height]));
         log.context = log.context.max(Some(plan.cut.context));
         log.seam.compared += seam.compared;
+        log.seam.black += seam.black;
         log.seam.differing += seam.differing;
         log.seam.most = log.seam.most.max(seam.max_difference);
     }

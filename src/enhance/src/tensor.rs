@@ -66,6 +66,37 @@ impl TensorData {
         fitting.ok_or_else(|| format!("{number} does not fit its type {element}"))
     }
 
+    /// These numbers, one after another; each must fit as in [`TensorData::filled`].
+    ///
+    /// # Errors
+    /// If a number does not fit; the message names the number and the type.
+    pub(super) fn listed(element: &ElementType, numbers: &[Number]) -> Result<Self, String> {
+        let mut all = Self::filled(element, Number::Integer(0), 0).or_else(|_| {
+            // A truth value has no 0.
+            Self::filled(element, Number::Bool(false), 0)
+        })?;
+        for number in numbers {
+            match (&mut all, Self::filled(element, *number, 1)?) {
+                (Self::Bool(all), Self::Bool(one)) => all.extend(one),
+                (Self::Int8(all), Self::Int8(one)) => all.extend(one),
+                (Self::Int16(all), Self::Int16(one)) => all.extend(one),
+                (Self::Int32(all), Self::Int32(one)) => all.extend(one),
+                (Self::Int64(all), Self::Int64(one)) => all.extend(one),
+                (Self::Uint8(all), Self::Uint8(one)) => all.extend(one),
+                (Self::Uint16(all), Self::Uint16(one)) => all.extend(one),
+                (Self::Uint32(all), Self::Uint32(one)) => all.extend(one),
+                (Self::Uint64(all), Self::Uint64(one)) => all.extend(one),
+                (Self::Float16(all), Self::Float16(one)) => all.extend(one),
+                (Self::Bfloat16(all), Self::Bfloat16(one)) => all.extend(one),
+                (Self::Float32(all), Self::Float32(one)) => all.extend(one),
+                (Self::Float64(all), Self::Float64(one)) => all.extend(one),
+                // Both are of the same type.
+                _ => {}
+            }
+        }
+        Ok(all)
+    }
+
     /// Floats as elements of a float type; `None` for another type.
     pub(super) fn floats(element: &ElementType, values: Vec<f32>) -> Option<Self> {
         Some(match element {

@@ -29,6 +29,8 @@ pub(super) enum Term {
     Clip,
     /// Mean over the channels.
     Mean,
+    /// Zero-DCE's curves: x + a · (x² − x) for each further argument a, one after another.
+    Curves(usize),
 }
 
 /// Value of an expression at one pixel.
@@ -94,7 +96,7 @@ impl Term {
             Self::Negate | Self::Mean => 1,
             Self::Add | Self::Subtract | Self::Multiply | Self::Divide | Self::Power => 2,
             Self::Clip => 3,
-            Self::Min(count) | Self::Max(count) => count,
+            Self::Min(count) | Self::Max(count) | Self::Curves(count) => count,
         }
     }
 
@@ -116,6 +118,9 @@ impl Term {
             (Self::Min(_), [a, rest @ ..]) => rest.iter().fold(*a, |a, b| a.with(*b, smaller)),
             (Self::Max(_), [a, rest @ ..]) => rest.iter().fold(*a, |a, b| a.with(*b, larger)),
             (Self::Clip, [a, low, high]) => a.with(*low, larger).with(*high, smaller),
+            (Self::Curves(_), [x, curves @ ..]) => curves
+                .iter()
+                .fold(*x, |x, a| x.with(*a, |x, a| x + a * (x * x - x))),
             (Self::Mean, [a]) => match a.folded(|a, b| a + b) {
                 Sample::One(sum) if matches!(a, Sample::Three(_)) => Sample::One(sum / 3.0),
                 same => same,

@@ -13,6 +13,9 @@ use darkqa_ground::types::Rgb;
 /// Pixels beyond a seam that a tile contributes too, for the comparison; chosen.
 pub(super) const GUARD: usize = 2;
 
+/// Largest code of a sample whose comparison shows nothing; chosen.
+const NEARLY_BLACK: u8 = 2;
+
 /// Rectangle of an image, in pixels. `right` and `bottom` are exclusive and may lie outside the image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct TileWindow {
@@ -190,6 +193,8 @@ pub(super) struct TiledImage {
 pub(super) struct Seam {
     /// Number of samples that both tiles contain.
     pub(super) compared: usize,
+    /// Number of those samples that are nearly black in both.
+    pub(super) black: usize,
     /// Number of those samples that differ.
     pub(super) differing: usize,
     /// Largest difference, in codes.
@@ -232,6 +237,7 @@ impl TiledImage {
             let overlap = 3 * (overlap_end - column.output_start);
             for (a, b) in target[..overlap].iter().zip(&line[..overlap]) {
                 self.seam.compared += 1;
+                self.seam.black += usize::from((*a).max(*b) <= NEARLY_BLACK);
                 self.seam.differing += usize::from(a != b);
                 self.seam.max_difference = self.seam.max_difference.max(a.abs_diff(*b));
             }

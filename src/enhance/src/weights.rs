@@ -9,7 +9,7 @@
 //!
 //! Field numbers are those of `onnx/onnx.proto` (IR version 13).
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::protobuf::{FieldValue, Malformed, fields};
@@ -19,8 +19,8 @@ use super::protobuf::{FieldValue, Malformed, fields};
 pub(super) struct Weights {
     /// Byte ranges of little-endian 32-bit floats.
     floats: Vec<Range<usize>>,
-    /// The `location` of every tensor with external data, relative to the model's folder.
-    pub(super) external: BTreeSet<String>,
+    /// The `location` of every tensor with external data, relative to the model's folder, and the least size of that file in bytes.
+    pub(super) external: BTreeMap<String, u64>,
 }
 
 /// Messages of an ONNX file that may contain weights.
@@ -88,7 +88,7 @@ impl Weights {
         const FLOAT: u64 = 1;
         const EXTERNAL: u64 = 1;
         let (mut data_type, mut location) = (0, 0);
-        let (mut floats, mut names) = (Vec::new(), Vec::new());
+        let (mut floats, mut entries) = (Vec::new(), BTreeMap::new());
         for field in fields(model, range) {
             match field? {
                 (2, FieldValue::Varint(value)) => data_type = value,
@@ -97,12 +97,18 @@ impl Weights {
                 (4 | 9, FieldValue::Bytes(bytes)) | (4, FieldValue::Fixed32(bytes)) => {
                     floats.push(bytes);
                 }
-                (13, FieldValue::Bytes(entry)) => names.extend(location_in(model, entry)?),
+                (13, FieldValue::Bytes(entry)) => entries.extend(entry_in(model, entry)?),
                 _ => {}
             }
         }
         if location == EXTERNAL {
-            self.external.extend(names);
+            let number = |key: &str| entries.get(key).and_then(|text: &String| text.parse().ok());
+            let end = number("offset").unwrap_or(0_u64);
+            let end = end.saturating_add(number("length").unwrap_or(0));
+            if let Some(location) = entries.get("location") {
+                let size = self.external.entry(location.clone()).or_default();
+                *size = end.max(*size);
+            }
         } else if data_type == FLOAT {
             self.floats.extend(floats);
         }
@@ -129,8 +135,8 @@ impl Weights {
     }
 }
 
-/// Value of a `StringStringEntryProto` if its key is `location`.
-fn location_in(model: &[u8], entry: Range<usize>) -> Result<Option<String>, Malformed> {
+/// Key and value of a `StringStringEntryProto`, if it has both.
+fn entry_in(model: &[u8], entry: Range<usize>) -> Result<Option<(String, String)>, Malformed> {
     let (mut key, mut value) = (None, None);
     for field in fields(model, entry) {
         match field? {
@@ -139,8 +145,9 @@ fn location_in(model: &[u8], entry: Range<usize>) -> Result<Option<String>, Malf
             _ => {}
         }
     }
-    let text = value.filter(|_| key == Some(b"location"));
-    text.map(|bytes| String::from_utf8(bytes.to_vec()).map_err(|_| Malformed))
+    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).map_err(|_| Malformed);
+    key.zip(value)
+        .map(|(key, value)| Ok((text(key)?, text(value)?)))
         .transpose()
 }
 
@@ -215,15 +222,18 @@ mod tests {
     #[test]
     fn external_data_is_named_and_not_changed() {
         let entry = [field(1, b"location"), field(2, b"weights.bin")].concat();
-        let offset = [field(1, b"offset"), field(2, b"0")].concat();
+        let offset = [field(1, b"offset"), field(2, b"8")].concat();
+        let length = [field(1, b"length"), field(2, b"12")].concat();
         let content = [
             &[16, 1, 14 << 3, 1],
             field(13, &entry).as_slice(),
             &field(13, &offset),
+            &field(13, &length),
         ]
         .concat();
         let weights = Weights::find(&model(&field(5, &content))).unwrap();
-        assert_eq!(weights.external, BTreeSet::from(["weights.bin".to_owned()]));
+        let expected = BTreeMap::from([("weights.bin".to_owned(), 20)]);
+        assert_eq!(weights.external, expected);
         assert!(weights.floats.is_empty());
     }
 

@@ -3,7 +3,7 @@
 use darkqa_eval::enhance::ModelFile;
 use darkqa_eval::types::Rgb;
 
-use super::{fault, image, loaded, map, open};
+use super::{fault, image, loaded, map, open, stated};
 use crate::support::onnx::Size::{Known, Named};
 use crate::support::onnx::{self, Graph, Type};
 use crate::support::table::check_rows;
@@ -104,7 +104,7 @@ fn other_conventions_are_refused_by_name() {
             onnx::shaped(Type::Float, &[Named("n"), Named("c"), any[0], any[1]]),
             "layout_in",
         ),
-        (onnx::no_image(), "no output that is an image"),
+        (onnx::no_image(), "24 channels, and an image has 3"),
         (onnx::two_inputs(), "exposure = 0.2"),
     ];
     check_rows(rows, |(graph, part)| {
@@ -117,7 +117,7 @@ fn other_conventions_are_refused_by_name() {
 fn what_goes_wrong_while_running_is_an_error() {
     let (_folder, mut halved) = loaded(&onnx::halved());
     let message = halved.enhance(&image(8, 8)).unwrap_err().to_string();
-    assert!(message.contains("[1, 3, 4, 4]"), "{message}");
+    assert!(message.contains("4 × 4 for one of 8 × 8"), "{message}");
     let (_folder, mut broken) = loaded(&onnx::not_a_number());
     let message = broken.enhance(&image(8, 8)).unwrap_err().to_string();
     assert!(message.contains("not numbers"), "{message}");
@@ -144,4 +144,62 @@ fn the_name_is_that_of_the_file() {
     let file = ModelFile::read(&folder.path().join("model.onnx")).unwrap();
     assert_eq!(enhancer.name().as_str(), "model");
     assert_eq!(enhancer.name(), file.name());
+}
+
+#[test]
+fn doubles_and_integers_are_read() {
+    let image = image(9, 14);
+    let (_folder, mut enhancer) = stated(&onnx::cast(Type::Double), "range_out = \"0..255\"");
+    assert_eq!(enhancer.enhance(&image).unwrap(), image);
+    check_rows([Type::Int, Type::Long], |element| {
+        let (_folder, mut enhancer) = loaded(&onnx::cast(element));
+        let result = enhancer.enhance(&image).unwrap();
+        let pairs = result.samples().iter().zip(image.samples());
+        assert!(pairs.clone().all(|(a, b)| a.abs_diff(*b) <= 1));
+    });
+}
+
+#[test]
+fn channels_of_an_output_are_selected() {
+    let image = image(9, 14);
+    let message = fault(&onnx::seven_channels());
+    assert!(message.contains("7 channels"), "{message}");
+    for sidecar in [
+        "output = \"x[4:7]\"",
+        "image = \"x[4:7] * 1\"",
+        "output = \"x[0:3]\"",
+    ] {
+        assert!(message.contains("`output = \"x[4:7]\"`"), "{message}");
+        let (_folder, mut enhancer) = stated(&onnx::seven_channels(), sidecar);
+        assert_eq!(enhancer.enhance(&image).unwrap(), image, "{sidecar}");
+    }
+}
+
+#[test]
+fn a_vector_is_given_as_a_list() {
+    let message = fault(&onnx::times_vector());
+    assert!(
+        message.contains("`alpha = [NUMBER, NUMBER, NUMBER]`"),
+        "{message}"
+    );
+    let image = image(9, 14);
+    let (_folder, mut enhancer) = stated(&onnx::times_vector(), "[extra]\nalpha = [1, 0, 1]");
+    let expected: Vec<u8> = image
+        .samples()
+        .iter()
+        .enumerate()
+        .map(|(i, byte)| if i % 3 == 1 { 0 } else { *byte })
+        .collect();
+    assert_eq!(enhancer.enhance(&image).unwrap().samples(), expected);
+}
+
+#[test]
+fn tiles_start_where_blocks_do() {
+    let image = image(40, 90);
+    let (_whole, mut whole) = loaded(&onnx::pooled(40, 90));
+    let (_tiled, mut tiled) = loaded(&onnx::pooled(40, 62));
+    assert_eq!(
+        tiled.enhance(&image).unwrap(),
+        whole.enhance(&image).unwrap()
+    );
 }

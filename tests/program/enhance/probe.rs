@@ -51,14 +51,16 @@ fn a_right_model_is_asked_and_its_ranges_are_confirmed() {
     let manifest = manifest(&bench);
     assert_eq!(
         stated(&manifest, "range_in"),
-        ("0..1".to_owned(), "probed".to_owned())
+        ("0..1".to_owned(), "assumed".to_owned())
     );
     let note = &manifest["enhancers"]["model"];
     assert_eq!(note["probe"]["outcome"], "plausible");
     assert!(note["judged"]["images"].as_u64().unwrap() > 0, "{note}");
     assert!(note["judged"]["flawed"].is_null(), "{note}");
     let page = fs::read_to_string(bench.path("run/report.html")).unwrap();
-    assert!(page.contains("fed 0..1 (probed)"), "the page says how");
+    assert!(page.contains("fed 0..1 (assumed)"), "the page says how");
+    assert!(page.contains("model: 0..1 assumed."), "the page warns");
+    assert!(called.stderr.contains("0..1 out assumed"), "{called:?}");
 }
 
 #[test]
@@ -132,6 +134,45 @@ fn sets_for_other_tools_are_not_made_with_it_either() {
     assert_eq!(called.code, Some(2), "{called:?}");
     assert!(called.stderr.contains("bright where"), "{called:?}");
     bench.complete(&words(&format!("{line} --llie-anyway")));
+}
+
+#[test]
+fn random_graphs_residuals_and_other_outputs_are_named() {
+    for (graph, part) in [
+        (onnx::noisy(), "draws random numbers (RandomNormalLike)"),
+        (onnx::residual(), "`image = \"input + output\"`"),
+        (
+            onnx::light_beside(),
+            "and \"L\", which has the image's size",
+        ),
+    ] {
+        let bench = bench(&graph, "");
+        let called = ask(&bench, "");
+        assert_eq!(called.code, Some(0), "{part}: {called:?}");
+        assert!(called.stderr.contains(part), "{part}: {called:?}");
+        assert_eq!(
+            manifest(&bench)["enhancers"]["model"]["remarks"]
+                .as_array()
+                .map(Vec::len),
+            Some(1)
+        );
+    }
+}
+
+#[test]
+fn a_normalised_input_is_found() {
+    let graph = onnx::normalised([0.485, 0.456, 0.406], [0.229, 0.224, 0.225]);
+    let bench = bench(&graph, "");
+    let called = ask(&bench, "");
+    assert_eq!(called.code, Some(2), "{called:?}");
+    let lines = "`mean = [0.485, 0.456, 0.406]` and `std = [0.229, 0.224, 0.225]` and `range_out = \"0..1\"`";
+    assert!(called.stderr.contains(lines), "{called:?}");
+    let stated = self::bench(
+        &graph,
+        "mean = [0.485, 0.456, 0.406]\nstd = [0.229, 0.224, 0.225]\n",
+    );
+    let called = ask(&stated, "");
+    assert_eq!(called.code, Some(0), "{called:?}");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! What follows from an examination: the lines of a sidecar that are proposed, and why ([`Found`]).
 
-use crate::convention::{ChannelOrder, ValueRange};
-use crate::probe::{Probe, RangePair};
+use crate::convention::ChannelOrder;
+use crate::probe::{Conclusion, Probe, RangePair};
 use darkqa_ground::types::Flaw;
 
 /// Whether an examination found one convention.
@@ -76,12 +76,12 @@ impl Found {
 
     fn ranges(pair: RangePair, conclusion: String) -> Self {
         let reason = "the only value ranges with which its images can be enhanced images";
-        let line = |key: &str, range: ValueRange| ProposedLine {
-            line: format!("{key} = \"{range}\""),
+        let lines = pair.lines().into_iter().map(|line| ProposedLine {
+            line,
             reason: reason.to_owned(),
-        };
+        });
         Self {
-            lines: vec![line("range_in", pair.input), line("range_out", pair.output)],
+            lines: lines.collect(),
             conclusion,
             settled: Settled::Yes,
         }
@@ -98,6 +98,15 @@ pub(super) fn propose(
     order: ChannelOrder,
 ) -> Found {
     match probe.plausible().as_slice() {
+        several @ [_, _, ..] if stated.is_none() && probe.conclusion() == Conclusion::Assumed => {
+            let others = several.iter().filter(|pair| **pair != probe.usual);
+            let others: Vec<String> = others.map(ToString::to_string).collect();
+            return Found::nothing(format!(
+                "With {} its images can be enhanced images: a run assumes these usual ranges and says so. They can with {} too; compare them below with the model's own examples.",
+                probe.usual,
+                others.join("; ")
+            ));
+        }
         [pair] => {
             let stated = stated.map_or_else(String::new, |stated| {
                 format!(" Stated are {stated}, with which they cannot.")

@@ -132,6 +132,7 @@ fn the_output_is_known_by_name_then_by_channels() {
         ("iat", &[("1", 3), ("2", 3), ("3", 3)], "3"),
         ("darkir", &[("1", 3), ("2", 3)], "2"),
         ("darkir", &[("output", 3), ("side", 3)], "output"),
+        ("enlightengan", &[("output", 3), ("255", 3)], "output"),
     ] {
         let found = stated(name, outputs).unwrap();
         let expected = OutputChoice::Name(expected.to_owned());
@@ -150,6 +151,7 @@ fn an_unknown_list_of_outputs_is_an_error_that_lists_them() {
         ("zero-dce", &[("1", 3), ("2", 3)][..]),
         ("ruas-lol", &[("output", 3), ("2", 3), ("3", 3)]),
         ("retinexformer", &[("a", 3), ("b", 3)]),
+        ("uretinex", &[("R", 3), ("L", 1)]),
     ] {
         let message = stated(name, outputs).unwrap_err();
         assert!(message.contains(&format!("preset {name}")), "{message}");
@@ -192,6 +194,15 @@ fn pairlie_is_composed_or_exported_with_its_exponent() {
     let found = preset("pairlie-lol").for_graph(&ModelSidecar::default(), &inputs, &outputs);
     let exponent = ExtraValue::Number(Number::Float(0.14));
     assert_eq!(found.unwrap().extra["exposure"], exponent);
+}
+
+#[test]
+fn uretinex_is_composed_of_reflectance_and_light() {
+    let found = stated("uretinex", &[("R", 3), ("L", 1), ("High_L", 1)]).unwrap();
+    assert_eq!(
+        (found.image, found.output),
+        ("R * High_L".parse().ok(), None)
+    );
 }
 
 #[test]

@@ -16,15 +16,19 @@ const FEEDING: Feeding = Feeding {
     std: [1.0; 3],
     pad: Padding::Reflect,
 };
-const READING: OutputReading = OutputReading {
-    layout: None,
-    preferred: TensorLayout::Nchw,
-    channels: &[3],
-    color: ChannelOrder::Rgb,
-    range: ValueRange::Unit,
-    certainty: Certainty::Known,
-    rounding: Rounding::Round,
-};
+fn reading() -> OutputReading {
+    OutputReading {
+        layout: None,
+        preferred: TensorLayout::Nchw,
+        channels: vec![3],
+        slice: None,
+        mean_and_std: None,
+        color: ChannelOrder::Rgb,
+        range: ValueRange::Unit,
+        certainty: Certainty::Known,
+        rounding: Rounding::Round,
+    }
+}
 
 fn image(height: usize, width: usize) -> Rgb {
     let samples = (0..height * width * 3).map(|i| (i * 37 % 256) as u8);
@@ -86,7 +90,7 @@ fn every_convention_gives_every_byte_back() {
                     preferred: layout,
                     color,
                     range,
-                    ..READING
+                    ..reading()
                 };
                 let samples = match &input.data {
                     TensorData::Float32(values) => TensorSamples::Float32(values),
@@ -187,7 +191,7 @@ fn samples_are_clamped_and_rounded() {
     let bytes = |rounding| {
         let reading = OutputReading {
             rounding,
-            ..READING
+            ..reading()
         };
         let samples = TensorSamples::Float32(&values);
         reading

@@ -355,8 +355,13 @@ fn other_conventions_are_refused_by_name() {
         (vec![image("a"), image("b")], "\"b\" (float32 [1, 3, n, n])"),
         (vec![double], "float64"),
         (vec![port("a", &[2, 3, 0, 0])], "several images"),
-        (vec![port("a", &[])], "no image among"),
-        (vec![port("a", &[1, 85])], "not an image of three"),
+        (vec![port("a", &[])], "without dimensions"),
+        (
+            vec![port("a", &[1, 4, 0, 0])],
+            "4 channels, and an image has 3",
+        ),
+        (vec![port("a", &[1, 2, 3, 64, 64])], "several frames"),
+        (vec![port("a", &[1, 85])], "flat values"),
     ];
     for (inputs, part) in cases {
         let message = of(&inputs, &[image("out")]).unwrap_err();

@@ -24,6 +24,9 @@ pub struct EnhancerNote {
     /// What the probe found before the first question; `None` if it was not run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub probe: Option<ProbeNote>,
+    /// What a reader of the results must know, in sentences that follow the enhancer's name.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub remarks: Vec<String>,
     /// What its images of dark frames looked like during the run.
     #[serde(default)]
     pub judged: JudgedImages,
@@ -98,6 +101,11 @@ impl EnhancerNote {
         self.judged.add(&earlier.judged);
         self.resized |= earlier.resized;
         self.probe = self.probe.or(earlier.probe);
+        for remark in earlier.remarks {
+            if !self.remarks.contains(&remark) {
+                self.remarks.push(remark);
+            }
+        }
         if self.sizes.is_empty() {
             self.sizes = earlier.sizes;
             self.size_counts = earlier.size_counts;

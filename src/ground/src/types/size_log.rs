@@ -43,10 +43,22 @@ pub struct SizeLog {
 pub struct SeamCounts {
     /// Samples that were compared.
     pub compared: usize,
+    /// Those of them that are nearly black in both tiles, which shows nothing.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub black: usize,
     /// Samples that differed.
     pub differing: usize,
     /// Largest difference in codes of 255.
     pub most: u8,
+}
+
+/// Whether a count is 0.
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde passes a reference"
+)]
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 impl SizeLog {
@@ -83,6 +95,7 @@ impl SizeLog {
         self.context = self.context.max(*context);
         self.reach = self.reach.max(*reach);
         self.seam.compared += seam.compared;
+        self.seam.black += seam.black;
         self.seam.differing += seam.differing;
         self.seam.most = self.seam.most.max(seam.most);
     }
@@ -100,6 +113,7 @@ impl SizeLog {
             too_long: self.too_long - earlier.too_long,
             seam: SeamCounts {
                 compared: self.seam.compared - earlier.seam.compared,
+                black: self.seam.black - earlier.seam.black,
                 differing: self.seam.differing - earlier.seam.differing,
                 // The largest of all images so far; sums of parts have the same largest.
                 most: self.seam.most,
@@ -146,13 +160,19 @@ impl SizeLog {
     /// The tiles with their context and seams.
     fn tiles(&self) -> String {
         let [width, height] = self.tile.unwrap_or_default();
-        let seam = if self.seam.differing == 0 {
+        let seam = if self.seam.black > 0
+            && self.seam.differing == 0
+            && self.seam.black * 10 >= self.seam.compared * 9
+        {
+            "seams could not be checked, because the images are nearly black there".to_owned()
+        } else if self.seam.differing == 0 {
             "no difference at seams".to_owned()
         } else {
             let SeamCounts {
                 compared,
                 differing,
                 most,
+                ..
             } = self.seam;
             format!("{differing} of {compared} samples at seams differ, by up to {most}")
         };
