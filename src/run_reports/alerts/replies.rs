@@ -26,6 +26,11 @@ pub(super) fn of_replies(health: &[Health], unread_as: &str) -> Vec<Alert> {
                 "{unread} of {replies} replies of {model} ({share:.1} %) could not be read, and {unread_as}."
             );
             alerts.push(Alert::new(AlertKind::Unread, text));
+        } else if let Some(worst) = worst(health, model) {
+            alerts.push(Alert::new(
+                AlertKind::Unread,
+                in_condition(worst, unread_as),
+            ));
         }
         if failed > 0 {
             let (trials, are) = (
@@ -37,6 +42,31 @@ pub(super) fn of_replies(health: &[Health], unread_as: &str) -> Vec<Alert> {
         }
     }
     alerts
+}
+
+/// The condition of a model with the largest share of replies that could not be read, if it is above the limit.
+fn worst<'h>(health: &'h [Health], model: &str) -> Option<&'h Health> {
+    let share = |health: &Health| (health.replies - health.read) as f64 / health.replies as f64;
+    let own = health.iter().filter(|health| health.subject.model == model);
+    let above = own.filter(|health| health.replies > 0 && share(health) > MAX_UNREAD);
+    above.max_by(|a, b| share(a).total_cmp(&share(b)))
+}
+
+/// The replies of a condition that could not be read, and how many of them the lenient parsing reads.
+fn in_condition(health: &Health, unread_as: &str) -> String {
+    let unread = health.replies - health.read;
+    let share = 100.0 * unread as f64 / health.replies as f64;
+    let lenient = match health.lenient_only {
+        0 => String::new(),
+        read => format!(" The lenient parsing reads {read} of them."),
+    };
+    let subject = &health.subject;
+    format!(
+        "{unread} of {} replies of {} at {} ({share:.1} %) could not be read, and {unread_as}.{lenient}",
+        health.replies,
+        subject.model,
+        subject.condition()
+    )
 }
 
 /// Answers of people that are no choice of their question.
@@ -56,4 +86,30 @@ pub(super) fn of_people(combined: &Combined) -> Vec<Alert> {
         (count > 0).then(|| Alert::new(AlertKind::NoChoice, text))
     });
     alerts.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::score::subject::Subject;
+
+    #[test]
+    fn one_condition_that_cannot_be_read_is_named() {
+        let health = |condition: &str, read: usize| Health {
+            subject: Subject::new("m", Some(&condition.parse().unwrap())),
+            replies: 100,
+            read,
+            lenient_only: 100 - read,
+            unread: BTreeMap::new(),
+            failed: BTreeMap::new(),
+        };
+        let mut all: Vec<Health> = (0..19).map(|_| health("L0", 100)).collect();
+        assert_eq!(of_replies(&all, "count as wrong"), []);
+        all.push(health("L5-noise", 80));
+        let alerts = of_replies(&all, "count as wrong");
+        assert_eq!(
+            alerts[0].text,
+            "20 of 100 replies of m at L5-noise (20.0 %) could not be read, and count as wrong. The lenient parsing reads 20 of them."
+        );
+    }
 }
