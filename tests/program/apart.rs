@@ -106,7 +106,7 @@ fn a_run_in_other_light_is_compared_although_replies_at_l0_differ() {
     let rows = scene.csv("ab/comparisons.csv");
     let lights = rows
         .iter()
-        .filter(|row| row[0] == "light" && row[5] == "all");
+        .filter(|row| row[0] == "light" && row[5] == "all" && row.last().unwrap() == "strict");
     let lights: Vec<[&str; 4]> = lights
         .map(|row| [&*row[1], &*row[2], &*row[3], &*row[4]])
         .collect();
@@ -143,7 +143,9 @@ fn a_row_that_pools_fewer_models_says_so() {
     let rows = scene.csv("out/pooled.csv");
     let place = |name: &str| rows[0].iter().position(|head| head == name).unwrap();
     let models = |kind: &str| {
-        let rows = rows.iter().filter(|row| row[0] == kind);
+        let rows = rows
+            .iter()
+            .filter(|row| row[0] == kind && row[place("mode")] == "strict");
         let mut numbers: Vec<&str> = rows.map(|row| &*row[place("models")]).collect();
         numbers.dedup();
         numbers

@@ -118,7 +118,7 @@ fn a_perfect_model_has_next_to_no_calibration_error() {
         let error = mean(&found, |row| row.error.unwrap().value);
         let (zero, gap) = (
             held(&found, 0.0, |row| row.error),
-            held(&found, 0.0, |row| Some(row.overconfidence)),
+            held(&found, 0.0, |row| Some(row.overconfidence.estimate)),
         );
         println!(
             "{} replies: error {error:.4}, 0 held {zero} %, gap {gap} %",
@@ -154,7 +154,7 @@ fn intervals_hold_the_truth_of_an_overconfident_model() {
         let found = simulated(4, 200, (frames, size), overconfident);
         let rates = [
             held(&found, error, |row| row.error),
-            held(&found, gap, |row| Some(row.overconfidence)),
+            held(&found, gap, |row| Some(row.overconfidence.estimate)),
             held(&found, 0.625, |row| Some(row.confidence)),
             held(&found, brier, |row| Some(row.brier)),
         ];

@@ -59,7 +59,9 @@ fn findings(
     let summary = fs::read(bench.path(out).join("summary.json")).unwrap();
     let summary: Value = serde_json::from_slice(&summary).unwrap();
     let table = fs::read_to_string(bench.path(out).join("pooled.csv")).unwrap();
-    let rows = table.lines().filter(|row| row.starts_with("answers "));
+    let rows = table
+        .lines()
+        .filter(|row| row.starts_with("answers ") && row.contains(",strict,"));
     (
         summary["findings"].as_array().unwrap().clone(),
         rows.map(str::to_owned).collect(),
@@ -110,16 +112,11 @@ fn no_in_the_dark_is_said_where_it_grows() {
 #[test]
 fn no_that_does_not_grow_and_replies_that_cannot_be_read_are_no_hallucination() {
     let bench = bench();
-    // “no” at every level: no growth, and one answer to everything.
+    // “no” at every level, also at L0: no growth, and no collapse in the dark.
     let (said, rows) = findings(&bench, "always", |_, _| "no".to_owned());
     assert!(texts(&said, "hallucination").is_empty(), "{said:?}");
     assert!(!rows.iter().any(|row| row.contains(",worse,")), "{rows:?}");
-    assert_eq!(
-        texts(&said, "collapse"),
-        [
-            "At L5 100.0 % of the replies about object recognition are “no”, which is true of 50.0 %."
-        ]
-    );
+    assert!(texts(&said, "collapse").is_empty(), "{said:?}");
     // A refusal in the dark is no “no”.
     let (said, rows) = findings(&bench, "refused", |answer, condition| {
         let is_dark = condition.starts_with("L5");

@@ -89,7 +89,7 @@ class Recipes(RunTest):
 
     def check_differences(self, names, path):
         effects = by_key(names["effects"])
-        differences = rows(path, kind="enhancer", family="all")
+        differences = rows(path, kind="enhancer", family="all", mode="strict")
         self.assertEqual(set(effects), {(row["model"], row["condition"]) for row in differences})
         for row in differences:
             found = effects[row["model"], row["condition"]]
@@ -97,7 +97,7 @@ class Recipes(RunTest):
             for name, column in same:
                 self.assertAlmostEqual(found[name], float(row[column]), msg=(name, row))
             self.assertTrue(-1 <= found["low"] <= found["difference"] <= found["high"] <= 1, found)
-        darkness = rows(path, kind="level", condition="L5-noise", family="all")
+        darkness = rows(path, kind="level", condition="L5-noise", family="all", mode="strict")
         expected = {row["model"]: int(row["only_second"]) for row in darkness if row["only_second"] != "0"}
         self.assertGreater(len(expected), 0)
         self.assertEqual(names["lost"].astype({"model": object})["model"].value_counts().to_dict(), expected)

@@ -278,9 +278,9 @@ impl Overview<'_> {
         let effect = levels.iter().map(|level| {
             let of = pooled.iter().find(|of| of.level == *level);
             of.map_or(PaperCell::Empty, |of| PaperCell::Interval {
-                value: points(of.difference.value),
-                ends: of.difference,
-                mark: if of.verdict.is_shown() {
+                value: points(of.strict.difference.value),
+                ends: of.strict.difference,
+                mark: if of.strict.verdict.is_shown() {
                     PaperMark::Shown
                 } else {
                     PaperMark::None

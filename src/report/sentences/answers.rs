@@ -2,10 +2,12 @@
 
 use super::sentence::{Numbers, Sentence, Tone};
 use crate::report::alert::MAX_UNREAD;
+use crate::score::claim::Claim;
 use crate::score::fidelity::{ConditionFidelity, FidelityFindings};
 use crate::score::findings::Findings;
 use crate::score::pooled::PooledFinding;
 use crate::score::pooled_kind::PooledKind;
+use crate::score::significance::ALPHA;
 
 /// Replies that could not be read, if they are few: an alert speaks of many, and of failed trials. Built-in models are not counted.
 pub(super) fn unread(findings: &Findings<'_>) -> Option<Sentence> {
@@ -36,14 +38,15 @@ pub(super) fn fidelity(findings: &Findings<'_>) -> Option<Sentence> {
     let auc = fidelity.within[0]?;
     let mut numbers = Numbers::of(findings.unit);
     let estimate = auc.estimate;
-    let (tone, text) = if estimate.low > 0.5 {
+    let is_detected = fidelity.p_report.is_some_and(|p| p < ALPHA);
+    let (tone, text) = if is_detected && estimate.value > 0.5 {
         let text = "Within a condition, images with a higher PSNR get more right answers.";
         (Tone::Better, text)
-    } else if estimate.high < 0.5 {
+    } else if is_detected {
         let text = "Within a condition, images with a higher PSNR get fewer right answers.";
         (Tone::Worse, text)
     } else {
-        let text = "Within a condition, it is not shown that PSNR tells right from wrong answers.";
+        let text = "Within a condition, PSNR was not detected to tell right from wrong answers.";
         (Tone::NotShown, text)
     };
     let ends = [
@@ -52,7 +55,7 @@ pub(super) fn fidelity(findings: &Findings<'_>) -> Option<Sentence> {
         ("high", estimate.high),
     ];
     let [value, low, high] = ends.map(|(name, value)| numbers.number(name, value, 2));
-    let p = numbers.p("p", auc.p);
+    let p = numbers.p("p", fidelity.p_report.unwrap_or(auc.p));
     let replies = numbers.count("n", estimate.n);
     let chance = numbers.number("chance", 0.5, 1);
     let mut detail =
@@ -108,11 +111,10 @@ fn example_text((row, raw, answers): Gain<'_>, numbers: &mut Numbers) -> String 
         numbers.number("psnr_raw", before, 1),
         numbers.number("psnr_enhanced", after, 1),
     );
-    let difference = numbers.difference("_answers", answers.difference);
-    let shown = if answers.verdict.is_shown() {
-        ""
-    } else {
-        ", not shown"
+    let difference = numbers.difference("_answers", answers.strict.difference);
+    let shown = match answers.claim() {
+        Claim::Detected(_) => "",
+        _ => ", not detected",
     };
     format!(
         ". Largest gain: {enhancer} takes the mean PSNR at {} from {before} to {after} dB and the answers by {difference} points{shown}",

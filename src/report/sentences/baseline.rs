@@ -4,6 +4,7 @@ use super::sentence::{Numbers, Sentence, Tone};
 use crate::score::baseline::BaselineRow;
 use crate::score::cluster::ClusterUnit;
 use crate::score::comparison::MIN_PAIRS;
+use crate::score::paired::POWER;
 use crate::score::significance::Significance;
 use crate::score::subject::judged;
 
@@ -82,7 +83,7 @@ fn shown_against(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Option<
         conditions(rows, &mut numbers),
         numbers.size("effect", largest.paired.difference.value)
     );
-    let detail = detail(largest, &mut numbers);
+    let detail = detail(largest, &mut numbers) + &detectable(rows, &mut numbers);
     Some(numbers.sentence("baseline", verdict.into(), text, detail))
 }
 
@@ -114,12 +115,29 @@ fn nothing_shown(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Sentenc
         ),
     };
     let detail = format!(
-        "{compared} {noun} of model and condition compared{without}; largest: {} at {}, {}",
+        "{compared} {noun} of model and condition compared{without}; largest: {} at {}, {}{}",
         largest.subject.model,
         largest.subject.condition(),
-        detail(largest, &mut numbers)
+        detail(largest, &mut numbers),
+        detectable(&possible, &mut numbers)
     );
     numbers.sentence("baseline", Tone::NotShown, text, detail)
+}
+
+/// The smallest loss that the tests of some rows detect with 80 % probability: of the row that detects most, and of all rows.
+fn detectable(rows: &[&BaselineRow], numbers: &mut Numbers) -> String {
+    let losses = rows.iter().map(|row| row.detectable.min(1.0));
+    let least = losses.clone().fold(1.0, f64::min);
+    let most = losses.fold(0.0, f64::max);
+    let power = numbers.number("power", 100.0 * POWER, 0);
+    let [least, most] = [("detectable", least), ("detectable_everywhere", most)]
+        .map(|(name, loss)| numbers.percent(name, loss));
+    let range = if least == most {
+        format!("{least} points")
+    } else {
+        format!("{least} points somewhere, {most} everywhere")
+    };
+    format!("; a true loss is detected with {power} % probability from {range}")
 }
 
 /// The row with the largest difference in either direction; of several, the first.

@@ -3,13 +3,10 @@
 use super::sentence::{Numbers, Sentence, Tone};
 use crate::score::calibration::Calibration;
 use crate::score::cluster::{ClusterUnit, MIN_SCENES};
-use crate::score::findings::Findings;
+use crate::score::findings::{Findings, LEAST_CONFIDENT_REPLIES};
 use crate::score::pooled::pool;
 use crate::score::subject::Subject;
 use crate::types::{AxisLevel, KindReading};
-
-/// The least number of replies with probabilities that a sentence is about (chosen): that of a calibration error.
-const LEAST_REPLIES: usize = 100;
 
 /// The confidence of a model in the images of a light: at the darkest level, and at L0 if that was asked.
 #[derive(Debug, Clone, Copy)]
@@ -30,7 +27,7 @@ impl<'f> Confidence<'f> {
         let models = pool(&findings.grid);
         let rows = || {
             let rows = findings.calibrations.iter();
-            rows.filter(|row| row.replies >= LEAST_REPLIES)
+            rows.filter(|row| row.replies >= LEAST_CONFIDENT_REPLIES)
         };
         let dark = rows().filter(|row| {
             let subject = &row.subject;
@@ -57,24 +54,23 @@ impl<'f> Confidence<'f> {
 
     /// Whether the confidence is shown to be above the accuracy.
     fn is_above(&self) -> bool {
-        self.dark.overconfidence.low > 0.0
+        self.dark.overconfidence.is_above()
     }
 
-    /// Whether the confidence is further above the accuracy than at L0: the intervals of the two do not meet.
+    /// Whether the confidence is shown to be further above the accuracy than at L0.
     fn is_grown(&self) -> bool {
-        let clean = self.clean.map(|clean| clean.overconfidence);
-        clean.is_some_and(|clean| self.dark.overconfidence.low > clean.high)
+        self.dark.growth.is_some_and(|growth| growth.is_above())
     }
 }
 
-/// Whether the models know how little they see, of the one whose confidence is furthest above its accuracy. What is shown is that the
-/// 95 % interval of the difference is above 0, and, against L0, that the two intervals do not meet.
+/// Whether the models know how little they see, of the one whose confidence is furthest above its accuracy. Both
+/// tests are among those that are corrected over all sentences.
 pub(super) fn confidence(all: &[Confidence<'_>], unit: ClusterUnit) -> Option<Sentence> {
-    let above = |one: &Confidence<'_>| one.dark.overconfidence.value;
-    let most = all
-        .iter()
-        .copied()
-        .max_by(|a, b| above(a).total_cmp(&above(b)))?;
+    let above = |one: &Confidence<'_>| (one.is_above(), one.dark.overconfidence.estimate.value);
+    let most = all.iter().copied().max_by(|a, b| {
+        let (a, b) = (above(a), above(b));
+        a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+    })?;
     let mut numbers = Numbers::of(unit);
     let (model, level) = (most.model, most.level);
     let sure = numbers.percent("confidence", most.dark.confidence.value);
@@ -92,14 +88,16 @@ pub(super) fn confidence(all: &[Confidence<'_>], unit: ClusterUnit) -> Option<Se
         (Tone::Worse, text)
     } else {
         let text = format!(
-            "It is not shown that {model} is surer than it is right at {level}: its mean confidence is {sure} %, and {right} % of its \
+            "{model} was not detected to be surer than it is right at {level}: its mean confidence is {sure} %, and {right} % of its \
              replies are right."
         );
         (Tone::NotShown, text)
     };
-    let difference = numbers.difference("", most.dark.overconfidence);
+    let difference = numbers.difference("", most.dark.overconfidence.estimate);
+    let tested = most.dark.overconfidence;
+    let p = numbers.p("p", tested.p_report.unwrap_or(tested.p));
     let clean = most.clean.map(|clean| {
-        let difference = numbers.difference("_L0", clean.overconfidence);
+        let difference = numbers.difference("_L0", clean.overconfidence.estimate);
         format!(", {difference} at L0")
     });
     let replies = numbers.count("n", most.dark.replies);
@@ -112,7 +110,7 @@ pub(super) fn confidence(all: &[Confidence<'_>], unit: ClusterUnit) -> Option<Se
         String::new()
     };
     let detail = format!(
-        "confidence less accuracy: {difference} points{}{others}; n = {replies} replies with probabilities",
+        "confidence less accuracy: {difference} points, {p}{}{others}; n = {replies} replies with probabilities",
         clean.unwrap_or_default()
     );
     Some(numbers.sentence("confidence", tone, text, detail))

@@ -1,7 +1,8 @@
 //! Sentences about what darkness costs all models together, with each variant.
 
+use super::format::format_alone;
 use super::lights::{Topic, of_set};
-use super::pooled::{detail, of_verdict, runs};
+use super::pooled::{detail, of_verdict, reserved, runs};
 use super::sample::WIDE;
 use super::sentence::{Numbers, Sentence, Tone, capitalised};
 use crate::report::words::light;
@@ -80,7 +81,7 @@ pub(super) fn with_variant(
     let verdict = verdict(levels)?;
     let found = of_verdict(levels, verdict);
     let darkest = found.last()?;
-    let size = darkest.difference.value;
+    let size = darkest.strict.difference.value;
     let cause = darkest.level.axis().unwrap_or(Axis::LIGHT).cause;
     let (text, more) = match verdict {
         Significance::Worse => (
@@ -88,7 +89,7 @@ pub(super) fn with_variant(
                 "{cause} costs {} points at {}, from {} % at L0.",
                 numbers.size("cost", size),
                 darkest.level,
-                numbers.percent("L0", darkest.second)
+                numbers.percent("L0", darkest.strict.second)
             ),
             format!("; a loss is shown at {}", runs(&found, levels)),
         ),
@@ -100,13 +101,17 @@ pub(super) fn with_variant(
             ),
             format!("; at {}", darkest.level),
         ),
-        _ => (
-            format!(
-                "it is not shown that {cause} costs anything at any level{}.",
+        _ => {
+            if let Some(format) = format_alone(levels, unit) {
+                return Some(format);
+            }
+            let text = format!(
+                "no loss by {cause} was detected at any level{}.",
                 not_ruled_out(&found, &mut numbers)
-            ),
-            format!("; at {}", darkest.level),
-        ),
+            );
+            let reserved = reserved(darkest, &mut numbers);
+            (text, format!("; at {}{reserved}", darkest.level))
+        }
     };
     let text = match name {
         None => capitalised(&text),
@@ -118,16 +123,18 @@ pub(super) fn with_variant(
 
 /// The largest loss that the intervals leave open, if it is large: so that nobody takes too few images for eyes that see in the dark.
 fn not_ruled_out(levels: &[&PooledFinding], numbers: &mut Numbers) -> String {
-    let lowest =
-        |a: &&&PooledFinding, b: &&&PooledFinding| a.difference.low.total_cmp(&b.difference.low);
+    let lowest = |a: &&&PooledFinding, b: &&&PooledFinding| {
+        let low = |of: &PooledFinding| of.strict.difference.low;
+        low(a).total_cmp(&low(b))
+    };
     let Some(finding) = levels.iter().min_by(lowest) else {
         return String::new();
     };
-    let largest = -finding.difference.low;
+    let largest = -finding.strict.difference.low;
     if largest <= WIDE {
         return String::new();
     }
     let points = numbers.number("possible loss", 100.0 * largest, 0);
     let level = finding.level;
-    format!(", and a loss of {points} points at {level} is not ruled out")
+    format!("; a loss of up to {points} points at {level} cannot be excluded")
 }

@@ -30,8 +30,8 @@ pub(super) fn false_answers(
         "At {} “{}” is answered to {} % of the objects {of_what} ({} % at L0).",
         worst.level,
         answer.word(),
-        numbers.percent("rate", worst.first),
-        numbers.percent("L0", worst.second)
+        numbers.percent("rate", worst.strict.first),
+        numbers.percent("L0", worst.strict.second)
     );
     let more = format!("; an increase is shown at {}", runs(&shown, levels));
     let detail = detail(worst, &mut numbers, &more);
@@ -45,8 +45,6 @@ pub(super) struct TopAnswer<'f> {
     pub(super) family: &'f Family,
     pub(super) level: AxisLevel,
     pub(super) collapse: &'f Collapse,
-    /// Share of the same answer at L0, if L0 was asked.
-    pub(super) clean: Option<f64>,
 }
 
 impl<'f> TopAnswer<'f> {
@@ -69,17 +67,11 @@ impl<'f> TopAnswer<'f> {
         let answers = confusions.filter_map(|confusion| {
             let subject = &confusion.subject;
             let collapse = confusion.collapse.as_ref()?;
-            let clean = Subject::seeing(&subject.model, AxisLevel::L0, variant, None);
-            let clean = findings
-                .confusions
-                .iter()
-                .find(|other| other.family == confusion.family && other.subject.is_for(&clean));
             Some(Self {
                 model: &subject.model,
                 family: &confusion.family,
                 level,
                 collapse,
-                clean: clean.map(|clean| clean.share_of(&collapse.top)),
             })
         });
         answers.collect()
@@ -91,8 +83,8 @@ impl<'f> TopAnswer<'f> {
     }
 }
 
-/// That a model gives one answer far too often: of the family and the model with the largest excess over the true share. This is no
-/// test.
+/// That a model gives one answer far too often: of the family and the model with the largest excess over the true share. It is said only
+/// if the answer is detected to be more frequent than at L0, in both parsings and after the correction over all sentences.
 pub(super) fn collapse(answers: &[TopAnswer<'_>], unit: ClusterUnit) -> Option<Sentence> {
     let shown = answers.iter().filter(|answer| answer.collapse.is_shown());
     let largest = shown.clone().reduce(|largest, next| {
@@ -138,7 +130,7 @@ pub(super) fn collapse(answers: &[TopAnswer<'_>], unit: ClusterUnit) -> Option<S
     } else {
         format!("{detail}; also in {}", others.join(", "))
     };
-    Some(numbers.sentence("collapse", Tone::Note, text, detail))
+    Some(numbers.sentence("collapse", Tone::Worse, text, detail))
 }
 
 /// Share, interval, the share at L0, the limit and n of an answer.
@@ -150,9 +142,11 @@ fn collapse_detail(answer: &TopAnswer<'_>, numbers: &mut Numbers) -> String {
         ("high", share.high),
     ];
     let [value, low, high] = ends.map(|(name, share)| numbers.percent(name, share));
-    let clean = answer.clean.map(|clean| {
-        let clean = numbers.percent("L0", clean);
-        format!(", {clean} % at L0")
+    let clean = answer.collapse.clean.as_ref().map(|clean| {
+        let share = numbers.percent("L0", clean.strict.second);
+        let difference = numbers.difference("_from_L0", clean.strict.difference);
+        let p = numbers.p("p", clean.p_report[0].unwrap_or(1.0));
+        format!(", {share} % at L0 ({difference} points, {p})")
     });
     let limit = numbers.number("limit", 100.0 * MIN_EXCESS, 0);
     let n = numbers.count("n", share.n);

@@ -3,14 +3,17 @@
 //! Each sentence comes from typed results and from fixed wording. The terminal, the page, `summary.json` and `tables.tex` show the
 //! same strings. Rules:
 //!
-//! - “costs”, “harms”, “helps” and “falls below” are used only if p after Holm's correction is below 0.05.
-//! - If nothing is shown, the sentence says “is not shown”, with the interval. It never says that there is no difference.
+//! - A sentence has a sign, and the words “costs”, “harms”, “helps” and “falls below”, only if p is below 0.05 after the correction over
+//!   all tests that sentences rest on, in the strict and in the lenient parsing, with the same direction.
+//! - If only the strict parsing detects a difference, the sentence is about the answer format.
+//! - If nothing is detected, the sentence says so, with the interval. It never says that there is no difference.
 //! - A sentence is about the models of the run and names their number; it does not speak of models in general.
 
 mod answers;
 mod baseline;
 mod confidence;
 mod darkness;
+mod format;
 mod hallucination;
 mod lights;
 mod models;
@@ -23,7 +26,7 @@ mod sentence;
 mod words_alone;
 
 pub(crate) use baseline::{against_baseline, no_verdict};
-pub(in crate::report) use models::over_levels;
+pub(in crate::report) use models::dark_levels;
 pub(in crate::report) use sample::left_out;
 pub(in crate::report) use self_agreement::self_agreement;
 pub(crate) use sentence::{Sentence, Tone};
@@ -42,7 +45,7 @@ use crate::types::{Family, KindReading};
 pub(in crate::report) const FIRST: usize = 8;
 
 /// What is said about the sentences as a whole, in the line below them.
-pub(in crate::report) const HOW_TO_READ: &str = "p is Holm's, over the levels of a finding (best: pairs of models; one family below blind: conditions and families of a model; old run: conditions of a model; fidelity: one test). An interval is uncorrected: effects outside it are ruled out at 95 %. Interval and test are two methods: near p = 0.05 they may disagree.";
+pub(in crate::report) const HOW_TO_READ: &str = "Signs and p are corrected over all tests behind these sentences: a report without any effect has a sign with a probability of 5 % at most (an old run: 5 % over its models and conditions). A sign holds in the strict and the lenient parsing. An interval is of one test: it leaves out 0 if and only if the uncorrected p is below 0.05.";
 
 /// All sentences, in the order of their importance.
 #[must_use]

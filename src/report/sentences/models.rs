@@ -1,9 +1,10 @@
-//! Sentences about single models and single families: which model sees best, and which family loses most.
+//! Sentences about single models and single families: which model sees best in the dark, and which family loses most.
 
 use super::lights::Topic;
 use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
 use crate::report::words::family;
-use crate::score::best::BestInTheDark;
+use crate::score::best::{BestInTheDark, Crossing};
+use crate::score::claim::Claim;
 use crate::score::findings::Findings;
 use crate::score::pooled::PooledFinding;
 use crate::score::pooled_kind::PooledKind;
@@ -11,42 +12,63 @@ use crate::score::significance::Significance;
 use crate::types::KindReading;
 use crate::types::degradation::{Axis, Kind};
 
-/// The model that sees best over all levels, and those that it is not shown to be better than.
+/// The model that sees best in the dark, and those that it is not shown to be better than; if the order of the leaders in the light
+/// and in the dark changes with the level, that in its place.
 pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
     let best = findings.best.as_ref().filter(|best| best.is_possible())?;
+    let lenient = findings.lenient_best.as_ref()?;
     let (leader, second) = (best.leader(), best.models.get(1)?);
     let mut numbers = Numbers::of(findings.unit);
-    let over = over_levels(best).map_or(String::new(), |over| format!(" {over}"));
+    let over = dark_levels(best);
     let axis = best.variant.kind.map_or(Axis::LIGHT, Kind::axis);
-    let (place, unit) = (axis.place, axis.unit);
-    let (tone, text) = if best.is_shown() {
-        (
-            Tone::Better,
-            format!("{} sees best {place}{over}.", leader.model),
-        )
+    let place = axis.place;
+    let is_same = lenient.is_detected() && lenient.leader().model == leader.model;
+    let (tone, text) = if let Some(crossing) = crossing(best, lenient) {
+        let ((before, last), (after, first)) = (&crossing.before, &crossing.after);
+        let text = format!("{before} is better to {last}, {after} from {first}.");
+        (Tone::Note, text)
+    } else if best.is_detected() && is_same {
+        let text = format!("{} sees best {place} ({over}).", leader.model);
+        (Tone::Better, text)
     } else {
-        let others = best.not_shown_better_than.join(", ");
+        let others = match &best.not_shown_better_than[..] {
+            [] => "the others".to_owned(),
+            others => others.join(", "),
+        };
         let text = format!(
-            "{} sees best {place} by its mean{over}, but is not shown to be better than {others}.",
+            "{} has the highest mean accuracy {place} ({over}), but was not detected to be better than {others}.",
             leader.model
         );
         (Tone::NotShown, text)
     };
-    let percent = |numbers: &mut Numbers, name: &str, share: f64| numbers.percent(name, share);
-    let value = percent(&mut numbers, "area", leader.area.value);
-    let low = percent(&mut numbers, "area_low", leader.area.low);
-    let high = percent(&mut numbers, "area_high", leader.area.high);
+    let value = numbers.percent("mean", leader.mean.value);
+    let low = numbers.percent("mean_low", leader.mean.low);
+    let high = numbers.percent("mean_high", leader.mean.high);
     let loss = leader.loss.map(|loss| {
         let loss = numbers.difference("_from_L0", loss);
         format!(", {loss} points from L0")
     });
     let loss = loss.unwrap_or_default();
-    let pair = best
-        .pairs
-        .iter()
-        .find(|pair| pair.first == leader.model && pair.second == second.model)?;
-    let difference = numbers.difference("", pair.difference);
-    let p = numbers.p("p", pair.holm);
+    let test = if let Some(crossing) = crossing(best, lenient) {
+        let lead = numbers.difference("_before", crossing.lead);
+        let lag = numbers.difference("_after", crossing.lag);
+        let p = numbers.p("p", crossing.p_report.unwrap_or(crossing.p));
+        format!(
+            "{} less {}: {lead} to {}, {lag} from {}, {p}",
+            crossing.before.0, crossing.after.0, crossing.before.1, crossing.after.1
+        )
+    } else {
+        let mut pairs = best.pairs.iter();
+        let pair = pairs.find(|pair| pair.first == leader.model && pair.second == second.model)?;
+        let difference = numbers.difference("", pair.difference);
+        let p = numbers.p("p", best.p_report.unwrap_or(pair.holm));
+        format!("{difference} against {}, {p}", second.model)
+    };
+    let format = if best.is_detected() && !is_same {
+        ", detected in the strict parsing alone"
+    } else {
+        ""
+    };
     let items = numbers.count("n", best.items);
     let clusters = numbers.clusters(best.clusters);
     let without = match &best.without[..] {
@@ -54,8 +76,8 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
         models => format!("; without {}, not asked in this way", models.join(", ")),
     };
     let detail = format!(
-        "mean accuracy over {unit} {value} % [{low}, {high}]{loss}; {difference} against {}, {p}; n = {items} in {clusters}{without}",
-        second.model
+        "{} over {over}: {value} % [{low}, {high}]{loss}; {test}{format}; n = {items} in {clusters}{without}",
+        leader.model
     );
     let sentence = numbers.sentence("best", tone, text, detail);
     let topics = Topic::all(findings);
@@ -65,13 +87,25 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
     })
 }
 
-/// The levels that the comparison of areas rests on, as `over L0, L3`; `None` if they are all that some model was asked.
-pub(in crate::report) fn over_levels(best: &BestInTheDark) -> Option<String> {
-    let is_all = best.levels == best.asked;
-    (!is_all).then(|| format!("over {}", level_runs(&best.levels, &best.asked)))
+/// The change of order of two models, if it is detected in both parsings.
+fn crossing<'b>(best: &'b BestInTheDark, lenient: &BestInTheDark) -> Option<&'b Crossing> {
+    let detected = |of: &'b BestInTheDark| of.crossing.as_ref().filter(|found| found.is_detected());
+    let strict = detected(best)?;
+    let lenient = lenient
+        .crossing
+        .as_ref()
+        .filter(|found| found.is_detected())?;
+    let is_same = strict.before.0 == lenient.before.0 && strict.after.0 == lenient.after.0;
+    is_same.then_some(strict)
 }
 
-/// The families that lose most and least at the darkest level, one against the other, if their intervals do not meet.
+/// The dark levels that the comparison of models rests on, as `L3–L5`.
+pub(in crate::report) fn dark_levels(best: &BestInTheDark) -> String {
+    level_runs(&best.levels, &best.asked)
+}
+
+/// The families that lose most and least at the darkest level, one against the other, if a loss over all families is detected there and
+/// their intervals do not meet. This is a description without a sign: the two families were chosen by the data.
 pub(super) fn families(findings: &Findings<'_>, variant: &KindReading) -> Option<Sentence> {
     let pooled = findings.pooled.iter();
     let of_families = pooled.filter(|finding| {
@@ -84,11 +118,21 @@ pub(super) fn families(findings: &Findings<'_>, variant: &KindReading) -> Option
         .filter(|finding| finding.level == darkest)
         .collect();
     let by_value = |a: &&&PooledFinding, b: &&&PooledFinding| {
-        a.difference.value.total_cmp(&b.difference.value)
+        let value = |of: &PooledFinding| of.strict.difference.value;
+        value(a).total_cmp(&value(b))
     };
     let most = of_families.iter().min_by(by_value)?;
     let least = of_families.iter().max_by(by_value)?;
-    if most.verdict != Significance::Worse || most.difference.high >= least.difference.low {
+    let mut whole = findings.pooled.iter();
+    let is_lost = whole.any(|finding| {
+        finding.kind == PooledKind::Darkness
+            && finding.family.is_none()
+            && finding.variant == *variant
+            && finding.level == darkest
+            && finding.claim() == Claim::Detected(Significance::Worse)
+    });
+    let (of_most, of_least) = (most.strict.difference, least.strict.difference);
+    if !is_lost || most.strict.verdict != Significance::Worse || of_most.high >= of_least.low {
         return None;
     }
     let mut numbers = Numbers::of(findings.unit);
@@ -96,20 +140,20 @@ pub(super) fn families(findings: &Findings<'_>, variant: &KindReading) -> Option
         "{} costs more in {} ({} points at {darkest}) than in {} ({}).",
         capitalised(darkest.axis().unwrap_or(Axis::LIGHT).cause),
         family(most.family.as_ref()),
-        numbers.points("effect_most", most.difference.value),
+        numbers.points("effect_most", of_most.value),
         family(least.family.as_ref()),
-        numbers.points("effect_least", least.difference.value)
+        numbers.points("effect_least", of_least.value)
     );
-    let [of_most, of_least] = [("_most", most), ("_least", least)]
-        .map(|(at, finding)| numbers.difference(at, finding.difference));
+    let [of_most, of_least] = [("_most", of_most), ("_least", of_least)]
+        .map(|(at, difference)| numbers.difference(at, difference));
     let sample = [("n_most", most), ("n_least", least)]
         .map(|(name, finding)| numbers.count(name, finding.items));
-    let p = numbers.p("p", most.holm);
+    let p = numbers.p("p", most.strict.holm);
     let detail = format!(
-        "{of_most}, n = {}, against {of_least}, n = {}: the two intervals do not meet; {p} is that of the loss in {}",
+        "{of_most}, n = {}, against {of_least}, n = {}: the two intervals do not meet, which is no test; {p} is that of the loss in {}",
         sample[0],
         sample[1],
         family(most.family.as_ref())
     );
-    Some(numbers.sentence("families", Tone::Worse, text, detail))
+    Some(numbers.sentence("families", Tone::Note, text, detail))
 }

@@ -1,6 +1,8 @@
 //! Sentences about all models together: noise and enhancers.
 
+use super::format::format_alone;
 use super::sentence::{Numbers, Sentence, Tone, level_runs, models};
+use crate::score::claim::Claim;
 use crate::score::cluster::ClusterUnit;
 use crate::score::pooled::PooledFinding;
 use crate::score::significance::Significance;
@@ -24,7 +26,7 @@ pub(super) fn noise(levels: &[&PooledFinding], unit: ClusterUnit) -> Vec<Sentenc
         let limit = if shown.len() > 1 { "up to " } else { "" };
         let text = format!(
             "With noise, accuracy is {limit}{} points {word} than by the exposure drop alone ({}).",
-            numbers.size("effect", largest.difference.value),
+            numbers.size("effect", largest.strict.difference.value),
             largest.level
         );
         let more = format!("; shown at {}", runs(&shown, levels));
@@ -35,9 +37,17 @@ pub(super) fn noise(levels: &[&PooledFinding], unit: ClusterUnit) -> Vec<Sentenc
     let unshown = of_verdict(levels, Significance::NotShown);
     match largest(&unshown) {
         Some(largest) if shown.is_empty() => {
+            if let Some(format) = format_alone(levels, unit) {
+                return vec![format];
+            }
             let mut numbers = Numbers::of(unit);
-            let text = "It is not shown that accuracy with noise differs from that by the exposure drop alone.";
-            let more = format!("; largest at {}", largest.level);
+            let text =
+                "No difference in accuracy between noise and the exposure drop alone was detected.";
+            let more = format!(
+                "; largest at {}{}",
+                largest.level,
+                reserved(largest, &mut numbers)
+            );
             let detail = detail(largest, &mut numbers, &more);
             vec![numbers.sentence("noise", Tone::NotShown, text.to_owned(), detail)]
         }
@@ -77,7 +87,7 @@ fn enhancer(
             } else {
                 "helps"
             };
-            let size = numbers.size("effect", largest.difference.value);
+            let size = numbers.size("effect", largest.strict.difference.value);
             let limit = if of_verdict.len() > 1 { "up to " } else { "" };
             if is_observer(largest) {
                 let more = if verdict == Significance::Better {
@@ -101,12 +111,17 @@ fn enhancer(
                 )
             }
         }
-        _ => (
-            format!("{name} at {at}: neither help nor harm is shown."),
-            format!("; largest at {}", largest.level),
-        ),
+        _ => {
+            if let Some(format) = format_alone(&of_verdict, unit) {
+                return Some(format);
+            }
+            (
+                format!("{name} at {at}: no effect detected."),
+                format!("; largest at {}", largest.level),
+            )
+        }
     };
-    let more = more + &uncorrected(largest, &mut numbers);
+    let more = more + &reserved(largest, &mut numbers);
     let detail = detail(largest, &mut numbers, &more);
     Some(numbers.sentence("enhancer", verdict.into(), text, detail))
 }
@@ -116,35 +131,42 @@ fn is_observer(finding: &PooledFinding) -> bool {
     matches!(&finding.models[..], [one] if subject::is_observer(one))
 }
 
-/// An interval that leaves out 0 although nothing is shown needs a word.
-fn uncorrected(finding: &PooledFinding, numbers: &mut Numbers) -> String {
-    let difference = finding.difference;
-    if finding.verdict != Significance::NotShown
-        || (difference.low <= 0.0 && difference.high >= 0.0)
-    {
-        return String::new();
+/// Why a finding is not among those detected although its own test or its interval says so; empty otherwise.
+pub(super) fn reserved(finding: &PooledFinding, numbers: &mut Numbers) -> String {
+    let strict = &finding.strict;
+    let difference = strict.difference;
+    match finding.claim() {
+        Claim::Detected(_) | Claim::Impossible => String::new(),
+        Claim::StrictOnly(_) => ", detected in the strict parsing alone".to_owned(),
+        Claim::InOwnSet => format!(
+            ", detected only if no other finding is counted ({})",
+            numbers.p("own_p", strict.holm)
+        ),
+        Claim::Open if difference.low <= 0.0 && difference.high >= 0.0 => String::new(),
+        Claim::Open => format!(
+            ", not detected after correction (uncorrected {})",
+            numbers.p("uncorrected_p", strict.p)
+        ),
     }
-    let (p, levels) = (
-        numbers.p("uncorrected_p", finding.p),
-        numbers.count("levels", finding.levels),
-    );
-    format!(", not shown after correction for {levels} levels (uncorrected {p})")
 }
 
-/// The findings with a verdict.
+/// The findings with a verdict in both parsings and after the correction over all sentences; those without one are
+/// [`Significance::NotShown`].
 pub(super) fn of_verdict<'f>(
     levels: &[&'f PooledFinding],
     verdict: Significance,
 ) -> Vec<&'f PooledFinding> {
-    let levels = levels.iter().copied();
-    levels
-        .filter(|finding| finding.verdict == verdict)
-        .collect()
+    let has = |finding: &&PooledFinding| match finding.claim() {
+        Claim::Detected(found) => found == verdict,
+        Claim::Impossible => false,
+        _ => verdict == Significance::NotShown,
+    };
+    levels.iter().copied().filter(has).collect()
 }
 
 /// The finding with the largest difference in either direction; of several, the first.
 pub(super) fn largest<'f>(levels: &[&'f PooledFinding]) -> Option<&'f PooledFinding> {
-    let size = |finding: &PooledFinding| finding.difference.value.abs();
+    let size = |finding: &PooledFinding| finding.strict.difference.value.abs();
     levels.iter().copied().reduce(|largest, next| {
         if size(next) > size(largest) {
             next
@@ -166,8 +188,9 @@ pub(super) fn runs(some: &[&PooledFinding], all: &[&PooledFinding]) -> String {
 /// Effect, interval, p and n of a finding, with `more` before n.
 pub(super) fn detail(finding: &PooledFinding, numbers: &mut Numbers, more: &str) -> String {
     let who = models(&finding.models, numbers);
-    let difference = numbers.difference("", finding.difference);
-    let p = numbers.p("p", finding.holm);
+    let strict = &finding.strict;
+    let difference = numbers.difference("", strict.difference);
+    let p = numbers.p("p", strict.p_report.unwrap_or(strict.holm));
     let sample = numbers.sample(finding);
     format!("{who}: {difference}, {p}{more}; {sample}")
 }

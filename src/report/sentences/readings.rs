@@ -17,24 +17,26 @@ pub(super) fn readings(found: &[FindingByReading], unit: ClusterUnit) -> Option<
             .filter(|one| one.robustness == robustness)
             .count()
     };
-    let [all, some, none, open] = [
+    let [all, some, reversed, none, open] = [
         Robustness::All,
         Robustness::Some,
+        Robustness::Reversed,
         Robustness::None,
         Robustness::Open,
     ]
     .map(of);
     let mut numbers = Numbers::of(unit);
     let text = format!(
-        "Of {} findings about noise, {} under all {} readings, {} under some, {} under none; {} open.",
+        "Of {} findings about noise, {} under all {} noise profiles, {} under some, {} under none; {} reversed between profiles, {} open.",
         numbers.count("findings", whole.len()),
         verb(&numbers.count("all", all), "holds", "hold"),
         numbers.count("readings", readings),
         numbers.count("some", some),
         numbers.count("none", none),
+        verb(&numbers.count("reversed", reversed), "is", "are"),
         verb(&numbers.count("open", open), "is", "are"),
     );
-    let detail = "a finding that does not hold under all is one about a reading: the table by reading names them";
+    let detail = "corrected over all claims, models and profiles; under none: the opposite is detected under a profile; the table by reading names them";
     Some(numbers.sentence("readings", Tone::Note, text, detail.to_owned()))
 }
 

@@ -2,6 +2,7 @@
 
 use super::sentence::{Numbers, Sentence, Tone};
 use crate::report::words::light;
+use crate::score::claim::Claim;
 use crate::score::cluster::ClusterUnit;
 use crate::score::comparison::{Comparison, ComparisonKind};
 use crate::score::findings::Findings;
@@ -36,14 +37,14 @@ fn cost(row: &Comparison, pair: &PairDarkness, unit: ClusterUnit) -> Sentence {
     let ev = numbers.number("ev", pair.ev[1], 1);
     let place = format!("Photographed in the dark ({}, {least}{ev} EV)", pair.name);
     let model = &row.first.model;
-    let text = match row.significance {
+    let text = match verdict(row) {
         Significance::Worse | Significance::Better => {
-            let does = if row.significance == Significance::Worse {
+            let does = if verdict(row) == Significance::Worse {
                 "loses"
             } else {
                 "gains"
             };
-            let size = numbers.size("effect", row.paired.difference.value);
+            let size = numbers.size("effect", row.strict.paired.difference.value);
             format!("{place}, {model} {does} {size} points against the light.")
         }
         _ => format!("{place}, no loss of {model} is shown."),
@@ -56,10 +57,10 @@ fn against_synthetic(row: &Comparison, unit: ClusterUnit) -> Sentence {
     let mut numbers = Numbers::of(unit);
     let (model, synthetic) = (&row.first.model, light(&row.second.variant, None));
     let level = row.second.condition();
-    let (name, size) = (row.first.condition(), row.paired.difference.value);
-    let text = match row.significance {
+    let (name, size) = (row.first.condition(), row.strict.paired.difference.value);
+    let text = match verdict(row) {
         Significance::Worse | Significance::Better => {
-            let harder = if row.significance == Significance::Worse {
+            let harder = if verdict(row) == Significance::Worse {
                 "harder"
             } else {
                 "easier"
@@ -79,14 +80,14 @@ fn enhanced(row: &Comparison, unit: ClusterUnit) -> Sentence {
     let mut numbers = Numbers::of(unit);
     let name = row.first.enhancer.as_ref().map_or("", |name| name.as_str());
     let (model, raw) = (&row.first.model, row.second.condition());
-    let text = match row.significance {
+    let text = match verdict(row) {
         Significance::Worse | Significance::Better => {
-            let does = if row.significance == Significance::Worse {
+            let does = if verdict(row) == Significance::Worse {
                 "harms"
             } else {
                 "helps"
             };
-            let size = numbers.size("effect", row.paired.difference.value);
+            let size = numbers.size("effect", row.strict.paired.difference.value);
             format!("{name} {does} {model} with {raw}, by {size} points.")
         }
         _ => format!("Neither help nor harm of {name} is shown for {model} with {raw}."),
@@ -94,18 +95,26 @@ fn enhanced(row: &Comparison, unit: ClusterUnit) -> Sentence {
     sentence("real enhanced", row, numbers, text)
 }
 
+/// What is detected, in both parsings and after the correction over all sentences.
+fn verdict(row: &Comparison) -> Significance {
+    match row.claim() {
+        Claim::Detected(verdict) => verdict,
+        _ => Significance::NotShown,
+    }
+}
+
 /// A sentence with the difference, its interval, its test and its sample.
 fn sentence(kind: &'static str, row: &Comparison, mut numbers: Numbers, text: String) -> Sentence {
-    let paired = &row.paired;
+    let paired = &row.strict.paired;
     let difference = numbers.difference("", paired.difference);
-    let p = numbers.p("p", row.holm);
+    let p = numbers.p("p", row.strict.p_report.unwrap_or(row.strict.holm));
     let n = numbers.count("n", paired.difference.n);
     let clusters = numbers.clusters(paired.clusters);
     let detail = format!("{difference}, {p}, n = {n} in {clusters}");
-    let tone = if row.significance.is_possible() {
-        Tone::from(row.significance)
-    } else {
+    let tone = if row.claim() == Claim::Impossible {
         Tone::Note
+    } else {
+        Tone::from(verdict(row))
     };
     numbers.sentence(kind, tone, text, detail)
 }

@@ -25,7 +25,8 @@ fn topic(kind: PooledKind, variant: &KindReading, enhancer: Option<&EnhancerName
 
 /// Whether no finding of a set can have a verdict, because the clusters are too few for any corrected p-value.
 pub(super) fn is_impossible(set: &[&PooledFinding]) -> bool {
-    set.iter().all(|finding| !finding.verdict.is_possible())
+    set.iter()
+        .all(|finding| !finding.strict.verdict.is_possible())
 }
 
 /// On what no verdict is possible with so few clusters; `None` if one is possible on everything. A set of which another light has
@@ -85,13 +86,18 @@ pub(super) fn impossible(findings: &Findings<'_>) -> Option<Sentence> {
 /// would show of a true effect depends on more than the intervals.
 pub(super) fn power(all: &[PooledFinding], unit: ClusterUnit) -> Option<Sentence> {
     let whole = all.iter().filter(|finding| finding.family.is_none());
-    let which = if whole.clone().all(|finding| finding.verdict.is_possible()) {
+    let which = if whole
+        .clone()
+        .all(|finding| finding.strict.verdict.is_possible())
+    {
         "the findings"
     } else {
         "the findings that may have a verdict"
     };
-    let whole = whole.filter(|finding| finding.verdict.is_possible());
-    let half = |finding: &PooledFinding| (finding.difference.high - finding.difference.low) / 2.0;
+    let whole = whole.filter(|finding| finding.strict.verdict.is_possible());
+    let half = |finding: &PooledFinding| {
+        (finding.strict.difference.high - finding.strict.difference.low) / 2.0
+    };
     let by_width = |a: &&PooledFinding, b: &&PooledFinding| half(a).total_cmp(&half(b));
     let narrowest = half(whole.clone().min_by(by_width)?);
     let widest = whole.max_by(by_width)?;

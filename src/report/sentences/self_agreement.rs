@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
 use crate::report::words::light;
+use crate::score::claim::Claim;
 use crate::score::comparison::{Comparison, ComparisonKind};
 use crate::score::self_agreement::SelfAgreement;
 use crate::score::self_agreement::cell::{AgreementCell, CellRole};
@@ -174,7 +175,7 @@ fn darkness(found: &SelfAgreement<'_>, model: &str, variant: &KindReading) -> Op
     let test = compared(found, ComparisonKind::Level, model)
         .find(|comparison| comparison.first == dark.subject);
     let detail = darkness_detail(found, dark, level, test, &mut numbers);
-    let tone = test.map_or(Tone::Note, |test| test.significance.into());
+    let tone = test.map_or(Tone::Note, |test| test.claim().into());
     Some(numbers.sentence("agreement_in_the_dark", tone, text, detail))
 }
 
@@ -209,8 +210,8 @@ fn darkness_detail(
         ));
     }
     if let Some(test) = test {
-        let difference = numbers.difference("", test.paired.difference);
-        let p = numbers.p("p", test.holm);
+        let difference = numbers.difference("", test.strict.paired.difference);
+        let p = numbers.p("p", test.strict.p_report.unwrap_or(test.strict.holm));
         parts.push(format!("{difference} points against L0 asked again, {p}"));
     }
     let curve = found.curves.iter().find(|curve| {
@@ -253,24 +254,29 @@ fn enhanced(
     let own: Vec<&Comparison> = own.collect();
     let levels: Vec<AxisLevel> = own.iter().filter_map(|c| c.first.level).collect();
     let at = |significance: Significance| {
-        let shown = own.iter().filter(|c| c.significance == significance);
+        let shown = own
+            .iter()
+            .filter(|c| c.claim() == Claim::Detected(significance));
         let shown: Vec<AxisLevel> = shown.filter_map(|c| c.first.level).collect();
         (!shown.is_empty()).then(|| level_runs(&shown, &levels))
     };
     let strongest = own.iter().max_by(|one, other| {
-        let size = |c: &Comparison| c.paired.difference.value.abs();
+        let size = |c: &Comparison| c.strict.paired.difference.value.abs();
         size(one).total_cmp(&size(other))
     })?;
     let levels = (at(Significance::Better), at(Significance::Worse));
     let (tone, text) = if found.set.light == SetLight::Dark && *variant == KindReading::NONE {
-        of_photographs(enhancer, model, strongest.significance)
+        of_photographs(enhancer, model, strongest.claim())
     } else {
         of_levels(enhancer, model, &light(variant, None), levels)
     };
     let mut numbers = Numbers::of(found.unit);
     let level = strongest.first.level?;
-    let difference = numbers.difference("", strongest.paired.difference);
-    let p = numbers.p("p", strongest.holm);
+    let difference = numbers.difference("", strongest.strict.paired.difference);
+    let p = numbers.p(
+        "p",
+        strongest.strict.p_report.unwrap_or(strongest.strict.holm),
+    );
     let against = if level == AxisLevel::L0 {
         "L0 asked again"
     } else {
@@ -319,15 +325,15 @@ fn of_levels(
 
 /// What an enhancer of photographs in the dark does to the answers of a model. The answers at L0 were given in the dark themselves, so
 /// that a change is neither help nor harm.
-fn of_photographs(enhancer: &EnhancerName, model: &str, change: Significance) -> (Tone, String) {
+fn of_photographs(enhancer: &EnhancerName, model: &str, change: Claim) -> (Tone, String) {
     match change {
-        Significance::Worse => (
+        Claim::Detected(Significance::Worse) => (
             Tone::Note,
             format!(
                 "{enhancer} changes answers of {model} to these photographs: whether for the better is not known."
             ),
         ),
-        Significance::Better => (
+        Claim::Detected(_) => (
             Tone::Note,
             format!(
                 "{model} answers with {enhancer} as at L0, more often than the same photographs asked about again."

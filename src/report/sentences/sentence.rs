@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::report::words::{counted, p, points};
+use crate::score::claim::Claim;
 use crate::score::cluster::ClusterUnit;
 use crate::score::estimate::Estimate;
 use crate::score::pooled::PooledFinding;
@@ -60,6 +61,15 @@ impl Tone {
             Self::Better => "better",
             Self::Worse => "worse",
             Self::NotShown | Self::Note => "unshown",
+        }
+    }
+}
+
+impl From<Claim> for Tone {
+    fn from(claim: Claim) -> Self {
+        match claim {
+            Claim::Detected(verdict) => verdict.into(),
+            _ => Self::NotShown,
         }
     }
 }
@@ -157,8 +167,11 @@ impl Numbers {
             self.note(name, 0.001, 3);
             "p < 0.001".to_owned()
         } else {
-            self.note(name, value, 3);
-            format!("p = {}", p(value))
+            let text = p(value);
+            // As it is written: halves are not rounded the same way everywhere.
+            self.values
+                .insert(name.to_owned(), text.parse().unwrap_or(value));
+            format!("p = {text}")
         }
     }
 
@@ -181,7 +194,7 @@ impl Numbers {
             let dropped = self.count("dropped", finding.dropped);
             parts.push(format!("{dropped} left out because a model has no reply"));
         }
-        match finding.p_by {
+        match finding.strict.p_by {
             SwapMethod::Counted => {}
             SwapMethod::Drawn(draws) => {
                 let draws = self.count("draws", draws);

@@ -2,9 +2,11 @@
 
 use std::collections::BTreeSet;
 
+use super::format::format_alone;
 use super::pooled::{detail, largest, of_verdict, runs};
 use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
 use crate::report::words::family as family_name;
+use crate::score::claim::Claim;
 use crate::score::cluster::ClusterUnit;
 use crate::score::comparison::{Comparison, ComparisonKind};
 use crate::score::findings::Findings;
@@ -16,7 +18,11 @@ use crate::types::{Axis, AxisLevel, KindReading};
 /// Where the models fall below their replies to the words alone.
 pub(super) fn pooled(levels: &[&PooledFinding], unit: ClusterUnit) -> Option<Sentence> {
     let shown = of_verdict(levels, Significance::Worse);
-    let largest = largest(&shown)?;
+    let Some(largest) = largest(&shown) else {
+        let worse = levels.iter().copied();
+        let worse = worse.filter(|of| of.claim() == Claim::StrictOnly(Significance::Worse));
+        return format_alone(&worse.collect::<Vec<_>>(), unit);
+    };
     let mut numbers = Numbers::of(unit);
     let who = match &largest.models[..] {
         [one] => format!("{one} falls"),
@@ -49,29 +55,32 @@ pub(super) fn untouched(findings: &Findings<'_>) -> Option<Sentence> {
             && finding.level == AxisLevel::L0
     })?;
     let mut numbers = Numbers::of(findings.unit);
+    if let Some(format) = format_alone(&[of], findings.unit) {
+        return Some(format);
+    }
     let (with, without) = (
-        numbers.percent("with", of.first),
-        numbers.percent("without", of.second),
+        numbers.percent("with", of.strict.first),
+        numbers.percent("without", of.strict.second),
     );
-    let text = match of.verdict {
-        Significance::Better => format!(
+    let text = match of.claim() {
+        Claim::Detected(Significance::Better) => format!(
             "At L0 images give {} points over {}: {with} % with them, {without} % without.",
-            numbers.size("gain", of.difference.value),
+            numbers.size("gain", of.strict.difference.value),
             second_side(of)
         ),
-        Significance::NotShown => format!(
-            "It is not shown that images help at L0: {with} % with them, {without} % without."
-        ),
-        Significance::Worse => format!(
+        Claim::Detected(_) => format!(
             "At L0 images cost {} points against {}: {with} % with them, {without} % without.",
-            numbers.size("cost", of.difference.value),
+            numbers.size("cost", of.strict.difference.value),
             second_side(of)
         ),
         // That no verdict is possible is said for all topics together.
-        _ => return None,
+        Claim::Impossible => return None,
+        _ => format!(
+            "No gain by images was detected at L0: {with} % with them, {without} % without."
+        ),
     };
     let detail = detail(of, &mut numbers, "");
-    Some(numbers.sentence("images", Tone::from(of.verdict), text, detail))
+    Some(numbers.sentence("images", Tone::from(of.claim()), text, detail))
 }
 
 /// The comparisons by family of raw images of a variant with no images, of the models over which findings are pooled.
@@ -98,7 +107,7 @@ pub(super) fn in_a_family(
     pooled: &[&PooledFinding],
     unit: ClusterUnit,
 ) -> Option<Sentence> {
-    let difference = |of: &Comparison| of.paired.difference.value;
+    let difference = |of: &Comparison| of.strict.paired.difference.value;
     let below = all.iter().copied().filter(|of| is_below(of));
     let most = below.min_by(|a, b| difference(a).total_cmp(&difference(b)))?;
     let model = &most.first.model;
@@ -137,7 +146,7 @@ pub(super) fn in_a_family(
 }
 
 fn is_below(comparison: &Comparison) -> bool {
-    comparison.significance == Significance::Worse
+    comparison.claim() == Claim::Detected(Significance::Worse)
 }
 
 /// Whether a model is compared with its own replies.
@@ -177,12 +186,13 @@ fn comparison_detail(comparison: &Comparison, numbers: &mut Numbers) -> Option<S
     } else {
         format!(" against {}", comparison.second.model)
     };
-    let paired = &comparison.paired;
+    let paired = &comparison.strict.paired;
     let difference = numbers.difference("", paired.difference);
-    let p = numbers.p("p", comparison.holm);
+    let tested = &comparison.strict;
+    let p = numbers.p("p", tested.p_report.unwrap_or(tested.holm));
     let n = numbers.count("n", paired.difference.n);
     let clusters = numbers.clusters(paired.clusters);
     Some(format!(
-        "{model} at {level}{against}: {difference}, {p}, corrected over its conditions and families; n = {n} in {clusters}"
+        "{model} at {level}{against}: {difference}, {p}; n = {n} in {clusters}"
     ))
 }

@@ -124,7 +124,7 @@ fn row(findings: &Findings<'_>, variant: &KindReading, model: &str, run: &RunLin
     let change = of(ComparisonKind::Level).find(|found| found.first.level == darkest);
     let gains = of(ComparisonKind::Enhancer);
     let gain = gains.max_by(|a, b| {
-        let value = |found: &Comparison| found.paired.difference.value;
+        let value = |found: &Comparison| found.strict.paired.difference.value;
         value(a).total_cmp(&value(b))
     });
     let below = grid.subjects.iter().filter(|subject| {
@@ -142,12 +142,17 @@ fn row(findings: &Findings<'_>, variant: &KindReading, model: &str, run: &RunLin
         clean,
         area: curve.and_then(|curve| curve.summary.area),
         darkest,
-        change: change.map(|change| (change.paired.difference, change.significance)),
+        change: change.map(|change| (change.strict.paired.difference, change.strict.significance)),
         threshold: curve.map(|curve| curve.summary.threshold),
         gain: gain.and_then(|gain| {
             let enhancer = gain.first.enhancer.as_ref()?.to_string();
-            let difference = gain.paired.difference;
-            Some((enhancer, gain.first.level?, difference, gain.significance))
+            let difference = gain.strict.paired.difference;
+            Some((
+                enhancer,
+                gain.first.level?,
+                difference,
+                gain.strict.significance,
+            ))
         }),
         below: below.filter_map(|subject| subject.level).collect(),
         unread: health.fold([0, 0], |[unread, all], health| {

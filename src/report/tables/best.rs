@@ -1,10 +1,10 @@
-//! The table of the models by area: each less each other, with its test.
+//! The table of the models by mean accuracy in the dark: each less each other, with its test.
 
-use crate::report::sentences::over_levels;
+use crate::report::sentences::dark_levels;
 use crate::report::table::ColumnKind::{Number, P, Percent, Points, Significance, Text};
 use crate::report::table::{Table, TableBuilder};
 use crate::report::words::{light, points};
-use crate::score::best::{AreaPair, BestInTheDark, ModelArea};
+use crate::score::best::{BestInTheDark, DarkAccuracy, DarkPair};
 use crate::score::findings::Findings;
 
 /// Empty if there are fewer than two models.
@@ -17,10 +17,10 @@ pub(super) fn best(findings: &Findings<'_>) -> Table {
         .best
         .as_ref()
         .map(|best| light(&best.variant, None));
-    let levels = findings.best.as_ref().and_then(over_levels);
+    let levels = findings.best.as_ref().map(dark_levels);
     let caption = format!(
-        "Mean accuracy {}, {}: model less model, on shared items",
-        levels.unwrap_or_else(|| "from L0 to the darkest level".to_owned()),
+        "Mean accuracy over the dark levels ({}), {}: model less model, on shared items",
+        levels.unwrap_or_default(),
         variant.unwrap_or_default()
     );
     let mut table = TableBuilder::new("best", pairs)
@@ -33,16 +33,16 @@ pub(super) fn best(findings: &Findings<'_>) -> Table {
         })
         .column(Text, "csv variant", |(best, _)| best.variant.to_string())
         .column(Number, "csv first", |row| {
-            area(row, first).map(|model| model.area.value)
+            accuracy(row, first).map(|model| model.mean.value)
         })
         .column(Number, "csv second", |row| {
-            area(row, second).map(|model| model.area.value)
+            accuracy(row, second).map(|model| model.mean.value)
         })
         .column(Percent, "page first", |row| {
-            area(row, first).map(|model| model.area.value)
+            accuracy(row, first).map(|model| model.mean.value)
         })
         .column(Percent, "page second", |row| {
-            area(row, second).map(|model| model.area.value)
+            accuracy(row, second).map(|model| model.mean.value)
         })
         .column(Text, "page first less L0", |row| loss(row, first))
         .column(Text, "page second less L0", |row| loss(row, second))
@@ -59,29 +59,33 @@ pub(super) fn best(findings: &Findings<'_>) -> Table {
         .column(Text, "csv shown", |(_, pair)| {
             pair.significance.is_shown().to_string()
         })
+        .column(Text, "csv levels", |(best, _)| {
+            let levels = best.levels.iter().map(ToString::to_string);
+            levels.collect::<Vec<_>>().join(";")
+        })
         .build();
     table.is_folded = true;
     table
 }
 
-fn first(pair: &AreaPair) -> &str {
+fn first(pair: &DarkPair) -> &str {
     &pair.first
 }
 
-fn second(pair: &AreaPair) -> &str {
+fn second(pair: &DarkPair) -> &str {
     &pair.second
 }
 
-fn area<'b>(
-    (best, pair): &(&'b BestInTheDark, &AreaPair),
-    side: fn(&AreaPair) -> &str,
-) -> Option<&'b ModelArea> {
+fn accuracy<'b>(
+    (best, pair): &(&'b BestInTheDark, &DarkPair),
+    side: fn(&DarkPair) -> &str,
+) -> Option<&'b DarkAccuracy> {
     let mut models = best.models.iter();
     models.find(|model| model.model == side(pair))
 }
 
-/// The area less the accuracy at L0; empty if that is not above chance.
-fn loss(row: &(&BestInTheDark, &AreaPair), side: fn(&AreaPair) -> &str) -> Option<String> {
-    let loss = area(row, side)?.loss?;
+/// The mean less the accuracy at L0; empty if that is not above chance.
+fn loss(row: &(&BestInTheDark, &DarkPair), side: fn(&DarkPair) -> &str) -> Option<String> {
+    let loss = accuracy(row, side)?.loss?;
     Some(points(loss.value))
 }

@@ -253,7 +253,7 @@ fn sentence(finding: &FindingByReading) -> String {
         effects
             .map(|(reading, effect)| match standing {
                 Standing::Holds => reading.to_string(),
-                Standing::Reversed | Standing::Open => {
+                Standing::Opposite | Standing::Open => {
                     format!(
                         "{reading} ({} points)",
                         ends_in_points(effect.difference).replace(", ", " to ")
@@ -266,7 +266,7 @@ fn sentence(finding: &FindingByReading) -> String {
     let unasked: Vec<String> = unasked.map(|one| one.reading.to_string()).collect();
     let parts = [
         ("holds under", of(Standing::Holds)),
-        ("reversed under", of(Standing::Reversed)),
+        ("the opposite under", of(Standing::Opposite)),
         ("open under", of(Standing::Open)),
         ("not asked under", unasked),
     ];
@@ -354,12 +354,12 @@ mod tests {
             effect(finding.effects[2].effect.as_ref()),
             "+1.9 [−1.2, +5.0] open"
         );
-        finding.effects[1] = effect_of("eld", -0.4, -0.2, Standing::Reversed);
+        finding.effects[1] = effect_of("eld", -0.4, -0.2, Standing::Opposite);
         finding.effects[2].effect = None;
         finding.claim = LightClaim::EnhancerHarms(crate::types::EnhancerName::new("ruas").unwrap());
         assert_eq!(
             sentence(&finding),
-            "ruas harms at L5: holds under paper; reversed under eld (−40.0 to −20.0 points); not asked under physical."
+            "ruas harms at L5: holds under paper; the opposite under eld (−40.0 to −20.0 points); not asked under physical."
         );
         assert_eq!(notes(std::slice::from_ref(&finding)).len(), 1);
     }

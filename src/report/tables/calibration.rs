@@ -47,7 +47,7 @@ fn confidence(findings: &Findings<'_>, all: &[Calibration]) -> Table {
         .column(
             Points,
             "csv overconfidence overconfidence_low overconfidence_high | terminal overconfidence, interval | page overconfidence [95 %]",
-            |row| row.overconfidence,
+            |row| row.overconfidence.estimate,
         );
     let numbers: [(&str, NumberOf); 6] = [
         (

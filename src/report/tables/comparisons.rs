@@ -5,6 +5,7 @@ use super::sections::{ENHANCERS, REAL};
 use crate::report::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
 use crate::report::table::{Column, Table, TableBuilder, TableFormat};
 use crate::report::words::{counted, name};
+use crate::score::choice::ReadingMode;
 use crate::score::cluster::ClusterUnit;
 use crate::score::comparison::{Comparison, ComparisonKind, MIN_PAIRS};
 use crate::score::findings::Findings;
@@ -14,7 +15,13 @@ use crate::score::significance::Significance;
 const MAX_ROWS: usize = 40;
 
 pub(super) fn comparisons(findings: &Findings<'_>) -> Vec<Table> {
-    tables_of(&findings.comparisons, findings.unit, titles)
+    let mut tables = tables_of(&findings.comparisons, findings.unit, titles);
+    for kind in ComparisonKind::ALL {
+        let all = findings.comparisons.iter();
+        let all: Vec<&Comparison> = all.filter(|comparison| comparison.kind == kind).collect();
+        tables.push(table(kind, "", &all, ReadingMode::Lenient).in_files_only());
+    }
+    tables
 }
 
 /// The tables of comparisons of another measure, which the last column of the file names.
@@ -56,9 +63,10 @@ fn tables_of(
             all.partition(|comparison| comparison.family.is_none());
         let (caption, heading) = titles(kind);
         let least = whole.iter();
-        let least = least.map(|comparison| (comparison.least_holm, comparison.paired.clusters));
+        let least =
+            least.map(|comparison| (comparison.least_holm, comparison.strict.paired.clusters));
         let note = too_few_clusters(least, &unit.to_string());
-        let mut total = table(kind, caption, &whole);
+        let mut total = table(kind, caption, &whole, ReadingMode::Strict);
         total.is_folded = !matches!(
             kind,
             ComparisonKind::Enhancer | ComparisonKind::RealSynthetic | ComparisonKind::RealEnhanced
@@ -73,7 +81,8 @@ fn tables_of(
             total.notes.extend(note);
             total.notes.extend(too_few(&whole));
         }
-        let mut by_family = table(kind, &format!("{caption}, by family"), &by_family);
+        let caption = format!("{caption}, by family");
+        let mut by_family = table(kind, &caption, &by_family, ReadingMode::Strict);
         by_family.is_folded = true;
         tables.extend([total, by_family]);
     }
@@ -171,7 +180,8 @@ fn shorten(table: &mut Table, kind: ComparisonKind, comparisons: &[&Comparison])
     if kind == ComparisonKind::Blind {
         // The terminal compares blind models with raw images only; the file also has the enhanced ones.
         printed.retain(|index| comparisons[*index].first.enhancer.is_none());
-        let is_better = |index: &usize| comparisons[*index].significance == Significance::Better;
+        let is_better =
+            |index: &usize| comparisons[*index].strict.significance == Significance::Better;
         if !printed.is_empty() && printed.iter().all(is_better) {
             let line = format!("better in all {} conditions", printed.len());
             table.notes.push(line);
@@ -191,7 +201,12 @@ fn shorten(table: &mut Table, kind: ComparisonKind, comparisons: &[&Comparison])
     }
 }
 
-fn table(kind: ComparisonKind, caption: &str, comparisons: &[&Comparison]) -> Table {
+fn table(
+    kind: ComparisonKind,
+    caption: &str,
+    comparisons: &[&Comparison],
+    mode: ReadingMode,
+) -> Table {
     let section = match kind {
         ComparisonKind::Enhancer => ENHANCERS,
         ComparisonKind::RealSynthetic | ComparisonKind::RealEnhanced => REAL,
@@ -199,13 +214,14 @@ fn table(kind: ComparisonKind, caption: &str, comparisons: &[&Comparison]) -> Ta
     };
     let builder =
         TableBuilder::new("comparisons", comparisons.iter().copied()).page(section, caption);
-    let builder = numbers(subjects(builder, kind));
+    let builder = numbers(subjects(builder, kind), mode);
     builder
         .column(
             ColumnKind::Significance,
             "csv verdict shown | terminal | page | latex",
-            |comparison| comparison.significance,
+            move |comparison| comparison.parsed(mode).significance,
         )
+        .column(Text, "csv mode", move |_| mode.name())
         .build()
 }
 
@@ -248,45 +264,55 @@ fn subjects(builder: TableBuilder<&Comparison>, kind: ComparisonKind) -> TableBu
     builder.family(|comparison| comparison.family.as_ref())
 }
 
-fn numbers(builder: TableBuilder<&Comparison>) -> TableBuilder<&Comparison> {
+fn numbers(builder: TableBuilder<&Comparison>, mode: ReadingMode) -> TableBuilder<&Comparison> {
     let difference = "csv difference low high | terminal difference, 95 % interval | page difference [95 %] \
                       | latex Difference [95\\,\\%]";
     builder
         .column(Count, "csv n | terminal n", |comparison| {
-            comparison.paired.difference.n
+            comparison.parsed(mode).paired.difference.n
         })
-        .column(Number, "csv first", |comparison| comparison.paired.first)
+        .column(Number, "csv first", |comparison| {
+            comparison.parsed(mode).paired.first
+        })
         .column(Percent, "csv second | latex Raw", |comparison| {
-            comparison.paired.second
+            comparison.parsed(mode).paired.second
         })
         .column(Percent, "latex Enhanced", |comparison| {
-            comparison.paired.first
+            comparison.parsed(mode).paired.first
         })
         .column(Points, difference, |comparison| {
-            comparison.paired.difference
+            comparison.parsed(mode).paired.difference
         })
         .column(Count, "latex Rescued / harmed", |comparison| {
-            format!("{} / {}", comparison.paired.gained, comparison.paired.lost)
+            format!(
+                "{} / {}",
+                comparison.parsed(mode).paired.gained,
+                comparison.parsed(mode).paired.lost
+            )
         })
         .column(
             Count,
             "csv only_first | terminal only first | page only first",
-            |comparison| comparison.paired.gained,
+            |comparison| comparison.parsed(mode).paired.gained,
         )
         .column(
             Count,
             "csv only_second | terminal only second | page only second",
-            |comparison| comparison.paired.lost,
+            |comparison| comparison.parsed(mode).paired.lost,
         )
-        .column(Count, "page n", |comparison| comparison.paired.difference.n)
-        .column(P, "csv p_mcnemar | page p (McNemar)", |comparison| {
-            comparison.paired.mcnemar
+        .column(Count, "page n", |comparison| {
+            comparison.parsed(mode).paired.difference.n
         })
-        .column(P, "csv p | page p", |comparison| comparison.paired.p)
+        .column(P, "csv p_mcnemar | page p (McNemar)", |comparison| {
+            comparison.parsed(mode).paired.mcnemar
+        })
+        .column(P, "csv p | page p", |comparison| {
+            comparison.parsed(mode).paired.p
+        })
         .column(
             P,
             "csv p_holm | terminal p (Holm) | page p (Holm) | latex $p$ (Holm)",
-            |comparison| comparison.holm,
+            |comparison| comparison.parsed(mode).holm,
         )
 }
 

@@ -6,6 +6,7 @@ use crate::report::sentences::left_out;
 use crate::report::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
 use crate::report::table::{Table, TableBuilder};
 use crate::report::words::{counted, light, p};
+use crate::score::choice::ReadingMode;
 use crate::score::confusion::FalseAnswer;
 use crate::score::findings::Findings;
 use crate::score::pooled::PooledFinding;
@@ -32,7 +33,8 @@ pub(super) fn pooled(findings: &Findings<'_>) -> Vec<Table> {
     } else {
         "csv models"
     };
-    let mut total = table(&format!("Pooled over {of_models}"), column, &whole);
+    let caption = format!("Pooled over {of_models}");
+    let mut total = table(&caption, column, &whole, ReadingMode::Strict);
     if models.is_some_and(|models| models > 1) {
         total.heading = Some(format!(
             "Pooled over {of_models}, paired by question, in percentage points"
@@ -47,12 +49,15 @@ pub(super) fn pooled(findings: &Findings<'_>) -> Vec<Table> {
         &format!("Pooled over {of_models}, by family"),
         column,
         &by_family,
+        ReadingMode::Strict,
     );
     by_family.is_folded = true;
-    vec![total, by_family]
+    let all: Vec<&PooledFinding> = findings.pooled.iter().collect();
+    let lenient = table("", column, &all, ReadingMode::Lenient).in_files_only();
+    vec![total, by_family, lenient]
 }
 
-fn table(caption: &str, models: &str, findings: &[&PooledFinding]) -> Table {
+fn table(caption: &str, models: &str, findings: &[&PooledFinding], mode: ReadingMode) -> Table {
     let builder = TableBuilder::new("pooled", findings.iter().copied())
         .page("comparisons", caption)
         .column(Text, "csv kind", |finding| {
@@ -66,44 +71,53 @@ fn table(caption: &str, models: &str, findings: &[&PooledFinding]) -> Table {
         .column(Text, "terminal | page difference", |finding| title(finding))
         .family(|finding| finding.family.as_ref())
         .column(Count, models, |finding| finding.models.len());
-    numbers(builder)
+    numbers(builder, mode)
         .column(ColumnKind::Significance, "terminal | page", |finding| {
-            finding.verdict
+            finding.parsed(mode).verdict
         })
-        .column(Text, "csv verdict", |finding| finding.verdict.word())
+        .column(Text, "csv verdict", |finding| {
+            finding.parsed(mode).verdict.word()
+        })
         .column(Text, "csv shown", |finding| {
-            finding.verdict.is_shown().to_string()
+            finding.parsed(mode).verdict.is_shown().to_string()
         })
         .column(Text, "csv names", |finding| finding.models.join(";"))
+        .column(Text, "csv mode", |_| mode.name())
+        .column(P, "csv p_report", |finding| finding.parsed(mode).p_report)
         .build()
 }
 
-fn numbers(builder: TableBuilder<&PooledFinding>) -> TableBuilder<&PooledFinding> {
+fn numbers(
+    builder: TableBuilder<&PooledFinding>,
+    mode: ReadingMode,
+) -> TableBuilder<&PooledFinding> {
     builder
         .column(Count, "csv n | page n", |finding| finding.items)
         .column(Count, "csv dropped | page dropped", |finding| {
             finding.dropped
         })
         .column(Count, "csv clusters", |finding| finding.clusters)
-        .column(Number, "csv first", |finding| finding.first)
-        .column(Number, "csv second", |finding| finding.second)
+        .column(Number, "csv first", |finding| finding.parsed(mode).first)
+        .column(Number, "csv second", |finding| finding.parsed(mode).second)
         .column(Percent, "terminal first | page first", |finding| {
-            finding.first
+            finding.parsed(mode).first
         })
         .column(Percent, "terminal second | page second", |finding| {
-            finding.second
+            finding.parsed(mode).second
         })
         .column(
             Points,
             "csv difference low high | terminal difference, 95 % interval | page difference [95 %]",
-            |finding| finding.difference,
+            |finding| finding.parsed(mode).difference,
         )
-        .column(P, "csv p | page p", |finding| finding.p)
-        .column(Text, "csv p_by", |finding| finding.p_by.to_string())
+        .column(P, "csv p | page p", |finding| finding.parsed(mode).p)
+        .column(Text, "csv p_by", |finding| {
+            finding.parsed(mode).p_by.to_string()
+        })
         .column(
             P,
             "csv p_holm | terminal p (Holm) | page p (Holm)",
-            |finding| finding.holm,
+            |finding| finding.parsed(mode).holm,
         )
         .column(Number, "csv p_least", |finding| finding.least_p)
 }
@@ -155,7 +169,7 @@ fn notes(findings: &[&PooledFinding], unit: &str) -> Vec<String> {
 
 /// How p was found where not all swaps were counted.
 fn not_counted(findings: &[&PooledFinding]) -> Option<String> {
-    let methods = findings.iter().map(|finding| finding.p_by);
+    let methods = findings.iter().map(|finding| finding.strict.p_by);
     let methods = methods.filter(|method| *method != SwapMethod::Counted);
     let methods: BTreeSet<String> = methods.map(|method| method.to_string()).collect();
     let methods: Vec<String> = methods.into_iter().collect();

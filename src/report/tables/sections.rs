@@ -37,8 +37,9 @@ pub(in crate::report) const SECTIONS: [Section; 15] = [
         "readings",
         "Does each finding hold under every reading?",
         "The paper’s noise can be read in several ways. Each finding is computed under every reading on the same items, at L1–L5. It \
-         holds where the whole 95 % interval is on its side, is reversed where all of it is on the other side, and is open where it \
-         covers 0. The curves under each reading are in the figures of accuracy. “Under some” is corrected by Holm over the readings; “under all” needs no correction.",
+         holds where an effect on its side is detected after Holm’s correction over all claims, models and readings, has the opposite \
+         where one on the other side is detected, and is open otherwise; it is reversed only if both are detected. The curves under each \
+         reading are in the figures of accuracy.",
         &[],
     ),
     (

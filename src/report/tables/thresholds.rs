@@ -5,9 +5,10 @@ use std::collections::BTreeSet;
 use crate::report::table::ColumnKind::{Number, Share, Text, Threshold};
 use crate::report::table::{Table, TableBuilder, TableCell};
 use crate::report::words::{counted, light};
+use crate::score::choice::ReadingMode;
 use crate::score::curve::Curve;
 use crate::score::findings::Findings;
-use crate::score::threshold::{NoThreshold, ThinLevel};
+use crate::score::threshold::{CurveSummary, NoThreshold, ThinLevel};
 use crate::types::AxisLevel;
 use crate::types::degradation::Axis;
 
@@ -25,8 +26,9 @@ pub(super) fn thresholds(findings: &Findings<'_>) -> Vec<Table> {
 }
 
 /// The tables of the curves over one axis.
-fn of_axis(findings: &Findings<'_>, axis: Axis, curves: Vec<&Curve>) -> [Table; 2] {
+fn of_axis(findings: &Findings<'_>, axis: Axis, curves: Vec<&Curve>) -> [Table; 3] {
     let notes = notes(&curves);
+    let lenient = table(&Names::of(axis), "", &curves, ReadingMode::Lenient).in_files_only();
     let (whole, by_family): (Vec<&Curve>, Vec<&Curve>) =
         curves.into_iter().partition(|curve| curve.family.is_none());
     let names = Names::of(axis);
@@ -34,15 +36,16 @@ fn of_axis(findings: &Findings<'_>, axis: Axis, curves: Vec<&Curve>) -> [Table; 
         "{} in {} (half-way from L0 to chance) and mean accuracy in %, with 95 % intervals by {}",
         names.threshold, axis.unit, findings.unit
     );
-    let mut whole = table(&names, names.caption, &whole);
+    let mut whole = table(&names, names.caption, &whole, ReadingMode::Strict);
     whole.heading = (!whole.rows.is_empty()).then_some(heading);
     whole.notes = notes;
     if axis == Axis::LIGHT {
         whole.notes.extend(finer(findings));
     }
-    let mut by_family = table(&names, &format!("{} by family", names.caption), &by_family);
+    let caption = format!("{} by family", names.caption);
+    let mut by_family = table(&names, &caption, &by_family, ReadingMode::Strict);
     by_family.is_folded = true;
-    [whole, by_family]
+    [whole, by_family, lenient]
 }
 
 /// Names in the tables of an axis.
@@ -80,7 +83,7 @@ impl Names {
 }
 
 /// A threshold is `inf` beyond the darkest level, and empty if it is not known.
-fn table(names: &Names, caption: &str, curves: &[&Curve]) -> Table {
+fn table(names: &Names, caption: &str, curves: &[&Curve], mode: ReadingMode) -> Table {
     TableBuilder::new(names.file, curves)
         .page("thresholds", caption)
         .line(|curve| (&curve.model, &curve.variant, curve.enhancer.as_ref()))
@@ -88,10 +91,12 @@ fn table(names: &Names, caption: &str, curves: &[&Curve]) -> Table {
             light(&curve.variant, curve.enhancer.as_ref())
         })
         .family(|curve| curve.family.as_ref())
-        .column(Number, names.darkest, |curve| curve.summary.darkest.value())
+        .column(Number, names.darkest, |curve| {
+            curve.parsed(mode).darkest.value()
+        })
         .column(Threshold, names.columns, |curve| {
-            let darkest = curve.summary.darkest.value();
-            match &curve.summary.threshold {
+            let darkest = curve.parsed(mode).darkest.value();
+            match &curve.parsed(mode).threshold {
                 Ok(threshold) => TableCell::Threshold(*threshold, darkest),
                 Err(reason) => TableCell::Unknown(why(reason)),
             }
@@ -99,12 +104,13 @@ fn table(names: &Names, caption: &str, curves: &[&Curve]) -> Table {
         .column(
             Share,
             "csv area area_low area_high n | terminal mean accuracy | page area in % [95 %]",
-            |curve| curve.summary.area,
+            |curve| curve.parsed(mode).area,
         )
         .column(Text, names.range, |curve| {
-            format!("0–{}", curve.summary.darkest.value())
+            format!("0–{}", curve.parsed(mode).darkest.value())
         })
-        .column(Text, "csv reason", |curve| reason(curve))
+        .column(Text, "csv reason", |curve| reason(curve.parsed(mode)))
+        .column(Text, "csv mode", |_| mode.name())
         .build()
 }
 
@@ -129,10 +135,10 @@ fn thin(level: &ThinLevel) -> String {
 }
 
 /// Why the threshold of a curve is not known, or which levels are left out; empty if neither.
-fn reason(curve: &Curve) -> String {
-    let left_out = curve.summary.left_out.iter();
+fn reason(summary: &CurveSummary) -> String {
+    let left_out = summary.left_out.iter();
     let left_out = left_out.map(|level| format!("left out: {}", thin(level)));
-    let unknown = curve.summary.threshold.as_ref().err().map(why);
+    let unknown = summary.threshold.as_ref().err().map(why);
     let reasons: Vec<String> = unknown.into_iter().chain(left_out).collect();
     reasons.join("; ")
 }

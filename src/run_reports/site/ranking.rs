@@ -7,12 +7,13 @@ use super::member::ChoiceMember;
 use crate::report::site::{ChoiceRow, GroupRows, Ranking};
 use crate::run_reports::combine::clusters;
 use crate::score::best::{BestInTheDark, best_in_the_dark};
+use crate::score::choice::ReadingMode;
 use crate::score::grid::Grid;
 use crate::score::ranks::rank_ranges;
 use crate::types::{ChoiceDetail, ModelListing, RunQuestion, Trials};
 
-/// The rows of runs that can be compared, in the order of their ranks. Models are compared by area on the items that all of them answered
-/// at all levels, as in the report; those that stand for comparison only are not.
+/// The rows of runs that can be compared, in the order of their ranks. Models are compared by mean accuracy in the dark on the items that all of
+/// them answered at all levels, as in the report; those that stand for comparison only are not.
 pub(super) fn ranked(members: Vec<ChoiceMember>) -> GroupRows {
     let names = names(&members);
     let (mut trials, mut questions, mut rows) = (Trials::default(), Vec::new(), Vec::new());
@@ -72,7 +73,10 @@ fn best(
 ) -> (Option<BestInTheDark>, String) {
     let clusters = clusters(trials, questions);
     let grid = Grid::of_models(trials, &clusters, &ModelListing::default(), |_| true);
-    (best_in_the_dark(&grid), clusters.unit().to_string())
+    (
+        best_in_the_dark(&grid, ReadingMode::Strict),
+        clusters.unit().to_string(),
+    )
 }
 
 /// On what the ranks are based.
@@ -86,8 +90,8 @@ fn words(best: Option<&BestInTheDark>, models: usize, unit: &str) -> String {
     };
     let levels = best.levels.iter().map(ToString::to_string);
     let mut words = format!(
-        "Ranks are by mean accuracy over {}, on the {} items that {} models answered at all of these levels ({} {unit}s): \
-         swaps of whole {unit}s, corrected by Holm over {}.",
+        "Ranks are by mean accuracy over the dark levels (L3 and darker: {}), on the {} items that {} models answered at all levels \
+         from L0 ({} {unit}s), corrected by Holm over {}.",
         levels.collect::<Vec<_>>().join(", "),
         best.items,
         match best.models.len() {

@@ -5,7 +5,7 @@ use super::comparison::MIN_PAIRS;
 use super::grid::Grid;
 use super::health::Health;
 use super::paired::PairedComparison;
-use super::significance::{Significance, holm, least_p};
+use super::significance::{ALPHA, Significance, holm, least_p};
 use super::subject::Subject;
 
 /// A model in a condition, in the new runs against the old one.
@@ -15,9 +15,13 @@ pub struct BaselineRow {
     pub subject: Subject,
     /// New less old on the items that both answered about the same image.
     pub paired: PairedComparison,
-    /// p-value after Holm's correction over the conditions of the model.
+    /// p-value after Holm's correction over all conditions of all models under test. Reference models (`random`, the observer) are
+    /// corrected among themselves.
     pub holm: f64,
     pub significance: Significance,
+    /// The smallest difference that the test would detect in 80 % of runs like these, at the level that Bonferroni's correction leaves
+    /// it.
+    pub detectable: f64,
     /// Number of items that both asked about different images; they do not count.
     pub other_images: usize,
     /// New and old, over all trials.
@@ -64,26 +68,34 @@ pub fn baseline_rows(
             paired: PairedComparison::on_items(grid, new, old, mode, |item, _| !is_other(item))?,
             holm: 1.0,
             significance: Significance::TooFew,
+            detectable: f64::INFINITY,
             other_images: (0..grid.items.len()).filter(|item| is_other(*item)).count(),
             sides: [side(new), side(old)],
         })
     });
     let mut rows: Vec<BaselineRow> = rows.collect();
-    for same_model in rows.chunk_by_mut(|one, other| one.subject.model == other.subject.model) {
-        let adjusted = |of: fn(&PairedComparison) -> f64| {
-            let values = same_model.iter().map(|row| of(&row.paired));
-            holm(&values.collect::<Vec<_>>())
-        };
-        let (corrected, least) = (
-            adjusted(|paired| paired.p),
-            adjusted(|paired| least_p(paired.clusters)),
-        );
-        for ((row, holm), least) in same_model.iter_mut().zip(corrected).zip(least) {
-            row.holm = holm;
-            if row.paired.difference.n >= MIN_PAIRS {
-                row.significance = Significance::of(row.paired.difference.value, holm, least);
-            }
-        }
+    for is_reference in [false, true] {
+        let own = rows.iter_mut();
+        let own = own.filter(|row| row.subject.is_reference() == is_reference);
+        correct(own.collect());
     }
     rows
+}
+
+/// Corrects the tests of some rows over all of them, so that the probability of any false verdict is 5 % at most.
+fn correct(mut rows: Vec<&mut BaselineRow>) {
+    let adjusted = |of: fn(&PairedComparison) -> f64| {
+        let values = rows.iter().map(|row| of(&row.paired));
+        holm(&values.collect::<Vec<_>>())
+    };
+    let corrected = adjusted(|paired| paired.p);
+    let least = adjusted(|paired| least_p(paired.clusters));
+    let level = ALPHA / rows.len() as f64;
+    for ((row, holm), least) in rows.iter_mut().zip(corrected).zip(least) {
+        row.holm = holm;
+        row.detectable = row.paired.spread.detectable(level);
+        if row.paired.difference.n >= MIN_PAIRS {
+            row.significance = Significance::of(row.paired.difference.value, holm, least);
+        }
+    }
 }

@@ -1,35 +1,40 @@
 //! Which model sees best in the dark: [`BestInTheDark`].
 
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 use super::choice::ReadingMode;
 use super::estimate::Estimate;
 use super::grid::{ClusterCount, Grid};
-use super::paired::difference;
+use super::paired::{ClusterNet, PairedTest};
 use super::pooled::pool;
-use super::significance::{Significance, SwapMethod, SwapTest, holm, least_p, swap_test};
+use super::significance::{ALPHA, Significance, SwapMethod, holm, least_p};
 use super::subject::Subject;
-use super::trapezoid::weights;
+use darkqa_ground::types::degradation::Kind;
 use darkqa_ground::types::{AxisLevel, KindReading};
 
-/// Comparison of the models by their mean accuracy over the exposure drops, raw, in the strict reading.
+/// Comparison of the models by their mean accuracy over the dark levels ([`is_dark`]), each level alike, on raw images.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BestInTheDark {
     /// Kind of degradation: the last kind that was asked (noise, if it was), in its first light reading.
     pub variant: KindReading,
-    /// The levels that every model was asked, from L0.
+    /// The dark levels that every model was asked.
     pub levels: Vec<AxisLevel>,
-    /// The levels that some model was asked, from L0.
+    /// The lighter levels that every model was asked, from L0.
+    pub lighter: Vec<AxisLevel>,
+    /// The dark levels that some model was asked.
     pub asked: Vec<AxisLevel>,
     /// Models with images that are not compared, because they were not asked at L0 and at a degraded level of this variant.
     pub without: Vec<String>,
-    /// The models with their areas, largest area first. The first one leads.
-    pub models: Vec<ModelArea>,
+    /// The models with their accuracies, the best in the dark first. The first one leads.
+    pub models: Vec<DarkAccuracy>,
     /// The models that the leader is not shown to be better than, in the order of `models`. If it is empty, the leader is shown
     /// to be the best.
     pub not_shown_better_than: Vec<String>,
     /// All pairs of models, in the order of `models`.
-    pub pairs: Vec<AreaPair>,
+    pub pairs: Vec<DarkPair>,
+    /// The leader in the light before the leader in the dark, if they are two models whose order changes once.
+    pub crossing: Option<Crossing>,
     /// Number of items that every model answered at every level.
     pub items: usize,
     /// Number of items that some model was asked at every level, but that are left out because a model has no reply.
@@ -38,12 +43,14 @@ pub struct BestInTheDark {
     pub clusters: usize,
     /// The smallest p-value that so many clusters allow, 2 / 2ᶜ.
     pub least_p: f64,
+    /// p-value of the leader being the best, after the correction over all tests that sentences rest on.
+    pub p_report: Option<f64>,
 }
 
 impl BestInTheDark {
-    /// The model with the largest area.
+    /// The model with the largest mean accuracy.
     #[must_use]
-    pub fn leader(&self) -> &ModelArea {
+    pub fn leader(&self) -> &DarkAccuracy {
         &self.models[0]
     }
 
@@ -54,49 +61,104 @@ impl BestInTheDark {
         pairs.any(|pair| pair.significance.is_possible())
     }
 
-    /// Whether the leader is shown to be better than every other model.
+    /// Whether the leader is shown to be better than every other model, by the correction over the pairs alone.
     #[must_use]
     pub fn is_shown(&self) -> bool {
         self.not_shown_better_than.is_empty()
     }
+
+    /// Whether the leader is shown to be the best, also after the correction over all sentences.
+    #[must_use]
+    pub fn is_detected(&self) -> bool {
+        self.is_shown() && self.p_report.is_some_and(|value| value < ALPHA)
+    }
+
+    /// p-value of the leader being the best: the largest one of its pairs, each after Holm's correction over all pairs.
+    #[must_use]
+    pub(super) fn p_leader(&self) -> f64 {
+        let pairs = self.pairs.iter();
+        let own = pairs.filter(|pair| pair.first == self.leader().model);
+        own.map(|pair| pair.holm).fold(0.0, f64::max)
+    }
 }
 
-/// Mean accuracy of one model over the exposure drops, on the items of all models.
+/// Mean accuracy of one model over the dark levels, on the items of all models.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ModelArea {
+pub struct DarkAccuracy {
     pub model: String,
-    /// Mean accuracy from L0 to the darkest level, by the trapezoid rule over EV.
-    pub area: Estimate,
+    /// Mean accuracy over the dark levels.
+    pub mean: Estimate,
+    /// Mean accuracy over the lighter levels.
+    pub lighter: f64,
+    /// Accuracy at each level, the lighter ones first.
+    pub by_level: Vec<f64>,
     /// Accuracy at L0, on the same items.
     pub clean: Estimate,
-    /// The area minus the accuracy at L0; `None` if that is not above chance, because then nothing can be lost.
+    /// The mean minus the accuracy at L0; `None` if that is not above chance, because then nothing can be lost.
     pub loss: Option<Estimate>,
 }
 
-/// One model against another by area, on the items of all models.
+/// One model against another by mean accuracy over the dark levels, on the items of all models.
 #[derive(Debug, Clone, PartialEq)]
-pub struct AreaPair {
+pub struct DarkPair {
     pub first: String,
     pub second: String,
-    /// Area of the first minus that of the second.
+    /// Mean of the first minus that of the second.
     pub difference: Estimate,
-    /// p-value of swapping the two models in whole clusters.
+    /// p-value of no difference.
     pub p: f64,
-    /// How the p-value was found.
+    /// How the swaps were counted.
     pub p_by: SwapMethod,
     /// p-value after Holm's correction over all pairs of models.
     pub holm: f64,
     pub significance: Significance,
 }
 
+/// Two models whose order changes once with the level.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Crossing {
+    /// The leader of the lighter levels, and the last level at which it is ahead.
+    pub before: (String, AxisLevel),
+    /// The leader of the dark levels, and the first level at which it is ahead.
+    pub after: (String, AxisLevel),
+    /// Mean accuracy of the first less that of the second, over the levels where the first is ahead.
+    pub lead: Estimate,
+    /// The same over the levels where the second is ahead.
+    pub lag: Estimate,
+    /// The larger p-value of the two, times the number of places between levels where the order could change.
+    pub p: f64,
+    /// p-value after the correction over all tests that sentences rest on.
+    pub p_report: Option<f64>,
+}
+
+impl Crossing {
+    /// Whether the change of order is shown after that correction.
+    #[must_use]
+    pub fn is_detected(&self) -> bool {
+        self.p_report.is_some_and(|value| value < ALPHA)
+    }
+}
+
+/// The exposure drop of L3, in EV.
+const DARK_EV: f64 = 6.0;
+
+/// Whether a level counts as dark: L3 (6 EV) and darker; of another kind of degradation the third step of its ladder and beyond.
+#[must_use]
+pub fn is_dark(level: AxisLevel, kind: Kind) -> bool {
+    let third = kind.ladder().get(2);
+    let least = third.map_or(DARK_EV, |third| AxisLevel::new(kind, *third).value());
+    level.value() >= least
+}
+
 /// A model and the levels at which it was asked.
 type Asked<'g> = (&'g str, BTreeSet<AxisLevel>);
 
-/// The comparison of the models by area; `None` if fewer than two of them were asked at L0 and at a degraded level, or if they share
-/// no item.
+/// The comparison of the models in the dark, in one parsing; `None` if fewer than two of them were asked at L0 and at a degraded level,
+/// or if they share no item. If they share no dark level, the darkest one that they share counts as dark.
 #[must_use]
-pub fn best_in_the_dark(grid: &Grid<'_>) -> Option<BestInTheDark> {
+pub fn best_in_the_dark(grid: &Grid<'_>, mode: ReadingMode) -> Option<BestInTheDark> {
     let variant = grid.main_variant()?;
+    let kind = variant.kind?;
     let models = pool(grid)
         .into_iter()
         .map(|model| (model, levels(grid, model, &variant)));
@@ -105,24 +167,28 @@ pub fn best_in_the_dark(grid: &Grid<'_>) -> Option<BestInTheDark> {
     let shared = |level: &AxisLevel| curves.iter().all(|(_, levels)| levels.contains(level));
     let levels = curves.first()?.1.iter().copied().filter(shared);
     let levels: Vec<AxisLevel> = levels.collect();
+    if curves.len() < 2 || levels.len() < 2 {
+        return None;
+    }
+    let dark = levels.iter().filter(|level| is_dark(**level, kind)).count();
+    let (lighter, dark) = levels.split_at(levels.len() - dark.max(1));
     let asked: BTreeSet<AxisLevel> = curves
         .iter()
         .flat_map(|(_, levels)| levels)
         .copied()
+        .filter(|level| *level >= dark[0])
         .collect();
-    if curves.len() < 2 || levels.len() < 2 {
-        return None;
-    }
     let names: Vec<&str> = curves.iter().map(|(model, _)| *model).collect();
-    let scores = Scores::new(grid, &names, &variant, &levels);
+    let scores = Scores::new(grid, &names, &variant, &levels, mode);
     if scores.items.is_empty() {
         return None;
     }
-    let models =
-        (0..names.len()).filter_map(|model| Some((scores.area(model, names[model])?, model)));
-    let mut models: Vec<(ModelArea, usize)> = models.collect();
-    models.sort_by(|(a, _), (b, _)| b.area.value.total_cmp(&a.area.value));
-    let pairs = scores.pairs(&models);
+    let split = lighter.len();
+    let models = (0..names.len())
+        .filter_map(|model| Some((scores.accuracy(model, names[model], split)?, model)));
+    let mut models: Vec<(DarkAccuracy, usize)> = models.collect();
+    models.sort_by(|(a, _), (b, _)| b.mean.value.total_cmp(&a.mean.value));
+    let pairs = scores.pairs(&models, split);
     let leader = &models.first()?.0.model;
     let unshown = pairs
         .iter()
@@ -130,8 +196,10 @@ pub fn best_in_the_dark(grid: &Grid<'_>) -> Option<BestInTheDark> {
     let clusters = scores.clusters();
     Some(BestInTheDark {
         not_shown_better_than: unshown.map(|pair| pair.second.clone()).collect(),
+        crossing: scores.crossing(&models, &levels),
         variant,
-        levels,
+        levels: dark.to_vec(),
+        lighter: lighter.to_vec(),
         asked: asked.into_iter().collect(),
         without: without
             .iter()
@@ -141,7 +209,8 @@ pub fn best_in_the_dark(grid: &Grid<'_>) -> Option<BestInTheDark> {
         dropped: scores.dropped,
         clusters,
         least_p: least_p(clusters),
-        models: models.into_iter().map(|(area, _)| area).collect(),
+        p_report: None,
+        models: models.into_iter().map(|(model, _)| model).collect(),
         pairs,
     })
 }
@@ -161,19 +230,23 @@ fn levels(grid: &Grid<'_>, model: &str, variant: &KindReading) -> BTreeSet<AxisL
 struct ItemScores {
     /// Index of the cluster.
     cluster: usize,
-    /// Weighted number of right replies of each model, over all levels.
-    weighted: Vec<u64>,
-    /// Whether each model is right at L0.
-    clean: Vec<bool>,
+    /// Whether each model is right at each level.
+    right: Vec<Vec<bool>>,
     /// Chance of a right guess.
     guess: f64,
+}
+
+impl ItemScores {
+    /// Number of some levels at which a model is right.
+    fn right(&self, model: usize, levels: &Range<usize>) -> i64 {
+        let right = self.right[model][levels.clone()].iter();
+        right.map(|right| i64::from(*right)).sum()
+    }
 }
 
 /// Right replies of all models to their shared items.
 struct Scores {
     items: Vec<ItemScores>,
-    /// Sum of the weights of the levels.
-    weight: u64,
     /// Number of levels.
     levels: usize,
     /// Number of items that are left out because a model has no reply.
@@ -183,7 +256,13 @@ struct Scores {
 }
 
 impl Scores {
-    fn new(grid: &Grid<'_>, models: &[&str], variant: &KindReading, levels: &[AxisLevel]) -> Self {
+    fn new(
+        grid: &Grid<'_>,
+        models: &[&str],
+        variant: &KindReading,
+        levels: &[AxisLevel],
+        mode: ReadingMode,
+    ) -> Self {
         let subject =
             |model: &str, level| grid.stand_in(&Subject::seeing(model, level, variant, None));
         let subjects = models.iter().map(|model| {
@@ -191,17 +270,15 @@ impl Scores {
             subjects.collect()
         });
         let subjects: Vec<Vec<usize>> = subjects.collect();
-        let weights = weights(levels);
         let mut scores = Self {
             items: Vec::new(),
-            weight: weights.iter().sum(),
             levels: levels.len(),
             dropped: 0,
             all_clusters: grid.clusters,
         };
         for (index, item) in grid.items.iter().enumerate() {
             let answered = |subject: &usize| {
-                let reading = grid.result(*subject, index).reading(ReadingMode::Strict);
+                let reading = grid.result(*subject, index).reading(mode);
                 reading.map(|chosen| item.is_right(chosen))
             };
             let right = subjects.iter();
@@ -212,14 +289,9 @@ impl Scores {
                 scores.dropped += usize::from(is_asked);
                 continue;
             };
-            let weighted = right.iter().map(|levels| {
-                let right = levels.iter().zip(&weights).filter(|(right, _)| **right);
-                right.map(|(_, weight)| weight).sum()
-            });
             scores.items.push(ItemScores {
                 cluster: item.cluster as usize,
-                weighted: weighted.collect(),
-                clean: right.iter().map(|levels| levels[0]).collect(),
+                right,
                 guess: 1.0 / item.asked.choices.len() as f64,
             });
         }
@@ -231,68 +303,72 @@ impl Scores {
         self.sums(|_| 0).len()
     }
 
-    /// Sum of a number over the items of each cluster that has an item, and the number of these items.
-    fn sums(&self, of: impl Fn(&ItemScores) -> i64) -> Vec<(i64, u32)> {
-        let mut sums = vec![(0, 0); self.all_clusters];
+    /// Sum of a number over the items of each cluster that has an item.
+    fn sums(&self, of: impl Fn(&ItemScores) -> i64) -> Vec<ClusterNet> {
+        let mut sums = vec![ClusterNet { net: 0, items: 0 }; self.all_clusters];
         for item in &self.items {
-            let (sum, count) = &mut sums[item.cluster];
-            *sum += of(item);
-            *count += 1;
+            let sum = &mut sums[item.cluster];
+            sum.net += of(item);
+            sum.items += 1;
         }
-        sums.retain(|(_, count)| *count > 0);
+        sums.retain(|sum| sum.items > 0);
         sums
     }
 
-    /// The mean of a weighted difference, as a share of all weights, and the test of swaps.
-    fn difference(&self, of: impl Fn(&ItemScores) -> i64) -> (Estimate, SwapTest) {
-        let weight = self.weight as f64;
-        let sums = self.sums(&of);
-        let nets: Vec<i64> = sums.iter().map(|(net, _)| *net).collect();
-        let shares = sums.iter();
-        let shares = shares.map(|(net, count)| (*net as f64 / weight, f64::from(*count)));
-        let squares = self.items.iter().map(|item| {
-            let share = of(item) as f64 / weight;
-            share * share
-        });
-        let estimate = difference(&shares.collect::<Vec<_>>(), squares.sum(), self.items.len());
-        (estimate, swap_test(&nets))
+    /// The test of a difference that each item has; it is `scale` at most.
+    fn tested(&self, scale: usize, of: impl Fn(&ItemScores) -> i64) -> PairedTest {
+        let squares: i64 = self.items.iter().map(|item| of(item) * of(item)).sum();
+        PairedTest::new(&self.sums(&of), scale as f64, squares as f64)
     }
 
-    /// The area of a model, given by its index.
-    fn area(&self, model: usize, name: &str) -> Option<ModelArea> {
-        let (n, weight) = (self.items.len(), self.weight as f64);
-        let sums = self.sums(|item| item.weighted[model] as i64).into_iter();
-        let sums = sums.map(|(sum, count)| (sum as f64 / weight, f64::from(count)));
-        let clean = self.sums(|item| i64::from(item.clean[model])).into_iter();
-        let clean = clean.map(|(right, replies)| ClusterCount {
-            right: right as u32,
-            replies,
+    /// The mean of the first model less that of the second over some levels.
+    fn less(&self, [first, second]: [usize; 2], levels: Range<usize>) -> PairedTest {
+        self.tested(levels.len(), |item| {
+            item.right(first, &levels) - item.right(second, &levels)
+        })
+    }
+
+    /// The accuracies of a model, given by its index; the levels from `split` on are dark.
+    fn accuracy(&self, model: usize, name: &str, split: usize) -> Option<DarkAccuracy> {
+        let (n, dark) = (self.items.len(), split..self.levels);
+        let share = |level: usize| {
+            let right = self.items.iter().filter(|item| item.right[model][level]);
+            right.count() as f64 / n as f64
+        };
+        let by_level: Vec<f64> = (0..self.levels).map(share).collect();
+        let count = dark.len() as f64;
+        let sums = self.sums(|item| item.right(model, &dark)).into_iter();
+        let sums = sums.map(|sum| (sum.net as f64 / count, f64::from(sum.items)));
+        let clean = self.sums(|item| item.right(model, &(0..1))).into_iter();
+        let clean = clean.map(|sum| ClusterCount {
+            right: sum.net as u32,
+            replies: sum.items,
         });
         let clean = Estimate::clustered(&clean.collect::<Vec<_>>())?;
         let chance = self.items.iter().map(|item| item.guess).sum::<f64>() / n as f64;
         let lost = |item: &ItemScores| {
-            let clean = if item.clean[model] { self.weight } else { 0 };
-            item.weighted[model] as i64 - clean as i64
+            item.right(model, &dark) - item.right(model, &(0..1)) * dark.len() as i64
         };
-        Some(ModelArea {
+        Some(DarkAccuracy {
             model: name.to_owned(),
-            area: Estimate::scored(&sums.collect::<Vec<_>>(), self.levels as f64, n)?,
+            mean: Estimate::scored(&sums.collect::<Vec<_>>(), count, n)?,
+            lighter: by_level[..split].iter().sum::<f64>() / split as f64,
+            by_level,
             clean,
-            loss: (clean.low > chance).then(|| self.difference(lost).0),
+            loss: (clean.low > chance).then(|| self.tested(dark.len(), lost).difference),
         })
     }
 
     /// All pairs of models, given with their indices, with their verdicts.
-    fn pairs(&self, models: &[(ModelArea, usize)]) -> Vec<AreaPair> {
+    fn pairs(&self, models: &[(DarkAccuracy, usize)], split: usize) -> Vec<DarkPair> {
         let mut pairs = Vec::new();
         for (index, (first, a)) in models.iter().enumerate() {
             for (second, b) in &models[index + 1..] {
-                let net = |item: &ItemScores| item.weighted[*a] as i64 - item.weighted[*b] as i64;
-                let (difference, tested) = self.difference(net);
-                pairs.push(AreaPair {
+                let tested = self.less([*a, *b], split..self.levels);
+                pairs.push(DarkPair {
                     first: first.model.clone(),
                     second: second.model.clone(),
-                    difference,
+                    difference: tested.difference,
                     p: tested.p,
                     p_by: tested.by,
                     holm: 1.0,
@@ -307,5 +383,37 @@ impl Scores {
             pair.significance = Significance::of(pair.difference.value, holm, least_holm);
         }
         pairs
+    }
+
+    /// The change of order of the leader of the lighter levels and the leader of the dark ones; `None` if they are one model, or if
+    /// their order changes more than once.
+    fn crossing(&self, models: &[(DarkAccuracy, usize)], levels: &[AxisLevel]) -> Option<Crossing> {
+        let (dark, dark_index) = models.first()?;
+        let by_lighter = |a: &&(DarkAccuracy, usize), b: &&(DarkAccuracy, usize)| {
+            a.0.lighter.total_cmp(&b.0.lighter)
+        };
+        // Of several, the first: the better one in the dark.
+        let (light, light_index) = models.iter().rev().max_by(by_lighter)?;
+        let ahead = |level: usize| light.by_level[level] - dark.by_level[level];
+        let split = (1..self.levels).find(|split| ahead(*split) < 0.0)?;
+        let changes_once = (0..split).all(|level| ahead(level) >= 0.0)
+            && (split..self.levels).all(|level| ahead(level) <= 0.0);
+        if !changes_once || dark_index == light_index {
+            return None;
+        }
+        let pair = [*light_index, *dark_index];
+        let (lead, lag) = (
+            self.less(pair, 0..split),
+            self.less(pair, split..self.levels),
+        );
+        let places = (self.levels - 1) as f64;
+        Some(Crossing {
+            before: (light.model.clone(), levels[split - 1]),
+            after: (dark.model.clone(), levels[split]),
+            lead: lead.difference,
+            lag: lag.difference,
+            p: (places * lead.p.max(lag.p)).min(1.0),
+            p_report: None,
+        })
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! The paper's noise can be read in several ways. A conclusion that holds under one of them alone is a conclusion about that
 //! reading. So each finding is computed under every reading on the same items, by the same formula, and the results stand beside
-//! each other. Only the levels of the paper, L1–L5, count.
+//! each other. Only the levels of the paper, L1–L5, count. What is said rests on Holm's correction over all claims of all models under
+//! all readings (Holm 1979, Scand. J. Stat. 6:65), so that a report without any effect names none with 95 % probability.
 
 use std::collections::BTreeSet;
 
@@ -11,16 +12,13 @@ use rayon::prelude::*;
 use super::choice::ReadingMode;
 use super::estimate::Estimate;
 use super::grid::Grid;
-use super::paired::difference;
-use super::significance::{holm, swap_test};
+use super::paired::{ClusterNet, PairedTest};
+use super::significance::{ALPHA, holm};
 use super::subject::Subject;
 use darkqa_ground::types::degradation::Kind;
 use darkqa_ground::types::{
     AxisLevel, EnhancerName, Family, KindReading, LightGroup, ReadingName, View,
 };
-
-/// The level of the tests (chosen, as usual).
-const ALPHA: f64 = 0.05;
 
 /// A statement about noise, of which each light reading may say something else.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -94,14 +92,14 @@ fn paper_levels() -> Vec<AxisLevel> {
         .collect()
 }
 
-/// What the interval of an effect says about a claim.
+/// What the test of an effect says about a claim, after the correction over claims and readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Standing {
-    /// The whole 95 % interval is on the side of the claim.
+    /// The effect is detected on the side of the claim.
     Holds,
-    /// The whole interval is on the other side.
-    Reversed,
-    /// The interval covers 0.
+    /// The effect is detected on the other side.
+    Opposite,
+    /// No effect is detected.
     Open,
 }
 
@@ -111,7 +109,7 @@ impl Standing {
     pub fn word(self) -> &'static str {
         match self {
             Self::Holds => "holds",
-            Self::Reversed => "reversed",
+            Self::Opposite => "opposite",
             Self::Open => "open",
         }
     }
@@ -120,11 +118,13 @@ impl Standing {
 /// A claim under all readings together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Robustness {
-    /// It holds under every reading of the report. Each test has the level 5 %, and so has their intersection.
+    /// It holds under every reading of the report.
     All,
-    /// It holds under some readings, after Holm's correction over the readings.
+    /// It holds under some readings.
     Some,
-    /// It holds under no reading and is reversed under at least one.
+    /// It holds under one reading at least, and the opposite is detected under another.
+    Reversed,
+    /// It holds under no reading, and the opposite is detected under at least one.
     None,
     /// No reading decides it.
     Open,
@@ -137,6 +137,7 @@ impl Robustness {
         match self {
             Self::All => "under all",
             Self::Some => "under some",
+            Self::Reversed => "reversed",
             Self::None => "under none",
             Self::Open => "open",
         }
@@ -157,11 +158,11 @@ pub struct EffectInReading {
 pub struct TestedEffect {
     /// The difference of accuracies with its 95 % interval by clusters.
     pub difference: Estimate,
-    /// What the interval says about the claim.
+    /// What the test says about the claim.
     pub standing: Standing,
-    /// p-value of swapping the two sides in whole clusters.
+    /// p-value of no difference.
     pub p: f64,
-    /// The p-value after Holm's correction over the readings.
+    /// The p-value after Holm's correction over all claims and readings.
     pub holm: f64,
 }
 
@@ -212,7 +213,7 @@ pub fn by_reading(grid: &Grid<'_>) -> Vec<FindingByReading> {
         let sides = Sides { grid, model, group };
         finding(&sides, claim, &readings)
     });
-    found.collect()
+    corrected(found.collect())
 }
 
 /// The subjects with noisy images.
@@ -323,9 +324,11 @@ fn finding(
     let (kept, dropped) = shared_items(sides.grid, &pairs, claim.family());
     let effects: Vec<Option<TestedEffect>> = pairs
         .iter()
-        .map(|pairs| effect(sides.grid, pairs, &kept, claim.is_gain()))
+        .map(|pairs| effect(sides.grid, pairs, &kept))
         .collect();
-    let effects = corrected(effects);
+    if effects.iter().all(Option::is_none) {
+        return None;
+    }
     let blind = matches!(claim, LightClaim::BelowBlind(..))
         .then(|| sides.blind())
         .flatten()
@@ -333,7 +336,7 @@ fn finding(
     Some(FindingByReading {
         model: sides.model.to_owned(),
         group: sides.group.cloned(),
-        robustness: robustness(&effects)?,
+        robustness: Robustness::Open,
         claim,
         levels,
         blind: blind.filter(|name| name != sides.model),
@@ -375,16 +378,11 @@ fn shared_items(
 }
 
 /// The mean over the pairs of the first side less the second, on the items of `kept`; `None` without pairs or items.
-fn effect(
-    grid: &Grid<'_>,
-    pairs: &[(usize, usize)],
-    kept: &[usize],
-    is_gain: bool,
-) -> Option<TestedEffect> {
+fn effect(grid: &Grid<'_>, pairs: &[(usize, usize)], kept: &[usize]) -> Option<TestedEffect> {
     if pairs.is_empty() || kept.is_empty() {
         return None;
     }
-    let mut clusters = vec![(0_i64, 0_u32); grid.clusters];
+    let mut clusters = vec![ClusterNet { net: 0, items: 0 }; grid.clusters];
     let mut squares = 0;
     for &index in kept {
         let item = &grid.items[index];
@@ -397,59 +395,61 @@ fn effect(
             .map(|(first, second)| is_right(*first) - is_right(*second))
             .sum();
         let cluster = &mut clusters[item.cluster as usize];
-        cluster.0 += net;
-        cluster.1 += 1;
+        cluster.net += net;
+        cluster.items += 1;
         squares += net * net;
     }
-    clusters.retain(|(_, items)| *items > 0);
-    let levels = pairs.len() as f64;
-    let nets: Vec<i64> = clusters.iter().map(|(net, _)| *net).collect();
-    let sums: Vec<(f64, f64)> = clusters
-        .iter()
-        .map(|(net, items)| (*net as f64 / levels, f64::from(*items)))
-        .collect();
-    let difference = difference(&sums, squares as f64 / levels / levels, kept.len());
-    let p = swap_test(&nets).p;
+    clusters.retain(|cluster| cluster.items > 0);
+    let tested = PairedTest::new(&clusters, pairs.len() as f64, squares as f64);
     Some(TestedEffect {
-        standing: standing(difference, is_gain),
-        difference,
-        p,
-        holm: p,
+        standing: Standing::Open,
+        difference: tested.difference,
+        p: tested.p,
+        holm: tested.p,
     })
 }
 
-fn standing(difference: Estimate, is_gain: bool) -> Standing {
-    let (gain, loss) = (difference.low > 0.0, difference.high < 0.0);
-    match (is_gain, gain, loss) {
-        (true, true, _) | (false, _, true) => Standing::Holds,
-        (true, _, true) | (false, true, _) => Standing::Reversed,
-        _ => Standing::Open,
+/// The findings with what their tests say, after Holm's correction over all of them and all readings.
+fn corrected(mut found: Vec<FindingByReading>) -> Vec<FindingByReading> {
+    let effects = found.iter().flat_map(|finding| &finding.effects);
+    let values = effects.filter_map(|effect| Some(effect.effect.as_ref()?.p));
+    let mut corrected = holm(&values.collect::<Vec<_>>()).into_iter();
+    for finding in &mut found {
+        let is_gain = finding.claim.is_gain();
+        let effects = finding.effects.iter_mut();
+        let tested = effects.filter_map(|effect| effect.effect.as_mut());
+        for (effect, holm) in tested.zip(&mut corrected) {
+            effect.holm = holm;
+            effect.standing = standing(effect, is_gain);
+        }
+        finding.robustness = robustness(&finding.effects);
+    }
+    found
+}
+
+fn standing(effect: &TestedEffect, is_gain: bool) -> Standing {
+    if effect.holm >= ALPHA {
+        Standing::Open
+    } else if (effect.difference.value > 0.0) == is_gain {
+        Standing::Holds
+    } else {
+        Standing::Opposite
     }
 }
 
-/// The effects with their p-values after Holm's correction over the readings.
-fn corrected(mut effects: Vec<Option<TestedEffect>>) -> Vec<Option<TestedEffect>> {
-    let p: Vec<f64> = effects.iter().flatten().map(|effect| effect.p).collect();
-    for (effect, holm) in effects.iter_mut().flatten().zip(holm(&p)) {
-        effect.holm = holm;
+/// The claim under the readings. A reading that was not asked shows nothing, so that the claim cannot hold under all.
+fn robustness(effects: &[EffectInReading]) -> Robustness {
+    let count = |standing: Standing| {
+        let tested = effects.iter().filter_map(|effect| effect.effect);
+        tested.filter(|effect| effect.standing == standing).count()
+    };
+    match (count(Standing::Holds), count(Standing::Opposite)) {
+        (0, 0) => Robustness::Open,
+        (0, _) => Robustness::None,
+        (holding, 0) if holding == effects.len() => Robustness::All,
+        (_, 0) => Robustness::Some,
+        _ => Robustness::Reversed,
     }
-    effects
-}
-
-/// The claim under the readings; `None` if it was asked under none. A reading that was not asked shows nothing, so that it cannot hold under
-/// all.
-fn robustness(effects: &[Option<TestedEffect>]) -> Option<Robustness> {
-    let asked: Vec<&TestedEffect> = effects.iter().flatten().collect();
-    let is = |standing: Standing| move |effect: &&&TestedEffect| effect.standing == standing;
-    let holding = asked.iter().filter(is(Standing::Holds));
-    let reversed = asked.iter().filter(is(Standing::Reversed)).count();
-    Some(match holding.clone().count() {
-        _ if asked.is_empty() => return None,
-        count if count == effects.len() => Robustness::All,
-        0 if reversed > 0 => Robustness::None,
-        _ if holding.clone().any(|effect| effect.holm < ALPHA) => Robustness::Some,
-        _ => Robustness::Open,
-    })
 }
 
 #[cfg(test)]

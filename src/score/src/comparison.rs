@@ -5,6 +5,7 @@ mod real_synthetic;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::choice::ReadingMode;
+use super::claim::{Claim, ParsedFinding};
 use super::grid::Grid;
 use super::paired::PairedComparison;
 use super::significance::{Significance, holm, least_p};
@@ -66,7 +67,7 @@ impl ComparisonKind {
 /// kinds were asked the same items by one run.
 pub const MIN_PAIRS: usize = 30;
 
-/// One subject against another on the items to which both replied, in the strict reading.
+/// One subject against another on the items to which both replied, in both parsings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
     pub kind: ComparisonKind,
@@ -76,13 +77,35 @@ pub struct Comparison {
     pub second: Subject,
     /// Question family; `None` for all families together.
     pub family: Option<Family>,
+    /// The comparison in the strict parsing, which is the headline.
+    pub strict: TestedComparison,
+    /// The comparison in the lenient parsing.
+    pub lenient: TestedComparison,
+    /// The smallest p-value after correction that the clusters of this comparison allow, however large the difference is.
+    pub least_holm: f64,
+}
+
+/// A comparison in one parsing of the replies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TestedComparison {
     pub paired: PairedComparison,
     /// p-value after Holm's correction over all comparisons of this kind and these models. Another model in the report
     /// therefore changes no result. Comparisons by family are corrected separately.
     pub holm: f64,
-    /// The smallest p-value after correction that the clusters of this comparison allow, however large the difference is.
-    pub least_holm: f64,
     pub significance: Significance,
+    /// p-value after the correction over all tests that sentences rest on; `None` if no sentence is about the comparison.
+    pub p_report: Option<f64>,
+}
+
+impl TestedComparison {
+    fn new(paired: PairedComparison) -> Self {
+        Self {
+            paired,
+            holm: 1.0,
+            significance: Significance::NotShown,
+            p_report: None,
+        }
+    }
 }
 
 impl Comparison {
@@ -90,7 +113,27 @@ impl Comparison {
     #[must_use]
     pub fn is_too_small(&self) -> bool {
         let is_across = matches!(self.kind, ComparisonKind::Model | ComparisonKind::Light);
-        is_across && self.paired.difference.n < MIN_PAIRS
+        is_across && self.strict.paired.difference.n < MIN_PAIRS
+    }
+
+    /// What sentences may claim.
+    #[must_use]
+    pub fn claim(&self) -> Claim {
+        let parsed = |tested: &TestedComparison| ParsedFinding {
+            gain: tested.paired.difference.value,
+            verdict: tested.significance,
+            p_report: tested.p_report,
+        };
+        Claim::new(parsed(&self.strict), parsed(&self.lenient))
+    }
+
+    /// The comparison in a parsing.
+    #[must_use]
+    pub fn parsed(&self, mode: ReadingMode) -> &TestedComparison {
+        match mode {
+            ReadingMode::Strict => &self.strict,
+            ReadingMode::Lenient => &self.lenient,
+        }
     }
 }
 
@@ -115,15 +158,22 @@ type Job<'a> = (ComparisonKind, Option<&'a Family>, usize, usize);
 fn paired(grid: &Grid<'_>, jobs: Vec<Job<'_>>) -> Vec<Comparison> {
     let jobs = jobs.into_par_iter();
     let found = jobs.filter_map(|(kind, family, first, second)| {
+        let paired = |mode| PairedComparison::new(grid, first, second, family, mode);
+        let strict = paired(ReadingMode::Strict)?;
+        let differs = grid.parsings_differ(first) || grid.parsings_differ(second);
+        let lenient = if differs {
+            paired(ReadingMode::Lenient)?
+        } else {
+            strict.clone()
+        };
         Some(Comparison {
             kind,
             first: grid.subjects[first].clone(),
             second: grid.subjects[second].clone(),
             family: family.cloned(),
-            paired: PairedComparison::new(grid, first, second, family, ReadingMode::Strict)?,
-            holm: 1.0,
+            strict: TestedComparison::new(strict),
+            lenient: TestedComparison::new(lenient),
             least_holm: 1.0,
-            significance: Significance::NotShown,
         })
     });
     found.collect()
@@ -163,22 +213,29 @@ fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
         sets.entry(set).or_default().push(index);
     }
     for set in sets.into_values() {
-        let values = |of: fn(&PairedComparison) -> f64| -> Vec<f64> {
-            let values = set.iter().map(|index| of(&all[*index].paired));
+        let values = |of: fn(&Comparison) -> f64| -> Vec<f64> {
+            let values = set.iter().map(|index| of(&all[*index]));
             holm(&values.collect::<Vec<_>>())
         };
-        let corrected = values(|paired| paired.p);
-        let least = values(|paired| least_p(paired.clusters));
-        for ((index, holm), least_holm) in set.into_iter().zip(corrected).zip(least) {
+        let strict = values(|found| found.strict.paired.p);
+        let lenient = values(|found| found.lenient.paired.p);
+        let least = values(|found| least_p(found.strict.paired.clusters));
+        for (place, index) in set.into_iter().enumerate() {
             let comparison = &mut all[index];
-            let difference = comparison.paired.difference.value;
-            comparison.holm = holm;
-            comparison.least_holm = least_holm;
-            comparison.significance = if comparison.is_too_small() {
-                Significance::TooFew
-            } else {
-                Significance::of(difference, holm, least_holm)
-            };
+            let is_too_small = comparison.is_too_small();
+            comparison.least_holm = least[place];
+            for (tested, holm) in [
+                (&mut comparison.strict, strict[place]),
+                (&mut comparison.lenient, lenient[place]),
+            ] {
+                let difference = tested.paired.difference.value;
+                tested.holm = holm;
+                tested.significance = if is_too_small {
+                    Significance::TooFew
+                } else {
+                    Significance::of(difference, holm, least[place])
+                };
+            }
         }
     }
     all

@@ -5,8 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::choice::ReadingMode;
 use super::estimate::Estimate;
 use super::grid::{ClusterCount, Grid, GridItem};
+use super::paired::PairedComparison;
+use super::significance::ALPHA;
 use super::subject::Subject;
-use darkqa_ground::types::Family;
+use darkqa_ground::types::{AxisLevel, Family};
 
 /// Maximum number of different answers of a family that gets a confusion table.
 const MAX_LABELS: usize = 26;
@@ -115,6 +117,80 @@ pub struct Collapse {
     pub true_entropy: f64,
     /// Number of clusters of the replies.
     pub clusters: usize,
+    /// The answer's share against that of the same model at L0; `None` for L0 itself, enhanced images and models without L0.
+    pub clean: Option<AgainstClean>,
+}
+
+/// How much more often an answer is given than at L0, on the same items.
+///
+/// The answer that is tested is the commonest of both sides together. Swaps of the sides do not change that choice, so that the test
+/// keeps its size although the answer is chosen by the data.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AgainstClean {
+    /// Shares of the answer in the strict parsing, with their difference.
+    pub strict: PairedComparison,
+    /// The same in the lenient parsing.
+    pub lenient: PairedComparison,
+    /// Whether the answer is the commonest of both sides together.
+    pub is_commonest: bool,
+    /// p-values after the correction over all tests that sentences rest on, by parsing; `None` if no sentence is about the answer.
+    pub p_report: [Option<f64>; 2],
+}
+
+impl AgainstClean {
+    fn new(grid: &Grid<'_>, subject: usize, family: &Family, answer: &str) -> Option<Self> {
+        let dark = &grid.subjects[subject];
+        if dark.enhancer.is_some() || !dark.variant.is_degraded() {
+            return None;
+        }
+        let clean = Subject::seeing(&dark.model, AxisLevel::L0, &dark.variant, None);
+        let clean = grid.stand_in(&clean)?;
+        let mut times = BTreeMap::<&str, usize>::new();
+        for (index, item) in grid.items.iter().enumerate() {
+            if !item.is_of(Some(family)) {
+                continue;
+            }
+            let [a, b] =
+                [subject, clean].map(|side| grid.result(side, index).reading(ReadingMode::Strict));
+            let (Some(a), Some(b)) = (a, b) else { continue };
+            for given in [a, b].into_iter().flatten() {
+                if let Some(text) = item.asked.choices.get(usize::from(given)) {
+                    *times.entry(text).or_default() += 1;
+                }
+            }
+        }
+        let own = times.get(answer).copied().unwrap_or(0);
+        let is_given = |item: &GridItem<'_>, chosen: Option<u8>| {
+            let given = chosen.and_then(|index| item.asked.choices.get(usize::from(index)));
+            given.is_some_and(|given| given == answer)
+        };
+        let paired = |mode| {
+            let has = |_: usize, item: &GridItem<'_>| item.is_of(Some(family));
+            PairedComparison::counting(grid, [subject, clean], mode, has, is_given)
+        };
+        Some(Self {
+            strict: paired(ReadingMode::Strict)?,
+            lenient: paired(ReadingMode::Lenient)?,
+            is_commonest: times.values().all(|times| *times <= own),
+            p_report: [None; 2],
+        })
+    }
+
+    /// p-value of no difference in a parsing; 1 if another answer is the commonest.
+    pub(super) fn p(&self, mode: ReadingMode) -> f64 {
+        match mode {
+            _ if !self.is_commonest => 1.0,
+            ReadingMode::Strict => self.strict.p,
+            ReadingMode::Lenient => self.lenient.p,
+        }
+    }
+
+    /// Whether the answer is shown to be given more often than at L0, in both parsings and after the correction over all sentences.
+    fn is_detected(&self) -> bool {
+        let is_small = |p: &Option<f64>| p.is_some_and(|p| p < ALPHA);
+        let is_more = |paired: &PairedComparison| paired.difference.value > 0.0;
+        self.p_report.iter().all(is_small) && is_more(&self.strict) && is_more(&self.lenient)
+    }
 }
 
 /// By how much the share of one answer must exceed its true share to be called a collapse; chosen.
@@ -158,13 +234,20 @@ impl Collapse {
             entropy: entropy(shares.iter().map(|(predicted, _)| *predicted)),
             true_entropy: entropy(shares.iter().map(|(_, truth)| *truth)),
             clusters: counts.len(),
+            clean: AgainstClean::new(grid, subject, &confusion.family, top),
         })
+    }
+
+    /// Whether one answer is given far too often, and detected to be given more often than by the same model at L0.
+    #[must_use]
+    pub fn is_shown(&self) -> bool {
+        self.is_far_too_frequent() && self.clean.as_ref().is_some_and(AgainstClean::is_detected)
     }
 
     /// Whether one answer is given far too often: [`MIN_EXCESS`] above its true share, and with an interval above both its true
     /// share and that of guessing. A model that draws yes or no where few answers are “yes” does not collapse.
     #[must_use]
-    pub fn is_shown(&self) -> bool {
+    pub fn is_far_too_frequent(&self) -> bool {
         let rounding = 1e-9;
         self.clusters >= MIN_CLUSTERS
             && self.share.value - self.truth >= MIN_EXCESS - rounding

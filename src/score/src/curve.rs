@@ -19,8 +19,10 @@ pub struct Curve {
     pub enhancer: Option<EnhancerName>,
     /// Question family; `None` for all families together.
     pub family: Option<Family>,
-    /// Threshold and area.
+    /// Threshold and area in the strict parsing, which is the headline.
     pub summary: CurveSummary,
+    /// The same in the lenient parsing.
+    pub lenient: CurveSummary,
 }
 
 impl Curve {
@@ -28,6 +30,15 @@ impl Curve {
     #[must_use]
     pub fn axis(&self) -> Axis {
         self.variant.kind.map_or(Axis::LIGHT, Kind::axis)
+    }
+
+    /// Threshold and area in a parsing.
+    #[must_use]
+    pub fn parsed(&self, mode: ReadingMode) -> &CurveSummary {
+        match mode {
+            ReadingMode::Strict => &self.summary,
+            ReadingMode::Lenient => &self.lenient,
+        }
     }
 }
 
@@ -99,15 +110,23 @@ fn curve(
     points: CurvePoints,
 ) -> Option<Curve> {
     let subjects = points.subjects.iter();
-    let counts = LevelCounts {
+    let counts = |mode| LevelCounts {
         levels: subjects.clone().map(|(level, _)| *level).collect(),
         counts: subjects
-            .map(|(_, subject)| grid.counts(*subject, family, ReadingMode::Strict))
+            .clone()
+            .map(|(_, subject)| grid.counts(*subject, family, mode))
             .collect(),
         guesses: guesses(grid, points.subjects[0].1, family),
     };
+    let (strict, lenient) = (counts(ReadingMode::Strict), counts(ReadingMode::Lenient));
+    let summary = strict.summary(draws)?;
     Some(Curve {
-        summary: counts.summary(draws)?,
+        lenient: if lenient.counts == strict.counts {
+            summary.clone()
+        } else {
+            lenient.summary(draws)?
+        },
+        summary,
         model: points.model,
         variant: points.variant,
         enhancer: points.enhancer,

@@ -23,6 +23,8 @@ pub struct FidelityFindings {
     pub conditions: Vec<ConditionFidelity>,
     /// How well PSNR and SSIM tell right from wrong answers within conditions, over all of these.
     pub within: [Option<Auc>; 2],
+    /// p-value of the first of these after the correction over all tests that sentences rest on.
+    pub p_report: Option<f64>,
     /// Spearman's rank correlation of mean accuracy with mean PSNR and with mean SSIM, over the conditions. A description without
     /// a test; `None` with fewer than three conditions.
     pub between: [Option<f64>; 2],
@@ -111,6 +113,7 @@ impl FidelityFindings {
         }
         correct(&mut rows);
         Some(Self {
+            p_report: None,
             models: models.into_iter().collect(),
             within: all.map(|pairs| pairs.auc()),
             between: [0, 1].map(|index| rank_correlation(&rows, index)),

@@ -7,6 +7,7 @@ use super::bootstrap::Resamples;
 use super::by_reading::{FindingByReading, by_reading};
 use super::calibration::{Calibration, calibrations};
 use super::chance::OfferedChoices;
+use super::choice::ReadingMode;
 use super::cluster::{ClusterUnit, Clusters, FrameTies};
 use super::common::CommonItems;
 use super::comparison::{Comparison, ComparisonKind, comparisons, lights_between};
@@ -15,6 +16,8 @@ use super::curve::{Curve, curves};
 use super::fidelity::FidelityFindings;
 use super::flips::{FirstFailure, first_failures};
 use super::grid::Grid;
+use super::head_tests;
+pub use super::head_tests::LEAST_CONFIDENT_REPLIES;
 use super::health::{Health, healths};
 use super::observed::ObserverSummary;
 use super::pair_darkness::{self, PairDarkness};
@@ -46,6 +49,8 @@ pub struct Findings<'a> {
     pub by_reading: Vec<FindingByReading>,
     /// The models by their mean accuracy in the dark, if there are two or more.
     pub best: Option<BestInTheDark>,
+    /// The same in the lenient parsing.
+    pub lenient_best: Option<BestInTheDark>,
     /// Paired differences between subjects.
     pub comparisons: Vec<Comparison>,
     /// Thresholds and areas, for all families together and for each family.
@@ -72,6 +77,8 @@ pub struct Findings<'a> {
     pub common: Option<CommonItems>,
     /// Shares of groups of which all questions are right; `None` if questions have no groups.
     pub strict: Option<StrictScore>,
+    /// Number of tests that sentences rest on, corrected together.
+    pub tests: usize,
     /// Results of the observer and its controls. The controls are in no other result.
     pub observer: ObserverSummary,
     /// The results without the observer, if one of its controls is not at chance; these are shown then.
@@ -155,36 +162,67 @@ impl<'a> Findings<'a> {
         measured: &[ImageFidelity],
     ) -> Self {
         let draws = Resamples::new(clusters.count());
+        let mut findings = Self::for_sentences(grid, clusters, questions, observer, measured);
+        let grid = &findings.grid;
+        findings.curves = grid
+            .groups()
+            .into_iter()
+            .flat_map(|family| curves(grid, &draws, family))
+            .collect();
+        findings.first_failures = first_failures(grid);
+        findings.agreements = agreements(grid);
+        findings.light_agreements = light_agreements(grid);
+        findings
+    }
+
+    /// The results that sentences rest on; without curves, first failures and agreements, which are left empty.
+    fn for_sentences(
+        grid: Grid<'a>,
+        clusters: &Clusters,
+        questions: &[OfferedChoices],
+        observer: ObserverSummary,
+        measured: &[ImageFidelity],
+    ) -> Self {
+        let draws = Resamples::new(clusters.count());
         let health = healths(&grid);
-        Self {
+        let mut findings = Self {
             unit: clusters.unit(),
             summary: summarize(&grid, &health, questions.iter().cloned()),
             health,
             pooled: pooled(&grid),
             left_out: levels_left_out(&grid),
             by_reading: by_reading(&grid),
-            best: best_in_the_dark(&grid),
+            best: best_in_the_dark(&grid, ReadingMode::Strict),
+            lenient_best: best_in_the_dark(&grid, ReadingMode::Lenient),
             comparisons: comparisons(&grid),
-            curves: grid
-                .groups()
-                .into_iter()
-                .flat_map(|family| curves(&grid, &draws, family))
-                .collect(),
+            curves: Vec::new(),
             calibrations: calibrations(&grid, &draws),
             confusions: confusions(&grid),
             hallucinations: hallucinations(&grid),
-            first_failures: first_failures(&grid),
-            agreements: agreements(&grid),
-            light_agreements: light_agreements(&grid),
+            first_failures: Vec::new(),
+            agreements: Vec::new(),
+            light_agreements: Vec::new(),
             set: PhotographedSet::default(),
             pairs: pair_darkness::of_grid(&grid),
             fidelity: FidelityFindings::new(&grid, measured),
             common: CommonItems::of(&grid),
             strict: None,
+            tests: 0,
             observer,
             without_observer: None,
             grid,
-        }
+        };
+        head_tests::correct(&mut findings);
+        findings
+    }
+
+    /// The results that the sentences about trials rest on, for simulations: without curves, first failures and agreements.
+    #[must_use]
+    pub fn sentences_only(trials: &'a Trials<ChoiceDetail>, ties: &FrameTies) -> Self {
+        let clusters = Clusters::new(trials.questions(), ties);
+        let observer = ObserverSummary::of(trials, &clusters);
+        let grid = Grid::new(trials, &clusters);
+        Self::for_sentences(grid, &clusters, &[], observer, &[])
     }
 
     /// Adds the comparisons of one light with another between different names of one model, which was asked in the same way under
@@ -205,7 +243,7 @@ impl<'a> Findings<'a> {
             comparison.kind == ComparisonKind::Blind
                 && comparison.family.as_ref() == family
                 && comparison.first == *subject
-                && comparison.significance == Significance::Worse
+                && comparison.strict.significance == Significance::Worse
         });
         below.map(|comparison| &*comparison.second.model).collect()
     }

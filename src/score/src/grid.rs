@@ -219,6 +219,15 @@ impl<'a> Grid<'a> {
         self.trials.get(place as usize)
     }
 
+    /// True if the two parsings of some reply of a subject differ.
+    #[must_use]
+    pub fn parsings_differ(&self, subject: usize) -> bool {
+        let results = &self.results[subject * self.items.len()..(subject + 1) * self.items.len()];
+        results.iter().any(
+            |result| matches!(result, TrialResult::Read { strict, lenient } if strict != lenient),
+        )
+    }
+
     /// Index of a subject, if the grid has it.
     #[must_use]
     pub fn find(&self, subject: &Subject) -> Option<usize> {

@@ -3,9 +3,9 @@
 use super::choice::ReadingMode;
 use super::estimate::Estimate;
 use super::grid::{Grid, GridItem};
-use super::quantiles::{degrees_of_freedom, student};
+use super::quantiles::{beyond, degrees_of_freedom, quantile};
 use super::residuals::{residuals, unknown_design_effect};
-use super::significance::{mcnemar, sign_flip};
+use super::significance::{ALPHA, SwapMethod, mcnemar, swap_test};
 use darkqa_ground::types::Family;
 
 /// Accuracy of one subject against another on the items to which both replied.
@@ -25,23 +25,18 @@ pub struct PairedComparison {
     pub clusters: usize,
     /// McNemar's exact p-value, which treats items as independent.
     pub mcnemar: f64,
-    /// Exact p-value of swapping the two subjects in whole clusters.
+    /// p-value of no difference ([`PairedTest`]).
     pub p: f64,
+    /// Standard error of the difference, and its degrees of freedom.
+    pub spread: Spread,
 }
 
 /// Counts of the pairs of a cluster.
 #[derive(Debug, Clone, Copy, Default)]
 struct ClusterPairs {
-    all: i64,
-    gained: i64,
-    lost: i64,
-}
-
-impl ClusterPairs {
-    /// The sum of the differences of the pairs, and the number of pairs.
-    fn net(&self) -> (f64, f64) {
-        ((self.gained - self.lost) as f64, self.all as f64)
-    }
+    all: u32,
+    gained: u32,
+    lost: u32,
 }
 
 impl PairedComparison {
@@ -65,8 +60,20 @@ impl PairedComparison {
         mode: ReadingMode,
         has: impl Fn(usize, &GridItem<'_>) -> bool,
     ) -> Option<Self> {
+        let is_right = |item: &GridItem<'_>, chosen| item.is_right(chosen);
+        Self::counting(grid, [first, second], mode, has, is_right)
+    }
+
+    /// The same for replies that `counts` counts in place of right ones; it takes an item and a reading of a reply to it.
+    pub(super) fn counting(
+        grid: &Grid<'_>,
+        [first, second]: [usize; 2],
+        mode: ReadingMode,
+        has: impl Fn(usize, &GridItem<'_>) -> bool,
+        counts: impl Fn(&GridItem<'_>, Option<u8>) -> bool,
+    ) -> Option<Self> {
         let mut clusters = vec![ClusterPairs::default(); grid.clusters];
-        let mut right = [0_usize; 2];
+        let mut counted = [0_usize; 2];
         for (index, item) in grid.items.iter().enumerate() {
             if !has(index, item) {
                 continue;
@@ -75,36 +82,134 @@ impl PairedComparison {
             let (Some(a), Some(b)) = (reading(first), reading(second)) else {
                 continue;
             };
-            let (a, b) = (item.is_right(a), item.is_right(b));
+            let (a, b) = (counts(item, a), counts(item, b));
             let cluster = &mut clusters[item.cluster as usize];
             cluster.all += 1;
-            cluster.gained += i64::from(a && !b);
-            cluster.lost += i64::from(b && !a);
-            right[0] += usize::from(a);
-            right[1] += usize::from(b);
+            cluster.gained += u32::from(a && !b);
+            cluster.lost += u32::from(b && !a);
+            counted[0] += usize::from(a);
+            counted[1] += usize::from(b);
         }
         clusters.retain(|cluster| cluster.all > 0);
-        let n = clusters.iter().map(|cluster| cluster.all).sum::<i64>() as usize;
+        let sum = |of: fn(&ClusterPairs) -> u32| -> usize {
+            clusters.iter().map(|cluster| of(cluster) as usize).sum()
+        };
+        let n = sum(|cluster| cluster.all);
         if n == 0 {
             return None;
         }
-        let sum = |of: fn(&ClusterPairs) -> i64| clusters.iter().map(of).sum::<i64>() as usize;
         let (gained, lost) = (sum(|pairs| pairs.gained), sum(|pairs| pairs.lost));
-        let differences = clusters.iter().map(|cluster| cluster.gained - cluster.lost);
-        let differences: Vec<i64> = differences.collect();
-        let nets: Vec<(f64, f64)> = clusters.iter().map(ClusterPairs::net).collect();
+        let nets = clusters.iter().map(|cluster| ClusterNet {
+            net: i64::from(cluster.gained) - i64::from(cluster.lost),
+            items: cluster.all,
+        });
+        let tested = PairedTest::new(&nets.collect::<Vec<_>>(), 1.0, (gained + lost) as f64);
         Some(Self {
-            first: right[0] as f64 / n as f64,
-            second: right[1] as f64 / n as f64,
-            difference: difference(&nets, (gained + lost) as f64, n),
+            first: counted[0] as f64 / n as f64,
+            second: counted[1] as f64 / n as f64,
+            difference: tested.difference,
             gained,
             lost,
             clusters: clusters.len(),
             mcnemar: mcnemar(gained, lost),
-            p: sign_flip(&differences),
+            p: tested.p,
+            spread: tested.spread,
         })
     }
 }
+
+/// The difference of the items of a cluster.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct ClusterNet {
+    /// Sum of the items' differences, each a whole number.
+    pub(super) net: i64,
+    /// Number of items.
+    pub(super) items: u32,
+}
+
+/// A paired difference with its interval and its test, which agree: p is below 0.05 if and only if the interval leaves out 0.
+///
+/// p is the larger of two p-values of no difference: that of Student's t, by which the interval of [`difference`] is made, and the
+/// exact one of swapping the two sides in whole clusters ([`swap_test`]). So it is never below the exact size, however few clusters
+/// there are. The interval holds all differences that the test does not reject: where the swaps alone do not reject 0, it is
+/// extended to 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct PairedTest {
+    pub(super) difference: Estimate,
+    pub(super) p: f64,
+    /// How the swaps were counted.
+    pub(super) by: SwapMethod,
+    pub(super) spread: Spread,
+}
+
+impl PairedTest {
+    /// The test of clusters that have items. `scale` is the number of pairs that an item's difference adds up; `squares` is the sum of
+    /// the squared differences of all items.
+    pub(super) fn new(clusters: &[ClusterNet], scale: f64, squares: f64) -> Self {
+        let n = clusters.iter().map(|cluster| cluster.items as usize).sum();
+        let sums = clusters.iter();
+        let sums = sums.map(|cluster| (cluster.net as f64 / scale, f64::from(cluster.items)));
+        let (estimate, spread) = interval(&sums.collect::<Vec<_>>(), squares / scale / scale, n);
+        let nets = clusters.iter().map(|cluster| cluster.net);
+        let swapped = swap_test(&nets.collect::<Vec<_>>());
+        let p = spread
+            .p(estimate.value * n as f64 / (n as f64 + ADDED))
+            .max(swapped.p);
+        Self {
+            difference: if p < ALPHA {
+                estimate
+            } else {
+                with_zero(estimate)
+            },
+            p,
+            by: swapped.by,
+            spread,
+        }
+    }
+}
+
+/// The estimate with its interval extended to 0.
+fn with_zero(estimate: Estimate) -> Estimate {
+    Estimate {
+        low: estimate.low.min(0.0),
+        high: estimate.high.max(0.0),
+        ..estimate
+    }
+}
+
+/// Number of pairs that Bonett and Price add.
+const ADDED: f64 = 2.0;
+
+/// Standard error of a difference, and the degrees of freedom of Student's t.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spread {
+    /// Standard error; infinite with one cluster.
+    pub error: f64,
+    /// Degrees of freedom, which need not be whole.
+    pub degrees: f64,
+}
+
+impl Spread {
+    /// Two-sided p-value of a centre of the interval.
+    pub(super) fn p(&self, center: f64) -> f64 {
+        if self.error.is_finite() {
+            beyond(center.abs() / self.error, self.degrees)
+        } else {
+            1.0
+        }
+    }
+
+    /// The smallest difference that a two-sided test at `level` detects in 80 % of samples of this spread: the error times the sum of
+    /// the two quantiles (Bloom 1995, Eval. Rev. 19:547).
+    #[must_use]
+    pub fn detectable(&self, level: f64) -> f64 {
+        let [test, power] = [1.0 - level / 2.0, POWER].map(|share| quantile(share, self.degrees));
+        self.error * (test + power)
+    }
+}
+
+/// Share of samples in which a detectable difference is detected (chosen, as usual).
+pub const POWER: f64 = 0.8;
 
 /// The difference with the interval of Bonett and Price (2012, J. Educ. Behav. Stat. 37:479).
 ///
@@ -118,6 +223,22 @@ impl PairedComparison {
 /// `squares` is the sum of the squared differences of all pairs, and `n` the number of all pairs.
 #[must_use]
 pub fn difference(clusters: &[(f64, f64)], squares: f64, n: usize) -> Estimate {
+    interval(clusters, squares, n).0
+}
+
+/// The same with its p-value of no difference by Student's t: below 0.05 if and only if the interval leaves out 0.
+#[must_use]
+pub(super) fn tested_difference(
+    clusters: &[(f64, f64)],
+    squares: f64,
+    n: usize,
+) -> (Estimate, f64) {
+    let (estimate, spread) = interval(clusters, squares, n);
+    let p = spread.p(estimate.value * n as f64 / (n as f64 + ADDED));
+    (estimate, p)
+}
+
+fn interval(clusters: &[(f64, f64)], squares: f64, n: usize) -> (Estimate, Spread) {
     let (all, c) = (n as f64, clusters.len() as f64);
     let sum: f64 = clusters.iter().map(|(net, _)| net).sum();
     let value = sum / all;
@@ -126,23 +247,28 @@ pub fn difference(clusters: &[(f64, f64)], squares: f64, n: usize) -> Estimate {
     let variance: f64 = residuals.iter().map(|residual| residual * residual).sum();
     let independent = squares - all * value * value;
     let added = if independent > all * ROUNDING {
-        2.0
+        ADDED
     } else {
-        2.0 * unknown_design_effect(clusters)
+        ADDED * unknown_design_effect(clusters)
     };
     let degrees = if variance * (c - 1.0) / c > independent * (1.0 + ROUNDING) {
         degrees_of_freedom(&residuals)
     } else {
         c - 1.0
     };
-    let half = student(degrees) * (variance + added).sqrt() / (all + 2.0);
-    let center = sum / (all + 2.0);
-    Estimate {
+    let spread = Spread {
+        error: (variance + added).sqrt() / (all + ADDED),
+        degrees,
+    };
+    let half = quantile(1.0 - ALPHA / 2.0, degrees) * spread.error;
+    let center = sum / (all + ADDED);
+    let estimate = Estimate {
         value,
         low: (center - half).clamp(-1.0, value),
         high: (center + half).clamp(value, 1.0),
         n,
-    }
+    };
+    (estimate, spread)
 }
 
 /// Relative error of sums that are equal but for rounding (chosen).
@@ -150,15 +276,75 @@ const ROUNDING: f64 = 1e-9;
 
 #[cfg(test)]
 mod tests {
+    use super::super::quantiles::student;
     use super::*;
+
+    /// A small generator of whole numbers, for designs of many shapes.
+    fn designs() -> impl Iterator<Item = Vec<ClusterNet>> {
+        let mut state = 1_u64;
+        let mut draw = move |below: u64| {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 33) % below
+        };
+        (0..4000).map(move |_| {
+            let (clusters, items, shift) = (2 + draw(30), 1 + draw(8), draw(3));
+            let cluster = |_| ClusterNet {
+                net: (draw(2 * items + 1) + shift).min(2 * items) as i64 - items as i64,
+                items: items as u32,
+            };
+            (0..clusters).map(cluster).collect()
+        })
+    }
+
+    #[test]
+    fn interval_and_test_agree() {
+        let (mut detected, mut extended) = (0, 0);
+        for clusters in designs() {
+            let squares = clusters
+                .iter()
+                .map(|cluster| cluster.net.abs())
+                .sum::<i64>() as f64;
+            let tested = PairedTest::new(&clusters, 1.0, squares);
+            let Estimate {
+                value,
+                low,
+                high,
+                n,
+            } = tested.difference;
+            assert_eq!(tested.p < 0.05, low > 0.0 || high < 0.0, "{clusters:?}");
+            assert!(low <= value && value <= high && n > 0);
+            let nets: Vec<i64> = clusters.iter().map(|cluster| cluster.net).collect();
+            assert!(tested.p >= swap_test(&nets).p, "{clusters:?}");
+            detected += usize::from(tested.p < 0.05);
+            let sums: Vec<(f64, f64)> = clusters
+                .iter()
+                .map(|cluster| (cluster.net as f64, f64::from(cluster.items)))
+                .collect();
+            let plain = difference(&sums, squares, n);
+            extended += usize::from(plain != tested.difference);
+        }
+        assert!(detected > 500 && extended > 10, "{detected} {extended}");
+    }
+
+    #[test]
+    fn a_detectable_difference_is_the_usual_sum_of_quantiles() {
+        // 1.962339 + 0.841998 standard errors (scipy 1.17.1, t.ppf).
+        let spread = Spread {
+            error: 0.01,
+            degrees: 1000.0,
+        };
+        assert!((spread.detectable(0.05) - 0.028_043_4).abs() < 1e-6);
+        assert!(spread.detectable(0.05 / 20.0) > 0.038);
+    }
 
     fn estimate(clusters: &[(i64, i64, i64)]) -> Estimate {
         let squares: i64 = clusters.iter().map(|(_, gained, lost)| gained + lost).sum();
-        let clusters =
-            clusters
-                .iter()
-                .map(|&(all, gained, lost)| ClusterPairs { all, gained, lost });
-        let clusters: Vec<(f64, f64)> = clusters.map(|pairs| pairs.net()).collect();
+        let clusters = clusters
+            .iter()
+            .map(|&(all, gained, lost)| ((gained - lost) as f64, all as f64));
+        let clusters: Vec<(f64, f64)> = clusters.collect();
         let n = clusters.iter().map(|(_, pairs)| pairs).sum::<f64>() as usize;
         difference(&clusters, squares as f64, n)
     }

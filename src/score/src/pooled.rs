@@ -7,16 +7,17 @@ use std::collections::{BTreeMap, BTreeSet};
 use rayon::prelude::*;
 
 use super::choice::ReadingMode;
+use super::claim::{Claim, ParsedFinding};
 use super::estimate::Estimate;
-use super::grid::Grid;
-use super::paired::difference;
+use super::grid::{Grid, TrialResult};
+use super::paired::{ClusterNet, PairedTest};
 use super::pooled_kind::PooledKind;
-use super::significance::{Significance, SwapMethod, holm, least_p, swap_test};
+use super::significance::{Significance, SwapMethod, holm, least_p};
 use super::subject::{Subject, pooled_models};
 use darkqa_ground::types::degradation::Kind;
 use darkqa_ground::types::{AxisLevel, EnhancerName, Family, KindReading, View};
 
-/// Difference of two conditions at one level, for all models of the pool together, in the strict reading.
+/// Difference of two conditions at one level, for all models of the pool together, in the strict parsing and the lenient one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PooledFinding {
     /// The two sides, and what is counted.
@@ -34,22 +35,14 @@ pub struct PooledFinding {
     /// The models without images on the second side, sorted; empty if the finding is not about them. They are the same models
     /// as `models` if these were asked without images too.
     pub blind_models: Vec<String>,
-    /// Share of the first side that is counted, accuracy or rate of false answers: mean over the items of the mean over the models.
-    pub first: f64,
-    /// The same share of the second side.
-    pub second: f64,
-    /// The first share minus the second. Its `n` is the number of items.
-    pub difference: Estimate,
-    /// p-value of swapping the two sides in whole clusters, of all models at once.
-    pub p: f64,
-    /// How the p-value was found.
-    pub p_by: SwapMethod,
-    /// p-value after Holm's correction over the levels of its set: the same kind, variant, enhancer and family.
-    pub holm: f64,
+    /// The difference in the strict parsing, which is the headline.
+    pub strict: PooledDifference,
+    /// The difference in the lenient parsing.
+    pub lenient: PooledDifference,
+    /// Share of the replies of each side that keep to the answer format: those that the strict parsing reads.
+    pub format: [f64; 2],
     /// Number of findings in its set.
     pub levels: usize,
-    /// Result of the test after correction. A rate of false answers that is shown to grow is worse.
-    pub verdict: Significance,
     /// Number of items that every model answered on both sides.
     pub items: usize,
     /// Number of items that some model was asked on both sides, but that are left out because a model has no reply.
@@ -60,6 +53,49 @@ pub struct PooledFinding {
     pub least_p: f64,
     /// The smallest p-value after correction that the clusters allow; no verdict is possible if it is 0.05 or more.
     pub least_holm: f64,
+}
+
+/// A pooled difference in one parsing of the replies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PooledDifference {
+    /// Share of the first side that is counted, accuracy or rate of false answers: mean over the items of the mean over the models.
+    pub first: f64,
+    /// The same share of the second side.
+    pub second: f64,
+    /// The first share minus the second. Its `n` is the number of items.
+    pub difference: Estimate,
+    /// p-value of no difference, of all models at once: the larger one of Student's t and of swapping the two sides in whole clusters.
+    pub p: f64,
+    /// How the swaps were counted.
+    pub p_by: SwapMethod,
+    /// p-value after Holm's correction over the levels of its set: the same kind, variant, enhancer and family.
+    pub holm: f64,
+    /// Result of the test after Holm's correction. A rate of false answers that is shown to grow is worse.
+    pub verdict: Significance,
+    /// p-value after the correction over all tests that sentences rest on; `None` if no sentence is about the finding.
+    pub p_report: Option<f64>,
+}
+
+impl PooledFinding {
+    /// What sentences may claim.
+    #[must_use]
+    pub fn claim(&self) -> Claim {
+        let parsed = |parsed: &PooledDifference| ParsedFinding {
+            gain: self.kind.gain(parsed.difference.value),
+            verdict: parsed.verdict,
+            p_report: parsed.p_report,
+        };
+        Claim::new(parsed(&self.strict), parsed(&self.lenient))
+    }
+
+    /// The difference in a parsing.
+    #[must_use]
+    pub fn parsed(&self, mode: ReadingMode) -> &PooledDifference {
+        match mode {
+            ReadingMode::Strict => &self.strict,
+            ReadingMode::Lenient => &self.lenient,
+        }
+    }
 }
 
 /// The models over which findings are pooled, sorted: those with images, without reference models if there are others; else one
@@ -174,8 +210,19 @@ impl PooledSet {
 struct PooledItem {
     /// Index of the item in the grid.
     index: usize,
-    /// Number of replies of each side that are counted: right ones, or false answers; `None` if a model has no reply.
-    counted: Option<[u32; 2]>,
+    /// Replies of each side; `None` if a model has no reply.
+    sides: Option<[SideCounts; 2]>,
+}
+
+/// Numbers of replies of all models to one item on one side.
+#[derive(Debug, Clone, Copy, Default)]
+struct SideCounts {
+    /// Replies that are counted in the strict parsing: right ones, or false answers.
+    strict: u32,
+    /// The same in the lenient parsing.
+    lenient: u32,
+    /// Replies that the strict parsing reads.
+    read: u32,
 }
 
 /// All pooled findings, ordered by kind, variant, enhancer, family and level.
@@ -267,19 +314,22 @@ fn items(
     let items = grid.items.iter().enumerate();
     let items = items.filter(|(_, item)| set.kind.is_about(item));
     let items = items.filter_map(|(index, item)| {
-        let (mut counted, mut is_asked, mut is_answered) = ([0, 0], false, true);
+        let (mut sides, mut is_asked, mut is_answered) = ([SideCounts::default(); 2], false, true);
         for &(first, second) in &pairs {
             let [a, b] = [first, second].map(|subject| grid.result(subject, index));
             is_asked |= a.is_asked() && b.is_asked();
-            for (side, result) in [a, b].into_iter().enumerate() {
-                match result.reading(ReadingMode::Strict) {
-                    None => is_answered = false,
-                    Some(chosen) => counted[side] += u32::from(set.kind.counts(item, chosen)),
-                }
+            for (side, result) in sides.iter_mut().zip([a, b]) {
+                let TrialResult::Read { strict, lenient } = result else {
+                    is_answered = false;
+                    continue;
+                };
+                side.strict += u32::from(set.kind.counts(item, strict));
+                side.lenient += u32::from(set.kind.counts(item, lenient));
+                side.read += u32::from(strict.is_some());
             }
         }
-        let counted = is_answered.then_some(counted);
-        is_asked.then_some(PooledItem { index, counted })
+        let sides = is_answered.then_some(sides);
+        is_asked.then_some(PooledItem { index, sides })
     });
     Some(items.collect())
 }
@@ -292,35 +342,35 @@ fn finding(
     (level, items): (AxisLevel, &[PooledItem]),
     family: Option<&Family>,
 ) -> Option<PooledFinding> {
-    let mut clusters = vec![(0_i64, 0_u32); grid.clusters];
-    let (mut counted, mut squares, mut dropped) = ([0_u64; 2], 0, 0);
+    let (mut answered, mut dropped) = (Vec::new(), 0);
     let of_family = items
         .iter()
-        .map(|item| (&grid.items[item.index], item.counted));
-    for (item, answered) in of_family.filter(|(item, _)| item.is_of(family)) {
-        let Some([first, second]) = answered else {
-            dropped += 1;
-            continue;
-        };
-        let (net, count) = &mut clusters[item.cluster as usize];
-        let item_net = i64::from(first) - i64::from(second);
-        *net += item_net;
-        squares += item_net * item_net;
-        *count += 1;
-        counted[0] += u64::from(first);
-        counted[1] += u64::from(second);
+        .map(|item| (&grid.items[item.index], item.sides));
+    for (item, sides) in of_family.filter(|(item, _)| item.is_of(family)) {
+        match sides {
+            Some(sides) => answered.push((item.cluster, sides)),
+            None => dropped += 1,
+        }
     }
-    clusters.retain(|(_, count)| *count > 0);
-    let n: usize = clusters.iter().map(|(_, count)| *count as usize).sum();
-    if n == 0 {
+    if answered.is_empty() {
         return None;
     }
-    let nets: Vec<i64> = clusters.iter().map(|(net, _)| *net).collect();
-    let pairs = models.len() as f64;
-    let sums = clusters.iter();
-    let sums = sums.map(|(net, count)| (*net as f64 / pairs, f64::from(*count)));
-    let tested = swap_test(&nets);
-    let mean = |count: u64| count as f64 / pairs / n as f64;
+    let replies = (models.len() * answered.len()) as f64;
+    let strict = parsed(grid, &answered, models.len(), |side| side.strict);
+    let differ =
+        |(_, sides): &(u32, [SideCounts; 2])| sides.iter().any(|side| side.strict != side.lenient);
+    let lenient = if answered.iter().any(differ) {
+        parsed(grid, &answered, models.len(), |side| side.lenient)
+    } else {
+        strict
+    };
+    let read = |side: usize| {
+        let read = answered
+            .iter()
+            .map(|(_, sides)| f64::from(sides[side].read));
+        read.sum::<f64>() / replies
+    };
+    let clusters: BTreeSet<u32> = answered.iter().map(|(cluster, _)| *cluster).collect();
     let names = |side: usize| {
         let names: BTreeSet<&str> = models.iter().map(|pair| pair[side]).collect();
         names.into_iter().map(str::to_owned).collect()
@@ -337,15 +387,11 @@ fn finding(
         } else {
             Vec::new()
         },
-        first: mean(counted[0]),
-        second: mean(counted[1]),
-        difference: difference(&sums.collect::<Vec<_>>(), squares as f64 / pairs / pairs, n),
-        p: tested.p,
-        p_by: tested.by,
-        holm: 1.0,
+        strict,
+        lenient,
+        format: [read(0), read(1)],
         levels: 1,
-        verdict: Significance::NotShown,
-        items: n,
+        items: answered.len(),
         dropped,
         clusters: clusters.len(),
         least_p: least_p(clusters.len()),
@@ -353,20 +399,59 @@ fn finding(
     })
 }
 
+/// The difference of the replies that `counted` counts, before correction.
+fn parsed(
+    grid: &Grid<'_>,
+    answered: &[(u32, [SideCounts; 2])],
+    models: usize,
+    counted: impl Fn(&SideCounts) -> u32,
+) -> PooledDifference {
+    let mut clusters = vec![ClusterNet { net: 0, items: 0 }; grid.clusters];
+    let (mut sums, mut squares) = ([0_u64; 2], 0);
+    for (cluster, sides) in answered {
+        let [first, second] = [&sides[0], &sides[1]].map(&counted);
+        let net = i64::from(first) - i64::from(second);
+        let of_cluster = &mut clusters[*cluster as usize];
+        of_cluster.net += net;
+        of_cluster.items += 1;
+        squares += net * net;
+        sums[0] += u64::from(first);
+        sums[1] += u64::from(second);
+    }
+    clusters.retain(|cluster| cluster.items > 0);
+    let tested = PairedTest::new(&clusters, models as f64, squares as f64);
+    let mean = |count: u64| count as f64 / models as f64 / answered.len() as f64;
+    PooledDifference {
+        first: mean(sums[0]),
+        second: mean(sums[1]),
+        difference: tested.difference,
+        p: tested.p,
+        p_by: tested.by,
+        holm: 1.0,
+        verdict: Significance::NotShown,
+        p_report: None,
+    }
+}
+
 /// The findings of one set with their verdicts, after Holm's correction.
 fn corrected(mut set: Vec<PooledFinding>) -> Vec<PooledFinding> {
     let adjusted = |of: fn(&PooledFinding) -> f64| holm(&set.iter().map(of).collect::<Vec<_>>());
-    let (corrected, least) = (
-        adjusted(|finding| finding.p),
-        adjusted(|finding| finding.least_p),
-    );
+    let least = adjusted(|finding| finding.least_p);
+    let strict = adjusted(|finding| finding.strict.p);
+    let lenient = adjusted(|finding| finding.lenient.p);
     let levels = set.len();
-    for ((finding, holm), least_holm) in set.iter_mut().zip(corrected).zip(least) {
-        finding.holm = holm;
+    for (index, finding) in set.iter_mut().enumerate() {
         finding.levels = levels;
-        finding.least_holm = least_holm;
-        let gain = finding.kind.gain(finding.difference.value);
-        finding.verdict = Significance::of(gain, holm, least_holm);
+        finding.least_holm = least[index];
+        let kind = finding.kind;
+        for (parsed, holm) in [
+            (&mut finding.strict, strict[index]),
+            (&mut finding.lenient, lenient[index]),
+        ] {
+            parsed.holm = holm;
+            let gain = kind.gain(parsed.difference.value);
+            parsed.verdict = Significance::of(gain, holm, least[index]);
+        }
     }
     set
 }

@@ -67,6 +67,15 @@ impl PooledKind {
         }
     }
 
+    /// True if the effect is taken to grow with the level, so that the levels are tested from the darkest on: a loss in the dark, a fall
+    /// below the words alone, objects overlooked. Noise, enhancers and objects reported may do most at any level.
+    pub(super) fn grows_with_the_level(self) -> bool {
+        matches!(
+            self,
+            Self::Darkness | Self::Blind | Self::Hallucination(FalseAnswer::No)
+        )
+    }
+
     /// Whether findings of this kind have this item.
     pub(super) fn is_about(self, item: &GridItem<'_>) -> bool {
         match self {

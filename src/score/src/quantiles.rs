@@ -1,12 +1,25 @@
-//! Quantiles of distributions for 95 % intervals: [`student`] with its [`degrees_of_freedom`], and [`least_share`].
+//! Quantiles and tails of distributions: [`student`] with its [`degrees_of_freedom`], [`beyond`], and [`least_share`].
 
 use statrs::distribution::{Beta, ContinuousCDF as _, StudentsT};
 
 /// The 97.5 % quantile of Student's t distribution with `degrees` degrees of freedom, which need not be whole; infinite for 0.
 #[must_use]
 pub(super) fn student(degrees: f64) -> f64 {
+    quantile(0.975, degrees)
+}
+
+/// The quantile of Student's t distribution at `share`; infinite for 0 degrees of freedom.
+#[must_use]
+pub(super) fn quantile(share: f64, degrees: f64) -> f64 {
     let distribution = StudentsT::new(0.0, 1.0, degrees);
-    distribution.map_or(f64::INFINITY, |student| student.inverse_cdf(0.975))
+    distribution.map_or(f64::INFINITY, |student| student.inverse_cdf(share))
+}
+
+/// The probability that Student's t is at least `distance` away from 0, in either direction; 1 for 0 degrees of freedom.
+#[must_use]
+pub(super) fn beyond(distance: f64, degrees: f64) -> f64 {
+    let distribution = StudentsT::new(0.0, 1.0, degrees);
+    distribution.map_or(1.0, |student| (2.0 * student.sf(distance)).min(1.0))
 }
 
 /// Degrees of freedom of a variance between clusters, from the clusters' residuals r: C / (κ − 1), kept within 2 and C − 1, with
@@ -83,6 +96,14 @@ mod tests {
             );
         }
         assert!(student(0.0).is_infinite());
+    }
+
+    #[test]
+    fn tails_are_those_of_the_quantiles() {
+        for (degrees, quantile) in STUDENTS {
+            assert!((beyond(quantile, degrees) - 0.05).abs() < 1e-9, "{degrees}");
+        }
+        assert!((beyond(1.0, 0.0) - 1.0).abs() < 1e-15);
     }
 
     #[test]

@@ -36,7 +36,7 @@ pub fn rank_ranges(best: &BestInTheDark) -> Vec<RankRange> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::best::{AreaPair, ModelArea};
+    use super::super::best::{DarkAccuracy, DarkPair};
     use super::super::estimate::Estimate;
     use super::super::significance::SwapMethod;
     use super::*;
@@ -49,13 +49,15 @@ mod tests {
             high: 0.6,
             n: 10,
         };
-        let models = names.iter().map(|name| ModelArea {
+        let models = names.iter().map(|name| DarkAccuracy {
             model: (*name).to_owned(),
-            area: share,
+            mean: share,
+            lighter: 0.5,
+            by_level: Vec::new(),
             clean: share,
             loss: None,
         });
-        let pairs = shown.iter().map(|(first, second, significance)| AreaPair {
+        let pairs = shown.iter().map(|(first, second, significance)| DarkPair {
             first: (*first).to_owned(),
             second: (*second).to_owned(),
             difference: share,
@@ -67,6 +69,9 @@ mod tests {
         BestInTheDark {
             variant: KindReading::NONE,
             levels: Vec::new(),
+            lighter: Vec::new(),
+            crossing: None,
+            p_report: None,
             asked: Vec::new(),
             without: Vec::new(),
             models: models.collect(),

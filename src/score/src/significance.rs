@@ -6,7 +6,7 @@ use std::fmt;
 use super::split_mix::SplitMix;
 
 /// The level of the tests (chosen, as usual).
-const ALPHA: f64 = 0.05;
+pub const ALPHA: f64 = 0.05;
 
 /// Result of a comparison at the 5 % level, after Holm's correction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -86,11 +86,11 @@ fn pooled_rates(design: &PooledDesign, runs: usize) -> PooledRates {
         let finding = findings.iter().find(all).unwrap();
         // The subjects are sorted: exposure drop of the first model, then its noise.
         let one = PairedComparison::new(&grid, 1, 0, None, ReadingMode::Strict).unwrap();
-        rates.rejected += f64::from(u8::from(finding.p < 0.05));
+        rates.rejected += f64::from(u8::from(finding.strict.p < 0.05));
         rates.rejected_by_one += f64::from(u8::from(one.p < 0.05));
-        rates.held += f64::from(u8::from(holds(finding.difference, -design.effect)));
-        assert_eq!(finding.verdict.is_shown(), finding.p < 0.05);
-        assert_ne!(finding.verdict, Significance::TooFewClusters);
+        rates.held += f64::from(u8::from(holds(finding.strict.difference, -design.effect)));
+        assert_eq!(finding.strict.verdict.is_shown(), finding.strict.p < 0.05);
+        assert_ne!(finding.strict.verdict, Significance::TooFewClusters);
     }
     let percent = 100.0 / runs as f64;
     for rate in [

@@ -184,7 +184,7 @@ fn the_report_sets_confidence_against_accuracy() {
     assert!(
         figure.contains(">confidence in %</text>") && page.contains("Is a model as often right")
     );
-    let not_shown = "It is not shown that m is surer than it is right at L3: its mean confidence is 77.8 %, and 100.0 % of its replies";
+    let not_shown = "m was not detected to be surer than it is right at L3: its mean confidence is 77.8 %, and 100.0 % of its replies";
     let said = |bench: &Bench| std::fs::read_to_string(bench.path("run/summary.json")).unwrap();
     assert!(said(&bench).contains(not_shown), "{printed}");
     // One that is as sure, and wrong, in the light as in the dark.

@@ -2,7 +2,7 @@
 
 use super::checked;
 use crate::report::sentences::confidence::{Confidence, confidence};
-use crate::score::calibration::{Calibration, RiskCoverage};
+use crate::score::calibration::{Calibration, RiskCoverage, TestedConfidence};
 use crate::score::cluster::ClusterUnit;
 use crate::score::estimate::Estimate;
 use crate::score::subject::Subject;
@@ -18,6 +18,15 @@ fn around(value: f64) -> Estimate {
     }
 }
 
+/// A number that is detected if it is more than 5 points from 0.
+fn tested(value: f64) -> TestedConfidence {
+    TestedConfidence {
+        estimate: around(value),
+        p: 0.0004,
+        p_report: Some(if value.abs() > 0.05 { 0.0004 } else { 0.3 }),
+    }
+}
+
 /// A model's confidence and accuracy.
 fn calibration(confidence: f64, accuracy: f64) -> Calibration {
     let zero = around(0.0);
@@ -28,7 +37,8 @@ fn calibration(confidence: f64, accuracy: f64) -> Calibration {
         unstated: 0,
         confidence: around(confidence),
         accuracy: around(accuracy),
-        overconfidence: around(confidence - accuracy),
+        overconfidence: tested(confidence - accuracy),
+        growth: Some(tested(confidence - accuracy - 0.02)),
         error: None,
         brier: zero,
         skill: zero,
@@ -69,7 +79,7 @@ fn a_model_that_stays_sure_in_the_dark_is_said_to_not_know_it() {
     assert_eq!(
         say(&[("a", &blind, Some(&clean))]).unwrap(),
         "− a does not know how little it sees at L5: its mean confidence is 85.0 %, and 40.0 % of its replies are right. \
-         (confidence less accuracy: +45.0 [+40.0, +50.0] points, +2.0 [−3.0, +7.0] at L0; n = 1,200 replies with probabilities)"
+         (confidence less accuracy: +45.0 [+40.0, +50.0] points, p < 0.001, +2.0 [−3.0, +7.0] at L0; n = 1,200 replies with probabilities)"
     );
     // The one that is furthest off is named, with how many are.
     let several = say(&[
@@ -92,7 +102,7 @@ fn a_model_that_stays_sure_in_the_dark_is_said_to_not_know_it() {
     }
     let said = say(&[("b", &modest, Some(&clean))]).unwrap();
     assert!(
-        said.starts_with("· It is not shown that b is surer than it is right at L5"),
+        said.starts_with("· b was not detected to be surer than it is right at L5"),
         "{said}"
     );
     assert_eq!(say(&[]), None);

@@ -3,8 +3,9 @@
 use super::{checked, findings};
 use crate::report::sentences::hallucination::{self, TopAnswer};
 use crate::score::cluster::ClusterUnit;
-use crate::score::confusion::{Collapse, FalseAnswer};
+use crate::score::confusion::{AgainstClean, Collapse, FalseAnswer};
 use crate::score::estimate::Estimate;
+use crate::score::paired::{PairedComparison, Spread};
 use crate::score::pooled::PooledFinding;
 use crate::score::pooled_kind::PooledKind;
 use crate::score::significance::Significance::{self, Better, NotShown, Worse};
@@ -16,7 +17,8 @@ fn false_answers_are_said_where_they_are_shown_to_grow() {
     let say = |answer: FalseAnswer, levels: &[(f64, Significance)]| {
         let mut all = findings(PooledKind::Hallucination(answer), levels);
         for finding in &mut all {
-            (finding.first, finding.second) = (0.05 + finding.difference.value, 0.05);
+            let strict = &mut finding.strict;
+            (strict.first, strict.second) = (0.05 + strict.difference.value, 0.05);
             finding.family = Some(Family::Presence);
         }
         let all: Vec<&PooledFinding> = all.iter().collect();
@@ -62,7 +64,47 @@ fn collapse(share: f64, truth: f64, guess: f64) -> Collapse {
         entropy: 1.0,
         true_entropy: 2.0,
         clusters: 24,
+        clean: Some(AgainstClean {
+            strict: at_clean(share),
+            lenient: at_clean(share),
+            is_commonest: true,
+            p_report: [Some(0.0012); 2],
+        }),
     }
+}
+
+/// The share of the same answer at L0.
+fn at_clean(share: f64) -> PairedComparison {
+    let difference = share - 0.305;
+    PairedComparison {
+        first: share,
+        second: 0.305,
+        difference: Estimate {
+            value: difference,
+            low: difference - 0.1,
+            high: difference + 0.1,
+            n: 45,
+        },
+        gained: 20,
+        lost: 3,
+        clusters: 24,
+        mcnemar: 0.001,
+        p: 0.001,
+        spread: Spread {
+            error: 0.05,
+            degrees: 23.0,
+        },
+    }
+}
+
+#[test]
+fn a_collapse_that_is_no_more_than_at_l0_is_not_said() {
+    let mut found = collapse(0.67, 0.32, 0.25);
+    assert!(found.is_shown());
+    found.clean.as_mut().unwrap().p_report[1] = Some(0.2);
+    assert!(!found.is_shown(), "only the strict parsing shows it");
+    found.clean = None;
+    assert!(!found.is_shown(), "there is no L0");
 }
 
 #[test]
@@ -75,7 +117,6 @@ fn one_answer_to_everything_is_named_or_counted() {
                 family,
                 level,
                 collapse,
-                clean: Some(0.305),
             })
         });
         let answers: Vec<TopAnswer<'_>> = answers.collect();
@@ -87,14 +128,14 @@ fn one_answer_to_everything_is_named_or_counted() {
     let blind = collapse(0.67, 0.32, 0.25);
     assert_eq!(
         say(&[(&room, &[("sim-F", blind.clone())])]).unwrap(),
-        "· At L5 67.0 % of the replies about room type are “living room”, which is true of 32.0 %. (sim-F: 67.0 % [57.0, 77.0], 30.5 % at \
-         L0; limit: 20 points above the true share; n = 45 in 24 scenes)"
+        "− At L5 67.0 % of the replies about room type are “living room”, which is true of 32.0 %. (sim-F: 67.0 % [57.0, 77.0], 30.5 % at \
+         L0 (+36.5 [+26.5, +46.5] points, p = 0.001); limit: 20 points above the true share; n = 45 in 24 scenes)"
     );
     let one = [("sim-A", seeing.clone()), ("sim-F", blind.clone())];
     let said = say(&[(&room, &one)]).unwrap();
     assert!(
         said.starts_with(
-            "· At L5 67.0 % of the replies of sim-F about room type are “living room”, which is true of 32.0 %. ("
+            "− At L5 67.0 % of the replies of sim-F about room type are “living room”, which is true of 32.0 %. ("
         ),
         "{said}"
     );
@@ -108,7 +149,7 @@ fn one_answer_to_everything_is_named_or_counted() {
     let said = say(&[(&Family::Color, &color), (&room, &two)]).unwrap();
     assert!(
         said.starts_with(
-            "· At L5 2 of 3 models give one answer about room type far more often than it is true: 67.0 % of the replies of sim-F are \
+            "− At L5 2 of 3 models give one answer about room type far more often than it is true: 67.0 % of the replies of sim-F are \
              “living room”, which is true of 32.0 %. ("
         ),
         "{said}"

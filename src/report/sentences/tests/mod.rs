@@ -3,13 +3,14 @@
 mod confidence;
 mod hallucination;
 mod made;
+mod simulation;
 mod words_alone;
 
 use super::sentence::{Sentence, level_runs};
 use super::{darkness, pooled, sample, words_alone as below};
 use crate::score::cluster::ClusterUnit;
 use crate::score::estimate::Estimate;
-use crate::score::pooled::PooledFinding;
+use crate::score::pooled::{PooledDifference, PooledFinding};
 use crate::score::pooled_kind::PooledKind;
 use crate::score::significance::Significance::{self, Better, NotShown, TooFewClusters, Worse};
 use crate::score::significance::SwapMethod;
@@ -39,6 +40,28 @@ fn finding(
         } else {
             Vec::new()
         },
+        strict: parsed(kind, difference, verdict),
+        lenient: parsed(kind, difference, verdict),
+        format: [1.0, 1.0],
+        levels: 5,
+        items: 1237,
+        dropped: 0,
+        clusters: 30,
+        least_p: 1e-9,
+        least_holm: 1e-8,
+    }
+}
+
+/// The difference of a finding in a parsing.
+fn parsed(kind: PooledKind, difference: f64, verdict: Significance) -> PooledDifference {
+    let holm = if verdict == NotShown { 0.062 } else { 0.0004 };
+    // The sign of the difference is that of the verdict, so that a rate that grows is worse.
+    let is_loss = matches!(kind, PooledKind::Hallucination(_)) == (difference > 0.0);
+    assert!(
+        verdict != Worse || is_loss || difference == 0.0,
+        "{kind:?} {difference}"
+    );
+    PooledDifference {
         first: 0.5,
         second: 0.8637,
         difference: Estimate {
@@ -49,14 +72,9 @@ fn finding(
         },
         p: 0.0124,
         p_by: SwapMethod::Counted,
-        holm: if verdict == NotShown { 0.062 } else { 0.0004 },
-        levels: 5,
+        holm,
         verdict,
-        items: 1237,
-        dropped: 0,
-        clusters: 30,
-        least_p: 1e-9,
-        least_holm: 1e-8,
+        p_report: Some(holm),
     }
 }
 
@@ -128,7 +146,7 @@ fn each_kind_and_verdict_has_its_words() {
     assert_eq!(
         said,
         [
-            "· It is not shown that darkness costs anything at any level, and a loss of 6 points at L1 is not ruled out. (mean of these 2 \
+            "· No loss by darkness was detected at any level; a loss of up to 6 points at L1 cannot be excluded. (mean of these 2 \
           models: −1.0 [−5.0, +3.0], p = 0.062; at L2; n = 1,237 in 30 scenes)"
         ]
     );
@@ -153,7 +171,7 @@ fn each_kind_and_verdict_has_its_words() {
     assert!(say(Darkness, &[(-1.0, TooFewClusters)]).is_empty());
     let said = say(Noise, &[(0.03, NotShown)]);
     assert!(said[0].starts_with(
-        "· It is not shown that accuracy with noise differs from that by the exposure drop alone. ("
+        "· No difference in accuracy between noise and the exposure drop alone was detected. ("
     ));
     let said = say(
         Enhancer,
@@ -168,8 +186,8 @@ fn each_kind_and_verdict_has_its_words() {
     let starts = [
         "− lift harms at L1–L2, by up to 8.1 points. (mean of these 2 models: −8.1 [−12.1, −4.1], p < 0.001; at L1;",
         "+ lift helps at L4–L5, by up to 5.6 points. (",
-        "· lift at L3: neither help nor harm is shown. (mean of these 2 models: −5.0 [−9.0, −1.0], p = 0.062; largest at L3, not shown \
-         after correction for 5 levels (uncorrected p = 0.012); n = 1,237 in 30 scenes)",
+        "· lift at L3: no effect detected. (mean of these 2 models: −5.0 [−9.0, −1.0], p = 0.062; largest at L3, not detected \
+         after correction (uncorrected p = 0.012); n = 1,237 in 30 scenes)",
     ];
     assert_eq!(said.len(), starts.len());
     for (said, start) in said.iter().zip(starts) {
@@ -222,7 +240,7 @@ fn how_far_intervals_reach_is_a_range() {
     let say = |halves: &[f64]| {
         let mut all = findings(PooledKind::Darkness, &vec![(-0.129, Worse); halves.len()]);
         for (finding, half) in all.iter_mut().zip(halves) {
-            let difference = &mut finding.difference;
+            let difference = &mut finding.strict.difference;
             (difference.low, difference.high) = (-0.129 - half, -0.129 + half);
         }
         let said = sample::power(&all, ClusterUnit::Scene);
@@ -245,7 +263,7 @@ fn how_far_intervals_reach_is_a_range() {
 fn one_model_and_lost_items_are_named() {
     let mut one = finding(PooledKind::Darkness, 5, -0.3, Worse);
     one.models = vec!["gpt-4o".to_owned()];
-    (one.dropped, one.p_by, one.clusters) = (100, SwapMethod::Drawn(100_000), 1);
+    (one.dropped, one.strict.p_by, one.clusters) = (100, SwapMethod::Drawn(100_000), 1);
     let said = checked(&darkness::with_variant(&[&one], None, ClusterUnit::Frame).unwrap());
     assert!(
         said.ends_with(

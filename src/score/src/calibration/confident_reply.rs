@@ -10,6 +10,8 @@ const LEAST: f64 = 1e-6;
 /// A reply with probabilities, and without reasoning before the answer.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ConfidentReply {
+    /// Index of its item.
+    pub(super) item: usize,
     /// Index of its cluster.
     pub(super) cluster: u32,
     /// The greatest probability of a choice.
@@ -22,6 +24,13 @@ pub(super) struct ConfidentReply {
     pub(super) guess: f64,
     /// −ln p of the true choice, which is at least the bound of a choice that is not listed.
     pub(super) nll: f64,
+}
+
+impl ConfidentReply {
+    /// Confidence less 1 if the reply is right, else the confidence.
+    pub(super) fn excess(&self) -> f64 {
+        self.confidence - f64::from(u8::from(self.right))
+    }
 }
 
 /// The replies of a subject, and how many are left out.
@@ -49,7 +58,9 @@ pub(super) fn confident_replies(grid: &Grid<'_>, subject: usize) -> SortedReplie
         match trial.options() {
             None => sorted.unstated += 1,
             Some(options) if options.reasoned => sorted.reasoned += 1,
-            Some(options) => sorted.replies.extend(reply(trial, options, item.cluster)),
+            Some(options) => sorted
+                .replies
+                .extend(reply(trial, options, (index, item.cluster))),
         }
     }
     let replies = &mut sorted.replies;
@@ -61,7 +72,7 @@ pub(super) fn confident_replies(grid: &Grid<'_>, subject: usize) -> SortedReplie
 fn reply(
     trial: TrialRef<'_>,
     options: &OptionProbabilities,
-    cluster: u32,
+    (item, cluster): (usize, u32),
 ) -> Option<ConfidentReply> {
     let p = &options.p;
     let truth = *p.get(trial.truth()?)?;
@@ -71,6 +82,7 @@ fn reply(
     let squares: f64 = p.iter().map(|p| p * p).sum();
     let least = (options.bound / options.mass).max(LEAST);
     Some(ConfidentReply {
+        item,
         cluster,
         confidence: options.confidence(),
         right: trial.outcome() == TrialOutcome::Right,

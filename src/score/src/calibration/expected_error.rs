@@ -91,6 +91,7 @@ mod tests {
         let replies = of.into_iter().enumerate();
         replies
             .map(|(index, (confidence, right))| ConfidentReply {
+                item: index,
                 cluster: index as u32,
                 confidence,
                 right,

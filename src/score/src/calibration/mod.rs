@@ -10,6 +10,9 @@ mod positions;
 mod reliability;
 mod risk;
 mod rotations;
+mod tested;
+
+use std::collections::BTreeMap;
 
 use super::auc::{Auc, PairCounts, RankedReply};
 use super::bootstrap::Resamples;
@@ -17,10 +20,12 @@ use super::estimate::Estimate;
 use super::grid::Grid;
 use super::subject::Subject;
 use confident_reply::{ConfidentReply, accuracy, confident_replies};
+use darkqa_ground::types::AxisLevel;
 
 pub use positions::PositionShare;
 pub use reliability::ReliabilityBin;
 pub use risk::RiskCoverage;
+pub use tested::TestedConfidence;
 
 /// The least number of replies for an expected calibration error (chosen).
 const LEAST_REPLIES: usize = 100;
@@ -40,8 +45,10 @@ pub struct Calibration {
     pub confidence: Estimate,
     /// Accuracy of the same replies.
     pub accuracy: Estimate,
-    /// Confidence less accuracy: above 0 the model is overconfident.
-    pub overconfidence: Estimate,
+    /// Confidence less accuracy, with its test: above 0 the model is overconfident.
+    pub overconfidence: TestedConfidence,
+    /// Overconfidence less that at L0, on the items of both; for raw degraded images of a model that was asked at L0.
+    pub growth: Option<TestedConfidence>,
     /// Expected calibration error (`expected_error`); `None` below 100 replies.
     pub error: Option<Estimate>,
     /// Mean Brier score over all choices, 0 to 2 (Brier 1950, Mon. Weather Rev. 78:1).
@@ -90,7 +97,11 @@ fn calibration(grid: &Grid<'_>, draws: &Resamples, subject: usize) -> Option<Cal
         unstated: sorted.unstated,
         confidence: mean(|reply| reply.confidence),
         accuracy: accuracy(grid.clusters, replies)?,
-        overconfidence: mean(|reply| reply.confidence - f64::from(u8::from(reply.right))),
+        overconfidence: TestedConfidence::new(
+            grid.clusters,
+            replies.iter().map(|reply| (reply.cluster, reply.excess())),
+        )?,
+        growth: growth(grid, subject, replies),
         error,
         brier: mean(|reply| reply.brier),
         skill: Estimate {
@@ -107,6 +118,25 @@ fn calibration(grid: &Grid<'_>, draws: &Resamples, subject: usize) -> Option<Cal
         bins: reliability::bins(grid.clusters, replies),
         positions: positions::shares(grid, subject),
     })
+}
+
+/// How much further the confidence is above the accuracy than at L0, on the items of both.
+fn growth(grid: &Grid<'_>, subject: usize, replies: &[ConfidentReply]) -> Option<TestedConfidence> {
+    let dark = &grid.subjects[subject];
+    if dark.enhancer.is_some() || !dark.variant.is_degraded() {
+        return None;
+    }
+    let clean = Subject::seeing(&dark.model, AxisLevel::L0, &dark.variant, None);
+    let clean = confident_replies(grid, grid.stand_in(&clean)?).replies;
+    let clean: BTreeMap<usize, f64> = clean
+        .iter()
+        .map(|reply| (reply.item, reply.excess()))
+        .collect();
+    let both = replies.iter().filter_map(|reply| {
+        let change = reply.excess() - clean.get(&reply.item)?;
+        Some((reply.cluster, change))
+    });
+    TestedConfidence::new(grid.clusters, both)
 }
 
 /// The mean distance to the probabilities without an image; `None` if there are none of the latter.

@@ -61,6 +61,7 @@ mod tests {
         let replies = of.into_iter().enumerate();
         replies
             .map(|(index, (confidence, right))| ConfidentReply {
+                item: index,
                 cluster: (index % 10) as u32,
                 confidence,
                 right,

@@ -53,6 +53,7 @@ mod tests {
         let replies: Vec<ConfidentReply> = of
             .iter()
             .map(|&(confidence, right)| ConfidentReply {
+                item: 0,
                 cluster: 0,
                 confidence,
                 right,

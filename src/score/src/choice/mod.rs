@@ -62,6 +62,15 @@ pub enum ReadingMode {
 impl ReadingMode {
     /// Both readings, the headline reading first.
     pub const ALL: [Self; 2] = [Self::Strict, Self::Lenient];
+
+    /// The word in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Strict => "strict",
+            Self::Lenient => "lenient",
+        }
+    }
 }
 
 /// The choice in a reply, as an index in the order shown, or the reason why none could be read.

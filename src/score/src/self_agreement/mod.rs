@@ -21,8 +21,11 @@ mod kappa;
 pub mod light;
 pub mod models_in_light;
 pub mod question_in_light;
+
 #[cfg(test)]
 mod tests;
+
+use std::collections::BTreeMap;
 
 use self::bank_index::BankIndex;
 use self::cell::{AgreementCell, cells};
@@ -36,6 +39,7 @@ use super::cluster::{ClusterUnit, Clusters, FrameTies};
 use super::comparison::{Comparison, ComparisonKind, comparisons};
 use super::confusion::{Confusion, Hallucination, confusions, hallucinations};
 use super::grid::Grid;
+use super::head::{QuestionTests, adjusted};
 use super::health::{Health, healths};
 use super::photographed_set::PhotographedSet;
 use darkqa_ground::types::{ChoiceDetail, ModelListing, RunQuestion, Trials};
@@ -123,6 +127,7 @@ impl<'a> SelfAgreement<'a> {
         // The kinds stand together, as in other reports; the sort is stable.
         all.comparisons
             .sort_by_key(|found| (found.kind, found.family.is_some()));
+        correct(&mut all.comparisons);
         all
     }
 
@@ -169,5 +174,48 @@ impl<'a> SelfAgreement<'a> {
     pub fn cannot_tell(&self, model: &str) -> bool {
         let (informative, all) = self.informative(model);
         informative == 0 && all > 0
+    }
+}
+
+/// Corrects the comparisons that sentences are about over all of them: each model at the darkest level of each variant, and each
+/// enhancer at each level.
+fn correct(comparisons: &mut [Comparison]) {
+    let mut darkest = BTreeMap::<_, usize>::new();
+    let mut enhanced = BTreeMap::<_, Vec<usize>>::new();
+    for (index, comparison) in comparisons.iter().enumerate() {
+        let first = &comparison.first;
+        if comparison.family.is_some() || !comparison.strict.significance.is_possible() {
+            continue;
+        }
+        match comparison.kind {
+            // The levels of a variant ascend: the last one is the darkest.
+            ComparisonKind::Level => {
+                darkest.insert((first.model.clone(), first.variant.clone()), index);
+            }
+            ComparisonKind::Enhancer => {
+                let tests = enhanced.entry(first.enhancer.clone()).or_default();
+                tests.push(index);
+            }
+            _ => {}
+        }
+    }
+    let questions = std::iter::once(darkest.into_values().collect()).chain(enhanced.into_values());
+    let questions: Vec<Vec<usize>> = questions
+        .filter(|tests: &Vec<usize>| !tests.is_empty())
+        .collect();
+    let values = questions.iter().map(|tests| {
+        let values = tests
+            .iter()
+            .map(|index| comparisons[*index].strict.paired.p);
+        QuestionTests::unordered(values)
+    });
+    let corrected = adjusted(&values.collect::<Vec<_>>());
+    for (tests, corrected) in questions.iter().zip(corrected) {
+        for (index, p) in tests.iter().zip(corrected.chains.into_iter().flatten()) {
+            // The answers at L0 are those of the strict parsing, so that it is the only one.
+            let comparison = &mut comparisons[*index];
+            comparison.strict.p_report = Some(p);
+            comparison.lenient = comparison.strict.clone();
+        }
     }
 }

@@ -118,19 +118,22 @@ fn dark_and_enhanced_images_are_compared_pair_by_pair() {
         };
         let dark = of(ComparisonKind::Level, "L5-noise");
         assert_eq!(
-            (dark.second.condition(), dark.significance),
+            (dark.second.condition(), dark.strict.significance),
             ("L0".into(), Significance::Worse)
         );
-        assert_eq!((dark.paired.second, dark.paired.gained), (1.0, 0));
+        assert_eq!(
+            (dark.strict.paired.second, dark.strict.paired.gained),
+            (1.0, 0)
+        );
         let lifted = of(ComparisonKind::Enhancer, "L5-noise+lift");
         assert_eq!(
-            (lifted.significance, lifted.paired.lost),
+            (lifted.strict.significance, lifted.strict.paired.lost),
             (Significance::Better, 0)
         );
-        assert!(lifted.holm < 0.001 && lifted.paired.mcnemar < 0.001);
+        assert!(lifted.strict.holm < 0.001 && lifted.strict.paired.mcnemar < 0.001);
         // An enhancer that harms in the light is held against the same images asked again.
         let harmed = of(ComparisonKind::Enhancer, "L0+lift");
-        assert_eq!(harmed.significance, Significance::Worse);
+        assert_eq!(harmed.strict.significance, Significance::Worse);
         assert!(
             found
                 .comparisons

@@ -1,0 +1,45 @@
+//! Confidence less accuracy with its test: [`TestedConfidence`].
+
+use crate::estimate::Estimate;
+use crate::paired::tested_difference;
+use crate::significance::ALPHA;
+
+/// A mean of confidence less accuracy, or of its change, with the test of 0 by Student's t that belongs to its interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TestedConfidence {
+    pub estimate: Estimate,
+    /// p-value of 0.
+    pub p: f64,
+    /// p-value after the correction over all tests that sentences rest on; `None` if no sentence is about it.
+    pub p_report: Option<f64>,
+}
+
+impl TestedConfidence {
+    /// The test of numbers, each with its cluster; `None` without any.
+    pub(super) fn new(clusters: usize, numbers: impl Iterator<Item = (u32, f64)>) -> Option<Self> {
+        let mut sums = vec![(0.0, 0.0); clusters];
+        let (mut squares, mut n) = (0.0, 0);
+        for (cluster, number) in numbers {
+            let (sum, count) = &mut sums[cluster as usize];
+            *sum += number;
+            *count += 1.0;
+            squares += number * number;
+            n += 1;
+        }
+        sums.retain(|(_, count)| *count > 0.0);
+        (n > 0).then(|| {
+            let (estimate, p) = tested_difference(&sums, squares, n);
+            Self {
+                estimate,
+                p,
+                p_report: None,
+            }
+        })
+    }
+
+    /// Whether it is shown to be above 0 after the correction over all sentences.
+    #[must_use]
+    pub fn is_above(&self) -> bool {
+        self.estimate.value > 0.0 && self.p_report.is_some_and(|value| value < ALPHA)
+    }
+}
