@@ -299,7 +299,7 @@ fn wrong_enhancers_name_their_file() {
     bench.file("text.onnx", "this is no model, whatever its name says");
     refused(&bench, &line("text.onnx"), &["text.onnx", "ONNX"]);
     onnx::no_image().write(&bench.path(""), "blind.onnx");
-    refused(&bench, &line("blind.onnx"), &["blind.onnx", "output"]);
+    refused(&bench, &line("blind.onnx"), &["blind.onnx", "24 channels"]);
     onnx::no_image().write(&bench.path(""), "rank.onnx");
     refused(&bench, &line("rank.onnx"), &["rank.onnx"]);
     let missing = "--model random --out run --llie fine.onnx --ort-lib no-such.so";

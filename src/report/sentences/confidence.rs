@@ -2,8 +2,9 @@
 
 use super::sentence::{Numbers, Sentence, Tone};
 use crate::score::calibration::Calibration;
+use crate::score::calibration::LEAST_CONFIDENT_REPLIES;
 use crate::score::cluster::{ClusterUnit, MIN_SCENES};
-use crate::score::findings::{Findings, LEAST_CONFIDENT_REPLIES};
+use crate::score::findings::Findings;
 use crate::score::pooled::pool;
 use crate::score::subject::Subject;
 use crate::types::{AxisLevel, KindReading};

@@ -1,6 +1,5 @@
 //! Sentences about replies that do not keep to the answer format, where only the strict parsing detects a difference.
 
-use super::pooled::largest;
 use super::sentence::{Numbers, Sentence, Tone, models};
 use crate::report::words::light;
 use crate::score::claim::Claim;
@@ -17,7 +16,7 @@ pub(super) fn format_alone(levels: &[&PooledFinding], unit: ClusterUnit) -> Opti
         let difference = finding.strict.difference.value;
         matches!(finding.claim(), Claim::StrictOnly(_)) && readable / difference >= 0.5
     });
-    let largest = largest(&alone.collect::<Vec<_>>())?;
+    let largest = PooledFinding::largest(&alone.collect::<Vec<_>>())?;
     let is_loss = largest.claim() == Claim::StrictOnly(Significance::Worse);
     let (more, effect) = if is_loss {
         ("fewer", "loss")

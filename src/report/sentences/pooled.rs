@@ -21,7 +21,7 @@ pub(super) fn noise(levels: &[&PooledFinding], unit: ClusterUnit) -> Vec<Sentenc
     ];
     let shown = verdicts.into_iter().filter_map(|(verdict, word)| {
         let shown = of_verdict(levels, verdict);
-        let largest = largest(&shown)?;
+        let largest = PooledFinding::largest(&shown)?;
         let mut numbers = Numbers::of(unit);
         let limit = if shown.len() > 1 { "up to " } else { "" };
         let text = format!(
@@ -35,7 +35,7 @@ pub(super) fn noise(levels: &[&PooledFinding], unit: ClusterUnit) -> Vec<Sentenc
     });
     let shown: Vec<Sentence> = shown.collect();
     let unshown = of_verdict(levels, Significance::NotShown);
-    match largest(&unshown) {
+    match PooledFinding::largest(&unshown) {
         Some(largest) if shown.is_empty() => {
             if let Some(format) = format_alone(levels, unit) {
                 return vec![format];
@@ -76,7 +76,7 @@ fn enhancer(
     unit: ClusterUnit,
 ) -> Option<Sentence> {
     let of_verdict = of_verdict(levels, verdict);
-    let largest = largest(&of_verdict)?;
+    let largest = PooledFinding::largest(&of_verdict)?;
     let name = largest.enhancer.as_ref()?;
     let at = runs(&of_verdict, levels);
     let mut numbers = Numbers::of(unit);
@@ -162,18 +162,6 @@ pub(super) fn of_verdict<'f>(
         _ => verdict == Significance::NotShown,
     };
     levels.iter().copied().filter(has).collect()
-}
-
-/// The finding with the largest difference in either direction; of several, the first.
-pub(super) fn largest<'f>(levels: &[&'f PooledFinding]) -> Option<&'f PooledFinding> {
-    let size = |finding: &PooledFinding| finding.strict.difference.value.abs();
-    levels.iter().copied().reduce(|largest, next| {
-        if size(next) > size(largest) {
-            next
-        } else {
-            largest
-        }
-    })
 }
 
 /// The levels of some findings among all of a set.

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::format::format_alone;
-use super::pooled::{detail, largest, of_verdict, runs};
+use super::pooled::{detail, of_verdict, runs};
 use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
 use crate::report::words::family as family_name;
 use crate::score::claim::Claim;
@@ -18,7 +18,7 @@ use crate::types::{Axis, AxisLevel, KindReading};
 /// Where the models fall below their replies to the words alone.
 pub(super) fn pooled(levels: &[&PooledFinding], unit: ClusterUnit) -> Option<Sentence> {
     let shown = of_verdict(levels, Significance::Worse);
-    let Some(largest) = largest(&shown) else {
+    let Some(largest) = PooledFinding::largest(&shown) else {
         let worse = levels.iter().copied();
         let worse = worse.filter(|of| of.claim() == Claim::StrictOnly(Significance::Worse));
         return format_alone(&worse.collect::<Vec<_>>(), unit);

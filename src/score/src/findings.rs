@@ -16,8 +16,6 @@ use super::curve::{Curve, curves};
 use super::fidelity::FidelityFindings;
 use super::flips::{FirstFailure, first_failures};
 use super::grid::Grid;
-use super::head_tests;
-pub use super::head_tests::LEAST_CONFIDENT_REPLIES;
 use super::health::{Health, healths};
 use super::observed::ObserverSummary;
 use super::pair_darkness::{self, PairDarkness};
@@ -212,7 +210,7 @@ impl<'a> Findings<'a> {
             without_observer: None,
             grid,
         };
-        head_tests::correct(&mut findings);
+        findings.correct_sentences();
         findings
     }
 

@@ -43,7 +43,6 @@ pub mod findings;
 pub mod flips;
 pub mod grid;
 mod head;
-mod head_tests;
 pub mod health;
 pub mod llm_match;
 pub mod observed;
@@ -64,6 +63,7 @@ pub mod significance;
 mod split_mix;
 pub mod strict_score;
 pub mod subject;
+mod tested_sentences;
 #[cfg(test)]
 mod tests;
 pub mod threshold;

@@ -77,6 +77,19 @@ pub struct PooledDifference {
 }
 
 impl PooledFinding {
+    /// The finding with the largest difference in either direction; of several, the first. `None` of none.
+    #[must_use]
+    pub fn largest<'f>(levels: &[&'f Self]) -> Option<&'f Self> {
+        let size = |finding: &Self| finding.strict.difference.value.abs();
+        levels.iter().copied().reduce(|largest, next| {
+            if size(next) > size(largest) {
+                next
+            } else {
+                largest
+            }
+        })
+    }
+
     /// What sentences may claim.
     #[must_use]
     pub fn claim(&self) -> Claim {

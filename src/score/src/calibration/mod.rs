@@ -27,6 +27,9 @@ pub use reliability::ReliabilityBin;
 pub use risk::RiskCoverage;
 pub use tested::TestedConfidence;
 
+/// The least number of replies with probabilities that a sentence is about (chosen): that of a calibration error.
+pub const LEAST_CONFIDENT_REPLIES: usize = 100;
+
 /// The least number of replies for an expected calibration error (chosen).
 const LEAST_REPLIES: usize = 100;
 

@@ -1,8 +1,9 @@
-//! The tests that the sentences of a report rest on, corrected together: [`correct`].
+//! The tests that the sentences of a report rest on, corrected together: [`Findings::correct_sentences`].
 
 use std::collections::BTreeMap;
 
 use super::best::BestInTheDark;
+use super::calibration::LEAST_CONFIDENT_REPLIES;
 use super::choice::ReadingMode;
 use super::cluster::MIN_SCENES;
 use super::comparison::{Comparison, ComparisonKind};
@@ -15,9 +16,6 @@ use super::pooled_kind::PooledKind;
 use super::subject::{Subject, judged};
 use darkqa_ground::types::degradation::Kind;
 use darkqa_ground::types::{AxisLevel, KindReading};
-
-/// The least number of replies with probabilities that a sentence is about (chosen): that of a calibration error.
-pub const LEAST_CONFIDENT_REPLIES: usize = 100;
 
 /// A test, by its place in the findings.
 #[derive(Debug, Clone, Copy)]
@@ -40,26 +38,28 @@ enum Test {
 /// The tests of a question, in chains as in [`QuestionTests`].
 type Question = Vec<Vec<Test>>;
 
-/// Corrects all tests that sentences rest on, in each parsing for itself.
-pub(super) fn correct(findings: &mut Findings<'_>) {
-    let questions = questions(findings);
-    for mode in ReadingMode::ALL {
-        let values = questions.iter().map(|question| QuestionTests {
-            chains: question
+impl Findings<'_> {
+    /// Corrects all tests that sentences rest on, in each parsing for itself.
+    pub(super) fn correct_sentences(&mut self) {
+        let questions = questions(self);
+        for mode in ReadingMode::ALL {
+            let values = questions.iter().map(|question| QuestionTests {
+                chains: question
+                    .iter()
+                    .map(|chain| chain.iter().map(|test| test.p(self, mode)).collect())
+                    .collect(),
+            });
+            let corrected = adjusted(&values.collect::<Vec<_>>());
+            let corrected = corrected
                 .iter()
-                .map(|chain| chain.iter().map(|test| test.p(findings, mode)).collect())
-                .collect(),
-        });
-        let corrected = adjusted(&values.collect::<Vec<_>>());
-        let corrected = corrected
-            .iter()
-            .flat_map(|question| question.chains.iter().flatten());
-        let tests = questions.iter().flatten().flatten();
-        for (test, p) in tests.zip(corrected) {
-            test.set(findings, mode, *p);
+                .flat_map(|question| question.chains.iter().flatten());
+            let tests = questions.iter().flatten().flatten();
+            for (test, p) in tests.zip(corrected) {
+                test.set(self, mode, *p);
+            }
         }
+        self.tests = questions.iter().flatten().map(Vec::len).sum();
     }
-    findings.tests = questions.iter().flatten().map(Vec::len).sum();
 }
 
 /// The questions of a report. Which tests they have depends on what was asked, never on the answers.
