@@ -263,8 +263,10 @@ fn intervals_of_differences_hold_the_truth() {
                     table,
                     "{frames} frames, {first} − {second}, ρ {correlation}: {held:.1} %"
                 );
-                // Four hundred runs: give or take 2.2 %.
-                assert!((92.5..=98.0).contains(&held), "{table}");
+                // Four hundred runs: give or take 2.2 %. Where the difference is 0, the interval is never without it while the exact
+                // test of few changed answers does not reject.
+                let most = if first > second { 98.0 } else { 99.5 };
+                assert!((92.5..=most).contains(&held), "{table}");
             }
         }
     });
