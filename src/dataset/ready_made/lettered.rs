@@ -166,10 +166,23 @@ fn after_letter(text: &str, index: usize) -> Option<String> {
         return None;
     }
     let text = text.trim();
-    let text = text.strip_prefix('(').unwrap_or(text);
-    let rest = text.strip_prefix(letter(index))?;
-    let rest = rest.strip_prefix(['.', ')', ':'])?.trim();
+    let text = text.strip_prefix(['(', '（']).unwrap_or(text);
+    let rest = text.strip_prefix([letter(index), full_width(letter(index))])?;
+    let rest = rest.strip_prefix(CLOSES)?.trim();
     (!rest.is_empty()).then(|| rest.to_owned())
+}
+
+/// What may stand behind the letter of an option, also in full-width signs, as Chinese and Japanese sets have them.
+const CLOSES: [char; 8] = ['.', ')', ':', '．', '。', '）', '：', '、'];
+
+/// The full-width form of a sign of ASCII.
+fn full_width(c: char) -> char {
+    char::from_u32(c as u32 + 0xFEE0).unwrap_or(c)
+}
+
+/// The capital letter that a sign is, in either width.
+fn capital(c: char) -> Option<char> {
+    ('A'..='Z').find(|letter| [*letter, full_width(*letter)].contains(&c))
 }
 
 /// The marks A, B, … in order from the first of a list, whose letter is A.
@@ -187,7 +200,7 @@ fn run(marks: &[Mark]) -> Vec<&Mark> {
 fn texts(text: &str, run: &[&Mark]) -> Vec<String> {
     let ends = run[1..].iter().map(|mark| mark.start);
     let spans = run.iter().zip(ends.chain([text.len()]));
-    let cut = |c: char| c.is_whitespace() || c == ',' || c == ';';
+    let cut = |c: char| c.is_whitespace() || ",;，；".contains(c);
     spans
         .map(|(mark, end)| {
             let option = text[mark.end..end.max(mark.end)].trim_end_matches(cut);
@@ -201,27 +214,25 @@ fn marks(text: &str) -> Vec<Mark> {
     let mut marks = Vec::new();
     let mut before = None;
     for (start, c) in text.char_indices() {
-        let is_free = before.is_none_or(|b: char| b.is_whitespace() || ",;:".contains(b));
+        let is_free =
+            before.is_none_or(|b: char| b.is_whitespace() || ",;:，；：。？、".contains(b));
         before = Some(c);
         if !is_free {
             continue;
         }
         let rest = &text[start..];
-        let (open, body) = match rest.strip_prefix('(') {
-            Some(body) => (1, body),
-            None => (0, rest),
-        };
-        let mut chars = body.chars();
-        let (Some(name @ 'A'..='Z'), Some(close)) = (chars.next(), chars.next()) else {
+        let opened = rest.strip_prefix(['(', '（']);
+        let mut chars = opened.unwrap_or(rest).chars();
+        let name = chars.next().and_then(capital);
+        let (Some(name), Some(close)) = (name, chars.next()) else {
             continue;
         };
-        let closes = if open == 1 {
-            close == ')'
-        } else {
-            matches!(close, '.' | ')' | ':')
+        let closes = match opened {
+            Some(_) => matches!(close, ')' | '）'),
+            None => CLOSES.contains(&close),
         };
         if closes {
-            marks.push(mark(text, start, start + open + 2, name));
+            marks.push(mark(text, start, text.len() - chars.as_str().len(), name));
         }
     }
     marks
@@ -229,12 +240,13 @@ fn marks(text: &str) -> Vec<Mark> {
 
 /// All letters in brackets in a text, of either case, as capitals.
 fn brackets(text: &str) -> Vec<Mark> {
-    let starts = text.match_indices('(');
-    let found = starts.filter_map(|(start, _)| {
-        let mut chars = text[start + 1..].chars();
+    let starts = text.match_indices(['(', '（']);
+    let found = starts.filter_map(|(start, open)| {
+        let mut chars = text[start + open.len()..].chars();
         let (name, close) = (chars.next()?, chars.next()?);
-        let is_mark = name.is_ascii_alphabetic() && close == ')';
-        is_mark.then(|| mark(text, start, start + 3, name.to_ascii_uppercase()))
+        let name = capital(name.to_ascii_uppercase())?;
+        let end = text.len() - chars.as_str().len();
+        matches!(close, ')' | '）').then(|| mark(text, start, end, name))
     });
     found.collect()
 }
@@ -270,6 +282,8 @@ mod tests {
                 vec!["one", "two"],
             ),
             ("Which?\nChoices:\nA.1\nB.2", "Which?", vec!["1", "2"]),
+            ("走哪边？\nA、左\nB、右", "走哪边？", vec!["左", "右"]),
+            ("走哪边？（A）左，（B）右", "走哪边？", vec!["左", "右"]),
             (
                 "Which?\n(A) red\n(B) blue\nThink of it first.",
                 "Which?\nThink of it first.",
@@ -321,6 +335,7 @@ mod tests {
     #[test]
     fn a_cell_of_options_holds_nothing_else() {
         assert_eq!(in_cell("(a) Open (b) Closed").unwrap(), ["Open", "Closed"]);
+        assert_eq!(in_cell("（A）开（B）关").unwrap(), ["开", "关"]);
         for text in [
             "(a) Open",
             "see (a) x (b) y",
@@ -337,6 +352,15 @@ mod tests {
         let cut =
             |options: &[&str]| without_letters(options.iter().map(ToString::to_string).collect());
         assert_eq!(cut(&["A. yes", "(B) no"]), ["yes", "no"]);
+        for own in [
+            ["（A） 直走。", "（B） 左转。"],
+            ["A、直走。", "B、左转。"],
+            ["Ａ．直走。", "Ｂ．左转。"],
+            ["A：直走。", "B：左转。"],
+            ["A）直走。", "(B) 左转。"],
+        ] {
+            assert_eq!(cut(&own), ["直走。", "左转。"], "{own:?}");
+        }
         for kept in [["A. yes", "no"], ["B. yes", "A. no"], ["A.", "B."]] {
             assert_eq!(cut(&kept), kept);
         }

@@ -3,30 +3,47 @@
 use std::sync::LazyLock;
 
 use regex::Regex;
+use serde::Deserialize;
 use unicode_normalization::UnicodeNormalization;
 
 use darkqa_ground::types::question::UnreadReason;
 
-/// Markers that end a reasoning block: those of DeepSeek, Qwen and many others, Magistral, Kimi, Cohere, Seed, and the
-/// final channel of the harmony format (also as it reads if a server drops its special tokens).
-static END: LazyLock<Regex> = LazyLock::new(|| {
-    compiled(concat!(
-        r"(?i)</(?:seed:)?(?:think|thinking|thought|thoughts|reasoning|reflection|analysis|scratchpad)>",
-        r"|\[/(?:think|thinking|reasoning)\]|◁/think▷",
-        r"|<\|(?:/think|end_of_thought|end_thinking)\|>",
-        r"|<\|channel\|>\s*final\b[^<]{0,80}<\|message\|>|assistantfinal"
-    ))
+/// The marks of one family of models, a table of `reasoning.toml`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Mark {
+    #[expect(dead_code, reason = "documents the table")]
+    family: String,
+    #[expect(dead_code, reason = "documents the table")]
+    source: String,
+    begin: String,
+    end: String,
+}
+
+#[derive(Debug, Default, Deserialize)]
+struct Marks {
+    mark: Vec<Mark>,
+}
+
+static MARKS: LazyLock<Vec<Mark>> = LazyLock::new(|| {
+    let marks: Marks = toml::from_str(include_str!("reasoning.toml")).unwrap_or_default();
+    marks.mark
 });
 
-/// Markers that begin a reasoning block.
-static BEGIN: LazyLock<Regex> = LazyLock::new(|| {
-    compiled(concat!(
-        r"(?i)<(?:seed:)?(?:think|thinking|thought|thoughts|reasoning|reflection|analysis|scratchpad)>",
-        r"|\[(?:think|thinking|reasoning)\]|◁think▷",
-        r"|<\|(?:think|begin_of_thought|start_thinking)\|>",
-        r"|<\|channel\|>\s*(?:analysis|commentary)\b"
-    ))
+/// Marks that end a reasoning block.
+static END: LazyLock<Regex> = LazyLock::new(|| {
+    let ends = MARKS.iter().map(|mark| format!("(?:{})", mark.end));
+    compiled(&format!("(?i){}", ends.collect::<Vec<_>>().join("|")))
 });
+
+/// Marks that begin a reasoning block.
+static BEGIN: LazyLock<Regex> = LazyLock::new(|| {
+    let begins = MARKS.iter().map(|mark| format!("(?:{})", mark.begin));
+    compiled(&format!("(?i){}", begins.collect::<Vec<_>>().join("|")))
+});
+
+/// The name of Gemma's channel alone on the first line, which is left of its marks if a server drops special tokens.
+static NAME_OF_CHANNEL: LazyLock<Regex> = LazyLock::new(|| compiled(r"\A\s*thought[ \t]*\r?\n"));
 
 /// The end of the harmony format's final channel.
 static HARMONY_CLOSE: LazyLock<Regex> =
@@ -79,6 +96,13 @@ pub(super) fn without_reasoning(reply: &str) -> Result<&str, UnreadReason> {
         "" => Err(UnreadReason::Empty),
         text => Ok(text),
     }
+}
+
+/// The text behind the name of a channel of reasoning whose marks a server dropped; `None` without one. Where the reasoning ends cannot
+/// be told.
+pub(super) fn behind_channel(text: &str) -> Option<&str> {
+    let name = NAME_OF_CHANNEL.find(text)?;
+    Some(text[name.end()..].trim_matches(is_blank))
 }
 
 /// The text in compatibility form (NFKC) without invisible characters and template tokens. It ends at the first token that

@@ -46,8 +46,8 @@ use darkqa_ground::types::question::{Answer, Choices, UnreadReason};
 use darkqa_ground::types::reply::{Finish, Reply};
 
 /// The version of the lenient reading, raised whenever any reply may read differently. Records of another version are read again by
-/// `report --rescore`. The strict reading has not changed since the first version.
-pub const LENIENT_VERSION: &str = "lenient/3";
+/// `report --rescore`. The strict reading changed with `lenient/4` alone: marks of reasoning, and full-width signs around letters.
+pub const LENIENT_VERSION: &str = "lenient/4";
 
 /// How much text a reply may have around the answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
@@ -75,8 +75,8 @@ impl ReadingMode {
 
 /// The choice in a reply, as an index in the order shown, or the reason why none could be read.
 ///
-/// Text in a closed reasoning block is ignored. A block that is opened and never closed leaves nothing to read: the reason
-/// is then [`UnreadReason::Truncated`].
+/// Text in a closed reasoning block, by the marks of `reasoning.toml`, is ignored. A block that is opened and never closed leaves
+/// nothing to read: the reason is then [`UnreadReason::Truncated`].
 ///
 /// ```
 /// use darkqa_score::choice::{ReadingMode, read};
@@ -96,6 +96,10 @@ pub fn read(reply: &str, choices: &Choices, mode: ReadingMode) -> Answer {
     };
     if let Some(answer) = strict::read(text, choices.texts()) {
         return answer;
+    }
+    if let Some(rest) = clean::behind_channel(text) {
+        let unread = Answer::Unparsed(UnreadReason::Truncated);
+        return strict::read(rest, choices.texts()).unwrap_or(unread);
     }
     match (mode, lenient::read(text, choices)) {
         (ReadingMode::Strict, Answer::Chosen(_)) => Answer::Unparsed(UnreadReason::NoChoice),

@@ -6,7 +6,7 @@ use darkqa_ground::types::question::{Answer, UnreadReason};
 /// The answer of a reply that is exactly one of the strict forms; otherwise `None`.
 ///
 /// The forms, in upper or lower case, are: a choice's text with or without a final period; `B`, `(B)`, `[B]`, `B.`, `B)`,
-/// `B:`; and such a letter, or `B -`, before the text of the same choice.
+/// `B:`, `（B）`, `B．`, `B：`, `B、`; and such a letter, or `B -`, before the text of the same choice.
 pub(super) fn read(text: &str, choices: &[String]) -> Option<Answer> {
     let by_text = position(text, choices);
     let by_letter = label(text).and_then(|(letter, rest)| {
@@ -52,9 +52,9 @@ fn label(text: &str) -> Option<(char, &str)> {
     let text = text.trim();
     let mut chars = text.chars();
     let first = chars.next()?;
-    let close = match first {
-        '(' => Some(')'),
-        '[' => Some(']'),
+    let close: Option<&[char]> = match first {
+        '(' | '（' => Some(&[')', '）']),
+        '[' => Some(&[']']),
         _ => None,
     };
     let letter = if close.is_some() {
@@ -72,7 +72,7 @@ fn label(text: &str) -> Option<(char, &str)> {
     if rest.is_empty() {
         return Some((letter, rest));
     }
-    if let Some(rest) = rest.strip_prefix(['.', ')', ':']) {
+    if let Some(rest) = rest.strip_prefix(['.', ')', ':', '．', '：', '、']) {
         return Some((letter, rest.trim_start()));
     }
     let after = rest.trim_start();

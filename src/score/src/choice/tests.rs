@@ -103,6 +103,64 @@ fn the_table_of_replies_is_read() {
     );
 }
 
+/// Text inside the marks of reasoning never gives the answer; text behind them is read strictly.
+#[test]
+fn marks_of_reasoning_are_those_of_the_table() {
+    let rooms = choices_of(&["kitchen", "bedroom", "bathroom"]);
+    for (begin, end) in [
+        ("<think>", "</think>"),
+        ("<|channel>thought\n", "<channel|>"),
+        ("[THINK]", "[/THINK]"),
+        ("◁think▷", "◁/think▷"),
+        ("<|START_THINKING|>", "<|END_THINKING|>"),
+        (
+            "<|channel|>analysis<|message|>",
+            "<|channel|>final<|message|>",
+        ),
+    ] {
+        let thought = "It could be A. The answer is C at first sight.\n";
+        for (reply, expected) in [
+            (format!("{begin}{thought}{end}B"), Answer::Chosen(1)),
+            (format!("{begin}{end}\n(B) bedroom"), Answer::Chosen(1)),
+            (format!("{thought}{end}B"), Answer::Chosen(1)),
+            (
+                format!("{begin}{thought}"),
+                Answer::Unparsed(UnreadReason::Truncated),
+            ),
+        ] {
+            for mode in ReadingMode::ALL {
+                assert_eq!(read(&reply, &rooms, mode), expected, "{reply:?}");
+            }
+        }
+    }
+}
+
+/// A server that drops special tokens leaves the name of Gemma's channel; where the reasoning ends is not known then.
+#[test]
+fn reasoning_without_its_marks_gives_no_answer() {
+    let rooms = choices_of(&["kitchen", "bedroom", "bathroom"]);
+    let reply = "thought\nThe image is dark. The answer is C at first sight, hmm.\nB";
+    for mode in ReadingMode::ALL {
+        let unread = Answer::Unparsed(UnreadReason::Truncated);
+        assert_eq!(read(reply, &rooms, mode), unread);
+        assert_eq!(read("thought\n\nB", &rooms, mode), Answer::Chosen(1));
+    }
+}
+
+#[test]
+fn full_width_letters_are_read_strictly() {
+    let rooms = choices_of(&["厨房", "卧室"]);
+    for reply in ["（B）", "B、", "B．", "B：", "（B） 卧室", "B、卧室"] {
+        assert_eq!(
+            read(reply, &rooms, ReadingMode::Strict),
+            Answer::Chosen(1),
+            "{reply}"
+        );
+    }
+    let wrong = Answer::Unparsed(UnreadReason::Contradiction);
+    assert_eq!(read("（B）厨房", &rooms, ReadingMode::Strict), wrong);
+}
+
 #[test]
 fn the_end_of_a_reply_is_considered() {
     let rooms = choices("rooms");
