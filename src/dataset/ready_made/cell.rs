@@ -129,8 +129,11 @@ impl Cell {
         }
     }
 
-    /// The field of a struct, by its name.
+    /// The field of a struct, by its name; the item of a list, by its number from 0.
     pub(super) fn field(&self, name: &str) -> Option<&Self> {
+        if let Self::List(cells) = self {
+            return cells.get(name.parse::<usize>().ok()?);
+        }
         let Self::Fields(fields) = self else {
             return None;
         };

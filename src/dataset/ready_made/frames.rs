@@ -4,9 +4,11 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::cell::FileFacts;
+use super::cell::{Cell, FileFacts, shortened};
 use super::container::{Archive, SetFile};
 use super::images::{CellPart, EmbeddedImage, ImagesAre, RowImage, images};
+use super::map::flag;
+use super::names::Role;
 use super::roles::{Column, Roles};
 use super::row::Table;
 use super::settings::SeveralImages;
@@ -167,6 +169,18 @@ impl<'a> Frames<'a> {
         images.into_iter().map(move |image| self.find(row, image))
     }
 
+    /// Why an image of a row cannot be used; `None` if all are there. Files are not opened.
+    pub(super) fn problem(&self, row: usize) -> Option<Error> {
+        self.of_row(row).find_map(|found| match found {
+            Err(problem) => Some(problem),
+            Ok(Found::Cell { row, facts, .. }) if facts.format.is_none() => {
+                let problem = "the cell of its image holds bytes that are no image";
+                Some(Error::data(self.table.place(row), problem))
+            }
+            Ok(_) => None,
+        })
+    }
+
     /// An image of a row.
     fn find(&self, row: usize, image: RowImage) -> Result<Found> {
         let at = |problem| Error::data(self.table.place(row), problem);
@@ -181,11 +195,15 @@ impl<'a> Frames<'a> {
                 steps,
                 facts,
             }),
-            RowImage::File(path) => self.file(row, &path).map_err(at),
+            RowImage::File(text) if is_long(&text) => Err(at(long_text(&text))),
+            RowImage::File(path) => self
+                .file(row, &path)
+                .map_err(|problem| at(self.with_other(row, problem))),
             RowImage::Frame(name) => Ok(Found::Frame(FrameId(name))),
             RowImage::RowOrFile(text) => match self.holder(row, &text) {
                 Some(found) => Ok(found),
                 None => self.file(row, &text).map_err(|problem| {
+                    let problem = self.with_other(row, problem);
                     let is_number = text.bytes().all(|byte| byte.is_ascii_digit());
                     at(if is_number {
                         format!("{problem}; and no row with an image has the id {text}")
@@ -194,6 +212,25 @@ impl<'a> Frames<'a> {
                     })
                 }),
             },
+        }
+    }
+
+    /// A problem of the path in a row, with the column that holds an image in its place.
+    fn with_other(&self, row: usize, problem: String) -> String {
+        let row = &self.table.rows[row];
+        let columns = self.table.columns.iter().enumerate();
+        let holds_image = |at: usize| match row.cell(at) {
+            Cell::File(facts) => facts.format.is_some(),
+            Cell::Fields(_) => matches!(row.cell(at).field("bytes"), Some(Cell::File(_))),
+            _ => false,
+        };
+        let mut holders = columns.filter(|(at, _)| holds_image(*at));
+        match holders.next() {
+            Some((_, name)) => format!(
+                "{problem}; the column {name:?} holds images: {}",
+                flag(Role::Image, name, None)
+            ),
+            None => problem,
         }
     }
 
@@ -305,6 +342,27 @@ impl<'a> Frames<'a> {
         (
             std::mem::take(&mut self.sources),
             std::mem::take(&mut self.series),
+        )
+    }
+}
+
+/// Whether a text is longer than any path; chosen.
+fn is_long(text: &str) -> bool {
+    text.len() > 400
+}
+
+/// The problem of a text that is neither an image nor a path, without the text.
+fn long_text(text: &str) -> String {
+    let is_base64 = |c: char| c.is_ascii_alphanumeric() || "+/=-_".contains(c) || c.is_whitespace();
+    let length = text.chars().count();
+    let start = shortened(text, 24);
+    if text.starts_with("data:") || text.chars().all(is_base64) {
+        format!(
+            "its image is base64 that is cut or damaged ({length} characters, {start:?}); --bad skip leaves such rows out"
+        )
+    } else {
+        format!(
+            "its image is a text of {length} characters, {start:?}, which is neither base64 nor a path; --bad skip leaves such rows out"
         )
     }
 }

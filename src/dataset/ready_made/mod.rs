@@ -277,6 +277,7 @@ fn finish(
     mut notes: Vec<String>,
     hint: Option<String>,
 ) -> Result<Finished> {
+    leave_out_unusable(opened, &mut set, &frames)?;
     let mut ids = frames.ids(&set.answered)?;
     if !ids.contradictory().is_empty() {
         let pairs = ids.contradictory();
@@ -318,6 +319,23 @@ fn finish(
         series,
         reading,
     })
+}
+
+/// Leaves out the rows with an image that is not there or is none, with `--bad skip`; without it such an image is named when it is read.
+fn leave_out_unusable(opened: &Opened<'_>, set: &mut ReadSet, frames: &Frames<'_>) -> Result<()> {
+    if opened.args.bad.is_none() {
+        return Ok(());
+    }
+    let ReadSet { answered, left, .. } = set;
+    answered.retain(|question| match frames.problem(question.row) {
+        None => true,
+        Some(problem) => {
+            left.add(Why::Bad, || problem.to_string());
+            false
+        }
+    });
+    let checked = left.check(opened.table.rows.len(), opened.args);
+    checked.map_err(|problem| Error::data(opened.place.display(), problem))
 }
 
 /// The rows of a set with their truths.

@@ -4,7 +4,8 @@ use std::fs;
 
 use serde_json::{Value, json};
 
-use super::fixture::{base64, row, set};
+use super::super::settings::LeaveOut;
+use super::fixture::{base64, bytes, row, set};
 use super::{open, refusal};
 use crate::dataset::ready_made::SetArgs;
 use crate::types::FrameId;
@@ -131,6 +132,64 @@ fn broken_text_files_name_their_place() {
         let problem = refusal(&path, &SetArgs::default());
         assert!(problem.contains(says), "{name}: {problem}");
     }
+}
+
+#[test]
+fn unusable_images_are_left_out_if_the_user_allows_it() {
+    let question = |id: usize, image: &str| {
+        row(
+            json!({"id": id, "question": "?", "options": ["x", "y"], "answer": "x", "image": image}),
+        )
+    };
+    for image in ["none.png", &"QUJD".repeat(40), &"QUJD".repeat(200)[1..]] {
+        let whole = base64(1);
+        let rows: Vec<_> = (0..40)
+            .map(|id| question(id, if id == 7 { image } else { &whole }))
+            .collect();
+        let (_folder, path) = set("set.tsv", &rows);
+        let skip = SetArgs {
+            bad: Some(LeaveOut::Skip),
+            ..SetArgs::default()
+        };
+        let dataset = open(&path, &skip).unwrap();
+        assert_eq!(dataset.questions.len(), 39, "{image}");
+    }
+    let (_folder, path) = set("set.tsv", &[question(1, &"QUJD".repeat(2000)[1..])]);
+    let problem = refusal(&path, &SetArgs::default());
+    assert!(
+        problem.contains("base64 that is cut or damaged"),
+        "{problem}"
+    );
+    assert!(problem.len() < 400, "{problem}");
+}
+
+/// As in A-OKVQA, MathVista and LLaVA's lists of conversations.
+#[test]
+fn columns_by_index_and_in_lists_are_read() {
+    let by_index = |index: u8| {
+        row(
+            json!({"id": index, "question": "?", "options": ["x", "y"], "correct_choice_idx": index, "image": base64(1 + index)}),
+        )
+    };
+    let (_folder, path) = set("set.jsonl", &[by_index(0), by_index(1)]);
+    let dataset = open(&path, &SetArgs::default()).unwrap();
+    assert_eq!(dataset.questions[1].choices.truth(), Some(1));
+    let said = json!([{"value": "Which? (A) x (B) y"}, {"value": "B"}]);
+    let listed = row(json!({"id": 1, "conversations": said, "image": base64(1)}));
+    let (_folder, path) = set("set.jsonl", &[listed]);
+    let map = "question=conversations.0.value,answer=conversations.1.value";
+    let args = SetArgs {
+        map: vec![map.parse().unwrap()],
+        ..SetArgs::default()
+    };
+    let dataset = open(&path, &args).unwrap();
+    assert_eq!(dataset.questions[0].choices.truth(), Some(1));
+    let beside = row(
+        json!({"id": 1, "question": "?", "options": ["x", "y"], "answer": "x", "image": "none.png", "decoded_image": bytes(1)}),
+    );
+    let (_folder, path) = set("set.parquet", &[beside]);
+    let problem = refusal(&path, &SetArgs::default());
+    assert!(problem.contains("image=decoded_image"), "{problem}");
 }
 
 #[test]
