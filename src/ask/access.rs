@@ -2,12 +2,17 @@
 
 use std::error::Error as _;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
 use reqwest::header::{HeaderMap, HeaderName, HeaderValue};
-use reqwest::{Certificate, Client, redirect};
+use reqwest::{Client, redirect};
+use rustls::crypto::ring::default_provider;
+use rustls::pki_types::CertificateDer;
+use rustls::pki_types::pem::PemObject as _;
 
 use super::key_header::KeyHeader;
+use super::own_certificate::client_config;
 use super::own_headers::OwnHeaders;
 use super::secret::{Scrub, Secret};
 use super::url::BaseUrl;
@@ -114,14 +119,17 @@ impl Access {
     /// elsewhere. Proxies come from the environment (`HTTPS_PROXY`, `NO_PROXY`, …); there is none for this machine.
     pub(super) fn client(&self, timeout: Duration, scrub: &Scrub) -> Result<Client> {
         // An error means that a provider is installed already.
-        let _ = rustls::crypto::ring::default_provider().install_default();
+        let _ = default_provider().install_default();
         let mut client = Client::builder()
             .user_agent(concat!("darkqa-eval/", env!("CARGO_PKG_VERSION")))
             .redirect(redirect::Policy::none())
             .connect_timeout(CONNECT.min(timeout))
             .timeout(timeout);
-        if !self.authorities.0.is_empty() {
-            client = client.tls_certs_merge(self.authorities.0.iter().cloned());
+        let trusted = &self.authorities.0;
+        if !trusted.is_empty() {
+            let config = client_config(trusted, Arc::new(default_provider()));
+            let config = config.map_err(|e| Error::usage("--ca-file", e.to_string()))?;
+            client = client.tls_backend_preconfigured(config);
         }
         if self.base.is_loopback() {
             client = client.no_proxy();
@@ -135,7 +143,7 @@ impl Access {
 
 /// Custom certificate authorities, as of a private CA.
 #[derive(Debug, Clone, Default)]
-pub struct Authorities(Vec<Certificate>);
+pub struct Authorities(Vec<CertificateDer<'static>>);
 
 impl Authorities {
     /// Reads a PEM file of one or more certificates.
@@ -144,7 +152,9 @@ impl Authorities {
     /// If it cannot be read or has no certificate.
     pub fn load(path: &Path) -> Result<Self> {
         let pem = reading::settings(path)?;
-        let found = Certificate::from_pem_bundle(pem.as_bytes()).unwrap_or_default();
+        let found = CertificateDer::pem_slice_iter(pem.as_bytes());
+        let found: Vec<CertificateDer<'static>> =
+            found.collect::<Result<_, _>>().unwrap_or_default();
         if found.is_empty() {
             return Err(Error::usage(
                 "--ca-file",

@@ -7,8 +7,8 @@ use super::constraint::letter_of;
 use super::parameters::Constrain;
 use super::reply_secrets::without_secrets;
 use super::secret::Scrub;
-use super::wire::batch_reply;
-use crate::types::{Failure, FailureKind, Reply};
+use super::wire::{batch_reply, batch_usage};
+use crate::types::{Failure, FailureKind, Reply, Usage};
 
 /// One line of an input file: `{"custom_id", "method", "url", "body"}` with a line end; the body is that of a single request.
 pub(super) fn line(id: &str, url: &str, body: &[u8]) -> Result<Vec<u8>, serde_json::Error> {
@@ -27,6 +27,8 @@ pub(crate) struct BatchLine {
     /// The status and the body of a refused request; `None` for a reply and for other failures. It is classified and not kept, so secrets
     /// are not removed from it.
     pub refusal: Option<(u16, String)>,
+    /// The tokens that a failure was charged; `None` for a reply, and if the server did not say.
+    pub charged: Option<Usage>,
 }
 
 impl BatchLine {
@@ -42,9 +44,16 @@ impl BatchLine {
     pub(super) fn without_secrets(line: &str, scrub: &Scrub) -> Option<Self> {
         let line: Value = serde_json::from_str(line).ok()?;
         let id = line.get("custom_id")?.as_str()?.to_owned();
+        let result = result(&line, scrub).map(|reply| without_secrets(reply, scrub));
+        let body = line
+            .get("response")
+            .and_then(|response| response.get("body"));
         Some(Self {
             id,
-            result: result(&line, scrub).map(|reply| without_secrets(reply, scrub)),
+            charged: body
+                .filter(|_| result.is_err())
+                .and_then(|body| batch_usage(&text(body))),
+            result,
             refusal: refusal(&line),
         })
     }
@@ -98,7 +107,7 @@ fn result(line: &Value, scrub: &Scrub) -> Result<Reply, Failure> {
     match status {
         None | Some(200..300) => batch_reply(&text).or_else(|unreadable| match unreadable {
             UnreadableReply::Complaint(complaint) => fail(FailureKind::Server, &complaint.message),
-            UnreadableReply::Other(what) => fail(FailureKind::Response, &what),
+            UnreadableReply::Other(found) => fail(FailureKind::Response, &found.what),
         }),
         Some(code) => {
             let complaint = Complaint::of_body(&text);

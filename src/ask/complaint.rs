@@ -5,6 +5,7 @@ use std::time::Duration;
 use serde_json::Value;
 
 use super::pace::{protobuf_duration, wait_in_words};
+use crate::types::Usage;
 
 /// An error as the server states it; secrets are not yet removed.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -23,6 +24,8 @@ pub(super) struct Complaint {
     pub(super) wait: Option<Duration>,
     /// Ids of the limits that were reached, as `GenerateRequestsPerDayPerProject`.
     limits: Vec<String>,
+    /// Google's words for the cause, as `API_KEY_INVALID`.
+    reasons: Vec<String>,
 }
 
 /// The number of errors within errors that are opened: routers pass on a server's error as text.
@@ -88,6 +91,7 @@ impl Complaint {
             moderated: inner.moderated || own.moderated,
             wait: inner.wait.max(own.wait),
             limits: [inner.limits, own.limits].concat(),
+            reasons: [inner.reasons, own.reasons].concat(),
             message: inner.message,
         }
     }
@@ -115,6 +119,9 @@ impl Complaint {
             }),
             wait: wait_in_words(&message).max(stated_wait(error)),
             limits: limits(error),
+            reasons: details(error)
+                .filter_map(|detail| text_or_number(detail.get("reason")?))
+                .collect(),
             message,
         }
     }
@@ -150,6 +157,13 @@ impl Complaint {
         phrases.iter().any(|phrase| message.contains(phrase))
     }
 
+    /// The message, the codes and the causes, in lower case.
+    pub(super) fn texts(&self) -> Vec<String> {
+        let codes = [&self.code, &self.kind].into_iter().flatten();
+        let texts = codes.chain(&self.reasons).chain([&self.message]);
+        texts.map(|text| text.to_lowercase()).collect()
+    }
+
     /// The error code as an HTTP status; `None` if it is not one from 400 to 599.
     pub(super) fn status(&self) -> Option<u16> {
         let status = self.code.as_ref()?.parse().ok()?;
@@ -162,8 +176,42 @@ impl Complaint {
 pub(super) enum UnreadableReply {
     /// The body states an error.
     Complaint(Box<Complaint>),
-    /// The body is not a reply of the API; the text says what it is.
-    Other(String),
+    /// The body has no reply of the API.
+    Other(Box<Unreadable>),
+}
+
+/// A body without a usable reply.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub(super) struct Unreadable {
+    /// The content of the body, in words.
+    pub(super) what: String,
+    /// The tokens that it was charged; `None` if the server did not say.
+    pub(super) usage: Option<Usage>,
+    /// The word for the reason why the model stopped, if that is not known or is no end.
+    pub(super) finish: Option<String>,
+    /// Whether the same request would end in the same way.
+    pub(super) is_final: bool,
+}
+
+impl Unreadable {
+    /// A body of this content, which was not charged as far as is known.
+    pub(super) fn new(what: impl Into<String>) -> Self {
+        Self {
+            what: what.into(),
+            ..Self::default()
+        }
+    }
+
+    /// The same body with the tokens that it was charged.
+    pub(super) fn charged(self, usage: Option<Usage>) -> Self {
+        Self { usage, ..self }
+    }
+}
+
+impl From<Unreadable> for UnreadableReply {
+    fn from(unreadable: Unreadable) -> Self {
+        Self::Other(Box::new(unreadable))
+    }
 }
 
 /// The title of an HTML page; `None` if the body is not one.

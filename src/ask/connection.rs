@@ -12,7 +12,8 @@ use tokio::time::Instant;
 
 use super::access::{Access, with_causes};
 use super::body::Parts;
-use super::failure::{Again, FailedTry};
+use super::connection_fault::permanent_cause;
+use super::failure::{Again, FailedTry, Reach};
 use super::parameters::Parameters;
 use super::secret::Scrub;
 use super::url::BaseUrl;
@@ -246,29 +247,28 @@ impl Connection {
 
     /// The failure of a request without a complete response.
     fn failed_try(&self, error: reqwest::Error) -> FailedTry {
-        let (kind, message) = if error.is_timeout() {
+        if error.is_timeout() {
             let timeout = self.timeout.as_secs_f64();
-            (
-                FailureKind::Timeout,
-                format!(
-                    "{} did not answer within {timeout} s; allow more with --timeout",
-                    self.base
-                ),
-            )
-        } else {
-            let text = self.scrub.line(&with_causes(&error.without_url()));
-            // Companies and universities often sign their certificates with a private CA.
-            let hint = if text.contains("UnknownIssuer") {
-                "; name the authority that signed it with --ca-file"
-            } else {
-                ""
+            let message = format!(
+                "{} did not answer within {timeout} s; allow more with --timeout",
+                self.base
+            );
+            return FailedTry {
+                again: Again::Later,
+                ..FailedTry::new(FailureKind::Timeout, message)
             };
-            let message = format!("{}: {text}{hint}", self.base);
-            (FailureKind::Connection, message)
+        }
+        let text = self.scrub.line(&with_causes(&error.without_url()));
+        let Some(remedy) = permanent_cause(&text, self.base.is_plain()) else {
+            return FailedTry {
+                again: Again::Later,
+                ..FailedTry::new(FailureKind::Connection, format!("{}: {text}", self.base))
+            };
         };
+        let message = format!("{}: {remedy} ({text})", self.base);
         FailedTry {
-            again: Again::Later,
-            ..FailedTry::new(kind, message)
+            reach: Reach::Endpoint,
+            ..FailedTry::new(FailureKind::Connection, message)
         }
     }
 }

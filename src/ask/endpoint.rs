@@ -23,7 +23,7 @@ use super::url::BaseUrl;
 use super::vendor::Vendor;
 use super::wire_kind::Wire;
 use crate::error::{Error, Result};
-use crate::types::{FailureKind, Reply};
+use crate::types::{FailureKind, LostAttempts, Reply};
 
 /// The maximum wait between retries if the server asks for none; chosen. A server may ask for longer waits.
 const MAX_DELAY: Duration = Duration::from_secs(30);
@@ -193,25 +193,34 @@ impl Endpoint {
             .with_max_times(self.sending.retries as usize)
             .build();
         let (mut attempts, mut avoided, mut last) = (0, Vec::new(), None::<FailedTry>);
+        let mut lost = LostAttempts::default();
         loop {
             let turn = self.turn(request, &avoided).await;
-            let turn = turn.map_err(|e| last.take().unwrap_or(e).after(attempts))?;
+            let turn = turn.map_err(|e| last.take().unwrap_or(e).after(attempts, lost))?;
             attempts += 1;
             let (failed, effect) = match self.send(request, turn).await {
                 Ok(reply) => {
                     self.is_known.store(true, Ordering::Relaxed);
-                    return Ok(Reply { attempts, ..reply });
+                    return Ok(Reply {
+                        attempts,
+                        lost,
+                        ..reply
+                    });
                 }
                 Err(failed) => failed,
             };
+            lost.add(failed.usage);
             avoided.push(turn.replica);
             if effect == Effect::Elsewhere && self.services.has_other(request.model, &avoided) {
                 last = Some(failed);
                 continue;
             }
+            if lost.attempts > self.sending.paid_retries {
+                return Err(out_of_paid_retries(failed, lost).after(attempts, lost));
+            }
             let (delay, failed) = self.delay(request.model, failed, &mut tries);
             let Some(delay) = delay else {
-                return Err(failed.after(attempts));
+                return Err(failed.after(attempts, lost));
             };
             avoided.clear();
             let base = self.replicas[turn.replica].base();
@@ -377,6 +386,21 @@ impl Endpoint {
         );
         failed
     }
+}
+
+/// The failure of a request that was charged for as many attempts as `--paid-retries` allows.
+fn out_of_paid_retries(mut failed: FailedTry, lost: LostAttempts) -> FailedTry {
+    failed.failure.message = format!(
+        "{} ({} charged without a reply, {} tokens; remedies: a larger --max-tokens, --thinking off, or more --paid-retries)",
+        failed.failure.message,
+        if lost.attempts == 1 {
+            "1 attempt".to_owned()
+        } else {
+            format!("{} attempts", lost.attempts)
+        },
+        lost.usage.total().unwrap_or_default()
+    );
+    failed
 }
 
 /// A replica whose next turn is within this time takes a request now; chosen: shorter than a reply.

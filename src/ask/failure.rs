@@ -3,13 +3,15 @@
 use std::time::Duration;
 
 use super::field::AdaptableField;
-use crate::types::{Failure, FailureKind};
+use crate::types::{Failure, FailureKind, LostAttempts, Usage};
 
 /// The requests that a failure affects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reach {
     /// Only this request; another may succeed.
     Trial,
+    /// Every request of this size: without a reply so far, it is every further one to this model.
+    Alike,
     /// Every further request to this model: the cause is the key, credit, address, name or parameters.
     Endpoint,
     /// None: the run ended before the reply, and the request may not have been sent.
@@ -28,12 +30,16 @@ pub struct AskError {
     pub reach: Reach,
     /// The field that the server refused, if the program can change how it is sent.
     pub refused_field: Option<AdaptableField>,
+    /// The attempts that were charged.
+    pub lost: Box<LostAttempts>,
+    /// The word for the reason why the model stopped, if that is why there is no reply.
+    pub finish: Option<String>,
 }
 
 impl AskError {
     /// A failure without an HTTP status, which does not affect other questions.
     pub(super) fn new(kind: FailureKind, message: String, attempts: u32) -> Self {
-        FailedTry::new(kind, message).after(attempts)
+        FailedTry::new(kind, message).after(attempts, LostAttempts::default())
     }
 }
 
@@ -57,6 +63,10 @@ pub(super) struct FailedTry {
     pub(super) wait: Option<Duration>,
     /// The field that the server refused, if the program can change how it is sent.
     pub(super) refused_field: Option<AdaptableField>,
+    /// The tokens that it was charged; `None` if it was charged none, as far as is known.
+    pub(super) usage: Option<Usage>,
+    /// The word for the reason why the model stopped, if that is why there is no reply.
+    pub(super) finish: Option<String>,
 }
 
 impl FailedTry {
@@ -72,16 +82,20 @@ impl FailedTry {
             again: Again::Never,
             wait: None,
             refused_field: None,
+            usage: None,
+            finish: None,
         }
     }
 
-    /// The error of the question if this was the last of its `attempts` requests.
-    pub(super) fn after(self, attempts: u32) -> AskError {
+    /// The error of the question if this was the last of its `attempts` requests, some of which were charged.
+    pub(super) fn after(self, attempts: u32, lost: LostAttempts) -> AskError {
         AskError {
             failure: self.failure,
             attempts,
             reach: self.reach,
             refused_field: self.refused_field,
+            lost: Box::new(lost),
+            finish: self.finish,
         }
     }
 }

@@ -5,6 +5,7 @@ use super::failure::Reach;
 use super::field::{AdaptableField, FieldState, RequestField, SentFields, is_unsupported};
 use super::wire::other_wire;
 use super::wire_kind::Wire;
+use super::wording::Wording;
 use crate::types::FailureKind;
 
 /// The consequences of a refused request.
@@ -38,19 +39,6 @@ const NO_CREDIT_WORDS: [&str; 6] = [
     "out of credits",
 ];
 
-/// Codes and types of errors that every request would get, with any status.
-const PERMANENT: [&str; 6] = [
-    "invalid_api_key",
-    "authentication_error",
-    "model_not_found",
-    "DeploymentNotFound",
-    "account_deactivated",
-    "unsupported_country_region_territory",
-];
-
-/// LiteLLM's texts with status 400 for a wrong key, if it has no database of keys, and for an unknown model.
-const PERMANENT_WORDS: [&str; 2] = ["no connected db", "invalid model name passed in"];
-
 /// Codes and types that mean: moderation refused the content. Another question may be accepted.
 const MODERATED: [&str; 6] = [
     "DataInspectionFailed",
@@ -59,17 +47,6 @@ const MODERATED: [&str; 6] = [
     "content_policy_violation",
     "moderation_blocked",
     "data_inspection_failed",
-];
-
-/// The texts of OpenAI, vLLM, Ollama, llama.cpp (with status 500) and OpenRouter for an image sent to a text-only model.
-const NO_IMAGES: [&str; 7] = [
-    "image_url is only supported by certain models",
-    "is not a multimodal model",
-    "does not support image",
-    "does not support vision",
-    "image input is not enabled",
-    "image input is not supported",
-    "no endpoints found that support image input",
 ];
 
 /// The words of servers, with status 413 or 429, for a request that is larger than a whole minute's limit: no wait helps.
@@ -100,15 +77,22 @@ impl FailureClass {
         {
             return class;
         }
+        if status >= 400
+            && status != 401
+            && !no_credit
+            && let Some(wording) = Wording::find(complaint, sent.has_image)
+        {
+            return Self {
+                reach: wording.reach(),
+                ..Self::permanent(&wording.hint())
+            };
+        }
         match status {
             429 if no_credit => Self {
                 kind: FailureKind::RateLimit,
                 ..Self::permanent(ADD_CREDIT)
             },
             _ if no_credit => Self::permanent(ADD_CREDIT),
-            _ if sent.has_image && complaint.mentions_any(&NO_IMAGES) => Self::permanent(
-                "the model takes no images: choose another --model, or ask it without images with --blind",
-            ),
             300..400 => {
                 Self::permanent("redirects are not followed: give the final address as --base-url")
             }
@@ -118,9 +102,9 @@ impl FailureClass {
             401 => Self::permanent(
                 "check the key; it is taken from OPENAI_API_KEY (for Azure AZURE_OPENAI_API_KEY) unless --api-key-env or --api-key-file names another",
             ),
-            400.. if complaint.has_code(&PERMANENT) || complaint.mentions_any(&PERMANENT_WORDS) => {
-                Self::permanent("check the key, --model and --base-url")
-            }
+            407 => Self::permanent(
+                "the proxy asks for a user and password: set them in HTTP_PROXY, or name the host in NO_PROXY",
+            ),
             400..500
                 if complaint.has_code(&MODERATED) || (status == 403 && moderated(complaint)) =>
             {
@@ -130,7 +114,7 @@ impl FailureClass {
                 }
             }
             402 => Self::permanent(ADD_CREDIT),
-            403 | 407 => Self::permanent(
+            403 => Self::permanent(
                 "the key may not use this model from here: check the key and --model",
             ),
             404 | 410 => Self::permanent("check --base-url (many end with /v1) and --model"),

@@ -149,6 +149,7 @@ mod tests {
             prompt_tokens: Some(1_000_000),
             completion_tokens: Some(100_000),
             cached_tokens: None,
+            total_tokens: None,
         };
         assert!((price.charged(usage) - 3.5).abs() < 1e-12);
         // Half of the prompt from the cache, at half the price; a server cannot cache more than the prompt.

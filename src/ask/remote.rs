@@ -18,7 +18,7 @@ use super::request::Request;
 use super::service::ModelNumber;
 use super::vendor::Vendor;
 use crate::error::{Error, Result};
-use crate::types::{FailureKind, Reply};
+use crate::types::{FailureKind, LostAttempts, Reply};
 
 /// One model of an endpoint, asked with one set of parameters.
 #[derive(Debug)]
@@ -123,14 +123,19 @@ impl Remote {
             Scout::Waiting => {}
             Scout::Ended => {
                 drop(scout);
-                return self.ask_adapting(message, choices).await;
+                let outcome = self.ask_adapting(message, choices).await;
+                return outcome.map_err(|error| reaching(error, Reach::Trial));
             }
             Scout::Refused(error) => {
-                let (error, attempts) = (error.clone(), 0);
-                return Err(AskError { attempts, ..error });
+                return Err(AskError {
+                    attempts: 0,
+                    lost: Box::default(),
+                    ..error.clone()
+                });
             }
         }
         let outcome = self.ask_adapting(message, choices).await;
+        let outcome = outcome.map_err(|error| reaching(error, Reach::Endpoint));
         *scout = match &outcome {
             Err(error) if error.reach == Reach::Endpoint => Scout::Refused(error.clone()),
             Err(error) if error.reach == Reach::Interrupted => Scout::Waiting,
@@ -141,21 +146,27 @@ impl Remote {
 
     /// Asks, and again after each field that is adapted.
     async fn ask_adapting(&self, message: Message<'_>, choices: usize) -> Result<Reply, AskError> {
-        let mut attempts = 0;
+        let (mut attempts, mut lost) = (0, LostAttempts::default());
         loop {
             let fields = self.fields();
             match self.ask_with(fields, message, choices).await {
-                Err(error) if self.adapt(fields, error.refused_field) => attempts += error.attempts,
+                Err(error) if self.adapt(fields, error.refused_field) => {
+                    attempts += error.attempts;
+                    lost = lost.plus(*error.lost);
+                }
                 Err(error) => {
-                    let attempts = attempts + error.attempts;
-                    return Err(AskError { attempts, ..error });
+                    return Err(AskError {
+                        attempts: attempts + error.attempts,
+                        lost: Box::new(lost.plus(*error.lost)),
+                        ..error
+                    });
                 }
                 Ok(reply) => {
-                    let attempts = attempts + reply.attempts;
                     let text = self.letter_or_text(reply.text, choices);
                     return Ok(Reply {
                         text,
-                        attempts,
+                        attempts: attempts + reply.attempts,
+                        lost: lost.plus(reply.lost),
                         ..reply
                     });
                 }
@@ -290,6 +301,14 @@ impl Remote {
             }
             text
         })
+    }
+}
+
+/// The error, with this reach if requests like it fail alike.
+fn reaching(error: AskError, reach: Reach) -> AskError {
+    match error.reach {
+        Reach::Alike => AskError { reach, ..error },
+        _ => error,
     }
 }
 

@@ -7,7 +7,7 @@ use tokio::time::Instant;
 use tracing::debug;
 
 use super::access::Access;
-use super::complaint::{Complaint, UnreadableReply};
+use super::complaint::{Complaint, Unreadable, UnreadableReply};
 use super::connection::{Connection, Deadline, HttpReply};
 use super::failure::{Again, FailedTry, Reach};
 use super::failure_class::FailureClass;
@@ -19,7 +19,7 @@ use super::url::BaseUrl;
 use super::vendor::Vendor;
 use super::wire_kind::Wire;
 use crate::error::Result;
-use crate::types::{Failure, FailureKind, Reply};
+use crate::types::{Failure, FailureKind, Finish, Reply};
 
 /// One address of an endpoint: its key, pooled connections, and the pauses that it asked for.
 #[derive(Debug)]
@@ -115,11 +115,23 @@ impl Replica {
                 let code = complaint.status().unwrap_or(500);
                 self.refused_try(code, &complaint, &answer, request, sent)
             }
-            UnreadableReply::Other(what) => {
-                let what = self.connection.scrub.line(&what);
-                let message = format!("{} answered with {what}", self.base());
+            UnreadableReply::Other(unreadable) => {
+                let limit = request.sent.parameters.limit();
+                if let Some(reply) = cut_reply(&unreadable, limit) {
+                    return Ok(self.succeeded(reply, &answer, sent));
+                }
+                let Unreadable {
+                    what,
+                    usage,
+                    finish,
+                    is_final,
+                } = *unreadable;
+                let scrub = &self.connection.scrub;
+                let message = format!("{} answered with {}", self.base(), scrub.line(&what));
                 FailedTry {
-                    again: Again::Later,
+                    again: if is_final { Again::Never } else { Again::Later },
+                    usage,
+                    finish: finish.map(|word| scrub.line(&word)),
                     ..FailedTry::new(FailureKind::Response, message)
                 }
             }
@@ -179,6 +191,8 @@ impl Replica {
             again,
             wait,
             refused_field: class.refused_field,
+            usage: None,
+            finish: None,
         };
         self.pause(status, sent, &mut failed);
         failed
@@ -239,6 +253,18 @@ impl Replica {
     fn request_id(&self, answer: &HttpReply) -> String {
         self.connection.scrub.line(answer.header("x-request-id"))
     }
+}
+
+/// The reply that the token limit cut, if a body without a reply was charged as many tokens as that: another attempt would be cut,
+/// too.
+fn cut_reply(unreadable: &Unreadable, limit: Option<u32>) -> Option<Reply> {
+    let tokens = unreadable.usage?.completion_tokens?;
+    let is_cut = unreadable.finish.is_none() && tokens >= u64::from(limit?);
+    is_cut.then(|| Reply {
+        finish: Finish::Length,
+        usage: unreadable.usage,
+        ..Reply::local(String::new())
+    })
 }
 
 /// Whether a status means that the server accepts no request at the moment.

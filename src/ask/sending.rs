@@ -25,6 +25,9 @@ pub struct Sending {
     /// Retries after a temporary failure
     #[arg(long, value_name = "N", default_value_t = 5, add = Decides::Nothing)]
     pub retries: u32,
+    /// Retries of a trial after an attempt that was charged and gave no reply, in all calls together
+    #[arg(long, value_name = "N", default_value_t = 1, add = Decides::Nothing)]
+    pub paid_retries: u32,
     /// The wait before the first retry if the server asks for none. Each further wait doubles, and each is extended at random
     /// by up to its length.
     #[arg(skip = FIRST_DELAY)]
@@ -50,6 +53,7 @@ impl Default for Sending {
             quota: Quota::default(),
             timeout: Duration::from_mins(2),
             retries: 5,
+            paid_retries: 1,
             first_delay: FIRST_DELAY,
             patience: Duration::from_mins(30),
             max_wait: Duration::from_mins(2),

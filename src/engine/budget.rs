@@ -8,7 +8,7 @@ use crate::images::trial::{Item, Prompt, Trial};
 use crate::run_reports;
 use crate::store::StoredTrial;
 use crate::types::manifest::RunManifest;
-use crate::types::{ImageFacts, Usage, Via};
+use crate::types::{ImageFacts, LostAttempts, Usage, Via};
 
 /// Characters of English text per token, by the rule of thumb of every provider.
 const CHARACTERS_PER_TOKEN: f64 = 4.0;
@@ -100,8 +100,17 @@ impl Budget {
             highest_cost: None,
         };
         for record in stored {
-            let price = answering.price(money, &record.model);
-            let Some((price, usage)) = price.zip(record.usage()) else {
+            let Some(price) = answering.price(money, &record.model) else {
+                continue;
+            };
+            if let Some(lost) = record.lost() {
+                let share = match record.via {
+                    Via::Direct | Via::File => 1.0,
+                    Via::Batch => money.prices.batch,
+                };
+                budget.spent += share * price.charged(lost);
+            }
+            let Some(usage) = record.usage() else {
                 continue;
             };
             let dollars = price.charged(usage);
@@ -120,6 +129,15 @@ impl Budget {
             (Some(usage), _) => self.charge(model, usage),
             (None, Some(price)) => self.add(price.of(prompt, reply)),
             (None, None) => {}
+        }
+    }
+
+    /// Adds the cost of attempts without a reply.
+    pub(crate) fn record_lost(&mut self, model: usize, lost: LostAttempts) {
+        if let Some(price) = self.prices[model].filter(|_| !lost.is_none()) {
+            self.spent += price.charged(lost.usage);
+            let each = price.charged(lost.usage) / f64::from(lost.attempts);
+            self.highest_cost = Some(self.highest_cost.map_or(each, |highest| highest.max(each)));
         }
     }
 

@@ -1,5 +1,7 @@
 //! The asynchronous part: asks about the images from the pipeline, and stores every reply when it arrives.
 
+use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -16,6 +18,7 @@ use crate::engine::lanes::{Lanes, PreparedTrial};
 use crate::engine::measured_tokens::MeasuredTokens;
 use crate::engine::models::ModelUnderTest;
 use crate::engine::settings::JobSettings;
+use crate::engine::suspects::Suspects;
 use crate::engine::truncation::TruncationCheck;
 use crate::error::{Error, Result};
 use crate::images::image_pipeline::EnhancerStopper;
@@ -25,7 +28,7 @@ use crate::images::trial::{Item, PreparedGroup};
 use crate::images::workers::unstarted;
 use crate::score::record::answered;
 use crate::store::Store;
-use crate::types::{Failure, FailureKind, Reply};
+use crate::types::{Failure, FailureKind, Finish, Record, Reply};
 
 /// Number of finished groups that may wait until they are asked about.
 const GROUPS_AHEAD: usize = 2;
@@ -71,6 +74,8 @@ impl Dispatcher<'_> {
             store,
             bar: self.progress.trials(counts.trials, counts.answered),
             breaker: self.breaker(),
+            suspects: Suspects::default(),
+            not_asked: BTreeMap::new(),
             budget,
             stoppers,
             answered: counts.answered,
@@ -105,6 +110,10 @@ struct ReplySink<'a, I: Item> {
     store: &'a mut Store<I::Detail>,
     bar: StepBar,
     breaker: CircuitBreaker,
+    /// Images for which the server fails again and again.
+    suspects: Suspects,
+    /// Numbers of trials that were not asked for that, by frame or walk.
+    not_asked: BTreeMap<String, usize>,
     budget: Budget,
     stoppers: Vec<EnhancerStopper>,
     /// Number of trials with a reply, including those of earlier calls.
@@ -132,7 +141,7 @@ impl<I: Item> ReplySink<'_, I> {
         let mut grace = None;
         let mut more_groups = true;
         loop {
-            while let Some(ready) = lanes.next(|model| self.breaker.is_stopped(model)) {
+            while let Some(ready) = self.next(&mut lanes) {
                 if self.can_afford(&lanes, &ready) {
                     let model = &self.dispatcher.models[ready.trial.model];
                     in_flight.spawn(send(model.clone(), ready));
@@ -142,6 +151,12 @@ impl<I: Item> ReplySink<'_, I> {
             }
             if in_flight.is_empty() && !lanes.is_empty() {
                 self.breaker.over_budget();
+            }
+            if !more_groups && lanes.is_empty() && in_flight.is_empty() && lanes.has_aside() {
+                lanes.ask_aside();
+                self.suspects.asks_last();
+                self.breaker.asks_last();
+                continue;
             }
             let all_asked = !more_groups && lanes.is_empty() && in_flight.is_empty();
             if all_asked || self.breaker.stopped() {
@@ -182,8 +197,36 @@ impl<I: Item> ReplySink<'_, I> {
             self.stoppers.iter().for_each(EnhancerStopper::stop);
             self.drain(in_flight, interrupt, grace).await?;
         }
+        for (source, trials) in &self.not_asked {
+            tracing::warn!(
+                "{source}: {trials} of its trials were not asked: the server fails for this image again and again, and answers others; \
+                 leave it out, or send it smaller (--max-side)"
+            );
+        }
         self.store.sync()?;
         Ok(self.breaker.into_end())
+    }
+
+    /// The next trial. Those about an image for which the server fails again and again come last, and are not asked if it still does.
+    fn next(&mut self, lanes: &mut Lanes<'_, I>) -> Option<PreparedTrial<I>> {
+        let Self {
+            breaker,
+            suspects,
+            not_asked,
+            ..
+        } = self;
+        let not_asked = RefCell::new(not_asked);
+        lanes.next(
+            |trial| {
+                let is_given_up = suspects.is_given_up(trial.model, trial.item.source());
+                if is_given_up {
+                    let mut not_asked = not_asked.borrow_mut();
+                    *not_asked.entry(trial.item.source().to_owned()).or_default() += 1;
+                }
+                is_given_up || breaker.is_stopped(trial.model)
+            },
+            |trial| suspects.is_aside(trial.model, trial.item.source()),
+        )
     }
 
     /// Whether `--max-cost` allows a trial, which is counted in its lane already.
@@ -300,6 +343,8 @@ impl<I: Item> ReplySink<'_, I> {
             attempts: 0,
             reach: Reach::Trial,
             refused_field: None,
+            lost: Box::default(),
+            finish: None,
         };
         for ready in ready {
             self.store_result(Ok((ready, Err(error.clone()))))?;
@@ -348,9 +393,23 @@ impl<I: Item> ReplySink<'_, I> {
             Err(panic) => std::panic::resume_unwind(panic.into_panic()),
         };
         let trial = &ready.trial;
+        let lost = result
+            .as_ref()
+            .map_or_else(|error| *error.lost, |reply| reply.lost);
+        self.budget.record_lost(trial.model, lost);
         match &result {
-            Ok(_) => self.breaker.succeeded(trial.model),
+            Ok(_) => {
+                self.breaker.succeeded(trial.model);
+                self.suspects.succeeded(trial.model, trial.item.source());
+            }
             Err(error) => {
+                let source = trial.item.source();
+                if self.suspects.failed(trial.model, error, source) {
+                    tracing::warn!(
+                        "{source}: trials about it failed twice; the others about it are asked last ({})",
+                        error.failure.message
+                    );
+                }
                 self.breaker.failed(trial.model, error, trial.item.source());
                 // If the endpoint is the cause or the run ends, the trial does not count as asked.
                 if error.reach != Reach::Trial {
@@ -373,7 +432,11 @@ impl<I: Item> ReplySink<'_, I> {
         let blank = I::blank(&ready.trial, &ready.stimulus, &model.name);
         self.store.append(&match result {
             Ok(reply) => answered(blank, reply)?,
-            Err(error) => blank.failed_by(error.failure, error.attempts),
+            Err(error) => Record {
+                lost: *error.lost,
+                finish: error.finish.map(|word| Finish::Other(word).shortened()),
+                ..blank.failed_by(error.failure, error.attempts)
+            },
         })
     }
 }

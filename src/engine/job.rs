@@ -10,7 +10,7 @@ use crate::engine::experiment::{DetailOf, Experiment};
 use crate::engine::folder;
 use crate::engine::manifest;
 use crate::engine::measured_tokens::MeasuredTokens;
-use crate::engine::open_run::{OpenRun, answered, pipeline};
+use crate::engine::open_run::{OpenRun, answered, lost_for_good, pipeline};
 use crate::enhance::ModelFile;
 use crate::error::Result;
 use crate::images::enhancers::OpenEnhancers;
@@ -106,7 +106,8 @@ impl<'a, E: Experiment> Job<'a, E> {
         let experiment = self.experiment;
         let settings = experiment.settings();
         let stored = store::read_trials(&self.folder)?;
-        let answered = answered(&stored);
+        let mut answered = answered(&stored);
+        answered.extend(lost_for_good(&stored, settings));
         let (mut plans, mut measured) = (Vec::new(), Vec::new());
         for phase in 0..E::PHASES.len() {
             let mut plan = Plan::new(experiment.plan(phase, || store::read_records(&self.folder))?);

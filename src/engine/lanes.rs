@@ -20,6 +20,8 @@ struct Lane<I> {
     /// Indexes of the models.
     models: Vec<usize>,
     waiting: VecDeque<PreparedTrial<I>>,
+    /// Trials that are asked last.
+    aside: VecDeque<PreparedTrial<I>>,
     in_flight: usize,
     /// The budget does not allow its next trial now.
     is_held: bool,
@@ -49,6 +51,7 @@ impl<'a, I> Lanes<'a, I> {
                 lanes.push(Lane {
                     models: Vec::new(),
                     waiting: VecDeque::new(),
+                    aside: VecDeque::new(),
                     in_flight: 0,
                     is_held: false,
                 });
@@ -89,8 +92,13 @@ impl<'a, I> Lanes<'a, I> {
         }
     }
 
-    /// Takes the next trial of a lane that has room and is not held; trials of models that `is_stopped` names are dropped.
-    pub(crate) fn next(&mut self, is_stopped: impl Fn(usize) -> bool) -> Option<PreparedTrial<I>> {
+    /// Takes the next trial of a lane that has room and is not held; trials that `is_dropped` names are dropped, those that `is_aside`
+    /// names wait until [`Self::ask_aside`].
+    pub(crate) fn next(
+        &mut self,
+        is_dropped: impl Fn(&Trial<I>) -> bool,
+        is_aside: impl Fn(&Trial<I>) -> bool,
+    ) -> Option<PreparedTrial<I>> {
         for index in 0..self.all.len() {
             let lane = &self.all[index];
             if lane.is_held || lane.in_flight >= self.width(lane) {
@@ -98,13 +106,30 @@ impl<'a, I> Lanes<'a, I> {
             }
             let lane = &mut self.all[index];
             while let Some(ready) = lane.waiting.pop_front() {
-                if !is_stopped(ready.trial.model) {
-                    lane.in_flight += 1;
-                    return Some(ready);
+                if is_dropped(&ready.trial) {
+                    continue;
                 }
+                if is_aside(&ready.trial) {
+                    lane.aside.push_back(ready);
+                    continue;
+                }
+                lane.in_flight += 1;
+                return Some(ready);
             }
         }
         None
+    }
+
+    /// Whether trials were set aside.
+    pub(crate) fn has_aside(&self) -> bool {
+        self.all.iter().any(|lane| !lane.aside.is_empty())
+    }
+
+    /// Has the trials that were set aside wait as the others.
+    pub(crate) fn ask_aside(&mut self) {
+        for lane in &mut self.all {
+            lane.waiting.append(&mut lane.aside);
+        }
     }
 
     /// Puts back a trial that the budget does not allow now; its lane is held until something ends.

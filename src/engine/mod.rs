@@ -26,6 +26,7 @@ pub(crate) mod open_run;
 pub(crate) mod plan_costs;
 pub(crate) mod planned_images;
 pub(crate) mod settings;
+pub(crate) mod suspects;
 pub(crate) mod truncation;
 
 pub(crate) use job::Job;

@@ -128,6 +128,19 @@ impl<E: Experiment> OpenRun<'_, E> {
             answered = self::answered(&stored);
         }
         plan.exclude(|key| answered.contains(key));
+        let paid_for = lost_for_good(&stored, self.experiment.settings());
+        let not_again = plan.exclude(|key| paid_for.contains(key));
+        if not_again > 0 {
+            let (trials, were) = if not_again == 1 {
+                ("trial", "was")
+            } else {
+                ("trials", "were")
+            };
+            tracing::warn!(
+                "{not_again} {trials} not asked again: {were} charged for several attempts without a reply; asked again with more \
+                 --paid-retries, best with a larger --max-tokens in another folder"
+            );
+        }
         let sent = self.store.pending_in_batches()?;
         let in_batch = plan.exclude(|key| sent.contains(key));
         Ok(Remaining {
@@ -383,6 +396,18 @@ pub(crate) fn missing_notes<E: Experiment>(experiment: &E, folder: &Path) -> Res
     let thumbnails = MissingThumbnails::new(names, store::read_thumbnails(folder)?);
     let thumbnails = thumbnails.with_objects(&experiment.questions());
     Ok(MissingNotes::new(thumbnails, store::read_fidelity(folder)?))
+}
+
+/// Keys of the trials without a reply that were charged as often as `--paid-retries` allows.
+pub(crate) fn lost_for_good(stored: &[StoredTrial], settings: &JobSettings) -> HashSet<TrialKey> {
+    let servers = settings.ask.servers().into_iter();
+    let Some(most) = servers.map(|server| server.sending.paid_retries).max() else {
+        return HashSet::new();
+    };
+    let lost = stored
+        .iter()
+        .filter(|trial| trial.failed() && trial.lost_attempts() > most);
+    lost.map(|trial| trial.key).collect()
 }
 
 /// Keys of the trials that have a reply.

@@ -1,32 +1,86 @@
-//! The warning about replies that are cut at the token limit: [`TruncationCheck`].
+//! The warnings about replies that are cut at the token limit: [`TruncationCheck`].
 
 use crate::types::{Finish, Reply};
 
-/// Counts replies that the token limit cut before an answer. The first replies show whether the limit is too low.
+/// Counts replies that the token limit cut. A share that is large shows that the limit is too low.
 #[derive(Debug, Default)]
 pub(crate) struct TruncationCheck {
     replies: usize,
     cut: usize,
+    /// Replies that were cut before any text.
+    empty: usize,
+    has_warned: bool,
 }
 
 impl TruncationCheck {
-    /// Number of replies that are checked.
-    const CHECKED: usize = 10;
+    /// Number of replies at which those without any text are judged.
+    const FIRST: usize = 10;
 
-    /// Counts a reply, and warns if most of the first ones were cut.
+    /// Smallest number of replies at which all that were cut are judged; chosen.
+    const FEWEST: usize = 20;
+
+    /// Counts a reply, and warns once: if most of the first ones were cut before any text, or later if a quarter of all were cut.
     pub(crate) fn count(&mut self, reply: &Reply) {
-        if self.replies >= Self::CHECKED {
+        self.replies += 1;
+        if reply.finish == Finish::Length {
+            self.cut += 1;
+            self.empty += usize::from(reply.text.trim().is_empty());
+        }
+        if self.has_warned {
             return;
         }
-        self.replies += 1;
-        self.cut += usize::from(reply.finish == Finish::Length && reply.text.trim().is_empty());
-        if self.replies == Self::CHECKED && self.cut > Self::CHECKED / 2 {
+        if self.replies == Self::FIRST && self.empty > Self::FIRST / 2 {
+            self.has_warned = true;
             tracing::warn!(
                 "{} of the first {} replies were cut at the token limit before any text: a reasoning model needs a larger \
                  --max-tokens, or a lower --reasoning-effort",
+                self.empty,
+                self.replies
+            );
+        } else if self.is_large() {
+            self.has_warned = true;
+            tracing::warn!(
+                "{} of {} replies so far were cut at the token limit: a larger --max-tokens, or a lower --reasoning-effort, lets them end",
                 self.cut,
                 self.replies
             );
         }
+    }
+
+    /// Whether a quarter of at least [`Self::FEWEST`] replies were cut.
+    fn is_large(&self) -> bool {
+        self.replies >= Self::FEWEST && self.cut * 4 >= self.replies
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn after(replies: usize, is_cut: impl Fn(usize) -> bool) -> TruncationCheck {
+        let mut check = TruncationCheck::default();
+        for i in 0..replies {
+            let finish = if is_cut(i) {
+                Finish::Length
+            } else {
+                Finish::Stop
+            };
+            check.count(&Reply {
+                finish,
+                ..Reply::local("It is".into())
+            });
+        }
+        check
+    }
+
+    #[test]
+    fn a_quarter_of_cut_replies_is_said_whenever_it_is_reached() {
+        assert!(!after(19, |_| true).has_warned, "too few");
+        assert!(after(20, |i| i % 4 == 0).has_warned);
+        assert!(!after(400, |i| i % 5 == 0).has_warned);
+        assert!(
+            after(400, |i| i >= 290).has_warned,
+            "not the first ten alone"
+        );
     }
 }

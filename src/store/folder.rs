@@ -75,21 +75,28 @@ pub(super) fn write_manifest(folder: &Path, manifest: &RunManifest) -> Result<()
 /// The last record of each trial in a run folder, in the order of each trial's first record. An incomplete last line is
 /// skipped.
 pub(crate) fn read_records<D: Detail>(folder: &Path) -> Result<Vec<Record<D>>> {
-    last_of_each(folder, |record: &Record<D>| record.key, |_| ())
+    last_of_each(folder, |record: &Record<D>| record.key, |_| (), |_, _| ())
 }
 
 /// The last state of each trial in a run folder, in the order of [`read_records`].
 pub(crate) fn read_trials(folder: &Path) -> Result<Vec<StoredTrial>> {
     let mut models = Distinct::default();
     let share = |trial: &mut StoredTrial| models.share(&mut trial.model);
-    last_of_each(folder, |trial: &StoredTrial| trial.key, share)
+    last_of_each(
+        folder,
+        |trial: &StoredTrial| trial.key,
+        share,
+        StoredTrial::follow,
+    )
 }
 
-/// The last line of each key among the records, at the place of its first one, after `share` has seen it.
+/// The last line of each key among the records, at the place of its first one, after `share` has seen it, and `follow` the earlier
+/// lines of its key.
 fn last_of_each<T: StoredLine>(
     folder: &Path,
     key: impl Fn(&T) -> TrialKey,
     mut share: impl FnMut(&mut T),
+    follow: impl Fn(&mut T, &T),
 ) -> Result<Vec<T>> {
     let mut all: Vec<T> = Vec::new();
     each_line(&folder.join(RECORDS), |mut line: T| {
@@ -103,6 +110,10 @@ fn last_of_each<T: StoredLine>(
     let again = keys.chunk_by(|one, next| one.0 == next.0);
     for places in again.filter(|places| places.len() > 1) {
         let (first, last) = (places[0].1 as usize, places[places.len() - 1].1 as usize);
+        for (_, place) in &places[..places.len() - 1] {
+            let (earlier, later) = all.split_at_mut(last);
+            follow(&mut later[0], &earlier[*place as usize]);
+        }
         all.swap(first, last);
         for (_, place) in &places[1..] {
             is_repeated[*place as usize] = true;

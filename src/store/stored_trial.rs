@@ -4,9 +4,9 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 
 use crate::types::small_number::{SmallNumber, Tokens};
-use crate::types::{Shared, TrialKey, Usage, Via};
+use crate::types::{LostAttempts, Shared, TrialKey, Usage, Via};
 
-/// A trial of a run, without what was asked and what was answered: 48 bytes.
+/// A trial of a run, without what was asked and what was answered: 56 bytes.
 #[derive(Debug, Clone, Deserialize)]
 pub(crate) struct StoredTrial {
     pub(crate) key: TrialKey,
@@ -19,6 +19,8 @@ pub(crate) struct StoredTrial {
     usage: Tokens,
     #[serde(default)]
     latency_ms: SmallNumber,
+    /// The attempts that were charged and gave no reply, in all calls; few trials have any.
+    lost: Option<Box<LostAttempts>>,
 }
 
 impl StoredTrial {
@@ -32,6 +34,25 @@ impl StoredTrial {
         self.usage.usage()
     }
 
+    /// Number of attempts that were charged and gave no reply, in all calls.
+    pub(crate) fn lost_attempts(&self) -> u32 {
+        self.lost.as_ref().map_or(0, |lost| lost.attempts)
+    }
+
+    /// The tokens of these attempts; `None` if there are none.
+    pub(crate) fn lost(&self) -> Option<Usage> {
+        self.lost.as_ref().map(|lost| lost.usage)
+    }
+
+    /// Adds the attempts of an earlier record of the same trial. A reply is followed only by other readings of itself, which repeat its
+    /// attempts.
+    pub(super) fn follow(&mut self, earlier: &Self) {
+        if let Some(before) = earlier.lost.as_deref().filter(|_| earlier.failed()) {
+            let own = self.lost.as_deref().copied().unwrap_or_default();
+            self.lost = Some(Box::new(before.plus(own)));
+        }
+    }
+
     /// The duration of the last try, in milliseconds.
     pub(crate) fn latency_ms(&self) -> Option<u64> {
         self.latency_ms.get()
@@ -42,8 +63,26 @@ impl StoredTrial {
 mod tests {
     use super::*;
 
+    fn trial(failure: &str, attempts: u32) -> StoredTrial {
+        let lost = format!(
+            r#"{{"attempts":{attempts},"usage":{{"prompt_tokens":{attempts}00,"completion_tokens":null}}}}"#
+        );
+        let key = "0".repeat(32);
+        let line = format!(r#"{{"key":"{key}","model":"m","failure":{failure},"lost":{lost}}}"#);
+        serde_json::from_str(&line).unwrap()
+    }
+
     #[test]
-    fn a_trial_takes_48_bytes() {
-        assert_eq!(size_of::<StoredTrial>(), 48);
+    fn attempts_of_all_calls_are_added_once() {
+        let mut last = trial("null", 1);
+        last.follow(&trial("{}", 2));
+        last.follow(&trial("null", 1));
+        assert_eq!(last.lost_attempts(), 3, "another reading repeats its own");
+        assert_eq!(last.lost().unwrap().prompt_tokens, Some(300));
+    }
+
+    #[test]
+    fn a_trial_takes_56_bytes() {
+        assert_eq!(size_of::<StoredTrial>(), 56);
     }
 }

@@ -376,7 +376,7 @@ const OPEN_ADDITIONS: [Addition; 10] = [
 ];
 
 /// What changes no answer: given on the folder of a run, it asks nothing.
-const NOTHING: [&str; 41] = [
+const NOTHING: [&str; 42] = [
     "--max-pixels 1000000",
     "--threads 1",
     "--offline",
@@ -396,6 +396,7 @@ const NOTHING: [&str; 41] = [
     "--tpm 900000",
     "--timeout 60",
     "--retries 1",
+    "--paid-retries 2",
     "--max-wait 9",
     "--patience 60",
     "--max-image 3",

@@ -4,8 +4,8 @@ use std::time::{Duration, SystemTime};
 
 use reqwest::header::{DATE, HeaderMap, RETRY_AFTER};
 
-/// The wait that a server asks for in its headers: the longer of `retry-after-ms` and `Retry-After` in seconds (fractions too) or as a
-/// date. A date is compared with the server's clock if it sends `Date`. `None` without a header, for no wait, or in an unknown form.
+/// The wait that a server asks for in its headers: `retry-after-ms`, which the vendors' clients follow first, else `Retry-After` in
+/// seconds (fractions too) or as a date. A date is compared with the server's clock if it sends `Date`. `None` without a header, for no wait, or in an unknown form.
 pub(in crate::ask) fn asked_wait(headers: &HeaderMap, now: SystemTime) -> Option<Duration> {
     let text = |name: &str| headers.get(name)?.to_str().ok();
     let after = || text(RETRY_AFTER.as_str());
@@ -18,7 +18,7 @@ pub(in crate::ask) fn asked_wait(headers: &HeaderMap, now: SystemTime) -> Option
     };
     let exact = text("retry-after-ms").and_then(|ms| seconds(ms, 1e-3));
     let after = after().and_then(|after| seconds(after, 1.0)).or_else(until);
-    exact.max(after)
+    exact.or(after)
 }
 
 /// A duration as Google's services write it, `45.837906927s`.
@@ -53,8 +53,8 @@ mod tests {
             (vec![("retry-after", "2")], ms(2000)),
             (vec![("retry-after", " 0.25 ")], ms(250)),
             (
-                vec![("retry-after", "2"), ("retry-after-ms", "50")],
-                ms(2000),
+                vec![("retry-after", "30"), ("retry-after-ms", "1500")],
+                ms(1500),
             ),
             (vec![("retry-after", "0"), ("retry-after-ms", "50")], ms(50)),
             (

@@ -13,6 +13,8 @@ const ONE: ModelNumber = ModelNumber(0);
 
 fn failed(kind: FailureKind, status: Option<u16>, reach: Reach) -> FailedTry {
     FailedTry {
+        usage: None,
+        finish: None,
         failure: Failure {
             kind,
             status,

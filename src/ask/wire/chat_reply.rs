@@ -2,11 +2,13 @@
 
 use serde_json::Value;
 
-use super::json_body::{self, other};
+use super::finish_reason;
+use super::json_body;
 use super::logprobs;
 use super::stream;
-use crate::ask::complaint::{Complaint, UnreadableReply};
-use crate::types::{Finish, Reply, TokenChances, Usage};
+use super::usage;
+use crate::ask::complaint::{Complaint, Unreadable, UnreadableReply};
+use crate::types::{Finish, LostAttempts, Reply, TokenChances, Usage};
 
 /// Reads a body; `latency_ms` and `attempts` stay zero.
 ///
@@ -24,37 +26,40 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
     if let Some(complaint) = complaint {
         return Err(UnreadableReply::Complaint(Box::new(complaint)));
     }
-    let choice = choice(&completion)?;
+    let usage = usage::read(completion.get("usage"));
+    let charged = |what| Unreadable::new(what).charged(usage);
+    let choice = choice(&completion).map_err(charged)?;
     if let Some(error) = choice.get("error").filter(|error| !error.is_null()) {
         return Err(UnreadableReply::Complaint(Box::new(Complaint::of_error(
             error,
         ))));
     }
-    let reason = choice.get("finish_reason").and_then(Value::as_str);
-    if reason == Some("error") {
-        return Err(other(
-            "a reply that broke off: its finish_reason is \"error\"",
-        ));
-    }
+    let word = choice.get("finish_reason").and_then(Value::as_str);
+    let finish = finish_reason::read(word.unwrap_or_default(), usage)?;
     let message = choice
         .get("message")
         .filter(|message| message.is_object())
-        .ok_or_else(|| other("a choice without a message"))?;
-    let (text, refusal_part) = content(message.get("content"))?;
+        .ok_or_else(|| charged("a choice without a message"))?;
+    let (text, refusal_part) = content(message.get("content")).map_err(charged)?;
     let positions = logprobs::positions(choice.get("logprobs"));
     let chances = positions.map(|positions| TokenChances {
         positions,
         thought: logprobs::thought(message, completion.get("usage"), &text),
     });
     let refusal = message.get("refusal").and_then(Value::as_str);
+    let refusal = refusal
+        .filter(|words| !words.is_empty())
+        .map(str::to_owned)
+        .or(refusal_part);
+    let is_empty = text.is_empty() && refusal.is_none() && !logprobs::has_reasoning(message);
+    if is_empty && is_lost(&finish, usage) {
+        return Err(charged(LOST).into());
+    }
     Ok(Reply {
         text,
-        refusal: refusal
-            .filter(|words| !words.is_empty())
-            .map(str::to_owned)
-            .or(refusal_part),
-        finish: finish(reason),
-        usage: usage(completion.get("usage")),
+        refusal,
+        finish,
+        usage,
         served_model: completion
             .get("model")
             .and_then(Value::as_str)
@@ -66,6 +71,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
         endpoint: None,
         latency_ms: 0,
         attempts: 0,
+        lost: LostAttempts::default(),
         observed: None,
         chances,
     })
@@ -73,32 +79,35 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
 
 fn parsed(text: &str, content_type: &str) -> Result<Value, UnreadableReply> {
     if stream::is_stream(text, content_type) {
-        return stream::assemble(text)
-            .ok_or_else(|| other("an event stream without a complete chat completion"));
+        return stream::assemble(text).map_err(|usage| {
+            let what = "an event stream without a complete chat completion";
+            let usage = usage::read(usage.as_ref());
+            Unreadable::new(what).charged(usage).into()
+        });
     }
     json_body::parsed(text, content_type)
 }
 
 /// The choice with index 0, or the first one if none has it.
-fn choice(completion: &Value) -> Result<&Value, UnreadableReply> {
+fn choice(completion: &Value) -> Result<&Value, &'static str> {
     let choices = completion
         .get("choices")
         .and_then(Value::as_array)
-        .ok_or_else(|| other("JSON without choices"))?;
+        .ok_or("JSON without choices")?;
     choices
         .iter()
         .find(|choice| choice.get("index").and_then(Value::as_u64) == Some(0))
         .or(choices.first())
-        .ok_or_else(|| other("a completion with no choices in it"))
+        .ok_or("a completion with no choices in it")
 }
 
 /// The text of a message, and the text of a refusal among its parts.
-fn content(content: Option<&Value>) -> Result<(String, Option<String>), UnreadableReply> {
+fn content(content: Option<&Value>) -> Result<(String, Option<String>), &'static str> {
     let parts = match content {
         None | Some(Value::Null) => return Ok((String::new(), None)),
         Some(Value::String(text)) => return Ok((text.clone(), None)),
         Some(Value::Array(parts)) => parts,
-        Some(_) => return Err(other("a message whose content is neither text nor parts")),
+        Some(_) => return Err("a message whose content is neither text nor parts"),
     };
     let (mut text, mut refusal) = (String::new(), String::new());
     for part in parts {
@@ -114,35 +123,13 @@ fn content(content: Option<&Value>) -> Result<(String, Option<String>), Unreadab
     Ok((text, (!refusal.is_empty()).then_some(refusal)))
 }
 
-fn finish(reason: Option<&str>) -> Finish {
-    let reason = reason.unwrap_or_default();
-    match reason.to_ascii_lowercase().as_str() {
-        "" => Finish::Unknown,
-        "stop" | "eos" | "eos_token" | "end_turn" | "stop_sequence" => Finish::Stop,
-        "length" | "max_tokens" => Finish::Length,
-        // Claude stops with "refusal" if its classifiers do.
-        "content_filter" | "safety" | "refusal" => Finish::Filter,
-        _ => Finish::Other(reason.to_owned()),
-    }
-}
+/// The words for a reply that was lost.
+const LOST: &str = "an empty reply for which it counts no token, so that it was lost";
 
-fn usage(usage: Option<&Value>) -> Option<Usage> {
-    let tokens = |field| usage?.get(field)?.as_u64();
-    let details = || {
-        usage?
-            .get("prompt_tokens_details")?
-            .get("cached_tokens")?
-            .as_u64()
-    };
-    // OpenAI's place for it, and Anthropic's name.
-    let cached = details().or_else(|| tokens("cache_read_input_tokens"));
-    let cached = cached.filter(|cached| *cached > 0);
-    let usage = Usage {
-        prompt_tokens: tokens("prompt_tokens"),
-        completion_tokens: tokens("completion_tokens"),
-        cached_tokens: cached,
-    };
-    (usage != Usage::default()).then_some(usage)
+/// Whether a reply without content was lost on its way: it is called complete, and no token of it is counted.
+fn is_lost(finish: &Finish, usage: Option<Usage>) -> bool {
+    let tokens = usage.map(|usage| usage.completion_tokens);
+    matches!(finish, Finish::Stop | Finish::Unknown) && matches!(tokens, Some(Some(0)))
 }
 
 #[cfg(test)]
@@ -220,14 +207,13 @@ mod tests {
             (reply.finish, reply.usage, reply.served_model),
             (Finish::Unknown, None, None)
         );
-        for (reason, finish_) in [
+        for (reason, finish) in [
             ("STOP", Finish::Stop),
             ("MAX_TOKENS", Finish::Length),
             ("content_filter", Finish::Filter),
             ("refusal", Finish::Filter),
-            ("abort\u{7}", Finish::Other("abort".into())),
         ] {
-            assert_eq!(finish(Some(reason)).shortened(), finish_);
+            assert_eq!(finish_reason::read(reason, None), Ok(finish));
         }
     }
 
@@ -274,10 +260,56 @@ mod tests {
             ("<html><title>Welcome</title>", "text/html", "Welcome"),
             (&deep, "application/json", "not complete JSON"),
         ] {
-            let Err(UnreadableReply::Other(what)) = read(body.as_bytes(), content_type) else {
+            let Err(UnreadableReply::Other(found)) = read(body.as_bytes(), content_type) else {
                 panic!("{body}");
             };
-            assert!(what.contains(expected), "{what}");
+            assert!(found.what.contains(expected), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn an_empty_reply_without_tokens_was_lost() {
+        let body = |content: &str, finish: &str, usage: &str| {
+            format!(
+                r#"{{"choices":[{{"finish_reason":"{finish}","message":{{"content":{content},"refusal":null}}}}],"usage":{usage}}}"#
+            )
+        };
+        let none = r#"{"prompt_tokens":0,"completion_tokens":0}"#;
+        for usage in [none, r#"{"prompt_tokens":300,"completion_tokens":0}"#] {
+            for content in ["null", "\"\"", "[]"] {
+                let Err(UnreadableReply::Other(lost)) = json(&body(content, "stop", usage)) else {
+                    panic!("{content} {usage}");
+                };
+                assert!(lost.what.contains("lost") && !lost.is_final);
+            }
+        }
+        let ended = r#"{"prompt_tokens":300,"completion_tokens":1}"#;
+        assert!(
+            json(&body("null", "stop", ended)).is_ok(),
+            "the model said nothing"
+        );
+        assert!(json(&body("null", "length", none)).is_ok());
+        assert!(json(&body("\"B\"", "stop", none)).is_ok());
+    }
+
+    #[test]
+    fn tokens_of_a_body_without_a_reply_are_known() {
+        let usage = r#""usage":{"prompt_tokens":300,"completion_tokens":1024}"#;
+        for body in [
+            format!(r#"{{"choices":[],{usage}}}"#),
+            format!(
+                r#"{{"choices":[{{"finish_reason":"abort","message":{{"content":"A"}}}}],{usage}}}"#
+            ),
+            format!("data: {{\"choices\":[],{usage}}}\n\ndata: [DONE]\n\n"),
+        ] {
+            let Err(UnreadableReply::Other(found)) = json(&body) else {
+                panic!("{body}");
+            };
+            assert_eq!(
+                found.usage.and_then(|usage| usage.total()),
+                Some(1324),
+                "{body}"
+            );
         }
     }
 

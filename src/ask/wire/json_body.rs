@@ -4,12 +4,12 @@ use std::borrow::Cow;
 
 use serde_json::Value;
 
-use crate::ask::complaint::{UnreadableReply, page_title};
+use crate::ask::complaint::{Unreadable, UnreadableReply, page_title};
 use crate::ask::escapes;
 
 /// The reason why a body is not a reply, in words.
 pub(super) fn other(what: &str) -> UnreadableReply {
-    UnreadableReply::Other(what.to_owned())
+    Unreadable::new(what).into()
 }
 
 /// A body as text, without a byte order mark; invalid UTF-8 becomes replacement characters.
@@ -33,9 +33,7 @@ fn unreadable(text: &str, content_type: &str, error: &serde_json::Error) -> Unre
     if text.trim().is_empty() {
         return other("an empty body");
     }
-    UnreadableReply::Other(
-        page_title(text).unwrap_or_else(|| {
-            format!("{content_type:?} that is not complete JSON ({error}): {text}")
-        }),
-    )
+    let what = page_title(text)
+        .unwrap_or_else(|| format!("{content_type:?} that is not complete JSON ({error}): {text}"));
+    Unreadable::new(what).into()
 }

@@ -2,6 +2,7 @@
 
 use serde_json::Value;
 
+use super::usage;
 use crate::types::{Thought, TokenPosition};
 
 /// The number of positions that are kept; chosen: an answer stands at the beginning, behind the few tokens of a JSON field at most.
@@ -99,24 +100,25 @@ fn older(logprobs: &Value) -> Option<Vec<TokenPosition>> {
 
 /// Whether a message has reasoning: tokens of it in the usage, a text of it beside the content, parts of it, or marks in the text.
 pub(super) fn thought(message: &Value, usage: Option<&Value>, text: &str) -> Thought {
-    let filled = |field| message.get(field).is_some_and(is_filled);
-    let details = ["completion_tokens_details", "output_tokens_details"];
-    let tokens = details.iter().any(|details| {
-        let tokens = usage.and_then(|usage| usage.get(details)?.get("reasoning_tokens")?.as_u64());
-        tokens.is_some_and(|tokens| tokens > 0)
-    });
+    let tokens = usage.and_then(usage::reasoning) > Some(0);
     let parts = message.get("content").and_then(Value::as_array);
     let in_parts = parts.into_iter().flatten().any(|part| {
         let kind = part.get("type").and_then(Value::as_str);
         matches!(kind, Some("thinking" | "reasoning"))
     });
-    let marked = ["<think", "</think>", "<|channel|>"];
+    let marked = ["<think", "</think>", "<|channel", "<channel|>"];
     let in_text = marked.iter().any(|mark| text.contains(mark));
-    if tokens || in_parts || in_text || filled("reasoning_content") || filled("reasoning") {
+    if tokens || in_parts || in_text || has_reasoning(message) {
         Thought::Before
     } else {
         Thought::None
     }
+}
+
+/// Whether a message has reasoning beside its content.
+pub(super) fn has_reasoning(message: &Value) -> bool {
+    let mut fields = ["reasoning_content", "reasoning"].iter();
+    fields.any(|field| message.get(*field).is_some_and(is_filled))
 }
 
 /// Whether a field of reasoning says anything.

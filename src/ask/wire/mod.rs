@@ -6,6 +6,7 @@
 mod chat_fields;
 mod chat_reply;
 mod chat_request;
+mod finish_reason;
 mod image_places;
 mod json_body;
 mod logprobs;
@@ -13,6 +14,7 @@ mod refusal;
 mod responses_reply;
 mod responses_request;
 mod stream;
+mod usage;
 
 use reqwest::header::{AUTHORIZATION, HeaderMap, HeaderName, HeaderValue};
 use serde_json::Value;
@@ -26,7 +28,7 @@ use super::parameters::Parameters;
 use super::secret::Secret;
 use super::wire_kind::Wire;
 use crate::error::{Error, Result};
-use crate::types::Reply;
+use crate::types::{Reply, Usage};
 
 pub(super) use refusal::other_wire;
 
@@ -102,6 +104,12 @@ pub(super) fn batch_reply(body: &str) -> Result<Reply, UnreadableReply> {
         Wire::Chat
     };
     wire.reply(body.as_bytes(), "application/json")
+}
+
+/// The tokens that a body in a batch's file was charged; `None` if it does not say.
+pub(super) fn batch_usage(body: &str) -> Option<Usage> {
+    let body: Value = serde_json::from_str(body).ok()?;
+    usage::read(body.get("usage"))
 }
 
 /// The header with the key, as OpenAI and Azure expect it.

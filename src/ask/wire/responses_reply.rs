@@ -2,11 +2,13 @@
 
 use serde_json::Value;
 
+use super::finish_reason;
 use super::json_body::{self, other};
 use super::logprobs;
 use super::stream;
-use crate::ask::complaint::{Complaint, UnreadableReply};
-use crate::types::{Finish, Reply, Thought, TokenChances, Usage};
+use super::usage;
+use crate::ask::complaint::{Complaint, Unreadable, UnreadableReply};
+use crate::types::{Finish, LostAttempts, Reply, Thought, TokenChances, Usage};
 
 /// Reads a body; `latency_ms` and `attempts` stay zero.
 ///
@@ -26,18 +28,26 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
     if let Some(complaint) = complaint {
         return Err(UnreadableReply::Complaint(Box::new(complaint)));
     }
-    let finish = finish(&response)?;
+    let usage = usage::read(response.get("usage"));
+    let finish = finish(&response, usage)?;
     let items = response
         .get("output")
         .and_then(Value::as_array)
-        .ok_or_else(|| other("JSON without output"))?;
+        .ok_or_else(|| Unreadable::new("JSON without output").charged(usage))?;
+    // Tokens without any item: the answer was dropped on its way.
+    let has_tokens = usage.is_some_and(|usage| usage.completion_tokens > Some(0));
+    if items.is_empty() && finish == Finish::Stop && has_tokens {
+        return Err(Unreadable::new("a response without an output")
+            .charged(usage)
+            .into());
+    }
     let (text, refusal) = words(items);
     let chances = chances(items, &response, &text);
     Ok(Reply {
         text,
         refusal: Some(refusal).filter(|words| !words.is_empty()),
         finish,
-        usage: usage(response.get("usage")),
+        usage,
         served_model: response
             .get("model")
             .and_then(Value::as_str)
@@ -48,6 +58,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
             .map(str::to_owned),
         latency_ms: 0,
         attempts: 0,
+        lost: LostAttempts::default(),
         endpoint: None,
         observed: None,
         chances,
@@ -71,7 +82,7 @@ fn ended(stream: &str) -> Option<Value> {
 }
 
 /// The reason why the model stopped. A response that is not at its end is no reply.
-fn finish(response: &Value) -> Result<Finish, UnreadableReply> {
+fn finish(response: &Value, usage: Option<Usage>) -> Result<Finish, UnreadableReply> {
     let text = |value: Option<&Value>| value.and_then(Value::as_str).map(str::to_owned);
     let status = text(response.get("status")).unwrap_or_default();
     match &*status {
@@ -80,13 +91,16 @@ fn finish(response: &Value) -> Result<Finish, UnreadableReply> {
         "incomplete" => {
             let details = response.get("incomplete_details");
             let reason = text(details.and_then(|details| details.get("reason")));
-            Ok(match reason.as_deref() {
-                Some("max_output_tokens" | "max_tokens") => Finish::Length,
-                Some("content_filter") => Finish::Filter,
-                reason => Finish::Other(reason.unwrap_or("incomplete").to_owned()),
-            })
+            Ok(finish_reason::read(
+                reason.as_deref().unwrap_or("incomplete"),
+                usage,
+            )?)
         }
-        status => Err(other(&format!("a response whose status is {status:?}"))),
+        status => Err(
+            Unreadable::new(format!("a response whose status is {status:?}"))
+                .charged(usage)
+                .into(),
+        ),
     }
 }
 
@@ -123,20 +137,6 @@ fn words(items: &[Value]) -> (String, String) {
         }
     }
     (text, refusal)
-}
-
-fn usage(usage: Option<&Value>) -> Option<Usage> {
-    let tokens = |field| usage?.get(field)?.as_u64();
-    let cached = || {
-        let details = usage?.get("input_tokens_details")?;
-        details.get("cached_tokens")?.as_u64()
-    };
-    let usage = Usage {
-        prompt_tokens: tokens("input_tokens"),
-        completion_tokens: tokens("output_tokens"),
-        cached_tokens: cached().filter(|cached| *cached > 0),
-    };
-    (usage != Usage::default()).then_some(usage)
 }
 
 #[cfg(test)]
@@ -191,10 +191,6 @@ mod tests {
                 r#""status":"incomplete","incomplete_details":{"reason":"content_filter"},"#,
                 Finish::Filter,
             ),
-            (
-                r#""status":"incomplete","incomplete_details":null,"#,
-                Finish::Other("incomplete".into()),
-            ),
         ] {
             let reply = json(&format!(r#"{{{status}"output":[]}}"#)).unwrap();
             assert_eq!(reply.finish, finish, "{status}");
@@ -205,6 +201,14 @@ mod tests {
     fn what_is_no_whole_response_is_described() {
         for (body, expected) in [
             (r#"{"status":"in_progress","output":[]}"#, "in_progress"),
+            (
+                r#"{"status":"incomplete","output":[]}"#,
+                "\"incomplete\" is not known",
+            ),
+            (
+                r#"{"status":"completed","output":[],"usage":{"output_tokens":9}}"#,
+                "without an output",
+            ),
             (r#"{"choices":[]}"#, "without output"),
             ("", "empty"),
             (
@@ -212,10 +216,10 @@ mod tests {
                 "without a complete response",
             ),
         ] {
-            let Err(UnreadableReply::Other(what)) = json(body) else {
+            let Err(UnreadableReply::Other(found)) = json(body) else {
                 panic!("{body}");
             };
-            assert!(what.contains(expected), "{what}");
+            assert!(found.what.contains(expected), "{found:?}");
         }
         for body in [
             r#"{"status":"failed","error":{"code":"server_error","message":"m"},"output":[]}"#,

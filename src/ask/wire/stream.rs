@@ -21,16 +21,19 @@ pub(super) fn events(stream: &str) -> impl Iterator<Item = Value> {
 }
 
 /// The completion that the pieces of the choice with index 0 make, in the form of `chat_reply`. An event with an error is
-/// returned unchanged. `None` if the stream is not a chat completion, or ended without a finish reason: then it was cut.
-pub(super) fn assemble(stream: &str) -> Option<Value> {
+/// returned unchanged.
+///
+/// # Errors
+/// If the stream is not a chat completion, or ended without a finish reason: then it was cut. The error is the usage, if it came.
+pub(super) fn assemble(stream: &str) -> Result<Value, Option<Value>> {
     let mut completion = Map::new();
     let mut pieces = Pieces::default();
     for event in events(stream) {
         if event.is_null() {
-            return None;
+            return Err(completion.remove("usage"));
         }
         if let Some(error) = error(&event) {
-            return Some(error);
+            return Ok(error);
         }
         for field in ["model", "provider", "usage"] {
             if let Some(value) = event.get(field).filter(|value| !value.is_null()) {
@@ -42,13 +45,18 @@ pub(super) fn assemble(stream: &str) -> Option<Value> {
         if let Some(choice) = choices.and_then(|choices| choices.iter().find(first)) {
             // Some gateways state an error in the choice.
             if choice.get("error").is_some_and(|error| !error.is_null()) {
-                return Some(event);
+                return Ok(event);
             }
             pieces.add(choice);
         }
     }
-    completion.insert("choices".to_owned(), json!([pieces.joined()?]));
-    Some(Value::Object(completion))
+    match pieces.joined() {
+        Some(choice) => {
+            completion.insert("choices".to_owned(), json!([choice]));
+            Ok(Value::Object(completion))
+        }
+        None => Err(completion.remove("usage")),
+    }
 }
 
 /// An event that states an error, in the form of a body that does; `None` if it states none.
@@ -150,17 +158,20 @@ mod tests {
             "model": "m", "usage": {"prompt_tokens": 3},
             "choices": [{"index": 0, "message": {"content": "B.", "reasoning_content": "A"}, "finish_reason": "stop"}],
         });
-        assert_eq!(assemble(stream), Some(expected));
+        assert_eq!(assemble(stream), Ok(expected));
     }
 
     #[test]
     fn an_incomplete_stream_is_refused() {
         let piece = "data: {\"choices\":[{\"index\":0,\"delta\":{\"content\":\"B\"}}]}\n\n";
-        assert_eq!(assemble(piece), None);
-        assert_eq!(assemble(&format!("{piece}data: {{\"choi")), None);
-        assert_eq!(assemble(&format!("{piece}data: [DONE]")), None);
-        assert_eq!(assemble("data: [DONE]\n\n"), None);
-        assert_eq!(assemble(": keep-alive\n\n"), None);
+        assert_eq!(assemble(piece), Err(None));
+        let usage = "data: {\"choices\":[],\"usage\":{\"prompt_tokens\":3}}\n\n";
+        let cut = assemble(&format!("{piece}{usage}data: [DONE]"));
+        assert_eq!(cut, Err(Some(json!({"prompt_tokens": 3}))));
+        assert_eq!(assemble(&format!("{piece}data: {{\"choi")), Err(None));
+        assert_eq!(assemble(&format!("{piece}data: [DONE]")), Err(None));
+        assert_eq!(assemble("data: [DONE]\n\n"), Err(None));
+        assert_eq!(assemble(": keep-alive\n\n"), Err(None));
         let error = "data: {\"error\":{\"message\":\"overloaded\"}}\n\n";
         assert_eq!(
             assemble(&format!("{piece}{error}")).unwrap()["error"]["message"],

@@ -74,7 +74,11 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
         let blank = blank.clone().batched();
         let reply = match line.result {
             Ok(reply) => reply,
-            Err(failure) => return self.store_failure(blank, failure),
+            Err(failure) => {
+                let mut blank = blank;
+                blank.lost.add(line.charged);
+                return self.store_failure(blank, failure);
+            }
         };
         self.counts.answered += 1;
         let constrain = constrain(self.manifest, &blank.model)?;

@@ -34,6 +34,7 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
     let mut alerts = of_runs(combined);
     alerts.extend(of_joining(combined));
     alerts.extend(replies::of_replies(&findings.health, "count as wrong"));
+    alerts.extend(replies::of_broken_off(combined));
     alerts.extend(replies::of_people(combined));
     alerts.extend(readings::of_readings(combined));
     alerts.extend(confidence::of_confidence(&combined.runs, &combined.trials));
@@ -57,6 +58,7 @@ pub(super) fn alerts_without_truths(combined: &Combined, found: &SelfAgreement<'
     let mut alerts = of_runs(combined);
     alerts.extend(of_joining(combined));
     alerts.extend(replies::of_replies(&found.health, "do not agree"));
+    alerts.extend(replies::of_broken_off(combined));
     alerts.extend(readings::of_readings(combined));
     alerts.extend(constraints::of_constraints(
         &combined.runs,

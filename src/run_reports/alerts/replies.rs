@@ -7,7 +7,7 @@ use crate::report::words::counted;
 use crate::run_reports::combine::Combined;
 use crate::run_reports::settings::is_of_people;
 use crate::score::health::Health;
-use crate::types::UnreadReason;
+use crate::types::{TrialRef, UnreadReason};
 
 /// Replies that could not be read, with what they count as, and trials without a reply.
 pub(super) fn of_replies(health: &[Health], unread_as: &str) -> Vec<Alert> {
@@ -67,6 +67,23 @@ fn in_condition(health: &Health, unread_as: &str) -> String {
         subject.model,
         subject.condition()
     )
+}
+
+/// Generations that broke off, by the server's word for the reason.
+pub(super) fn of_broken_off(combined: &Combined) -> Option<Alert> {
+    let mut counts = BTreeMap::<&str, usize>::new();
+    for word in combined.trials.iter().filter_map(TrialRef::broken_off) {
+        *counts.entry(word).or_default() += 1;
+    }
+    let words = counts.iter();
+    let words: Vec<String> = words
+        .map(|(word, count)| format!("{word} ({})", counted(*count, "trial")))
+        .collect();
+    let text = format!(
+        "The server ended replies without finishing them, with the finish_reason {}: they are not scored.",
+        words.join(", ")
+    );
+    (!words.is_empty()).then(|| Alert::new(AlertKind::Failed, text))
 }
 
 /// Answers of people that are no choice of their question.

@@ -11,7 +11,7 @@ use darkqa_ground::types::{
 
 /// A detail that takes the answer from a reply.
 pub trait Detail: StoredDetail {
-    /// Version of the rules by which answers are read, as `lenient/3`; `None` if no choice is read.
+    /// Version of the rules by which answers are read, as `lenient/4`; `None` if no choice is read.
     const REPLY_READING: Option<&'static str>;
 
     /// Reads the answer from a reply into the detail; a stored reply can be read again.
@@ -77,6 +77,7 @@ pub fn answered<D: Detail>(mut record: Record<D>, reply: Reply) -> Result<Record
     record.endpoint = reply.endpoint;
     record.latency_ms = Some(reply.latency_ms);
     record.attempts = reply.attempts;
+    record.lost = reply.lost;
     Ok(record)
 }
 

@@ -48,7 +48,6 @@ fn what_may_pass_is_tried_again() {
         ),
         ("no byte", Answer::dropped()),
         ("half a head", Answer::raw("HTTP/1.1 200 OK\r\nconten")),
-        ("no HTTP", Answer::raw("SSH-2.0-OpenSSH_9.6\r\n")),
         ("half a body", Answer::text("B").cut(20)),
         (
             "half a chunk",

@@ -11,7 +11,7 @@ use super::option_probabilities::OptionProbabilities;
 use super::pair_facts::PairFacts;
 use super::question::{Answer, Family, QuestionId, UnreadReason};
 use super::record::{Failure, Record, Via, View};
-use super::reply::{Finish, Usage};
+use super::reply::{Finish, LostAttempts, Usage};
 use super::trial_key::TrialKey;
 
 /// Declares a detail, and the line of a record with it. serde's `flatten` would take a quarter more time to read a line,
@@ -46,6 +46,8 @@ macro_rules! details {
             endpoint: Option<usize>,
             latency_ms: Option<u64>,
             attempts: u32,
+            #[serde(default)]
+            lost: LostAttempts,
             $($(#[$meta])* $field: $type,)+
         }
 
@@ -68,6 +70,7 @@ macro_rules! details {
                     endpoint: line.endpoint,
                     latency_ms: line.latency_ms,
                     attempts: line.attempts,
+                    lost: line.lost,
                     detail: $name { $($field: line.$field,)+ },
                 }
             }

@@ -9,7 +9,7 @@ use super::condition::Condition;
 use super::condition_columns::ConditionColumns;
 use super::digest::Digest;
 use super::question::QuestionId;
-use super::reply::{Finish, Usage};
+use super::reply::{Finish, LostAttempts, Usage};
 use super::trial_key::TrialKey;
 use super::trials::AskedParts;
 
@@ -31,7 +31,7 @@ pub struct Record<D> {
     pub reply: Option<String>,
     /// The text of a refusal that the server sent separately from the reply.
     pub refusal: Option<String>,
-    /// The reason why the model stopped; `None` if no reply came.
+    /// The reason why the model stopped; `None` if no reply came, except for an attempt that broke off.
     pub finish: Option<Finish>,
     /// The way in which the model was asked; not in the file if it was asked directly.
     #[serde(skip_serializing_if = "Via::is_direct")]
@@ -52,6 +52,9 @@ pub struct Record<D> {
     pub latency_ms: Option<u64>,
     /// The number of requests that were sent.
     pub attempts: u32,
+    /// The attempts that were charged and gave no reply; not in the file if there were none.
+    #[serde(skip_serializing_if = "LostAttempts::is_none")]
+    pub lost: LostAttempts,
     /// The fields that the experiment adds.
     #[serde(flatten)]
     pub detail: D,
@@ -140,6 +143,7 @@ impl<D> Record<D> {
             endpoint: None,
             latency_ms: None,
             attempts: 0,
+            lost: LostAttempts::default(),
             detail,
         }
     }

@@ -48,6 +48,9 @@ pub struct Usage {
     /// The number of tokens of the prompt that the server had in its cache, which may cost less.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cached_tokens: Option<u64>,
+    /// The total as the server stated it; not in the file if it stated none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub total_tokens: Option<u64>,
 }
 
 impl Usage {
@@ -57,6 +60,55 @@ impl Usage {
         let (prompt, completion) = (self.prompt_tokens, self.completion_tokens);
         (prompt.is_some() || completion.is_some())
             .then(|| prompt.unwrap_or(0).saturating_add(completion.unwrap_or(0)))
+    }
+
+    /// The tokens of both; a number is unknown if neither has it.
+    #[must_use]
+    pub fn plus(self, more: Self) -> Self {
+        let sum = |one: Option<u64>, other: Option<u64>| match (one, other) {
+            (Some(one), Some(other)) => Some(one.saturating_add(other)),
+            (one, other) => one.or(other),
+        };
+        Self {
+            prompt_tokens: sum(self.prompt_tokens, more.prompt_tokens),
+            completion_tokens: sum(self.completion_tokens, more.completion_tokens),
+            cached_tokens: sum(self.cached_tokens, more.cached_tokens),
+            total_tokens: sum(self.total_tokens, more.total_tokens),
+        }
+    }
+}
+
+/// Attempts that were charged and gave no reply, with their tokens.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct LostAttempts {
+    /// The number of attempts.
+    pub attempts: u32,
+    /// The tokens of all of them.
+    pub usage: Usage,
+}
+
+impl LostAttempts {
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        self.attempts == 0
+    }
+
+    /// Adds an attempt without a reply; one that was not charged does not count.
+    pub fn add(&mut self, usage: Option<Usage>) {
+        if let Some(usage) = usage.filter(|usage| usage.total().is_some_and(|tokens| tokens > 0)) {
+            self.attempts += 1;
+            self.usage = self.usage.plus(usage);
+        }
+    }
+
+    /// All attempts of both.
+    #[must_use]
+    pub fn plus(self, more: Self) -> Self {
+        Self {
+            attempts: self.attempts.saturating_add(more.attempts),
+            usage: self.usage.plus(more.usage),
+        }
     }
 }
 
@@ -81,6 +133,8 @@ pub struct Reply {
     pub latency_ms: u64,
     /// The number of requests that were sent.
     pub attempts: u32,
+    /// The attempts before it that were charged and gave no reply.
+    pub lost: LostAttempts,
     /// What the observer saw; `None` for every other model.
     pub observed: Option<Observed>,
     /// The likeliest tokens; `None` if the server was not asked for them or stated none.
@@ -101,6 +155,7 @@ impl Reply {
             endpoint: None,
             latency_ms: 0,
             attempts: 1,
+            lost: LostAttempts::default(),
             observed: None,
             chances: None,
         }

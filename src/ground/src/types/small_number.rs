@@ -64,6 +64,7 @@ impl Tokens {
             prompt_tokens: self.prompt.get(),
             completion_tokens: self.completion.get(),
             cached_tokens: self.cached.get(),
+            total_tokens: None,
         };
         (usage != Usage::default()).then_some(usage)
     }
@@ -86,6 +87,7 @@ mod tests {
             prompt_tokens: Some(1200),
             completion_tokens: None,
             cached_tokens: Some(0),
+            total_tokens: None,
         };
         assert_eq!(Tokens::from(Some(usage)).usage(), Some(usage));
         assert_eq!(Tokens::from(None).usage(), None);

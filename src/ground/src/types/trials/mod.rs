@@ -31,7 +31,7 @@ use values::Values;
 use crate::error::Error;
 
 use super::record::{Record, StoredDetail};
-use super::{ChoiceDetail, Condition, Distinct, Family, FrameId, QuestionId, TrialKey};
+use super::{ChoiceDetail, Condition, Distinct, Family, Finish, FrameId, QuestionId, TrialKey};
 
 /// Trials with what they refer to.
 #[derive(Debug, Clone)]
@@ -93,11 +93,16 @@ impl<D: StoredDetail> Trials<D> {
             condition: record.condition,
         });
         let failure = record.failure.map(|failure| (failure.kind, failure.status));
+        let broken_off = match record.finish {
+            Some(Finish::Other(word)) if failure.is_some() => Some(word),
+            _ => None,
+        };
         let ending = self.endings.number(Ending {
             served_model: record.served_model,
             provider: record.provider,
             via: record.via,
             failure,
+            broken_off,
             attempts: record.attempts,
         });
         self.keys.push(record.key);

@@ -129,6 +129,12 @@ impl<'t, D: StoredDetail> TrialRef<'t, D> {
         self.ending().failure
     }
 
+    /// The server's word for the reason why the last attempt broke off; `None` for other failures and for replies.
+    #[must_use]
+    pub fn broken_off(self) -> Option<&'t str> {
+        self.ending().broken_off.as_deref()
+    }
+
     /// Whether a reply or a refusal came.
     #[must_use]
     pub fn has_reply(self) -> bool {

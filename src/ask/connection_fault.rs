@@ -1,0 +1,109 @@
+//! The cause of a connection that cannot be made, from the words of the HTTP client: [`permanent_cause`].
+
+/// Words of causes that another try does not remove, with what to do.
+const CAUSES: [(&[&str], &str); 7] = [
+    (
+        &["UnknownIssuer", "self-signed", "self signed"],
+        "its certificate is signed by an authority that is not trusted; name that authority, or the certificate itself, with --ca-file",
+    ),
+    (
+        &["CaUsedAsEndEntity"],
+        "its certificate is that of an authority (CA:TRUE) and is not trusted; name it with --ca-file, or make one with \
+         basicConstraints=CA:FALSE",
+    ),
+    (
+        &[
+            "certificate expired",
+            "certificate not valid yet",
+            "NotValidYet",
+            "Expired",
+        ],
+        "its certificate is not valid at the time of this machine; renew it, or set the clock",
+    ),
+    (
+        &["NotValidForName", "certificate not valid for name"],
+        "its certificate is for another host name; use the name in the certificate as --base-url",
+    ),
+    (
+        &["invalid peer certificate"],
+        "its certificate is rejected; make another one, or name the authority with --ca-file",
+    ),
+    (
+        &[
+            "proxy authorization required",
+            "proxy authentication required",
+        ],
+        "the proxy asks for a user and password: set them in HTTPS_PROXY, or name the host in NO_PROXY",
+    ),
+    (
+        &["InvalidContentType", "corrupt message"],
+        "the server speaks plain http at this port; use http:// in --base-url",
+    ),
+];
+
+/// Words for a server that speaks TLS where plain HTTP was sent.
+const TLS_EXPECTED: [&str; 2] = ["invalid HTTP version parsed", "received invalid HTTP"];
+
+/// The remedy for a failure to connect that another try does not remove; `None` for others. `is_plain` if http:// was used.
+pub(super) fn permanent_cause(text: &str, is_plain: bool) -> Option<&'static str> {
+    if is_plain {
+        let is_tls = TLS_EXPECTED.iter().any(|words| text.contains(words));
+        return is_tls.then_some(
+            "the server does not answer in plain http at this port; if it speaks TLS, use https:// in --base-url",
+        );
+    }
+    let mut causes = CAUSES.iter();
+    let found = causes.find(|(words, _)| words.iter().any(|words| text.contains(words)));
+    found.map(|(_, remedy)| *remedy)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn causes_that_stay_have_a_remedy() {
+        for (text, is_plain, remedy) in [
+            (
+                "invalid peer certificate: UnknownIssuer",
+                false,
+                "--ca-file",
+            ),
+            (
+                "invalid peer certificate: Other(OtherError(CaUsedAsEndEntity))",
+                false,
+                "CA:FALSE",
+            ),
+            (
+                "invalid peer certificate: certificate expired: x",
+                false,
+                "clock",
+            ),
+            (
+                "client error (Connect): proxy authorization required",
+                false,
+                "HTTPS_PROXY",
+            ),
+            (
+                "received corrupt message of type InvalidContentType",
+                false,
+                "http://",
+            ),
+            (
+                "client error: invalid HTTP version parsed",
+                true,
+                "https://",
+            ),
+        ] {
+            let cause = permanent_cause(text, is_plain).unwrap();
+            assert!(cause.contains(remedy), "{text}: {cause}");
+        }
+        for text in [
+            "tcp connect error: Connection refused",
+            "connection reset by peer",
+        ] {
+            assert_eq!(permanent_cause(text, false), None);
+            assert_eq!(permanent_cause(text, true), None);
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! The tokens that a server charged, in the shapes in which servers state them: [`read`].
+
+use serde_json::Value;
+
+use crate::types::Usage;
+
+/// Reads a `usage` of chat completions (`prompt_tokens`, `completion_tokens`) or of responses (`input_tokens`, `output_tokens`).
+///
+/// Some servers leave reasoning out of the tokens of the reply and charge it (xAI, Gemini's compatible route). So the tokens of the
+/// reply are the largest number that the usage supports: those stated, the total less the prompt, or their sum with a reasoning
+/// that cannot be among them because it is longer. `None` if no number is stated.
+pub(super) fn read(usage: Option<&Value>) -> Option<Usage> {
+    let usage = usage?;
+    let stated = |names: [&str; 2]| names.iter().find_map(|name| number(usage.get(*name)?));
+    let prompt = stated(["prompt_tokens", "input_tokens"]);
+    let completion = stated(["completion_tokens", "output_tokens"]);
+    let total = number_in(usage, "total_tokens");
+    // OpenAI's place for it, and Anthropic's name.
+    let cached = detail(usage, PROMPT_DETAILS, "cached_tokens");
+    let written = number_in(usage, "cache_creation_input_tokens").unwrap_or(0);
+    let read = number_in(usage, "cache_read_input_tokens");
+    // Anthropic counts what was in its cache, or is put there, apart from the prompt.
+    let apart = read.unwrap_or(0).saturating_add(written);
+    let is_apart = apart > 0 && sum([prompt, completion, Some(apart)]) == total;
+    let prompt = prompt.map(|prompt| prompt + if is_apart { apart } else { 0 });
+    let outside = reasoning(usage).filter(|reasoning| completion.is_some_and(|c| *reasoning > c));
+    let completion = [
+        completion,
+        outside.and_then(|reasoning| completion?.checked_add(reasoning)),
+        total
+            .zip(prompt)
+            .and_then(|(all, prompt)| all.checked_sub(prompt)),
+    ];
+    let usage = Usage {
+        prompt_tokens: prompt,
+        completion_tokens: completion.into_iter().flatten().max(),
+        cached_tokens: cached.or(read).filter(|cached| *cached > 0),
+        total_tokens: total,
+    };
+    (usage != Usage::default()).then_some(usage)
+}
+
+/// The places of details about a prompt.
+const PROMPT_DETAILS: [&str; 2] = ["prompt_tokens_details", "input_tokens_details"];
+
+/// The places of details about a reply.
+const REPLY_DETAILS: [&str; 2] = ["completion_tokens_details", "output_tokens_details"];
+
+/// The tokens of hidden reasoning; `None` if they are not stated.
+pub(super) fn reasoning(usage: &Value) -> Option<u64> {
+    detail(usage, REPLY_DETAILS, "reasoning_tokens")
+        .or_else(|| number_in(usage, "reasoning_tokens"))
+}
+
+fn detail(usage: &Value, places: [&str; 2], name: &str) -> Option<u64> {
+    places
+        .iter()
+        .find_map(|place| number_in(usage.get(*place)?, name))
+}
+
+fn number_in(object: &Value, name: &str) -> Option<u64> {
+    number(object.get(name)?)
+}
+
+/// The sum of numbers; `None` if one is not known.
+fn sum(numbers: [Option<u64>; 3]) -> Option<u64> {
+    numbers.into_iter().sum()
+}
+
+/// A number of tokens: an integer, a fraction, which is rounded up, or either as text. `None` for what is not one.
+fn number(value: &Value) -> Option<u64> {
+    let fraction = match value {
+        Value::Number(number) => return number.as_u64().or_else(|| whole(number.as_f64()?)),
+        Value::String(text) => text.trim(),
+        _ => return None,
+    };
+    let integer = fraction.parse().ok();
+    integer.or_else(|| whole(fraction.parse().ok()?))
+}
+
+/// A fraction rounded up; `None` if it is no number of tokens.
+fn whole(number: f64) -> Option<u64> {
+    (number.is_finite() && (0.0..=1e15).contains(&number)).then_some(number.ceil() as u64)
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+    use crate::ask::prices::Price;
+
+    /// Usages of seven vendors, with the prompt and the reply that their bill has.
+    fn vendors() -> [(&'static str, Value, [u64; 2]); 8] {
+        [
+            (
+                "OpenAI: reasoning inside",
+                json!({"prompt_tokens": 1000, "completion_tokens": 600, "total_tokens": 1600, "completion_tokens_details": {"reasoning_tokens": 512}}),
+                [1000, 600],
+            ),
+            (
+                "xAI: reasoning outside",
+                json!({"prompt_tokens": 1000, "completion_tokens": 100, "total_tokens": 6100, "completion_tokens_details": {"reasoning_tokens": 5000}}),
+                [1000, 5100],
+            ),
+            (
+                "Gemini: reasoning in the total alone",
+                json!({"prompt_tokens": 1000, "completion_tokens": 5, "total_tokens": 1805}),
+                [1000, 805],
+            ),
+            (
+                "OpenAI Responses",
+                json!({"input_tokens": 1000, "output_tokens": 70, "total_tokens": 1070, "output_tokens_details": {"reasoning_tokens": 64}}),
+                [1000, 70],
+            ),
+            (
+                "Perplexity: reasoning beside both",
+                json!({"prompt_tokens": 1000, "completion_tokens": 30, "reasoning_tokens": 400, "total_tokens": 1030}),
+                [1000, 430],
+            ),
+            (
+                "DeepSeek: a cache inside the prompt",
+                json!({"prompt_tokens": 1000, "completion_tokens": 9, "total_tokens": 1009, "prompt_cache_hit_tokens": 900}),
+                [1000, 9],
+            ),
+            (
+                "Anthropic behind a gateway: a cache outside the prompt",
+                json!({"prompt_tokens": 100, "completion_tokens": 10, "total_tokens": 1010, "cache_read_input_tokens": 900}),
+                [1000, 10],
+            ),
+            (
+                "a gateway that writes text and fractions",
+                json!({"prompt_tokens": "1000", "completion_tokens": 20.0, "total_tokens": " 1060.5 "}),
+                [1000, 61],
+            ),
+        ]
+    }
+
+    #[test]
+    fn the_bill_is_that_of_the_vendor() {
+        let price = Price {
+            input: 10.0,
+            output: 100.0,
+            cached_input: None,
+            image_tokens: None,
+        };
+        for (vendor, usage, [prompt, reply]) in vendors() {
+            let read = read(Some(&usage)).unwrap();
+            let tokens = (read.prompt_tokens, read.completion_tokens);
+            assert_eq!(tokens, (Some(prompt), Some(reply)), "{vendor}");
+            let by_hand = (prompt * 10 + reply * 100) as f64 / 1e6;
+            assert!((price.charged(read) - by_hand).abs() < 1e-12, "{vendor}");
+        }
+    }
+
+    #[test]
+    fn a_number_that_is_missing_follows_from_the_total() {
+        let usage = read(Some(&json!({"prompt_tokens": 9, "total_tokens": 12}))).unwrap();
+        assert_eq!(usage.completion_tokens, Some(3));
+        assert_eq!(usage.total_tokens, Some(12));
+        let odd = json!({"prompt_tokens": -1, "completion_tokens": "many", "total_tokens": null});
+        assert_eq!(read(Some(&odd)), None);
+        let small = json!({"prompt_tokens": 9, "completion_tokens": 3, "total_tokens": 2});
+        assert_eq!(read(Some(&small)).unwrap().completion_tokens, Some(3));
+    }
+}
