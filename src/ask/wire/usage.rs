@@ -67,20 +67,28 @@ fn sum(numbers: [Option<u64>; 3]) -> Option<u64> {
     numbers.into_iter().sum()
 }
 
+/// The largest number of tokens that is believed, so that no sum of them overflows; chosen.
+const MOST: u64 = 1_000_000_000_000_000;
+
 /// A number of tokens: an integer, a fraction, which is rounded up, or either as text. `None` for what is not one.
 fn number(value: &Value) -> Option<u64> {
-    let fraction = match value {
-        Value::Number(number) => return number.as_u64().or_else(|| whole(number.as_f64()?)),
-        Value::String(text) => text.trim(),
-        _ => return None,
+    let number = match value {
+        Value::Number(number) => number.as_u64().or_else(|| whole(number.as_f64()?)),
+        Value::String(text) => {
+            let text = text.trim();
+            let integer = text.parse().ok();
+            integer.or_else(|| whole(text.parse().ok()?))
+        }
+        _ => None,
     };
-    let integer = fraction.parse().ok();
-    integer.or_else(|| whole(fraction.parse().ok()?))
+    number.filter(|number| *number <= MOST)
 }
 
 /// A fraction rounded up; `None` if it is no number of tokens.
 fn whole(number: f64) -> Option<u64> {
-    (number.is_finite() && (0.0..=1e15).contains(&number)).then_some(number.ceil() as u64)
+    (0.0..=MOST as f64)
+        .contains(&number)
+        .then_some(number.ceil() as u64)
 }
 
 #[cfg(test)]
@@ -162,5 +170,20 @@ mod tests {
         assert_eq!(read(Some(&odd)), None);
         let small = json!({"prompt_tokens": 9, "completion_tokens": 3, "total_tokens": 2});
         assert_eq!(read(Some(&small)).unwrap().completion_tokens, Some(3));
+    }
+
+    #[test]
+    fn numbers_that_are_no_tokens_are_ignored() {
+        for tokens in [
+            json!(u64::MAX),
+            json!(-1),
+            json!("1e99"),
+            json!("nan"),
+            json!(null),
+        ] {
+            let stated = json!({"prompt_tokens": tokens, "completion_tokens": tokens, "cache_read_input_tokens": 3});
+            let usage = read(Some(&stated)).unwrap();
+            assert_eq!((usage.prompt_tokens, usage.completion_tokens), (None, None));
+        }
     }
 }
