@@ -215,7 +215,7 @@ fn a_run_that_an_earlier_version_read_says_what_has_changed() {
         ["run/records.jsonl", "run/manifest.json"].map(|name| bench.path(name));
     let read_manifest =
         || -> Value { serde_json::from_slice(&fs::read(&manifest).unwrap()).unwrap() };
-    assert_eq!(read_manifest()["reply_reading"], "lenient/3");
+    assert_eq!(read_manifest()["reply_reading"], "lenient/4");
     assert!(!bench.complete(&["report", "run"]).contains("differently"));
     // As an earlier version read them.
     let old: String = fs::read_to_string(&records)
@@ -229,9 +229,9 @@ fn a_run_that_an_earlier_version_read_says_what_has_changed() {
         })
         .collect();
     // The first version has no name in a manifest.
-    for (stored, named) in [(None, "lenient/1"), (Some("lenient/2"), "lenient/2")] {
+    for (stored, named) in [(None, "lenient/1"), (Some("lenient/3"), "lenient/3")] {
         let change = format!(
-            "lenient/3 reads 6 of 6 replies differently than {named}: the lenient accuracy is 0.0 %, and was 100.0 %"
+            "lenient/4 reads 6 of 6 replies differently than {named}: the lenient accuracy is 0.0 %, and was 100.0 %"
         );
         fs::write(&records, &old).unwrap();
         let mut earlier = read_manifest();
@@ -250,7 +250,7 @@ fn a_run_that_an_earlier_version_read_says_what_has_changed() {
             rescored.starts_with(&format!("6 of 6 records now read differently\n{change}\n")),
             "{rescored}"
         );
-        assert_eq!(read_manifest()["reply_reading"], "lenient/3");
+        assert_eq!(read_manifest()["reply_reading"], "lenient/4");
         assert!(!bench.complete(&["report", "run"]).contains("differently"));
     }
 }
