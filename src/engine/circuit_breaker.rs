@@ -52,6 +52,8 @@ struct ModelHealth {
     outage: usize,
     /// The same failures by frame or walk: a single one may be the cause, so that it counts at most [`FAILURES_OF_ONE`] times.
     outage_sources: BTreeMap<String, usize>,
+    /// Frames or walks that were answered: they are not the cause of later failures.
+    answered_sources: BTreeSet<String>,
     /// Requests that the server refused, in the whole run.
     refusals: usize,
     /// Frames or walks of the refused requests. A single one does not count, because it may be the cause.
@@ -169,10 +171,13 @@ impl CircuitBreaker {
         }
     }
 
-    pub(crate) fn succeeded(&mut self, model: usize) {
+    pub(crate) fn succeeded(&mut self, model: usize, source: &str) {
         let health = &mut self.models[model].health;
         (health.succeeded, health.outage) = (true, 0);
         health.outage_sources.clear();
+        if !health.answered_sources.contains(source) {
+            health.answered_sources.insert(source.to_owned());
+        }
     }
 
     /// Records a failure about a frame or walk.
@@ -203,7 +208,9 @@ impl CircuitBreaker {
                 let of_source = health.outage_sources.entry(source.to_owned()).or_default();
                 *of_source += 1;
                 let is_down = *kind == FailureKind::Connection && message.contains("connect error");
-                let counts = *of_source <= FAILURES_OF_ONE || self.is_last || is_down;
+                let may_be_cause = !health.answered_sources.contains(source);
+                let counts =
+                    *of_source <= FAILURES_OF_ONE || !may_be_cause || self.is_last || is_down;
                 health.outage += usize::from(counts);
             }
         }
@@ -288,10 +295,10 @@ mod tests {
     fn stopped_after(kind: FailureKind, times: usize, frames: usize, succeeded: bool) -> bool {
         let mut breaker = breaker(2, None);
         if succeeded {
-            breaker.succeeded(0);
+            breaker.succeeded(0, "another");
         }
         for i in 0..times {
-            breaker.succeeded(1);
+            breaker.succeeded(1, "another");
             breaker.failed(0, &error(kind, Reach::Trial), &(i % frames).to_string());
         }
         assert!(!breaker.stopped(), "the other model continues");
@@ -302,7 +309,7 @@ mod tests {
     fn an_interrupt_after_one_model_was_stopped_is_the_end() {
         let mut breaker = breaker(2, None);
         for i in 0..5 {
-            breaker.succeeded(1);
+            breaker.succeeded(1, "another");
             let failure = error(FailureKind::Server, Reach::Trial);
             breaker.failed(0, &failure, &i.to_string());
         }
@@ -341,7 +348,7 @@ mod tests {
         let mut breaker = breaker(1, None);
         for i in 0..100 {
             if i % 10 == 0 {
-                breaker.succeeded(0);
+                breaker.succeeded(0, "another");
             }
             breaker.failed(0, &error(FailureKind::Server, Reach::Trial), &i.to_string());
         }

@@ -399,7 +399,7 @@ impl<I: Item> ReplySink<'_, I> {
         self.budget.record_lost(trial.model, lost);
         match &result {
             Ok(_) => {
-                self.breaker.succeeded(trial.model);
+                self.breaker.succeeded(trial.model, trial.item.source());
                 self.suspects.succeeded(trial.model, trial.item.source());
             }
             Err(error) => {

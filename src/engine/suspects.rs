@@ -15,8 +15,8 @@ const GIVEN_UP_AFTER: usize = 3;
 #[derive(Debug, Default)]
 pub(crate) struct Suspects {
     failures: BTreeMap<(usize, String), usize>,
-    /// The models that have answered a trial.
-    answered: BTreeSet<usize>,
+    /// The models that have answered a trial, with its frame or walk. Such an image is not suspected: the server had an outage.
+    answered: BTreeSet<(usize, String)>,
     /// Whether only trials that were set aside are left.
     is_last: bool,
 }
@@ -24,18 +24,20 @@ pub(crate) struct Suspects {
 impl Suspects {
     /// Notes a reply.
     pub(crate) fn succeeded(&mut self, model: usize, source: &str) {
-        self.answered.insert(model);
-        self.failures.remove(&(model, source.to_owned()));
+        let key = (model, source.to_owned());
+        self.failures.remove(&key);
+        self.answered.insert(key);
     }
 
     /// Notes a failure; those that say nothing about the image are ignored. Returns whether the others about it are now set aside.
     pub(crate) fn failed(&mut self, model: usize, error: &AskError, source: &str) -> bool {
         use FailureKind::{Connection, Response, Server, Timeout};
         let may_be_image = matches!(error.failure.kind, Connection | Response | Server | Timeout);
-        if error.reach != Reach::Trial || !may_be_image {
+        let key = (model, source.to_owned());
+        if error.reach != Reach::Trial || !may_be_image || self.answered.contains(&key) {
             return false;
         }
-        let count = self.failures.entry((model, source.to_owned())).or_default();
+        let count = self.failures.entry(key).or_default();
         *count += 1;
         *count == ASIDE_AFTER && !self.is_last
     }
@@ -47,14 +49,17 @@ impl Suspects {
 
     /// Whether a trial is not asked in this call, because the server failed for its image and not for others.
     pub(crate) fn is_given_up(&self, model: usize, source: &str) -> bool {
-        self.is_last
-            && self.answered.contains(&model)
-            && self.count(model, source) >= GIVEN_UP_AFTER
+        self.is_last && self.has_answered(model) && self.count(model, source) >= GIVEN_UP_AFTER
     }
 
     /// Only trials that were set aside are left.
     pub(crate) fn asks_last(&mut self) {
         self.is_last = true;
+    }
+
+    fn has_answered(&self, model: usize) -> bool {
+        let mut from = self.answered.range((model, String::new())..);
+        from.next().is_some_and(|(answered, _)| *answered == model)
     }
 
     fn count(&self, model: usize, source: &str) -> usize {
@@ -99,11 +104,14 @@ mod tests {
     }
 
     #[test]
-    fn a_reply_clears_an_image() {
+    fn an_image_that_was_answered_is_not_suspected() {
         let mut suspects = Suspects::default();
         suspects.failed(0, &error(FailureKind::Server), "i0");
         suspects.succeeded(0, "i0");
-        assert!(!suspects.failed(0, &error(FailureKind::Server), "i0"));
+        for _ in 0..9 {
+            assert!(!suspects.failed(0, &error(FailureKind::Server), "i0"));
+        }
+        assert!(!suspects.is_aside(0, "i0"));
         for _ in 0..9 {
             suspects.failed(0, &error(FailureKind::RateLimit), "i1");
         }
