@@ -52,8 +52,6 @@ struct ModelHealth {
     outage: usize,
     /// The same failures by frame or walk: a single one may be the cause, so that it counts at most [`FAILURES_OF_ONE`] times.
     outage_sources: BTreeMap<String, usize>,
-    /// Frames or walks that were answered: they are not the cause of later failures.
-    answered_sources: BTreeSet<String>,
     /// Requests that the server refused, in the whole run.
     refusals: usize,
     /// Frames or walks of the refused requests. A single one does not count, because it may be the cause.
@@ -81,8 +79,6 @@ pub(crate) struct CircuitBreaker {
     max_outage: usize,
     models: Vec<ModelState>,
     failures: usize,
-    /// Whether only trials that were set aside are left, so that all their failures count.
-    is_last: bool,
     /// Whether nothing more is asked of any model.
     stopped: bool,
     end: Option<EndReason>,
@@ -108,7 +104,6 @@ impl CircuitBreaker {
             max_outage: FAILURES_IN_A_ROW.max(3 * concurrency),
             models: states.collect(),
             failures: 0,
-            is_last: false,
             stopped: false,
             end: None,
             model_errors: Vec::new(),
@@ -144,11 +139,6 @@ impl CircuitBreaker {
         }
     }
 
-    /// Only trials that were set aside are left.
-    pub(crate) fn asks_last(&mut self) {
-        self.is_last = true;
-    }
-
     pub(crate) fn interrupted(&mut self) {
         self.stop(EndReason::Interrupted);
     }
@@ -171,17 +161,20 @@ impl CircuitBreaker {
         }
     }
 
-    pub(crate) fn succeeded(&mut self, model: usize, source: &str) {
+    pub(crate) fn succeeded(&mut self, model: usize) {
         let health = &mut self.models[model].health;
         (health.succeeded, health.outage) = (true, 0);
         health.outage_sources.clear();
-        if !health.answered_sources.contains(source) {
-            health.answered_sources.insert(source.to_owned());
-        }
     }
 
-    /// Records a failure about a frame or walk.
-    pub(crate) fn failed(&mut self, model: usize, error: &AskError, source: &str) {
+    /// Records a failure about a frame or walk, which may be its cause ([`Suspects::may_be_cause`](super::suspects::Suspects)) or not.
+    pub(crate) fn failed(
+        &mut self,
+        model: usize,
+        error: &AskError,
+        source: &str,
+        may_be_cause: bool,
+    ) {
         if error.reach == Reach::Interrupted {
             return;
         }
@@ -208,9 +201,7 @@ impl CircuitBreaker {
                 let of_source = health.outage_sources.entry(source.to_owned()).or_default();
                 *of_source += 1;
                 let is_down = *kind == FailureKind::Connection && message.contains("connect error");
-                let may_be_cause = !health.answered_sources.contains(source);
-                let counts =
-                    *of_source <= FAILURES_OF_ONE || !may_be_cause || self.is_last || is_down;
+                let counts = *of_source <= FAILURES_OF_ONE || !may_be_cause || is_down;
                 health.outage += usize::from(counts);
             }
         }
@@ -295,11 +286,16 @@ mod tests {
     fn stopped_after(kind: FailureKind, times: usize, frames: usize, succeeded: bool) -> bool {
         let mut breaker = breaker(2, None);
         if succeeded {
-            breaker.succeeded(0, "another");
+            breaker.succeeded(0);
         }
         for i in 0..times {
-            breaker.succeeded(1, "another");
-            breaker.failed(0, &error(kind, Reach::Trial), &(i % frames).to_string());
+            breaker.succeeded(1);
+            breaker.failed(
+                0,
+                &error(kind, Reach::Trial),
+                &(i % frames).to_string(),
+                true,
+            );
         }
         assert!(!breaker.stopped(), "the other model continues");
         breaker.is_stopped(0)
@@ -309,9 +305,9 @@ mod tests {
     fn an_interrupt_after_one_model_was_stopped_is_the_end() {
         let mut breaker = breaker(2, None);
         for i in 0..5 {
-            breaker.succeeded(1, "another");
+            breaker.succeeded(1);
             let failure = error(FailureKind::Server, Reach::Trial);
-            breaker.failed(0, &failure, &i.to_string());
+            breaker.failed(0, &failure, &i.to_string(), true);
         }
         assert!(breaker.is_stopped(0) && !breaker.stopped());
         breaker.interrupted();
@@ -344,13 +340,31 @@ mod tests {
     }
 
     #[test]
+    fn failures_about_one_frame_count_if_it_is_not_the_cause() {
+        let failure = error(FailureKind::Server, Reach::Trial);
+        for (may_be_cause, is_stopped) in [(true, false), (false, true)] {
+            let mut breaker = breaker(1, None);
+            breaker.succeeded(0);
+            for _ in 0..20 {
+                breaker.failed(0, &failure, "a", may_be_cause);
+            }
+            assert_eq!(breaker.is_stopped(0), is_stopped);
+        }
+    }
+
+    #[test]
     fn a_success_ends_an_outage() {
         let mut breaker = breaker(1, None);
         for i in 0..100 {
             if i % 10 == 0 {
-                breaker.succeeded(0, "another");
+                breaker.succeeded(0);
             }
-            breaker.failed(0, &error(FailureKind::Server, Reach::Trial), &i.to_string());
+            breaker.failed(
+                0,
+                &error(FailureKind::Server, Reach::Trial),
+                &i.to_string(),
+                true,
+            );
         }
         assert!(!breaker.is_stopped(0));
     }
@@ -358,22 +372,27 @@ mod tests {
     #[test]
     fn the_run_stops_when_no_model_remains_or_too_much_has_failed() {
         let mut breaker = breaker(2, None);
-        breaker.failed(0, &error(FailureKind::Request, Reach::Endpoint), "a");
+        breaker.failed(0, &error(FailureKind::Request, Reach::Endpoint), "a", true);
         assert!(breaker.is_stopped(0) && !breaker.stopped());
-        breaker.failed(1, &error(FailureKind::Request, Reach::Endpoint), "a");
+        breaker.failed(1, &error(FailureKind::Request, Reach::Endpoint), "a", true);
         assert!(breaker.stopped());
 
         let mut breaker = self::breaker(1, Some(2));
-        breaker.failed(0, &error(FailureKind::Image, Reach::Trial), "a");
+        breaker.failed(0, &error(FailureKind::Image, Reach::Trial), "a", true);
         assert!(!breaker.stopped());
-        breaker.failed(0, &error(FailureKind::Image, Reach::Trial), "b");
+        breaker.failed(0, &error(FailureKind::Image, Reach::Trial), "b", true);
         assert!(breaker.stopped() && matches!(breaker.into_end(), EndReason::Stopped(_)));
     }
 
     #[test]
     fn aborted_requests_do_not_count_as_failures() {
         let mut breaker = breaker(1, Some(1));
-        breaker.failed(0, &error(FailureKind::Connection, Reach::Interrupted), "a");
+        breaker.failed(
+            0,
+            &error(FailureKind::Connection, Reach::Interrupted),
+            "a",
+            true,
+        );
         assert!(!breaker.stopped() && breaker.failures() == 0);
     }
 

@@ -155,7 +155,6 @@ impl<I: Item> ReplySink<'_, I> {
             if !more_groups && lanes.is_empty() && in_flight.is_empty() && lanes.has_aside() {
                 lanes.ask_aside();
                 self.suspects.asks_last();
-                self.breaker.asks_last();
                 continue;
             }
             let all_asked = !more_groups && lanes.is_empty() && in_flight.is_empty();
@@ -399,7 +398,7 @@ impl<I: Item> ReplySink<'_, I> {
         self.budget.record_lost(trial.model, lost);
         match &result {
             Ok(_) => {
-                self.breaker.succeeded(trial.model, trial.item.source());
+                self.breaker.succeeded(trial.model);
                 self.suspects.succeeded(trial.model, trial.item.source());
             }
             Err(error) => {
@@ -410,7 +409,9 @@ impl<I: Item> ReplySink<'_, I> {
                         error.failure.message
                     );
                 }
-                self.breaker.failed(trial.model, error, trial.item.source());
+                let may_be_cause = self.suspects.may_be_cause(trial.model, source);
+                self.breaker
+                    .failed(trial.model, error, source, may_be_cause);
                 // If the endpoint is the cause or the run ends, the trial does not count as asked.
                 if error.reach != Reach::Trial {
                     return Ok(());

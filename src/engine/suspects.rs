@@ -42,6 +42,11 @@ impl Suspects {
         *count == ASIDE_AFTER && !self.is_last
     }
 
+    /// Whether a failure may be that of the image alone: the model has not answered about it, and others are still asked.
+    pub(crate) fn may_be_cause(&self, model: usize, source: &str) -> bool {
+        !self.is_last && !self.answered.contains(&(model, source.to_owned()))
+    }
+
     /// Whether a trial waits until the others are asked.
     pub(crate) fn is_aside(&self, model: usize, source: &str) -> bool {
         !self.is_last && self.count(model, source) >= ASIDE_AFTER
