@@ -56,6 +56,7 @@ mod memory;
 mod memory_check;
 mod memory_limit;
 mod noise;
+mod onnx_message;
 mod output;
 mod parser;
 mod planes;

@@ -5,6 +5,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
+use super::onnx_message::OnnxMessage;
 use super::protobuf::{FieldValue, Malformed, fields};
 
 /// Operators whose attribute `seed` is a float.
@@ -19,28 +20,6 @@ const SEEDED_BY_FLOAT: [&str; 6] = [
 
 /// Deepest nesting of graphs in nodes in which a seed is set; chosen.
 const DEEPEST: usize = 60;
-
-/// Messages of an ONNX file that contain nodes.
-#[derive(Clone, Copy, PartialEq)]
-enum OnnxMessage {
-    Model,
-    Graph,
-    Function,
-    Node,
-    Attribute,
-}
-
-impl OnnxMessage {
-    fn in_field(self, number: u64) -> Option<Self> {
-        match (self, number) {
-            (Self::Model, 7) | (Self::Attribute, 6 | 11) => Some(Self::Graph),
-            (Self::Model, 25) => Some(Self::Function),
-            (Self::Graph, 1) | (Self::Function, 7) => Some(Self::Node),
-            (Self::Node, 5) => Some(Self::Attribute),
-            _ => None,
-        }
-    }
-}
 
 /// The random operators of a model.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -83,7 +62,7 @@ impl RandomOperators {
                     let (name, value) = truth_value(model, bytes.clone())?;
                     constants.extend(value.map(|value| (name, value)));
                 }
-                if let Some(inner) = message.in_field(number) {
+                if let Some(inner) = message.with_nodes(number) {
                     open.push((inner, bytes));
                 }
             }
@@ -140,8 +119,8 @@ impl RandomOperators {
         while let Some(field) = all.next() {
             let end = all.position();
             match field.ok()? {
-                (number, FieldValue::Bytes(bytes)) if message.in_field(number).is_some() => {
-                    let inner = message.in_field(number)?;
+                (number, FieldValue::Bytes(bytes)) if message.with_nodes(number).is_some() => {
+                    let inner = message.with_nodes(number)?;
                     let inner = self.copied(model, inner, bytes, depth + 1)?;
                     push_bytes(&mut copy, number, &inner);
                 }

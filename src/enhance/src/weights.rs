@@ -12,6 +12,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
+use super::onnx_message::OnnxMessage;
 use super::protobuf::{FieldValue, Malformed, fields};
 
 /// Positions of the 32-bit floats in a model, and names of other files with weights.
@@ -21,35 +22,6 @@ pub(super) struct Weights {
     floats: Vec<Range<usize>>,
     /// The `location` of every tensor with external data, relative to the model's folder, and the least size of that file in bytes.
     pub(super) external: BTreeMap<String, u64>,
-}
-
-/// Messages of an ONNX file that may contain weights.
-#[derive(Clone, Copy)]
-enum OnnxMessage {
-    Model,
-    Graph,
-    Function,
-    Node,
-    Attribute,
-    SparseTensor,
-    Tensor,
-}
-
-impl OnnxMessage {
-    /// Type of the message in a field; `None` if it cannot contain weights.
-    fn in_field(self, number: u64) -> Option<Self> {
-        match (self, number) {
-            (Self::Model, 7) | (Self::Attribute, 6 | 11) => Some(Self::Graph),
-            (Self::Model, 25) => Some(Self::Function),
-            (Self::Graph, 1) | (Self::Function, 7) => Some(Self::Node),
-            (Self::Node, 5) => Some(Self::Attribute),
-            (Self::Graph, 15) | (Self::Attribute, 22 | 23) => Some(Self::SparseTensor),
-            (Self::Graph, 5) | (Self::Attribute, 5 | 10) | (Self::SparseTensor, 1) => {
-                Some(Self::Tensor)
-            }
-            _ => None,
-        }
-    }
 }
 
 impl Weights {
