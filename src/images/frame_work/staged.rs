@@ -26,11 +26,11 @@ pub(crate) struct MadeImage<'a> {
 
 /// The pixels of an image that is sent.
 pub(crate) enum PixelsSent {
-    /// Those that were encoded now.
+    /// Encoded now.
     Encoded(Arc<Rgb>),
-    /// Those of the frame, whose file is sent unchanged.
+    /// In the file of the frame, which is sent unchanged.
     OfFile,
-    /// Those of a file in the image store, not decoded.
+    /// In a file of the image store, not decoded.
     Stored,
 }
 

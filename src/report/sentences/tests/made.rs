@@ -24,11 +24,6 @@ fn asked(model: &str, frames: usize, conditions: &[(&str, f64)]) -> Vec<Record> 
                 why: None,
             });
             let detail = ChoiceDetail {
-                frame: FrameId(format!("f{:02}", item / 2)),
-                family: [Family::Color, Family::RoomType][item % 2].clone(),
-                choices: ["a", "b", "c"].map(str::to_owned).to_vec(),
-                truth: Some(0),
-                repeat: 0,
                 strict: reading,
                 lenient: reading,
                 outcome: if wrong == 0 {
@@ -36,11 +31,11 @@ fn asked(model: &str, frames: usize, conditions: &[(&str, f64)]) -> Vec<Record> 
                 } else {
                     TrialOutcome::Wrong
                 },
-                image: None,
-                more_images: Vec::new(),
-                shown_frame: None,
-                observed: None,
-                options: None,
+                ..unanswered(
+                    format!("f{:02}", item / 2),
+                    [Family::Color, Family::RoomType][item % 2].clone(),
+                    &["a", "b", "c"],
+                )
             };
             let key = Digest::of(format!("{item} {model} {name}").as_bytes()).into();
             let question = QuestionId(format!("q{item:02}"));
@@ -54,6 +49,25 @@ fn asked(model: &str, frames: usize, conditions: &[(&str, f64)]) -> Vec<Record> 
         }
     }
     records
+}
+
+/// A question about a frame whose first choice is true, without an answer.
+pub(super) fn unanswered(frame: String, family: Family, choices: &[&str]) -> ChoiceDetail {
+    ChoiceDetail {
+        frame: FrameId(frame),
+        family,
+        choices: choices.iter().map(|text| (*text).to_owned()).collect(),
+        truth: Some(0),
+        repeat: 0,
+        strict: None,
+        lenient: None,
+        outcome: TrialOutcome::Wrong,
+        image: None,
+        more_images: Vec::new(),
+        shown_frame: None,
+        observed: None,
+        options: None,
+    }
 }
 
 /// All sentences about records.

@@ -6,6 +6,7 @@ use rand::rngs::StdRng;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::{Distribution, StandardNormal};
 
+use super::made::unanswered;
 use crate::report::sentences::{Sentence, Tone, sentences};
 use crate::score::baseline::baseline_rows;
 use crate::score::cluster::{Clusters, FrameTies};
@@ -87,21 +88,7 @@ impl Design {
                     (!name.is_empty()).then(|| name.parse().unwrap());
                 for item in 0..4 * self.frames {
                     let (family, choices) = &QUESTIONS[item % 4];
-                    let detail = ChoiceDetail {
-                        frame: FrameId(format!("f{:03}", item / 4)),
-                        family: family.clone(),
-                        choices: choices.iter().map(|text| (*text).to_owned()).collect(),
-                        truth: Some(0),
-                        repeat: 0,
-                        strict: None,
-                        lenient: None,
-                        outcome: TrialOutcome::Wrong,
-                        image: None,
-                        more_images: Vec::new(),
-                        shown_frame: None,
-                        observed: None,
-                        options: None,
-                    };
+                    let detail = unanswered(format!("f{:03}", item / 4), family.clone(), choices);
                     let key = Digest::of(format!("{item} {model} {name}").as_bytes()).into();
                     let question = QuestionId(format!("q{item:04}"));
                     records.push(Record::blank(
