@@ -24,7 +24,7 @@ mod scene_args;
 mod settings;
 mod view;
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
@@ -40,7 +40,7 @@ use maps::MapPaths;
 pub(crate) use photographs::Photographs;
 pub(crate) use picture::Picture;
 pub use ready_made::SetArgs;
-use ready_made::{Form, ReadQuestions, Series};
+use ready_made::{Form, ReadQuestions, SceneNames, Series};
 pub(crate) use root::Root;
 pub(crate) use root::RootArgs;
 pub(crate) use scene_args::SceneArgs;
@@ -87,6 +87,8 @@ pub struct Dataset {
     pub(crate) sources: BTreeMap<FrameId, ImageSource>,
     /// The frames of each question that shows several, by the name that the question has for all of them.
     series: Series,
+    /// The scenes that the questions give to their frames; they go before those of the frames themselves.
+    scenes: SceneNames,
     questions: Vec<Question>,
     labels: Option<Labels>,
     rule: ReadingRule,
@@ -106,6 +108,7 @@ impl Dataset {
             title: String::new(),
             sources,
             series: Series::new(),
+            scenes: SceneNames::new(),
             questions,
             labels: None,
             rule: ReadingRule::default(),
@@ -151,6 +154,7 @@ impl Dataset {
             reading: set.reading,
             form: set.form,
             series: set.series,
+            scenes: set.scenes,
             ..Self::new(set.name, set.sources, set.questions)
         }
     }
@@ -169,7 +173,11 @@ impl Dataset {
 
     /// The same data set with the questions of a file. Each must be about one of its frames.
     fn with_questions_of(self, file: &Path, read: ReadQuestions) -> Result<Self> {
-        let (questions, reading) = read;
+        let ReadQuestions {
+            questions,
+            scenes,
+            reading,
+        } = read;
         let unmatched = questions
             .iter()
             .find(|question| !self.sources.contains_key(&question.frame));
@@ -183,6 +191,7 @@ impl Dataset {
         }
         Ok(Self {
             questions,
+            scenes,
             form: if reading.is_empty() {
                 Form::Own
             } else {
@@ -266,9 +275,19 @@ impl Dataset {
         shown.all(|frame| self.sources.contains_key(frame))
     }
 
-    /// The scene of a frame; empty if the data set does not name scenes.
+    /// The scene of a frame, or of several that a question shows together; empty if the data set names none.
     #[must_use]
     pub fn scene(&self, id: &FrameId) -> String {
+        if let Some(scene) = self.scenes.get(id) {
+            return scene.clone();
+        }
+        if let Some(shown) = self.series.get(id) {
+            let scenes: BTreeSet<String> = shown.iter().map(|frame| self.scene(frame)).collect();
+            return match scenes.len() {
+                1 => scenes.into_iter().next().unwrap_or_default(),
+                _ => String::new(),
+            };
+        }
         match self.sources.get(id) {
             Some(ImageSource::File(file)) => file.view.scene.clone(),
             Some(ImageSource::Room(room)) => room.scene(),

@@ -126,7 +126,9 @@ pub(super) fn ties<'a>(questions: impl IntoIterator<Item = &'a RunQuestion>) -> 
     let mut ties = FrameTies::default();
     for question in questions {
         let frame = &question.frame;
-        ties.scenes.insert(frame.clone(), question.scene.clone());
+        if !question.scene.is_empty() {
+            ties.scenes.insert(frame.clone(), question.scene.clone());
+        }
         if !question.images.is_empty() {
             ties.images.insert(frame.clone(), question.images.clone());
         }

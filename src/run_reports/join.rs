@@ -149,8 +149,14 @@ impl<D: Detail> Joined<D> {
             let place = *known.questions.entry(question.id.clone()).or_insert(next);
             if place == next {
                 self.questions.push(question.clone());
-            } else if self.questions[place].group.is_none() {
-                self.questions[place].group.clone_from(&question.group);
+                continue;
+            }
+            let known = &mut self.questions[place];
+            if known.group.is_none() {
+                known.group.clone_from(&question.group);
+            }
+            if known.scene.is_empty() {
+                known.scene.clone_from(&question.scene);
             }
         }
     }

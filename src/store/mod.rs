@@ -248,7 +248,15 @@ impl<D: Detail> Store<D> {
                 continue;
             };
             let question = &mut questions[place];
-            if !stored.is_same(question) {
+            // A scene decides no reply: it can be named later, and stays.
+            if question.scene.is_empty() {
+                question.scene.clone_from(&stored.scene);
+            }
+            let in_scene = RunQuestion {
+                scene: question.scene.clone(),
+                ..stored.clone()
+            };
+            if !in_scene.is_same(question) {
                 let problem = format!(
                     "the question {} is not the one stored in this run: --data or --questions give it other words, choices, another \
                      answer, image or group; use another --out",

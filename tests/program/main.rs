@@ -62,6 +62,7 @@ mod report;
 mod report_of_parts;
 mod rooms;
 mod same_bytes;
+mod scenes;
 mod sentences;
 mod serve;
 mod several_images;

@@ -33,6 +33,7 @@ mod preset;
 mod python_list;
 mod roles;
 mod row;
+mod scenes;
 mod settings;
 mod step;
 mod summary;
@@ -53,6 +54,7 @@ pub(super) use container::{Archive, holds_files};
 pub(super) use frames::Series;
 pub(super) use images::EmbeddedImage;
 pub(super) use preset::{is_known as is_known_set, names as known_sets};
+pub(super) use scenes::SceneNames;
 pub use settings::SetArgs;
 
 use container::{FoundFiles, Joined, SetFile};
@@ -69,6 +71,7 @@ use map::{How, Map};
 use names::Role;
 use roles::Roles;
 use row::Table;
+use scenes::Scenes;
 use summary::Summary;
 use truths::{Answered, is_own, truths};
 
@@ -134,7 +137,8 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
         roles: &roles,
         args,
     };
-    let asked = finish(&opened, set, frames, notes, hint)?;
+    let scenes = Scenes::new(&table, &map, roles.scene.as_ref());
+    let asked = finish(&opened, set, (frames, scenes), notes, hint)?;
     Ok(ReadySet {
         reading: asked.reading,
         form: if is_own(&table) {
@@ -146,6 +150,7 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
         name,
         sources: asked.sources,
         series: asked.series,
+        scenes: asked.scenes,
         questions: asked.questions,
     })
 }
@@ -189,6 +194,7 @@ pub(super) struct ReadySet {
     pub(super) sources: BTreeMap<FrameId, ImageSource>,
     /// The images of each question that shows several, by the name of its frame.
     pub(super) series: Series,
+    pub(super) scenes: SceneNames,
     pub(super) questions: Vec<Question>,
     /// What was taken for what, one fact a line.
     pub(super) reading: Vec<String>,
@@ -204,8 +210,14 @@ pub(super) enum Form {
     Foreign,
 }
 
-/// Questions, and what was taken for what when they were read, one fact a line.
-pub(super) type ReadQuestions = (Vec<Question>, Vec<String>);
+/// Questions about frames of other data.
+pub(super) struct ReadQuestions {
+    pub(super) questions: Vec<Question>,
+    /// The scenes that the file gives to the frames.
+    pub(super) scenes: SceneNames,
+    /// What was taken for what, one fact a line; empty for this program's own form.
+    pub(super) reading: Vec<String>,
+}
 
 /// That the column `frame` names the image, if there is one.
 fn of_frame(table: &Table) -> Option<Map> {
@@ -213,7 +225,7 @@ fn of_frame(table: &Table) -> Option<Map> {
     frame.and_then(|_| "image=frame".parse().ok())
 }
 
-/// The questions of a file about frames of other data, and what was taken for what.
+/// The questions of a file about frames of other data.
 ///
 /// # Errors
 /// As [`open`].
@@ -245,11 +257,14 @@ pub(super) fn about_frames(file: &Path, args: &SetArgs) -> Result<ReadQuestions>
         args,
     };
     let notes = table.notes.clone();
-    let asked = finish(&opened, set, frames, notes, None)?;
-    if is_own(&table) && info.map.is_none() {
-        return Ok((asked.questions, Vec::new()));
-    }
-    Ok((asked.questions, asked.reading))
+    let scenes = Scenes::new(&table, &map, roles.scene.as_ref());
+    let asked = finish(&opened, set, (frames, scenes), notes, None)?;
+    let is_plain = is_own(&table) && info.map.is_none();
+    Ok(ReadQuestions {
+        questions: asked.questions,
+        scenes: asked.scenes,
+        reading: if is_plain { Vec::new() } else { asked.reading },
+    })
 }
 
 /// The questions of a set, the sources of their frames, and what was taken for what.
@@ -257,6 +272,7 @@ struct Finished {
     questions: Vec<Question>,
     sources: BTreeMap<FrameId, ImageSource>,
     series: Series,
+    scenes: SceneNames,
     reading: Vec<String>,
 }
 
@@ -273,7 +289,7 @@ struct Opened<'a> {
 fn finish(
     opened: &Opened<'_>,
     mut set: ReadSet,
-    mut frames: Frames<'_>,
+    (mut frames, mut scenes): (Frames<'_>, Scenes<'_>),
     mut notes: Vec<String>,
     hint: Option<String>,
 ) -> Result<Finished> {
@@ -293,8 +309,15 @@ fn finish(
     }
     let family = FamilyOf::of(opened.table, &opened.roles.families, &set.answered);
     let groups = (&family, &set.groups);
-    let questions = questions(opened, groups, set.answered, &ids, &mut frames)?;
+    let questions = questions(
+        opened,
+        groups,
+        set.answered,
+        &ids,
+        (&mut frames, &mut scenes),
+    )?;
     let (sources, series) = frames.take_sources();
+    notes.extend(scenes.note());
     notes.extend(ids.note());
     notes.extend(hint);
     let summary = Summary {
@@ -317,6 +340,7 @@ fn finish(
         questions,
         sources,
         series,
+        scenes: scenes.take(),
         reading,
     })
 }
@@ -410,19 +434,20 @@ fn image_hint(table: &Table, roles: &Roles, problem: String) -> String {
     )
 }
 
-/// The questions. The sources of their frames are kept in `frames`.
+/// The questions. The sources of their frames are kept in `frames`, and their scenes in `scenes`.
 fn questions(
     opened: &Opened<'_>,
     (families, groups): (&FamilyOf, &Groups),
     answered: Vec<Answered>,
     ids: &Ids,
-    frames: &mut Frames<'_>,
+    (frames, scenes): (&mut Frames<'_>, &mut Scenes<'_>),
 ) -> Result<Vec<Question>> {
     let (table, evidence) = (opened.table, opened.roles.evidence.as_ref());
     let mut questions = Vec::with_capacity(answered.len());
     for (at, answered) in answered.into_iter().enumerate() {
         let row = answered.row;
         let frame = frames.frame(&answered)?;
+        scenes.add(table, row, &frame)?;
         let cells = &table.rows[row];
         let family = families.text(table, cells);
         let family = family.unwrap_or_else(|| other().name().to_owned());

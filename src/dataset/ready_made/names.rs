@@ -21,12 +21,13 @@ pub(super) enum Role {
     Hint,
     Family,
     Group,
+    Scene,
     Evidence,
 }
 
 impl Role {
     /// The roles that `--map` knows.
-    pub(super) const ALL: [Self; 8] = [
+    pub(super) const ALL: [Self; 9] = [
         Self::Question,
         Self::Image,
         Self::Options,
@@ -35,6 +36,7 @@ impl Role {
         Self::Hint,
         Self::Family,
         Self::Group,
+        Self::Scene,
     ];
 
     /// The name in `--map` and messages.
@@ -48,6 +50,7 @@ impl Role {
             Self::Hint => "hint",
             Self::Family => "family",
             Self::Group => "group",
+            Self::Scene => "scene",
             Self::Evidence => "evidence",
         }
     }

@@ -24,6 +24,7 @@ pub(super) struct Roles {
     pub(super) hint: Option<Column>,
     pub(super) families: Families,
     pub(super) evidence: Option<Column>,
+    pub(super) scene: Option<Column>,
     pub(super) split_options: Option<String>,
     pub(super) in_question: InQuestion,
 }
@@ -123,6 +124,7 @@ impl Roles {
                 None => Families::Known(named(Role::Family)?),
             },
             evidence,
+            scene: named(Role::Scene)?.into_iter().next(),
             in_question: match how {
                 Some(entry) if entry.columns.is_empty() => InQuestion::None,
                 _ => InQuestion::Searched,
@@ -135,7 +137,7 @@ impl Roles {
     }
 
     /// The columns that nobody reads again once the questions have their text, their options and their answers: not those of images,
-    /// ids and families.
+    /// ids, families and scenes.
     pub(super) fn read_once(&self) -> BTreeSet<usize> {
         let (Images::First(images) | Images::All(images)) = &self.images else {
             // A template may name any column.
@@ -146,7 +148,8 @@ impl Roles {
             Families::Said(column) => column.as_slice(),
         };
         let kept = images.iter().chain(&self.ids).chain(families);
-        let kept: BTreeSet<usize> = kept.chain(&self.evidence).map(|column| column.at).collect();
+        let kept = kept.chain(&self.evidence).chain(&self.scene);
+        let kept: BTreeSet<usize> = kept.map(|column| column.at).collect();
         let read = std::iter::once(&self.question).chain(&self.hint);
         let read = read.chain(&self.options).chain(&self.cells);
         read.chain(&self.answers)

@@ -109,7 +109,7 @@ fn names_no_options(table: &Table, roles: &Roles, item: &Item) -> bool {
 
 /// Whether the lines are of this program's own form, in which the answer is the text of a choice.
 pub(super) fn is_own(table: &Table) -> bool {
-    const FIELDS: [&str; 10] = [
+    const FIELDS: [&str; 11] = [
         "id",
         "frame",
         "image",
@@ -120,6 +120,7 @@ pub(super) fn is_own(table: &Table) -> bool {
         "evidence",
         "group",
         "group_size",
+        "scene",
     ];
     let has = |name: &&str| table.find(name).is_some();
     ["question", "choices", "answer"].iter().all(has)

@@ -10,6 +10,7 @@ mod plan_identity;
 mod record;
 mod settings;
 mod setup;
+mod unnamed_scenes;
 mod write_plan;
 
 use crate::engine::Job;

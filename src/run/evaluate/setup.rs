@@ -7,6 +7,7 @@ use super::controls::{AddedControls, is_other_room};
 use super::other_room::OtherRooms;
 use super::plan_identity::plan_identity;
 use super::settings::Evaluation;
+use super::unnamed_scenes::unnamed_scenes;
 use crate::ask::{Model, Random};
 use crate::dataset::Dataset;
 use crate::engine::dark_already;
@@ -148,6 +149,9 @@ impl<'a> ChoiceSetup<'a> {
     pub(super) fn say_reading(&self, progress: &Progress) {
         for line in self.dataset.reading_to_say() {
             progress.note(line);
+        }
+        if let Some(warning) = unnamed_scenes(&self.dataset, &self.questions) {
+            tracing::warn!("{warning}");
         }
     }
 

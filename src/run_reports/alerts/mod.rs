@@ -26,6 +26,7 @@ use crate::score::pair_darkness::PairDarkness;
 use crate::score::photographed_set::PhotographedSet;
 use crate::score::record::Detail;
 use crate::score::self_agreement::SelfAgreement;
+use crate::score::suggested_scenes::SuggestedScenes;
 use crate::types::manifest::Status;
 use crate::types::{FrameId, InputSummary};
 
@@ -77,21 +78,51 @@ fn of_set(set: PhotographedSet) -> Option<Alert> {
     notice.map(|text| Alert::new(AlertKind::Pairs, text))
 }
 
-/// That there are too few clusters for good intervals, or that all are questions about one frame.
-fn of_clusters(combined: &Combined, (clusters, unit): (usize, ClusterUnit)) -> Option<Alert> {
+/// Too few clusters for good intervals, questions about one frame alone, and frames without the scenes that their names suggest.
+fn of_clusters(combined: &Combined, (clusters, unit): (usize, ClusterUnit)) -> Vec<Alert> {
     let frames: BTreeSet<&FrameId> = combined.questions.iter().map(|one| &one.frame).collect();
-    let text = if clusters < MIN_SCENES {
-        format!(
+    let few = if clusters < MIN_SCENES {
+        Some(format!(
             "Only {} ({MIN_SCENES} are needed): intervals and tests are rough.",
             counted(clusters, &unit.to_string())
-        )
+        ))
     } else if frames.len() == 1 {
-        "Only 1 frame: intervals and tests are by question, and say nothing about other frames."
-            .to_owned()
+        let text = "Only 1 frame: intervals and tests are by question, and say nothing about other frames.";
+        Some(text.to_owned())
     } else {
-        return None;
+        None
     };
-    Some(Alert::new(AlertKind::Clusters, text))
+    let texts = few.into_iter().chain(unnamed_scenes(combined, &frames));
+    let alerts = texts.map(|text| Alert::new(AlertKind::Clusters, text));
+    alerts.collect()
+}
+
+/// Scenes that the names of the frames suggest and no question names, or frames without a scene beside others that have one.
+fn unnamed_scenes(combined: &Combined, frames: &BTreeSet<&FrameId>) -> Option<String> {
+    let in_scenes = combined
+        .questions
+        .iter()
+        .filter(|one| !one.scene.is_empty());
+    let in_scenes: BTreeSet<&FrameId> = in_scenes.map(|one| &one.frame).collect();
+    if in_scenes.is_empty() {
+        let suggested = SuggestedScenes::new(frames.iter().copied())?;
+        return Some(format!(
+            "{}: intervals may be too narrow. Give each question a \"scene\" and repeat the run's command; nothing is asked again.",
+            suggested.sentence()
+        ));
+    }
+    let without = frames.len() - in_scenes.len();
+    (without > 0).then(|| {
+        let count = if without == 1 {
+            "counts as a scene"
+        } else {
+            "count as scenes"
+        };
+        format!(
+            "{without} of {} have no scene and {count} of their own.",
+            counted(frames.len(), "frame")
+        )
+    })
 }
 
 /// The alerts that follow from manifests and the questions asked, of runs of either kind.

@@ -38,8 +38,8 @@ pub struct FrameTies {
 /// The cluster of each frame.
 ///
 /// Questions of a frame and frames of a scene are not independent. Intervals that treat them as independent are too
-/// narrow (Miller 2024, "Adding Error Bars to Evals", arXiv:2411.00640, section 2.2). The unit is the scene if every frame
-/// has one, there are at least [`MIN_SCENES`], and some have more than one frame. Otherwise it is the frame, or the
+/// narrow (Miller 2024, "Adding Error Bars to Evals", arXiv:2411.00640, section 2.2). The unit is the scene if there are at least
+/// [`MIN_SCENES`], and some have more than one frame. A frame without a scene then counts as a scene of its own. Otherwise it is the frame, or the
 /// question if there is only one frame. Questions that show several images are of one frame if they share an image with each other, or
 /// with a question about that image alone.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -67,14 +67,18 @@ impl Clusters {
             .collect();
         let frames: BTreeSet<&FrameId> = pairs.iter().map(|(frame, _)| *frame).collect();
         let scene_of = |frame: &FrameId| ties.scenes.get(frame).filter(|scene| !scene.is_empty());
-        let known: Option<Vec<&String>> = frames.iter().map(|frame| scene_of(frame)).collect();
-        let names: BTreeSet<&String> = known.iter().flatten().copied().collect();
-        if known.is_some() && names.len() >= MIN_SCENES && names.len() < frames.len() {
-            let numbers: BTreeMap<&String, u32> = names.into_iter().zip(0..).collect();
-            let by_frame = frames.iter().filter_map(|frame| {
-                let number = numbers.get(scene_of(frame)?)?;
-                Some(((*frame).clone(), *number))
-            });
+        // The scene, or the frame that has none.
+        let place = |frame: &'a FrameId| match scene_of(frame) {
+            Some(scene) => (Some(scene), None),
+            None => (None, Some(frame)),
+        };
+        let places: BTreeSet<(Option<&String>, Option<&FrameId>)> =
+            frames.iter().map(|frame| place(frame)).collect();
+        if places.len() >= MIN_SCENES && places.len() < frames.len() {
+            let numbers: BTreeMap<_, u32> = places.into_iter().zip(0..).collect();
+            let by_frame = frames
+                .iter()
+                .map(|frame| ((*frame).clone(), numbers[&place(frame)]));
             return Self {
                 unit: ClusterUnit::Scene,
                 by_frame: by_frame.collect(),
@@ -208,6 +212,23 @@ mod tests {
         assert!(of(3) != of(0) && of(4) != of(0) && of(3) != of(4));
         let apart = Clusters::new(ids.iter().zip(&frames), &FrameTies::default());
         assert_eq!((apart.count(), apart.unit()), (6, ClusterUnit::Question));
+    }
+
+    #[test]
+    fn a_frame_without_a_scene_is_a_scene_of_its_own() {
+        let frames: Vec<FrameId> = (0..30).map(|i| FrameId(format!("f{i:02}"))).collect();
+        let ids: Vec<QuestionId> = (0..30).map(|i| QuestionId(format!("q{i}"))).collect();
+        let known = frames[..24].iter().enumerate();
+        let ties = FrameTies {
+            scenes: known
+                .map(|(i, frame)| (frame.clone(), format!("s{}", i % 8)))
+                .collect(),
+            ..FrameTies::default()
+        };
+        let found = Clusters::new(ids.iter().zip(&frames), &ties);
+        assert_eq!((found.unit(), found.count()), (ClusterUnit::Scene, 8 + 6));
+        let of = |frame: usize| found.of(&frames[frame], &ids[frame]);
+        assert!(of(0) == of(8) && of(0) != of(1) && of(28) != of(29));
     }
 
     #[test]

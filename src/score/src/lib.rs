@@ -63,6 +63,7 @@ pub mod significance;
 mod split_mix;
 pub mod strict_score;
 pub mod subject;
+pub mod suggested_scenes;
 mod tested_sentences;
 #[cfg(test)]
 mod tests;

@@ -9,6 +9,7 @@ mod joined;
 mod limits;
 mod marks;
 mod refusals;
+mod scenes;
 mod several;
 mod shapes;
 

@@ -16,6 +16,7 @@ use sha2::{Digest as _, Sha256};
 
 use super::estimate;
 use super::settings::EvaluateArgs;
+use super::unnamed_scenes::unnamed_scenes;
 use crate::dataset::{DataPlace, Dataset, Picture};
 use crate::engine::dark_already::DarkImages;
 use crate::error::{Error, Result};
@@ -149,6 +150,9 @@ fn data(
         }
     };
     questions::questions(&asked, findings);
+    if let Some(warning) = unnamed_scenes(&dataset, &asked) {
+        findings.warn(warning);
+    }
     let depth = if check.deep {
         Depth::Pixels
     } else {

@@ -1,0 +1,129 @@
+//! The scenes of the frames of a set.
+
+use std::fs;
+use std::path::PathBuf;
+
+use serde_json::{Map, Value, json};
+
+use super::fixture::{png, row, set};
+use super::{map, open, refusal};
+use crate::dataset::{DataPlace, Dataset, SetArgs};
+
+/// Six rows about three images, whose scenes are in a column.
+fn rows(column: &str, scenes: [Value; 6]) -> Vec<Map<String, Value>> {
+    let rows = scenes.into_iter().enumerate();
+    let rows = rows.map(|(number, scene)| {
+        row(json!({
+            "id": format!("q{number}"), "image": format!("{}.png", number / 2), "question": format!("Is it {number}?"),
+            "choices": ["yes", "no"], "answer": "yes", column: scene,
+        }))
+    });
+    rows.collect()
+}
+
+fn made(name: &str, rows: &[Map<String, Value>]) -> (tempfile::TempDir, PathBuf) {
+    let (folder, path) = set(name, rows);
+    for name in ["0.png", "1.png", "2.png"] {
+        fs::write(folder.path().join(name), png(name.as_bytes()[0])).unwrap();
+    }
+    (folder, path)
+}
+
+/// The scene of each frame that is asked about.
+fn scenes(dataset: &Dataset) -> Vec<String> {
+    let frames = dataset.questions().iter().step_by(2);
+    frames
+        .map(|question| dataset.scene(&question.frame))
+        .collect()
+}
+
+const TWO: [&str; 6] = ["a", "a", "a", "a", "b", "b"];
+
+#[test]
+fn a_column_names_the_scene_in_every_form() {
+    for name in ["set.jsonl", "set.json", "set.tsv", "set.csv", "set.parquet"] {
+        let (_folder, path) = made(name, &rows("Scene", TWO.map(|scene| json!(scene))));
+        let read = open(&path, &SetArgs::default()).unwrap();
+        assert_eq!(scenes(&read), ["a", "a", "b"], "{name}");
+        let said = read.reading().join("\n");
+        assert!(
+            said.contains("scene = Scene: 2 scenes of 3 images"),
+            "{said}"
+        );
+    }
+    let (_folder, path) = made(
+        "set.jsonl",
+        &rows("house", [3, 3, 3, 3, 4, 4].map(|n| json!(n))),
+    );
+    let read = |args: &SetArgs| scenes(&open(&path, args).unwrap());
+    assert_eq!(read(&SetArgs::default()), ["", "", ""]);
+    assert_eq!(read(&map("scene=house")), ["3", "3", "4"]);
+}
+
+#[test]
+fn the_questions_of_a_folder_name_the_scenes_of_its_frames() {
+    let rows = rows("scene", TWO.map(|scene| json!(scene)));
+    let rows: Vec<Map<String, Value>> = rows
+        .into_iter()
+        .map(|mut row| {
+            let image = row.remove("image").unwrap();
+            row.insert("frame".to_owned(), image);
+            row
+        })
+        .collect();
+    let (folder, _path) = made("questions.jsonl", &rows);
+    let place = DataPlace::Path(folder.path().to_owned());
+    let read = Dataset::open(&place, None, &SetArgs::default()).unwrap();
+    assert_eq!(scenes(&read), ["a", "a", "b"]);
+    // It is this program's own form still.
+    assert_eq!(read.reading_to_say(), &[] as &[String]);
+}
+
+#[test]
+fn some_frames_may_have_no_scene() {
+    let some = [
+        json!("a"),
+        json!("a"),
+        json!(" "),
+        Value::Null,
+        json!("b"),
+        Value::Null,
+    ];
+    let (_folder, path) = made("set.jsonl", &rows("scene", some));
+    let read = open(&path, &map("id=id")).unwrap();
+    assert_eq!(scenes(&read), ["a", "", "b"]);
+    let said = read.reading().join("\n");
+    assert!(
+        said.contains("2 scenes of 3 images, 1 image without a scene"),
+        "{said}"
+    );
+}
+
+#[test]
+fn an_image_of_two_scenes_is_refused_or_no_scene_is_used() {
+    let two = ["a", "b", "a", "a", "b", "b"].map(|scene| json!(scene));
+    let (_folder, path) = made("set.jsonl", &rows("scene", two));
+    let problem = refusal(&path, &SetArgs::default());
+    assert!(
+        problem.contains("line 2: the image \"0.png\" is of the scene \"b\" here and of \"a\" before; an image has one scene (--map scene=")
+            && problem.len() < 250,
+        "{problem}"
+    );
+    assert_eq!(scenes(&open(&path, &map("scene=")).unwrap()), ["", "", ""]);
+    // A column of other sets that happens to have the name.
+    let mut foreign = rows(
+        "scene",
+        ["a", "b", "a", "a", "b", "b"].map(|scene| json!(scene)),
+    );
+    for row in &mut foreign {
+        row.insert("source".to_owned(), json!("web"));
+    }
+    let (_folder, path) = made("set.jsonl", &foreign);
+    let read = open(&path, &SetArgs::default()).unwrap();
+    assert_eq!(scenes(&read), ["", "", ""]);
+    let said = read.reading().join("\n");
+    assert!(
+        said.contains("scene is not used as the scene: the image \"0.png\" is of"),
+        "{said}"
+    );
+}

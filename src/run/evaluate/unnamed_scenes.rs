@@ -1,0 +1,18 @@
+//! The warning about frames without the scenes that their names suggest: [`unnamed_scenes`].
+
+use crate::dataset::Dataset;
+use crate::score::suggested_scenes::SuggestedScenes;
+use crate::types::Question;
+
+/// The warning; `None` if the data name scenes, or the names of the frames suggest none.
+pub(super) fn unnamed_scenes(dataset: &Dataset, questions: &[Question]) -> Option<String> {
+    let frames = || questions.iter().map(|question| &question.frame);
+    if frames().any(|frame| !dataset.scene(frame).is_empty()) {
+        return None;
+    }
+    let suggested = SuggestedScenes::new(frames())?;
+    Some(format!(
+        "{}; a \"scene\" in each question (or --map scene=COLUMN) names them",
+        suggested.sentence()
+    ))
+}
