@@ -10,6 +10,7 @@ pub(crate) fn outcome(record: &Record) -> String {
         TrialOutcome::Answered => "answered".to_owned(),
         TrialOutcome::Unparsed => match record.detail.strict.and_then(|strict| strict.why) {
             None => "not read".to_owned(),
+            Some(UnreadReason::CannotTell) => unread(UnreadReason::CannotTell).to_owned(),
             Some(why) => format!("not read ({})", unread(why)),
         },
         TrialOutcome::Failed => match &record.failure {
@@ -31,6 +32,7 @@ pub(crate) fn unread(why: UnreadReason) -> &'static str {
         UnreadReason::Contradiction => "names the letter of one choice with the text of another",
         UnreadReason::Negated => "names a choice only to deny it",
         UnreadReason::NoChoice => "names no choice in the form that was asked for",
+        UnreadReason::CannotTell => "“I cannot tell”",
     }
 }
 

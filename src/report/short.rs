@@ -109,10 +109,16 @@ pub(super) fn head(report: &ChoiceReport<'_>) -> String {
         .map(|subject| &*subject.model)
         .collect();
     models.dedup();
+    let is_people = |model: &&str| grid.listing.is_people(model);
+    let (people, models): (Vec<&str>, Vec<&str>) = models.into_iter().partition(is_people);
     let who = match &models[..] {
+        [] => String::new(),
         [one] => (*one).to_owned(),
         several => counted(several.len(), "model"),
     };
+    let people = people.into_iter().map(|name| format!("{name} (people)"));
+    let who: Vec<String> = Some(who).filter(|who| !who.is_empty()).into_iter().chain(people).collect();
+    let who = who.join(", ");
     let questions: BTreeSet<_> = grid
         .items
         .iter()

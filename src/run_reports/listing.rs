@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::Value;
 
 use super::join::{Joined, JoinedRun};
+use super::settings::is_of_people;
 use crate::runs::renamed::ADAPTED_FOR;
 use crate::score::record::Detail;
 use crate::types::{ModelColumn, ModelListing};
@@ -23,6 +24,13 @@ pub(super) fn listing<D: Detail>(joined: &Joined<D>) -> ModelListing {
             let group = joined.models.group(model, index);
             group.map_or_else(|| model.to_owned(), |(_, name)| name.clone())
         };
+        if is_of_people(&run.manifest) {
+            let names = run.manifest.identity.get("--model");
+            let names = names.and_then(Value::as_array).into_iter().flatten();
+            for name in names.filter_map(Value::as_str) {
+                listing.add_people(shown(name));
+            }
+        }
         for (field, changes) in &run.manifest.settings {
             if let Some(model) = field.strip_prefix(ADAPTED_FOR) {
                 let changes = changes.as_array().into_iter().flatten();

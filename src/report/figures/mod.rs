@@ -181,9 +181,10 @@ impl<'a> Overview<'a> {
         lines.collect()
     }
 
-    /// The models over which a mean is taken: without the built-in ones, if there are others.
+    /// The models over which a mean is taken: without people and the built-in models, if there are others.
     fn averaged_models(&self) -> Vec<&'a str> {
-        let judged = judged(self.models.iter().copied());
+        let listing = &self.findings.grid.listing;
+        let judged = judged(listing.without_people(self.models.iter().copied()));
         let models = self.models.iter().copied();
         models.filter(|model| judged.contains(model)).collect()
     }

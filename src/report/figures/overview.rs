@@ -72,7 +72,8 @@ pub(crate) fn overview(findings: &Findings<'_>, names: &Names) -> OverviewPanels
 impl Overview<'_> {
     /// The models over which the means of the sheet are.
     fn pooled(&self) -> Vec<&str> {
-        let pooled = pooled_models(self.models.iter().copied());
+        let listing = &self.findings.grid.listing;
+        let pooled = pooled_models(listing.without_people(self.models.iter().copied()));
         let models = self.models.iter().copied();
         models.filter(|model| pooled.contains(model)).collect()
     }

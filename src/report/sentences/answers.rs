@@ -8,6 +8,7 @@ use crate::score::findings::Findings;
 use crate::score::pooled::PooledFinding;
 use crate::score::pooled_kind::PooledKind;
 use crate::score::significance::ALPHA;
+use crate::types::UnreadReason;
 
 /// Replies that could not be read, if they are few: an alert speaks of many, and of failed trials. Built-in models are not counted.
 pub(super) fn unread(findings: &Findings<'_>) -> Option<Sentence> {
@@ -16,7 +17,8 @@ pub(super) fn unread(findings: &Findings<'_>) -> Option<Sentence> {
     let (mut replies, mut unread) = (0, 0);
     for health in health {
         replies += health.replies;
-        unread += health.unread.values().sum::<usize>();
+        let all: usize = health.unread.values().sum();
+        unread += all - health.unread_for(&[UnreadReason::CannotTell]);
     }
     let share = unread as f64 / replies.max(1) as f64;
     if unread == 0 || share > MAX_UNREAD {

@@ -10,6 +10,7 @@
 //! - A sentence is about the models of the run and names their number; it does not speak of models in general.
 
 mod answers;
+mod apart;
 mod baseline;
 mod confidence;
 mod darkness;
@@ -60,6 +61,7 @@ pub(crate) fn sentences(findings: &Findings<'_>) -> Vec<Sentence> {
     sentences.extend(words_alone::untouched(findings));
     sentences.extend(about_clean(findings));
     sentences.extend(models::best(findings));
+    sentences.extend(apart::apart(findings));
     sentences.extend(in_each_light(findings, about_answers));
     sentences.extend(answers::fidelity(findings));
     sentences.extend(answers::unread(findings));

@@ -1,10 +1,10 @@
-//! Sentences about the sample: what so few clusters cannot show, and which levels are left out.
+//! Sentences about the sample: what so few clusters cannot show, and which models are left out.
 
 use super::sentence::{Numbers, Sentence, Tone, level_runs};
 use crate::report::words::light;
 use crate::score::cluster::ClusterUnit;
 use crate::score::findings::Findings;
-use crate::score::pooled::{LevelsLeftOut, PooledFinding};
+use crate::score::pooled::{ModelsLeftOut, PooledFinding};
 use crate::score::pooled_kind::PooledKind;
 use crate::types::{EnhancerName, KindReading};
 
@@ -123,10 +123,10 @@ pub(super) fn power(all: &[PooledFinding], unit: ClusterUnit) -> Option<Sentence
     Some(numbers.sentence("power", Tone::Note, text, detail.to_owned()))
 }
 
-/// Which levels are not compared, because models were not asked there: a sentence for the same levels and models. False answers are
-/// left out at the levels of darkness.
+/// The models that are left out of findings, because they answered less than others: a sentence for the same levels and models. False
+/// answers are left out at the levels of darkness.
 pub(in crate::report) fn left_out(findings: &Findings<'_>) -> Vec<Sentence> {
-    let mut grouped: Vec<(&LevelsLeftOut, Vec<String>)> = Vec::new();
+    let mut grouped: Vec<(&ModelsLeftOut, Vec<String>)> = Vec::new();
     for set in &findings.left_out {
         if matches!(set.kind, PooledKind::Hallucination(_)) {
             continue;
@@ -136,8 +136,9 @@ pub(in crate::report) fn left_out(findings: &Findings<'_>) -> Vec<Sentence> {
             topic(set.kind, &set.variant, set.enhancer.as_ref()),
             light(&set.variant, None)
         );
-        let is_same =
-            |other: &LevelsLeftOut| runs(other) == runs(set) && other.models == set.models;
+        let is_same = |other: &ModelsLeftOut| {
+            runs(other) == runs(set) && other.models == set.models && other.items == set.items
+        };
         match grouped.iter_mut().find(|(other, _)| is_same(other)) {
             Some((_, topics)) => topics.push(about),
             None => grouped.push((set, vec![about])),
@@ -145,30 +146,41 @@ pub(in crate::report) fn left_out(findings: &Findings<'_>) -> Vec<Sentence> {
     }
     let sentences = grouped.into_iter().map(|(set, topics)| {
         let mut numbers = Numbers::of(findings.unit);
-        let are = if set.levels.len() == 1 { "is" } else { "are" };
-        let were = if set.models.len() == 1 { "was" } else { "were" };
+        let is_one = set.models.len() == 1;
         let models = if set.models.len() > MAX_NAMED {
             format!("{} models", numbers.count("models", set.models.len()))
         } else {
             listed(&set.models)
         };
+        let [all, answered] = set.items;
+        let why = match (answered, is_one) {
+            (0, true) => "it was not asked".to_owned(),
+            (0, false) => "they were not asked".to_owned(),
+            (_, is_one) => format!(
+                "{} answered {} of {} questions",
+                if is_one { "it" } else { "each" },
+                numbers.count("answered", answered),
+                numbers.count("questions", all)
+            ),
+        };
         let text = format!(
-            "{} {are} not compared: {models} {were} not asked there.",
+            "{models} {} apart from the other models: {why} at {}.",
+            if is_one { "stands" } else { "stand" },
             runs(set)
         );
-        let detail = format!("left out of the findings about {}", listed(&topics));
+        let detail = format!("in no mean about {}", listed(&topics));
         numbers.sentence("left out", Tone::Note, text, detail)
     });
     sentences.collect()
 }
 
-/// The levels that are left out.
-fn runs(set: &LevelsLeftOut) -> String {
+/// The levels at which models answered less.
+fn runs(set: &ModelsLeftOut) -> String {
     level_runs(&set.levels, &set.asked)
 }
 
 /// Things in words, as `a, b and c`.
-fn listed(things: &[String]) -> String {
+pub(super) fn listed(things: &[String]) -> String {
     match things {
         [] => String::new(),
         [one] => one.clone(),

@@ -156,7 +156,7 @@ fn row(findings: &Findings<'_>, variant: &KindReading, model: &str, run: &RunLin
         }),
         below: below.filter_map(|subject| subject.level).collect(),
         unread: health.fold([0, 0], |[unread, all], health| {
-            [unread + health.replies - health.read, all + health.replies]
+            [unread + health.unreadable(), all + health.replies]
         }),
     }
 }

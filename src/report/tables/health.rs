@@ -17,6 +17,7 @@ const UNREAD: [&str; UnreadReason::ALL.len()] = [
     "contradiction",
     "negated",
     "no_choice",
+    "cannot_tell",
 ];
 
 /// CSV columns of the kinds of failure, in the order of [`FailureKind::ALL`].
@@ -32,11 +33,12 @@ const FAILED: [&str; FailureKind::ALL.len()] = [
 ];
 
 /// Reasons that do not concern the form of the answer.
-const OTHER: [UnreadReason; 4] = [
+const OTHER: [UnreadReason; 5] = [
     UnreadReason::Refused,
     UnreadReason::Filtered,
     UnreadReason::Truncated,
     UnreadReason::Empty,
+    UnreadReason::CannotTell,
 ];
 
 pub(in crate::report) fn health(health: &[Health]) -> Table {

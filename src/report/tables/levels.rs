@@ -217,5 +217,13 @@ pub(in crate::report) fn unread(summary: &AccuracySummary) -> Option<String> {
         Some(format!("{count} {what}"))
     });
     let counts: Vec<String> = counts.collect();
-    (!counts.is_empty()).then(|| format!("of the unparsed replies {}", counts.join(", ")))
+    let unparsed =
+        (!counts.is_empty()).then(|| format!("of the unparsed replies {}", counts.join(", ")));
+    let cannot_tell = summary.unread.get(&UnreadReason::CannotTell);
+    let people = cannot_tell.map(|count| {
+        let answers = if *count == 1 { "answer of people is" } else { "answers of people are" };
+        format!("{count} {answers} “I cannot tell”, which counts as wrong and not as unparsed")
+    });
+    let parts: Vec<String> = unparsed.into_iter().chain(people).collect();
+    (!parts.is_empty()).then(|| parts.join("; "))
 }

@@ -23,7 +23,7 @@ use crate::store::now;
 use crate::store::{AddressChange, Store, read_questions};
 use crate::types::manifest::{Counts, RunManifest, Status};
 use crate::types::{
-    ChoiceDetail, Condition, Decides, Digest, QuestionId, Record, Reply, StoredDetail as _,
+    AnswerReading, ChoiceDetail, Condition, Decides, Digest, QuestionId, Record, Reply, StoredDetail as _,
     TrialKey, TrialRef, Trials, UnreadReason,
 };
 
@@ -157,7 +157,7 @@ fn no_choice(line: &PlacedAnswer<'_>, record: &Record) -> Option<String> {
     let found = line.answer.answer.as_deref().unwrap_or_default();
     let choices = record.detail.choices.join(", ");
     let (file, number, question) = (line.file.display(), line.line, &record.question);
-    (why != UnreadReason::Empty).then(|| {
+    (why != UnreadReason::CannotTell).then(|| {
         format!("{file}, line {number}: {found:?} is not a choice of {question}: {choices}")
     })
 }
@@ -279,6 +279,13 @@ impl People {
             ..Reply::local(line.answer.clone().unwrap_or_default())
         };
         let mut answered = answered(blank, reply)?;
+        if line.answer.is_none() {
+            let cannot_tell = Some(AnswerReading {
+                chosen: None,
+                why: Some(UnreadReason::CannotTell),
+            });
+            (answered.detail.strict, answered.detail.lenient) = (cannot_tell, cannot_tell);
+        }
         answered.latency_ms = None;
         Ok(answered)
     }

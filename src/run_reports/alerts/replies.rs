@@ -15,7 +15,7 @@ pub(super) fn of_replies(health: &[Health], unread_as: &str) -> Vec<Alert> {
     for health in health {
         let [replies, unread, failed] = counts.entry(&health.subject.model).or_default();
         *replies += health.replies;
-        *unread += health.replies - health.read;
+        *unread += health.unreadable();
         *failed += health.failures();
     }
     let mut alerts = Vec::new();
@@ -46,7 +46,7 @@ pub(super) fn of_replies(health: &[Health], unread_as: &str) -> Vec<Alert> {
 
 /// The condition of a model with the largest share of replies that could not be read, if it is above the limit.
 fn worst<'h>(health: &'h [Health], model: &str) -> Option<&'h Health> {
-    let share = |health: &Health| (health.replies - health.read) as f64 / health.replies as f64;
+    let share = |health: &Health| health.unreadable() as f64 / health.replies as f64;
     let own = health.iter().filter(|health| health.subject.model == model);
     let above = own.filter(|health| health.replies > 0 && share(health) > MAX_UNREAD);
     above.max_by(|a, b| share(a).total_cmp(&share(b)))
@@ -54,7 +54,7 @@ fn worst<'h>(health: &'h [Health], model: &str) -> Option<&'h Health> {
 
 /// The replies of a condition that could not be read, and how many of them the lenient parsing reads.
 fn in_condition(health: &Health, unread_as: &str) -> String {
-    let unread = health.replies - health.read;
+    let unread = health.unreadable();
     let share = 100.0 * unread as f64 / health.replies as f64;
     let lenient = match health.lenient_only {
         0 => String::new(),
@@ -94,7 +94,9 @@ pub(super) fn of_people(combined: &Combined) -> Vec<Alert> {
         .filter(|run| is_of_people(&run.manifest));
     let alerts = people.filter_map(|run| {
         let unread = combined.of(run).filter_map(|trial| trial.strict()?.why);
-        let count = unread.filter(|why| *why != UnreadReason::Empty).count();
+        // In runs of earlier versions, who could not tell gave an empty answer.
+        let is_said = |why: &UnreadReason| matches!(why, UnreadReason::Empty | UnreadReason::CannotTell);
+        let count = unread.filter(|why| !is_said(why)).count();
         let text = format!(
             "{} of {} of people are not choices of their questions, and count as wrong.",
             count,

@@ -24,7 +24,7 @@ pub struct AccuracyCell {
     pub mode: ReadingMode,
     /// Number of replies that named the true choice.
     pub right: usize,
-    /// Number of replies in which no choice could be read. They count as wrong.
+    /// Number of replies in which no choice could be read. They count as wrong, as people do who cannot tell.
     pub unparsed: usize,
     /// Number of trials without a reply. They are not scored.
     pub failed: usize,
@@ -117,9 +117,12 @@ fn cell(
     mode: ReadingMode,
 ) -> AccuracyCell {
     let (mut unparsed, mut failed) = (0, 0);
-    for (_, result) in grid.of_family(subject, family) {
+    let items = grid.items.iter().enumerate();
+    for (index, _) in items.filter(|(_, item)| item.is_of(family)) {
+        let result = grid.result(subject, index);
         failed += usize::from(result == TrialResult::Failed);
-        unparsed += usize::from(result.reading(mode) == Some(None));
+        unparsed +=
+            usize::from(result.reading(mode) == Some(None) && !cannot_tell(grid, subject, index));
     }
     let counts = grid.counts(subject, family, mode);
     AccuracyCell {
@@ -132,6 +135,13 @@ fn cell(
         accuracy: Estimate::clustered(&counts),
         always: always(grid, subject, family, mode),
     }
+}
+
+/// True if a person said that they cannot tell: that is read, and is no choice.
+fn cannot_tell(grid: &Grid<'_>, subject: usize, item: usize) -> bool {
+    let trial = grid.trial(subject, item);
+    let strict = trial.and_then(|trial| trial.strict());
+    strict.and_then(|reading| reading.why) == Some(UnreadReason::CannotTell)
 }
 
 /// Share of questions answered correctly every time; `None` if each question was asked once.

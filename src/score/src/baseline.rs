@@ -52,7 +52,7 @@ pub fn baseline_rows(
 ) -> Vec<BaselineRow> {
     let side = |subject: usize| BaselineSide {
         replies: health[subject].replies,
-        unread: health[subject].replies - health[subject].read,
+        unread: health[subject].unreadable(),
         failed: health[subject].failures(),
         cost: cost(subject),
     };

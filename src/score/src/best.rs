@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 use super::choice::ReadingMode;
+use super::coverage::{Coverage, most};
 use super::estimate::Estimate;
 use super::grid::{ClusterCount, Grid};
 use super::paired::{ClusterNet, PairedTest};
@@ -24,7 +25,8 @@ pub struct BestInTheDark {
     pub lighter: Vec<AxisLevel>,
     /// The dark levels that some model was asked.
     pub asked: Vec<AxisLevel>,
-    /// Models with images that are not compared, because they were not asked at L0 and at a degraded level of this variant.
+    /// Models with images that are not compared, because they were not asked at L0 and at a degraded level of this variant, or answered
+    /// less than others there.
     pub without: Vec<String>,
     /// The models with their accuracies, the best in the dark first. The first one leads.
     pub models: Vec<DarkAccuracy>,
@@ -162,8 +164,10 @@ pub fn best_in_the_dark(grid: &Grid<'_>, mode: ReadingMode) -> Option<BestInTheD
     let models = pool(grid)
         .into_iter()
         .map(|model| (model, levels(grid, model, &variant)));
-    let (curves, without): (Vec<Asked<'_>>, Vec<Asked<'_>>) =
+    let (curves, mut without): (Vec<Asked<'_>>, Vec<Asked<'_>>) =
         models.partition(|(_, levels)| levels.len() > 1 && levels.contains(&AxisLevel::L0));
+    let (curves, apart) = with_most_answers(grid, curves, &variant);
+    without.extend(apart);
     let shared = |level: &AxisLevel| curves.iter().all(|(_, levels)| levels.contains(level));
     let levels = curves.first()?.1.iter().copied().filter(shared);
     let levels: Vec<AxisLevel> = levels.collect();
@@ -224,6 +228,33 @@ fn levels(grid: &Grid<'_>, model: &str, variant: &KindReading) -> BTreeSet<AxisL
         is_degraded || subject.is_for(&clean)
     });
     subjects.filter_map(|subject| subject.level).collect()
+}
+
+/// The models that answered most, and those that answered less, so that none of them takes away what is compared of the others.
+fn with_most_answers<'g>(
+    grid: &Grid<'_>,
+    models: Vec<Asked<'g>>,
+    variant: &KindReading,
+) -> (Vec<Asked<'g>>, Vec<Asked<'g>>) {
+    let coverages = models.iter().map(|(model, levels)| {
+        let sides = levels.iter().filter_map(|level| {
+            let subject = grid.stand_in(&Subject::seeing(model, *level, variant, None))?;
+            Some((*level, vec![subject]))
+        });
+        Coverage::new(grid, sides, |_| true)
+    });
+    let coverages: Vec<Coverage> = coverages.collect();
+    let Some(most) = most(&coverages) else {
+        return (models, Vec::new());
+    };
+    let is_complete: Vec<bool> = coverages
+        .iter()
+        .map(|coverage| coverage.lacking(most).is_empty())
+        .collect();
+    let mut is_complete = is_complete.into_iter();
+    models
+        .into_iter()
+        .partition(|_| is_complete.next() == Some(true))
 }
 
 /// Right replies of all models to an item that every model answered at every level.

@@ -6,6 +6,7 @@ use super::accuracy::{AccuracySummary, summarize};
 use super::chance::OfferedChoices;
 use super::grid::Grid;
 use super::health::healths;
+use super::subject::Subject;
 use darkqa_ground::types::{QuestionId, View};
 
 /// The questions that a model was asked, in any condition.
@@ -41,7 +42,7 @@ impl CommonItems {
             .map(|item| &*item.asked.question)
             .collect();
         let mut asked = BTreeMap::<(bool, &str), BTreeSet<&QuestionId>>::new();
-        for (index, subject) in grid.subjects.iter().enumerate() {
+        for (index, subject) in of_models(grid) {
             let model = (subject.view == Some(View::Blind), &*subject.model);
             let questions = asked.entry(model).or_default();
             if questions.len() == all.len() {
@@ -78,11 +79,20 @@ impl CommonItems {
     }
 }
 
-/// Whether each item has a reply of every model with images, in any condition. Models without any reply do not count.
+/// The subjects with their indices, without those of people beside models.
+fn of_models<'g>(grid: &'g Grid<'_>) -> impl Iterator<Item = (usize, &'g Subject)> {
+    let models = grid.subjects.iter().map(|subject| &*subject.model);
+    let models: BTreeSet<&str> = grid.listing.without_people(models).into_iter().collect();
+    let subjects = grid.subjects.iter().enumerate();
+    subjects.filter(move |(_, subject)| models.contains(&*subject.model))
+}
+
+/// Whether each item has a reply of every model with images, in any condition. Models without any reply do not count, and people count
+/// only if there are no models.
 #[must_use]
 pub fn shared_items(grid: &Grid<'_>) -> Vec<bool> {
     let mut models = BTreeMap::<&str, Vec<bool>>::new();
-    for (index, subject) in grid.subjects.iter().enumerate() {
+    for (index, subject) in of_models(grid) {
         if subject.view != Some(View::Image) {
             continue;
         }

@@ -87,7 +87,10 @@ impl FidelityFindings {
         }
         let seeing = grid.subjects.iter();
         let seeing = seeing.filter(|subject| subject.view == Some(View::Image));
-        let pool = pooled_models(seeing.map(|subject| &*subject.model));
+        let models = grid
+            .listing
+            .without_people(seeing.map(|subject| &*subject.model));
+        let pool = pooled_models(models);
         let mut conditions = BTreeMap::<ConditionKey<'_>, Vec<usize>>::new();
         let mut models = BTreeSet::new();
         for (index, subject) in grid.subjects.iter().enumerate() {

@@ -20,7 +20,7 @@ use super::health::{Health, healths};
 use super::observed::ObserverSummary;
 use super::pair_darkness::{self, PairDarkness};
 use super::photographed_set::PhotographedSet;
-use super::pooled::{LevelsLeftOut, PooledFinding, levels_left_out, pooled};
+use super::pooled::{ModelsLeftOut, PooledFinding, models_left_out, pooled};
 use super::significance::Significance;
 use super::strict_score::StrictScore;
 use super::subject::{Subject, is_control, is_observer};
@@ -41,8 +41,8 @@ pub struct Findings<'a> {
     pub health: Vec<Health>,
     /// Differences of all models together, ordered by kind, variant, enhancer, family and level.
     pub pooled: Vec<PooledFinding>,
-    /// Levels that the pooled findings leave out, because some of their models were not asked there.
-    pub left_out: Vec<LevelsLeftOut>,
+    /// Models that the pooled findings leave out, because they answered less than others.
+    pub left_out: Vec<ModelsLeftOut>,
     /// Whether each finding about noise holds under every light reading; empty with one reading.
     pub by_reading: Vec<FindingByReading>,
     /// The models by their mean accuracy in the dark, if there are two or more.
@@ -188,7 +188,7 @@ impl<'a> Findings<'a> {
             summary: summarize(&grid, &health, questions.iter().cloned()),
             health,
             pooled: pooled(&grid),
-            left_out: levels_left_out(&grid),
+            left_out: models_left_out(&grid),
             by_reading: by_reading(&grid),
             best: best_in_the_dark(&grid, ReadingMode::Strict),
             lenient_best: best_in_the_dark(&grid, ReadingMode::Lenient),

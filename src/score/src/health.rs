@@ -46,7 +46,14 @@ impl Health {
         self.failed.values().sum()
     }
 
-    /// Number of replies that could not be read for one of these reasons.
+    /// Number of replies that could not be read. People who cannot tell said so.
+    #[must_use]
+    pub fn unreadable(&self) -> usize {
+        let unread = self.replies - self.read;
+        unread.saturating_sub(self.unread_for(&[UnreadReason::CannotTell]))
+    }
+
+    /// Number of replies without a choice for one of these reasons.
     #[must_use]
     pub fn unread_for(&self, reasons: &[UnreadReason]) -> usize {
         let count = |reason| self.unread.get(reason).copied().unwrap_or(0);

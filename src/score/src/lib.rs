@@ -36,6 +36,7 @@ pub mod cluster;
 pub mod common;
 pub mod comparison;
 pub mod confusion;
+mod coverage;
 pub mod curve;
 pub mod estimate;
 pub mod fidelity;

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::choice::ReadingMode;
 use super::claim::{Claim, ParsedFinding};
+use super::coverage::{Coverage, most};
 use super::estimate::Estimate;
 use super::grid::{Grid, TrialResult};
 use super::paired::{ClusterNet, PairedTest};
@@ -111,8 +112,8 @@ impl PooledFinding {
     }
 }
 
-/// The models over which findings are pooled, sorted: those with images, without reference models if there are others; else one
-/// reference alone.
+/// The models that findings are about, sorted: those with images, without people, and without reference models if there are others; else
+/// one reference alone.
 #[must_use]
 pub fn pool<'g>(grid: &'g Grid<'_>) -> Vec<&'g str> {
     models(grid, View::Image)
@@ -122,8 +123,8 @@ pub fn pool<'g>(grid: &'g Grid<'_>) -> Vec<&'g str> {
 fn models<'g>(grid: &'g Grid<'_>, view: View) -> Vec<&'g str> {
     let subjects = grid.subjects.iter();
     let asked = subjects.filter(|subject| subject.view == Some(view));
-    let models = pooled_models(asked.map(|subject| &*subject.model));
-    models.into_iter().collect()
+    let models = grid.listing.without_people(asked.map(|subject| &*subject.model));
+    pooled_models(models).into_iter().collect()
 }
 
 /// A kind, variant and enhancer: one set of Holm's correction for each family.
@@ -195,11 +196,42 @@ impl PooledSet {
         subjects.filter_map(|subject| subject.level).collect()
     }
 
-    /// The models of each pair, first and second side, among those of the pool that have both sides at some level.
+    /// The models of each pair, first and second side, among those of the pool that have both sides at some level. Those that answered
+    /// less than others stand apart.
+    fn models<'g>(&self, grid: &'g Grid<'_>, levels: &BTreeSet<AxisLevel>) -> SetModels<'g> {
+        let all = self.asked_models(grid, levels);
+        let coverages = all.iter().map(|[model, other]| {
+            let sides = levels.iter().filter_map(|level| {
+                let (first, second) = self.sides(grid, model, other, *level)?;
+                Some((*level, vec![first, second]))
+            });
+            Coverage::new(grid, sides, |item| self.kind.is_about(&grid.items[item]))
+        });
+        let coverages: Vec<Coverage> = coverages.collect();
+        let mut models = SetModels::default();
+        let Some(most) = most(&coverages) else {
+            return models;
+        };
+        for (pair, coverage) in all.into_iter().zip(&coverages) {
+            let lacking = coverage.lacking(most);
+            if lacking.is_empty() {
+                models.pooled.push(pair);
+            } else {
+                models.apart.push((pair[0], lacking));
+            }
+        }
+        models
+    }
+
+    /// The models of each pair that were asked on both sides at some level.
     ///
     /// Without images, models are compared with their own replies; only if none of them was asked so, each is compared with
     /// every model without images.
-    fn models<'g>(&self, grid: &'g Grid<'_>, levels: &BTreeSet<AxisLevel>) -> Vec<[&'g str; 2]> {
+    fn asked_models<'g>(
+        &self,
+        grid: &'g Grid<'_>,
+        levels: &BTreeSet<AxisLevel>,
+    ) -> Vec<[&'g str; 2]> {
         let pool = pool(grid);
         let own = pool.iter().map(|model| [*model, *model]);
         let asked = |pair: &[&str; 2]| {
@@ -216,6 +248,15 @@ impl PooledSet {
             .flat_map(|model| blind.iter().map(|other| [*model, *other]));
         pairs.filter(asked).collect()
     }
+}
+
+/// The models of a set.
+#[derive(Debug, Default)]
+struct SetModels<'g> {
+    /// The models of each pair, first and second side.
+    pooled: Vec<[&'g str; 2]>,
+    /// The models that answered too little, with the levels and the numbers of items of [`Coverage::lacking`].
+    apart: Vec<(&'g str, Vec<(AxisLevel, [usize; 2])>)>,
 }
 
 /// Replies of all models to one item on both sides.
@@ -246,47 +287,49 @@ pub fn pooled(grid: &Grid<'_>) -> Vec<PooledFinding> {
     findings.collect()
 }
 
-/// Levels that a set of findings leaves out, because some of its models were not asked on both sides there and others were.
+/// Models that a set of findings leaves out, because they answered less than others at some levels.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct LevelsLeftOut {
+pub struct ModelsLeftOut {
     pub kind: PooledKind,
     pub variant: KindReading,
     pub enhancer: Option<EnhancerName>,
-    /// The levels, sorted.
-    pub levels: Vec<AxisLevel>,
-    /// All levels at which some model was asked on both sides, sorted.
-    pub asked: Vec<AxisLevel>,
-    /// The models that were not asked on both sides at these levels, sorted.
+    /// The models, sorted.
     pub models: Vec<String>,
+    /// The levels at which they answered less, sorted.
+    pub levels: Vec<AxisLevel>,
+    /// All levels of the findings, sorted.
+    pub asked: Vec<AxisLevel>,
+    /// Number of items of the findings at `levels`, and of those that each of the models answered.
+    pub items: [usize; 2],
 }
 
-/// The levels that the findings leave out, by set and by the models that were not asked there.
+/// The models that the findings leave out, by set and by what they did not answer.
 #[must_use]
-pub fn levels_left_out(grid: &Grid<'_>) -> Vec<LevelsLeftOut> {
+pub fn models_left_out(grid: &Grid<'_>) -> Vec<ModelsLeftOut> {
     let mut all = Vec::new();
     for set in PooledSet::all(grid) {
-        let mut levels = set.levels(grid);
+        let levels = set.levels(grid);
         let models = set.models(grid, &levels);
-        let mut by_models = BTreeMap::<BTreeSet<&str>, Vec<AxisLevel>>::new();
-        levels.retain(|level| {
-            let (asked, lacking): (Vec<[&str; 2]>, Vec<[&str; 2]>) = models
-                .iter()
-                .copied()
-                .partition(|[model, other]| set.sides(grid, model, other, *level).is_some());
-            if !asked.is_empty() && !lacking.is_empty() {
-                let lacking = lacking.into_iter().map(|[model, _]| model);
-                by_models.entry(lacking.collect()).or_default().push(*level);
-            }
-            !asked.is_empty()
+        let asked = levels.iter().copied().filter(|level| {
+            let mut pooled = models.pooled.iter();
+            pooled.all(|[model, other]| set.sides(grid, model, other, *level).is_some())
         });
-        let asked: Vec<AxisLevel> = levels.into_iter().collect();
-        all.extend(by_models.into_iter().map(|(models, levels)| LevelsLeftOut {
+        let asked: Vec<AxisLevel> = asked.collect();
+        let mut groups = BTreeMap::<(Vec<AxisLevel>, [usize; 2]), BTreeSet<&str>>::new();
+        for (model, lacking) in models.apart {
+            let sum = |side: usize| lacking.iter().map(|(_, items)| items[side]).sum();
+            let levels = lacking.iter().map(|(level, _)| *level).collect();
+            let group = groups.entry((levels, [sum(0), sum(1)])).or_default();
+            group.insert(model);
+        }
+        all.extend(groups.into_iter().map(|((levels, items), models)| ModelsLeftOut {
             kind: set.kind,
             variant: set.variant.clone(),
             enhancer: set.enhancer.clone(),
+            models: models.into_iter().map(str::to_owned).collect(),
             levels,
             asked: asked.clone(),
-            models: models.into_iter().map(str::to_owned).collect(),
+            items,
         }));
     }
     all
@@ -295,7 +338,7 @@ pub fn levels_left_out(grid: &Grid<'_>) -> Vec<LevelsLeftOut> {
 /// The findings of a set, with all families together and with each family.
 fn of_set(grid: &Grid<'_>, set: &PooledSet) -> Vec<PooledFinding> {
     let levels = set.levels(grid);
-    let models = set.models(grid, &levels);
+    let models = set.models(grid, &levels).pooled;
     if models.is_empty() {
         return Vec::new();
     }

@@ -7,6 +7,7 @@ use darkqa_ground::error::Result;
 use darkqa_ground::types::record::Record;
 use darkqa_ground::types::{
     Answer, ChoiceDetail, Choices, Finish, OpenDetail, Reply, Step, StoredDetail, TrialOutcome,
+    UnreadReason,
 };
 
 /// A detail that takes the answer from a reply.
@@ -26,6 +27,11 @@ impl Detail for ChoiceDetail {
 
     /// Stores both readings of a reply, and the outcome, which follows from the strict reading.
     fn read(&mut self, reply: &Reply) -> Result<()> {
+        let why = self.strict.and_then(|strict| strict.why);
+        if why == Some(UnreadReason::CannotTell) && reply.text.is_empty() {
+            // A person said so by a button; there is no text to read again.
+            return Ok(());
+        }
         let choices = Choices::known_by(self.choices.clone().into(), self.truth)?;
         let (strict, lenient) = readings(reply, &choices);
         self.outcome = match strict {

@@ -1,6 +1,6 @@
 //! The models of a report as tables list them ([`ModelListing`]): their order, groups, marks and further columns.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
@@ -28,6 +28,8 @@ pub struct ModelListing {
     facts: BTreeMap<(ModelColumn, String), String>,
     /// The further columns of tables.
     columns: Vec<ModelColumn>,
+    /// The names under which people answered.
+    people: BTreeSet<String>,
 }
 
 /// A further column of tables, about the model of a row.
@@ -117,6 +119,29 @@ impl ModelListing {
                 known.push(change);
             }
         }
+    }
+
+    /// Notes that people answered under this name.
+    pub fn add_people(&mut self, name: String) {
+        self.people.insert(name);
+    }
+
+    /// True if people answered under this name, or under the name before a run or a time in brackets, as `human (one)`.
+    #[must_use]
+    pub fn is_people(&self, name: &str) -> bool {
+        let is_of = |people: &String| {
+            let rest = name.strip_prefix(&**people);
+            rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(" ("))
+        };
+        self.people.iter().any(is_of)
+    }
+
+    /// These models without people; the people if there are no others.
+    pub fn without_people<'m>(&self, models: impl IntoIterator<Item = &'m str>) -> Vec<&'m str> {
+        let (people, models): (Vec<&str>, Vec<&str>) = models
+            .into_iter()
+            .partition(|model| self.is_people(model));
+        if models.is_empty() { people } else { models }
     }
 
     /// Notes what stands in a column about a model.
@@ -232,6 +257,15 @@ mod tests {
         let foot = listing.foot(["b", "a", "a"]).unwrap();
         assert!(foot.ends_with("(a: no x is sent, no y is sent)"), "{foot}");
         assert_eq!(listing.foot(["b"]), None);
+    }
+
+    #[test]
+    fn people_are_apart_unless_they_are_alone() {
+        let mut listing = ModelListing::default();
+        listing.add_people("human".to_owned());
+        assert!(listing.is_people("human (one)") && !listing.is_people("humane"));
+        assert_eq!(listing.without_people(["a", "human", "b"]), ["a", "b"]);
+        assert_eq!(listing.without_people(["human"]), ["human"]);
     }
 
     #[test]

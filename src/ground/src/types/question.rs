@@ -246,11 +246,13 @@ pub enum UnreadReason {
     Negated,
     /// No choice was named in the form that this reading accepts.
     NoChoice,
+    /// A person said that they cannot tell.
+    CannotTell,
 }
 
 impl UnreadReason {
     /// All reasons, in the order of tables.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Empty,
         Self::Refused,
         Self::Truncated,
@@ -260,6 +262,7 @@ impl UnreadReason {
         Self::Contradiction,
         Self::Negated,
         Self::NoChoice,
+        Self::CannotTell,
     ];
 }
 

@@ -1,0 +1,69 @@
+//! How much of what others answered a model has answered: [`Coverage`].
+
+use std::collections::BTreeMap;
+
+use super::grid::Grid;
+use darkqa_ground::types::AxisLevel;
+
+/// Smallest share of the items of a level that a model must have answered to be averaged or ranked with others; chosen. A few failed
+/// trials leave a model in, a level or a part of the questions that it was never asked leave it out.
+pub(super) const LEAST_SHARE: f64 = 0.9;
+
+/// The items that a model answered at each level, on all sides of a comparison.
+#[derive(Debug)]
+pub(super) struct Coverage(BTreeMap<AxisLevel, Vec<bool>>);
+
+impl Coverage {
+    /// The items at each level to which all of these subjects, given by their indices, replied.
+    pub(super) fn new(
+        grid: &Grid<'_>,
+        levels: impl IntoIterator<Item = (AxisLevel, Vec<usize>)>,
+        is_about: impl Fn(usize) -> bool,
+    ) -> Self {
+        let answered = levels.into_iter().map(|(level, subjects)| {
+            let items = (0..grid.items.len()).map(|item| {
+                let mut sides = subjects.iter();
+                is_about(item) && sides.all(|side| grid.result(*side, item).is_reply())
+            });
+            (level, items.collect())
+        });
+        Self(answered.collect())
+    }
+
+    /// Number of answered items over all levels.
+    pub(super) fn total(&self) -> usize {
+        self.0.values().flatten().filter(|answered| **answered).count()
+    }
+
+    /// Numbers of items of `most` at a level, and of those among them that are answered here.
+    fn of_level(&self, most: &Self, level: AxisLevel) -> [usize; 2] {
+        let Some(all) = most.0.get(&level) else {
+            return [0, 0];
+        };
+        let count = |answered: Option<&Vec<bool>>| {
+            let both = answered.into_iter().flatten().zip(all);
+            both.filter(|(here, there)| **here && **there).count()
+        };
+        [count(Some(all)), count(self.0.get(&level))]
+    }
+
+    /// The levels at which less is answered than [`LEAST_SHARE`] of what `most` has, with both numbers of items.
+    pub(super) fn lacking(&self, most: &Self) -> Vec<(AxisLevel, [usize; 2])> {
+        let levels = most.0.keys();
+        let counts = levels.map(|level| (*level, self.of_level(most, *level)));
+        counts
+            .filter(|(_, [all, here])| (*here as f64) < LEAST_SHARE * *all as f64)
+            .collect()
+    }
+}
+
+/// The first of the models that answered most; `None` without models.
+pub(super) fn most<'c>(coverages: impl IntoIterator<Item = &'c Coverage>) -> Option<&'c Coverage> {
+    coverages.into_iter().reduce(|most, next| {
+        if next.total() > most.total() {
+            next
+        } else {
+            most
+        }
+    })
+}
