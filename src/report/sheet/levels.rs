@@ -46,7 +46,9 @@ pub(crate) fn levels(clean: &Rgb, blocks: &[LevelBlock], foot: &str) -> Rgb {
     let [height, width] = size;
     let rows = blocks.iter().flat_map(|block| &block.rows);
     let letters = rows.map(|row| row.name.chars().count()).max();
-    let margin = letters.unwrap_or_default().max(NAME) * letter_width() + GAP;
+    // A gap before a long name and behind it.
+    let longest = letters.unwrap_or_default() * letter_width() + 2 * GAP;
+    let margin = longest.max(NAME * letter_width() + GAP);
     // A label needs its width even if the image is small.
     let cell = width.max(CELL / 2);
     let columns = blocks.iter().map(|block| block.levels.len()).max();
@@ -252,6 +254,35 @@ mod tests {
             "T33.33 ms"
         );
         assert_eq!(label(AxisLevel::new(Kind::Auto, Severity::L3)), "L3 -6 EV");
+    }
+
+    #[test]
+    fn a_long_name_does_not_touch_the_picture() {
+        let block = LevelBlock {
+            levels: vec![AxisLevel::new(Kind::Sensor, Severity::L5)],
+            rows: vec![LevelRow {
+                name: "noise@physical".to_owned(),
+                images: vec![LevelImage {
+                    image: grey(60, 80, 3),
+                    dark_ev: 0.0,
+                }],
+            }],
+        };
+        let sheet = levels(&grey(60, 80, 100), &[block], "");
+        let rows: Vec<&[u8]> = sheet.samples().chunks(3 * sheet.width()).collect();
+        let is_frame = |row: &&[u8]| {
+            let mut runs = row.windows(3 * 80).step_by(3);
+            runs.position(|run| run.iter().all(|sample| *sample == 100))
+        };
+        let frame: Vec<(&[u8], usize)> = rows
+            .iter()
+            .filter_map(|row| Some((*row, is_frame(row)?)))
+            .collect();
+        assert_eq!(frame.len(), 60);
+        for (row, left) in frame {
+            let before = row[3 * (left - GAP)..3 * left].iter();
+            assert!(before.into_iter().all(|sample| *sample == 255));
+        }
     }
 
     #[test]
