@@ -32,6 +32,7 @@ use crate::error::Result;
 use crate::score::confusion::Confusion;
 use crate::score::findings::Findings;
 use crate::score::grid::Grid;
+use crate::types::Truths;
 use crate::types::manifest::RunManifest;
 
 /// The template of the page, its style and its script.
@@ -52,6 +53,8 @@ const SCRIPT: &str = concat!(
 /// The values of the template. They are not converted to JSON first, because a large run has 100,000 cells.
 #[derive(Serialize)]
 struct Page<'a> {
+    /// Class of the body: that of pages on which nothing is known to be right or wrong.
+    class: &'static str,
     title: String,
     /// What families of questions are called.
     family: &'static str,
@@ -106,6 +109,8 @@ pub(crate) struct PageContent<'a> {
     /// Answers against answers, and the heading of their table.
     pub(crate) confusions: &'a [Confusion],
     pub(crate) answers_title: &'static str,
+    /// Whether the true answers are known.
+    pub(crate) truths: Truths,
 }
 
 /// The page of an evaluation as HTML.
@@ -128,6 +133,7 @@ pub(crate) fn page<'a>(
         grid: &findings.grid,
         confusions: &findings.confusions,
         answers_title: "Answers given against true answers",
+        truths: Truths::Known,
     };
     page_of(content, figures, inputs)
 }
@@ -145,6 +151,10 @@ pub(crate) fn page_of<'a>(
     filled(
         PAGE,
         Page {
+            class: match content.truths {
+                Truths::Known => "",
+                Truths::Unknown => "no-truth",
+            },
             title: title(inputs),
             family: "family",
             alerts: content.alerts.iter().map(|alert| &*alert.text).collect(),
@@ -185,6 +195,7 @@ pub(in crate::report) fn page_of_open_questions(
     filled(
         PAGE,
         Page {
+            class: "",
             title: content.title,
             family: "category",
             alerts: content.alerts.iter().map(String::as_str).collect(),

@@ -28,6 +28,7 @@ pub(crate) use agreement_report::AgreementReport;
 pub(crate) use text::{TextLength, text};
 
 use self::measure::{AGREEMENT, HOW_TO_READ};
+use crate::types::Truths;
 
 /// Files of a report by name: numbers as CSV, the main tables as LaTeX, figures as SVG, and the HTML page.
 ///
@@ -48,6 +49,7 @@ pub(crate) fn products<'a>(
         grid: &report.found.grid,
         confusions: &report.found.confusions,
         answers_title: "Answers given against those at L0",
+        truths: Truths::Unknown,
     };
     let page = page_of(content, &figures, inputs)?;
     files(&report.tables, &report.sentences, figures, page, inputs)

@@ -3,7 +3,7 @@
 use super::pooled::too_few_clusters;
 use super::sections::{ENHANCERS, REAL};
 use crate::report::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
-use crate::report::table::{Column, Table, TableBuilder, TableFormat};
+use crate::report::table::{Column, Table, TableBuilder, TableCell, TableFormat};
 use crate::report::words::{counted, name};
 use crate::score::choice::ReadingMode;
 use crate::score::cluster::ClusterUnit;
@@ -42,6 +42,15 @@ pub(in crate::report) fn comparisons_of(
             heads: "csv measure".into(),
         });
         for row in &mut table.rows {
+            for cell in &mut row.cells {
+                // Another answer than at L0 need not be worse.
+                let words = match cell {
+                    TableCell::Significance(Significance::Better) => "agrees more",
+                    TableCell::Significance(Significance::Worse) => "agrees less",
+                    _ => continue,
+                };
+                *cell = TableCell::Text(words.to_owned());
+            }
             row.cells.push(measure.into());
         }
     }

@@ -62,8 +62,8 @@ const mark = (subject, item) => {
   if (code === FAILED) return ["!", "m-odd", (isOpen() ? "not answered" : "failed") + because(subject, item)];
   if (code === UNREAD) return ["?", "m-odd", (isOpen() ? "not marked" : "not read") + because(subject, item)];
   if (reference(subject, item) === null) return [letter(code), "m-none", "no answer at L0"];
-  const [same, other] = hasTruth() ? ["right", "wrong"] : [SAME, OTHER];
-  return isRight(subject, item) ? ["✓ " + letter(code), "m-right", same] : ["✗ " + letter(code), "m-wrong", other];
+  if (!hasTruth()) return isRight(subject, item) ? ["= " + letter(code), "m-same", SAME] : ["≠ " + letter(code), "m-other", OTHER];
+  return isRight(subject, item) ? ["✓ " + letter(code), "m-right", "right"] : ["✗ " + letter(code), "m-wrong", "wrong"];
 };
 const find = (model, light, level) =>
   data.subjects.findIndex((s) => s.model === model && s.light === light && s.level === level);
@@ -340,7 +340,11 @@ const draw = () => {
   const list = data.choices[item.choices].map((choice, index) => {
     const row = make("li");
     reveal(row, letter(index) + ". " + choice);
-    if (index === reference(subject, i)) { row.classList.add("true"); row.title = hasTruth() ? "true" : "its answer at L0"; row.append(" ✓"); }
+    if (index === reference(subject, i)) {
+      row.classList.add(hasTruth() ? "true" : "before");
+      row.title = hasTruth() ? "true" : "its answer at L0";
+      row.append(hasTruth() ? " ✓" : " (at L0)");
+    }
     if (subject >= 0 && chosen(subject, i) === index) { row.classList.add("chosen"); row.title = "chosen"; }
     return row;
   });
@@ -411,7 +415,7 @@ const start = async () => {
   $("i-evidenced").hidden = isOpen();
   $("i-key").textContent = isOpen()
     ? "Marks of the judge from 1 to 5 (0: no answer) · ? not marked · ! not answered; a click shows the answer and what the judge said"
-    : `✓ ${hasTruth() ? "right" : SAME} · ✗ ${hasTruth() ? "wrong" : OTHER} · ? not read · ! failed; the letter is the choice that was read; a click shows the reply`;
+    : `${hasTruth() ? "✓ right · ✗ wrong" : `= ${SAME} · ≠ ${OTHER}`} · ? not read · ! failed; the letter is the choice that was read; a click shows the reply`;
   const first = data.subjects.find((s) => s.light !== "blind") || data.subjects[0];
   state = { family: "all", model: first?.model, light: undefined, level: undefined, against: "–", show: "all", words: "", item: data.items.length ? 0 : null, pictured: null };
   $("loading").hidden = true;
