@@ -25,6 +25,9 @@ pub(crate) struct OverviewPanels {
     pub note: String,
 }
 
+/// The lines of [`Overview::beside_a_mean`], and chance, in a caption.
+const BESIDE: &str = "Broken: without images. Dotted: chance.";
+
 /// The panels of a run: each model, the mean over the models by variant, and that mean raw and with each enhancer.
 pub(crate) fn overview(findings: &Findings<'_>, names: &Names) -> OverviewPanels {
     let overview = Overview::new(findings, names);
@@ -129,19 +132,44 @@ impl Overview<'_> {
         variants: &[&KindReading],
         models: &[&str],
     ) -> Option<(String, Chart)> {
-        let (lines, alone) = with_dark_levels(self.lines_of_variants(variants, models));
+        let (mut lines, alone) = with_dark_levels(self.lines_of_variants(variants, models));
         if variants.len() - alone.len() < 2 {
             return None;
         }
+        lines.extend(
+            variants
+                .last()
+                .map_or_else(Vec::new, |last| self.beside_a_mean(last)),
+        );
         let who = self.who(models);
         let mut caption = format!(
-            "Accuracy by variant of the light, {who}. {}",
+            "Accuracy by variant of the light, {who}. {} {BESIDE}",
             self.band(models)
         );
         if !alone.is_empty() {
             let _ = write!(caption, " Not asked of all of them: {}.", alone.join(", "));
         }
         Some((caption, Self::one(format!("{who}, raw"), lines)))
+    }
+
+    /// The lines beside a mean over models, other than chance: each model without images, and on raw images the model that is drawn in
+    /// black.
+    fn beside_a_mean(&self, variant: &KindReading) -> Vec<PlotLine> {
+        let flat = self.flat_lines(None).into_iter();
+        let mut lines: Vec<PlotLine> = flat.filter(|line| line.name != CHANCE).collect();
+        let black = self.names.black.as_deref();
+        if let Some(model) = black.filter(|model| self.models.contains(model)) {
+            let points = self.points(model, variant, None, |subject| {
+                self.accuracy_of(subject, None)
+            });
+            lines.push(PlotLine {
+                name: self.names.of(model),
+                style: LineStyle::BLACK,
+                content: PanelContent::Curve(points),
+                model: None,
+            });
+        }
+        lines
     }
 
     /// The mean over the models, raw and with each enhancer; `None` without an enhancer that has a line.
@@ -168,9 +196,10 @@ impl Overview<'_> {
         }
         let flat = self.flat_lines(None).into_iter();
         lines.extend(flat.filter(|line| line.name == CHANCE));
+        lines.extend(self.beside_a_mean(variant));
         let (who, light) = (self.who(models), self.light(variant, None));
         let caption = format!(
-            "Accuracy raw and with each enhancer, {light}, {who}. L0 is the untouched frame. {}",
+            "Accuracy raw and with each enhancer, {light}, {who}. L0 is the untouched frame. {} {BESIDE}",
             self.band(models)
         );
         Some((caption, Self::one(format!("{who}, {light}"), lines)))
