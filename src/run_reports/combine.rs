@@ -159,8 +159,8 @@ pub(super) fn combine(runs: Vec<StoredRun<ChoiceDetail>>) -> Result<Combined> {
     Ok(combined)
 }
 
-/// The choices of all questions, for the chance line. A question is repeated for each order of its choices, since the answer to each
-/// order counts separately. Questions that are not asked yet are included once. Without stored questions, those in the trials count.
+/// The choices of all questions, for the chance line, with the number of orders that are asked: the answer to each order counts
+/// separately. Questions that are not asked yet are included once. Without stored questions, those in the trials count.
 fn offers(trials: &Trials<ChoiceDetail>, questions: &[RunQuestion]) -> Vec<OfferedChoices> {
     let mut orders = BTreeMap::<&QuestionId, BTreeSet<&[String]>>::new();
     let mut all = BTreeMap::<&QuestionId, OfferedChoices>::new();
@@ -172,17 +172,19 @@ fn offers(trials: &Trials<ChoiceDetail>, questions: &[RunQuestion]) -> Vec<Offer
         all.entry(&item.question).or_insert_with(|| OfferedChoices {
             family: item.family.as_ref().clone(),
             choices: item.choices.len(),
+            orders: 1,
         });
     }
     for question in questions {
         all.entry(&question.id).or_insert_with(|| OfferedChoices {
             family: question.family.clone(),
             choices: question.choices.len(),
+            orders: 1,
         });
     }
-    let offers = all.into_iter().flat_map(|(question, offer)| {
-        let times = orders.get(question).map_or(1, BTreeSet::len);
-        std::iter::repeat_n(offer, times)
+    let offers = all.into_iter().map(|(question, offer)| OfferedChoices {
+        orders: orders.get(question).map_or(1, BTreeSet::len),
+        ..offer
     });
     offers.collect()
 }

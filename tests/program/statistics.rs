@@ -413,6 +413,7 @@ fn a_made_set_gives_the_papers_arithmetic() {
         .map(|record| darkqa_eval::internals::score::OfferedChoices {
             family: record.detail.family.clone(),
             choices: record.detail.choices.len(),
+            orders: 1,
         });
     let trials = records.iter().cloned().collect();
     let findings = Findings::new(

@@ -22,7 +22,20 @@ pub(super) fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyC
             continue;
         };
         parts.push(match subject.view {
-            None => format!("chance {}", percent(share.value)),
+            None => {
+                let once = report.findings.summary.chance_of_questions;
+                let once = once.map(|once| {
+                    format!(
+                        " over all orders of choices ({} with each question once)",
+                        percent(once.value)
+                    )
+                });
+                format!(
+                    "chance {}{}",
+                    percent(share.value),
+                    once.unwrap_or_default()
+                )
+            }
             Some(_) if parts.is_empty() => {
                 format!("without images: {} {}", subject.model, with_interval(share))
             }

@@ -179,6 +179,13 @@ fn notes(summary: &AccuracySummary, ladder: &Ladder<'_, AccuracyCell>) -> Vec<St
         let share = 100.0 * chance.value;
         format!("chance: {share:.2} over {} {unit}", chance.n)
     }));
+    notes.extend(summary.chance_of_questions.map(|once| {
+        let share = 100.0 * once.value;
+        format!(
+            "chance with each question once, as the paper counts: {share:.2} over {} questions",
+            once.n
+        )
+    }));
     notes.extend(unread(summary));
     notes
 }
@@ -221,7 +228,11 @@ pub(in crate::report) fn unread(summary: &AccuracySummary) -> Option<String> {
         (!counts.is_empty()).then(|| format!("of the unparsed replies {}", counts.join(", ")));
     let cannot_tell = summary.unread.get(&UnreadReason::CannotTell);
     let people = cannot_tell.map(|count| {
-        let answers = if *count == 1 { "answer of people is" } else { "answers of people are" };
+        let answers = if *count == 1 {
+            "answer of people is"
+        } else {
+            "answers of people are"
+        };
         format!("{count} {answers} “I cannot tell”, which counts as wrong and not as unparsed")
     });
     let parts: Vec<String> = unparsed.into_iter().chain(people).collect();

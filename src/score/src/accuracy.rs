@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::chance::{OfferedChoices, chance};
+use super::chance::{OfferedChoices, chance, chance_of_questions};
 use super::choice::ReadingMode;
 use super::estimate::Estimate;
 use super::grid::{ClusterCount, Grid, GridItem, TrialResult};
@@ -49,6 +49,9 @@ pub struct AccuracySummary {
     pub cells: Vec<AccuracyCell>,
     /// Number of replies that the strict reading could not read, by reason.
     pub unread: BTreeMap<UnreadReason, usize>,
+    /// Chance with each question once, if several orders of its choices are asked and this changes chance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub chance_of_questions: Option<Estimate>,
 }
 
 impl AccuracySummary {
@@ -98,6 +101,7 @@ pub fn summarize(
     AccuracySummary {
         cells,
         unread: unread(health),
+        chance_of_questions: chance_of_questions(&questions),
     }
 }
 
