@@ -117,7 +117,11 @@ pub(super) fn head(report: &ChoiceReport<'_>) -> String {
         several => counted(several.len(), "model"),
     };
     let people = people.into_iter().map(|name| format!("{name} (people)"));
-    let who: Vec<String> = Some(who).filter(|who| !who.is_empty()).into_iter().chain(people).collect();
+    let who: Vec<String> = Some(who)
+        .filter(|who| !who.is_empty())
+        .into_iter()
+        .chain(people)
+        .collect();
     let who = who.join(", ");
     let questions: BTreeSet<_> = grid
         .items

@@ -379,7 +379,7 @@ fn people_enter_as_a_model() {
     assert_eq!(
         imported
             .iter()
-            .filter(|record| record["strict"]["why"] == "empty")
+            .filter(|record| record["strict"]["why"] == "cannot_tell")
             .count(),
         6
     );
@@ -388,6 +388,39 @@ fn people_enter_as_a_model() {
     assert!(records(&bench.path("people")) == imported);
     let both = bench.call(&["report", "run", "people", "--out", "both"]);
     assert_eq!(both.code, Some(0), "{both:?}");
+    // Who cannot tell says so: that is no reply that cannot be read, and stays so if replies are read again.
+    assert!(
+        !both.stdout.contains("could not be read"),
+        "{}",
+        both.stdout
+    );
+    let health = csv(&bench.path("both/health.csv"));
+    let column = health[0]
+        .iter()
+        .position(|name| name == "cannot_tell")
+        .unwrap();
+    let cannot_tell: usize = health[1..]
+        .iter()
+        .map(|row| row[column].parse::<usize>().unwrap())
+        .sum();
+    assert_eq!(cannot_tell, 6);
+    let again = bench.call(&["report", "people", "--rescore"]);
+    assert!(
+        again
+            .stdout
+            .contains("0 of 18 records now read differently"),
+        "{again:?}"
+    );
+    // People are in no mean over models, and take no question from it.
+    let pooled = csv(&bench.path("both/pooled.csv"));
+    let names = pooled[0].iter().position(|name| name == "names").unwrap();
+    assert!(
+        pooled[1..]
+            .iter()
+            .all(|row| row[names] == "script:said.jsonl"),
+        "{pooled:?}"
+    );
+    assert!(both.stdout.contains("people (people)"), "{}", both.stdout);
     let rows = csv(&bench.path("both/comparisons.csv"));
     let held = rows
         .iter()

@@ -23,8 +23,8 @@ use crate::store::now;
 use crate::store::{AddressChange, Store, read_questions};
 use crate::types::manifest::{Counts, RunManifest, Status};
 use crate::types::{
-    AnswerReading, ChoiceDetail, Condition, Decides, Digest, QuestionId, Record, Reply, StoredDetail as _,
-    TrialKey, TrialRef, Trials, UnreadReason,
+    AnswerReading, ChoiceDetail, Condition, Decides, Digest, QuestionId, Record, Reply,
+    StoredDetail as _, TrialKey, TrialRef, Trials, UnreadReason,
 };
 
 /// The flags of `study read`.

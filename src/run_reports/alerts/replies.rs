@@ -95,7 +95,8 @@ pub(super) fn of_people(combined: &Combined) -> Vec<Alert> {
     let alerts = people.filter_map(|run| {
         let unread = combined.of(run).filter_map(|trial| trial.strict()?.why);
         // In runs of earlier versions, who could not tell gave an empty answer.
-        let is_said = |why: &UnreadReason| matches!(why, UnreadReason::Empty | UnreadReason::CannotTell);
+        let is_said =
+            |why: &UnreadReason| matches!(why, UnreadReason::Empty | UnreadReason::CannotTell);
         let count = unread.filter(|why| !is_said(why)).count();
         let text = format!(
             "{} of {} of people are not choices of their questions, and count as wrong.",

@@ -138,9 +138,8 @@ impl ModelListing {
 
     /// These models without people; the people if there are no others.
     pub fn without_people<'m>(&self, models: impl IntoIterator<Item = &'m str>) -> Vec<&'m str> {
-        let (people, models): (Vec<&str>, Vec<&str>) = models
-            .into_iter()
-            .partition(|model| self.is_people(model));
+        let (people, models): (Vec<&str>, Vec<&str>) =
+            models.into_iter().partition(|model| self.is_people(model));
         if models.is_empty() { people } else { models }
     }
 
