@@ -33,6 +33,7 @@ fn names<'f>(findings: &'f Findings<'_>) -> Vec<&'f str> {
     let left_out: BTreeSet<&str> = findings
         .left_out
         .iter()
+        .filter(|set| !set.is_more)
         .flat_map(|set| &set.models)
         .map(String::as_str)
         .collect();
@@ -129,9 +130,8 @@ fn sentence(
     });
     let darkest = levels.filter_map(|subject| subject.level).max();
     let levels = [Some(AxisLevel::L0), darkest].into_iter().flatten();
-    let found = levels.filter_map(|level| {
-        OnSameQuestions::new(findings, name, others, (level, variant))
-    });
+    let found =
+        levels.filter_map(|level| OnSameQuestions::new(findings, name, others, (level, variant)));
     let found: Vec<OnSameQuestions> = found.collect();
     if found.is_empty() {
         return None;
@@ -166,7 +166,10 @@ fn sentence(
     };
     let who = match others {
         [one] => (*one).to_owned(),
-        several => format!("the mean of {} models", numbers.count("models", several.len())),
+        several => format!(
+            "the mean of {} models",
+            numbers.count("models", several.len())
+        ),
     };
     let beside = match &*beside {
         [] => String::new(),

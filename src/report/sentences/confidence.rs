@@ -5,7 +5,6 @@ use crate::score::calibration::Calibration;
 use crate::score::calibration::LEAST_CONFIDENT_REPLIES;
 use crate::score::cluster::{ClusterUnit, MIN_SCENES};
 use crate::score::findings::Findings;
-use crate::score::pooled::pool;
 use crate::score::subject::Subject;
 use crate::types::{AxisLevel, KindReading};
 
@@ -25,7 +24,7 @@ impl<'f> Confidence<'f> {
         if findings.grid.clusters < MIN_SCENES {
             return Vec::new();
         }
-        let models = pool(&findings.grid);
+        let models = findings.models_of(variant);
         let rows = || {
             let rows = findings.calibrations.iter();
             rows.filter(|row| row.replies >= LEAST_CONFIDENT_REPLIES)

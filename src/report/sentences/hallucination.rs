@@ -8,7 +8,7 @@ use crate::report::words::family as family_name;
 use crate::score::cluster::ClusterUnit;
 use crate::score::confusion::{Collapse, FalseAnswer, MIN_EXCESS};
 use crate::score::findings::Findings;
-use crate::score::pooled::{PooledFinding, pool};
+use crate::score::pooled::PooledFinding;
 use crate::score::significance::Significance;
 use crate::score::subject::Subject;
 use crate::types::{AxisLevel, Family, KindReading};
@@ -51,7 +51,7 @@ impl<'f> TopAnswer<'f> {
     /// The top answers to raw images of the darkest level of a variant, of the models over which findings are pooled.
     pub(super) fn all(findings: &'f Findings<'_>, variant: &KindReading) -> Vec<Self> {
         let grid = &findings.grid;
-        let models = pool(grid);
+        let models = findings.models_of(variant);
         let of_variant = |subject: &Subject| {
             subject.variant == *variant
                 && subject.enhancer.is_none()

@@ -68,6 +68,18 @@ pub(super) fn in_each_light(
     sentences
 }
 
+/// The findings over several levels together of one kind and variant, in the order of enhancers.
+pub(super) fn means_of_set<'f>(
+    findings: &'f Findings<'_>,
+    kind: PooledKind,
+    variant: &KindReading,
+) -> Vec<&'f PooledFinding> {
+    let averaged = findings.averaged.iter();
+    averaged
+        .filter(|mean| mean.kind == kind && mean.variant == *variant)
+        .collect()
+}
+
 /// The findings of one kind and variant over all families that the kind is about, in the order of enhancers and levels. Sets in which
 /// no verdict is possible are left out.
 pub(super) fn of_set<'f>(

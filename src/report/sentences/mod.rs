@@ -36,7 +36,7 @@ use std::collections::BTreeSet;
 
 use self::confidence::Confidence;
 use self::hallucination::TopAnswer;
-use self::lights::{in_each_light, of_set};
+use self::lights::{in_each_light, means_of_set, of_set};
 use crate::score::confusion::FalseAnswer;
 use crate::score::findings::Findings;
 use crate::score::pooled_kind::PooledKind;
@@ -74,8 +74,17 @@ fn about_light(findings: &Findings<'_>, variant: &KindReading) -> Vec<Sentence> 
     let unit = findings.unit;
     let of = |kind| of_set(findings, kind, variant);
     let mut sentences = Vec::new();
-    sentences.extend(pooled::noise(&of(PooledKind::Noise), unit));
-    sentences.extend(pooled::enhancers(&of(PooledKind::Enhancer), unit));
+    let means = |kind| means_of_set(findings, kind, variant);
+    sentences.extend(pooled::noise(
+        &of(PooledKind::Noise),
+        &means(PooledKind::Noise),
+        unit,
+    ));
+    sentences.extend(pooled::enhancers(
+        &of(PooledKind::Enhancer),
+        &means(PooledKind::Enhancer),
+        unit,
+    ));
     let blind = of(PooledKind::Blind);
     sentences.extend(words_alone::pooled(&blind, unit));
     let by_family = words_alone::by_family(findings, variant);
@@ -92,7 +101,7 @@ fn about_clean(findings: &Findings<'_>) -> Vec<Sentence> {
     let clean: BTreeSet<&KindReading> = clean.map(|finding| &finding.variant).collect();
     let sentences = clean.into_iter().flat_map(|variant| {
         let levels = of_set(findings, PooledKind::Enhancer, variant);
-        pooled::enhancers(&levels, findings.unit)
+        pooled::enhancers(&levels, &[], findings.unit)
     });
     sentences.collect()
 }

@@ -12,118 +12,209 @@ use crate::types::AxisLevel;
 /// Largest number of sentences about one enhancer.
 const MAX_PER_ENHANCER: usize = 3;
 
-/// How accuracy with noise differs from that by the exposure drop alone: a sentence for each verdict, at the level where it differs
-/// most. The two variants differ in contrast, too, so this is no effect of noise alone.
-pub(super) fn noise(levels: &[&PooledFinding], unit: ClusterUnit) -> Vec<Sentence> {
-    let verdicts = [
-        (Significance::Worse, "lower"),
-        (Significance::Better, "higher"),
-    ];
-    let shown = verdicts.into_iter().filter_map(|(verdict, word)| {
+/// Findings with one verdict, and how sentences speak of them: the level where they are largest, or the mean of levels of which none is
+/// detected alone.
+struct Shown<'f> {
+    largest: &'f PooledFinding,
+    /// The levels.
+    at: String,
+    /// Whether there are several levels.
+    are_several: bool,
+}
+
+impl<'f> Shown<'f> {
+    /// The findings of levels with a verdict, if there are any.
+    fn levels(levels: &[&'f PooledFinding], verdict: Significance) -> Option<Self> {
         let shown = of_verdict(levels, verdict);
-        let largest = PooledFinding::largest(&shown)?;
-        let mut numbers = Numbers::of(unit);
-        let limit = if shown.len() > 1 { "up to " } else { "" };
-        let text = format!(
-            "With noise, accuracy is {limit}{} points {word} than by the exposure drop alone ({}).",
-            numbers.size("effect", largest.strict.difference.value),
-            largest.level
-        );
-        let more = format!("; shown at {}", runs(&shown, levels));
-        let detail = detail(largest, &mut numbers, &more);
-        Some(numbers.sentence("noise", verdict.into(), text, detail))
-    });
-    let shown: Vec<Sentence> = shown.collect();
-    let unshown = of_verdict(levels, Significance::NotShown);
-    match PooledFinding::largest(&unshown) {
-        Some(largest) if shown.is_empty() => {
-            if let Some(format) = format_alone(levels, unit) {
-                return vec![format];
-            }
-            let mut numbers = Numbers::of(unit);
-            let text =
-                "No difference in accuracy between noise and the exposure drop alone was detected.";
-            let more = format!(
-                "; largest at {}{}",
-                largest.level,
-                reserved(largest, &mut numbers)
-            );
-            let detail = detail(largest, &mut numbers, &more);
-            vec![numbers.sentence("noise", Tone::NotShown, text.to_owned(), detail)]
+        Some(Self {
+            largest: PooledFinding::largest(&shown)?,
+            at: runs(&shown, levels),
+            are_several: shown.len() > 1,
+        })
+    }
+
+    /// The findings of levels with a verdict, and each mean with that verdict of whose levels none has it.
+    fn all(
+        levels: &[&'f PooledFinding],
+        means: &[&'f PooledFinding],
+        verdict: Significance,
+    ) -> Vec<Self> {
+        let shown = of_verdict(levels, verdict);
+        let is_alone = |mean: &&PooledFinding| {
+            let mut shown = shown.iter();
+            !shown.any(|finding| mean.mean_over.contains(&finding.level))
+        };
+        let means = of_verdict(means, verdict).into_iter().filter(is_alone);
+        let means = means.map(|mean| Self {
+            largest: mean,
+            at: mean_levels(mean, levels),
+            are_several: true,
+        });
+        let levels = Self::levels(levels, verdict);
+        levels.into_iter().chain(means).collect()
+    }
+
+    /// `up to 5.0 points`, `5.0 points` of one level, or `5.0 points on average`.
+    fn size(&self, numbers: &mut Numbers) -> String {
+        let size = numbers.size("effect", self.largest.strict.difference.value);
+        if self.is_mean() {
+            format!("{size} points on average")
+        } else if self.are_several {
+            format!("up to {size} points")
+        } else {
+            format!("{size} points")
         }
-        _ => shown,
+    }
+
+    fn is_mean(&self) -> bool {
+        !self.largest.mean_over.is_empty()
+    }
+
+    /// The level, or the levels of the mean, as `; at L4` or `; mean of L4–L5`.
+    fn place(&self) -> String {
+        if self.is_mean() {
+            format!("; mean of {}", self.at)
+        } else {
+            format!("; at {}", self.largest.level)
+        }
     }
 }
 
+/// The levels of a mean among all of a set.
+pub(super) fn mean_levels(mean: &PooledFinding, levels: &[&PooledFinding]) -> String {
+    let all: Vec<AxisLevel> = levels.iter().map(|finding| finding.level).collect();
+    level_runs(&mean.mean_over, &all)
+}
+
+/// The levels about which nothing is detected, alone or as a mean.
+fn unshown<'f>(levels: &[&'f PooledFinding], means: &[&PooledFinding]) -> Vec<&'f PooledFinding> {
+    let is_detected = |mean: &&PooledFinding| matches!(mean.claim(), Claim::Detected(_));
+    let means: Vec<&PooledFinding> = means.iter().copied().filter(is_detected).collect();
+    let mut unshown = of_verdict(levels, Significance::NotShown);
+    unshown.retain(|finding| {
+        !means
+            .iter()
+            .any(|mean| mean.mean_over.contains(&finding.level))
+    });
+    unshown
+}
+
+/// How accuracy with noise differs from that by the exposure drop alone: a sentence for each verdict, at the level where it differs
+/// most, or over several. The two variants differ in contrast, too, so this is no effect of noise alone.
+pub(super) fn noise(
+    levels: &[&PooledFinding],
+    means: &[&PooledFinding],
+    unit: ClusterUnit,
+) -> Vec<Sentence> {
+    let mut sentences = Vec::new();
+    for (verdict, word) in [
+        (Significance::Worse, "lower"),
+        (Significance::Better, "higher"),
+    ] {
+        for shown in Shown::all(levels, means, verdict) {
+            let mut numbers = Numbers::of(unit);
+            let size = shown
+                .size(&mut numbers)
+                .replace(" points", &format!(" points {word}"));
+            let (at, more) = if shown.is_mean() {
+                (shown.at.clone(), shown.place())
+            } else {
+                let at = shown.largest.level.to_string();
+                (at, format!("; shown at {}", shown.at))
+            };
+            let text =
+                format!("With noise, accuracy is {size} than by the exposure drop alone ({at}).");
+            let detail = detail(shown.largest, &mut numbers, &more);
+            sentences.push(numbers.sentence("noise", verdict.into(), text, detail));
+        }
+    }
+    if !sentences.is_empty() {
+        return sentences;
+    }
+    let Some(largest) = PooledFinding::largest(&unshown(levels, means)) else {
+        return sentences;
+    };
+    if let Some(format) = format_alone(levels, unit) {
+        return vec![format];
+    }
+    let mut numbers = Numbers::of(unit);
+    let text = "No difference in accuracy between noise and the exposure drop alone was detected.";
+    let more = format!(
+        "; largest at {}{}",
+        largest.level,
+        reserved(largest, &mut numbers)
+    );
+    let detail = detail(largest, &mut numbers, &more);
+    vec![numbers.sentence("noise", Tone::NotShown, text.to_owned(), detail)]
+}
+
 /// What each enhancer does: a sentence for each verdict, with its levels.
-pub(super) fn enhancers(all: &[&PooledFinding], unit: ClusterUnit) -> Vec<Sentence> {
+pub(super) fn enhancers(
+    all: &[&PooledFinding],
+    means: &[&PooledFinding],
+    unit: ClusterUnit,
+) -> Vec<Sentence> {
     let mut sentences = Vec::new();
     for levels in all.chunk_by(|a, b| a.enhancer == b.enhancer) {
-        let of_one = [
-            Significance::Worse,
-            Significance::Better,
-            Significance::NotShown,
-        ]
-        .map(|verdict| enhancer(levels, verdict, unit));
-        sentences.extend(of_one.into_iter().flatten().take(MAX_PER_ENHANCER));
+        let own = means.iter().copied();
+        let own: Vec<&PooledFinding> = own
+            .filter(|mean| mean.enhancer == levels[0].enhancer)
+            .collect();
+        let shown = [Significance::Worse, Significance::Better]
+            .into_iter()
+            .flat_map(|verdict| {
+                let shown = Shown::all(levels, &own, verdict).into_iter();
+                shown.filter_map(move |shown| enhancer(&shown, verdict, unit))
+            });
+        let unshown = unshown(levels, &own);
+        let unshown = no_effect(&unshown, levels, unit);
+        sentences.extend(shown.chain(unshown).take(MAX_PER_ENHANCER));
     }
     sentences
 }
 
-fn enhancer(
+/// What an enhancer is shown to do.
+fn enhancer(shown: &Shown<'_>, verdict: Significance, unit: ClusterUnit) -> Option<Sentence> {
+    let name = shown.largest.enhancer.as_ref()?;
+    let at = &shown.at;
+    let mut numbers = Numbers::of(unit);
+    let size = shown.size(&mut numbers);
+    let is_better = verdict == Significance::Better;
+    let (text, note) = if is_observer(shown.largest) {
+        let more = if is_better { "more" } else { "less" };
+        (
+            format!("With {name} the observer confirms {more} at {at}, by {size}."),
+            "; local tone and sharpening count as noise, so this does not show that evidence is lost",
+        )
+    } else {
+        let verb = if is_better { "helps" } else { "harms" };
+        (format!("{name} {verb} at {at}, by {size}."), "")
+    };
+    let more = shown.place() + note;
+    let detail = detail(shown.largest, &mut numbers, &more);
+    Some(numbers.sentence("enhancer", verdict.into(), text, detail))
+}
+
+/// The levels at which no effect of an enhancer is detected, among all of its levels.
+fn no_effect(
+    unshown: &[&PooledFinding],
     levels: &[&PooledFinding],
-    verdict: Significance,
     unit: ClusterUnit,
 ) -> Option<Sentence> {
-    let of_verdict = of_verdict(levels, verdict);
-    let largest = PooledFinding::largest(&of_verdict)?;
+    let largest = PooledFinding::largest(unshown)?;
     let name = largest.enhancer.as_ref()?;
-    let at = runs(&of_verdict, levels);
+    if let Some(format) = format_alone(unshown, unit) {
+        return Some(format);
+    }
     let mut numbers = Numbers::of(unit);
-    let (text, more) = match verdict {
-        Significance::Worse | Significance::Better => {
-            let verb = if verdict == Significance::Worse {
-                "harms"
-            } else {
-                "helps"
-            };
-            let size = numbers.size("effect", largest.strict.difference.value);
-            let limit = if of_verdict.len() > 1 { "up to " } else { "" };
-            if is_observer(largest) {
-                let more = if verdict == Significance::Better {
-                    "more"
-                } else {
-                    "less"
-                };
-                (
-                    format!(
-                        "With {name} the observer confirms {more} at {at}, by {limit}{size} points."
-                    ),
-                    format!(
-                        "; at {}; local tone and sharpening count as noise, so this does not show that evidence is lost",
-                        largest.level
-                    ),
-                )
-            } else {
-                (
-                    format!("{name} {verb} at {at}, by {limit}{size} points."),
-                    format!("; at {}", largest.level),
-                )
-            }
-        }
-        _ => {
-            if let Some(format) = format_alone(&of_verdict, unit) {
-                return Some(format);
-            }
-            (
-                format!("{name} at {at}: no effect detected."),
-                format!("; largest at {}", largest.level),
-            )
-        }
-    };
-    let more = more + &reserved(largest, &mut numbers);
+    let text = format!("{name} at {}: no effect detected.", runs(unshown, levels));
+    let more = format!(
+        "; largest at {}{}",
+        largest.level,
+        reserved(largest, &mut numbers)
+    );
     let detail = detail(largest, &mut numbers, &more);
-    Some(numbers.sentence("enhancer", verdict.into(), text, detail))
+    Some(numbers.sentence("enhancer", Tone::NotShown, text, detail))
 }
 
 /// Whether a finding is about the observer alone. It has its own words: what it does not confirm need not be lost.

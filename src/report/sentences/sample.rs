@@ -152,6 +152,15 @@ pub(in crate::report) fn left_out(findings: &Findings<'_>) -> Vec<Sentence> {
         } else {
             listed(&set.models)
         };
+        if set.is_more {
+            let were = if is_one { "was" } else { "were" };
+            let text = format!(
+                "Only {models} {were} asked at {}: no mean is made there.",
+                runs(set)
+            );
+            let detail = format!("left out of the findings about {}", listed(&topics));
+            return numbers.sentence("left out", Tone::Note, text, detail);
+        }
         let [all, answered] = set.items;
         let why = match (answered, is_one) {
             (0, true) => "it was not asked".to_owned(),

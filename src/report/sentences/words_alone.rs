@@ -10,7 +10,7 @@ use crate::score::claim::Claim;
 use crate::score::cluster::ClusterUnit;
 use crate::score::comparison::{Comparison, ComparisonKind};
 use crate::score::findings::Findings;
-use crate::score::pooled::{PooledFinding, pool};
+use crate::score::pooled::PooledFinding;
 use crate::score::pooled_kind::PooledKind;
 use crate::score::significance::Significance;
 use crate::types::{Axis, AxisLevel, KindReading};
@@ -88,7 +88,7 @@ pub(super) fn by_family<'f>(
     findings: &'f Findings<'_>,
     variant: &KindReading,
 ) -> Vec<&'f Comparison> {
-    let models = pool(&findings.grid);
+    let models = findings.models_of(variant);
     let comparisons = findings.comparisons.iter().filter(|comparison| {
         let first = &comparison.first;
         comparison.kind == ComparisonKind::Blind

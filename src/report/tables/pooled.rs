@@ -34,7 +34,8 @@ pub(super) fn pooled(findings: &Findings<'_>) -> Vec<Table> {
         "csv models"
     };
     let caption = format!("Pooled over {of_models}");
-    let mut total = table(&caption, column, &whole, ReadingMode::Strict);
+    let all: Vec<&PooledFinding> = whole.iter().copied().chain(&findings.averaged).collect();
+    let mut total = table(&caption, column, &all, ReadingMode::Strict);
     if models.is_some_and(|models| models > 1) {
         total.heading = Some(format!(
             "Pooled over {of_models}, paired by question, in percentage points"
@@ -52,7 +53,8 @@ pub(super) fn pooled(findings: &Findings<'_>) -> Vec<Table> {
         ReadingMode::Strict,
     );
     by_family.is_folded = true;
-    let all: Vec<&PooledFinding> = findings.pooled.iter().collect();
+    let all = findings.pooled.iter().chain(&findings.averaged);
+    let all: Vec<&PooledFinding> = all.collect();
     let lenient = table("", column, &all, ReadingMode::Lenient).in_files_only();
     vec![total, by_family, lenient]
 }
@@ -63,7 +65,7 @@ fn table(caption: &str, models: &str, findings: &[&PooledFinding], mode: Reading
         .column(Text, "csv kind", |finding| {
             finding.kind.name_on(finding.variant.kind)
         })
-        .column(Text, "csv level", |finding| finding.level.to_string())
+        .column(Text, "csv level", |finding| levels(finding))
         .column(Text, "csv variant", |finding| finding.variant.to_string())
         .column(Text, "csv enhancer", |finding| {
             finding.enhancer.as_ref().map(ToString::to_string)
@@ -122,6 +124,14 @@ fn numbers(
         .column(Number, "csv p_least", |finding| finding.least_p)
 }
 
+/// The level, or those of a mean, as `L4–L5`.
+fn levels(finding: &PooledFinding) -> String {
+    match &*finding.mean_over {
+        [first, .., last] => format!("{first}–{last}"),
+        _ => finding.level.to_string(),
+    }
+}
+
 /// The two sides in words, as `L3, with noise less L0`.
 fn title(finding: &PooledFinding) -> String {
     let first = light(&finding.variant, finding.enhancer.as_ref());
@@ -132,7 +142,7 @@ fn title(finding: &PooledFinding) -> String {
         PooledKind::Enhancer => "raw",
         PooledKind::Blind => "without images",
     };
-    format!("{} {first} − {second}", finding.level)
+    format!("{} {first} − {second}", levels(finding))
 }
 
 /// The two sides of a finding about false answers, and what is counted.

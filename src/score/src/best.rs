@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 use super::choice::ReadingMode;
-use super::coverage::{Coverage, most};
+use super::coverage::{Coverage, shared};
 use super::estimate::Estimate;
 use super::grid::{ClusterCount, Grid};
 use super::paired::{ClusterNet, PairedTest};
@@ -244,7 +244,7 @@ fn with_most_answers<'g>(
         Coverage::new(grid, sides, |_| true)
     });
     let coverages: Vec<Coverage> = coverages.collect();
-    let Some(most) = most(&coverages) else {
+    let Some(most) = shared(&coverages) else {
         return (models, Vec::new());
     };
     let is_complete: Vec<bool> = coverages

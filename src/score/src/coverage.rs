@@ -1,6 +1,6 @@
 //! How much of what others answered a model has answered: [`Coverage`].
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::grid::Grid;
 use darkqa_ground::types::AxisLevel;
@@ -32,7 +32,27 @@ impl Coverage {
 
     /// Number of answered items over all levels.
     pub(super) fn total(&self) -> usize {
-        self.0.values().flatten().filter(|answered| **answered).count()
+        self.0
+            .values()
+            .flatten()
+            .filter(|answered| **answered)
+            .count()
+    }
+
+    /// Number of answered items at each level.
+    fn counts(&self) -> Vec<(AxisLevel, usize)> {
+        let levels = self.0.iter();
+        let counts = levels
+            .map(|(level, items)| (*level, items.iter().filter(|answered| **answered).count()));
+        counts.collect()
+    }
+
+    /// The levels with any answer.
+    pub(super) fn levels(&self) -> impl Iterator<Item = AxisLevel> {
+        let counts = self.counts().into_iter();
+        counts
+            .filter(|(_, count)| *count > 0)
+            .map(|(level, _)| level)
     }
 
     /// Numbers of items of `most` at a level, and of those among them that are answered here.
@@ -57,13 +77,25 @@ impl Coverage {
     }
 }
 
-/// The first of the models that answered most; `None` without models.
-pub(super) fn most<'c>(coverages: impl IntoIterator<Item = &'c Coverage>) -> Option<&'c Coverage> {
-    coverages.into_iter().reduce(|most, next| {
-        if next.total() > most.total() {
-            next
-        } else {
-            most
+/// What a mean is about: of all coverages that of which most answers remain if the models that lack some of it stand apart; of several
+/// the larger one, then the first. So neither a model that was asked less nor one that was asked more takes away what is said of the
+/// others. `None` without models.
+pub(super) fn shared<'c>(coverages: &'c [Coverage]) -> Option<&'c Coverage> {
+    let mut seen = BTreeSet::new();
+    let mut best: Option<((usize, usize), &Coverage)> = None;
+    for coverage in coverages {
+        // Most models were asked the same.
+        if !seen.insert(coverage.counts()) {
+            continue;
         }
-    })
+        let complete = coverages
+            .iter()
+            .filter(|other| other.lacking(coverage).is_empty());
+        let (models, total) = (complete.count(), coverage.total());
+        let worth = (models * total, total);
+        if best.is_none_or(|(known, _)| worth > known) {
+            best = Some((worth, coverage));
+        }
+    }
+    best.map(|(_, coverage)| coverage)
 }

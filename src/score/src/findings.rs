@@ -20,12 +20,13 @@ use super::health::{Health, healths};
 use super::observed::ObserverSummary;
 use super::pair_darkness::{self, PairDarkness};
 use super::photographed_set::PhotographedSet;
-use super::pooled::{ModelsLeftOut, PooledFinding, models_left_out, pooled};
+use super::pooled::{ModelsLeftOut, PooledFinding, models_left_out, pool, pooled};
+use super::pooled_kind::PooledKind;
 use super::significance::Significance;
 use super::strict_score::StrictScore;
 use super::subject::{Subject, is_control, is_observer};
 use darkqa_ground::types::{
-    ChoiceDetail, Family, ImageFidelity, ModelListing, RunQuestion, Trials,
+    ChoiceDetail, Family, ImageFidelity, KindReading, ModelListing, RunQuestion, Trials,
 };
 
 /// All results that are computed from the trials of a run.
@@ -41,6 +42,8 @@ pub struct Findings<'a> {
     pub health: Vec<Health>,
     /// Differences of all models together, ordered by kind, variant, enhancer, family and level.
     pub pooled: Vec<PooledFinding>,
+    /// The same over all darker levels of a set together, and over all lighter ones; sentences test them before single levels.
+    pub averaged: Vec<PooledFinding>,
     /// Models that the pooled findings leave out, because they answered less than others.
     pub left_out: Vec<ModelsLeftOut>,
     /// Whether each finding about noise holds under every light reading; empty with one reading.
@@ -183,11 +186,13 @@ impl<'a> Findings<'a> {
     ) -> Self {
         let draws = Resamples::new(clusters.count());
         let health = healths(&grid);
+        let (pooled, averaged) = pooled(&grid);
         let mut findings = Self {
             unit: clusters.unit(),
             summary: summarize(&grid, &health, questions.iter().cloned()),
             health,
-            pooled: pooled(&grid),
+            pooled,
+            averaged,
             left_out: models_left_out(&grid),
             by_reading: by_reading(&grid),
             best: best_in_the_dark(&grid, ReadingMode::Strict),
@@ -231,6 +236,19 @@ impl<'a> Findings<'a> {
         let shown = self.without_observer.take();
         self.without_observer = shown.map(|shown| Box::new(shown.with_lights_between(names)));
         self
+    }
+
+    /// The models that findings about a variant are about: those with images, without people and without those that answered less than
+    /// others there, sorted.
+    #[must_use]
+    pub fn models_of(&self, variant: &KindReading) -> Vec<&str> {
+        let mut models = pool(&self.grid);
+        let of_variant = self.left_out.iter().filter(|set| {
+            set.kind == PooledKind::Darkness && set.variant == *variant && !set.is_more
+        });
+        let apart: Vec<&String> = of_variant.flat_map(|set| &set.models).collect();
+        models.retain(|model| !apart.iter().any(|name| name == model));
+        models
     }
 
     /// The models without images than which a subject is shown to be less accurate: itself, or any if it was not asked without

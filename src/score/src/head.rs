@@ -1,76 +1,165 @@
 //! One correction over all tests that a report's sentences rest on: [`adjusted`].
 //!
-//! A report asks several questions at once: what darkness costs, what noise adds, what each enhancer does, and others. Each has a
-//! [`QuestionTests`]. The level of 5 % is shared equally by the questions, and the share of a question equally by its chains of tests. A
-//! chain is tested in a fixed order, the next test only after the one before is rejected; so it costs no more than its first test. When
-//! all tests of a chain are rejected, its share goes to the other chains of its question, and that of a finished question to the other
-//! questions. Where each chain has one test and there is one question, this is Holm's procedure (Holm 1979, Scand. J. Stat. 6:65).
+//! The tests are a tree. The level of 5 % is shared by the branches in proportion to their weights. A test that depends on another one
+//! starts only after that one is rejected, and takes over its share: so a finding about several levels together costs nothing more if the
+//! single levels are tested below it, each after the one before. When all tests of a branch are rejected, its share goes to the
+//! branches beside it. Where all tests are leaves of one weight, this is Holm's procedure (Holm 1979, Scand. J. Stat. 6:65); a single
+//! branch of tests below each other is a fixed sequence.
 //!
 //! Shares never shrink while tests are rejected and never add up to more than 1. Therefore the probability that any true hypothesis is
-//! rejected is at most 5 %, whichever others are false and however the tests depend on each other (Bretz, Maurer, Brannath and Posch
-//! 2009, Stat. Med. 28:586; Goeman and Solari 2010, Ann. Stat. 38:3782, theorem 1).
+//! rejected is at most 5 %, whichever others are false and however the tests depend on each other (Goeman and Solari 2010, Ann. Stat.
+//! 38:3782, theorem 1; Goeman and Finos 2012, Stat. Appl. Genet. Mol. Biol. 11(1):11, for trees; Bretz, Maurer, Brannath and Posch 2009,
+//! Stat. Med. 28:586, for weights that pass from test to test).
 
-/// The p-values of one question: chains, each in its order.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct QuestionTests {
-    pub(super) chains: Vec<Vec<f64>>,
+/// A test with the tests that start after it, or a group of tests that start together.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct TestTree<T> {
+    /// The test before the others; `None` for a group.
+    test: Option<T>,
+    /// Share of the level beside the other branches, in any unit.
+    weight: f64,
+    branches: Vec<Self>,
 }
 
-impl QuestionTests {
-    /// Tests in no order: a chain for each.
-    pub(super) fn unordered(values: impl IntoIterator<Item = f64>) -> Self {
-        let chains = values.into_iter().map(|value| vec![value]);
+impl<T> TestTree<T> {
+    /// A test alone.
+    pub(super) fn leaf(test: T) -> Self {
+        Self::before(test, Vec::new())
+    }
+
+    /// A test, and the branches that start once it is rejected.
+    pub(super) fn before(test: T, branches: Vec<Self>) -> Self {
         Self {
-            chains: chains.collect(),
+            test: Some(test),
+            weight: 1.0,
+            branches,
+        }
+    }
+
+    /// Branches that start together. Those without a test are left out.
+    pub(super) fn group(branches: impl IntoIterator<Item = Self>) -> Self {
+        let branches = branches.into_iter().filter(|branch| !branch.is_empty());
+        Self {
+            test: None,
+            weight: 1.0,
+            branches: branches.collect(),
+        }
+    }
+
+    /// Tests of which each starts once the one before is rejected.
+    pub(super) fn chain(tests: impl DoubleEndedIterator<Item = T>) -> Self {
+        let below = tests.rev().fold(None, |below, test| {
+            Some(Self::before(test, below.into_iter().collect()))
+        });
+        below.unwrap_or_else(|| Self::group([]))
+    }
+
+    /// The same branch with this weight.
+    pub(super) fn weighing(self, weight: f64) -> Self {
+        Self { weight, ..self }
+    }
+
+    /// True without any test.
+    pub(super) fn is_empty(&self) -> bool {
+        self.test.is_none() && self.branches.iter().all(Self::is_empty)
+    }
+
+    /// Number of tests.
+    pub(super) fn count(&self) -> usize {
+        let own = usize::from(self.test.is_some());
+        own + self.branches.iter().map(Self::count).sum::<usize>()
+    }
+}
+
+/// A branch while tests are rejected.
+struct Branch<T> {
+    /// The test with its p-value; `None` for a group.
+    test: Option<(T, f64)>,
+    /// p-value after correction; `None` until the test is rejected.
+    rejected: Option<f64>,
+    weight: f64,
+    branches: Vec<Self>,
+    /// Number of tests that are not rejected, with those below.
+    remaining: usize,
+}
+
+impl<T: Copy> Branch<T> {
+    fn new(tree: &TestTree<T>, p: &impl Fn(T) -> f64) -> Self {
+        Self {
+            test: tree.test.map(|test| (test, p(test))),
+            rejected: None,
+            weight: tree.weight,
+            branches: tree
+                .branches
+                .iter()
+                .map(|branch| Self::new(branch, p))
+                .collect(),
+            remaining: tree.count(),
+        }
+    }
+
+    /// The test that has started, with a share of the level of `share` for this branch, and has the smallest p-value over its own
+    /// share: that ratio, and the places of the branches on the way to it.
+    fn next(&self, share: f64, way: &mut Vec<usize>) -> Option<f64> {
+        if let (Some((_, p)), None) = (self.test, self.rejected) {
+            return Some(p / share);
+        }
+        let weights: f64 = self.open().map(|(_, branch)| branch.weight).sum();
+        let mut best: Option<(f64, Vec<usize>)> = None;
+        for (place, branch) in self.open() {
+            let mut below = vec![place];
+            let found = branch.next(share * branch.weight / weights, &mut below);
+            if let Some(found) = found
+                && best.as_ref().is_none_or(|(least, _)| found < *least)
+            {
+                best = Some((found, below));
+            }
+        }
+        let (least, below) = best?;
+        way.extend(below);
+        Some(least)
+    }
+
+    /// The branches with tests that are not rejected.
+    fn open(&self) -> impl Iterator<Item = (usize, &Self)> {
+        let branches = self.branches.iter().enumerate();
+        branches.filter(|(_, branch)| branch.remaining > 0)
+    }
+
+    /// Rejects the test at the end of a way.
+    fn reject(&mut self, way: &[usize], p: f64) {
+        self.remaining -= 1;
+        match way {
+            [] => self.rejected = Some(p),
+            [place, rest @ ..] => self.branches[*place].reject(rest, p),
+        }
+    }
+
+    /// The tests with their p-values after correction, those before others first.
+    fn corrected(&self, corrected: &mut Vec<(T, f64)>) {
+        if let Some((test, _)) = self.test {
+            corrected.push((test, self.rejected.unwrap_or(1.0)));
+        }
+        for branch in &self.branches {
+            branch.corrected(corrected);
         }
     }
 }
 
-/// The chains of a question while tests are rejected.
-struct Progress<'q> {
-    chains: &'q [Vec<f64>],
-    /// Number of rejected tests of each chain.
-    rejected: Vec<usize>,
-}
-
-impl Progress<'_> {
-    /// The unfinished chains, each with the p-value of its next test.
-    fn next_tests(&self) -> impl Iterator<Item = (usize, f64)> + Clone + '_ {
-        let chains = self.chains.iter().zip(&self.rejected).enumerate();
-        chains.filter_map(|(chain, (values, rejected))| Some((chain, *values.get(*rejected)?)))
-    }
-}
-
-/// The adjusted p-values of all tests, in the order of questions, chains and tests. Those below 0.05 are the rejected ones.
+/// All tests with their p-values after correction, by their p-values before. Those below 0.05 are the rejected ones.
 #[must_use]
-pub(super) fn adjusted(questions: &[QuestionTests]) -> Vec<QuestionTests> {
-    let mut all: Vec<Progress<'_>> = questions
-        .iter()
-        .map(|question| Progress {
-            chains: &question.chains,
-            rejected: vec![0; question.chains.len()],
-        })
-        .collect();
-    let mut adjusted = questions.to_vec();
+pub(super) fn adjusted<T: Copy>(tree: &TestTree<T>, p: impl Fn(T) -> f64) -> Vec<(T, f64)> {
+    let mut root = Branch::new(tree, &p);
     let mut highest = 0.0_f64;
-    loop {
-        let unfinished = all
-            .iter()
-            .filter(|question| question.next_tests().next().is_some());
-        let questions = unfinished.count() as f64;
-        let candidates = all.iter().enumerate().flat_map(|(number, question)| {
-            let tests = question.next_tests();
-            let chains = tests.clone().count() as f64;
-            tests.map(move |(chain, value)| (number, chain, value * chains * questions))
-        });
-        let Some((question, chain, value)) = candidates.min_by(|a, b| a.2.total_cmp(&b.2)) else {
-            return adjusted;
-        };
+    let mut way = Vec::new();
+    while let Some(value) = root.next(1.0, &mut way) {
         highest = highest.max(value).min(1.0);
-        let place = &mut all[question].rejected[chain];
-        adjusted[question].chains[chain][*place] = highest;
-        *place += 1;
+        root.reject(&way, highest);
+        way.clear();
     }
+    let mut corrected = Vec::new();
+    root.corrected(&mut corrected);
+    corrected
 }
 
 #[cfg(test)]
@@ -78,41 +167,80 @@ mod tests {
     use super::super::significance::holm;
     use super::*;
 
+    /// The p-values after correction of tests that are their own p-values.
+    fn corrected(tree: &TestTree<f64>) -> Vec<f64> {
+        let tests = adjusted(tree, |p| p).into_iter();
+        tests.map(|(_, p)| (p * 1e9).round() / 1e9).collect()
+    }
+
+    fn leaves(values: &[f64]) -> TestTree<f64> {
+        TestTree::group(values.iter().copied().map(TestTree::leaf))
+    }
+
     #[test]
-    fn one_question_without_an_order_is_holms_procedure() {
+    fn leaves_of_one_weight_are_holms_procedure() {
         let values = [0.01, 0.04, 0.03, 0.005, 0.6, 0.0001, 0.03, 1.0];
-        let found = adjusted(&[QuestionTests::unordered(values)]);
-        let found: Vec<f64> = found[0].chains.iter().flatten().copied().collect();
-        for (found, expected) in found.iter().zip(holm(&values)) {
-            assert!((found - expected).abs() < 1e-12);
+        for (found, expected) in corrected(&leaves(&values)).iter().zip(holm(&values)) {
+            assert!((found - expected).abs() < 1e-8);
         }
+        assert_eq!(corrected(&leaves(&[])), Vec::<f64>::new());
     }
 
     #[test]
     fn a_chain_costs_its_first_test_and_stops_at_a_failure() {
-        let chain = QuestionTests {
-            chains: vec![vec![0.01, 0.02, 0.3, 0.001]],
-        };
-        let other = QuestionTests::unordered([0.5]);
-        let found = adjusted(&[chain.clone(), other]);
-        // Two questions: each has half of the level.
-        let [first, second, third, fourth] = found[0].chains[0][..] else {
-            panic!("{found:?}");
-        };
-        assert!((first - 0.02).abs() < 1e-12 && (second - 0.04).abs() < 1e-12);
-        assert!((third - 0.6).abs() < 1e-12 && (fourth - 0.6).abs() < 1e-12);
-        assert!((found[1].chains[0][0] - 0.6).abs() < 1e-12);
-        assert_eq!(adjusted(&[]), []);
+        let chain = TestTree::chain([0.01, 0.02, 0.3, 0.001].into_iter());
+        let found = corrected(&TestTree::group([chain, TestTree::leaf(0.5)]));
+        // Each branch has half of the level until the other one is finished.
+        assert_eq!(found, [0.02, 0.04, 0.6, 0.6, 0.6]);
     }
 
     #[test]
-    fn a_finished_question_leaves_its_share_to_the_others() {
-        let found = adjusted(&[
-            QuestionTests::unordered([0.001, 0.002]),
-            QuestionTests::unordered([0.03]),
-        ]);
+    fn branches_start_after_the_test_before_them_and_share_its_level() {
+        let tree = TestTree::before(0.04, vec![TestTree::leaf(0.02), TestTree::leaf(0.03)]);
+        assert_eq!(corrected(&tree), [0.04, 0.04, 0.04]);
+        let stopped = TestTree::before(0.2, vec![TestTree::leaf(0.001)]);
+        assert_eq!(corrected(&stopped), [0.2, 0.2]);
+    }
+
+    #[test]
+    fn a_finished_branch_leaves_its_share_to_those_beside_it() {
+        let found = corrected(&TestTree::group([
+            leaves(&[0.001, 0.002]),
+            TestTree::leaf(0.03),
+        ]));
         // 0.001 · 2 · 2, then 0.002 · 2, then 0.03 alone.
-        assert_eq!(found[0].chains, [[0.004], [0.004]]);
-        assert_eq!(found[1].chains, [[0.03]]);
+        assert_eq!(found, [0.004, 0.004, 0.03]);
+    }
+
+    #[test]
+    fn weights_share_the_level() {
+        let heavy = TestTree::leaf(0.03).weighing(3.0);
+        let found = corrected(&TestTree::group([heavy, TestTree::leaf(0.04), leaves(&[])]));
+        assert_eq!(found, [0.04, 0.04]);
+        let found = corrected(&TestTree::group([
+            TestTree::leaf(0.01),
+            TestTree::leaf(0.5).weighing(3.0),
+        ]));
+        assert_eq!(found, [0.04, 0.5]);
+    }
+
+    #[test]
+    fn independent_null_tests_reject_any_in_five_percent() {
+        use rand::rngs::StdRng;
+        use rand::{RngExt as _, SeedableRng as _};
+        let mut random = StdRng::seed_from_u64(7);
+        let runs = 4000;
+        let signed = (0..runs).filter(|_| {
+            let mut p = || random.random_range(0.0..1.0);
+            let set = TestTree::before(p(), vec![TestTree::chain([p(), p()].into_iter())]);
+            let tree = TestTree::group([
+                set,
+                TestTree::leaf(p()).weighing(0.25),
+                TestTree::group([TestTree::leaf(p()), TestTree::leaf(p())]),
+            ]);
+            adjusted(&tree, |p| p).iter().any(|(_, p)| *p < 0.05)
+        });
+        let share = signed.count() as f64 / f64::from(runs);
+        assert!((0.035..0.055).contains(&share), "{share}");
     }
 }

@@ -65,7 +65,7 @@ mod split_mix;
 pub mod strict_score;
 pub mod subject;
 pub mod suggested_scenes;
-mod tested_sentences;
+pub mod tested_sentences;
 #[cfg(test)]
 mod tests;
 pub mod threshold;

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::choice::ReadingMode;
 use super::claim::{Claim, ParsedFinding};
-use super::coverage::{Coverage, most};
+use super::coverage::{Coverage, shared};
 use super::estimate::Estimate;
 use super::grid::{Grid, TrialResult};
 use super::paired::{ClusterNet, PairedTest};
@@ -29,8 +29,10 @@ pub struct PooledFinding {
     pub variant: KindReading,
     /// Enhancer of the first side; `None` for raw images.
     pub enhancer: Option<EnhancerName>,
-    /// Level of the first side.
+    /// Level of the first side; of a mean over several, the darkest one.
     pub level: AxisLevel,
+    /// All levels of a mean over several, sorted; empty for one level.
+    pub mean_over: Vec<AxisLevel>,
     /// The models, sorted. All findings of one set (kind, variant and enhancer) have the same ones.
     pub models: Vec<String>,
     /// The models without images on the second side, sorted; empty if the finding is not about them. They are the same models
@@ -102,6 +104,20 @@ impl PooledFinding {
         Claim::new(parsed(&self.strict), parsed(&self.lenient))
     }
 
+    /// True if its level, or all levels of a mean, are in the darker part of the ladder: L4 (7.5 EV) and darker, of another kind of
+    /// degradation its fourth step and beyond. The paper's claims about enhancers divide L1–L3 and L4–L5 in the same way.
+    #[must_use]
+    pub fn is_severe(&self) -> bool {
+        is_severe(self.level, self.variant.kind)
+    }
+
+    pub(super) fn set_p_report(&mut self, mode: ReadingMode, p: Option<f64>) {
+        match mode {
+            ReadingMode::Strict => self.strict.p_report = p,
+            ReadingMode::Lenient => self.lenient.p_report = p,
+        }
+    }
+
     /// The difference in a parsing.
     #[must_use]
     pub fn parsed(&self, mode: ReadingMode) -> &PooledDifference {
@@ -123,7 +139,9 @@ pub fn pool<'g>(grid: &'g Grid<'_>) -> Vec<&'g str> {
 fn models<'g>(grid: &'g Grid<'_>, view: View) -> Vec<&'g str> {
     let subjects = grid.subjects.iter();
     let asked = subjects.filter(|subject| subject.view == Some(view));
-    let models = grid.listing.without_people(asked.map(|subject| &*subject.model));
+    let models = grid
+        .listing
+        .without_people(asked.map(|subject| &*subject.model));
     pooled_models(models).into_iter().collect()
 }
 
@@ -209,12 +227,18 @@ impl PooledSet {
         });
         let coverages: Vec<Coverage> = coverages.collect();
         let mut models = SetModels::default();
-        let Some(most) = most(&coverages) else {
+        let Some(most) = shared(&coverages) else {
             return models;
         };
         for (pair, coverage) in all.into_iter().zip(&coverages) {
             let lacking = coverage.lacking(most);
             if lacking.is_empty() {
+                let levels = coverage.levels();
+                let more = levels.filter(|level| !most.levels().any(|known| known == *level));
+                let more: Vec<AxisLevel> = more.collect();
+                if !more.is_empty() {
+                    models.more.push((pair[0], more));
+                }
                 models.pooled.push(pair);
             } else {
                 models.apart.push((pair[0], lacking));
@@ -257,6 +281,8 @@ struct SetModels<'g> {
     pooled: Vec<[&'g str; 2]>,
     /// The models that answered too little, with the levels and the numbers of items of [`Coverage::lacking`].
     apart: Vec<(&'g str, Vec<(AxisLevel, [usize; 2])>)>,
+    /// The pooled models that were asked at more levels than the others, with these levels.
+    more: Vec<(&'g str, Vec<AxisLevel>)>,
 }
 
 /// Replies of all models to one item on both sides.
@@ -279,15 +305,95 @@ struct SideCounts {
     read: u32,
 }
 
-/// All pooled findings, ordered by kind, variant, enhancer, family and level.
-#[must_use]
-pub fn pooled(grid: &Grid<'_>) -> Vec<PooledFinding> {
-    let sets: Vec<PooledSet> = PooledSet::all(grid).into_iter().collect();
-    let findings = sets.into_par_iter().flat_map_iter(|set| of_set(grid, &set));
-    findings.collect()
+impl SideCounts {
+    fn plus(self, other: Self) -> Self {
+        Self {
+            strict: self.strict + other.strict,
+            lenient: self.lenient + other.lenient,
+            read: self.read + other.read,
+        }
+    }
 }
 
-/// Models that a set of findings leaves out, because they answered less than others at some levels.
+/// All pooled findings, ordered by kind, variant, enhancer, family and level; those over several levels stand behind.
+#[must_use]
+pub fn pooled(grid: &Grid<'_>) -> (Vec<PooledFinding>, Vec<PooledFinding>) {
+    let sets: Vec<PooledSet> = PooledSet::all(grid).into_iter().collect();
+    let findings = sets.into_par_iter().flat_map_iter(|set| of_set(grid, &set));
+    let findings: Vec<PooledFinding> = findings.collect();
+    findings
+        .into_iter()
+        .partition(|finding| finding.mean_over.is_empty())
+}
+
+/// True for the darker part of the ladder of a kind.
+fn is_severe(level: AxisLevel, kind: Option<Kind>) -> bool {
+    let fourth = kind.and_then(|kind| Some(AxisLevel::new(kind, *kind.ladder().get(3)?)));
+    fourth.is_some_and(|fourth| level.value() >= fourth.value())
+}
+
+/// The findings of a set over its darker levels together, and over its lighter ones, if it has several of them. What grows with the
+/// level has no mean over the lighter ones.
+fn averaged(
+    grid: &Grid<'_>,
+    set: &PooledSet,
+    models: &[[&str; 2]],
+    levels: &[(AxisLevel, Vec<PooledItem>)],
+) -> Vec<PooledFinding> {
+    if !set.kind.is_averaged() {
+        return Vec::new();
+    }
+    let halves = [true, false].map(|severe| {
+        let own = levels
+            .iter()
+            .filter(|(level, _)| is_severe(*level, set.variant.kind) == severe);
+        let own: Vec<&(AxisLevel, Vec<PooledItem>)> = own.collect();
+        let is_tested = severe || !set.kind.grows_with_the_level();
+        if own.len() < 2 || !is_tested {
+            return None;
+        }
+        let mean_over: Vec<AxisLevel> = own.iter().map(|(level, _)| *level).collect();
+        let mut sums = BTreeMap::<usize, Option<[SideCounts; 2]>>::new();
+        for item in own.iter().flat_map(|(_, items)| items) {
+            let sum = sums
+                .entry(item.index)
+                .or_insert_with(|| Some([SideCounts::default(); 2]));
+            *sum = sum.zip(item.sides).map(|(sum, sides)| {
+                let [first, second] = sum;
+                [first.plus(sides[0]), second.plus(sides[1])]
+            });
+        }
+        // An item counts if it was answered at every level.
+        let mut asked = BTreeMap::<usize, usize>::new();
+        for item in own.iter().flat_map(|(_, items)| items) {
+            *asked.entry(item.index).or_default() += 1;
+        }
+        let items = sums.into_iter().map(|(index, sides)| PooledItem {
+            index,
+            sides: sides.filter(|_| asked[&index] == own.len()),
+        });
+        let items: Vec<PooledItem> = items.collect();
+        let level = *mean_over.last()?;
+        let pool = PoolOfLevels {
+            models,
+            levels: own.len(),
+        };
+        let found = finding(grid, set, pool, (level, &items), None)?;
+        Some(PooledFinding { mean_over, ..found })
+    });
+    let found = halves.into_iter().flatten();
+    found.flat_map(|one| corrected(vec![one])).collect()
+}
+
+/// The models of a finding, and the number of levels over which it is a mean.
+#[derive(Debug, Clone, Copy)]
+struct PoolOfLevels<'m> {
+    models: &'m [[&'m str; 2]],
+    levels: usize,
+}
+
+/// Models that a set of findings leaves out, because they answered less than others at some levels; or levels that it leaves out, because
+/// only these models were asked there.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ModelsLeftOut {
     pub kind: PooledKind,
@@ -301,6 +407,8 @@ pub struct ModelsLeftOut {
     pub asked: Vec<AxisLevel>,
     /// Number of items of the findings at `levels`, and of those that each of the models answered.
     pub items: [usize; 2],
+    /// True if the models are in the findings, which leave out these levels of theirs.
+    pub is_more: bool,
 }
 
 /// The models that the findings leave out, by set and by what they did not answer.
@@ -322,14 +430,33 @@ pub fn models_left_out(grid: &Grid<'_>) -> Vec<ModelsLeftOut> {
             let group = groups.entry((levels, [sum(0), sum(1)])).or_default();
             group.insert(model);
         }
-        all.extend(groups.into_iter().map(|((levels, items), models)| ModelsLeftOut {
+        all.extend(
+            groups
+                .into_iter()
+                .map(|((levels, items), models)| ModelsLeftOut {
+                    kind: set.kind,
+                    variant: set.variant.clone(),
+                    enhancer: set.enhancer.clone(),
+                    models: models.into_iter().map(str::to_owned).collect(),
+                    levels,
+                    asked: asked.clone(),
+                    items,
+                    is_more: false,
+                }),
+        );
+        let mut more = BTreeMap::<Vec<AxisLevel>, BTreeSet<&str>>::new();
+        for (model, levels) in models.more {
+            more.entry(levels).or_default().insert(model);
+        }
+        all.extend(more.into_iter().map(|(levels, models)| ModelsLeftOut {
             kind: set.kind,
             variant: set.variant.clone(),
             enhancer: set.enhancer.clone(),
             models: models.into_iter().map(str::to_owned).collect(),
+            asked: levels.clone(),
             levels,
-            asked: asked.clone(),
-            items,
+            items: [0, 0],
+            is_more: true,
         }));
     }
     all
@@ -348,13 +475,19 @@ fn of_set(grid: &Grid<'_>, set: &PooledSet) -> Vec<PooledFinding> {
         None => grid.groups(),
         only => vec![only],
     };
+    let pool = PoolOfLevels {
+        models: &models,
+        levels: 1,
+    };
     let findings = groups.into_iter().flat_map(|family| {
         let levels = levels.iter();
-        let of_family = levels
-            .filter_map(|(level, items)| finding(grid, set, &models, (*level, items), family));
+        let of_family =
+            levels.filter_map(|(level, items)| finding(grid, set, pool, (*level, items), family));
         corrected(of_family.collect())
     });
-    findings.collect()
+    let mut findings: Vec<PooledFinding> = findings.collect();
+    findings.extend(averaged(grid, set, &models, &levels));
+    findings
 }
 
 /// The items that some model was asked on both sides; `None` if a model lacks a side.
@@ -394,10 +527,12 @@ fn items(
 fn finding(
     grid: &Grid<'_>,
     set: &PooledSet,
-    models: &[[&str; 2]],
+    pool: PoolOfLevels<'_>,
     (level, items): (AxisLevel, &[PooledItem]),
     family: Option<&Family>,
 ) -> Option<PooledFinding> {
+    let models = pool.models;
+    let each = models.len() * pool.levels;
     let (mut answered, mut dropped) = (Vec::new(), 0);
     let of_family = items
         .iter()
@@ -411,12 +546,12 @@ fn finding(
     if answered.is_empty() {
         return None;
     }
-    let replies = (models.len() * answered.len()) as f64;
-    let strict = parsed(grid, &answered, models.len(), |side| side.strict);
+    let replies = (each * answered.len()) as f64;
+    let strict = parsed(grid, &answered, each, |side| side.strict);
     let differ =
         |(_, sides): &(u32, [SideCounts; 2])| sides.iter().any(|side| side.strict != side.lenient);
     let lenient = if answered.iter().any(differ) {
-        parsed(grid, &answered, models.len(), |side| side.lenient)
+        parsed(grid, &answered, each, |side| side.lenient)
     } else {
         strict
     };
@@ -437,6 +572,7 @@ fn finding(
         variant: set.variant.clone(),
         enhancer: set.enhancer.clone(),
         level,
+        mean_over: Vec::new(),
         models: names(0),
         blind_models: if set.kind == PooledKind::Blind {
             names(1)
@@ -455,11 +591,11 @@ fn finding(
     })
 }
 
-/// The difference of the replies that `counted` counts, before correction.
+/// The difference of the replies that `counted` counts, before correction; `each` is the number of replies to an item on each side.
 fn parsed(
     grid: &Grid<'_>,
     answered: &[(u32, [SideCounts; 2])],
-    models: usize,
+    each: usize,
     counted: impl Fn(&SideCounts) -> u32,
 ) -> PooledDifference {
     let mut clusters = vec![ClusterNet { net: 0, items: 0 }; grid.clusters];
@@ -475,8 +611,8 @@ fn parsed(
         sums[1] += u64::from(second);
     }
     clusters.retain(|cluster| cluster.items > 0);
-    let tested = PairedTest::new(&clusters, models as f64, squares as f64);
-    let mean = |count: u64| count as f64 / models as f64 / answered.len() as f64;
+    let tested = PairedTest::new(&clusters, each as f64, squares as f64);
+    let mean = |count: u64| count as f64 / each as f64 / answered.len() as f64;
     PooledDifference {
         first: mean(sums[0]),
         second: mean(sums[1]),

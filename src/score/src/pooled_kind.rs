@@ -76,6 +76,11 @@ impl PooledKind {
         )
     }
 
+    /// True if levels are also tested together: what darkness and noise cost, and what enhancers do.
+    pub(super) fn is_averaged(self) -> bool {
+        matches!(self, Self::Darkness | Self::Noise | Self::Enhancer)
+    }
+
     /// Whether findings of this kind have this item.
     pub(super) fn is_about(self, item: &GridItem<'_>) -> bool {
         match self {

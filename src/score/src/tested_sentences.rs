@@ -1,26 +1,29 @@
 //! The tests that the sentences of a report rest on, corrected together: [`Findings::correct_sentences`].
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::best::BestInTheDark;
 use super::calibration::LEAST_CONFIDENT_REPLIES;
 use super::choice::ReadingMode;
 use super::cluster::MIN_SCENES;
 use super::comparison::{Comparison, ComparisonKind};
-use super::confusion::{AgainstClean, Confusion};
+use super::confusion::{AgainstClean, Confusion, FalseAnswer};
 use super::findings::Findings;
 use super::grid::Grid;
-use super::head::{QuestionTests, adjusted};
-use super::pooled::{PooledFinding, pool};
+use super::head::{TestTree, adjusted};
+use super::pooled::PooledFinding;
 use super::pooled_kind::PooledKind;
+use super::significance::ALPHA;
 use super::subject::{Subject, judged};
 use darkqa_ground::types::degradation::Kind;
-use darkqa_ground::types::{AxisLevel, KindReading};
+use darkqa_ground::types::{AxisLevel, EnhancerName, KindReading};
 
 /// A test, by its place in the findings.
 #[derive(Debug, Clone, Copy)]
 enum Test {
     Pooled(usize),
+    /// Several levels of a set together.
+    Averaged(usize),
     Comparison(usize),
     /// The leader in the dark is the best.
     Best,
@@ -35,56 +38,99 @@ enum Test {
     Fidelity,
 }
 
-/// The tests of a question, in chains as in [`QuestionTests`].
-type Question = Vec<Vec<Test>>;
+/// Weight of what the report is about: what darkness costs, what each enhancer does, which model is best, and photographs in the dark.
+const MAIN: f64 = 1.0;
+
+/// Weight of noise beside the exposure drop.
+const NOISE: f64 = 0.5;
+
+/// Weight of all other questions together: they say how, not how much, accuracy is lost.
+const FURTHER: f64 = 0.5;
+
+/// Weight of a variant that sentences name only if it differs from the main one, beside the main one.
+const OTHER_VARIANT: f64 = 0.25;
+
+type Tests = TestTree<Test>;
+
+/// What a run asks, as far as it decides how the level is shared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct AskedSets {
+    pub models: usize,
+    pub enhancers: usize,
+    /// Number of variants of the last kind of degradation: of noise profiles, if noise is asked.
+    pub lights: usize,
+    /// Whether noise is asked beside the exposure drop.
+    pub has_noise: bool,
+}
+
+impl AskedSets {
+    /// The level at which a report first tests what an enhancer does to the darker levels of a light; without enhancers, what darkness
+    /// costs. Later tests of the same questions have the same level or a larger one.
+    #[must_use]
+    pub fn first_level(self) -> f64 {
+        let rank = if self.models > 1 { 1 } else { 0 };
+        let main = MAIN * f64::from(1 + rank + self.enhancers as u32);
+        let noise = if self.has_noise { NOISE } else { 0.0 };
+        let share = ALPHA * MAIN / (main + noise + FURTHER) / self.lights.max(1) as f64;
+        if self.enhancers > 0 {
+            // An enhancer has a branch for the darker levels and one for the lighter ones.
+            share / 2.0
+        } else {
+            share
+        }
+    }
+}
 
 impl Findings<'_> {
     /// Corrects all tests that sentences rest on, in each parsing for itself.
     pub(super) fn correct_sentences(&mut self) {
-        let questions = questions(self);
+        let tests = tests(self);
         for mode in ReadingMode::ALL {
-            let values = questions.iter().map(|question| QuestionTests {
-                chains: question
-                    .iter()
-                    .map(|chain| chain.iter().map(|test| test.p(self, mode)).collect())
-                    .collect(),
-            });
-            let corrected = adjusted(&values.collect::<Vec<_>>());
-            let corrected = corrected
-                .iter()
-                .flat_map(|question| question.chains.iter().flatten());
-            let tests = questions.iter().flatten().flatten();
-            for (test, p) in tests.zip(corrected) {
-                test.set(self, mode, *p);
+            for (test, p) in adjusted(&tests, |test| test.p(self, mode)) {
+                test.set(self, mode, p);
             }
         }
-        self.tests = questions.iter().flatten().map(Vec::len).sum();
+        self.tests = tests.count();
     }
 }
 
-/// The questions of a report. Which tests they have depends on what was asked, never on the answers.
-fn questions(findings: &Findings<'_>) -> Vec<Question> {
-    let mut questions = pooled(findings);
-    questions.push(below_blind(findings));
-    questions.extend(photographs(findings));
-    if findings
+/// The tests of a report. Which ones it has depends on what was asked, never on the answers.
+fn tests(findings: &Findings<'_>) -> Tests {
+    let sets = pooled(findings);
+    let of_kind = |is_of: &dyn Fn(PooledKind) -> bool| {
+        let sets = sets.iter().filter(|set| is_of(set.kind));
+        TestTree::group(sets.map(|set| set.tests(findings)))
+    };
+    let names = sets.iter().filter_map(|set| set.enhancer);
+    let names: BTreeSet<&EnhancerName> = names.collect();
+    let enhancers = names.into_iter().map(|name| {
+        let own = sets.iter().filter(|set| set.enhancer == Some(name));
+        TestTree::group(own.map(|set| set.tests(findings)))
+    });
+    let best = findings
         .best
         .as_ref()
-        .is_some_and(BestInTheDark::is_possible)
-    {
-        questions.push(vec![vec![Test::Best], vec![Test::Crossing]]);
-    }
-    questions.push(collapses(findings));
-    questions.push(confidence(findings));
-    if findings
-        .fidelity
-        .as_ref()
-        .is_some_and(|found| found.within[0].is_some())
-    {
-        questions.push(vec![vec![Test::Fidelity]]);
-    }
-    questions.retain(|question| !question.is_empty());
-    questions
+        .filter(|best| best.is_possible())
+        .map(|_| [Test::Best, Test::Crossing].map(TestTree::leaf));
+    let fidelity = findings.fidelity.as_ref();
+    let fidelity = fidelity.filter(|found| found.within[0].is_some());
+    let further = [
+        of_kind(&|kind| kind == PooledKind::Blind),
+        below_blind(findings),
+        of_kind(&|kind| kind == PooledKind::Hallucination(FalseAnswer::No)),
+        of_kind(&|kind| kind == PooledKind::Hallucination(FalseAnswer::Yes)),
+        collapses(findings),
+        confidence(findings),
+        TestTree::group(fidelity.map(|_| TestTree::leaf(Test::Fidelity))),
+    ];
+    let main = [of_kind(&|kind| kind == PooledKind::Darkness)]
+        .into_iter()
+        .chain(enhancers)
+        .chain([TestTree::group(best.into_iter().flatten())])
+        .chain(photographs(findings));
+    let noise = of_kind(&|kind| kind == PooledKind::Noise).weighing(NOISE);
+    let branches = main.map(|branch| branch.weighing(MAIN));
+    TestTree::group(branches.chain([noise, TestTree::group(further).weighing(FURTHER)]))
 }
 
 /// Whether sentences are about raw or enhanced images of a variant: those of the last kind of each root. The others have sentences about
@@ -96,48 +142,98 @@ fn is_main(grid: &Grid<'_>, variant: &KindReading) -> bool {
     variant.kind.is_none() || last == Some(variant.kind)
 }
 
-/// A question for each set of pooled findings in which a verdict is possible.
-fn pooled(findings: &Findings<'_>) -> Vec<Question> {
-    let all: Vec<(usize, &PooledFinding)> = findings.pooled.iter().enumerate().collect();
-    let is_one_set = |a: &(usize, &PooledFinding), b: &(usize, &PooledFinding)| {
-        let set = |of: &PooledFinding| {
-            (
-                of.kind,
-                of.variant.clone(),
-                of.enhancer.clone(),
-                of.family.clone(),
-            )
-        };
-        set(a.1) == set(b.1)
-    };
-    let sets = all.chunk_by(is_one_set).filter(|set| {
-        let first = set[0].1;
-        first.family.as_ref() == first.kind.only_family()
-            && (first.kind == PooledKind::Darkness || is_main(&findings.grid, &first.variant))
-            && set
-                .iter()
-                .any(|(_, finding)| finding.strict.verdict.is_possible())
-    });
-    let questions = sets.map(|set| {
-        let tests = set.iter().map(|(index, _)| Test::Pooled(*index));
-        by_level(set[0].1.kind.grows_with_the_level(), tests.collect())
-    });
-    questions.collect()
+/// A set of pooled findings, by their places in ascending order of levels.
+struct PooledTests<'f> {
+    kind: PooledKind,
+    variant: &'f KindReading,
+    enhancer: Option<&'f EnhancerName>,
+    levels: Vec<(usize, &'f PooledFinding)>,
 }
 
-/// Tests of levels in ascending order: one chain from the darkest on, or a chain for each.
-fn by_level(is_ordered: bool, mut tests: Vec<Test>) -> Question {
-    if is_ordered {
-        tests.reverse();
-        vec![tests]
-    } else {
-        tests.into_iter().map(|test| vec![test]).collect()
+/// The sets in which a verdict is possible and that sentences are about.
+fn pooled<'f>(findings: &'f Findings<'_>) -> Vec<PooledTests<'f>> {
+    let mut sets: Vec<PooledTests<'f>> = Vec::new();
+    for (index, finding) in findings.pooled.iter().enumerate() {
+        if finding.family.as_ref() != finding.kind.only_family() {
+            continue;
+        }
+        let (kind, variant, enhancer) = (finding.kind, &finding.variant, finding.enhancer.as_ref());
+        let known = sets
+            .iter_mut()
+            .find(|set| (set.kind, set.variant, set.enhancer) == (kind, variant, enhancer));
+        match known {
+            Some(set) => set.levels.push((index, finding)),
+            None => sets.push(PooledTests {
+                kind,
+                variant,
+                enhancer,
+                levels: vec![(index, finding)],
+            }),
+        }
+    }
+    sets.retain(|set| {
+        let mut levels = set.levels.iter();
+        (set.kind == PooledKind::Darkness || is_main(&findings.grid, set.variant))
+            && levels.any(|(_, finding)| finding.strict.verdict.is_possible())
+    });
+    sets
+}
+
+impl PooledTests<'_> {
+    /// The tests of the set. Levels of which a mean is tested follow it, from the outermost one on.
+    fn tests(&self, findings: &Findings<'_>) -> Tests {
+        let weight = if is_main(&findings.grid, self.variant) {
+            1.0
+        } else {
+            OTHER_VARIANT
+        };
+        let averaged = findings.averaged.iter().enumerate().filter(|(_, mean)| {
+            mean.kind == self.kind
+                && mean.variant == *self.variant
+                && mean.enhancer.as_ref() == self.enhancer
+        });
+        let averaged: Vec<(usize, &PooledFinding)> = averaged.collect();
+        let tests = |levels: &[(usize, &PooledFinding)]| -> Vec<Test> {
+            let tests = levels.iter().map(|(index, _)| Test::Pooled(*index));
+            tests.collect()
+        };
+        if self.kind.grows_with_the_level() {
+            let means = averaged.iter().map(|(index, _)| Test::Averaged(*index));
+            let mut levels = tests(&self.levels);
+            levels.reverse();
+            let chain: Vec<Test> = means.chain(levels).collect();
+            return TestTree::chain(chain.into_iter()).weighing(weight);
+        }
+        let is_severe = |(_, finding): &(usize, &PooledFinding)| finding.is_severe();
+        let (severe, mild): (Vec<_>, Vec<_>) = self.levels.iter().copied().partition(is_severe);
+        let mean = |is_severe: bool| {
+            let own = averaged
+                .iter()
+                .filter(|(_, mean)| mean.is_severe() == is_severe);
+            own.map(|(index, _)| Test::Averaged(*index)).next()
+        };
+        let mut severe_tests = tests(&severe);
+        severe_tests.reverse();
+        let branch = |mean: Option<Test>, levels: Vec<Test>| match mean {
+            Some(mean) => TestTree::chain(
+                [mean]
+                    .into_iter()
+                    .chain(levels)
+                    .collect::<Vec<_>>()
+                    .into_iter(),
+            ),
+            None => TestTree::group(levels.into_iter().map(TestTree::leaf)),
+        };
+        TestTree::group([
+            branch(mean(true), severe_tests),
+            branch(mean(false), tests(&mild)),
+        ])
+        .weighing(weight)
     }
 }
 
 /// Each family of each model against the words alone, from the darkest level on.
-fn below_blind(findings: &Findings<'_>) -> Question {
-    let models = pool(&findings.grid);
+fn below_blind(findings: &Findings<'_>) -> Tests {
     let mut chains = BTreeMap::<_, Vec<Test>>::new();
     for (index, comparison) in findings.comparisons.iter().enumerate() {
         let (first, second) = (&comparison.first, &comparison.second);
@@ -146,7 +242,7 @@ fn below_blind(findings: &Findings<'_>) -> Question {
             && first.enhancer.is_none()
             && first.variant.kind.is_some()
             && is_main(&findings.grid, &first.variant)
-            && models.contains(&&*first.model)
+            && findings.models_of(&first.variant).contains(&&*first.model)
             && comparison.strict.significance.is_possible()
         {
             let chain = (
@@ -161,12 +257,15 @@ fn below_blind(findings: &Findings<'_>) -> Question {
                 .push(Test::Comparison(index));
         }
     }
-    let chains = chains.into_values().flat_map(|tests| by_level(true, tests));
-    chains.collect()
+    TestTree::group(
+        chains
+            .into_values()
+            .map(|tests| TestTree::chain(tests.into_iter().rev())),
+    )
 }
 
 /// What photographs in the dark cost, whether synthetic images stand for them, and what enhancers do to them.
-fn photographs(findings: &Findings<'_>) -> Vec<Question> {
+fn photographs(findings: &Findings<'_>) -> Vec<Tests> {
     let models = judged(findings.grid.subjects.iter().map(|subject| &*subject.model));
     let kinds = [
         ComparisonKind::Level,
@@ -184,9 +283,7 @@ fn photographs(findings: &Findings<'_>) -> Vec<Question> {
         };
         let comparisons = findings.comparisons.iter().enumerate();
         let stated = comparisons.filter(|(_, comparison)| is_stated(comparison));
-        stated
-            .map(|(index, _)| vec![Test::Comparison(index)])
-            .collect()
+        TestTree::group(stated.map(|(index, _)| TestTree::leaf(Test::Comparison(index))))
     });
     questions.into()
 }
@@ -194,12 +291,13 @@ fn photographs(findings: &Findings<'_>) -> Vec<Question> {
 /// The subjects of raw images at the darkest level of each main variant, of the models over which findings are pooled.
 fn darkest<'f>(findings: &'f Findings<'_>) -> Vec<&'f Subject> {
     let grid = &findings.grid;
-    let models = pool(grid);
     let raw = grid.subjects.iter().filter(|subject| {
         subject.enhancer.is_none()
             && subject.variant.kind.is_some()
             && is_main(grid, &subject.variant)
-            && models.contains(&&*subject.model)
+            && findings
+                .models_of(&subject.variant)
+                .contains(&&*subject.model)
     });
     let raw: Vec<&Subject> = raw.collect();
     let level = |variant: &KindReading| -> Option<AxisLevel> {
@@ -213,15 +311,13 @@ fn darkest<'f>(findings: &'f Findings<'_>) -> Vec<&'f Subject> {
 }
 
 /// Answer collapse of each model in each family.
-fn collapses(findings: &Findings<'_>) -> Question {
+fn collapses(findings: &Findings<'_>) -> Tests {
     let darkest = darkest(findings);
     let confusions = findings.confusions.iter().enumerate();
     let tested = confusions.filter(|(_, confusion)| {
         darkest.contains(&&confusion.subject) && against_clean(confusion).is_some()
     });
-    tested
-        .map(|(index, _)| vec![Test::Collapse(index)])
-        .collect()
+    TestTree::group(tested.map(|(index, _)| TestTree::leaf(Test::Collapse(index))))
 }
 
 /// The commonest answer of a subject against that at L0.
@@ -230,22 +326,19 @@ fn against_clean(confusion: &Confusion) -> Option<&AgainstClean> {
 }
 
 /// The confidence of each model: above its accuracy, then further above than at L0.
-fn confidence(findings: &Findings<'_>) -> Question {
+fn confidence(findings: &Findings<'_>) -> Tests {
     if findings.grid.clusters < MIN_SCENES {
-        return Vec::new();
+        return TestTree::group([]);
     }
     let darkest = darkest(findings);
     let calibrations = findings.calibrations.iter().enumerate();
     let tested = calibrations.filter(|(_, row)| {
         row.replies >= LEAST_CONFIDENT_REPLIES && darkest.contains(&&row.subject)
     });
-    let chains = tested.map(|(index, row)| {
-        let grown = row.growth.map(|_| Test::Grown(index));
-        std::iter::once(Test::Overconfident(index))
-            .chain(grown)
-            .collect()
-    });
-    chains.collect()
+    TestTree::group(tested.map(|(index, row)| {
+        let grown = row.growth.map(|_| TestTree::leaf(Test::Grown(index)));
+        TestTree::before(Test::Overconfident(index), grown.into_iter().collect())
+    }))
 }
 
 impl Test {
@@ -257,6 +350,7 @@ impl Test {
         };
         let found = match self {
             Self::Pooled(index) => Some(findings.pooled[index].parsed(mode).p),
+            Self::Averaged(index) => Some(findings.averaged[index].parsed(mode).p),
             Self::Comparison(index) => Some(findings.comparisons[index].parsed(mode).paired.p),
             Self::Best => best.map(BestInTheDark::p_leader),
             Self::Crossing => best.and_then(|best| Some(best.crossing.as_ref()?.p)),
@@ -281,13 +375,8 @@ impl Test {
             ReadingMode::Lenient => findings.lenient_best.as_mut(),
         };
         match self {
-            Self::Pooled(index) => {
-                let finding = &mut findings.pooled[index];
-                match mode {
-                    ReadingMode::Strict => finding.strict.p_report = p,
-                    ReadingMode::Lenient => finding.lenient.p_report = p,
-                }
-            }
+            Self::Pooled(index) => findings.pooled[index].set_p_report(mode, p),
+            Self::Averaged(index) => findings.averaged[index].set_p_report(mode, p),
             Self::Comparison(index) => {
                 let comparison = &mut findings.comparisons[index];
                 match mode {

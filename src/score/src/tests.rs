@@ -89,7 +89,7 @@ fn one_model_pooled_is_its_own_comparison() {
     ]
     .concat();
     with_grid(&records, |grid| {
-        let findings = pooled(grid);
+        let (findings, _) = pooled(grid);
         let dark = find(&findings, PooledKind::Darkness, "L3-noise")[0];
         // The subjects are sorted: L0, L3-noise, L5-noise of the model, then the observer.
         let own = PairedComparison::new(grid, 1, 0, None, ReadingMode::Strict).unwrap();
@@ -117,16 +117,18 @@ fn items_are_those_that_every_model_answered_on_both_sides() {
         records("a", "L3-noise", |item| (item != 0).then_some(item > 11)),
         records("b", "L3-ev", |item| (item != 1).then_some(true)),
         records("b", "L3-noise", |item| Some(item > 11)),
+        records("c", "L3-ev", |_| Some(true)),
+        records("c", "L3-noise", |item| Some(item > 11)),
         // Asked of one model only: no finding of the pool.
         records("b", "L5-noise", |_| Some(true)),
         records("b", "L5-ev", |_| Some(true)),
     ]
     .concat();
     with_grid(&records, |grid| {
-        let findings = pooled(grid);
+        let (findings, _) = pooled(grid);
         let noise = find(&findings, PooledKind::Noise, "L3-noise")[0];
         assert_eq!((noise.items, noise.dropped), (22, 2));
-        assert_eq!(noise.models, ["a", "b"]);
+        assert_eq!(noise.models, ["a", "b", "c"]);
         assert!((noise.strict.difference.value + 10.0 / 22.0).abs() < 1e-12);
         assert!((noise.strict.second - 1.0).abs() < 1e-12);
         // Frames 1 to 5 lose all, frame 0 has no item: 5 of 11 clusters differ, all in one direction. The swaps do not reject 0, so
@@ -152,7 +154,7 @@ fn models_are_compared_with_their_own_words_if_some_were_asked() {
     ]
     .concat();
     with_grid(&own, |grid| {
-        let findings = pooled(grid);
+        let (findings, _) = pooled(grid);
         let blind = find(&findings, PooledKind::Blind, "L3-noise")[0];
         assert_eq!(
             (&*blind.models, &*blind.blind_models),
@@ -162,7 +164,7 @@ fn models_are_compared_with_their_own_words_if_some_were_asked() {
     });
     let other = [base, records("c", "", right), records("random", "", right)].concat();
     with_grid(&other, |grid| {
-        let findings = pooled(grid);
+        let (findings, _) = pooled(grid);
         let blind = find(&findings, PooledKind::Blind, "L3-noise")[0];
         assert_eq!(blind.models, ["a", "b"]);
         assert_eq!(blind.blind_models, ["c"]);
@@ -180,7 +182,7 @@ fn few_clusters_give_no_verdict() {
     // Five frames: 2 / 2⁵ is above 0.05.
     all.retain(|record| *record.detail.frame.0 < *"f05");
     with_grid(&all, |grid| {
-        let findings = pooled(grid);
+        let (findings, _) = pooled(grid);
         let dark = find(&findings, PooledKind::Darkness, "L3-noise")[0];
         assert_eq!(dark.strict.verdict, Significance::TooFewClusters);
         assert!((dark.strict.p - 0.0625).abs() < 1e-12 && (dark.least_p - 0.0625).abs() < 1e-15);
@@ -291,7 +293,7 @@ fn false_answers_are_the_other_word_and_not_a_missing_one() {
     ]
     .concat();
     with_grid(&all[..6 * FRAMES], |grid| {
-        let findings = pooled(grid);
+        let (findings, _) = pooled(grid);
         let of = |answer: FalseAnswer| -> Vec<&PooledFinding> {
             let kind = PooledKind::Hallucination(answer);
             let of_kind = findings.iter().filter(|finding| finding.kind == kind);
@@ -318,7 +320,7 @@ fn false_answers_are_the_other_word_and_not_a_missing_one() {
         assert_eq!(accuracy.strict.verdict, Significance::Worse);
     });
     with_grid(&all[6 * FRAMES..], |grid| {
-        let findings = pooled(grid);
+        let (findings, _) = pooled(grid);
         assert!(
             findings
                 .iter()

@@ -78,7 +78,7 @@ fn pooled_rates(design: &PooledDesign, runs: usize) -> PooledRates {
         answer(&mut random, &mut records, &clusters, design);
         let trials = records.iter().cloned().collect();
         let grid = Grid::new(&trials, &units);
-        let findings = pooled(&grid);
+        let (findings, _) = pooled(&grid);
         let all = |finding: &&_| {
             let finding: &darkqa_eval::internals::score::PooledFinding = finding;
             finding.kind == PooledKind::Noise && finding.family.is_none()

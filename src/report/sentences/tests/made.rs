@@ -5,8 +5,8 @@ use crate::report::sentences::{Sentence, Tone, sentences};
 use crate::score::cluster::FrameTies;
 use crate::score::findings::Findings;
 use crate::types::{
-    AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, LightGroup, QuestionId,
-    Record, TrialOutcome, UnreadReason,
+    AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, LightGroup, ModelListing,
+    QuestionId, Record, TrialOutcome, UnreadReason,
 };
 
 /// Number of frames, each with two questions: one about colour and one about the room.
@@ -224,11 +224,7 @@ fn too_few_clusters_are_no_verdict_set_by_set() {
         lift[0].starts_with("+ lift helps at L3, by 100.0 points. ("),
         "{lift:?}"
     );
-    let models = [
-        asked("a", 4, &levels),
-        asked("b", 4, &[("L0", 0.0), ("L3-noise", 0.0)]),
-    ]
-    .concat();
+    let models = [asked("a", 4, &levels), asked("b", 4, &levels)].concat();
     let fewer = said(&models);
     assert!(of_kind(&fewer, "best").is_empty());
     let without = of_kind(&fewer, "no verdict");
@@ -241,8 +237,16 @@ fn too_few_clusters_are_no_verdict_set_by_set() {
     assert!(of_kind(&enough, "no verdict").is_empty());
 }
 
+/// Sentences that do not say who is apart.
+fn about_others(said: &[Sentence]) -> Vec<String> {
+    let others = said
+        .iter()
+        .filter(|sentence| !["apart", "left out"].contains(&sentence.kind));
+    others.map(checked).collect()
+}
+
 #[test]
-fn levels_that_a_model_lacks_are_named() {
+fn a_model_that_lacks_levels_changes_nothing_about_others() {
     let all_levels = [
         ("L0", 1.0),
         ("L1-noise", 1.0),
@@ -252,7 +256,8 @@ fn levels_that_a_model_lacks_are_named() {
         ("L5-noise", 0.0),
     ];
     let one = asked("a", FRAMES, &all_levels);
-    assert!(of_kind(&said(&one), "left out").is_empty());
+    let alone = said(&one);
+    assert!(of_kind(&alone, "left out").is_empty() && of_kind(&alone, "apart").is_empty());
     // What a reference was asked is no level of the models.
     let with_random = [
         one.clone(),
@@ -260,37 +265,110 @@ fn levels_that_a_model_lacks_are_named() {
     ]
     .concat();
     assert!(of_kind(&said(&with_random), "left out").is_empty());
-    let two = [one, asked("b", FRAMES, &[("L0", 1.0), ("L3-noise", 1.0)])].concat();
-    let both = said(&two);
+    let both = [one, asked("b", FRAMES, &[("L0", 1.0), ("L3-noise", 0.5)])].concat();
+    let both = said(&both);
     assert_eq!(
         of_kind(&both, "left out"),
         [
-            "· L1–L2, L4–L5 are not compared: b was not asked there. (left out of the findings about darkness (with noise))"
+            "· b stands apart from the other models: it was not asked at L1–L2, L4–L5. (in no mean about darkness (with noise))"
         ]
     );
-    assert!(of_kind(&both, "darkness")[0].contains(" at L3"));
-    let best = of_kind(&both, "best");
+    assert_eq!(about_others(&both), about_others(&alone));
+    let apart = of_kind(&both, "apart");
     assert!(
-        best[0].starts_with("+ b sees best in the dark (L3). ("),
-        "{best:?}"
+        apart.len() == 1
+            && apart[0].starts_with(
+                "· With noise, b: 100.0 % at L0, 50.0 % at L3; a: 100.0 % and 0.0 % on the same questions. (L0 ["
+            ),
+        "{apart:?}"
     );
-    // No level in common: nothing can be said about darkness, and why is said.
-    let apart = [
-        asked("a", FRAMES, &all_levels[..2]),
+}
+
+#[test]
+fn models_without_a_common_level_stand_apart() {
+    let records = [
+        asked("a", FRAMES, &[("L0", 1.0), ("L1-noise", 1.0)]),
         asked("b", FRAMES, &[("L0", 1.0), ("L3-noise", 1.0)]),
     ]
     .concat();
-    let apart = said(&apart);
-    assert!(of_kind(&apart, "darkness").is_empty());
-    let left_out = of_kind(&apart, "left out");
+    let seen = said(&records);
+    let darkness = of_kind(&seen, "darkness");
+    assert!(darkness[0].contains(" (a: 0.0 "), "{darkness:?}");
+    let left_out = of_kind(&seen, "left out");
     assert!(
-        left_out[0].starts_with("· L3 is not compared: a was not asked there. ("),
+        left_out[0]
+            .starts_with("· b stands apart from the other models: it was not asked at L1. ("),
         "{left_out:?}"
     );
+}
+
+#[test]
+fn a_model_with_part_of_the_questions_changes_nothing_about_others() {
+    let levels = [("L0", 1.0), ("L3-noise", 0.5), ("L5-noise", 0.0)];
+    let two = [asked("a", FRAMES, &levels), asked("b", FRAMES, &levels)].concat();
+    let part = asked("part", 3, &levels);
+    let with_part = said(&[two.clone(), part].concat());
+    let but_best = |said: &[Sentence]| -> Vec<String> {
+        let all = about_others(said).into_iter();
+        all.filter(|said| !said.contains("the highest mean accuracy"))
+            .collect()
+    };
+    assert_eq!(but_best(&with_part), but_best(&said(&two)));
+    let best = of_kind(&with_part, "best");
     assert!(
-        left_out[1].starts_with("· L1 is not compared: b was not asked there. ("),
+        best[0].contains("n = 24 in 12 frames; without part,"),
+        "{best:?}"
+    );
+    let left_out = of_kind(&with_part, "left out");
+    assert!(
+        left_out[0].starts_with(
+            "· part stands apart from the other models: it answered 12 of 48 questions at L3–L5. ("
+        ),
         "{left_out:?}"
     );
+    let apart = of_kind(&with_part, "apart");
+    assert!(
+        apart[0].contains("part: 100.0 % at L0, 0.0 % at L5; the mean of 2 models: 100.0 % and 0.0 % on the same questions."),
+        "{apart:?}"
+    );
+}
+
+#[test]
+fn people_are_in_no_mean_even_if_they_answered_everything() {
+    let levels = [("L0", 1.0), ("L3-noise", 0.5), ("L5-noise", 0.0)];
+    let bright = [("L0", 1.0), ("L3-noise", 1.0), ("L5-noise", 1.0)];
+    let two = [asked("a", FRAMES, &levels), asked("b", FRAMES, &levels)].concat();
+    let mut people = asked("human", FRAMES, &bright);
+    let cannot_tell = people.iter_mut().rev().take(3);
+    for record in cannot_tell {
+        let reading = Some(AnswerReading {
+            chosen: None,
+            why: Some(UnreadReason::CannotTell),
+        });
+        (record.detail.strict, record.detail.lenient) = (reading, reading);
+        record.detail.outcome = TrialOutcome::Unparsed;
+    }
+    let mut listing = ModelListing::default();
+    listing.add_people("human".to_owned());
+    let say = |records: &[Record]| {
+        let trials = records.iter().cloned().collect();
+        let findings = Findings::listed(&trials, &FrameTies::default(), [], &[], &listing);
+        assert!(findings.common.is_none());
+        sentences(&findings)
+    };
+    let with_people = say(&[two.clone(), people.clone()].concat());
+    assert_eq!(about_others(&with_people), about_others(&say(&two)));
+    let apart = of_kind(&with_people, "apart");
+    assert!(
+        apart[0].starts_with("· With noise, human: 100.0 % at L0, 87.5 % at L5; the mean of 2 models: 100.0 % and 0.0 % on the same questions. (people; L0 ["),
+        "{apart:?}"
+    );
+    assert!(
+        apart[0].contains(", n = 24, 3 “I cannot tell”; in no mean)"),
+        "{apart:?}"
+    );
+    // Alone they are what the report is about.
+    assert!(of_kind(&say(&people), "darkness")[0].contains("human: "));
 }
 
 #[test]

@@ -34,6 +34,7 @@ fn finding(
         },
         enhancer,
         level: AxisLevel::new(Kind::Sensor, Severity::LADDER[level - 1]),
+        mean_over: Vec::new(),
         models: ["a", "b"].map(str::to_owned).to_vec(),
         blind_models: if kind == PooledKind::Blind {
             vec!["a".to_owned(), "b".to_owned()]
@@ -121,11 +122,11 @@ fn each_kind_and_verdict_has_its_words() {
         let unit = ClusterUnit::Scene;
         let sentences: Vec<Sentence> = match kind {
             Darkness => {
-                let said = darkness::with_variant(&all, None, unit);
+                let said = darkness::with_variant(&all, None, None, unit);
                 said.into_iter().collect()
             }
-            Noise => pooled::noise(&all, unit),
-            Enhancer => pooled::enhancers(&all, unit),
+            Noise => pooled::noise(&all, &[], unit),
+            Enhancer => pooled::enhancers(&all, &[], unit),
             Blind => below::pooled(&all, unit).into_iter().collect(),
             Hallucination(_) => Vec::new(),
         };
@@ -210,6 +211,67 @@ fn each_kind_and_verdict_has_its_words() {
     assert!(said[0].starts_with("− In the dark the models fall below the words alone at L2. ("));
 }
 
+/// Findings about L1–L5 without a verdict, and the mean of L4–L5 with one.
+fn shown_by_mean(
+    kind: PooledKind,
+    difference: f64,
+    verdict: Significance,
+) -> [Vec<PooledFinding>; 2] {
+    let levels = findings(kind, &[(difference / 5.0, NotShown); 5]);
+    let mean = PooledFinding {
+        mean_over: levels[3..].iter().map(|finding| finding.level).collect(),
+        ..finding(kind, 5, difference, verdict)
+    };
+    [levels, vec![mean]]
+}
+
+#[test]
+fn a_mean_of_levels_is_named_if_no_level_is_shown_alone() {
+    let say = |kind: PooledKind, difference: f64, verdict: Significance| -> Vec<String> {
+        let [levels, means] = shown_by_mean(kind, difference, verdict);
+        let [levels, means] =
+            [&levels, &means].map(|all| all.iter().collect::<Vec<&PooledFinding>>());
+        let unit = ClusterUnit::Scene;
+        let sentences: Vec<Sentence> = match kind {
+            PooledKind::Darkness => darkness::with_variant(&levels, Some(means[0]), None, unit)
+                .into_iter()
+                .collect(),
+            PooledKind::Noise => pooled::noise(&levels, &means, unit),
+            _ => pooled::enhancers(&levels, &means, unit),
+        };
+        sentences.iter().map(checked).collect()
+    };
+    let helps = say(PooledKind::Enhancer, 0.05, Better);
+    assert!(
+        helps[0].starts_with(
+            "+ lift helps at L4–L5, by 5.0 points on average. (mean of these 2 models: +5.0 ["
+        ) && helps[0].contains("; mean of L4–L5; n = "),
+        "{helps:?}"
+    );
+    assert!(
+        helps[1].starts_with("· lift at L1–L3: no effect detected. ("),
+        "{helps:?}"
+    );
+    let costs = say(PooledKind::Darkness, -0.05, Worse);
+    assert!(
+        costs.len() == 1
+            && costs[0].starts_with("− Darkness costs 5.0 points on average over L4–L5, from "),
+        "{costs:?}"
+    );
+    let noise = say(PooledKind::Noise, -0.05, Worse);
+    assert!(
+        noise.len() == 1
+            && noise[0].starts_with("− With noise, accuracy is 5.0 points lower on average than by the exposure drop alone (L4–L5). ("),
+        "{noise:?}"
+    );
+    // A mean without a verdict changes nothing.
+    let none = say(PooledKind::Enhancer, 0.05, NotShown);
+    assert!(
+        none.len() == 1 && none[0].starts_with("· lift at L1–L5: no effect detected. ("),
+        "{none:?}"
+    );
+}
+
 #[test]
 fn the_observer_confirms_less() {
     let say = |model: &str, levels: &[(f64, Significance)]| {
@@ -218,7 +280,7 @@ fn the_observer_confirms_less() {
             finding.models = vec![model.to_owned()];
         }
         let all: Vec<&PooledFinding> = all.iter().collect();
-        let said = pooled::enhancers(&all, ClusterUnit::Scene);
+        let said = pooled::enhancers(&all, &[], ClusterUnit::Scene);
         said.iter().map(checked).collect::<Vec<String>>()
     };
     // Of several runs, the name has the run.
@@ -264,7 +326,7 @@ fn one_model_and_lost_items_are_named() {
     let mut one = finding(PooledKind::Darkness, 5, -0.3, Worse);
     one.models = vec!["gpt-4o".to_owned()];
     (one.dropped, one.strict.p_by, one.clusters) = (100, SwapMethod::Drawn(100_000), 1);
-    let said = checked(&darkness::with_variant(&[&one], None, ClusterUnit::Frame).unwrap());
+    let said = checked(&darkness::with_variant(&[&one], None, None, ClusterUnit::Frame).unwrap());
     assert!(
         said.ends_with(
             "(gpt-4o: −30.0 [−34.0, −26.0], p < 0.001; a loss is shown at L5; n = 1,237 in 1 frame, 100 left out because a model has no \

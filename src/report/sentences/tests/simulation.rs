@@ -270,6 +270,20 @@ fn runs() -> usize {
     runs.and_then(|runs| runs.parse().ok()).unwrap_or(300)
 }
 
+/// The numbers of models to simulate: those in `DARKQA_MODELS`, separated by commas, or all.
+fn model_counts(all: &[usize]) -> Vec<usize> {
+    let named = std::env::var("DARKQA_MODELS").unwrap_or_default();
+    let named: Vec<usize> = named
+        .split(',')
+        .filter_map(|count| count.parse().ok())
+        .collect();
+    if named.is_empty() {
+        all.to_vec()
+    } else {
+        named
+    }
+}
+
 #[test]
 #[ignore = "takes an hour; prints a table of src/docs/numbers.md"]
 #[expect(clippy::print_stdout, reason = "the table")]
@@ -278,7 +292,7 @@ fn null_reports_have_no_sign() {
         "| models | profiles | enhancers | runs | any sign, % | within sets alone, % | decided by profile, % | kinds |"
     );
     let (mut all, mut signed) = (0, 0);
-    for models in [1, 3, 6, 12] {
+    for models in model_counts(&[1, 3, 6, 12]) {
         for profiles in [1, 4] {
             for enhancers in [0, 1, 4] {
                 let design = Design {
@@ -318,7 +332,7 @@ fn effects_are_found() {
     println!(
         "| models | profiles | enhancers | effect | runs | help, % | help within its set, % | loss, % | loss within its set, % |"
     );
-    for models in [1, 6] {
+    for models in model_counts(&[1, 6]) {
         for (profiles, enhancers) in [(1, 1), (1, 4), (4, 1)] {
             for effect in [0.05, 0.1] {
                 let design = Design {

@@ -39,7 +39,7 @@ use super::cluster::{ClusterUnit, Clusters, FrameTies};
 use super::comparison::{Comparison, ComparisonKind, comparisons};
 use super::confusion::{Confusion, Hallucination, confusions, hallucinations};
 use super::grid::Grid;
-use super::head::{QuestionTests, adjusted};
+use super::head::{TestTree, adjusted};
 use super::health::{Health, healths};
 use super::photographed_set::PhotographedSet;
 use darkqa_ground::types::{ChoiceDetail, ModelListing, RunQuestion, Trials};
@@ -203,19 +203,15 @@ fn correct(comparisons: &mut [Comparison]) {
     let questions: Vec<Vec<usize>> = questions
         .filter(|tests: &Vec<usize>| !tests.is_empty())
         .collect();
-    let values = questions.iter().map(|tests| {
-        let values = tests
-            .iter()
-            .map(|index| comparisons[*index].strict.paired.p);
-        QuestionTests::unordered(values)
-    });
-    let corrected = adjusted(&values.collect::<Vec<_>>());
-    for (tests, corrected) in questions.iter().zip(corrected) {
-        for (index, p) in tests.iter().zip(corrected.chains.into_iter().flatten()) {
-            // The answers at L0 are those of the strict parsing, so that it is the only one.
-            let comparison = &mut comparisons[*index];
-            comparison.strict.p_report = Some(p);
-            comparison.lenient = comparison.strict.clone();
-        }
+    let tests = questions
+        .iter()
+        .map(|tests| TestTree::group(tests.iter().copied().map(TestTree::leaf)));
+    let tests = TestTree::group(tests);
+    let corrected = adjusted(&tests, |index: usize| comparisons[index].strict.paired.p);
+    for (index, p) in corrected {
+        // The answers at L0 are those of the strict parsing, so that it is the only one.
+        let comparison = &mut comparisons[index];
+        comparison.strict.p_report = Some(p);
+        comparison.lenient = comparison.strict.clone();
     }
 }
