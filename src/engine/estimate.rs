@@ -96,6 +96,7 @@ pub(crate) fn estimate<E: Experiment>(
             .map(|set| StoreForecast::new(set.words(), set.bytes(), set.room())),
         reply: E::REPLY,
         few_sources: is_few.then_some(few_sources),
+        power: experiment.power().filter(|_| experiment.part().is_none()),
         largest_request: sources
             .iter()
             .any(|source| source.order.len() > 1)

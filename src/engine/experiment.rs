@@ -9,6 +9,7 @@ use crate::images::plan::SourcePlan;
 use crate::images::recipe::Recipe;
 use crate::images::source::{Frames, Source};
 use crate::images::trial::Item;
+use crate::report::power::PowerForecast;
 use crate::runs::outcome::{Outcome, StdoutFormat};
 use crate::runs::stored::StoredRun;
 use crate::store::Store;
@@ -80,6 +81,11 @@ pub(crate) trait Experiment: Sync {
     /// Settings that decide neither a reply nor an image, but may explain how a run went.
     fn notes(&self) -> Vec<(&'static str, Value)> {
         Vec::new()
+    }
+
+    /// What the whole run can detect; `None` if that is not known.
+    fn power(&self) -> Option<PowerForecast> {
+        None
     }
 
     /// Records from files of answers, which are not asked.

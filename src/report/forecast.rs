@@ -5,6 +5,7 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
+use super::power::PowerForecast;
 use super::table::ColumnKind::{Count, Text};
 use super::table::TableBuilder;
 use super::terminal;
@@ -91,6 +92,9 @@ pub(crate) struct Forecast {
     /// The frames or walks, if intervals and tests need more of them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub few_sources: Option<FewSources>,
+    /// What the whole run can detect; `None` for a shard, and for questions without choices or answers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub power: Option<PowerForecast>,
     /// Size of the largest request in bytes, as sampled images suggest, if requests hold many images.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub largest_request: Option<f64>,
@@ -192,6 +196,9 @@ pub(crate) fn render(forecast: &Forecast) -> String {
     }
     let store = forecast.image_store.as_ref();
     let mut last = store.map(StoreForecast::line).unwrap_or_default();
+    if let Some(power) = &forecast.power {
+        let _ = writeln!(last, "{}", power.line());
+    }
     if let Some(few) = &forecast.few_sources {
         let _ = writeln!(
             last,

@@ -19,6 +19,7 @@ pub(crate) mod openeqa;
 pub(crate) mod outcome_words;
 pub(crate) mod page;
 pub(crate) mod paper;
+pub(crate) mod power;
 pub(crate) mod products;
 pub(crate) mod questions;
 mod readable;

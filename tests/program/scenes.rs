@@ -33,7 +33,7 @@ fn bench() -> Bench {
     bench
 }
 
-const RUN: &str = "--model random --data set --levels L0,L3 --kinds ev --out run";
+const RUN: &str = "--model random --data set --levels L0,L3 --variant ev --out run";
 
 #[test]
 fn scenes_are_clusters_and_can_be_named_later() {
@@ -61,6 +61,15 @@ fn scenes_are_clusters_and_can_be_named_later() {
     assert!(records() == before);
     assert!(!called.stderr.contains("suggest") && !called.stdout.contains("suggest"));
     assert!(called.stdout.contains("in 12 scenes"), "{}", called.stdout);
+    // What can be detected follows from the scenes, too.
+    let check = bench.call(&words("check set"));
+    let power = "power: 48 questions in 12 scenes detects ";
+    assert!(joined(&check.stdout).contains(power), "{check:?}");
+    let dry = bench.call(&words(&format!("{RUN} --dry-run")));
+    assert!(
+        dry.stdout.contains(power) && dry.stdout.contains("; 5 points need about "),
+        "{dry:?}"
+    );
     // A file without them takes none away.
     questions(&bench, false);
     let called = bench.call(&words(RUN));

@@ -5,6 +5,7 @@ use std::collections::HashSet;
 use serde_json::{Value, json};
 
 use super::plan::{ChoiceItem, trials};
+use super::power::{asked_sets, power};
 use super::settings::ImagePlace;
 use super::setup::ChoiceSetup;
 use crate::engine::experiment::Experiment;
@@ -17,14 +18,16 @@ use crate::images::questions::ASK;
 use crate::images::recipe::Recipe;
 use crate::images::source::{Frames, Source};
 use crate::questions::rules::Rules;
+use crate::report::power::PowerForecast;
 use crate::run_reports;
 use crate::runs::Outcome;
 use crate::runs::StdoutFormat;
 use crate::runs::stored::StoredRun;
+use crate::score::subject::is_reference;
 use crate::store::Store;
 use crate::types::manifest::PartPlace;
 use crate::types::manifest::{Columns, Identity};
-use crate::types::{ChoiceDetail, QuestionId, Record, RunQuestion, SetLight};
+use crate::types::{ChoiceDetail, QuestionId, Record, RunQuestion, SetLight, View};
 
 impl Experiment for ChoiceSetup<'_> {
     type Item = ChoiceItem;
@@ -79,6 +82,13 @@ impl Experiment for ChoiceSetup<'_> {
                 )
             })
             .collect()
+    }
+
+    fn power(&self) -> Option<PowerForecast> {
+        let models = self.models.iter();
+        let models = models.filter(|model| model.view == View::Image && !is_reference(&model.name));
+        let asked = asked_sets(&self.conditions, models.count());
+        power(&self.dataset, &self.questions, asked)
     }
 
     fn identity(&self) -> Identity {

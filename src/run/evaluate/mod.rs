@@ -7,6 +7,7 @@ mod experiment;
 mod other_room;
 mod plan;
 mod plan_identity;
+mod power;
 mod record;
 mod settings;
 mod setup;

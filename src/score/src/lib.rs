@@ -54,6 +54,7 @@ pub mod paired;
 pub mod photographed_set;
 pub mod pooled;
 pub mod pooled_kind;
+pub mod power;
 mod quantiles;
 pub mod ranks;
 pub mod realism;

@@ -15,6 +15,7 @@ use serde_json::json;
 use sha2::{Digest as _, Sha256};
 
 use super::estimate;
+use super::power::power;
 use super::settings::EvaluateArgs;
 use super::unnamed_scenes::unnamed_scenes;
 use crate::dataset::{DataPlace, Dataset, Picture};
@@ -24,6 +25,7 @@ use crate::files::write;
 use crate::images::progress::Progress;
 use crate::images::questions::{QuestionBank, open_data, rules, select};
 use crate::runs::Outcome;
+use crate::score::tested_sentences::AskedSets;
 use crate::synthesis::LightSettings;
 use crate::types::Decides;
 use crate::types::Question;
@@ -152,6 +154,18 @@ fn data(
     questions::questions(&asked, findings);
     if let Some(warning) = unnamed_scenes(&dataset, &asked) {
         findings.warn(warning);
+    }
+    if args.job.models.is_empty() {
+        // With a model, this line is among what a run would take.
+        let sets = AskedSets {
+            models: 1,
+            enhancers: args.job.enhancers.llie.len(),
+            lights: 1,
+            has_noise: true,
+        };
+        if let Some(power) = power(&dataset, &asked, sets) {
+            findings.ok(power.line());
+        }
     }
     let depth = if check.deep {
         Depth::Pixels

@@ -1,0 +1,136 @@
+//! What a run can detect, in words, before anything is asked: [`PowerForecast`].
+
+use serde::Serialize;
+
+use super::words::counted;
+use crate::score::cluster::{ClusterUnit, Clusters};
+use crate::score::paired::POWER;
+use crate::score::power::{CHANGED, CORRELATION, Detectable, PlannedSample, TARGET};
+use crate::score::tested_sentences::AskedSets;
+
+/// The difference between two conditions that a run detects, and the frames that 5 points need.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct PowerForecast {
+    /// Number of questions.
+    pub questions: usize,
+    /// Number of clusters, and what they are: scene, frame or question.
+    pub clusters: usize,
+    pub unit: String,
+    /// Number of models whose mean is tested.
+    pub models: usize,
+    /// Level of the test, after the report's correction.
+    pub level: f64,
+    #[serde(flatten)]
+    pub detectable: Detectable,
+}
+
+impl PowerForecast {
+    /// The forecast for questions in these clusters, each given by its cluster's index; `None` without questions.
+    pub(crate) fn new(clusters: &Clusters, of_questions: &[u32], asked: AskedSets) -> Option<Self> {
+        let mut questions = vec![0; clusters.count()];
+        for cluster in of_questions {
+            questions[*cluster as usize] += 1;
+        }
+        questions.retain(|count| *count > 0);
+        if questions.is_empty() {
+            return None;
+        }
+        let sample = PlannedSample {
+            questions,
+            models: asked.models.max(1),
+            level: asked.first_level(),
+        };
+        Some(Self {
+            questions: of_questions.len(),
+            clusters: sample.questions.len(),
+            unit: clusters.unit().to_string(),
+            models: sample.models,
+            level: sample.level,
+            detectable: sample.detectable(),
+        })
+    }
+
+    /// One line of text, without a line break.
+    pub(crate) fn line(&self) -> String {
+        let among = if self.unit == ClusterUnit::Question.to_string() {
+            counted(self.questions, "question")
+        } else {
+            format!(
+                "{} in {}",
+                counted(self.questions, "question"),
+                counted(self.clusters, &self.unit)
+            )
+        };
+        let power = 100.0 * POWER;
+        let found = match self.detectable.difference {
+            None => "detects no difference between two conditions".to_owned(),
+            Some(difference) => format!(
+                "detects {:.1} points between two conditions in {power:.0} % of such runs",
+                100.0 * difference
+            ),
+        };
+        let who = match self.models {
+            1 => "one model".to_owned(),
+            models => format!("mean of {models} models"),
+        };
+        format!(
+            "power: {among} {found}; {:.0} points need about {} ({who}; level {:.2} % after correction; assumed: {:.0} % of answers change without an effect, correlation {CORRELATION} in a {})",
+            100.0 * TARGET,
+            counted(self.detectable.clusters_for_target, &self.unit),
+            100.0 * self.level,
+            100.0 * CHANGED,
+            self.unit
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::score::cluster::FrameTies;
+    use crate::types::{FrameId, QuestionId};
+
+    fn forecast(frames: usize, models: usize) -> PowerForecast {
+        let questions: Vec<(QuestionId, FrameId)> = (0..4 * frames)
+            .map(|item| {
+                (
+                    QuestionId(format!("q{item}")),
+                    FrameId(format!("f{}", item / 4)),
+                )
+            })
+            .collect();
+        let pairs = questions.iter().map(|(question, frame)| (question, frame));
+        let clusters = Clusters::new(pairs, &FrameTies::default());
+        let of_questions: Vec<u32> = questions
+            .iter()
+            .map(|(question, frame)| clusters.of(frame, question).unwrap())
+            .collect();
+        let asked = AskedSets {
+            models,
+            enhancers: 1,
+            lights: 1,
+            has_noise: true,
+        };
+        PowerForecast::new(&clusters, &of_questions, asked).unwrap()
+    }
+
+    #[test]
+    fn the_line_names_sample_difference_and_assumptions() {
+        let line = forecast(42, 1).line();
+        assert!(
+            line.starts_with("power: 168 questions in 42 frames detects ")
+                && line.contains(" points between two conditions in 80 % of such runs; 5 points need about ")
+                && line.ends_with(" frames (one model; level 0.83 % after correction; assumed: 20 % of answers change without an effect, correlation 0.05 in a frame)"),
+            "{line}"
+        );
+        let (one, six) = (forecast(42, 1).detectable, forecast(42, 6).detectable);
+        assert!(
+            six.difference < one.difference && six.clusters_for_target < one.clusters_for_target
+        );
+        let few = forecast(3, 1).line();
+        assert!(
+            few.starts_with("power: 12 questions in 3 frames detects no difference"),
+            "{few}"
+        );
+    }
+}

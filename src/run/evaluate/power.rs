@@ -1,0 +1,60 @@
+//! What a planned evaluation can detect: [`power`].
+
+use std::collections::BTreeSet;
+
+use crate::dataset::Dataset;
+use crate::report::power::PowerForecast;
+use crate::score::cluster::{Clusters, FrameTies};
+use crate::score::tested_sentences::AskedSets;
+use crate::types::{Condition, KindReading, Question};
+
+/// What questions about these data can detect; `None` without questions, or if nobody knows their answers.
+pub(super) fn power(
+    dataset: &Dataset,
+    questions: &[Question],
+    asked: AskedSets,
+) -> Option<PowerForecast> {
+    if questions
+        .iter()
+        .any(|question| question.choices.truth().is_none())
+    {
+        return None;
+    }
+    let mut ties = FrameTies::default();
+    for question in questions {
+        let frame = &question.frame;
+        let (scene, several) = (dataset.scene(frame), dataset.several(frame));
+        if !scene.is_empty() {
+            ties.scenes.insert(frame.clone(), scene);
+        }
+        if !several.is_empty() {
+            ties.images.insert(frame.clone(), several.to_vec());
+        }
+    }
+    let pairs = questions
+        .iter()
+        .map(|question| (&question.id, &question.frame));
+    let clusters = Clusters::new(pairs, &ties);
+    let of_questions = questions
+        .iter()
+        .filter_map(|question| clusters.of(&question.frame, &question.id));
+    PowerForecast::new(&clusters, &of_questions.collect::<Vec<u32>>(), asked)
+}
+
+/// What is asked in these conditions.
+pub(super) fn asked_sets(conditions: &[Condition], models: usize) -> AskedSets {
+    let variants: BTreeSet<KindReading> = conditions.iter().map(Condition::kind_reading).collect();
+    let last = variants.iter().filter_map(|variant| variant.kind).max();
+    let lights = variants.iter().filter(|variant| variant.kind == last);
+    let base = last.and_then(|kind| kind.base());
+    let enhancers: BTreeSet<_> = conditions
+        .iter()
+        .filter_map(|condition| condition.enhancer.as_ref())
+        .collect();
+    AskedSets {
+        models: models.max(1),
+        enhancers: enhancers.len(),
+        lights: lights.count(),
+        has_noise: base.is_some() && variants.iter().any(|variant| variant.kind == base),
+    }
+}

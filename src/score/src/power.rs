@@ -1,0 +1,224 @@
+//! The difference that a planned run can detect, before anything is asked: [`PlannedSample`].
+//!
+//! Paired answers right or wrong are a matched-pairs design. With n pairs, a share ψ of which differ between the two sides, a difference δ
+//! is detected with power 1 − β at level α if n δ² = D (t₁₋α⁄₂ √ψ + t₁₋β √(ψ − δ²))² (Connett, Smith and McHugh 1987, Stat. Med. 6:53). D is
+//! the design effect of clusters of unequal sizes m, 1 + (Σm² / Σm − 1) ρ (Eldridge, Ashby and Kerry 2006, Int. J. Epidemiol. 35:1292,
+//! with its cv of the sizes written out). The quantiles are those of Student's t, with the degrees of freedom that the test finds on average
+//! ([`degrees_of_freedom`](super::quantiles)): half the number C of clusters, whose sums have a kurtosis of about 3; C − 1 if pairs are
+//! independent.
+//!
+//! ψ and ρ are not known before a run, so both are assumed: [`CHANGED`] and [`CORRELATION`].
+
+use serde::Serialize;
+
+use super::paired::POWER;
+use super::quantiles::quantile;
+use super::significance::least_p;
+
+/// Share of the answers that change between two conditions without any effect, half of them in each direction; assumed. It is that of the
+/// simulated runs of `src/docs/numbers.md`.
+pub const CHANGED: f64 = 0.2;
+
+/// Correlation of the changes of answers within a cluster; assumed.
+pub const CORRELATION: f64 = 0.05;
+
+/// The difference for which the number of clusters is given: 5 points.
+pub const TARGET: f64 = 0.05;
+
+/// Most clusters that are tried.
+const MAX_CLUSTERS: f64 = 1e6;
+
+/// The questions of a planned run by cluster, and the models over which findings are pooled.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlannedSample {
+    /// Number of questions of each cluster.
+    pub questions: Vec<usize>,
+    pub models: usize,
+    /// Level of the test.
+    pub level: f64,
+}
+
+/// What a planned run can detect.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Detectable {
+    /// The smallest difference that is detected in 80 % of runs; `None` if none is.
+    pub difference: Option<f64>,
+    /// Number of clusters of the same size that detect a difference of [`TARGET`].
+    pub clusters_for_target: usize,
+}
+
+impl PlannedSample {
+    /// What is detected.
+    #[must_use]
+    pub fn detectable(&self) -> Detectable {
+        let clusters = self.questions.len() as f64;
+        let mut low = 0.0;
+        let mut high = 1.0;
+        let is_possible = least_p(self.questions.len()) < self.level && self.finds(high, clusters);
+        // Bisection: the power grows with the difference.
+        for _ in 0..40 {
+            let middle = (low + high) / 2.0;
+            if self.finds(middle, clusters) {
+                high = middle;
+            } else {
+                low = middle;
+            }
+        }
+        Detectable {
+            difference: is_possible.then_some(high),
+            clusters_for_target: self.clusters_for(TARGET),
+        }
+    }
+
+    /// Number of clusters like these that detect a difference.
+    fn clusters_for(&self, difference: f64) -> usize {
+        let (mut low, mut high) = (2.0, MAX_CLUSTERS);
+        while high - low > 1.0 {
+            let middle = ((low + high) / 2.0_f64).floor();
+            if self.finds(difference, middle) {
+                high = middle;
+            } else {
+                low = middle;
+            }
+        }
+        high as usize
+    }
+
+    /// Whether a difference is detected with [`POWER`] in this many clusters like these.
+    fn finds(&self, difference: f64, clusters: f64) -> bool {
+        let replies = self.questions.iter().map(|count| count * self.models);
+        let replies: Vec<f64> = replies.map(|count| count as f64).collect();
+        let sum: f64 = replies.iter().sum();
+        let squares: f64 = replies.iter().map(|count| count * count).sum();
+        let design = (1.0 + (squares / sum - 1.0) * CORRELATION).max(1.0);
+        let n = sum / replies.len() as f64 * clusters;
+        // An effect turns some answers that would change the other way, and some that would not change.
+        let changed = (CHANGED + difference / 2.0).max(difference);
+        let degrees = if design > 1.0 {
+            clusters / 2.0
+        } else {
+            clusters - 1.0
+        };
+        let [test, power] =
+            [1.0 - self.level / 2.0, POWER].map(|share| quantile(share, degrees.max(1.0)));
+        let spread =
+            test * changed.sqrt() + power * (changed - difference * difference).max(0.0).sqrt();
+        n * difference * difference >= design * spread * spread
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::rngs::StdRng;
+    use rand::{RngExt as _, SeedableRng as _};
+
+    use super::super::paired::{ClusterNet, PairedTest};
+    use super::*;
+
+    #[test]
+    fn independent_pairs_follow_the_formula_of_matched_pairs() {
+        // n = (1.96 √ψ + 0.8416 √(ψ − δ²))² / δ² for ψ = 0.25 and δ = 0.1: 194 pairs.
+        let sample = PlannedSample {
+            questions: vec![1; 194],
+            models: 1,
+            level: 0.05,
+        };
+        let found = sample.detectable().difference.unwrap();
+        assert!((found - 0.1).abs() < 0.001, "{found}");
+        assert_eq!(
+            PlannedSample {
+                questions: vec![4; 5],
+                ..sample.clone()
+            }
+            .detectable()
+            .difference,
+            None
+        );
+        // More questions of the same clusters help less than more clusters.
+        let of = |questions: Vec<usize>| {
+            let sample = PlannedSample {
+                questions,
+                ..sample.clone()
+            };
+            sample.detectable().difference.unwrap()
+        };
+        assert!(of(vec![8; 40]) > of(vec![4; 80]) && of(vec![8; 40]) < of(vec![4; 40]));
+    }
+
+    #[test]
+    fn the_number_of_clusters_detects_the_target() {
+        let sample = |clusters: usize| PlannedSample {
+            questions: vec![4; clusters],
+            models: 1,
+            level: 0.01,
+        };
+        let needed = sample(42).detectable().clusters_for_target;
+        let found = |clusters: usize| sample(clusters).detectable().difference.unwrap();
+        assert!(found(needed) <= TARGET + 1e-6 && found(needed - 2) > TARGET);
+    }
+
+    /// Share of simulated samples in which a difference is detected. Changes of a cluster are correlated because some items take the
+    /// draw of their cluster.
+    fn power(sample: &PlannedSample, difference: f64, random: &mut StdRng) -> f64 {
+        let runs = 400;
+        let changed = CHANGED + difference / 2.0;
+        let better = (changed + difference) / 2.0;
+        let found = (0..runs).filter(|_| {
+            let mut squares = 0.0;
+            let clusters = sample.questions.iter().map(|items| {
+                let change = |draw: f64| match draw {
+                    draw if draw < better => 1,
+                    draw if draw < changed => -1,
+                    _ => 0,
+                };
+                let common = random.random_range(0.0..1.0);
+                let nets = (0..*items).map(|_| {
+                    let net: i64 = (0..sample.models)
+                        .map(|_| {
+                            let is_common = random.random_bool(CORRELATION.sqrt());
+                            change(if is_common {
+                                common
+                            } else {
+                                random.random_range(0.0..1.0)
+                            })
+                        })
+                        .sum();
+                    squares += (net * net) as f64;
+                    net
+                });
+                ClusterNet {
+                    net: nets.sum(),
+                    items: *items as u32,
+                }
+            });
+            let clusters: Vec<ClusterNet> = clusters.collect();
+            PairedTest::new(&clusters, sample.models as f64, squares).p < sample.level
+        });
+        found.count() as f64 / f64::from(runs)
+    }
+
+    #[test]
+    fn simulated_runs_detect_it_in_about_four_of_five() {
+        let mut random = StdRng::seed_from_u64(11);
+        let uneven = (0..40).map(|number| 1 + number % 8).collect();
+        for (questions, models, level) in [
+            (vec![4; 42], 1, 0.05),
+            (vec![4; 42], 1, 0.005),
+            (vec![8; 25], 6, 0.01),
+            (uneven, 3, 0.05),
+            (vec![1; 300], 1, 0.01),
+        ] {
+            let sample = PlannedSample {
+                questions,
+                models,
+                level,
+            };
+            let difference = sample.detectable().difference.unwrap();
+            let found = power(&sample, difference, &mut random);
+            assert!(
+                (0.7..0.9).contains(&found),
+                "{sample:?} {difference}: {found}"
+            );
+        }
+    }
+}
