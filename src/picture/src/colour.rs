@@ -6,6 +6,7 @@
 mod conversion;
 mod curve;
 mod icc;
+mod inks;
 pub(super) mod primaries;
 mod srgb;
 
@@ -15,6 +16,7 @@ use std::sync::{Arc, LazyLock};
 pub(super) use self::conversion::Conversion;
 use self::curve::ToneCurve;
 use self::icc::Profile;
+pub(super) use self::inks::Inks;
 use self::primaries::Primaries;
 use darkqa_ground::types::recent::Recent;
 use darkqa_ground::types::{ColourHandling, ColourNote, Digest};

@@ -1,5 +1,6 @@
 //! An image file in memory: [`ImageFile`].
 
+mod cmyk_jpeg;
 mod exr_layers;
 mod facts;
 pub mod format;
@@ -14,12 +15,12 @@ use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
 use image::metadata::Orientation;
-use image::{ColorType, DynamicImage, ImageDecoder, ImageReader, Limits};
+use image::{ColorType, DynamicImage, ImageDecoder, ImageReader, Limits, RgbImage};
 
 use self::exr_layers::ExrFile;
-use self::facts::{Depth, FileFacts, fault};
+use self::facts::{Depth, FileFacts, InkForm, fault};
 use self::format::FileFormat;
-use super::colour::{CodeDepth, ColourSpace, ColourTag, Meaning};
+use super::colour::{CodeDepth, ColourSpace, ColourTag, Inks, Meaning};
 use super::reading_rule::{ColourRule, ReadingRule, Transfer};
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::files::guarded::guarded;
@@ -167,6 +168,9 @@ impl ImageFile {
     /// What is done about the colours of the file; `None` if they are sRGB, or cannot be shown.
     fn colour_note(&self, facts: &FileFacts) -> Option<ColourNote> {
         let FileFacts { colour, depth, .. } = facts;
+        if facts.inks.is_some() {
+            return self.ink_colours().ok().map(|inks| inks.note());
+        }
         match (self.rule.colour, colour.meaning(depth.of_codes())) {
             (ColourRule::Convert, Err(_) | Ok(Meaning::Linear)) | (_, Ok(Meaning::Srgb)) => None,
             (ColourRule::Convert, Ok(Meaning::Other(space))) => {
@@ -191,6 +195,9 @@ impl ImageFile {
         let ReadingRule {
             colour, transfer, ..
         } = self.rule;
+        if facts.inks.is_some() {
+            return Ok(Samples::Codes(None));
+        }
         let meaning = match colour {
             ColourRule::Ignore => Meaning::Srgb,
             ColourRule::Convert => facts.colour.meaning(facts.depth.of_codes())?,
@@ -250,14 +257,18 @@ impl ImageFile {
     /// The pixels in the depth of the file. A truncated file, or a PNG with a wrong checksum, is refused.
     ///
     /// Grey becomes three equal channels, and a palette becomes its colours. An alpha channel is dropped if it is opaque
-    /// everywhere. CMYK and transparency are refused: there is no one right way to show them. The image is turned as its EXIF
-    /// orientation states, unless it has maps. Colours are converted to sRGB by the rule.
+    /// everywhere; transparency is refused, because there is no one right way to show it. The image is turned as its EXIF
+    /// orientation states, unless it has maps. Colours are converted to sRGB by the rule, inks by their profile, or by a formula
+    /// without one.
     ///
     /// # Errors
     /// If the file is broken, or cannot be shown as it is; the error names the file.
     pub fn pixels(&self) -> Result<Pixels> {
         if FileFormat::of(&self.bytes) == Ok(FileFormat::OpenExr) {
             return self.light_of_layers();
+        }
+        if let Some(form) = self.facts().inks {
+            return self.pixels_of_inks(form);
         }
         let decoder = self.decoder()?;
         // The PNG decoder stops after the last sample, and the JPEG decoder accepts fewer samples than it should.
@@ -298,6 +309,30 @@ impl ImageFile {
             }
         };
         pixels.map_err(|e| e.at(self.place.clone()))
+    }
+
+    /// The pixels of a JPEG file of four components.
+    fn pixels_of_inks(&self, form: InkForm) -> Result<Pixels> {
+        let (width, height) = self.decoder()?.dimensions();
+        self.check_complete()?;
+        let read = || {
+            let colours = self.ink_colours()?;
+            let inks = guarded(|| cmyk_jpeg::inks(&self.bytes, form == InkForm::Adobe))?;
+            let image = RgbImage::from_raw(width, height, colours.srgb(&inks));
+            let mut image =
+                DynamicImage::from(image.ok_or("not a whole image: samples are missing")?);
+            image.apply_orientation(self.orientation());
+            let (width, height) = (image.width() as usize, image.height() as usize);
+            let codes = Rgb::new(height, width, image.into_rgb8().into_raw());
+            codes.map_err(|e| e.to_string())
+        };
+        let codes = read().map_err(|problem: String| self.wrong(problem))?;
+        Ok(Pixels::Codes8(Arc::new(codes)))
+    }
+
+    /// The colours of the inks of a file of four components.
+    fn ink_colours(&self) -> Result<Inks, String> {
+        guarded(|| Inks::new(&self.facts().colour, self.rule.colour))
     }
 
     /// The pixels of an OpenEXR file.

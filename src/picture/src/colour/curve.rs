@@ -82,7 +82,8 @@ fn bt709(value: f64) -> f64 {
     }
 }
 
-fn interpolated(values: &[f64], at: f64) -> f64 {
+/// The value at a place in [0, 1] among at least two values at equal distances.
+pub(super) fn interpolated(values: &[f64], at: f64) -> f64 {
     let place = at * (values.len() - 1) as f64;
     let low = (place as usize).min(values.len() - 2);
     let share = place - low as f64;

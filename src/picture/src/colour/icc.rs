@@ -1,4 +1,4 @@
-//! ICC profiles of curves and a matrix: [`Profile`].
+//! ICC profiles: [`Profile`] of curves and a matrix, [`InkProfile`] of four inks.
 
 use moxcms::{ColorProfile, DataColorSpace, ProfileText, ToneReprCurve};
 
@@ -24,7 +24,7 @@ impl Profile {
     /// # Errors
     /// If it is broken, or not of curves and a matrix. The error names it.
     pub(super) fn read(bytes: &[u8]) -> Result<Self, String> {
-        let header = Header::read(bytes).ok_or("the ICC profile is broken: it ends too early")?;
+        let header = Header::read(bytes)?;
         // A library would read the tables of printers, too, which may be large and are not needed.
         match &header.space {
             b"RGB " | b"GRAY" => {}
@@ -45,8 +45,7 @@ impl Profile {
         if &header.connection != b"XYZ " {
             return Err("the connection space of the ICC profile is not XYZ".to_owned());
         }
-        let profile = ColorProfile::new_from_slice(bytes)
-            .map_err(|e| format!("the ICC profile is broken: {}", readable(&e.to_string())))?;
+        let profile = parsed(bytes)?;
         let name = name(&profile);
         let lacks = |what: &str| format!("the ICC profile {name:?} has no {what}");
         let curve = |curve: &Option<ToneReprCurve>| {
@@ -83,6 +82,37 @@ impl Profile {
     }
 }
 
+/// A profile of cyan, magenta, yellow and black.
+pub(super) struct InkProfile {
+    /// The description of the profile.
+    pub(super) name: String,
+    pub(super) profile: ColorProfile,
+}
+
+impl InkProfile {
+    /// Reads a profile (ICC.1:2022).
+    ///
+    /// # Errors
+    /// If it is broken, or not of these inks.
+    pub(super) fn read(bytes: &[u8]) -> Result<Self, String> {
+        let header = Header::read(bytes)?;
+        if &header.space != b"CMYK" {
+            return Err("the image is CMYK, but its ICC profile is not for CMYK".to_owned());
+        }
+        let profile = parsed(bytes)?;
+        Ok(Self {
+            name: name(&profile),
+            profile,
+        })
+    }
+}
+
+/// All parts of a profile.
+fn parsed(bytes: &[u8]) -> Result<ColorProfile, String> {
+    ColorProfile::new_from_slice(bytes)
+        .map_err(|e| format!("the ICC profile is broken: {}", readable(&e.to_string())))
+}
+
 /// The fields at the head of a profile that decide whether it can be used.
 struct Header {
     space: [u8; 4],
@@ -92,7 +122,11 @@ struct Header {
 }
 
 impl Header {
-    fn read(bytes: &[u8]) -> Option<Self> {
+    fn read(bytes: &[u8]) -> Result<Self, &'static str> {
+        Self::fields(bytes).ok_or("the ICC profile is broken: it ends too early")
+    }
+
+    fn fields(bytes: &[u8]) -> Option<Self> {
         let four = |at: usize| bytes.get(at..)?.first_chunk::<4>().copied();
         let tags = u32::from_be_bytes(four(128)?) as usize;
         // Each tag takes 12 bytes of the profile.

@@ -7,7 +7,7 @@ pub(crate) type Matrix = [[f64; 3]; 3];
 pub(super) const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// The white of profiles, D50 (ICC.1:2022, section 7.2.16).
-const D50: [f64; 3] = [0.9642, 1.0, 0.8249];
+pub(super) const D50: [f64; 3] = [0.9642, 1.0, 0.8249];
 
 /// The cone responses by which whites are adapted (Lam 1985, "Bradford").
 const BRADFORD: Matrix = [

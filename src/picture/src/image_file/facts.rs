@@ -21,6 +21,8 @@ pub(super) struct FileFacts {
     pub(super) first_of: Option<&'static str>,
     pub(super) colour: ColourTag,
     pub(super) depth: Depth,
+    /// The form of the inks of a JPEG of four components; `None` for other files.
+    pub(super) inks: Option<InkForm>,
     /// Why the file cannot be shown as it is; `None` if nothing is known before it is decoded.
     pub(super) unshowable: Option<String>,
     /// The bytes that the file has at least if it is whole; `None` if its header does not tell.
@@ -38,12 +40,22 @@ pub(super) enum Depth {
     Float,
 }
 
+/// How a file holds amounts of ink.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum InkForm {
+    /// 0 is no ink.
+    Plain,
+    /// 255 is no ink, as Adobe's programs write it.
+    Adobe,
+}
+
 impl FileFacts {
     pub(super) const NONE: Self = Self {
         orientation: Orientation::NoTransforms,
         first_of: None,
         colour: ColourTag::None,
         depth: Depth::Eight,
+        inks: None,
         unshowable: None,
         whole: None,
     };
@@ -74,11 +86,15 @@ impl FileFacts {
             }
             FileFormat::Jpeg => {
                 let outline = JpegOutline::of(file);
-                let unshowable = (outline.components == Some(4)).then(|| CMYK.to_owned());
+                let form = if outline.is_adobe {
+                    InkForm::Adobe
+                } else {
+                    InkForm::Plain
+                };
                 Self {
                     orientation: turn(of_exif(outline.exif)),
+                    inks: (outline.components == Some(4)).then_some(form),
                     colour: profile(outline.profile()),
-                    unshowable,
                     ..Self::NONE
                 }
             }
@@ -101,6 +117,7 @@ impl FileFacts {
                     depth: deep(outline.bits),
                     unshowable: unshowable(&outline),
                     whole: Some(outline.end),
+                    ..Self::NONE
                 }
             }
             FileFormat::Bmp => Self::NONE,
@@ -118,9 +135,6 @@ impl FileFacts {
         }
     }
 }
-
-/// Why a JPEG of four components cannot be shown.
-const CMYK: &str = "a CMYK image (four components: CMYK or YCCK); convert it to RGB first";
 
 /// Why a TIFF cannot be shown as it is; `None` if nothing is known before it is decoded.
 fn unshowable(outline: &TiffOutline<'_>) -> Option<String> {

@@ -1,6 +1,6 @@
 //! The facts of a JPEG file that its markers hold: [`JpegOutline`]; and whether it has its end: [`ends`].
 //!
-//! The decoder converts CMYK to RGB without an error, and fills the missing part of a truncated file with grey. Models
+//! The decoder converts CMYK to RGB without regard to its profile, and fills the missing part of a truncated file with grey. Models
 //! would be asked about either as if it were the image.
 
 /// Start of the segment with the EXIF data (EXIF 2.32, section 4.5.5).
@@ -9,9 +9,13 @@ const EXIF: &[u8] = b"Exif\0\0";
 /// Start of a segment with a part of an ICC profile.
 const PROFILE: &[u8] = b"ICC_PROFILE\0";
 
-/// Markers of the application segments with EXIF data (APP1) and with a profile (APP2).
+/// Start of the segment that Adobe's programs write, in which inks are inverted.
+const ADOBE: &[u8] = b"Adobe";
+
+/// Markers of the application segments with EXIF data (APP1), with a profile (APP2), and of Adobe (APP14).
 const APP1: u8 = 0xE1;
 const APP2: u8 = 0xE2;
+const APP14: u8 = 0xEE;
 
 /// Marker before the coded samples (SOS), after which no header follows.
 const SAMPLES: u8 = 0xDA;
@@ -23,6 +27,8 @@ pub(super) struct JpegOutline<'a> {
     pub(super) components: Option<u8>,
     /// The EXIF data, a TIFF structure; `None` if there are none.
     pub(super) exif: Option<&'a [u8]>,
+    /// Whether the file has Adobe's marker.
+    pub(super) is_adobe: bool,
     /// The parts of the ICC profile, each with its number from 1 (ICC.1:2022, section B.4).
     profile: Vec<(u8, &'a [u8])>,
 }
@@ -40,6 +46,7 @@ impl<'a> JpegOutline<'a> {
             if marker == APP1 && outline.exif.is_none() {
                 outline.exif = segment.strip_prefix(EXIF);
             }
+            outline.is_adobe |= marker == APP14 && segment.starts_with(ADOBE);
             let part = segment.strip_prefix(PROFILE).filter(|_| marker == APP2);
             if let Some([number, _, part @ ..]) = part {
                 outline.profile.push((*number, part));

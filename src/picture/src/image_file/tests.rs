@@ -116,24 +116,85 @@ fn jpeg(color: jpeg_encoder::ColorType, channels: usize) -> Vec<u8> {
     bytes
 }
 
-#[test]
-fn cmyk_is_refused_by_name() {
-    for color in [
-        jpeg_encoder::ColorType::Cmyk,
-        jpeg_encoder::ColorType::CmykAsYcck,
-    ] {
-        let error = fault(jpeg(color, 4));
-        assert!(
-            error.contains("CMYK") && error.contains("convert it"),
-            "{error}"
-        );
+/// A JPEG of one colour in four inks, 32 × 32 pixels.
+fn inked(color: jpeg_encoder::ColorType, inks: [u8; 4], profile: Option<&[u8]>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = jpeg_encoder::Encoder::new(&mut bytes, 100);
+    if let Some(profile) = profile {
+        encoder.add_icc_profile(profile).unwrap();
     }
+    encoder
+        .encode(&inks.repeat(32 * 32), 32, 32, color)
+        .unwrap();
+    bytes
+}
+
+fn assert_near(file: &ImageFile, expected: [u8; 3]) {
+    let rgb = file.decode().unwrap();
+    assert_eq!((rgb.width(), rgb.height()), (32, 32));
+    for pixel in rgb.samples().as_chunks::<3>().0 {
+        let is_near = pixel
+            .iter()
+            .zip(expected)
+            .all(|(found, code)| found.abs_diff(code) <= 3);
+        assert!(is_near, "{pixel:?}, not {expected:?}");
+    }
+}
+
+#[test]
+fn inks_become_rgb_with_a_note() {
+    use jpeg_encoder::ColorType::{Cmyk, CmykAsYcck};
+    // The encoder takes 255 for full ink, and writes Adobe's marker.
+    for color in [Cmyk, CmykAsYcck] {
+        for (inks, expected) in [
+            ([0, 0, 0, 0], [255, 255, 255]),
+            ([255, 0, 0, 0], [0, 255, 255]),
+            ([40, 90, 200, 60], [164, 126, 42]),
+        ] {
+            let file = encoded(inked(color, inks, None), "a.jpg");
+            assert_near(&file, expected);
+            assert_eq!(file.check().unwrap(), (32, 32));
+            let note = file.note().colour.unwrap();
+            assert_eq!(note.from, "CMYK without a profile");
+            assert_ne!(file.digest(), Digest::of(file.bytes()));
+        }
+    }
+}
+
+#[test]
+fn inks_without_the_marker_of_adobe_are_not_inverted() {
+    let mut bytes = inked(jpeg_encoder::ColorType::Cmyk, [0, 0, 0, 255], None);
+    let marker = bytes.windows(5).position(|five| five == b"Adobe").unwrap();
+    bytes[marker] = b'a';
+    // Black, inverted, is full cyan, magenta and yellow; both are black. White would tell them apart.
+    assert_near(&encoded(bytes, "a.jpg"), [0, 0, 0]);
+    let mut bytes = inked(jpeg_encoder::ColorType::Cmyk, [255, 255, 255, 255], None);
+    bytes[marker] = b'a';
+    assert_near(&encoded(bytes, "a.jpg"), [255, 255, 255]);
+}
+
+#[test]
+fn a_broken_profile_of_inks_is_named_and_can_be_ignored() {
+    let file = inked(jpeg_encoder::ColorType::Cmyk, [0; 4], Some(b"no profile"));
+    let problem = fault(file.clone());
+    assert!(
+        problem.contains("ICC profile") && problem.contains("--colour ignore"),
+        "{problem}"
+    );
+    let mut file = encoded(file, "a.jpg");
+    file.rule.colour = ColourRule::Ignore;
+    assert_near(&file, [255, 255, 255]);
+}
+
+#[test]
+fn grey_and_rgb_files_have_no_inks() {
     for (color, channels) in [
         (jpeg_encoder::ColorType::Rgb, 3),
         (jpeg_encoder::ColorType::Luma, 1),
     ] {
         let (bytes, place) = (jpeg(color, channels), String::new());
-        assert!(encoded(bytes, place).decode().is_ok());
+        let file = encoded(bytes, place);
+        assert!(file.decode().is_ok() && file.note().colour.is_none());
     }
 }
 
