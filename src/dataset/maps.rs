@@ -39,7 +39,7 @@ pub(crate) enum DepthFile {
         /// Metres per unit of the samples.
         scale: f64,
     },
-    /// A `.npy` file of metres as 4- or 8-byte floats. NaN, an infinity, 0 and negative numbers mean no depth.
+    /// A `.npy` file of metres as 2-, 4- or 8-byte floats. NaN, an infinity, 0 and negative numbers mean no depth.
     Npy(PathBuf),
 }
 
@@ -104,6 +104,17 @@ impl DepthFile {
 }
 
 impl MapPaths {
+    /// The files of the maps.
+    pub(crate) fn paths(&self) -> impl Iterator<Item = PathBuf> {
+        let depth = self.depth.iter().map(|depth| depth.path().to_owned());
+        depth.chain(
+            [&self.semantic, &self.segments]
+                .into_iter()
+                .flatten()
+                .cloned(),
+        )
+    }
+
     /// The paths of a frame without maps.
     pub(crate) const NONE: Self = Self {
         depth: None,
@@ -269,7 +280,7 @@ fn segment(id: i128) -> Result<u32, String> {
 }
 
 /// A depth in whole millimetres, rounded half to even; 0 if there is none. `unit` is millimetres per unit.
-fn millimetres(units: f64, unit: f64) -> Result<u32, String> {
+pub(crate) fn millimetres(units: f64, unit: f64) -> Result<u32, String> {
     if !units.is_finite() || units <= 0.0 {
         return Ok(0);
     }

@@ -135,6 +135,9 @@ pub(crate) trait Adapter: fmt::Debug + Sync {
         None
     }
 
+    /// The files that are read besides the images of the frames: maps, and files about scenes or the whole.
+    fn further_files(&self) -> Vec<PathBuf>;
+
     /// Reads the maps of a frame; `rgb` is its image.
     ///
     /// # Errors

@@ -7,12 +7,11 @@ use std::path::{Path, PathBuf};
 
 use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs, labels};
 use super::files::{
-    IMAGES, check_same_size, depth_of, files, first_folder, folders, png, segments,
+    IMAGES, MAPS, check_same_size, classes, depth_of, files, first_folder, folders, segments,
 };
 use crate::dataset::image_names::ImageNames;
 use crate::error::{Error, Result};
 use crate::files::reading::entries;
-use crate::picture::raw_png::SampleForm;
 use crate::types::{Labels, Rgb};
 
 /// Names of the folders of images, depth, classes and segments.
@@ -47,6 +46,8 @@ pub(super) struct Folder {
     offset: NumberOffset,
     /// The files in the folders of images.
     beside: Vec<PathBuf>,
+    /// The file of the label space, if it lies in the folder.
+    labels_file: Option<PathBuf>,
 }
 
 /// Offset of the numbers of class maps from those of the label space.
@@ -70,7 +71,12 @@ impl Folder {
         let known = folder.join("classes.json");
         let labels = match labels(stated)? {
             Some(labels) => labels,
-            None if known.is_file() => crate::labels::read(&known)?,
+            None if known.is_file() => {
+                let labels = crate::labels::read(&known)?;
+                let set = Self::of(folder, stated, labels, NumberOffset::None)?;
+                let labels_file = Some(known);
+                return Ok(Self { labels_file, ..set });
+            }
             None => {
                 let problem = "the label space of the class maps is missing; nyu40, nyu13, mpcat40, ade150 or the path of a classes.json expected";
                 return Err(Error::usage("--labels", problem));
@@ -96,6 +102,7 @@ impl Folder {
             depth_scale: stated.depth_scale,
             offset,
             beside: Vec::new(),
+            labels_file: None,
         };
         if first_folder(folder, &RGB).is_some() {
             set.add(folder)?;
@@ -125,9 +132,9 @@ impl Folder {
         if let Some(folder) = first_folder(folder, &RGB) {
             self.beside.extend(entries(&folder)?);
         }
-        let mut depths = in_any(&DEPTH, &[".npy", ".png"])?;
-        let mut classes = in_any(&CLASSES, &[".png"])?;
-        let mut segments = in_any(&SEGMENTS, &[".npy", ".png"])?;
+        let mut depths = in_any(&DEPTH, &MAPS)?;
+        let mut classes = in_any(&CLASSES, &MAPS)?;
+        let mut segments = in_any(&SEGMENTS, &MAPS)?;
         for (frame, rgb) in images {
             self.maps.push(FolderMaps {
                 depth: depths.remove(&frame),
@@ -164,6 +171,14 @@ impl Adapter for Folder {
         &self.listing
     }
 
+    fn further_files(&self) -> Vec<PathBuf> {
+        let maps = self
+            .maps
+            .iter()
+            .flat_map(|maps| [&maps.depth, &maps.classes, &maps.segments]);
+        maps.chain([&self.labels_file]).flatten().cloned().collect()
+    }
+
     fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
         let maps = &self.maps[frame.index];
         let mut result = FrameMaps {
@@ -171,10 +186,7 @@ impl Adapter for Folder {
             ..FrameMaps::default()
         };
         if let Some(path) = &maps.classes {
-            let mut classes = png(
-                path,
-                &[SampleForm::Grey8, SampleForm::Grey16, SampleForm::Palette],
-            )?;
+            let mut classes = classes(path)?;
             check_same_size(path, &classes, rgb)?;
             if self.offset == NumberOffset::One {
                 classes.mapv_inplace(|id| if id == 255 { 0 } else { id + 1 });

@@ -29,6 +29,8 @@ pub(super) struct Habitat {
     scenes: BTreeMap<String, SceneFiles>,
     numbers: BTreeMap<String, u16>,
     depth_scale: Option<f64>,
+    /// The files about scenes.
+    about: Vec<PathBuf>,
 }
 
 /// Information from the annotation file of a scene.
@@ -64,6 +66,7 @@ impl Habitat {
             maps: Vec::new(),
             scenes: BTreeMap::new(),
             depth_scale: stated.depth_scale,
+            about: vec![folder.join("scenes.json")],
         };
         for scene in folders(folder)? {
             if scene.join("rgb").is_dir() {
@@ -80,7 +83,9 @@ impl Habitat {
         let images = files(&folder.join("rgb"), &IMAGES)?;
         let depths = files(&folder.join("depth"), &[".npy", ".png"])?;
         let semantics = files(&folder.join("semantic"), &[".npy", ".png"])?;
-        let mut steps = steps(&folder.join("trajectory.jsonl"))?;
+        let trajectory = folder.join("trajectory.jsonl");
+        let mut steps = steps(&trajectory)?;
+        self.about.push(trajectory);
         for (frame, rgb) in images {
             let Some(semantic) = semantics.get(&frame) else {
                 let problem = format_args!("no semantic map of the frame {frame:?}");
@@ -113,6 +118,7 @@ impl Habitat {
             return Err(Error::data(folder.display(), problem));
         };
         let content = text(&path)?;
+        self.about.push(path.clone());
         let at_line = |(line, problem): (usize, String)| Error::line(&path, line, problem);
         let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
         let (names, rooms) = if ending == "house" {
@@ -150,6 +156,14 @@ fn steps(path: &Path) -> Result<BTreeMap<String, TrajectoryStep>> {
 impl Adapter for Habitat {
     fn listing(&self) -> &Listing {
         &self.listing
+    }
+
+    fn further_files(&self) -> Vec<PathBuf> {
+        let maps = self
+            .maps
+            .iter()
+            .flat_map(|(depth, semantic)| depth.iter().chain([semantic]));
+        maps.chain(&self.about).cloned().collect()
     }
 
     fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {

@@ -13,6 +13,7 @@ use crate::types::{DepthKind, Frame, FrameId, Rgb, Segmentation};
 /// An open folder of the common interface.
 #[derive(Debug)]
 pub(super) struct Interface {
+    folder: PathBuf,
     dataset: Dataset,
     listing: Listing,
 }
@@ -70,13 +71,38 @@ impl Interface {
         listing
             .frames
             .sort_by(|a, b| (&a.scene, &a.frame).cmp(&(&b.scene, &b.frame)));
-        Ok(Self { dataset, listing })
+        Ok(Self {
+            folder: folder.to_owned(),
+            dataset,
+            listing,
+        })
     }
 }
 
 impl Adapter for Interface {
     fn listing(&self) -> &Listing {
         &self.listing
+    }
+
+    fn further_files(&self) -> Vec<PathBuf> {
+        let about =
+            ["frames.jsonl", "classes.json", "dataset.json"].map(|name| self.folder.join(name));
+        let scenes = self.listing.names.keys();
+        let names =
+            scenes.map(|scene| self.folder.join("scenes").join(scene).join("segments.json"));
+        let maps = self
+            .dataset
+            .sources
+            .values()
+            .filter_map(|source| match source {
+                ImageSource::File(file) => Some(file.maps.paths()),
+                _ => None,
+            });
+        about
+            .into_iter()
+            .chain(names)
+            .chain(maps.flatten())
+            .collect()
     }
 
     fn read(&self, frame: &ListedFrame, _rgb: &Rgb) -> Result<FrameMaps> {

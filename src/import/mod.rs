@@ -8,8 +8,11 @@ mod files;
 mod folder;
 mod habitat;
 mod hm3d;
+mod hypersim;
 mod interface;
+mod joined;
 pub(crate) mod keyframes;
+mod left_over;
 mod mp3d;
 mod nyu;
 mod polygons;
@@ -19,12 +22,14 @@ mod scannet;
 mod sunrgbd;
 mod thor;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 use crate::types::flag::flag_words;
 
 pub(crate) use adapter::{Adapter, FrameMaps, ListedFrame, StatedArgs};
+pub(crate) use left_over::LeftOver;
 
 /// The kind of data set in a folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -39,17 +44,58 @@ pub(crate) enum DataSetKind {
     Sunrgbd,
     /// A dump of AI2-THOR or ProcTHOR.
     Thor,
+    /// Hypersim.
+    Hypersim,
     /// Folders of images and maps by name, or a folder of the common interface.
     Folder,
 }
 
 flag_words!(DataSetKind);
 
-/// Opens the folder of a data set. `further` are folders that paths in a list of frames may lead to.
+/// Opens the folders of data sets of one kind as one data set. `further` are folders that paths in a list of frames may lead to.
+///
+/// # Errors
+/// As of [`open`], or if the data sets do not fit each other.
+pub(crate) fn open_all(
+    kind: DataSetKind,
+    folders: &[PathBuf],
+    stated: &StatedArgs,
+    further: &[PathBuf],
+) -> Result<Box<dyn Adapter>> {
+    let mut parts = Vec::with_capacity(folders.len());
+    for folder in folders {
+        parts.push(open(kind, folder, stated, further)?);
+    }
+    if parts.len() > 1 {
+        return Ok(Box::new(joined::Joined::new(folders, parts)?));
+    }
+    let problem = || Error::usage("--src", "a folder of a data set expected");
+    parts.pop().ok_or_else(problem)
+}
+
+/// The files in the folders of a data set that it does not read.
+///
+/// # Errors
+/// If a folder cannot be read.
+pub(crate) fn left_over(folders: &[PathBuf], adapter: &dyn Adapter) -> Result<LeftOver> {
+    let images = adapter
+        .listing()
+        .frames
+        .iter()
+        .map(|frame| frame.rgb.clone());
+    let read: BTreeSet<PathBuf> = images.chain(adapter.further_files()).collect();
+    let mut all = LeftOver::default();
+    for folder in folders {
+        all.join(LeftOver::in_folder(folder, &read)?);
+    }
+    Ok(all)
+}
+
+/// Opens the folder of a data set.
 ///
 /// # Errors
 /// With the file or folder that is missing or has another layout, or with the flag that is required.
-pub(crate) fn open(
+fn open(
     kind: DataSetKind,
     folder: &Path,
     stated: &StatedArgs,
@@ -67,6 +113,7 @@ pub(crate) fn open(
         DataSetKind::Nyu => Box::new(nyu::open(folder, stated)?),
         DataSetKind::Sunrgbd => Box::new(sunrgbd::SunRgbd::open(folder)?),
         DataSetKind::Thor => Box::new(thor::Thor::open(folder, stated)?),
+        DataSetKind::Hypersim => Box::new(hypersim::Hypersim::open(folder, stated)?),
         DataSetKind::Folder if folder.join("frames.jsonl").exists() => {
             Box::new(interface::Interface::open(folder, further)?)
         }

@@ -35,6 +35,8 @@ pub(super) struct Scannet {
     listing: Listing,
     maps: Vec<ScannetMaps>,
     depth_scale: f64,
+    /// The files about scenes, and the table of labels.
+    about: Vec<PathBuf>,
 }
 
 #[derive(Debug)]
@@ -61,6 +63,7 @@ impl Scannet {
             listing: Listing::default(),
             maps: Vec::new(),
             depth_scale: stated.depth_scale.unwrap_or(SCALE),
+            about: Vec::new(),
         };
         let scenes: Vec<PathBuf> = folders(folder)?
             .into_iter()
@@ -73,7 +76,12 @@ impl Scannet {
             Numbering::Nyu40
         };
         set.listing.labels = match numbering {
-            Numbering::Own => table(&folder.join(TABLE))?,
+            Numbering::Own => {
+                let path = folder.join(TABLE);
+                let labels = table(&path)?;
+                set.about.push(path);
+                labels
+            }
             Numbering::Nyu40 => space("nyu40").unwrap_or_default(),
         };
         for scene in scenes {
@@ -90,7 +98,10 @@ impl Scannet {
                 .into_iter()
                 .map(|name| folder.join(name))
                 .find(|path| path.exists());
-            path.map(|path| intrinsics(&path)).transpose()
+            path.as_deref()
+                .map(intrinsics)
+                .transpose()
+                .map(|camera| (path, camera))
         };
         let of = |which: &str| {
             camera([
@@ -98,8 +109,12 @@ impl Scannet {
                 format!("intrinsics_{which}.txt"),
             ])
         };
-        let (color, depth_camera) = (of("color")?, of("depth")?);
-        let room = room(&folder.join(format!("{name}.txt")))?;
+        let ((color_file, color), (depth_file, depth_camera)) = (of("color")?, of("depth")?);
+        let room_file = folder.join(format!("{name}.txt"));
+        let room = room(&room_file)?;
+        self.about.extend(color_file.into_iter().chain(depth_file));
+        self.about
+            .extend([room_file, folder.join(format!("{name}.aggregation.json"))]);
         let within = |folders: &[&str]| match first_folder(folder, folders) {
             Some(folder) => files(&folder, &[".png"]),
             None => Ok(BTreeMap::new()),
@@ -110,6 +125,7 @@ impl Scannet {
         };
         let depths = within(&["depth"])?;
         let poses = files(&folder.join("pose"), &[".txt"])?;
+        self.about.extend(poses.values().cloned());
         for (frame, rgb) in files(&folder.join("color"), &IMAGES)? {
             let pose = poses.get(&frame).map(|path| numbers(path)).transpose()?;
             if pose
@@ -280,6 +296,17 @@ fn resampled(depth: &Array2<u32>, rgb: &Rgb, cameras: Option<[Intrinsics; 2]>) -
 impl Adapter for Scannet {
     fn listing(&self) -> &Listing {
         &self.listing
+    }
+
+    fn further_files(&self) -> Vec<PathBuf> {
+        let maps = self.maps.iter();
+        let maps = maps.flat_map(|maps| {
+            maps.depth
+                .iter()
+                .chain([&maps.labels])
+                .chain(&maps.instances)
+        });
+        maps.chain(&self.about).cloned().collect()
     }
 
     fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {

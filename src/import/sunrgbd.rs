@@ -35,6 +35,8 @@ pub(super) struct SunRgbd {
     listing: Listing,
     files: Vec<SunRgbdFiles>,
     numbers: BTreeMap<String, u16>,
+    /// The files of cameras and rooms.
+    about: Vec<PathBuf>,
 }
 
 #[derive(Debug)]
@@ -75,6 +77,7 @@ impl SunRgbd {
             listing: Listing::default(),
             files: Vec::new(),
             numbers: BTreeMap::new(),
+            about: Vec::new(),
         };
         set.find_frames(folder, &[])?;
         set.number_words()?;
@@ -120,8 +123,9 @@ impl SunRgbd {
             Some(_) => return Err(Error::data(camera.display(), "nine numbers expected")),
             None => None,
         };
-        let room = folder.join("scene.txt");
-        let room = room.exists().then(|| text(&room)).transpose()?;
+        let room_file = folder.join("scene.txt");
+        let room = room_file.exists().then(|| text(&room_file)).transpose()?;
+        self.about.extend([camera, room_file]);
         let (frame, scene) = parents.split_last().map_or_else(
             || ("frame".to_owned(), String::new()),
             |(frame, scene)| (frame.clone(), scene.join("-")),
@@ -206,6 +210,15 @@ impl Adapter for SunRgbd {
     fn depth_folder(&self, frame: &ListedFrame) -> Option<&'static str> {
         let depth = self.files[frame.index].depth.as_ref();
         depth.map(|(folder, _)| *folder)
+    }
+
+    fn further_files(&self) -> Vec<PathBuf> {
+        let frames = self.files.iter();
+        let frames = frames.flat_map(|files| {
+            let depth = files.depth.iter().map(|(_, path)| path);
+            depth.chain([&files.annotation])
+        });
+        frames.chain(&self.about).cloned().collect()
     }
 
     fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {

@@ -25,6 +25,8 @@ pub(super) struct Thor {
     colors: BTreeMap<String, BTreeMap<[u8; 3], u32>>,
     numbers: BTreeMap<String, u16>,
     depth_scale: Option<f64>,
+    /// The files of colours.
+    color_files: Vec<PathBuf>,
 }
 
 impl Thor {
@@ -36,6 +38,7 @@ impl Thor {
             maps: Vec::new(),
             colors: BTreeMap::new(),
             depth_scale: stated.depth_scale,
+            color_files: Vec::new(),
         };
         for scene in folders(folder)? {
             if scene.join("instance").is_dir() {
@@ -47,7 +50,9 @@ impl Thor {
 
     fn add(&mut self, folder: &Path) -> Result<()> {
         let name = file_name(folder);
-        let (colors, names) = scene(&folder.join("colors.json"))?;
+        let color_file = folder.join("colors.json");
+        let (colors, names) = scene(&color_file)?;
+        self.color_files.push(color_file);
         let depths = files(&folder.join("depth"), &[".npy", ".png"])?;
         let instances = files(&folder.join("instance"), &[".png"])?;
         for (frame, rgb) in files(&folder.join("rgb"), &IMAGES)? {
@@ -126,6 +131,14 @@ fn room(scene: &str) -> Option<&'static str> {
 impl Adapter for Thor {
     fn listing(&self) -> &Listing {
         &self.listing
+    }
+
+    fn further_files(&self) -> Vec<PathBuf> {
+        let maps = self
+            .maps
+            .iter()
+            .flat_map(|(depth, instance)| depth.iter().chain([instance]));
+        maps.chain(&self.color_files).cloned().collect()
     }
 
     fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {

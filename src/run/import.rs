@@ -15,7 +15,9 @@ use crate::images::input_tally::InputTally;
 use crate::images::progress::Progress;
 use crate::images::workers::{ThreadArgs, pool};
 use crate::import::keyframes::{KeyFrameArgs, choose};
-use crate::import::{Adapter, DataSetKind, FrameMaps, ListedFrame, StatedArgs, open};
+use crate::import::{
+    Adapter, DataSetKind, FrameMaps, ListedFrame, StatedArgs, left_over, open_all,
+};
 use crate::picture::ImageFile;
 use crate::picture::png;
 use crate::report::words::counted;
@@ -38,9 +40,10 @@ pub(crate) struct ImportArgs {
     /// The kind of data set in --src
     #[arg(value_name = "KIND", value_enum, add = Decides::Pixels)]
     pub kind: DataSetKind,
-    /// The data set, laid out as src/import/README.md shows; default: none; required without --script
+    /// The data set, laid out as src/import/README.md shows; repeatable: several folders are joined, each scene with its folder's number
+    /// if two have one of its name; default: none; required without --script
     #[arg(long, value_name = "DIR", required_unless_present = "script", add = Decides::Pixels)]
-    pub src: Option<PathBuf>,
+    pub src: Vec<PathBuf>,
     /// Where the frames go, in the common interface; default: none; required without --script
     #[arg(long, value_name = "DIR", required_unless_present = "script", add = Decides::Nothing)]
     pub out: Option<PathBuf>,
@@ -79,9 +82,9 @@ pub(crate) struct ImportArgs {
 /// If there are no frames, the folder holds frames already, the typical depth is not that of a room, or no frame could be
 /// read; or if the kind has no script.
 pub(crate) fn import(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
-    match (&args.src, &args.out) {
+    match (&*args.src, &args.out) {
         _ if args.script => script(args.kind),
-        (Some(src), Some(out)) => import_frames(args, src, out, progress),
+        (src @ [_, ..], Some(out)) => import_frames(args, src, out, progress),
         _ => Err(Error::usage("--src", "--src and --out are required")),
     }
 }
@@ -97,7 +100,7 @@ fn script(kind: DataSetKind) -> Result<Outcome> {
 /// If one frame fails, the error is logged and counted, and the others continue.
 fn import_frames(
     args: &ImportArgs,
-    src: &Path,
+    src: &[PathBuf],
     out: &Path,
     progress: &Progress,
 ) -> Result<Outcome> {
@@ -107,7 +110,7 @@ fn import_frames(
             "the folder has frames already; --force overwrites them, another --out keeps both";
         return Err(Error::data(list.display(), problem));
     }
-    let adapter = open(args.kind, src, &args.stated, &args.root.data_root)?;
+    let adapter = open_all(args.kind, src, &args.stated, &args.root.data_root)?;
     let frames = choose(
         &adapter.listing().frames,
         args.key_frames.selection(),
@@ -130,9 +133,19 @@ fn import_frames(
     let failed = written.iter().filter(|written| written.is_none()).count();
     let written: Vec<WrittenFrame> = written.into_iter().flatten().collect();
     if written.is_empty() {
-        return Err(Error::data(src.display(), "no frame of it could be read"));
+        let folders: Vec<String> = src
+            .iter()
+            .map(|folder| folder.display().to_string())
+            .collect();
+        return Err(Error::data(
+            folders.join(", "),
+            "no frame of it could be read",
+        ));
     }
-    let note = depths(&written)? + &depth_folders(&written);
+    let note = depths(&written)?
+        + &without_maps(&written)
+        + &depth_folders(&written)
+        + &left_over(src, &*adapter)?.line();
     let mut scenes: Vec<&str> = frames.iter().map(|frame| frame.scene.as_str()).collect();
     scenes.dedup();
     let listing = adapter.listing();
@@ -153,11 +166,17 @@ fn import_frames(
     }
     let lines = written.iter().map(|written| &written.line);
     frame_folder::finish(out, &listing.labels, &info, lines)?;
+    let listed = listing.frames.len();
     let mut output = format!(
-        "{}: {} of {}{}\n{note}",
+        "{}: {} of {}{}{}\n{note}",
         out.display(),
         counted(written.len(), "frame"),
         counted(scenes.len(), "scene"),
+        if listed == frames.len() {
+            String::new()
+        } else {
+            format!(", chosen from {listed}")
+        },
         if failed == 0 {
             String::new()
         } else {
@@ -305,6 +324,30 @@ fn depths(written: &[WrittenFrame]) -> Result<String> {
         return Err(Error::data("depth", problem));
     }
     Ok(format!("typical depth: {:.2} m\n", metres(typical)))
+}
+
+/// A note of how many frames lack a map; empty if all have the same kinds, depth aside if none has any.
+fn without_maps(written: &[WrittenFrame]) -> String {
+    let mut note = String::new();
+    for (key, noun) in [
+        ("depth", "depth"),
+        ("sem", "class map"),
+        ("over", "segments"),
+    ] {
+        let lacking = written
+            .iter()
+            .filter(|written| !written.line.contains_key(key))
+            .count();
+        if lacking == written.len() && key == "sem" {
+            note += "no class maps: there will be no questions by rule\n";
+        } else if lacking > 0 && lacking < written.len() {
+            note += &format!(
+                "without {noun}: {lacking} of {}\n",
+                counted(written.len(), "frame")
+            );
+        }
+    }
+    note
 }
 
 /// A note of the folders that depth was read from; empty if the data set has one depth of each frame.

@@ -501,6 +501,206 @@ fn folders_of_images_and_maps() {
 }
 
 #[test]
+fn class_maps_of_arrays_are_read_and_other_files_are_named() {
+    let scene = Scene::new();
+    for number in 0..3 {
+        scene.rgb(&format!("home/rgb/{number}.png"));
+        // Hypersim has −1 for no class.
+        scene.npy(
+            &format!("home/sem/{number}.npy"),
+            "<i2",
+            4_i16,
+            -1,
+            |value| value.to_le_bytes().to_vec(),
+        );
+        scene.npy(
+            &format!("home/depth/{number}.npy"),
+            "<f2",
+            0x4000_u16,
+            0x4400,
+            |value| value.to_le_bytes().to_vec(),
+        );
+        scene.text(&format!("home/normals/{number}.exr"), "");
+    }
+    scene.text("home/notes", "");
+    let called = scene
+        .run("folder", &["--labels", "nyu40", "--count", "2"])
+        .success();
+    let said = String::from_utf8(called.get_output().stdout.clone()).unwrap();
+    assert!(
+        said.contains("2 frames of 1 scene, chosen from 3"),
+        "{said}"
+    );
+    assert!(
+        said.contains("not read: 3 normals/*.exr, home/notes"),
+        "{said}"
+    );
+    let set = Dataset::of_frames(&scene.out(), &[]).unwrap();
+    let found = frame(&set, "home/0");
+    assert_eq!(sides(found.semantic.as_ref()), (4, 0));
+    assert_eq!(sides(found.depth.as_ref()), (2_000, 4_000));
+    scene.npy("home/sem/0.npy", "<i4", 70_000_i32, 0, |value| {
+        value.to_le_bytes().to_vec()
+    });
+    let refused = scene.refused("folder", &["--labels", "nyu40", "--force"]);
+    assert!(
+        refused.contains("70000 is too large for the number of a class"),
+        "{refused}"
+    );
+}
+
+#[test]
+fn hypersim_is_read_with_its_maps_in_hdf5() {
+    let scene = Scene::new();
+    let images = "ai_001_002/images/scene_cam_01";
+    scene.rgb("image.png");
+    for number in ["0003", "0007"] {
+        let image = scene.at(&format!(
+            "{images}_final_preview/frame.{number}.tonemap.jpg"
+        ));
+        let picture = image::open(scene.at("image.png")).unwrap().into_rgb8();
+        picture.save(image).unwrap();
+        let map = |name: &str| {
+            scene.at(&format!(
+                "{images}_geometry_hdf5/frame.{number}.{name}.hdf5"
+            ))
+        };
+        let sides = |left: u16, right: u16| -> Vec<u8> {
+            let row = (0..WIDTH).map(|x| if x < WIDTH / 2 { left } else { right });
+            let row: Vec<u8> = row.flat_map(u16::to_le_bytes).collect();
+            row.repeat(HEIGHT as usize)
+        };
+        let size = [u64::from(HEIGHT), u64::from(WIDTH)];
+        // 2.0 and 4.0 as 16-bit floats; classes and instances of −1 are none.
+        fs::write(
+            map("depth_meters"),
+            hdf5(1, 0, size, &sides(0x4000, 0x4400)),
+        )
+        .unwrap();
+        fs::write(map("semantic"), hdf5(0, 8, size, &sides(4, u16::MAX))).unwrap();
+        fs::write(
+            map("semantic_instance"),
+            hdf5(0, 8, size, &sides(7, u16::MAX)),
+        )
+        .unwrap();
+        fs::write(map("world_normal"), "").unwrap();
+    }
+    let called = scene.run("hypersim", &[]).success();
+    let said = String::from_utf8(called.get_output().stdout.clone()).unwrap();
+    assert!(said.contains("2 frames of 1 scene"), "{said}");
+    assert!(
+        said.contains("not read: 2 scene_cam_01_geometry_hdf5/*.hdf5, image.png"),
+        "{said}"
+    );
+    let set = Dataset::of_frames(&scene.out(), &[]).unwrap();
+    let found = frame(&set, "ai_001_002/cam_01-0003");
+    assert_eq!(found.depth_kind, DepthKind::Euclid);
+    assert_eq!(sides(found.depth.as_ref()), (2_000, 4_000));
+    assert_eq!(sides(found.semantic.as_ref()), (4, 0));
+    assert_eq!(sides(found.segments.as_ref()), (7, 0));
+}
+
+/// An HDF5 file of one array of 16-bit numbers, as h5py writes it without compression: a class of type, its bits, and the numbers.
+fn hdf5(class: u8, bits: u8, size: [u64; 2], data: &[u8]) -> Vec<u8> {
+    let long = |numbers: &[u64]| -> Vec<u8> {
+        numbers
+            .iter()
+            .flat_map(|number| number.to_le_bytes())
+            .collect()
+    };
+    let header = |messages: &[(u16, Vec<u8>)]| {
+        let mut body = Vec::new();
+        for (kind, data) in messages {
+            let whole = data.len().next_multiple_of(8);
+            body.extend(kind.to_le_bytes());
+            body.extend((whole as u16).to_le_bytes());
+            body.extend([0; 4]);
+            body.extend(data);
+            body.extend(vec![0; whole - data.len()]);
+        }
+        let mut header = vec![1, 0, messages.len() as u8, 0, 1, 0, 0, 0];
+        header.extend(long(&[body.len() as u64]));
+        header.extend(body);
+        header
+    };
+    let mut file = b"\x89HDF\r\n\x1a\n\0\0\0\0\0\x08\x08\0\x04\0\x10\0\0\0\0\0".to_vec();
+    // The root group is at 96, its tree at 136, its node at 184, its names at 232 and 264, the array at 288, its numbers at 400.
+    file.extend(long(&[
+        0,
+        u64::MAX,
+        400 + data.len() as u64,
+        u64::MAX,
+        0,
+        96,
+        0,
+        0,
+        0,
+    ]));
+    file.extend(header(&[(17, long(&[136, 232]))]));
+    file.extend(b"TREE\0\0\x01\0");
+    file.extend(long(&[u64::MAX, u64::MAX, 0, 184, 8]));
+    file.extend(b"SNOD\x01\0\x01\0");
+    file.extend(long(&[8, 288, 0, 0, 0]));
+    file.extend(b"HEAP\0\0\0\0");
+    file.extend(long(&[24, u64::MAX, 264]));
+    file.extend(b"\0\0\0\0\0\0\0\0dataset\0\0\0\0\0\0\0\0\0");
+    let dataspace = [vec![1, 2, 0, 0, 0, 0, 0, 0], long(&size)].concat();
+    let datatype = vec![16 | class, bits, 0, 0, 2, 0, 0, 0];
+    let layout = [vec![3, 1], long(&[400, data.len() as u64])].concat();
+    file.extend(header(&[(1, dataspace), (3, datatype), (8, layout)]));
+    file.resize(400, 0);
+    file.extend(data);
+    file
+}
+
+#[test]
+fn a_folder_without_class_maps_says_so() {
+    let scene = Scene::new();
+    scene.rgb("rgb/0.png");
+    let called = scene.run("folder", &["--labels", "nyu40"]).success();
+    let said = String::from_utf8(called.get_output().stdout.clone()).unwrap();
+    assert!(said.contains("no class maps"), "{said}");
+}
+
+#[test]
+fn folders_are_joined_and_scenes_of_one_name_told_apart() {
+    let scene = Scene::new();
+    for (folder, class) in [("one", 4), ("two", 5)] {
+        scene.rgb(&format!("{folder}/home/rgb/0.png"));
+        scene.shallow(&format!("{folder}/home/sem/0.png"), class, 9);
+        scene.rgb(&format!("{folder}/only-{folder}/rgb/0.png"));
+        scene.shallow(&format!("{folder}/only-{folder}/sem/0.png"), class, 9);
+    }
+    let import = |labels: &str| {
+        let mut command = Command::cargo_bin("darkqa-eval").unwrap();
+        command.args(["import", "folder", "--labels", labels, "--src"]);
+        command.arg(scene.0.path().join("src/one")).arg("--src");
+        command
+            .arg(scene.0.path().join("src/two"))
+            .arg("--out")
+            .arg(scene.out());
+        command.assert()
+    };
+    import("nyu40").success();
+    let set = Dataset::of_frames(&scene.out(), &[]).unwrap();
+    let names: Vec<&str> = set.frames().map(|frame| frame.0.as_str()).collect();
+    assert_eq!(names, ["1-home/0", "2-home/0", "only-one/0", "only-two/0"]);
+    assert_eq!(sides(frame(&set, "1-home/0").semantic.as_ref()), (4, 9));
+    assert_eq!(sides(frame(&set, "2-home/0").semantic.as_ref()), (5, 9));
+    // Questions name the command that joins.
+    let mut command = Command::cargo_bin("darkqa-eval").unwrap();
+    let refused = command
+        .args(["questions", "one", "two", "--out", "q.jsonl"])
+        .assert()
+        .failure();
+    let said = String::from_utf8(refused.get_output().stderr.clone()).unwrap();
+    assert!(
+        said.contains("import folder --src one --src two --out JOINED"),
+        "{said}"
+    );
+}
+
+#[test]
 fn broken_folders_are_named() {
     let scene = Scene::new();
     scene.rgb("rgb/a.png");

@@ -5,7 +5,7 @@
 //! Rgb ─ Scaling ─ PayloadFormat ─ Payload ─ data URL         what a model receives
 //! ```
 //!
-//! Maps of numbers, which are not to be shown, are read as they are stored: [`raw_png`] and [`npy`].
+//! Maps of numbers, which are not to be shown, are read as they are stored: [`raw_png`], [`npy`] and [`hdf5`].
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
@@ -13,6 +13,7 @@ mod bilinear;
 mod colour;
 mod encoding;
 mod fitting;
+pub mod hdf5;
 pub mod image_file;
 pub mod npy;
 mod payload;

@@ -32,6 +32,10 @@ impl NumberForm {
     /// The size of one number in bytes, and its type; `None` unless `descr` is of one byte or little-endian.
     fn of(descr: &str) -> Option<(usize, Self)> {
         Some(match descr {
+            "<f2" => (
+                2,
+                Self::Floats(|b| half::f16::from_le_bytes(sized(b)).into()),
+            ),
             "<f4" => (4, Self::Floats(|b| f32::from_le_bytes(sized(b)).into())),
             "<f8" => (8, Self::Floats(|b| f64::from_le_bytes(sized(b)))),
             "|i1" => (1, Self::Integers(|b| i8::from_le_bytes(sized(b)).into())),
@@ -75,9 +79,6 @@ impl<'a> Npy<'a> {
             let header = header.trim_end();
             format!("its header is not that of a .npy array: {header:.200}")
         })?;
-        let (width, numbers) = NumberForm::of(descr).ok_or_else(|| {
-            format!("its numbers are {descr:?}; little-endian integers or floats of 4 or 8 bytes expected")
-        })?;
         if fortran == "True" {
             return Err(
                 "it is in Fortran order; save numpy.ascontiguousarray(array) instead".to_owned(),
@@ -86,6 +87,21 @@ impl<'a> Npy<'a> {
         let [rows, columns] = shape[..] else {
             return Err(format!("its shape is {shape:?}; [height, width] expected"));
         };
+        Self::new(descr, (rows, columns), data)
+    }
+
+    /// The numbers of a type, row by row, of an array of this height and width.
+    ///
+    /// # Errors
+    /// If the type is none that is read, or a number is missing.
+    pub(crate) fn new(
+        descr: &str,
+        (rows, columns): (usize, usize),
+        data: &'a [u8],
+    ) -> Result<Self, String> {
+        let (width, numbers) = NumberForm::of(descr).ok_or_else(|| {
+            format!("its numbers are {descr:?}; little-endian integers or floats of 2, 4 or 8 bytes expected")
+        })?;
         let count = rows.checked_mul(columns);
         if count.and_then(|count| count.checked_mul(width)) != Some(data.len()) {
             return Err(format!(
@@ -106,7 +122,7 @@ impl<'a> Npy<'a> {
         match self.numbers {
             NumberForm::Floats(read) => Ok(self.data.chunks_exact(self.width).map(read)),
             NumberForm::Integers(_) => {
-                Err("it holds integers; floats of 4 or 8 bytes expected".to_owned())
+                Err("it holds integers; floats of 2, 4 or 8 bytes expected".to_owned())
             }
         }
     }

@@ -35,6 +35,7 @@ use crate::runs::Outcome;
 use crate::runs::part_args::{keep_part, part_of};
 use crate::runs::shard::Shard;
 use crate::types::manifest::Status;
+use crate::types::shell_word;
 use crate::types::{Decides, Digest, Family, FrameId, Labels, QuestionId};
 
 use statistics_cache::StatisticsCache;
@@ -44,8 +45,8 @@ use statistics_file::{parts_beside, statistics_path};
 #[derive(Debug, Args)]
 pub(crate) struct QuestionsArgs {
     /// A folder of frames with their maps (frames.jsonl, classes.json), as import makes it
-    #[arg(value_name = "DATA", add = Decides::Reply)]
-    pub data: PathBuf,
+    #[arg(value_name = "DATA", required = true, add = Decides::Reply)]
+    pub data: Vec<PathBuf>,
     /// Where the questions go (.jsonl); the statistics of the frames go into a file next to it
     #[arg(long, value_name = "FILE", value_parser = file, add = Decides::Nothing)]
     pub out: PathBuf,
@@ -126,6 +127,27 @@ fn family(name: &str) -> Result<Family, String> {
     }
 }
 
+/// The folder of frames.
+///
+/// # Errors
+/// If there are several: a run takes one folder with the questions about it. The error names the command that joins them.
+fn folder(args: &QuestionsArgs) -> Result<&Path> {
+    match &*args.data {
+        [folder] => Ok(folder),
+        folders => {
+            let sources = folders
+                .iter()
+                .map(|folder| format!(" --src {}", shell_word(&folder.display().to_string())));
+            let sources: String = sources.collect();
+            let problem = format_args!(
+                "one folder expected, which a run takes with its questions; darkqa-eval import folder{sources} --out JOINED makes one of {}",
+                folders.len()
+            );
+            Err(Error::usage("DATA", problem))
+        }
+    }
+}
+
 /// The flags, and the tables of rules and colours that they name.
 struct QuestionMaking<'a> {
     args: &'a QuestionsArgs,
@@ -182,11 +204,12 @@ fn read<T>(path: Option<&Path>, parse: fn(&str) -> Result<T>) -> Result<Option<T
 /// If there are no frames or no classes, or a file cannot be written.
 pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Outcome> {
     let making = &QuestionMaking::read(args)?;
-    let dataset = Dataset::of_frames(&args.data, &args.root.data_root)?;
+    let folder = folder(args)?;
+    let dataset = Dataset::of_frames(folder, &args.root.data_root)?;
     let dataset = dataset.with_rule(args.codes.rule(args.limit));
     let labels = dataset.labels().ok_or_else(|| {
         let problem = "no classes.json in this folder, which gives the class of each number in its maps; `darkqa-eval import` writes one";
-        Error::data(args.data.display(), problem)
+        Error::data(folder.display(), problem)
     })?;
     let shard = part_of(args.shard.as_deref())?;
     let (frames, failed) = measured(making, (&dataset, labels), shard, progress)?;
@@ -314,7 +337,7 @@ fn measured(
     let frames: Vec<FrameStatistics> = results.into_iter().flatten().collect();
     if frames.is_empty() {
         return Err(Error::data(
-            making.args.data.display(),
+            dataset.name(),
             "no frame in this folder could be measured",
         ));
     }

@@ -1,0 +1,133 @@
+//! Hypersim as it is distributed: `<scene>/images/scene_cam_<nn>_final_preview/frame.<nnnn>.tonemap.jpg` and maps in HDF5,
+//! `<scene>/images/scene_cam_<nn>_geometry_hdf5/frame.<nnnn>.{depth_meters,semantic,semantic_instance}.hdf5`.
+//!
+//! Depth is the distance along the ray; classes are those of NYU40, and −1 is none (README of apple/ml-hypersim). The cameras of a
+//! scene show the same rooms, so that their frames are one scene here.
+
+use std::path::{Path, PathBuf};
+
+use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs, labels};
+use super::files::{check_same_size, classes, depth_of, file_name, files, folders, segments};
+use crate::error::Result;
+use crate::types::{DepthKind, Rgb};
+
+/// The horizontal field of view of most scenes, π/3, in degrees.
+const HFOV: f64 = 60.0;
+
+/// The endings of the names of images, the first that a camera has.
+const IMAGES: [&str; 2] = [".tonemap.jpg", ".tonemap.png"];
+
+/// An open folder of scenes.
+#[derive(Debug)]
+pub(super) struct Hypersim {
+    listing: Listing,
+    maps: Vec<HypersimMaps>,
+}
+
+#[derive(Debug)]
+struct HypersimMaps {
+    depth: Option<PathBuf>,
+    classes: Option<PathBuf>,
+    segments: Option<PathBuf>,
+}
+
+impl Hypersim {
+    pub(super) fn open(folder: &Path, stated: &StatedArgs) -> Result<Self> {
+        let stated = &StatedArgs {
+            labels: stated.labels.clone().or(Some("nyu40".to_owned())),
+            ..stated.clone()
+        };
+        let mut set = Self {
+            listing: Listing {
+                labels: labels(stated)?.unwrap_or_default(),
+                depth_kind: stated.depth_kind.unwrap_or(DepthKind::Euclid),
+                hfov: stated.hfov.or(Some(HFOV)),
+                ..Listing::default()
+            },
+            maps: Vec::new(),
+        };
+        if folder.join("images").is_dir() {
+            set.add(folder)?;
+        } else {
+            for scene in folders(folder)? {
+                if scene.join("images").is_dir() {
+                    set.add(&scene)?;
+                }
+            }
+        }
+        Ok(set)
+    }
+
+    fn add(&mut self, folder: &Path) -> Result<()> {
+        let real = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+        let scene = file_name(&real);
+        let images = folder.join("images");
+        for preview in folders(&images)? {
+            let name = file_name(&preview);
+            let camera = name
+                .strip_prefix("scene_")
+                .and_then(|name| name.strip_suffix("_final_preview"));
+            let Some(camera) = camera else {
+                continue;
+            };
+            let geometry = images.join(format!("scene_{camera}_geometry_hdf5"));
+            let mut depths = files(&geometry, &[".depth_meters.hdf5"])?;
+            let mut semantics = files(&geometry, &[".semantic.hdf5"])?;
+            let mut instances = files(&geometry, &[".semantic_instance.hdf5"])?;
+            for (frame, rgb) in files(&preview, &IMAGES)? {
+                self.maps.push(HypersimMaps {
+                    depth: depths.remove(&frame),
+                    classes: semantics.remove(&frame),
+                    segments: instances.remove(&frame),
+                });
+                self.listing.frames.push(ListedFrame {
+                    scene: scene.clone(),
+                    frame: format!(
+                        "{camera}-{}",
+                        frame.strip_prefix("frame.").unwrap_or(&frame)
+                    ),
+                    time: None,
+                    pose: None,
+                    intrinsics: None,
+                    room: None,
+                    rgb,
+                    index: self.maps.len() - 1,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Adapter for Hypersim {
+    fn listing(&self) -> &Listing {
+        &self.listing
+    }
+
+    fn further_files(&self) -> Vec<PathBuf> {
+        let maps = self
+            .maps
+            .iter()
+            .flat_map(|maps| [&maps.depth, &maps.classes, &maps.segments]);
+        maps.flatten().cloned().collect()
+    }
+
+    fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
+        let maps = &self.maps[frame.index];
+        let depth = depth_of(maps.depth.as_deref(), None, rgb)?;
+        let semantic = maps.classes.as_deref().map(classes).transpose()?;
+        if let (Some(path), Some(classes)) = (&maps.classes, &semantic) {
+            check_same_size(path, classes, rgb)?;
+        }
+        let segments = maps.segments.as_deref().map(segments).transpose()?;
+        if let (Some(path), Some(segments)) = (&maps.segments, &segments) {
+            check_same_size(path, segments, rgb)?;
+        }
+        Ok(FrameMaps {
+            depth,
+            semantic,
+            segments,
+            room: None,
+        })
+    }
+}

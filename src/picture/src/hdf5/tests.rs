@@ -1,0 +1,194 @@
+use std::io::Write as _;
+
+use super::*;
+
+/// A file of one array, as h5py writes it by default, with 16-bit numbers.
+struct Written {
+    file: Vec<u8>,
+}
+
+impl Written {
+    fn new() -> Self {
+        let mut file = SIGNATURE.to_vec();
+        file.extend([0, 0, 0, 0, 0, 8, 8, 0, 4, 0, 16, 0, 0, 0, 0, 0]);
+        for number in [0, u64::MAX, 0, u64::MAX, 0, 96, 0, 0, 0] {
+            file.extend(number.to_le_bytes());
+        }
+        file.resize(96, 0);
+        Self { file }
+    }
+
+    fn put(&mut self, bytes: &[u8]) -> u64 {
+        self.file.resize(self.file.len().next_multiple_of(8), 0);
+        let at = self.file.len() as u64;
+        self.file.extend(bytes);
+        at
+    }
+
+    fn header(messages: &[(u16, Vec<u8>)]) -> Vec<u8> {
+        let mut body = Vec::new();
+        for (kind, data) in messages {
+            let size = data.len().next_multiple_of(8);
+            body.extend(kind.to_le_bytes());
+            body.extend((size as u16).to_le_bytes());
+            body.extend([0; 4]);
+            body.extend(data);
+            body.resize(body.len() + size - data.len(), 0);
+        }
+        let mut header = vec![1, 0];
+        header.extend((messages.len() as u16).to_le_bytes());
+        header.extend(1_u32.to_le_bytes());
+        header.extend((body.len() as u32).to_le_bytes());
+        header.extend([0; 4]);
+        header.extend(body);
+        header
+    }
+}
+
+/// The bytes of 64-bit numbers.
+fn long(numbers: &[u64]) -> Vec<u8> {
+    numbers
+        .iter()
+        .flat_map(|number| number.to_le_bytes())
+        .collect()
+}
+
+/// A file whose array has `rows` × `columns` numbers of a type, in chunks if their size is given.
+fn file(class: u8, bits: u8, size: (u64, u64), data: &[u8], chunk: Option<(u64, u64)>) -> Vec<u8> {
+    let width = data.len() as u64 / (size.0 * size.1);
+    let mut written = Written::new();
+    // The header of the root group comes first; its addresses are filled in last.
+    let root = written.put(&Written::header(&[(17, vec![0; 16])]));
+    assert_eq!(root, 96);
+    let mut dataspace = vec![1, 2, 0, 0, 0, 0, 0, 0];
+    dataspace.extend(long(&[size.0, size.1]));
+    let mut datatype = vec![16 | class, bits, 0, 0];
+    datatype.extend((width as u32).to_le_bytes());
+    let mut messages = vec![(1, dataspace), (3, datatype)];
+    match chunk {
+        None => {
+            let at = written.put(data);
+            let mut layout = vec![3, 1];
+            layout.extend(long(&[at, data.len() as u64]));
+            messages.push((8, layout));
+        }
+        Some((height, breadth)) => {
+            let mut entries = Vec::new();
+            for top in (0..size.0).step_by(height as usize) {
+                for left in (0..size.1).step_by(breadth as usize) {
+                    let mut plain = vec![0; (height * breadth * width) as usize];
+                    for (row, column) in
+                        (0..height).flat_map(|row| (0..breadth).map(move |column| (row, column)))
+                    {
+                        if top + row < size.0 && left + column < size.1 {
+                            let from = (((top + row) * size.1 + left + column) * width) as usize;
+                            let to = ((row * breadth + column) * width) as usize;
+                            plain[to..to + width as usize]
+                                .copy_from_slice(&data[from..from + width as usize]);
+                        }
+                    }
+                    let count = plain.len() / width as usize;
+                    let shuffled: Vec<u8> = (0..width as usize)
+                        .flat_map(|byte| (0..count).map(move |number| (number, byte)))
+                        .map(|(number, byte)| plain[number * width as usize + byte])
+                        .collect();
+                    let mut deflated =
+                        flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+                    deflated.write_all(&shuffled).unwrap();
+                    let stored = deflated.finish().unwrap();
+                    let at = written.put(&stored);
+                    let mut key = (stored.len() as u32).to_le_bytes().to_vec();
+                    key.extend([0; 4]);
+                    key.extend(long(&[top, left, 0]));
+                    entries.push((key, at));
+                }
+            }
+            let mut tree = b"TREE\x01\x00".to_vec();
+            tree.extend((entries.len() as u16).to_le_bytes());
+            tree.extend(long(&[u64::MAX, u64::MAX]));
+            for (key, at) in entries {
+                tree.extend(key);
+                tree.extend(at.to_le_bytes());
+            }
+            let at = written.put(&tree);
+            let mut layout = vec![3, 2, 3];
+            layout.extend(at.to_le_bytes());
+            for side in [height, breadth, width] {
+                layout.extend((side as u32).to_le_bytes());
+            }
+            messages.push((8, layout));
+            let mut filters = vec![1, 2, 0, 0, 0, 0, 0, 0];
+            for (id, value) in [(2_u16, width as u32), (1, 4)] {
+                for field in [id, 8, 0, 1] {
+                    filters.extend(field.to_le_bytes());
+                }
+                filters.extend(b"filter\0\0");
+                filters.extend(value.to_le_bytes());
+                filters.extend([0; 4]);
+            }
+            messages.push((11, filters));
+        }
+    }
+    let array = written.put(&Written::header(&messages));
+    let names = written.put(b"\0\0\0\0\0\0\0\0dataset\0");
+    let mut heap = b"HEAP\0\0\0\0".to_vec();
+    heap.extend(long(&[16, u64::MAX, names]));
+    let heap = written.put(&heap);
+    let mut node = b"SNOD\x01\x00\x01\x00".to_vec();
+    node.extend(long(&[8, array, 0, 0, 0]));
+    let node = written.put(&node);
+    let mut tree = b"TREE\x00\x00\x01\x00".to_vec();
+    tree.extend(long(&[u64::MAX, u64::MAX, 0, node, 8]));
+    let tree = written.put(&tree);
+    written.file[120..136].copy_from_slice(&long(&[tree, heap]));
+    written.file
+}
+
+#[test]
+fn integers_and_floats_are_read_whole_and_in_chunks() {
+    let ids: Vec<i16> = (0..35).map(|number| number * 3 - 1).collect();
+    let ids_bytes: Vec<u8> = ids.iter().flat_map(|id| id.to_le_bytes()).collect();
+    let halves: Vec<u8> = (0..35_u16)
+        .flat_map(|number| (0x3C00 + number).to_le_bytes())
+        .collect();
+    for chunk in [None, Some((2, 3)), Some((5, 7)), Some((8, 8))] {
+        let array = Hdf5Array::parse(&file(0, 8, (5, 7), &ids_bytes, chunk), "dataset").unwrap();
+        let found: Vec<i128> = array.numbers().unwrap().integers().unwrap().collect();
+        assert_eq!(
+            found,
+            ids.iter().map(|id| i128::from(*id)).collect::<Vec<i128>>()
+        );
+        assert_eq!(array.numbers().unwrap().size, (5, 7));
+        let array = Hdf5Array::parse(&file(1, 0, (5, 7), &halves, chunk), "another name").unwrap();
+        let found: Vec<f64> = array.numbers().unwrap().floats().unwrap().collect();
+        assert!((found[1] - (1.0 + 1.0 / 1024.0)).abs() < 1e-9, "{found:?}");
+    }
+}
+
+#[test]
+fn broken_files_are_refused_and_nothing_breaks_down() {
+    let ids: Vec<u8> = (0..70).collect();
+    let whole = file(0, 8, (5, 7), &ids, Some((2, 3)));
+    assert!(
+        Hdf5Array::parse(b"PNG", "dataset")
+            .unwrap_err()
+            .contains("not an HDF5 file")
+    );
+    let mut latest = whole.clone();
+    latest[8] = 2;
+    assert!(
+        Hdf5Array::parse(&latest, "dataset")
+            .unwrap_err()
+            .contains("latest")
+    );
+    for length in 0..whole.len() {
+        let _ = Hdf5Array::parse(&whole[..length], "dataset");
+    }
+    for at in 8..whole.len() {
+        for bit in [1, 0x80, 0xFF] {
+            let mut damaged = whole.clone();
+            damaged[at] ^= bit;
+            let _ = Hdf5Array::parse(&damaged, "dataset").map(|array| array.numbers().is_ok());
+        }
+    }
+}
