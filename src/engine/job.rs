@@ -161,7 +161,7 @@ impl<'a, E: Experiment> Job<'a, E> {
         let manifest = manifest::of(experiment, stored)?;
         folder::make(&folder, settings)?;
         let mut store = Store::open(&folder, &manifest, folder::address_change(&settings.place))?;
-        store.add_questions(experiment.questions())?;
+        store.add_questions(experiment.questions(), manifest.inputs.as_ref())?;
         let present: HashSet<TrialKey> = if experiment.imported_records().is_empty() {
             HashSet::new()
         } else {

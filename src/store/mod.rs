@@ -5,6 +5,7 @@
 //! `thumbnails.jsonl` small copies of its images, and `fidelity.jsonl` their similarity to the clean frames. All other files are made again from these,
 //! `records.parquet` among them: the records once more, as a table for other programs ([`ColumnFile`]).
 
+mod changed_questions;
 mod column_file;
 mod folder;
 mod image_notes;
@@ -31,10 +32,11 @@ use crate::score::record::Detail;
 use crate::types::manifest::RunManifest;
 use crate::types::recorded_names::RecordedNames;
 use crate::types::{
-    ChoiceDetail, Distinct, FrameId, ImageFidelity, QuestionId, Record, RunQuestion, Thumbnail,
-    TrialKey, Via,
+    ChoiceDetail, Distinct, FrameId, ImageFidelity, InputSummary, QuestionId, Record, RunQuestion,
+    Thumbnail, TrialKey, Via,
 };
 
+use changed_questions::ChangedQuestions;
 use folder::{
     FIDELITY, QUESTIONS, RECORDS, THUMBNAILS, check_same_run, create_run, write, write_manifest,
 };
@@ -235,11 +237,16 @@ impl<D: Detail> Store<D> {
         append(&self.folder.join(FIDELITY), std::slice::from_ref(fidelity)).map(drop)
     }
 
-    /// Writes the questions of the run, new and stored ones, in the order of the data.
+    /// Writes the questions of the run, new and stored ones, in the order of the data. `inputs` is how their images were read.
     ///
     /// # Errors
-    /// If a stored question now has other words, choices, another answer, image or group.
-    pub(crate) fn add_questions(&self, mut questions: Vec<RunQuestion>) -> Result<()> {
+    /// If a stored question differs in a part that decides its replies or its score. The error names the part.
+    pub(crate) fn add_questions(
+        &self,
+        mut questions: Vec<RunQuestion>,
+        inputs: Option<&InputSummary>,
+    ) -> Result<()> {
+        let mut changed = ChangedQuestions::default();
         let ids = questions.iter().map(|question| question.id.clone());
         let places: HashMap<QuestionId, usize> = ids.zip(0..).collect();
         for stored in read_questions(&self.folder)? {
@@ -256,22 +263,27 @@ impl<D: Detail> Store<D> {
                 scene: question.scene.clone(),
                 ..stored.clone()
             };
-            if !in_scene.is_same(question) {
-                let problem = format!(
-                    "the question {} is not the one stored in this run: --data or --questions give it other words, choices, another \
-                     answer, image or group; use another --out",
-                    stored.id
-                );
-                let path = self.folder.clone();
-                return Err(Error::Run { path, problem });
+            if let Some(part) = in_scene.difference(question) {
+                changed.add(part, &stored, question);
+                continue;
             }
             // A run of blind models alone does not read the image.
             question.image = question.image.or(stored.image);
             // A group decides no reply: it can be named later, and stays.
             question.group = question.group.take().or(stored.group);
         }
+        if let Some(problem) = changed.problem(|| self.reads_alike(inputs)) {
+            let path = self.folder.clone();
+            return Err(Error::Run { path, problem });
+        }
         questions.sort_by_key(|question| question.place);
         self.write_questions(&questions)
+    }
+
+    /// Whether the images of the run were read in the same way when it was last written.
+    fn reads_alike(&self, inputs: Option<&InputSummary>) -> bool {
+        let stored = read_manifest(&self.folder, D::SCHEMA).ok().flatten();
+        stored.is_some_and(|stored| stored.inputs.as_ref() == inputs)
     }
 
     /// Replaces the stored questions of the run.

@@ -250,7 +250,9 @@ fn the_images_of_a_walk_are_made_again_and_proved() {
     let refused = run(&house, "--out run");
     assert_eq!(refused.code, Some(2), "{refused:?}");
     assert!(
-        refused.stderr.contains("is not the one stored in this run"),
+        refused
+            .stderr
+            .contains("has changed since the run began; restore the file"),
         "{}",
         refused.stderr
     );

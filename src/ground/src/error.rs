@@ -87,6 +87,26 @@ pub enum Error {
     },
 }
 
+/// The most characters of a line of a message about data; a longer one loses its middle (chosen).
+const LONGEST_LINE: usize = 600;
+
+/// The characters that a line that is too long keeps at its start, and at its end, where the remedy stands.
+const KEPT: (usize, usize) = (300, 200);
+
+/// A text whose lines are no longer than a message may be, whatever names and values data hold.
+fn bounded(text: &str) -> String {
+    let lines = text.split('\n').map(|line| {
+        let length = line.chars().count();
+        if length <= LONGEST_LINE {
+            return line.to_owned();
+        }
+        let start: String = line.chars().take(KEPT.0).collect();
+        let end: String = line.chars().skip(length - KEPT.1).collect();
+        format!("{start} … {end}")
+    });
+    lines.collect::<Vec<String>>().join("\n")
+}
+
 impl Error {
     /// An error about a flag, variable or configuration line.
     pub fn usage(origin: impl Into<String>, problem: impl Display) -> Self {
@@ -108,8 +128,8 @@ impl Error {
     /// An error in a data file; `place` is its path, with the line or frame if known.
     pub fn data(place: impl Display, problem: impl Display) -> Self {
         Self::Data {
-            place: place.to_string(),
-            problem: problem.to_string(),
+            place: bounded(&place.to_string()),
+            problem: bounded(&problem.to_string()),
         }
     }
 

@@ -51,22 +51,78 @@ pub struct RunQuestion {
     pub group: Option<StrictGroup>,
 }
 
+/// A part of a question.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum QuestionPart {
+    /// The words of the question.
+    Text,
+    /// The choices, in order.
+    Choices,
+    /// The right answers.
+    Answer,
+    /// The name of the image, or of the several that it shows.
+    Frame,
+    /// The content of the image, or how it is read.
+    Image,
+    /// The family.
+    Family,
+    /// The scene of its frame.
+    Scene,
+    /// The questions that it is scored with.
+    Group,
+}
+
+impl QuestionPart {
+    /// The part in words.
+    #[must_use]
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Text => "text",
+            Self::Choices => "choices",
+            Self::Answer => "answer",
+            Self::Frame => "image name",
+            Self::Image => "image",
+            Self::Family => "family",
+            Self::Scene => "scene",
+            Self::Group => "group",
+        }
+    }
+}
+
 impl RunQuestion {
     /// Whether two questions are the same, evidence and place aside; images and groups are compared if both are known.
     #[must_use]
     pub fn is_same(&self, other: &Self) -> bool {
-        let words = |question: &Self| Self {
-            image: None,
-            group: None,
-            evidence: Value::Null,
-            place: 0,
-            ..question.clone()
-        };
+        self.id == other.id && self.difference(other).is_none()
+    }
+
+    /// The first part in which two questions of one name differ; `None` if they are the same ([`Self::is_same`]).
+    #[must_use]
+    pub fn difference(&self, other: &Self) -> Option<QuestionPart> {
         let images = self.image.zip(other.image);
         let groups = self.group.as_ref().zip(other.group.as_ref());
-        words(self) == words(other)
-            && images.is_none_or(|(image, other)| image == other)
-            && groups.is_none_or(|(group, other)| group == other)
+        let answers = |question: &Self| (question.answer.clone(), question.extra_answers.clone());
+        let parts = [
+            (QuestionPart::Text, self.text != other.text),
+            (QuestionPart::Choices, self.choices != other.choices),
+            (QuestionPart::Answer, answers(self) != answers(other)),
+            (
+                QuestionPart::Frame,
+                (&self.frame, &self.images) != (&other.frame, &other.images),
+            ),
+            (
+                QuestionPart::Image,
+                images.is_some_and(|(image, other)| image != other),
+            ),
+            (QuestionPart::Family, self.family != other.family),
+            (QuestionPart::Scene, self.scene != other.scene),
+            (
+                QuestionPart::Group,
+                groups.is_some_and(|(group, other)| group != other),
+            ),
+        ];
+        let differing = parts.into_iter().find(|(_, differs)| *differs);
+        differing.map(|(part, _)| part)
     }
 
     /// The question without its evidence, which may be ten times as large as the rest; the name in [`bank_id`](Self::bank_id) stays.
@@ -143,5 +199,41 @@ impl RunQuestion {
             group: self.group.clone(),
             evidence: self.evidence.clone(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_part_that_differs_is_named() {
+        let question: RunQuestion = serde_json::from_value(serde_json::json!({
+            "id": "q", "frame": "f", "family": "color", "question": "?", "choices": ["x", "y"], "answer": "x",
+            "image": Digest::of(b"one"),
+        }))
+        .unwrap();
+        assert_eq!(question.difference(&question), None);
+        let change = |change: fn(&mut RunQuestion)| {
+            let mut other = question.clone();
+            change(&mut other);
+            question.difference(&other)
+        };
+        for (found, part) in [
+            (change(|q| q.text.push('!')), QuestionPart::Text),
+            (change(|q| q.choices.swap(0, 1)), QuestionPart::Choices),
+            (change(|q| q.answer = None), QuestionPart::Answer),
+            (change(|q| q.frame.0.push('2')), QuestionPart::Frame),
+            (
+                change(|q| q.image = Some(Digest::of(b"two"))),
+                QuestionPart::Image,
+            ),
+            (change(|q| q.scene.push('s')), QuestionPart::Scene),
+        ] {
+            assert_eq!(found, Some(part));
+        }
+        // A run of blind models knows no image; where the question stands, and its evidence, do not matter.
+        assert_eq!(change(|q| q.image = None), None);
+        assert_eq!(change(|q| q.place = 7), None);
     }
 }

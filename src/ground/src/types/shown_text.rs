@@ -26,6 +26,17 @@ pub fn is_hidden(c: char) -> bool {
     )
 }
 
+/// A text on one line, in at most `most` characters: a longer one ends in `…`.
+#[must_use]
+pub fn excerpt(text: &str, most: usize) -> String {
+    let line = text.chars().map(|c| if c.is_control() { ' ' } else { c });
+    if text.chars().nth(most).is_none() {
+        return line.collect();
+    }
+    let head: String = line.take(most.saturating_sub(1)).collect();
+    format!("{head}…")
+}
+
 /// A text with each hidden character as `⟨U+202E⟩`.
 #[must_use]
 pub fn shown(text: &str) -> Cow<'_, str> {
