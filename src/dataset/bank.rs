@@ -14,10 +14,12 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::family::{checked, other};
+use super::ready_made::one_line;
 use crate::error::{Error, Result};
 use crate::files::reading::text;
 use crate::types::question::CANNOT_TELL;
 use crate::types::run_question::BANK_ID;
+use crate::types::shown_text::excerpt;
 use crate::types::{Choices, Digest, Family, FrameId, Question, QuestionId};
 
 /// The built-in bank.
@@ -121,7 +123,8 @@ impl Bank {
             ] {
                 if let Some(first) = known.insert(value.clone(), number) {
                     let problem = format_args!(
-                        "line {first} has the same {name}, {value:?}; each needs its own"
+                        "line {first} has the same {name}, {:?}; each needs its own",
+                        excerpt(&value, 60)
                     );
                     return Err(Error::line(path, number, problem));
                 }
@@ -234,12 +237,16 @@ fn line_of(line: &str, way_out: WayOut, path: &Path, number: usize) -> Result<Ba
         Value::Number(id) => id.to_string(),
         other => {
             return Err(wrong(format!(
-                "the id {other} is neither text nor a number"
+                "the id {} is neither text nor a number",
+                excerpt(&other.to_string(), 60)
             )));
         }
     };
     if line.question.trim().is_empty() {
-        return Err(wrong(format!("question {id:?} is empty")));
+        return Err(wrong(format!("question {:?} is empty", excerpt(&id, 60))));
+    }
+    for choice in &mut line.choices {
+        *choice = one_line(choice);
     }
     if way_out == WayOut::CannotTell {
         line.choices.push(CANNOT_TELL.to_owned());
@@ -247,7 +254,7 @@ fn line_of(line: &str, way_out: WayOut, path: &Path, number: usize) -> Result<Ba
     let at = |e: Error| e.at(format!("{}, line {number}", path.display()));
     Ok(BankQuestion {
         id,
-        text: line.question,
+        text: line.question.trim().to_owned(),
         choices: Choices::without_truth(line.choices).map_err(at)?,
         family: checked(line.family).map_err(at)?,
     })

@@ -29,7 +29,7 @@ use super::image_source::FrameFile;
 use super::maps::{DepthFile, MapPaths};
 use super::root::LeadsTo;
 use super::view::FrameFacts;
-use super::{Dataset, ImageSource, Root, SetArgs, ready_made, stem};
+use super::{Dataset, ImageSource, Root, SetArgs, SkipBad, ready_made, stem};
 use crate::error::{Error, Result};
 use crate::files::reading::{entries, json, json_lines};
 use crate::labels;
@@ -87,15 +87,37 @@ enum SegmentSource {
     Superpixel,
 }
 
+/// What is done about files of a list that do not exist.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum MissingFiles {
+    /// The list is refused.
+    Refused,
+    /// They are named when they are read, so that `--bad skip` leaves out their frames.
+    Named,
+}
+
+impl MissingFiles {
+    pub(super) fn new(skip: Option<SkipBad>) -> Self {
+        match skip {
+            Some(_) => Self::Named,
+            None => Self::Refused,
+        }
+    }
+}
+
 impl FrameLine {
-    /// The files of the frame and the other facts of its line. Every file must exist.
+    /// The files of the frame and the other facts of its line.
     fn source(
         self,
         root: &Root,
         info: &DataSetInfo,
         names: &SceneNames,
+        missing: MissingFiles,
     ) -> Result<ImageSource, String> {
-        let existing = |file: PathBuf| root.file(root.folder(), &file);
+        let existing = |file: PathBuf| match missing {
+            MissingFiles::Refused => root.file(root.folder(), &file),
+            MissingFiles::Named => root.place(root.folder(), &file),
+        };
         let rgb = existing(self.rgb)?;
         let dark = self.dark.map(|dark| dark.photos(existing)).transpose()?;
         let dark = dark.unwrap_or_default();
@@ -138,7 +160,7 @@ impl FrameLine {
 }
 
 /// The frames of a folder and the labels of its maps, without questions.
-pub(super) fn frames(folder: &Path, further: &[PathBuf]) -> Result<Dataset> {
+pub(super) fn frames(folder: &Path, further: &[PathBuf], missing: MissingFiles) -> Result<Dataset> {
     let info = data_set_info(folder)?;
     let labels = labels(folder)?;
     let title = info.name.unwrap_or_default();
@@ -147,7 +169,7 @@ pub(super) fn frames(folder: &Path, further: &[PathBuf]) -> Result<Dataset> {
     } else {
         title.clone()
     };
-    let dataset = Dataset::new(name, sources(folder, further)?, Vec::new());
+    let dataset = Dataset::new(name, sources(folder, further, missing)?, Vec::new());
     Ok(Dataset {
         title,
         labels,
@@ -207,9 +229,10 @@ fn segment_names(root: &Root, scene: &str) -> Result<Arc<BTreeMap<u32, SegmentNa
 
 pub(super) fn open(folder: &Path, questions: Option<&Path>, set: &SetArgs) -> Result<Dataset> {
     let file = questions.map_or_else(|| folder.join(QUESTIONS), Path::to_owned);
+    let missing = MissingFiles::new(set.bad);
     if questions.is_none() && !file.exists() {
         if folder.join(FRAMES).exists() && folder.join(CLASSES).exists() {
-            return frames(folder, &set.root.data_root);
+            return frames(folder, &set.root.data_root, missing);
         }
         let is_empty = fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_none());
         let what = if is_empty {
@@ -232,10 +255,10 @@ pub(super) fn open(folder: &Path, questions: Option<&Path>, set: &SetArgs) -> Re
     let read = ready_made::about_frames(&file, set)?;
     Dataset::new(
         stem(folder),
-        sources(folder, &set.root.data_root)?,
+        sources(folder, &set.root.data_root, missing)?,
         Vec::new(),
     )
-    .with_questions_of(&file, read)
+    .with_questions_of(&file, read, set.bad)
 }
 
 /// The files of questions that are in a folder besides [`QUESTIONS`].
@@ -256,10 +279,11 @@ pub(super) fn is_folder_of_frames(place: &Path, questions: Option<&Path>) -> boo
 pub(super) fn sources(
     folder: &Path,
     further: &[PathBuf],
+    missing: MissingFiles,
 ) -> Result<BTreeMap<FrameId, ImageSource>> {
     let list = folder.join(FRAMES);
     if list.exists() {
-        frames_of_list(&Root::of(folder, further)?, &list)
+        frames_of_list(&Root::of(folder, further)?, &list, missing)
     } else {
         images(&Root::of(folder, further)?)
     }
@@ -273,7 +297,11 @@ pub(super) fn image(path: &Path) -> Result<BTreeMap<FrameId, ImageSource>> {
     Ok([(id, ImageSource::image(path.to_owned()))].into())
 }
 
-fn frames_of_list(root: &Root, list: &Path) -> Result<BTreeMap<FrameId, ImageSource>> {
+fn frames_of_list(
+    root: &Root,
+    list: &Path,
+    missing: MissingFiles,
+) -> Result<BTreeMap<FrameId, ImageSource>> {
     let (info, mut names) = (data_set_info(root.folder())?, SceneNames::new());
     let mut sources = BTreeMap::new();
     for (number, line) in json_lines::<FrameLine>(list)? {
@@ -284,7 +312,7 @@ fn frames_of_list(root: &Root, list: &Path) -> Result<BTreeMap<FrameId, ImageSou
             names.insert(line.scene.clone(), of_scene);
         }
         let source = line
-            .source(root, &info, &names)
+            .source(root, &info, &names, missing)
             .map_err(|problem| Error::line(list, number, problem))?;
         if sources.insert(id.clone(), source).is_some() {
             let problem = format_args!("a second frame {:?}", id.0);
@@ -387,7 +415,12 @@ mod tests {
     #[test]
     fn a_folder_of_folders_of_images_names_one_of_them() {
         let folder = tempfile::tempdir().unwrap();
-        let problem = || sources(folder.path(), &[]).err().unwrap().to_string();
+        let problem = || {
+            sources(folder.path(), &[], MissingFiles::Refused)
+                .err()
+                .unwrap()
+                .to_string()
+        };
         assert!(problem().ends_with("in this folder"), "{}", problem());
         fs::create_dir(folder.path().join("inner")).unwrap();
         RgbImage::new(2, 1)

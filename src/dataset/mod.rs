@@ -22,6 +22,7 @@ mod ready_made;
 mod root;
 mod scene_args;
 mod settings;
+mod unusable;
 mod view;
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
@@ -31,16 +32,19 @@ use std::sync::LazyLock;
 use crate::error::{Error, Result};
 use crate::picture::{ImageFile, ReadingRule};
 use crate::rooms::{self, Rooms};
+use crate::types::shown_text::excerpt;
 use crate::types::{Frame, FrameId, Labels, PhotoName, Question};
 
 pub(crate) use bank::{Bank, BankPlace};
 use dark_photos::DarkPhoto;
+use frames::MissingFiles;
 pub(crate) use image_source::ImageSource;
 use maps::MapPaths;
 pub(crate) use photographs::Photographs;
 pub(crate) use picture::Picture;
 pub use ready_made::SetArgs;
-use ready_made::{Form, ReadQuestions, SceneNames, Series};
+pub(crate) use ready_made::SkipBad;
+use ready_made::{Form, LEFT_OUT, ReadQuestions, RowCounts, SceneNames, Series};
 pub(crate) use root::Root;
 pub(crate) use root::RootArgs;
 pub(crate) use scene_args::SceneArgs;
@@ -95,6 +99,7 @@ pub struct Dataset {
     /// What was taken for what in a ready-made set, one fact a line; empty for other data.
     reading: Vec<String>,
     form: Form,
+    rows: RowCounts,
 }
 
 impl Dataset {
@@ -114,6 +119,7 @@ impl Dataset {
             rule: ReadingRule::default(),
             reading: Vec::new(),
             form: Form::Own,
+            rows: RowCounts::default(),
         }
     }
 
@@ -153,6 +159,7 @@ impl Dataset {
             title: set.title,
             reading: set.reading,
             form: set.form,
+            rows: set.rows,
             series: set.series,
             scenes: set.scenes,
             ..Self::new(set.name, set.sources, set.questions)
@@ -171,42 +178,55 @@ impl Dataset {
         std::mem::take(&mut self.questions)
     }
 
-    /// The same data set with the questions of a file. Each must be about one of its frames.
-    fn with_questions_of(self, file: &Path, read: ReadQuestions) -> Result<Self> {
+    /// The same data set with the questions of a file. Each must be about one of its frames; others are left out with `--bad skip`.
+    fn with_questions_of(
+        self,
+        file: &Path,
+        read: ReadQuestions,
+        skip: Option<SkipBad>,
+    ) -> Result<Self> {
         let ReadQuestions {
             questions,
             scenes,
             reading,
+            form,
+            rows,
         } = read;
         let unmatched = questions
             .iter()
             .find(|question| !self.sources.contains_key(&question.frame));
-        if let Some(unmatched) = unmatched {
-            let example = self.sources.keys().next().map_or("", |id| id.0.as_str());
-            let problem = format_args!(
-                "question {:?} is about the frame {:?}, which {} does not have (its frames are named like {example:?})",
-                unmatched.id.0, unmatched.frame.0, self.name
-            );
-            return Err(Error::data(file.display(), problem));
-        }
-        Ok(Self {
+        let example = self.sources.keys().next().map_or("", |id| id.0.as_str());
+        let problem = unmatched.map(|unmatched| {
+            format!(
+                "{}: question {:?} is about the frame {:?}, which {} does not have (its frames are named like {example:?})",
+                file.display(),
+                excerpt(&unmatched.id.0, 60),
+                excerpt(&unmatched.frame.0, 80),
+                self.name
+            )
+        });
+        let asked = Self {
             questions,
             scenes,
-            form: if reading.is_empty() {
-                Form::Own
-            } else {
-                Form::Foreign
-            },
+            form,
             reading,
+            rows,
             ..self
-        })
+        };
+        match (problem, skip) {
+            (None, _) => Ok(asked),
+            (Some(problem), Some(skip)) => asked.without_strangers(&problem, skip),
+            (Some(problem), None) => {
+                Err(Error::data(problem, "--bad skip leaves such questions out"))
+            }
+        }
     }
 
     /// The images of an image file or a folder of frames, without questions; `further` are folders that its paths may lead to. No image
     /// is read.
     pub fn of_images(path: &Path, further: &[PathBuf]) -> Result<Self> {
         let sources = if path.is_dir() {
-            frames::sources(path, further)?
+            frames::sources(path, further, MissingFiles::Refused)?
         } else {
             frames::image(path)?
         };
@@ -221,7 +241,7 @@ impl Dataset {
                 format_args!("{}: no such folder of frames", folder.display()),
             ));
         }
-        frames::frames(folder, further)
+        frames::frames(folder, further, MissingFiles::Refused)
     }
 
     /// The labels of the semantic maps at a place, whether or not it has questions.
@@ -306,7 +326,8 @@ impl Dataset {
                 let rooms = Self::of_rooms(*rooms);
                 match questions {
                     Some(file) => {
-                        rooms.with_questions_of(file, ready_made::about_frames(file, set)?)?
+                        let questions = ready_made::about_frames(file, set)?;
+                        rooms.with_questions_of(file, questions, set.bad)?
                     }
                     None => rooms,
                 }
@@ -348,7 +369,7 @@ impl Dataset {
         {
             return Err(Error::data(
                 &dataset.name,
-                format_args!("two questions have the id {:?}", twice.id.0),
+                format_args!("two questions have the id {:?}", excerpt(&twice.id.0, 60)),
             ));
         }
         Ok(dataset)
@@ -372,13 +393,11 @@ impl Dataset {
         &self.reading
     }
 
-    /// The lines of [`Self::reading`] that the user should see; none where the set has this program's own form.
-    #[must_use]
-    pub fn reading_to_say(&self) -> &[String] {
-        match self.form {
-            Form::Own => &[],
-            Form::Foreign => &self.reading,
-        }
+    /// The lines of [`Self::reading`] that the user should see: those about what is left out alone where the set has this program's own
+    /// form.
+    pub fn reading_to_say(&self) -> impl Iterator<Item = &String> {
+        let is_said = |line: &&String| self.form == Form::Foreign || line.starts_with(LEFT_OUT);
+        self.reading.iter().filter(is_said)
     }
 
     /// The questions, in the order of their file.

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use super::frames::MissingFiles;
 use super::image_names::{ImageNames, is_image};
 use super::root::{LeadsTo, Root};
 use super::{DataPlace, Dataset, ImageSource, SetArgs, frames, stem};
@@ -33,7 +34,7 @@ impl Photographs {
         let dataset = match place {
             DataPlace::Rooms(rooms) => Dataset::of_rooms(*rooms),
             DataPlace::Path(path) if path.is_dir() => {
-                return Self::in_folder(path, &set.root.data_root);
+                return Self::in_folder(path, set);
             }
             DataPlace::Path(path) if is_image(path) => Dataset::of_images(path, &[])?,
             DataPlace::Path(_) | DataPlace::Files(_) | DataPlace::Known { .. } => {
@@ -52,7 +53,8 @@ impl Photographs {
         Ok(Self { dataset, notes })
     }
 
-    fn in_folder(folder: &Path, further: &[PathBuf]) -> Result<Self> {
+    fn in_folder(folder: &Path, set: &SetArgs) -> Result<Self> {
+        let further = &set.root.data_root;
         let mut notes = Vec::new();
         let own = folder.join(frames::QUESTIONS);
         let own = own.exists().then_some(own).into_iter();
@@ -63,7 +65,7 @@ impl Photographs {
             ));
         }
         if folder.join(frames::FRAMES).exists() {
-            let dataset = Dataset::of_frames(folder, further)?;
+            let dataset = frames::frames(folder, further, MissingFiles::new(set.bad))?;
             return Ok(Self { dataset, notes });
         }
         let root = Root::of(folder, further)?;

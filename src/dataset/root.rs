@@ -112,6 +112,18 @@ impl Root {
     /// If the name is no path of this machine, leads out of the folders, or no file is there. Whether a file exists outside them is
     /// not told.
     pub(crate) fn file(&self, base: &Path, spelled: &Path) -> Result<PathBuf, String> {
+        let path = self.place(base, spelled)?;
+        if !path.is_file() {
+            return Err(format!("no such file: {}", path.display()));
+        }
+        Ok(path)
+    }
+
+    /// The path of a file that data name relative to a folder, whether or not it exists.
+    ///
+    /// # Errors
+    /// If the name is no path of this machine, or leads out of the folders.
+    pub(crate) fn place(&self, base: &Path, spelled: &Path) -> Result<PathBuf, String> {
         check_name(spelled)?;
         let path = base.join(spelled);
         let written = without_dots(&absolute(&path));
@@ -119,16 +131,10 @@ impl Root {
         if !self.written.iter().chain(&self.real).any(is_below) {
             return Err(self.outside(spelled, &written));
         }
-        let Ok(real) = path.canonicalize() else {
-            return Err(format!("no such file: {}", path.display()));
-        };
-        if !self.holds(&real) {
-            return Err(self.outside(spelled, &real));
+        match path.canonicalize() {
+            Ok(real) if !self.holds(&real) => Err(self.outside(spelled, &real)),
+            _ => Ok(path),
         }
-        if !real.is_file() {
-            return Err(format!("no such file: {}", path.display()));
-        }
-        Ok(path)
     }
 
     /// Where a path that was found in the folder leads, links followed.

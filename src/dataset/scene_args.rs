@@ -116,7 +116,7 @@ impl SceneArgs {
                     let problem = "pairs of photographs have no questions; --questions FILE names some about the files in normal light";
                     return Err(Error::usage("--pairs", problem));
                 };
-                dataset.with_questions_of(file, ready_made::about_frames(file, set)?)
+                dataset.with_questions_of(file, ready_made::about_frames(file, set)?, set.bad)
             }
             Some(dataset) => {
                 let why = "the folders make the questions of --label-folders";

@@ -1,11 +1,14 @@
 //! The questions of a data set that are asked: [`select`], [`QuestionBank`]; and the rules that make them: [`rules`].
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroUsize;
 use std::path::Path;
 
+use rayon::prelude::*;
+
 use crate::dataset::{
     Bank, BankArgs, BankPlace, DataPlace, Dataset, Photographs, SceneArgs, SelectionArgs, SetArgs,
+    SkipBad,
 };
 use crate::error::{Error, Result};
 use crate::files::reading;
@@ -14,7 +17,7 @@ use crate::images::questions_by_rule::by_rule;
 use crate::picture::ReadingRule;
 use crate::questions::rules::Rules;
 use crate::report::words::counted;
-use crate::types::{Digest, Family, Question};
+use crate::types::{Digest, Family, FrameId, Question};
 
 /// The rulebook in a file; without one, the one built in.
 ///
@@ -35,12 +38,38 @@ pub(crate) fn open_data(
     rule: ReadingRule,
     progress: &Progress,
 ) -> Result<Dataset> {
-    let dataset = open_unasked(data, selection, rule)?;
+    let dataset = usable(open_unasked(data, selection, rule)?, data.2.bad, progress)?;
     if !dataset.questions().is_empty() {
         return Ok(dataset);
     }
     let questions = by_rule(&dataset, rules, progress)?;
     Ok(dataset.with_questions(questions))
+}
+
+/// The same data without images that cannot be read, and without the questions that show one, if `--bad` allows it. Each image is
+/// decoded; with its maps if questions are to be made of them.
+///
+/// # Errors
+/// If more is broken than `--bad` allows.
+fn usable(dataset: Dataset, skip: Option<SkipBad>, progress: &Progress) -> Result<Dataset> {
+    let Some(skip) = skip else {
+        return Ok(dataset);
+    };
+    let with_maps = dataset.questions().is_empty() && dataset.labels().is_some();
+    let shown = dataset.shown_images();
+    let bar = progress.bar("decoding images", shown.len());
+    let unusable = shown.into_par_iter().filter_map(|frame| {
+        let read = if with_maps {
+            dataset.frame(frame).map(drop)
+        } else {
+            dataset.decode_all(frame)
+        };
+        bar.inc();
+        Some((frame.clone(), read.err()?.to_string()))
+    });
+    let unusable: BTreeMap<FrameId, String> = unusable.collect();
+    drop(bar);
+    dataset.without(&unusable, skip)
 }
 
 /// The opened data, with the questions that they have themselves. No image is read.
@@ -120,8 +149,9 @@ impl QuestionBank {
         for note in &found.notes {
             progress.note(note);
         }
-        let questions = self.bank.about(found.dataset.frames(), self.per_image);
-        let images = found.dataset.frames().count();
+        let dataset = usable(found.dataset.with_rule(rule), set.bad, progress)?;
+        let questions = self.bank.about(dataset.frames(), self.per_image);
+        let images = dataset.frames().count();
         progress.note(&format!(
             "--ask {}: {} about {} without answers ({} each); each model is compared with its own answers at L0, and is asked without images, too",
             self.place,
@@ -135,7 +165,7 @@ impl QuestionBank {
                 self.place
             );
         }
-        Ok(found.dataset.with_rule(rule).with_questions(questions))
+        Ok(dataset.with_questions(questions))
     }
 }
 

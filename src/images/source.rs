@@ -8,6 +8,7 @@ use crate::dataset::{Dataset, Picture};
 use crate::error::{Error, Result};
 use crate::images::photograph::{SourcePhotograph, matched};
 use crate::images::progress::Progress;
+use crate::types::shown_text::excerpt;
 use crate::types::{
     Condition, Degradation, Digest, FrameId, InputNote, InputSummary, PairDark, PhotoName, Question,
 };
@@ -249,8 +250,13 @@ pub(crate) fn inspect_all(
     let first = first_asked(questions);
     let bar = progress.bar("reading images", first.len());
     let sources = first.into_par_iter().map(|question| {
-        let source = Source::of_questions(dataset, &question.frame)
-            .map_err(|e| Error::data(format_args!("question {:?}", question.id.0), e))?;
+        let source = Source::of_questions(dataset, &question.frame).map_err(|e| {
+            let problem = format_args!("{e}; --bad skip leaves such questions out");
+            Error::data(
+                format_args!("question {:?}", excerpt(&question.id.0, 60)),
+                problem,
+            )
+        })?;
         bar.inc();
         Ok(source)
     });

@@ -465,7 +465,169 @@ fn drawn_questions_break_groups_and_the_report_says_so() {
     ));
     assert_eq!(called.code, Some(2), "{called:?}");
     assert!(
-        called.stderr.contains("image or group; use another --out"),
+        called
+            .stderr
+            .contains("has another group than in this run; so have 7 more questions"),
+        "{}",
+        called.stderr
+    );
+}
+
+/// Twenty-four questions about an image each, of which the files of some are replaced by these bytes.
+fn with_unusable(unusable: &[(usize, Option<Vec<u8>>)]) -> Bench {
+    let bench = Bench::new();
+    let mut lines = String::new();
+    fs::create_dir(bench.path("img")).unwrap();
+    for number in 0..24 {
+        let name = format!("img/{number}.png");
+        let picture = image::RgbImage::from_pixel(32, 24, image::Rgb([number as u8 * 9, 60, 30]));
+        picture.save(bench.path(&name)).unwrap();
+        let line = json!({"id": number.to_string(), "image": name, "question": "Which?", "choices": ["x", "y"], "answer": "x"});
+        lines += &format!("{line}\n");
+    }
+    for (number, bytes) in unusable {
+        let path = bench.path(&format!("img/{number}.png"));
+        match bytes {
+            Some(bytes) => fs::write(path, bytes).unwrap(),
+            None => fs::remove_file(path).unwrap(),
+        }
+    }
+    bench.file("set.jsonl", lines);
+    bench
+}
+
+/// A PNG of transparent pixels, which is not shown.
+fn transparent() -> Vec<u8> {
+    let mut file = std::io::Cursor::new(Vec::new());
+    let picture = image::RgbaImage::from_pixel(32, 24, image::Rgba([1, 2, 3, 90]));
+    picture
+        .write_to(&mut file, image::ImageFormat::Png)
+        .unwrap();
+    file.into_inner()
+}
+
+#[test]
+fn an_image_that_cannot_be_used_is_left_out_and_counted() {
+    for bytes in [
+        None,
+        Some(Vec::new()),
+        Some(b"<html>404</html>".to_vec()),
+        Some(b"GIF89a\x01\0\x01\0\0\0\0;".to_vec()),
+        Some(transparent()),
+    ] {
+        let bench = with_unusable(&[(7, bytes)]);
+        let run = |line: &str| {
+            bench.call(&words(&format!(
+                "--data set.jsonl --model random --levels L0 {line}"
+            )))
+        };
+        let called = run("--out run");
+        assert_eq!(called.code, Some(2), "{called:?}");
+        assert!(
+            called.stderr.contains("--bad skip") && called.stderr.contains("7"),
+            "{}",
+            called.stderr
+        );
+        let called = run("--out run --bad skip");
+        assert_eq!(called.code, Some(0), "{called:?}");
+        assert!(
+            called.stderr.contains("left out: 1 of 24"),
+            "{}",
+            called.stderr
+        );
+        assert!(called.stderr.contains("7.png"), "{}", called.stderr);
+        let records = fs::read_to_string(bench.path("run/records.jsonl")).unwrap();
+        assert_eq!(records.lines().count(), 23);
+        let manifest = fs::read_to_string(bench.path("run/manifest.json")).unwrap();
+        assert!(manifest.contains("left out: 1 of 24"), "{manifest}");
+    }
+}
+
+#[test]
+fn the_limit_on_unusable_images_is_shared_with_missing_ones_and_can_be_raised() {
+    let bench = with_unusable(&[(3, None), (7, Some(transparent()))]);
+    let run = |line: &str| {
+        bench.call(&words(&format!(
+            "--data set.jsonl --model random --levels L0 {line}"
+        )))
+    };
+    let called = run("--bad skip --out run");
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert!(
+        called.stderr.contains("2 of 24 questions are broken"),
+        "{}",
+        called.stderr
+    );
+    assert!(called.stderr.contains("--bad skip:9%"), "{}", called.stderr);
+    let called = run("--bad skip:9% --out run");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    let records = fs::read_to_string(bench.path("run/records.jsonl")).unwrap();
+    assert_eq!(records.lines().count(), 22);
+    let checked = bench.call(&words(
+        "check set.jsonl --model random --levels L0 --bad skip:9%",
+    ));
+    assert_eq!(checked.code, Some(0), "{checked:?}");
+}
+
+#[test]
+fn unusable_photographs_are_left_out_of_a_bank() {
+    let bench = with_unusable(&[(7, Some(b"no image".to_vec()))]);
+    let bank = json!({"id": "a", "question": "Which?", "choices": ["x \n", "y"]});
+    bench.file("bank.jsonl", bank.to_string());
+    let run = |line: &str| {
+        bench.call(&words(&format!(
+            "--data img --ask bank.jsonl --model random --levels L0,L3 {line}"
+        )))
+    };
+    assert_eq!(run("--out run").code, Some(2));
+    let called = run("--out run --bad skip");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert!(
+        called.stderr.contains("left out: 1 of 24 images"),
+        "{}",
+        called.stderr
+    );
+}
+
+#[test]
+fn a_changed_image_is_named_when_a_run_goes_on() {
+    let bench = with_unusable(&[]);
+    let run = || {
+        bench.call(&words(
+            "--data set.jsonl --model random --levels L0 --out run",
+        ))
+    };
+    assert_eq!(run().code, Some(0));
+    for number in [4, 5] {
+        fs::copy(
+            bench.path("img/1.png"),
+            bench.path(&format!("img/{number}.png")),
+        )
+        .unwrap();
+    }
+    let called = run();
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert!(
+        called.stderr.contains("the image \"img/4.png\" of question \"4\" has changed since the run began; so has 1 more question; restore the file, or use another --out"),
+        "{}",
+        called.stderr
+    );
+    // Another answer has a message of its own.
+    let text = fs::read_to_string(bench.path("set.jsonl")).unwrap();
+    let bench = with_unusable(&[]);
+    let run = || {
+        bench.call(&words(
+            "--data set.jsonl --model random --levels L0 --out run",
+        ))
+    };
+    assert_eq!(run().code, Some(0));
+    bench.file(
+        "set.jsonl",
+        text.replacen("\"answer\":\"x\"", "\"answer\":\"y\"", 1),
+    );
+    let called = run();
+    assert!(
+        called.stderr.contains("question \"0\" has another answer than in this run: \"y\", before \"x\"; restore the questions"),
         "{}",
         called.stderr
     );

@@ -3,13 +3,13 @@
 //! A gap in a column, or a broken answer, does not make it give way to another: columns are compared in the rows that both answer.
 
 use super::answers::{Reading, digit, yes_or_no};
-use super::cell::shortened;
 use super::items::{AnswerCell, Item};
 use super::map::flag;
 use super::names::Role;
 use super::offered::Offered;
 use super::roles::{Column, Roles};
 use super::row::Table;
+use crate::types::shown_text::excerpt;
 
 /// What a column says in each row; `None` where it says nothing that can be read.
 type Said = Vec<Option<usize>>;
@@ -68,6 +68,32 @@ pub(super) fn of_options<'a>(
         Some(Candidate { column, ways })
     };
     chosen(table, roles, items, candidate)
+}
+
+/// The flag for a column of no known name whose cells are an option in every row, in the first way that fits; `None` if there is none.
+pub(super) fn unnamed(table: &Table, roles: &Roles, items: &[Item]) -> Option<String> {
+    let none = Offered::default();
+    let columns = table.columns.iter().enumerate();
+    let free = columns.filter(|(at, _)| !roles.holds(*at));
+    let found = free.flat_map(|(at, name)| {
+        let column = Column {
+            at,
+            field: None,
+            name: name.clone(),
+        };
+        Reading::ALL
+            .into_iter()
+            .map(move |reading| (column.clone(), reading))
+    });
+    let mut fitting = found.filter(|(column, reading)| {
+        items.iter().all(|item| {
+            let options = item.options.as_deref().unwrap_or(&none);
+            answer(table, item, column)
+                .is_some_and(|answer| reading.truth(&answer, options).is_some())
+        })
+    });
+    let (column, reading) = fitting.next()?;
+    Some(flag(Role::Answer, &column.name, Some(reading)))
 }
 
 /// The column whose answers are yes or no. A column of other words beside it differs from it.
@@ -151,7 +177,7 @@ fn difference(one: &Candidate<'_>, other: &Candidate<'_>) -> Option<usize> {
 }
 
 fn differ(table: &Table, item: &Item, one: &Column, other: &Column) -> String {
-    let says = |column: &Column| shortened(&answer(table, item, column).unwrap_or_default(), 60);
+    let says = |column: &Column| excerpt(&answer(table, item, column).unwrap_or_default(), 60);
     format!(
         "{}: the answers of {:?} and {:?} differ, {:?} and {:?}; {} or {} says which is meant",
         table.place(item.row),

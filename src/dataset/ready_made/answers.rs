@@ -1,6 +1,6 @@
 //! What the answers of a set mean: [`Reading`], and the one of all rows: [`one_reading`].
 
-use super::offered::{Offered, Origin};
+use super::offered::{Offered, Origin, one_line};
 use crate::types::Choices;
 use crate::types::question::letter;
 
@@ -74,10 +74,10 @@ impl Reading {
     }
 }
 
-/// A text without letter case, space around it and a full stop at its end.
+/// A text on one line, without letter case, space around it and a full stop at its end.
 pub(super) fn folded(text: &str) -> String {
-    let text = text.trim().trim_end_matches('.').trim_end();
-    text.to_lowercase()
+    let text = one_line(text);
+    text.trim_end_matches('.').trim_end().to_lowercase()
 }
 
 /// The whole number in a text, as `3` or `3.0`.
@@ -165,7 +165,7 @@ mod tests {
     use super::*;
 
     fn options(texts: &[&str]) -> Offered {
-        Offered::listed(texts.iter().map(ToString::to_string).collect())
+        Offered::listed(&texts.iter().map(ToString::to_string).collect::<Vec<_>>())
     }
 
     #[test]

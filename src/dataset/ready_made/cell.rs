@@ -10,6 +10,7 @@ use serde_json::Value;
 use super::text_list::list;
 use crate::picture::image_file::format::FileFormat;
 use crate::types::Digest;
+use crate::types::shown_text::excerpt;
 
 /// The maximum length of a text that may be a path or the id of a row. A longer one of the base64 alphabet is a file (the rule of
 /// VLMEvalKit, `vlmeval/dataset/image_base.py`).
@@ -129,6 +130,17 @@ impl Cell {
         }
     }
 
+    /// The list or struct in a text of JSON; `None` if it holds none.
+    pub(super) fn parsed(&self) -> Option<Self> {
+        let Self::Text(text) = self else {
+            return None;
+        };
+        if !text.trim_start().starts_with(['[', '{']) {
+            return None;
+        }
+        serde_json::from_str::<Value>(text).ok().map(Self::from)
+    }
+
     /// The field of a struct, by its name; the item of a list, by its number from 0.
     pub(super) fn field(&self, name: &str) -> Option<&Self> {
         if let Self::List(cells) = self {
@@ -176,7 +188,7 @@ impl Cell {
                 format!("{{{}}}", fields.join(", "))
             }
         };
-        shortened(&whole, most)
+        excerpt(&whole, most)
     }
 }
 
@@ -226,19 +238,6 @@ impl From<Value> for Cell {
 /// The text of a number without a fraction of zero: `3.0` is `3`.
 fn whole(number: &str) -> String {
     number.strip_suffix(".0").unwrap_or(number).to_owned()
-}
-
-/// A text in at most about `most` characters, on one line.
-pub(super) fn shortened(text: &str, most: usize) -> String {
-    let line: String = text
-        .chars()
-        .map(|c| if c.is_control() { ' ' } else { c })
-        .collect();
-    if line.chars().count() <= most {
-        return line;
-    }
-    let head: String = line.chars().take(most.saturating_sub(1)).collect();
-    format!("{head}…")
 }
 
 /// The file in a text, if the text is base64 and longer than a name. The head of a `data:` address is cut.

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::cell::{Cell, FileFacts, shortened};
+use super::cell::{Cell, FileFacts, LONGEST_NAME};
 use super::container::{Archive, SetFile};
 use super::images::{CellPart, EmbeddedImage, ImagesAre, RowImage, images};
 use super::map::flag;
@@ -17,6 +17,7 @@ use super::truths::Answered;
 use crate::dataset::Root;
 use crate::dataset::image_source::ImageSource;
 use crate::error::{Error, Result};
+use crate::types::shown_text::excerpt;
 use crate::types::{Digest, FrameId};
 
 /// The image of a question, found.
@@ -108,7 +109,7 @@ impl<'a> Frames<'a> {
         let named = unique.or_else(|| self.roles.ids.iter().find(differs));
         let mut name_rows = false;
         for row in &self.table.rows {
-            let found = images(self.table, row, self.roles);
+            let found = images(row, self.roles);
             let is_name = |image: &RowImage| matches!(image, RowImage::RowOrFile(_));
             name_rows |= found.iter().any(is_name);
             if found.len() > 1 && several != Some(SeveralImages::Send) {
@@ -142,7 +143,7 @@ impl<'a> Frames<'a> {
     /// Finds the rows that others may name by their ids, in this column.
     fn find_holders(&mut self, column: &Column) {
         for (at, row) in self.table.rows.iter().enumerate() {
-            let found = images(self.table, row, self.roles);
+            let found = images(row, self.roles);
             if let ([RowImage::Embedded { .. }], Some(id)) = (&*found, column.text(row)) {
                 let key = (row.file, id.trim().to_owned());
                 self.holders.entry(key).or_insert(at);
@@ -165,7 +166,7 @@ impl<'a> Frames<'a> {
 
     /// The images of a row, in order.
     pub(super) fn of_row(&self, row: usize) -> impl Iterator<Item = Result<Found>> {
-        let images = self.kind.of(self.table, &self.table.rows[row], self.roles);
+        let images = self.kind.of(&self.table.rows[row], self.roles);
         images.into_iter().map(move |image| self.find(row, image))
     }
 
@@ -195,15 +196,14 @@ impl<'a> Frames<'a> {
                 steps,
                 facts,
             }),
-            RowImage::File(text) if is_long(&text) => Err(at(long_text(&text))),
             RowImage::File(path) => self
                 .file(row, &path)
-                .map_err(|problem| at(self.with_other(row, problem))),
+                .map_err(|problem| at(self.with_other(row, no_path(&path, problem)))),
             RowImage::Frame(name) => Ok(Found::Frame(FrameId(name))),
             RowImage::RowOrFile(text) => match self.holder(row, &text) {
                 Some(found) => Ok(found),
                 None => self.file(row, &text).map_err(|problem| {
-                    let problem = self.with_other(row, problem);
+                    let problem = self.with_other(row, no_path(&text, problem));
                     let is_number = text.bytes().all(|byte| byte.is_ascii_digit());
                     at(if is_number {
                         format!("{problem}; and no row with an image has the id {text}")
@@ -238,7 +238,7 @@ impl<'a> Frames<'a> {
     fn holder(&self, row: usize, id: &str) -> Option<Found> {
         let file = self.table.rows[row].file;
         let holder = *self.holders.get(&(file, id.trim().to_owned()))?;
-        let own = images(self.table, &self.table.rows[holder], self.roles);
+        let own = images(&self.table.rows[holder], self.roles);
         let [
             RowImage::Embedded {
                 column,
@@ -346,24 +346,25 @@ impl<'a> Frames<'a> {
     }
 }
 
-/// Whether a text is longer than any path; chosen.
-fn is_long(text: &str) -> bool {
-    text.len() > 400
-}
+/// The length from which on a text is hardly a path; chosen.
+const LONG: usize = 200;
 
-/// The problem of a text that is neither an image nor a path, without the text.
-fn long_text(text: &str) -> String {
+/// The problem of a text that leads to no image: that of its path, or what it is if it is hardly a path. Long texts are not repeated.
+fn no_path(text: &str, problem: String) -> String {
     let is_base64 = |c: char| c.is_ascii_alphanumeric() || "+/=-_".contains(c) || c.is_whitespace();
     let length = text.chars().count();
-    let start = shortened(text, 24);
-    if text.starts_with("data:") || text.chars().all(is_base64) {
+    let start = excerpt(text, 24);
+    let is_long = length > LONGEST_NAME && text.chars().all(is_base64);
+    if text.starts_with("data:") || is_long {
         format!(
             "its image is base64 that is cut or damaged ({length} characters, {start:?}); --bad skip leaves such rows out"
         )
-    } else {
+    } else if length > LONG {
         format!(
-            "its image is a text of {length} characters, {start:?}, which is neither base64 nor a path; --bad skip leaves such rows out"
+            "its image is a text of {length} characters, {start:?}, which is neither base64 nor a path of a file; --bad skip leaves such rows out"
         )
+    } else {
+        problem
     }
 }
 

@@ -5,6 +5,7 @@ use std::sync::LazyLock;
 use regex::{Captures, Regex};
 
 use crate::types::image_mark::mark;
+use crate::types::shown_text::excerpt;
 
 /// A mark with the space behind it: `<image>`, `<image 2>` or `<image2>`.
 static MARK: LazyLock<Option<Regex>> =
@@ -55,7 +56,7 @@ impl ImageMarks {
             } else if number == 0 || number > self.images {
                 problem = Some(format!(
                     "{:?} is not an image of the row, which shows {}",
-                    found[0].trim(),
+                    excerpt(found[0].trim(), 30),
                     self.images
                 ));
             }

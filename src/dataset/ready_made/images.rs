@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use super::cell::{Cell, FileFacts, LONGEST_NAME, decoded};
 use super::container::SetFile;
-use super::roles::{Images, Roles, braces};
-use super::row::{Row, RowPlace, Table};
+use super::roles::{Images, Roles};
+use super::row::{Row, RowPlace};
 use super::step::Step;
 use super::text_list::list;
 use crate::error::{Error, Result};
@@ -49,24 +49,29 @@ fn named_frames(row: &Row, roles: &Roles) -> Vec<RowImage> {
 
 impl ImagesAre {
     /// The images of a row, in order.
-    pub(super) fn of(self, table: &Table, row: &Row, roles: &Roles) -> Vec<RowImage> {
+    pub(super) fn of(self, row: &Row, roles: &Roles) -> Vec<RowImage> {
         match self {
-            Self::Files => images(table, row, roles),
+            Self::Files => images(row, roles),
             Self::Frames => named_frames(row, roles),
         }
     }
 }
 
-/// The images of a row, in order.
-pub(super) fn images(table: &Table, row: &Row, roles: &Roles) -> Vec<RowImage> {
+/// The images of a row, in order. Of columns that hold the same image, the first with the image itself goes before paths.
+pub(super) fn images(row: &Row, roles: &Roles) -> Vec<RowImage> {
     let mut found = Vec::new();
     match &roles.images {
         Images::First(columns) => {
             for column in columns {
                 let steps = field_steps(column.field.as_deref());
-                collect(column.of(row), column.at, &steps, &mut found);
-                if !found.is_empty() {
-                    break;
+                let mut own = Vec::new();
+                collect(column.of(row), column.at, &steps, &mut own);
+                let is_embedded = |image: &RowImage| matches!(image, RowImage::Embedded { .. });
+                if own.iter().any(is_embedded) {
+                    return own;
+                }
+                if found.is_empty() {
+                    found = own;
                 }
             }
         }
@@ -77,7 +82,7 @@ pub(super) fn images(table: &Table, row: &Row, roles: &Roles) -> Vec<RowImage> {
             }
         }
         Images::Template(template) => {
-            found.extend(filled(table, row, template).map(RowImage::File));
+            found.extend(template.filled(row).map(RowImage::File));
         }
     }
     found
@@ -86,17 +91,6 @@ pub(super) fn images(table: &Table, row: &Row, roles: &Roles) -> Vec<RowImage> {
 fn field_steps(field: Option<&str>) -> Vec<Step> {
     let fields = field.into_iter().flat_map(|field| field.split('.'));
     fields.map(|field| Step::Field(field.to_owned())).collect()
-}
-
-/// The template with the cells of a row; `None` if one is absent.
-fn filled(table: &Table, row: &Row, template: &str) -> Option<String> {
-    let mut text = template.to_owned();
-    for name in braces(template).ok()? {
-        let cell = row.cell(table.find(name)?);
-        let value = (!cell.is_absent()).then(|| cell.text()).flatten()?;
-        text = text.replace(&format!("{{{name}}}"), value.trim());
-    }
-    Some(text)
 }
 
 /// Adds the images of a cell.

@@ -8,9 +8,11 @@ use super::map::flag;
 use super::names::{Role, without_endings};
 use super::offered::{AllOffered, Offered};
 use super::options::Options;
-use super::roles::{InQuestion, Roles};
+use super::roles::{Asked, Column, InQuestion, Roles};
 use super::row::{Row, Table};
 use super::settings::{SetArgs, SeveralImages};
+use super::turns::Turns;
+use crate::types::shown_text::excerpt;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -76,7 +78,7 @@ pub(super) fn items(
     let mut endings = Endings((!args.keep_instructions).then_some(cut));
     let (mut items, mut offered) = (Vec::new(), AllOffered::default());
     for (at, row) in table.rows.iter().enumerate() {
-        let count = kind.of(table, row, roles).len();
+        let count = kind.of(row, roles).len();
         let why = match (count, args.multi_image) {
             (0, _) => Some(Why::NoImage),
             (1, _) | (_, Some(SeveralImages::Send)) => None,
@@ -146,7 +148,7 @@ fn parts(
             let text = endings.cut(&text);
             match in_question(&text) {
                 Lettered::Found { question, options } => {
-                    let options = Offered::lettered(options);
+                    let options = Offered::lettered(&options);
                     (endings.cut(&question), Some(text), Some(options))
                 }
                 Lettered::None => (text, None, None),
@@ -186,9 +188,9 @@ fn parts(
 
 /// The hint of a row, empty if it has none, and its question.
 fn words(row: &Row, roles: &Roles, marks: &mut ImageMarks) -> Result<[String; 2], String> {
-    let Some(text) = roles.question.text(row) else {
-        let column = &roles.question.name;
-        return Err(format!("the question is empty (column {column:?})"));
+    let text = match &roles.question {
+        Asked::InImage => Asked::IN_IMAGE.to_owned(),
+        Asked::Column(column) => column.text(row).ok_or_else(|| no_text(column, row))?,
     };
     if text.len() > LONGEST_TEXT {
         let longest = LONGEST_TEXT >> 10;
@@ -197,6 +199,25 @@ fn words(row: &Row, roles: &Roles, marks: &mut ImageMarks) -> Result<[String; 2]
     let hint = roles.hint.as_ref().and_then(|hint| hint.text(row));
     let hint = marks.read(hint.as_deref().unwrap_or_default().trim())?;
     Ok([hint, marks.read(&text)?])
+}
+
+/// The problem of a cell of a question that holds no text.
+fn no_text(column: &Column, row: &Row) -> String {
+    let (cell, name) = (column.of(row), excerpt(&column.name, 60));
+    if cell.is_absent() {
+        return format!("the question is empty (column {name:?})");
+    }
+    let inner = Turns::of(&column.name, cell).map_or_else(String::new, |turns| {
+        format!(
+            "; {} reads its text",
+            flag(Role::Question, &turns.question, None)
+        )
+    });
+    format!(
+        "the column {name:?} of the question holds a {}, not a text: {}{inner}",
+        cell.kind(),
+        cell.shown(60)
+    )
 }
 
 /// The answer in a column of a row, as text; a list of one is that one.
@@ -208,7 +229,7 @@ pub(super) enum AnswerCell {
 }
 
 impl AnswerCell {
-    pub(super) fn of(row: &Row, column: &super::roles::Column) -> Self {
+    pub(super) fn of(row: &Row, column: &Column) -> Self {
         use super::cell::Cell;
         let cell = column.of(row);
         let items = match cell {

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::settings::{LeaveOut, SetArgs, SeveralImages};
+use super::settings::{SetArgs, SeveralImages};
+use super::skip_bad::SkipBad;
 
 /// Why a row cannot be asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -41,15 +42,14 @@ impl Why {
     }
 
     fn is_left_out(self, args: &SetArgs) -> bool {
-        let flag = match self {
-            Self::SeveralImages => return args.multi_image == Some(SeveralImages::Skip),
-            Self::NoImage => args.no_image,
-            Self::Open => args.open,
-            Self::SeveralTruths => args.several,
-            Self::Bad => args.bad,
-            Self::Rotation => Some(LeaveOut::Skip),
-        };
-        flag.is_some()
+        match self {
+            Self::SeveralImages => args.multi_image == Some(SeveralImages::Skip),
+            Self::NoImage => args.no_image.is_some(),
+            Self::Open => args.open.is_some(),
+            Self::SeveralTruths => args.several.is_some(),
+            Self::Bad => args.bad.is_some(),
+            Self::Rotation => true,
+        }
     }
 }
 
@@ -58,9 +58,6 @@ impl Why {
 pub(super) struct LeftOut {
     counts: BTreeMap<Why, (usize, String)>,
 }
-
-/// The largest share of bad rows that can be left out.
-const MOST_BAD: f64 = 0.05;
 
 impl LeftOut {
     /// Adds a row with its problem.
@@ -72,6 +69,12 @@ impl LeftOut {
     /// How many rows are left out, by the reason.
     pub(super) fn counts(&self) -> impl Iterator<Item = (Why, usize)> {
         self.counts.iter().map(|(why, (count, _))| (*why, *count))
+    }
+
+    /// The number of broken rows, and the problem of the first; `None` if there are none.
+    pub(super) fn bad(&self) -> Option<(usize, &str)> {
+        let (count, first) = self.counts.get(&Why::Bad)?;
+        Some((*count, first))
     }
 
     /// Checks that the user allows all of it.
@@ -89,21 +92,23 @@ impl LeftOut {
                 Why::SeveralTruths => format!("{head} have several true options, e.g. {first}"),
                 Why::Bad | Why::Rotation => format!("{head} are broken; the first: {first}"),
             };
-            let is_too_bad = why == Why::Bad && *count as f64 > MOST_BAD * rows as f64;
-            if is_too_bad {
-                problems.push(format!(
-                    "{head}; --bad skip leaves out at most 5 %: repair the file"
-                ));
+            let skip = args.bad.filter(|_| why == Why::Bad);
+            if let Some(Err(problem)) = skip.map(|skip| skip.check(*count, rows, "rows", first)) {
+                problems.push(problem);
             } else if !why.is_left_out(args) {
                 let verb = match count {
                     1 => "leaves it out",
                     _ => "leaves them out",
                 };
+                let flag = match why {
+                    Why::Bad => format!("--bad {}", SkipBad::enough(*count, rows)),
+                    why => why.flag().to_owned(),
+                };
                 let other = match why {
                     Why::SeveralImages => ", --multi-image send shows all of them in one request",
                     _ => "",
                 };
-                problems.push(format!("{head}; {} {verb}{other}", why.flag()));
+                problems.push(format!("{head}; {flag} {verb}{other}"));
             }
         }
         if problems.is_empty() {
@@ -115,6 +120,7 @@ impl LeftOut {
 
 #[cfg(test)]
 mod tests {
+    use super::super::settings::LeaveOut;
     use super::*;
 
     #[test]
@@ -138,7 +144,7 @@ mod tests {
     #[test]
     fn many_bad_rows_are_never_left_out() {
         let args = SetArgs {
-            bad: Some(LeaveOut::Skip),
+            bad: Some(SkipBad::default()),
             ..SetArgs::default()
         };
         let mut left = LeftOut::default();

@@ -4,10 +4,10 @@ use std::sync::LazyLock;
 
 use regex::Regex;
 
-use super::cell::shortened;
 use super::names::without_endings;
 use crate::types::Choices;
 use crate::types::question::letter;
+use crate::types::shown_text::excerpt;
 
 /// A letter of an option in a text: `(A)`, `A.`, `A)` or `A:`.
 struct Mark {
@@ -123,7 +123,7 @@ fn split<'a>(text: &'a str, run: &[&Mark]) -> Result<(Vec<String>, &'a str), Str
     let unclear = || {
         format!(
             "it is not clear where the last option ends: {:?}; write a line break behind it, or the options in columns of their own",
-            shortened(&last, 80)
+            excerpt(&last, 80)
         )
     };
     let (only, rest) = match last.split_once('\n') {

@@ -13,6 +13,7 @@
 mod answer_column;
 mod answers;
 mod cell;
+mod column;
 mod container;
 mod contradiction;
 mod family_column;
@@ -35,10 +36,13 @@ mod roles;
 mod row;
 mod scenes;
 mod settings;
+mod skip_bad;
 mod step;
 mod summary;
+mod template;
 mod text_list;
 mod truths;
+mod turns;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -53,9 +57,12 @@ use crate::types::{Family, FrameId, Question};
 pub(super) use container::{Archive, holds_files};
 pub(super) use frames::Series;
 pub(super) use images::EmbeddedImage;
+pub(super) use offered::one_line;
 pub(super) use preset::{is_known as is_known_set, names as known_sets};
 pub(super) use scenes::SceneNames;
 pub use settings::SetArgs;
+pub(crate) use skip_bad::SkipBad;
+pub(super) use summary::LEFT_OUT;
 
 use container::{FoundFiles, Joined, SetFile};
 use contradiction::leave_out;
@@ -101,6 +108,7 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
     let root = Root::of(&folder, &further)?;
     let files: Vec<Arc<SetFile>> = files.into_iter().map(Arc::new).collect();
     let mut table = rows(&files, joined, args)?;
+    table.parse_cells(info.map.iter().chain(&args.map));
     let (group, no_group) = preset.map_or((None, None), |preset| preset.group(&table));
     let frame = of_frame(&table).filter(|_| is_own(&table) && table.find("image").is_none());
     let map = Map::joined(frame.iter().chain(&group).chain(&info.map).chain(&args.map));
@@ -140,6 +148,7 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
     let scenes = Scenes::new(&table, &map, roles.scene.as_ref());
     let asked = finish(&opened, set, (frames, scenes), notes, hint)?;
     Ok(ReadySet {
+        rows: asked.rows,
         reading: asked.reading,
         form: if is_own(&table) {
             Form::Own
@@ -199,6 +208,15 @@ pub(super) struct ReadySet {
     /// What was taken for what, one fact a line.
     pub(super) reading: Vec<String>,
     pub(super) form: Form,
+    pub(super) rows: RowCounts,
+}
+
+/// The numbers of rows of a set.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct RowCounts {
+    pub(super) all: usize,
+    /// Broken rows, which are left out.
+    pub(super) bad: usize,
 }
 
 /// Whose form a set has.
@@ -210,13 +228,15 @@ pub(super) enum Form {
     Foreign,
 }
 
-/// Questions about frames of other data.
+/// The questions of a file about frames of other data.
 pub(super) struct ReadQuestions {
     pub(super) questions: Vec<Question>,
     /// The scenes that the file gives to the frames.
     pub(super) scenes: SceneNames,
-    /// What was taken for what, one fact a line; empty for this program's own form.
+    /// What was taken for what, one fact a line.
     pub(super) reading: Vec<String>,
+    pub(super) form: Form,
+    pub(super) rows: RowCounts,
 }
 
 /// That the column `frame` names the image, if there is one.
@@ -235,6 +255,7 @@ pub(super) fn about_frames(file: &Path, args: &SetArgs) -> Result<ReadQuestions>
     let own = of_frame(&table);
     let folder = file.parent().unwrap_or(Path::new(""));
     let info = FolderInfo::of(folder)?;
+    table.parse_cells(info.map.iter().chain(&args.map));
     let map = Map::joined(own.iter().chain(&info.map).chain(&args.map));
     let (roles, set) = read(&table, &map, args, None, ImagesAre::Frames)
         .map_err(|problem| Error::data(file.display(), problem))?;
@@ -259,11 +280,19 @@ pub(super) fn about_frames(file: &Path, args: &SetArgs) -> Result<ReadQuestions>
     let notes = table.notes.clone();
     let scenes = Scenes::new(&table, &map, roles.scene.as_ref());
     let asked = finish(&opened, set, (frames, scenes), notes, None)?;
-    let is_plain = is_own(&table) && info.map.is_none();
+    let mut reading = asked.reading;
+    let form = if is_own(&table) && info.map.is_none() {
+        reading.retain(|line| line.starts_with(LEFT_OUT));
+        Form::Own
+    } else {
+        Form::Foreign
+    };
     Ok(ReadQuestions {
         questions: asked.questions,
         scenes: asked.scenes,
-        reading: if is_plain { Vec::new() } else { asked.reading },
+        reading,
+        form,
+        rows: asked.rows,
     })
 }
 
@@ -274,6 +303,7 @@ struct Finished {
     series: Series,
     scenes: SceneNames,
     reading: Vec<String>,
+    rows: RowCounts,
 }
 
 /// A set that is being read.
@@ -336,7 +366,12 @@ fn finish(
         notes,
     };
     let reading = summary.lines();
+    let rows = RowCounts {
+        all: opened.table.rows.len(),
+        bad: set.left.bad().map_or(0, |(count, _)| count),
+    };
     Ok(Finished {
+        rows,
         questions,
         sources,
         series,
@@ -346,6 +381,7 @@ fn finish(
 }
 
 /// Leaves out the rows with an image that is not there or is none, with `--bad skip`; without it such an image is named when it is read.
+/// Images that are there and cannot be decoded are left out later ([`Dataset::without`](crate::dataset::Dataset::without)).
 fn leave_out_unusable(opened: &Opened<'_>, set: &mut ReadSet, frames: &Frames<'_>) -> Result<()> {
     if opened.args.bad.is_none() {
         return Ok(());
@@ -419,7 +455,7 @@ fn image_hint(table: &Table, roles: &Roles, problem: String) -> String {
     let are_there = table
         .rows
         .iter()
-        .any(|row| !images::images(table, row, roles).is_empty());
+        .any(|row| !images::images(row, roles).is_empty());
     if are_there {
         return problem;
     }
@@ -434,6 +470,18 @@ fn image_hint(table: &Table, roles: &Roles, problem: String) -> String {
     )
 }
 
+/// The error of an image that is not there, with the flag that leaves its row out.
+fn with_skip(error: Error) -> Error {
+    const FLAG: &str = "--bad skip";
+    match error {
+        Error::Data { place, problem } if !problem.contains(FLAG) => Error::data(
+            place,
+            format_args!("{problem}; {FLAG} leaves such rows out"),
+        ),
+        other => other,
+    }
+}
+
 /// The questions. The sources of their frames are kept in `frames`, and their scenes in `scenes`.
 fn questions(
     opened: &Opened<'_>,
@@ -446,7 +494,7 @@ fn questions(
     let mut questions = Vec::with_capacity(answered.len());
     for (at, answered) in answered.into_iter().enumerate() {
         let row = answered.row;
-        let frame = frames.frame(&answered)?;
+        let frame = frames.frame(&answered).map_err(with_skip)?;
         scenes.add(table, row, &frame)?;
         let cells = &table.rows[row];
         let family = families.text(table, cells);

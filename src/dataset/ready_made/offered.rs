@@ -3,6 +3,8 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
+use crate::types::shown_text::excerpt;
+
 /// The options of a row.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 pub(super) struct Offered {
@@ -21,9 +23,33 @@ pub(super) enum Origin {
     Question,
 }
 
+/// A text without blanks at its ends, on one line: a prompt has one line for each option.
+pub(in crate::dataset) fn one_line(text: &str) -> String {
+    let breaks = [
+        '\n', '\r', '\u{b}', '\u{c}', '\u{85}', '\u{2028}', '\u{2029}',
+    ];
+    let lines = text.split(breaks).map(str::trim);
+    let lines: Vec<&str> = lines.filter(|line| !line.is_empty()).collect();
+    lines.join(" ")
+}
+
 impl Offered {
+    /// Options in columns, with their places among these.
+    pub(super) fn placed(texts: &[String], places: Vec<usize>) -> Self {
+        Self {
+            texts: texts.iter().map(|text| one_line(text)).collect(),
+            places,
+            origin: Origin::Columns,
+        }
+    }
+
+    /// The options in at most `most` characters, for messages.
+    pub(super) fn shown(&self, most: usize) -> String {
+        excerpt(&format!("{:?}", self.texts), most)
+    }
+
     /// The options in the text of a question, in order.
-    pub(super) fn lettered(texts: Vec<String>) -> Self {
+    pub(super) fn lettered(texts: &[String]) -> Self {
         let origin = Origin::Question;
         Self {
             origin,
@@ -32,14 +58,8 @@ impl Offered {
     }
 
     /// The options of a list, in order.
-    pub(super) fn listed(texts: Vec<String>) -> Self {
-        let places = (0..texts.len()).collect();
-        let origin = Origin::Columns;
-        Self {
-            texts: texts.into(),
-            places,
-            origin,
-        }
+    pub(super) fn listed(texts: &[String]) -> Self {
+        Self::placed(texts, (0..texts.len()).collect())
     }
 }
 
@@ -55,5 +75,22 @@ impl AllOffered {
         let offered = Arc::new(offered);
         self.0.insert(Arc::clone(&offered));
         offered
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_are_on_one_line_without_blanks_at_their_ends() {
+        for (text, line) in [
+            ("kitchen \n", "kitchen"),
+            ("\tliving  room\r\n", "living  room"),
+            ("living\r\n  room", "living room"),
+            ("a\u{2028}b\u{a0}", "a b"),
+        ] {
+            assert_eq!(&*Offered::listed(&[text.to_owned()]).texts, [line]);
+        }
     }
 }

@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use super::cell::{Cell, Fields};
 use super::lettered::{in_cell, without_letters};
-use super::offered::{Offered, Origin};
+use super::offered::Offered;
 use super::roles::{Column, Roles};
 use super::row::Row;
 use super::text_list::{dict, list};
 use crate::types::question::letter;
 use crate::types::shell_word;
+use crate::types::shown_text::excerpt;
 
 /// What the columns of a row offer as options.
 #[derive(Debug, PartialEq, Eq)]
@@ -31,13 +32,7 @@ impl Options {
         let cells = cells.filter_map(|(place, cell)| Some((option(cell.of(row))?, place)));
         let (texts, places): (Vec<String>, Vec<usize>) = cells.unzip();
         if !texts.is_empty() {
-            let texts = without_letters(texts).into();
-            let origin = Origin::Columns;
-            let offered = Offered {
-                texts,
-                places,
-                origin,
-            };
+            let offered = Offered::placed(&without_letters(texts), places);
             found.push((cell_names(&roles.cells), offered));
         }
         for column in &roles.options {
@@ -55,7 +50,7 @@ impl Options {
                     )
                 }),
                 None => options(cell, split)
-                    .map(|texts| Offered::listed(without_letters(texts)))
+                    .map(|texts| Offered::listed(&without_letters(texts)))
                     .ok_or_else(|| no_list(column, cell)),
             };
             match offered {
@@ -112,7 +107,8 @@ fn of_fields(fields: &[(Arc<str>, Cell)]) -> Result<Offered, String> {
             }
             _ => {
                 return Err(format!(
-                    "have the name {name:?}, where a letter is expected"
+                    "have the name {:?}, where a letter is expected",
+                    excerpt(name, 60)
                 ));
             }
         }
@@ -135,11 +131,7 @@ fn of_fields(fields: &[(Arc<str>, Cell)]) -> Result<Offered, String> {
             None => return Err(format!("hold no text at {name}")),
         }
     }
-    Ok(Offered {
-        texts: without_letters(texts).into(),
-        places,
-        origin: Origin::Columns,
-    })
+    Ok(Offered::placed(&without_letters(texts), places))
 }
 
 /// The names of the columns of options as `--map` takes them.

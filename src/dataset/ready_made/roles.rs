@@ -3,16 +3,20 @@
 use std::collections::BTreeSet;
 
 use super::cell::Cell;
+pub(super) use super::column::Column;
 use super::map::{How, Map, flag};
 use super::names::{Role, known, plain};
-use super::row::{Row, Table};
+use super::row::Table;
+use super::template::Template;
+use super::turns::Turns;
 use crate::types::Choices;
 use crate::types::question::letter;
+use crate::types::shown_text::excerpt;
 
 /// The columns by role.
 #[derive(Debug)]
 pub(super) struct Roles {
-    pub(super) question: Column,
+    pub(super) question: Asked,
     /// The columns of images; the first that has any wins, or all of a numbered family.
     pub(super) images: Images,
     /// Columns of lists or texts of options.
@@ -27,6 +31,27 @@ pub(super) struct Roles {
     pub(super) scene: Option<Column>,
     pub(super) split_options: Option<String>,
     pub(super) in_question: InQuestion,
+}
+
+/// Where the text of a question stands.
+#[derive(Debug)]
+pub(super) enum Asked {
+    Column(Column),
+    /// In the image, as the user says: the text only points there.
+    InImage,
+}
+
+impl Asked {
+    /// The text of questions that stand in their images.
+    pub(super) const IN_IMAGE: &str = "Answer the question in the image.";
+
+    /// The column; `None` if there is none.
+    pub(super) fn column(&self) -> Option<&Column> {
+        match self {
+            Self::Column(column) => Some(column),
+            Self::InImage => None,
+        }
+    }
 }
 
 /// The columns that may name families.
@@ -54,37 +79,7 @@ pub(super) enum Images {
     /// In all of these columns.
     All(Vec<Column>),
     /// In a file of this name, with the cells of columns in braces.
-    Template(String),
-}
-
-/// A column, or a field of structs in it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Column {
-    pub(super) at: usize,
-    pub(super) field: Option<String>,
-    pub(super) name: String,
-}
-
-impl Column {
-    /// The cell of the column in a row.
-    pub(super) fn of<'a>(&self, row: &'a Row) -> &'a Cell {
-        let cell = row.cell(self.at);
-        match &self.field {
-            None => cell,
-            Some(field) => {
-                let mut fields = field.split('.');
-                fields
-                    .try_fold(cell, |cell, field| cell.field(field))
-                    .unwrap_or(&Cell::Absent)
-            }
-        }
-    }
-
-    /// The cell as text, if it holds one.
-    pub(super) fn text(&self, row: &Row) -> Option<String> {
-        let cell = self.of(row);
-        (!cell.is_absent()).then(|| cell.text()).flatten()
-    }
+    Template(Template),
 }
 
 impl Roles {
@@ -96,12 +91,11 @@ impl Roles {
         let named = |role| Self::named(table, map, role);
         let question = named(Role::Question)?;
         refuse_wide(table, map)?;
-        let question = question.into_iter().next();
-        let question =
-            question.ok_or_else(|| format!(
-                "no question among its columns:\n{}\n say which is which: --map question=COLUMN,image=COLUMN,options=COLUMN,answer=COLUMN",
-                shown(table)
-            ))?;
+        let question = match (question.into_iter().next(), map.of(Role::Question)) {
+            (Some(column), _) => Asked::Column(column),
+            (None, Some(_)) => Asked::InImage,
+            (None, None) => return Err(no_question(table)),
+        };
         let how = map.of(Role::Options);
         let mut options = named(Role::Options)?;
         let is_of_cells = how.is_some() && options.len() > 1;
@@ -150,12 +144,36 @@ impl Roles {
         let kept = images.iter().chain(&self.ids).chain(families);
         let kept = kept.chain(&self.evidence).chain(&self.scene);
         let kept: BTreeSet<usize> = kept.map(|column| column.at).collect();
-        let read = std::iter::once(&self.question).chain(&self.hint);
+        let read = self.question.column().into_iter().chain(&self.hint);
         let read = read.chain(&self.options).chain(&self.cells);
         read.chain(&self.answers)
             .map(|column| column.at)
             .filter(|at| !kept.contains(at))
             .collect()
+    }
+
+    /// Whether a column has a role.
+    pub(super) fn holds(&self, at: usize) -> bool {
+        let images = match &self.images {
+            Images::First(columns) | Images::All(columns) => columns.as_slice(),
+            Images::Template(_) => &[],
+        };
+        let families = match &self.families {
+            Families::Known(columns) => columns.as_slice(),
+            Families::Said(column) => column.as_slice(),
+        };
+        let mut columns = images
+            .iter()
+            .chain(families)
+            .chain(&self.ids)
+            .chain(self.question.column());
+        let mut others = self
+            .hint
+            .iter()
+            .chain(&self.options)
+            .chain(&self.cells)
+            .chain(&self.answers);
+        columns.any(|column| column.at == at) || others.any(|column| column.at == at)
     }
 
     /// The columns of a role: those of the map, or those with one of its names, the best first.
@@ -189,10 +207,8 @@ impl Roles {
         if let Some([template]) = entry.map(|entry| &*entry.columns)
             && template.contains('{')
         {
-            for name in braces(template)? {
-                column(table, name)?;
-            }
-            return Ok(Images::Template(template.clone()));
+            let template = Template::new(table, template, |name| column(table, name));
+            return template.map(Images::Template);
         }
         let columns = Self::named(table, map, Role::Image)?;
         if entry.is_some() && columns.len() > 1 {
@@ -209,6 +225,53 @@ impl Roles {
         }
         Ok(Images::All(numbered))
     }
+}
+
+/// The problem of a table without a column of questions, with the map that reads it, as far as one can be told.
+fn no_question(table: &Table) -> String {
+    let known: BTreeSet<&String> = Role::ALL.iter().flat_map(|role| known(*role)).collect();
+    let is_free = |(_, name): &(usize, &String)| {
+        !known.contains(&plain(name)) && !cells(table).iter().any(|cell| cell.name == **name)
+    };
+    let texts = table.columns.iter().enumerate().filter(is_free);
+    let asking = texts.map(|(at, name)| {
+        let cells = table.rows.iter().filter_map(|row| match row.cell(at) {
+            Cell::Text(text) => Some(text.trim_end().ends_with(['?', '？'])),
+            _ => None,
+        });
+        let cells: Vec<bool> = cells.collect();
+        (
+            cells.iter().filter(|asks| **asks).count(),
+            cells.len(),
+            name,
+        )
+    });
+    let likely = asking
+        .filter(|(_, texts, _)| *texts > 0)
+        .max_by_key(|(asks, texts, _)| (*asks, *texts));
+    let remedy = match (Turns::find(table), likely) {
+        (Some(Turns { question, answer }), _) => {
+            let answer = answer.map_or_else(String::new, |path| format!(",answer={path}"));
+            format!(
+                "it holds conversations, whose first question is read with {}",
+                flag(Role::Question, &format!("{question}{answer}"), None)
+            )
+        }
+        (None, Some((_, _, name))) => format!(
+            "say which is which, e.g. {}; {} if it stands in the image",
+            flag(Role::Question, name, None),
+            flag(Role::Question, "", None)
+        ),
+        (None, None) => format!(
+            "if the question stands in the image, {} asks {:?}; else say which is which: --map question=COLUMN,image=COLUMN,options=COLUMN,answer=COLUMN",
+            flag(Role::Question, "", None),
+            Asked::IN_IMAGE
+        ),
+    };
+    format!(
+        "no question among its columns:\n{}\n {remedy}",
+        shown(table)
+    )
 }
 
 /// The column of a name, or the field of structs in it, as `meta.source`.
@@ -235,20 +298,6 @@ pub(super) fn column(table: &Table, name: &str) -> Result<Column, String> {
             shown(table)
         )
     })
-}
-
-/// The names in braces of a template.
-pub(super) fn braces(template: &str) -> Result<Vec<&str>, String> {
-    let mut names = Vec::new();
-    let mut rest = template;
-    while let Some((_, after)) = rest.split_once('{') {
-        let (name, after) = after
-            .split_once('}')
-            .ok_or_else(|| format!("{template:?}: '}}' is missing"))?;
-        names.push(name);
-        rest = after;
-    }
-    Ok(names)
 }
 
 /// The columns `NAME` and a number, in the order of the numbers.
@@ -320,16 +369,22 @@ fn refuse_wide(table: &Table, map: &Map) -> Result<(), String> {
     ))
 }
 
+/// The most characters of values that are shown of a table, and of a name.
+const MOST_SHOWN: usize = 360;
+const LONGEST_SHOWN_NAME: usize = 40;
+
 /// The columns with their kinds and a short value each, one a line.
 pub(super) fn shown(table: &Table) -> String {
     let width = table.columns.iter().map(|name| name.chars().count()).max();
     let width = width.unwrap_or(0).min(24);
+    let most = (MOST_SHOWN / table.columns.len().clamp(1, 40)).min(60);
     let lines = table.columns.iter().enumerate().take(40).map(|(at, name)| {
         let mut cells = table.rows.iter().map(|row| row.cell(at));
         let cell = cells
             .find(|cell| !cell.is_absent())
             .unwrap_or(&Cell::Absent);
-        format!("   {name:width$}  {:8} {}", cell.kind(), cell.shown(60))
+        let name = excerpt(name, LONGEST_SHOWN_NAME);
+        format!("   {name:width$}  {:8} {}", cell.kind(), cell.shown(most))
     });
     let mut lines: Vec<String> = lines.collect();
     if table.columns.len() > lines.len() {

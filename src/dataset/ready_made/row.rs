@@ -8,6 +8,7 @@ use std::sync::Arc;
 use csv::Position;
 
 use super::cell::{Cell, FieldNames};
+use super::map::Map;
 use super::names::{Role, known, plain};
 
 /// The maximum number of columns of a set.
@@ -161,6 +162,25 @@ impl Table {
             place,
             cells: row.into(),
         });
+    }
+
+    /// Parses the cells of columns of text that a map takes as lists or structs, as tables hold them in JSON: `turns.0.value`.
+    pub(super) fn parse_cells<'m>(&mut self, maps: impl Iterator<Item = &'m Map>) {
+        let names = maps
+            .flat_map(|map| &map.entries)
+            .flat_map(|entry| &entry.columns);
+        let inner = names.filter(|name| self.find(name).is_none());
+        let columns = inner.filter_map(|name| self.find(name.split_once('.')?.0));
+        for column in columns.collect::<BTreeSet<usize>>() {
+            for row in &mut self.rows {
+                let Some(cell) = row.cells.get_mut(column) else {
+                    continue;
+                };
+                if let Some(parsed) = cell.parsed() {
+                    *cell = parsed.without_files(&mut self.names);
+                }
+            }
+        }
     }
 
     /// Frees the cells of columns that are not read again.

@@ -3,6 +3,7 @@
 use clap::{Args, ValueEnum};
 
 use super::map::Map;
+use super::skip_bad::SkipBad;
 use crate::dataset::root::RootArgs;
 use crate::types::Decides;
 
@@ -41,9 +42,10 @@ pub struct SetArgs {
     /// What is done about rows with several true options; default: stop
     #[arg(long, value_name = "skip", add = Decides::Trials)]
     pub several: Option<LeaveOut>,
-    /// What is done about rows that are broken, at most 5 % of all; default: stop
-    #[arg(long, value_name = "skip", add = Decides::Trials)]
-    pub bad: Option<LeaveOut>,
+    /// What is done about broken rows, and about images that are missing or cannot be read: leave them out, up to 5 % of all, or up to
+    /// another share with skip:20%; default: stop
+    #[arg(long, value_name = "skip|skip:PERCENT", add = Decides::Trials)]
+    pub bad: Option<SkipBad>,
     /// Further folders of the data.
     #[command(flatten)]
     pub root: RootArgs,

@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::family_column::FamilyOf;
 use super::frames::Series;
 use super::items::Cut;
-use super::left_out::LeftOut;
-use super::roles::{Images, Roles};
+use super::left_out::{LeftOut, Why};
+use super::roles::{Asked, Images, Roles};
 use super::row::Table;
 use crate::dataset::image_source::ImageSource;
 use crate::types::{FrameId, Question};
@@ -31,6 +31,9 @@ pub(super) struct Summary<'a> {
     /// Further facts, one a line.
     pub(super) notes: Vec<String>,
 }
+
+/// The start of a line about rows that are left out.
+pub(in crate::dataset) const LEFT_OUT: &str = "left out: ";
 
 /// The number of families from which on tables are hard to read.
 const MANY_FAMILIES: usize = 60;
@@ -57,9 +60,12 @@ impl Summary<'_> {
         lines.extend(self.several());
         lines.extend(self.groups.clone());
         for (why, number) in self.left.counts() {
+            let first = match (why, self.left.bad()) {
+                (Why::Bad, Some((_, first))) => format!("; the first: {first}"),
+                _ => String::new(),
+            };
             lines.push(format!(
-                "left out: {} of {} rows ({})",
-                number,
+                "{LEFT_OUT}{number} of {} rows ({}){first}",
                 self.table.rows.len(),
                 why.name()
             ));
@@ -117,10 +123,13 @@ impl Summary<'_> {
                 let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
                 names.join(", ")
             }
-            Images::Template(template) => template.clone(),
+            Images::Template(template) => template.text().to_owned(),
         };
         let mut parts = vec![
-            format!("question = {}", roles.question.name),
+            match roles.question.column() {
+                Some(column) => format!("question = {}", column.name),
+                None => format!("question = in the image (asked as {:?})", Asked::IN_IMAGE),
+            },
             format!("image = {image} ({})", self.formats()),
         ];
         let cells: Vec<&str> = roles.cells.iter().map(|cell| cell.name.as_str()).collect();

@@ -6,7 +6,7 @@ use super::answer_column;
 use super::answers::{
     AnswerOf, OneReading, Reading, asks_yes_or_no, digit, one_reading, yes_or_no,
 };
-use super::cell::{Cell, shortened};
+use super::cell::Cell;
 use super::items::{AnswerCell, Item};
 use super::left_out::{LeftOut, Why};
 use super::map::{How, flag};
@@ -15,6 +15,7 @@ use super::offered::Offered;
 use super::roles::{Column, Roles};
 use super::row::Table;
 use crate::types::Choices;
+use crate::types::shown_text::excerpt;
 
 /// A question with its choices.
 #[derive(Debug)]
@@ -58,8 +59,12 @@ pub(super) fn truths(
         });
     }
     if roles.answers.is_empty() {
+        let remedy = answer_column::unnamed(table, roles, &items).map_or_else(
+            || "a test split without them? (--ask FILE asks questions without answers about every image.)".to_owned(),
+            |flag| format!("{flag} reads those of a column."),
+        );
         return Err(format!(
-            "no answers among its columns: a test split without them? (--ask FILE asks questions without answers about every image.) Its columns:\n{}",
+            "no answers among its columns: {remedy} Its columns:\n{}",
             super::roles::shown(table)
         ));
     }
@@ -136,12 +141,14 @@ fn are_texts(table: &Table, column: &Column) -> bool {
     cells.all(|cell| matches!(cell, Cell::Text(_)))
 }
 
-/// Items with an answer each. Those without one, or with several, are counted.
+/// Items with an answer each. Those without one, or with several, are counted. `other` is a flag for a column of answers that is not
+/// known by its name, for the error if there are none.
 fn with_answers(
     table: &Table,
     column: &Column,
     items: Vec<Item>,
     left: &mut LeftOut,
+    other: Option<String>,
 ) -> Result<Vec<(Item, String)>, String> {
     let count = items.len();
     let mut absent = Vec::new();
@@ -154,8 +161,12 @@ fn with_answers(
         }
     }
     if absent.len() == count && count > 0 {
+        let remedy = other.map_or_else(
+            || "a test split without them? --split names another, and --ask FILE asks questions without answers about every image".to_owned(),
+            |flag| format!("{flag} reads those of another column"),
+        );
         return Err(format!(
-            "no answer in any row (column {:?}): a test split without them? --split names another, and --ask FILE asks questions without answers about every image",
+            "no answer in any row (column {:?}): {remedy}",
             column.name
         ));
     }
@@ -180,7 +191,8 @@ fn of_options(
         return Ok(());
     }
     let column = answer_column::of_options(table, roles, &items)?;
-    let items = with_answers(table, column, items, left)?;
+    let other = answer_column::unnamed(table, roles, &items);
+    let items = with_answers(table, column, items, left, other)?;
     let read = ColumnReading::of(table, column, how, &items)?;
     let name = read.reading.name();
     truths.said.push(format!("{} ({name})", column.name));
@@ -250,10 +262,11 @@ impl<'h> ColumnReading<'h> {
         };
         match items.first() {
             Some((item, answer)) if read.fit == 0 => Err(format!(
-                "{}: the answer {answer:?} (column {:?}) is not one of the options {:?}, neither by letter nor by text nor by number",
+                "{}: the answer {:?} (column {:?}) is not one of the options {}, neither by letter nor by text nor by number",
                 table.place(item.row),
+                excerpt(answer, 60),
                 column.name,
-                rows[0].1.texts
+                rows[0].1.shown(120)
             )),
             _ => Ok(read),
         }
@@ -276,8 +289,9 @@ impl<'h> ColumnReading<'h> {
             Some(truth) => Choices::known_by(Arc::clone(&options.texts), Some(truth))
                 .map_err(|e| e.to_string()),
             None => Err(format!(
-                "the answer {answer:?} is not one of the options {:?} (read as {}, which fits {} rows)",
-                options.texts,
+                "the answer {:?} is not one of the options {} (read as {}, which fits {} rows)",
+                excerpt(answer, 60),
+                options.shown(120),
                 self.reading.name(),
                 self.fit
             )),
@@ -316,9 +330,10 @@ fn ambiguous(
     let [one, other] = readings.map(Reading::name);
     let [first, second] = readings.map(|reading| flag(Role::Answer, &column.name, Some(reading)));
     format!(
-        "{}: the answer {answer:?} may be read as {one} or as {other}, which differ among the options {:?}; {first} or {second} says which is meant",
+        "{}: the answer {:?} may be read as {one} or as {other}, which differ among the options {}; {first} or {second} says which is meant",
         table.place(item.row),
-        options.texts,
+        excerpt(answer, 60),
+        options.shown(120),
     )
 }
 
@@ -334,7 +349,7 @@ fn of_yes_or_no(
         return Ok(());
     }
     let column = answer_column::of_words(table, roles, &items)?;
-    let items = with_answers(table, column, items, left)?;
+    let items = with_answers(table, column, items, left, None)?;
     let verbs = items
         .iter()
         .filter(|(item, _)| asks_yes_or_no(last_line(&item.text)))
@@ -351,7 +366,7 @@ fn of_yes_or_no(
                 count += 1;
                 truths.answered.push(Answered { row, text, choices });
             }
-            Ok(_) | Err(_) => left.add(Why::Open, || format!("{:?}", shortened(&answer, 60))),
+            Ok(_) | Err(_) => left.add(Why::Open, || format!("{:?}", excerpt(&answer, 60))),
         }
     }
     if count > 0 {

@@ -3,6 +3,8 @@
 //! Read are mappings and lists in blocks and in brackets, texts with and without quotes, and comments (YAML 1.2.2, chapters 7 and 8).
 //! Anchors, tags and the like are refused.
 
+use crate::types::shown_text::excerpt;
+
 /// A value.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Yaml {
@@ -49,7 +51,10 @@ pub(super) fn value(text: &str) -> Result<Yaml, String> {
     let value = block.value(indent, 0)?;
     match block.line() {
         None => Ok(value),
-        Some((_, line)) => Err(format!("the line {line:?} is not understood")),
+        Some((_, line)) => Err(format!(
+            "the line {:?} is not understood",
+            excerpt(line, 80)
+        )),
     }
 }
 
@@ -70,7 +75,10 @@ impl<'a> Block<'a> {
             return Ok(Yaml::Nothing);
         };
         if depth > DEEPEST {
-            return Err(format!("the line {line:?} is nested too deep"));
+            return Err(format!(
+                "the line {:?} is nested too deep",
+                excerpt(line, 80)
+            ));
         }
         if is_item(line) {
             return self.list(indent, depth);
@@ -154,7 +162,10 @@ impl<'a> Block<'a> {
         if rest.trim().is_empty() {
             return Ok(value);
         }
-        Err(format!("the value {text:?} is not understood"))
+        Err(format!(
+            "the value {:?} is not understood",
+            excerpt(&text, 80)
+        ))
     }
 }
 
@@ -182,7 +193,7 @@ fn key(line: &str) -> Option<(String, &str)> {
 /// A value in a text, and what follows it. Inside brackets a text without quotes ends at a comma or a bracket.
 fn in_brackets(text: &str, depth: usize) -> Result<(Yaml, &str), String> {
     let text = text.trim_start();
-    let wrong = || format!("the value {text:?} is not understood");
+    let wrong = || format!("the value {:?} is not understood", excerpt(text, 80));
     if depth > DEEPEST {
         return Err(wrong());
     }

@@ -4,7 +4,6 @@ use std::fs;
 
 use serde_json::{Value, json};
 
-use super::super::settings::LeaveOut;
 use super::fixture::{base64, bytes, row, set};
 use super::{open, refusal};
 use crate::dataset::ready_made::SetArgs;
@@ -148,7 +147,7 @@ fn unusable_images_are_left_out_if_the_user_allows_it() {
             .collect();
         let (_folder, path) = set("set.tsv", &rows);
         let skip = SetArgs {
-            bad: Some(LeaveOut::Skip),
+            bad: Some(crate::dataset::SkipBad::default()),
             ..SetArgs::default()
         };
         let dataset = open(&path, &skip).unwrap();
@@ -185,11 +184,11 @@ fn columns_by_index_and_in_lists_are_read() {
     let dataset = open(&path, &args).unwrap();
     assert_eq!(dataset.questions[0].choices.truth(), Some(1));
     let beside = row(
-        json!({"id": 1, "question": "?", "options": ["x", "y"], "answer": "x", "image": "none.png", "decoded_image": bytes(1)}),
+        json!({"id": 1, "question": "?", "options": ["x", "y"], "answer": "x", "image": "none.png", "pixels": bytes(1)}),
     );
     let (_folder, path) = set("set.parquet", &[beside]);
     let problem = refusal(&path, &SetArgs::default());
-    assert!(problem.contains("image=decoded_image"), "{problem}");
+    assert!(problem.contains("image=pixels"), "{problem}");
 }
 
 #[test]

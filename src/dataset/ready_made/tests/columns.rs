@@ -2,7 +2,6 @@
 
 use serde_json::{Value, json};
 
-use super::super::settings::LeaveOut;
 use super::fixture::{base64, row, set};
 use super::{map, open, read, refusal};
 use crate::dataset::ready_made::SetArgs;
@@ -14,7 +13,7 @@ fn with(rows: Vec<Value>) -> (tempfile::TempDir, std::path::PathBuf) {
 
 fn skipping() -> SetArgs {
     SetArgs {
-        bad: Some(LeaveOut::Skip),
+        bad: Some(crate::dataset::SkipBad::default()),
         ..SetArgs::default()
     }
 }

@@ -14,7 +14,7 @@ fn with(rows: Vec<Value>) -> (tempfile::TempDir, std::path::PathBuf) {
 
 fn skipping() -> SetArgs {
     SetArgs {
-        bad: Some(LeaveOut::Skip),
+        bad: Some(crate::dataset::SkipBad::default()),
         open: Some(LeaveOut::Skip),
         ..SetArgs::default()
     }

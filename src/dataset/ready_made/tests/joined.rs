@@ -199,7 +199,7 @@ fn two_rows_that_differ_in_their_answers_alone_contradict_each_other() {
         "{problem}"
     );
     let skip = SetArgs {
-        bad: Some(LeaveOut::Skip),
+        bad: Some(crate::dataset::SkipBad::default()),
         ..SetArgs::default()
     };
     let dataset = open(&path, &skip).unwrap();
@@ -225,7 +225,7 @@ fn two_rows_that_differ_in_their_answers_alone_contradict_each_other() {
 #[test]
 fn rows_with_ids_contradict_each_other_too() {
     let skip = SetArgs {
-        bad: Some(LeaveOut::Skip),
+        bad: Some(crate::dataset::SkipBad::default()),
         ..SetArgs::default()
     };
     let strict = SetArgs::default();

@@ -2,7 +2,6 @@
 
 use serde_json::{Value, json};
 
-use super::super::settings::LeaveOut;
 use super::fixture::{base64, row, set};
 use super::{map, open, read, refusal};
 use crate::dataset::ready_made::SetArgs;
@@ -193,7 +192,7 @@ fn a_list_of_one_image_in_a_text_is_one_image() {
         )],
     );
     let args = SetArgs {
-        bad: Some(LeaveOut::Skip),
+        bad: Some(crate::dataset::SkipBad::default()),
         ..SetArgs::default()
     };
     assert!(refusal(&path, &args).contains("1 of 1 rows show 2 images"));

@@ -12,6 +12,7 @@ mod refusals;
 mod scenes;
 mod several;
 mod shapes;
+mod user_shapes;
 
 use std::path::Path;
 

@@ -162,10 +162,19 @@ fn bad_rows_are_left_out_up_to_a_share() {
         "{problem}"
     );
     let skip = SetArgs {
-        bad: Some(crate::dataset::ready_made::settings::LeaveOut::Skip),
+        bad: Some(crate::dataset::SkipBad::default()),
         ..SetArgs::default()
     };
     assert_eq!(open(&path, &skip).unwrap().questions().len(), 39);
     let (_folder, path) = with(&rows[30..]);
-    assert!(refusal(&path, &skip).contains("at most 5 %"));
+    let problem = refusal(&path, &skip);
+    assert!(
+        problem.contains("at most 5 %") && problem.contains("--bad skip:10%"),
+        "{problem}"
+    );
+    let raised = SetArgs {
+        bad: "skip:10%".parse().ok(),
+        ..SetArgs::default()
+    };
+    assert_eq!(open(&path, &raised).unwrap().questions().len(), 9);
 }

@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
-use super::super::settings::{LeaveOut, SeveralImages};
+use super::super::settings::SeveralImages;
 use super::fixture::{bytes, row, set};
 use super::{SetArgs, open, refusal};
 
@@ -127,7 +127,7 @@ fn a_mark_without_an_image_makes_a_bad_row() {
         "{problem}"
     );
     let args = SetArgs {
-        bad: Some(LeaveOut::Skip),
+        bad: Some(crate::dataset::SkipBad::default()),
         ..send()
     };
     let reading = open(&path, &args).unwrap().reading().join("\n");

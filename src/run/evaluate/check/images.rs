@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use rayon::prelude::*;
 
 use super::findings::{Findings, Mark};
-use crate::dataset::{Dataset, Picture};
+use crate::dataset::{Dataset, Picture, SkipBad};
 use crate::engine::dark_already::{DarkImages, advice};
 use crate::enhance::brightness;
 use crate::error::Result;
@@ -62,7 +62,7 @@ pub(super) fn images(
         .collect();
     drop(bar);
     let (mut by_digest, mut sizes) = (HashMap::new(), BTreeMap::new());
-    let (mut bytes, mut notes) = (0, InputSummary::default());
+    let (mut bytes, mut notes, mut unusable) = (0, InputSummary::default(), 0);
     for Looked {
         id,
         facts,
@@ -70,7 +70,10 @@ pub(super) fn images(
     } in looked
     {
         match facts {
-            Err(e) => findings.one_of("images that cannot be used", Mark::Problem, e.to_string()),
+            Err(e) => {
+                unusable += 1;
+                findings.one_of("images that cannot be used", Mark::Problem, e.to_string());
+            }
             Ok(Facts { size, digest, note }) => {
                 bytes += of;
                 *sizes.entry(size).or_insert(0_usize) += 1;
@@ -86,6 +89,13 @@ pub(super) fn images(
                 }
             }
         }
+    }
+    if unusable > 0 {
+        findings.warn(format!(
+            "--bad {} leaves out the questions about {} that cannot be used",
+            SkipBad::enough(unusable, shown.len()),
+            counted(unusable, "image")
+        ));
     }
     findings.ok(format!(
         "{}, {}, {}",

@@ -6,6 +6,7 @@ use super::findings::{Findings, Mark};
 use crate::report::words::counted;
 use crate::types::Question;
 use crate::types::question::letter;
+use crate::types::shown_text::excerpt;
 
 /// The share of one answer or letter from which on a model that always says it scores well.
 const COMMON: f64 = 0.6;
@@ -34,7 +35,7 @@ pub(super) fn questions(questions: &[Question], findings: &mut Findings) {
     let shown: Vec<String> = families
         .iter()
         .take(12)
-        .map(|(family, count)| format!("{family} {count}"))
+        .map(|(family, count)| format!("{} {count}", excerpt(family, 30)))
         .collect();
     let more = match families.len() {
         count @ 13.. => format!(" and {} more", count - 12),
@@ -69,7 +70,8 @@ fn commonest(questions: &[Question], findings: &mut Findings) {
         let share = *count as f64 / questions.len() as f64;
         if share >= COMMON {
             findings.warn(format!(
-                "always the {what} {answer:?} scores {:.0} %; ask the model without images too (--blind-model NAME), or show the choices in other orders (--shuffle-options)",
+                "always the {what} {:?} scores {:.0} %; ask the model without images too (--blind-model NAME), or show the choices in other orders (--shuffle-options)",
+                excerpt(answer, 60),
                 100.0 * share
             ));
         }
@@ -84,7 +86,8 @@ fn repeats(questions: &[Question], findings: &mut Findings) {
         if let Some(first) = seen.insert(content, &question.id) {
             let text = format!(
                 "the questions {:?} and {:?} are the same",
-                first.0, question.id.0
+                excerpt(&first.0, 60),
+                excerpt(&question.id.0, 60)
             );
             findings.one_of("questions that occur twice", Mark::Warning, text);
         }
@@ -103,8 +106,10 @@ fn given_away(questions: &[Question], findings: &mut Findings) {
         let others = texts.iter().filter(|choice| *choice != truth);
         if words(truth).len() > 2 && held(truth) && !others.clone().any(held) {
             let line = format!(
-                "the question {:?} holds its answer {truth:?}: {:?}",
-                question.id.0, question.text
+                "the question {:?} holds its answer {:?}: {:?}",
+                excerpt(&question.id.0, 60),
+                excerpt(truth, 60),
+                excerpt(&question.text, 120)
             );
             findings.one_of("questions that hold their answers", Mark::Warning, line);
         }

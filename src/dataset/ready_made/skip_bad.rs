@@ -1,0 +1,135 @@
+//! The share of a set that may be left out because it is broken: [`SkipBad`].
+
+use std::fmt;
+use std::str::FromStr;
+
+/// The largest share of a set that is left out if the user names none, in percent (chosen).
+const USUAL_PERCENT: f64 = 5.0;
+
+/// Broken rows and unusable images are left out, up to a share of all.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SkipBad {
+    /// The largest share, in percent.
+    most: f64,
+}
+
+impl SkipBad {
+    /// Checks that a number of broken rows or images of a set may be left out. `first` is the problem of the first of them.
+    ///
+    /// # Errors
+    /// If they are more than the share. The error names the flag that allows as many.
+    pub(crate) fn check(
+        self,
+        bad: usize,
+        all: usize,
+        noun: &str,
+        first: &str,
+    ) -> Result<(), String> {
+        if share(bad, all) <= self.most {
+            return Ok(());
+        }
+        Err(format!(
+            "{bad} of {all} {noun} are broken; the first: {first}; --bad {self} leaves out at most {} %: repair the data, or raise the \
+             limit with --bad {}",
+            self.most,
+            Self::enough(bad, all)
+        ))
+    }
+
+    /// The usual share, or one in whole percent that allows a number of broken rows of a set.
+    pub(crate) fn enough(bad: usize, all: usize) -> Self {
+        Self {
+            most: share(bad, all).ceil().max(USUAL_PERCENT),
+        }
+    }
+}
+
+/// A share in percent.
+fn share(part: usize, all: usize) -> f64 {
+    100.0 * part as f64 / all.max(1) as f64
+}
+
+impl Default for SkipBad {
+    fn default() -> Self {
+        Self {
+            most: USUAL_PERCENT,
+        }
+    }
+}
+
+impl fmt::Display for SkipBad {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if *self == Self::default() {
+            return f.write_str("skip");
+        }
+        write!(f, "skip:{}%", self.most)
+    }
+}
+
+impl FromStr for SkipBad {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected = || "skip expected, or a share of the rows as skip:20%".to_owned();
+        if text == "skip" {
+            return Ok(Self::default());
+        }
+        let share = text.strip_prefix("skip:").ok_or_else(expected)?;
+        let share: f64 = share
+            .strip_suffix('%')
+            .unwrap_or(share)
+            .parse()
+            .map_err(|_| expected())?;
+        if !(0.0..=100.0).contains(&share) {
+            return Err("a share from 0% to 100% expected".to_owned());
+        }
+        Ok(Self { most: share })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_share_is_read_and_written() {
+        for (text, most) in [
+            ("skip", 5.0),
+            ("skip:20%", 20.0),
+            ("skip:0.5%", 0.5),
+            ("skip:100", 100.0),
+        ] {
+            let skip: SkipBad = text.parse().unwrap();
+            assert_eq!(skip, SkipBad { most }, "{text}");
+            assert_eq!(skip.to_string().parse(), Ok(skip));
+        }
+        for wrong in [
+            "",
+            "skip:",
+            "skip:-1%",
+            "skip:101%",
+            "skip:NaN",
+            "leave",
+            "skip:x%",
+        ] {
+            assert!(wrong.parse::<SkipBad>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn more_than_the_share_is_refused_with_the_flag_that_allows_it() {
+        let usual = SkipBad::default();
+        assert_eq!(usual.check(1, 20, "rows", "a"), Ok(()));
+        let problem = usual.check(3, 40, "rows", "line 3").unwrap_err();
+        assert!(
+            problem.contains("3 of 40 rows are broken; the first: line 3"),
+            "{problem}"
+        );
+        let (_, raised) = problem.rsplit_once("--bad ").unwrap();
+        assert_eq!(raised, "skip:8%");
+        assert_eq!(
+            raised.parse::<SkipBad>().unwrap().check(3, 40, "rows", ""),
+            Ok(())
+        );
+    }
+}

@@ -1,0 +1,220 @@
+//! Shapes of users' own sets and of late benchmarks: read, or refused with the map that reads them.
+
+use serde_json::{Value, json};
+
+use super::fixture::{base64, bytes, png, row, set};
+use super::{map, open, read, refusal};
+use crate::dataset::ready_made::SetArgs;
+
+/// The map in a refusal, as a user pastes it.
+fn map_in(problem: &str) -> SetArgs {
+    let (_, flag) = problem.split_once("--map ").unwrap();
+    let value = flag.split([' ', '\n']).next().unwrap();
+    map(value.trim_matches(['\'', ',', ';', '.']))
+}
+
+/// The choices and the truth of the first question.
+fn first(path: &std::path::Path, args: &SetArgs) -> (String, Vec<String>, String) {
+    let (_, _, text, choices, truth, _) = read(&open(path, args).unwrap()).swap_remove(0);
+    (text, choices, truth)
+}
+
+fn words(words: &[&str]) -> Vec<String> {
+    words.iter().map(ToString::to_string).collect()
+}
+
+#[test]
+fn conversations_are_refused_with_the_map_that_reads_them() {
+    let question = "<image>\nWhich room?\nA. hall\nB. attic";
+    for turns in [
+        json!([{"from": "human", "value": question}, {"from": "gpt", "value": "B"}]),
+        json!([
+            {"role": "system", "content": "Be brief."},
+            {"role": "user", "content": [{"type": "text", "text": question}]},
+            {"role": "assistant", "content": "B"},
+        ]),
+    ] {
+        for (form, cell) in [("json", turns.clone()), ("csv", json!(turns.to_string()))] {
+            let rows = [row(json!({"id": 1, "image": base64(9), "turns": cell}))];
+            let (_folder, path) = set(&format!("set.{form}"), &rows);
+            let problem = refusal(&path, &SetArgs::default());
+            assert!(problem.contains("conversations"), "{problem}");
+            let expected = (
+                "Which room?".to_owned(),
+                words(&["hall", "attic"]),
+                "attic".to_owned(),
+            );
+            assert_eq!(
+                first(&path, &map_in(&problem)),
+                expected,
+                "{form}: {problem}"
+            );
+            if form == "csv" {
+                continue;
+            }
+            // A list is no empty question.
+            let problem = refusal(&path, &map("question=turns,answer=id"));
+            assert!(
+                !problem.contains("is empty") && problem.contains("--map question=turns."),
+                "{problem}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_question_in_the_image_is_asked_by_an_empty_map() {
+    let rows = [row(
+        json!({"id": "1", "image": base64(9), "options": "['x', 'y']", "answer": "B", "subject": "Art"}),
+    )];
+    let (_folder, path) = set("set.json", &rows);
+    let problem = refusal(&path, &SetArgs::default());
+    assert!(problem.contains("stands in the image"), "{problem}");
+    let (text, choices, truth) = first(&path, &map_in(&problem));
+    assert_eq!(text, "Answer the question in the image.");
+    assert_eq!((choices, truth.as_str()), (words(&["x", "y"]), "y"));
+}
+
+#[test]
+fn a_column_of_questions_of_another_name_is_proposed() {
+    let rows = [row(
+        json!({"bild": "a text", "frage": "What is it?", "image": base64(9), "options": ["x", "y"], "answer": "x"}),
+    )];
+    let (_folder, path) = set("set.json", &rows);
+    let problem = refusal(&path, &SetArgs::default());
+    assert_eq!(
+        first(&path, &map_in(&problem)).0,
+        "What is it?",
+        "{problem}"
+    );
+}
+
+#[test]
+fn bytes_in_another_column_than_the_path_are_the_image() {
+    let fields = |column: &str| {
+        let mut fields = row(
+            json!({"pid": "1", "question": "?", "image": "images/1.jpg", "choices": ["x", "y"], "answer": "y"}),
+        );
+        fields.insert(column.to_owned(), bytes(77));
+        fields
+    };
+    let (_folder, path) = set("set.parquet", &[fields("decoded_image")]);
+    assert_eq!(read(&open(&path, &SetArgs::default()).unwrap())[0].5, 77);
+    // A column of no known name is proposed.
+    let (_folder, path) = set("set.parquet", &[fields("pixels")]);
+    let problem = refusal(&path, &SetArgs::default());
+    assert_eq!(
+        read(&open(&path, &map_in(&problem)).unwrap())[0].5,
+        77,
+        "{problem}"
+    );
+}
+
+#[test]
+fn answers_by_index_beside_an_empty_column_are_read_or_proposed() {
+    let fields = |column: &str, at: usize| {
+        let mut fields = row(
+            json!({"question_id": at.to_string(), "question": "?", "image": base64(at as u8), "choices": ["x", "y", "z"], "answer": ""}),
+        );
+        fields.insert(column.to_owned(), json!(at));
+        fields
+    };
+    for form in ["json", "csv", "tsv", "parquet"] {
+        let rows = [
+            fields("correct_choice_idx", 2),
+            fields("correct_choice_idx", 0),
+        ];
+        let (_folder, path) = set(&format!("set.{form}"), &rows);
+        let args = if form == "json" {
+            SetArgs::default()
+        } else {
+            map("question=question")
+        };
+        match open(&path, &args) {
+            Ok(dataset) => assert_eq!(read(&dataset)[0].4, "z", "{form}"),
+            Err(e) => panic!("{form}: {e}"),
+        }
+    }
+    let rows = [fields("richtig", 2), fields("richtig", 0)];
+    let (_folder, path) = set("set.json", &rows);
+    let problem = refusal(&path, &SetArgs::default());
+    assert!(problem.contains("--map answer=richtig:index0"), "{problem}");
+    assert_eq!(first(&path, &map_in(&problem)).2, "z");
+}
+
+#[test]
+fn a_template_takes_a_width() {
+    let fields =
+        row(json!({"image_id": 42, "question": "?", "options": ["x", "y"], "answer": "x"}));
+    let (folder, path) = set("set.json", &[fields]);
+    std::fs::create_dir(folder.path().join("val")).unwrap();
+    std::fs::write(folder.path().join("val/000000000042.png"), png(5)).unwrap();
+    for template in ["val/{image_id:012}.png", "val/{image_id:012d}.png"] {
+        let args = map(&format!("image={template}"));
+        assert_eq!(read(&open(&path, &args).unwrap())[0].5, 5, "{template}");
+    }
+    for (template, says) in [
+        ("val/{image_id:099}.png", "a width of at most 64"),
+        ("val/{image_id:x}.png", "image_id:x"),
+        ("val/{image_id", "'}' is missing"),
+    ] {
+        let problem = refusal(&path, &map(&format!("image={template}")));
+        assert!(problem.contains(says), "{problem}");
+    }
+}
+
+#[test]
+fn blanks_and_line_ends_of_options_do_not_reach_the_choices() {
+    let clean = words(&["red", "dark blue"]);
+    for fields in [
+        json!({"options": ["red \n", "dark\r\nblue\t"], "answer": "red"}),
+        json!({"A": " red\r\n", "B": "dark\nblue ", "answer": "A"}),
+        json!({"options": {"A": "red ", "B": "dark \n blue"}, "answer": "A"}),
+        json!({"options": ["A. red \n", "B. dark\nblue"], "answer": "red "}),
+    ] {
+        let mut fields = row(fields);
+        fields.insert("question".to_owned(), json!("?"));
+        fields.insert("image".to_owned(), json!(base64(9)));
+        let (_folder, path) = set("set.json", &[fields]);
+        let (_, choices, truth) = first(&path, &SetArgs::default());
+        assert_eq!((choices, truth.as_str()), (clean.clone(), "red"));
+    }
+}
+
+/// Values so long that a message may not repeat them.
+#[test]
+fn no_message_repeats_long_values() {
+    let long = "lorem ipsum ".repeat(500);
+    let unbroken = "x".repeat(5000);
+    let good = json!({"id": "1", "question": "?", "image": base64(9), "options": ["x", "y"], "answer": "x"});
+    let cut = base64(9).repeat(20)[..1301].to_owned();
+    for (column, value) in [
+        ("answer", json!(long)),
+        ("options", json!([long, unbroken])),
+        ("options", json!(long)),
+        ("options", json!({"A": long, unbroken.clone(): "y"})),
+        ("image", json!(cut)),
+        ("image", json!(format!("/9j/{cut}"))),
+        ("image", json!(format!("data:image/png;base64,{cut}"))),
+        ("image", json!(unbroken)),
+        ("image", json!(long)),
+        ("image", json!(format!("../{}", "a/".repeat(600)))),
+        ("question", json!([long, {"a": unbroken}])),
+        ("id", Value::Null),
+    ] {
+        let mut bad = row(good.clone());
+        bad.insert(column.to_owned(), value);
+        for args in [SetArgs::default(), map("question=question,image=image")] {
+            let (_folder, path) = set("set.json", &[bad.clone()]);
+            let problem = refusal(&path, &args);
+            let longest = problem.lines().map(|line| line.chars().count()).max();
+            assert!(
+                longest <= Some(620) && problem.len() < 2000,
+                "{column}: {problem}"
+            );
+            if column == "image" && problem.contains("no such file") {
+                panic!("{problem}");
+            }
+        }
+    }
+}
