@@ -188,6 +188,26 @@ impl AccessArgs {
         }
     }
 
+    /// Checks that no key and no header goes to an address that only a run folder names, unless it is that of a vendor of the built-in
+    /// table: the folder may be a stranger's.
+    ///
+    /// # Errors
+    /// If one would.
+    pub(crate) fn check_address_of_run(&self, base: &BaseUrl) -> Result<()> {
+        if Vendor::has_host(base.host()) && !base.is_plain() {
+            return Ok(());
+        }
+        let has_headers = !self.header.is_empty() || !self.header_env.is_empty();
+        if base.is_loopback() && !has_headers && self.key(base, None)?.is_none() {
+            return Ok(());
+        }
+        let problem = format_args!(
+            "only the run folder names the address {base}, and it may be a stranger's: to send your key there, name it with --base-url \
+             {base}"
+        );
+        Err(Error::usage("--base-url", problem))
+    }
+
     /// The key from a file or a variable. For an endpoint on another machine a key is required, except with `none`.
     fn key(&self, base: &BaseUrl, vendor: Option<&'static Vendor>) -> Result<Option<Secret>> {
         if let Some(path) = &self.api_key_file {

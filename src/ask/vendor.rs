@@ -117,6 +117,12 @@ impl Vendor {
         self.key_form.iter().any(|form| has_form(key, form))
     }
 
+    /// Whether a vendor of the built-in table has a host of this very name; a name below a domain may be that of any customer.
+    pub(super) fn has_host(host: &str) -> bool {
+        let mut hosts = VENDORS.vendor.iter().flat_map(|vendor| &vendor.hosts);
+        hosts.any(|known| known == host)
+    }
+
     /// Whether a host is one of the vendor's.
     pub(super) fn is_of(&self, host: &str) -> bool {
         self.hosts.iter().any(|end| is_below(host, end))

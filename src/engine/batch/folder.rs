@@ -167,6 +167,9 @@ fn start() -> Result<runtime::Runtime> {
 }
 
 /// The address of the server: as the flags name it, else where the parts were made; `None` if nothing is left to do at a server.
+///
+/// # Errors
+/// If a key would go to an address that only the folder names.
 fn address(journal: &Journal, access: &AccessArgs) -> Result<Option<String>> {
     match &access.base_url[..] {
         [] => {}
@@ -197,5 +200,9 @@ fn address(journal: &Journal, access: &AccessArgs) -> Result<Option<String>> {
         let url = text.parse::<crate::ask::BaseUrl>();
         url.is_ok_and(|url| url.to_string() == base)
     });
-    Ok(Some(same.unwrap_or_else(|| base.to_owned())))
+    if let Some(same) = same {
+        return Ok(Some(same));
+    }
+    access.check_address_of_run(&base.parse()?)?;
+    Ok(Some(base.to_owned()))
 }
