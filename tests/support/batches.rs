@@ -22,6 +22,12 @@ pub struct Course {
     order: Order,
     /// The text of each answer.
     text: &'static str,
+    /// Looks at which the output file has no name yet.
+    late: usize,
+    /// The tokens of each answer.
+    tokens: u64,
+    /// Requests that the server does not count.
+    uncounted: usize,
 }
 
 /// What comes of one request.
@@ -46,6 +52,8 @@ pub enum Order {
     Twice,
     /// The last line is cut.
     Cut,
+    /// The file is empty.
+    Empty,
 }
 
 impl Course {
@@ -58,7 +66,25 @@ impl Course {
             line: |_| Line::Right,
             order: Order::AsSent,
             text: "C",
+            late: 0,
+            tokens: 1,
+            uncounted: 0,
         }
+    }
+
+    /// A batch of which the server does not count so many requests.
+    pub fn uncounted(self, uncounted: usize) -> Self {
+        Self { uncounted, ..self }
+    }
+
+    /// A batch whose output file has no name at so many looks.
+    pub fn late(self, late: usize) -> Self {
+        Self { late, ..self }
+    }
+
+    /// A batch whose answers are charged so many tokens each.
+    pub fn tokens(self, tokens: u64) -> Self {
+        Self { tokens, ..self }
     }
 
     pub fn text(self, text: &'static str) -> Self {
@@ -494,13 +520,28 @@ impl StoredBatch {
 
     fn object(&self) -> Value {
         let total = self.requests.len();
-        let done = if self.output.is_some() { total } else { 0 };
+        let has_ended = self.output.is_some() || self.errors.is_some();
+        let lines = (0..total).map(|i| (self.course.line)(i));
+        let right = lines.filter(|line| matches!(line, Line::Right)).count();
+        let (completed, failed) = if has_ended {
+            (right - self.course.uncounted, total - right)
+        } else {
+            (0, 0)
+        };
         json!({
             "id": self.id, "object": "batch", "endpoint": self.body["endpoint"],
             "errors": if self.state() == "failed" { self.course.errors.clone() } else { Value::Null },
             "input_file_id": self.body["input_file_id"], "completion_window": "24h", "status": self.state(),
-            "output_file_id": self.output, "error_file_id": self.errors, "created_at": 1,
-            "request_counts": {"total": total, "completed": done, "failed": 0}, "metadata": self.body["metadata"],
+            "output_file_id": self.output.as_ref().filter(|_| self.looks > self.course.late), "error_file_id": self.errors,
+            "created_at": 1, "metadata": self.body["metadata"],
+            "request_counts": {"total": total, "completed": completed, "failed": failed},
+        })
+    }
+
+    fn completion(&self, text: &str) -> Value {
+        json!({
+            "model": "m-1", "choices": [{"index": 0, "message": {"content": text}, "finish_reason": "stop"}],
+            "usage": {"prompt_tokens": 90, "completion_tokens": self.course.tokens},
         })
     }
 
@@ -509,7 +550,7 @@ impl StoredBatch {
         let (mut output, mut errors) = (Vec::new(), Vec::new());
         for (i, request) in self.requests.iter().enumerate() {
             match (self.course.line)(i) {
-                Line::Right => output.push(reply(request, 200, &completion(self.course.text))),
+                Line::Right => output.push(reply(request, 200, &self.completion(self.course.text))),
                 Line::Status(status, message) => {
                     let body = json!({"error": {"message": message, "type": "x", "param": null, "code": null}});
                     errors.push(reply(request, status, &body));
@@ -525,27 +566,23 @@ impl StoredBatch {
             Order::Reversed => output.reverse(),
             Order::Twice => {
                 let again = self.requests.iter();
-                output.extend(again.map(|one| reply(one, 200, &completion("A"))));
+                output.extend(again.map(|one| reply(one, 200, &self.completion("A"))));
             }
-            Order::AsSent | Order::Cut => {}
+            Order::AsSent | Order::Cut | Order::Empty => {}
         }
         let text = |lines: Vec<Value>| {
             let lines: Vec<String> = lines.iter().map(|line| format!("{line}\n")).collect();
             lines.concat().into_bytes()
         };
         let (mut output, errors) = (text(output), text(errors));
-        if self.course.order == Order::Cut {
-            output.truncate(output.len() - 40);
+        match self.course.order {
+            Order::Cut => output.truncate(output.len() - 40),
+            // A file without lines is one all the same.
+            Order::Empty => output = b"\n".to_vec(),
+            Order::AsSent | Order::Reversed | Order::Twice => {}
         }
         [output, errors]
     }
-}
-
-fn completion(text: &str) -> Value {
-    json!({
-        "model": "m-1", "choices": [{"index": 0, "message": {"content": text}, "finish_reason": "stop"}],
-        "usage": {"prompt_tokens": 90, "completion_tokens": 1},
-    })
 }
 
 fn reply(request: &Value, status: u16, body: &Value) -> Value {

@@ -94,6 +94,8 @@ impl BatchState {
 /// The numbers of requests in a batch.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct RequestCounts {
+    /// Requests with a reply.
+    pub answered: u64,
     /// Requests with a reply or a failure.
     pub done: u64,
     /// All requests; 0 while the server has not counted them.
@@ -138,6 +140,7 @@ impl RemoteBatch {
             output_file: text(object, "output_file_id"),
             error_file: text(object, "error_file_id"),
             counts: RequestCounts {
+                answered: count("completed").unwrap_or(0),
                 done: count("completed").unwrap_or(0) + count("failed").unwrap_or(0),
                 total: count("total").unwrap_or(0),
             },

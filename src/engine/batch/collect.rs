@@ -1,5 +1,6 @@
 //! The steps of a part after its batch is made: looking at it, fetching its replies, deleting its files.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::PathBuf;
 
@@ -8,12 +9,17 @@ use tokio::time::sleep;
 
 use super::driver::{Driver, Step, Until};
 use super::event::Event;
+use super::take_over::for_each_line;
 use crate::ask::batch_api::{ApiResult, BatchState, RemoteBatch};
 use crate::error::{Error, Result};
 use crate::score::record::Detail;
 
 /// Bytes that a reply may have; chosen: far more than the longest reply of a reasoning model.
 const MOST_REPLY_BYTES: u64 = 4 << 20;
+
+/// How many looks at a batch that has ended wait until its files have as many lines as the server counts; chosen: 19 minutes with the
+/// default of `--poll`.
+const MOST_INCOMPLETE: u32 = 10;
 
 /// How often a file is tried to be deleted; chosen.
 const DELETIONS: usize = 3;
@@ -119,11 +125,103 @@ impl<D: Detail> Driver<'_, D> {
             };
             let unfinished = path.with_extension("download");
             let loaded = self.server(part)?.download(id, &unfinished, most).await;
-            if let Err(failure) = loaded {
-                return self.look_failed(part, &failure);
+            match loaded {
+                Err(failure) if failure.is_permanent() => {
+                    let problem = format!("its file {id} cannot be fetched: {failure}");
+                    return self.incomplete(part, batch, &problem);
+                }
+                Err(failure) => return self.look_failed(part, &failure),
+                Ok(()) => {}
             }
             fs::rename(&unfinished, &path).map_err(|e| Error::file(&path, "write", e))?;
         }
+        if let Some(problem) = self.missing_lines(part, batch)? {
+            return self.incomplete(part, batch, &problem);
+        }
+        self.fetched_all(part, batch)
+    }
+
+    /// The difference between the server's counts and the lines of an ended batch's files; `None` if they agree, if none of its trials waits any
+    /// more, or if the user wants the batch to end.
+    fn missing_lines(&self, part: usize, batch: &RemoteBatch) -> Result<Option<String>> {
+        let Some(keys) = self.keys(part)? else {
+            return Ok(None);
+        };
+        let waiting = self.store.pending_in_batches()?;
+        if self.until == Until::Cancelled || !keys.iter().any(|key| waiting.contains(key)) {
+            return Ok(None);
+        }
+        let server = self.server(part)?;
+        let (mut lines, mut replies) = (BTreeSet::new(), BTreeSet::new());
+        for path in self.fetched(part).iter().filter(|path| path.exists()) {
+            for_each_line(path, |line| {
+                let line = server.line(line);
+                let key = line.as_ref().and_then(|line| line.id.parse().ok());
+                if let (Some(line), Some(key)) = (line, key.filter(|key| keys.contains(key))) {
+                    lines.insert(key);
+                    replies.extend(line.result.is_ok().then_some(key));
+                }
+                Ok(())
+            })?;
+        }
+        let (lines, replies) = (lines.len() as u64, replies.len() as u64);
+        let (counts, requests) = (batch.counts, keys.len() as u64);
+        let is_counted = counts.total > 0 || counts.done > 0;
+        let problem = match batch.state {
+            BatchState::Completed if is_counted && counts.done < requests => format!(
+                "the server counts {} of {requests} requests of a batch that is completed",
+                counts.done
+            ),
+            BatchState::Completed if !is_counted && lines < requests => {
+                format!("its files have {lines} lines for {requests} requests")
+            }
+            _ if lines < counts.done && replies < counts.answered => format!(
+                "the server counts {} replies, and its files have {replies}",
+                counts.answered
+            ),
+            _ => return Ok(None),
+        };
+        Ok(Some(problem))
+    }
+
+    /// A look at a batch that has ended and whose files are not complete: nothing is asked again and nothing deleted.
+    ///
+    /// # Errors
+    /// If they have not been complete for many looks. The replies that exist are imported then.
+    fn incomplete(&mut self, part: usize, batch: &RemoteBatch, problem: &str) -> Result<Step> {
+        let looks = self.notes.incomplete_looks.entry(part).or_default();
+        *looks += 1;
+        let has_ended = *looks >= MOST_INCOMPLETE;
+        let name = self.part(part).name.clone();
+        let text = format!("{name}: batch {}: {problem}", batch.id);
+        if self.until == Until::Cancelled {
+            return self.fetched_all(part, batch);
+        }
+        if self.until == Until::LookedAt {
+            self.warn_once(format!(
+                "{text}; nothing is imported, asked again or deleted; look again later"
+            ));
+            return Ok(Step::Waiting);
+        }
+        if !has_ended {
+            self.warn_once(format!("{text}; looked at again"));
+            return Ok(Step::Waiting);
+        }
+        self.import_lines(part)?;
+        let run = self.store.folder().display();
+        let problem = format!(
+            "{text}; nothing is asked again or deleted. The same command looks again; batch import {run} FILE imports a file of the \
+             server's page; batch cancel {run} frees the rest"
+        );
+        Err(Error::Endpoint {
+            endpoint: self.part(part).facts.base.clone(),
+            problem,
+        })
+    }
+
+    /// Notes that all files of a batch are fetched.
+    fn fetched_all(&mut self, part: usize, batch: &RemoteBatch) -> Result<Step> {
+        let files = [&batch.output_file, &batch.error_file];
         let event = Event::Fetched {
             state: batch.state.word().to_owned(),
             files: files.into_iter().flatten().cloned().collect(),

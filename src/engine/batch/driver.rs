@@ -106,6 +106,8 @@ pub(super) struct Notes {
     pub(super) failed_calls: BTreeMap<usize, u32>,
     /// Refused looks in a row, by part.
     pub(super) refused_looks: BTreeMap<usize, u32>,
+    /// Looks in a row at a batch that has ended and whose files are not complete, by part.
+    pub(super) incomplete_looks: BTreeMap<usize, u32>,
     /// Parts that have been looked at since the last wait.
     pub(super) looked_at: BTreeSet<usize>,
     /// US dollars that the stored replies were charged; `None` if it is to be summed again.

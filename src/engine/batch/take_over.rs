@@ -7,7 +7,7 @@ use std::path::Path;
 use super::driver::{Driver, Step};
 use super::event::Event;
 use super::part::Stage;
-use super::replies::{Imported, ReplyImport};
+use super::replies::{Imported, ReplyCounts, ReplyImport};
 use crate::ask::Model;
 use crate::error::{Error, Result};
 use crate::files::reading;
@@ -20,6 +20,29 @@ impl<'a, D: Detail> Driver<'a, D> {
         let Stage::Fetched { state } = self.part(part).stage.clone() else {
             return Ok(Step::Waiting);
         };
+        let (counts, unread) = self.read_lines(part, Some(&state))?;
+        let (answered, failed) = (counts.answered, counts.failed);
+        self.say_what_is_missing(part, unread)?;
+        self.say(part, &format!("{state}: {answered} answered, {failed} not"));
+        self.journal
+            .record(part, Event::TakenOver { answered, failed })?;
+        Ok(Step::Moved)
+    }
+
+    /// Imports the replies of files that are not complete; the other requests wait for them.
+    pub(super) fn import_lines(&mut self, part: usize) -> Result<()> {
+        let (counts, _) = self.read_lines(part, None)?;
+        let (answered, failed) = (counts.answered, counts.failed);
+        if answered + failed > 0 {
+            let line = format!("{answered} answered, {failed} not, as far as its files go");
+            self.say(part, &line);
+        }
+        Ok(())
+    }
+
+    /// Reads the lines of a part's files into the records. `ended` is the state in which the batch has ended for good: what has no line
+    /// has failed then. Returns the number of lines that cannot be read, too.
+    fn read_lines(&mut self, part: usize, ended: Option<&str>) -> Result<(ReplyCounts, usize)> {
         let (paths, keys) = (self.fetched(part), self.keys(part)?);
         let models = self.models_of(part);
         let mut refused = BTreeSet::new();
@@ -47,8 +70,10 @@ impl<'a, D: Detail> Driver<'a, D> {
                 Ok(())
             })?;
         }
-        for key in keys.iter().flatten() {
-            replies.fail(*key, without_line(&state))?;
+        if let Some(state) = ended {
+            for key in keys.iter().flatten() {
+                replies.fail(*key, without_line(state))?;
+            }
         }
         let counts = replies.finish()?;
         self.notes.charged.take();
@@ -56,12 +81,7 @@ impl<'a, D: Detail> Driver<'a, D> {
         if !is_adapted {
             self.refused.append(&mut refused);
         }
-        let (answered, failed) = (counts.answered, counts.failed);
-        self.say_what_is_missing(part, unread, keys.is_none());
-        self.say(part, &format!("{state}: {answered} answered, {failed} not"));
-        self.journal
-            .record(part, Event::TakenOver { answered, failed })?;
-        Ok(Step::Moved)
+        Ok((counts, unread))
     }
 
     /// The models that a part asks: several if one is asked with images and without. A model that has another name now is known by its id.
@@ -77,8 +97,9 @@ impl<'a, D: Detail> Driver<'a, D> {
         of_id.map(|(_, model)| model).collect()
     }
 
-    fn say_what_is_missing(&self, part: usize, unread: usize, is_file_gone: bool) {
+    fn say_what_is_missing(&self, part: usize, unread: usize) -> Result<()> {
         let name = &self.part(part).name;
+        let is_file_gone = self.keys(part)?.is_none();
         if unread > 0 {
             tracing::warn!(
                 "{name}: lines of its output that are not those of a Batch API: {unread}; their requests are asked again"
@@ -90,6 +111,7 @@ impl<'a, D: Detail> Driver<'a, D> {
                  folder when no batch is waiting at the server, to ask them again"
             );
         }
+        Ok(())
     }
 
     /// Ends a part without a batch, and frees its requests.
@@ -123,7 +145,7 @@ impl<'a, D: Detail> Driver<'a, D> {
     }
 
     /// The trials of a part, from its file; `None` if the file is gone.
-    fn keys(&self, part: usize) -> Result<Option<Vec<TrialKey>>> {
+    pub(super) fn keys(&self, part: usize) -> Result<Option<Vec<TrialKey>>> {
         let path = self.journal.file(part);
         if !path.exists() {
             return Ok(None);

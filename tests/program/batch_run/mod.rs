@@ -2,6 +2,7 @@
 
 mod ends;
 mod folder;
+mod incomplete;
 mod killed;
 mod limits;
 mod of_file;

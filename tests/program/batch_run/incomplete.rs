@@ -1,0 +1,110 @@
+//! Batches that have ended, and whose files are late, cut, empty or gone: nothing is asked and paid again, and nothing is deleted.
+
+use super::{BLIND, QUESTIONS, answered, assert_each_once, blind, call_with};
+use crate::support::batches::{Course, Fault, Line, MockBatches, Order};
+use crate::support::endpoint::Answer;
+use crate::support::run::{Bench, Called, words};
+
+/// Asserts that a call stopped with a message about the only batch, and that everything is still at the server.
+fn assert_stopped(mock: &MockBatches, called: &Called, case: &str) {
+    assert_eq!(called.code, Some(2), "{case}: {called:?}");
+    for words in ["batch batch_1: ", "nothing is asked again", "batch cancel"] {
+        assert!(called.stderr.contains(words), "{case}: {called:?}");
+    }
+    assert_eq!(mock.count("POST batches"), 1, "{case}");
+    assert_eq!(mock.count("DELETE files/id"), 0, "{case}");
+}
+
+#[test]
+fn an_output_that_is_named_later_is_waited_for() {
+    let course = Course::of("in_progress completed").late(4);
+    let (bench, mock, called) = blind(&[course], "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_each_once(&bench, &mock, QUESTIONS);
+    assert_eq!(mock.count("POST batches"), 1);
+}
+
+#[test]
+fn an_output_with_too_few_lines_stops_the_run() {
+    for (order, replies) in [(Order::Cut, QUESTIONS - 1), (Order::Empty, 0)] {
+        let courses = [
+            Course::of("completed").order(order),
+            Course::of("completed"),
+        ];
+        let (bench, mock, called) = blind(&courses, "");
+        assert_stopped(&mock, &called, &format!("{order:?}"));
+        // What is there is not lost.
+        assert_eq!(answered(&bench).len(), replies, "{order:?}");
+        let again = call_with(BLIND, &bench, &mock, "");
+        assert_stopped(&mock, &again, &format!("again {order:?}"));
+        // Only the user's word frees the rest.
+        let cancelled = bench.call(&words("batch cancel run --poll 0.02"));
+        assert_eq!(cancelled.code, Some(1), "{cancelled:?}");
+        let rest = call_with(BLIND, &bench, &mock, "");
+        assert_eq!(rest.code, Some(0), "{rest:?}");
+        assert_each_once_but_lost(&bench, &mock, QUESTIONS - replies);
+    }
+}
+
+/// Asserts that every trial has a reply, and that the second batch has so many requests.
+fn assert_each_once_but_lost(bench: &Bench, mock: &MockBatches, again: usize) {
+    assert_eq!(answered(bench).len(), QUESTIONS);
+    assert_eq!(mock.asked()[1].len(), again);
+}
+
+#[test]
+fn a_file_of_the_servers_page_ends_the_wait() {
+    let (bench, mock, called) = blind(&[Course::of("completed").order(Order::Cut)], "");
+    assert_stopped(&mock, &called, "cut");
+    let id = mock.asked()[0][QUESTIONS - 1].clone();
+    let body = r#"{"model":"m-1","choices":[{"message":{"content":"C"},"finish_reason":"stop"}]}"#;
+    let line = format!(r#"{{"custom_id":"{id}","response":{{"status_code":200,"body":{body}}}}}"#);
+    bench.file("page.jsonl", line + "\n");
+    let imported = bench.call(&words("batch import run page.jsonl"));
+    assert!(imported.stdout.contains("1 imported"), "{imported:?}");
+    let called = call_with(BLIND, &bench, &mock, "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_each_once(&bench, &mock, QUESTIONS);
+}
+
+#[test]
+fn an_output_that_is_deleted_ends_with_a_message() {
+    let bench = Bench::with_questions(QUESTIONS);
+    let mock = MockBatches::start([Course::of("completed")]);
+    for _ in 0..10 {
+        let gone = Answer::error(404, "not_found", "No such File object");
+        mock.fault("GET files/id/content", Fault::Instead(gone));
+    }
+    let called = call_with(BLIND, &bench, &mock, "");
+    assert_stopped(&mock, &called, "deleted");
+    assert!(called.stderr.contains("No such File object"), "{called:?}");
+}
+
+/// A server that counts only some of the requests of a batch that it calls completed.
+#[test]
+fn counts_that_are_not_complete_are_waited_for() {
+    let (bench, mock, called) = blind(&[Course::of("completed").uncounted(1)], "");
+    assert_stopped(&mock, &called, "uncounted");
+    assert_eq!(answered(&bench).len(), QUESTIONS);
+}
+
+#[test]
+fn fetch_imports_nothing_of_an_incomplete_batch() {
+    let courses = [Course::of("completed").order(Order::Cut)];
+    let (bench, mock, _) = blind(&courses, "--detach");
+    let fetched = bench.call(&words("batch fetch run"));
+    assert_eq!(fetched.code, Some(1), "{fetched:?}");
+    assert!(fetched.stderr.contains("look again later"), "{fetched:?}");
+    assert_eq!(
+        (answered(&bench).len(), mock.count("DELETE files/id")),
+        (0, 0)
+    );
+}
+
+#[test]
+fn failures_without_a_line_are_asked_again_as_counted() {
+    let some = Course::of("completed").lines(|i| [Line::Right, Line::Absent][i % 2]);
+    let (bench, mock, called) = blind(&[some, Course::of("completed")], "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_each_once_but_lost(&bench, &mock, QUESTIONS / 2);
+}
