@@ -7,7 +7,7 @@ use super::constraint::letter_of;
 use super::parameters::Constrain;
 use super::reply_secrets::without_secrets;
 use super::secret::Scrub;
-use super::wire::{batch_reply, batch_usage};
+use super::wire::{batch_reply, body_usage};
 use crate::types::{Failure, FailureKind, Reply, Usage};
 
 /// One line of an input file: `{"custom_id", "method", "url", "body"}` with a line end; the body is that of a single request.
@@ -52,7 +52,7 @@ impl BatchLine {
             id,
             charged: body
                 .filter(|_| result.is_err())
-                .and_then(|body| batch_usage(&text(body))),
+                .and_then(|body| body_usage(&text(body))),
             result,
             refusal: refusal(&line),
         })

@@ -247,6 +247,8 @@ impl Connection {
 
     /// The failure of a request without a complete response.
     fn failed_try(&self, error: reqwest::Error) -> FailedTry {
+        // A request whose connection was not made was not sent.
+        let may_be_charged = !error.is_connect();
         if error.is_timeout() {
             let timeout = self.timeout.as_secs_f64();
             let message = format!(
@@ -255,6 +257,7 @@ impl Connection {
             );
             return FailedTry {
                 again: Again::Later,
+                may_be_charged,
                 ..FailedTry::new(FailureKind::Timeout, message)
             };
         }
@@ -262,6 +265,7 @@ impl Connection {
         let Some(remedy) = permanent_cause(&text, self.base.is_plain()) else {
             return FailedTry {
                 again: Again::Later,
+                may_be_charged,
                 ..FailedTry::new(FailureKind::Connection, format!("{}: {text}", self.base))
             };
         };

@@ -19,6 +19,7 @@ use super::replica::Replica;
 use super::request::Request;
 use super::sending::Sending;
 use super::service::{Choice, Effect, ModelNumber, Services};
+use super::spending::{Charge, Reservation};
 use super::url::BaseUrl;
 use super::vendor::Vendor;
 use super::wire_kind::Wire;
@@ -193,12 +194,26 @@ impl Endpoint {
             .with_max_times(self.sending.retries as usize)
             .build();
         let (mut attempts, mut avoided, mut last) = (0, Vec::new(), None::<FailedTry>);
-        let mut lost = LostAttempts::default();
+        let (mut retried, mut lost) = (None, LostAttempts::default());
         loop {
-            let turn = self.turn(request, &avoided).await;
+            let turn = match self.unless_closed(hold(request.reservation)).await {
+                Ok(true) => self.turn(request, &avoided).await,
+                Ok(false) => Err(over_budget(retried.take())),
+                Err(closed) => Err(closed),
+            };
             let turn = turn.map_err(|e| last.take().unwrap_or(e).after(attempts, lost))?;
             attempts += 1;
-            let (failed, effect) = match self.send(request, turn).await {
+            request
+                .reservation
+                .inspect(|reservation| reservation.sent());
+            let sent = self.send(request, turn).await;
+            if let Some(reservation) = request.reservation {
+                reservation.ended(match &sent {
+                    Ok(reply) => reply.usage.map_or(Charge::Unknown, Charge::Stated),
+                    Err((failed, _)) => failed.charge(),
+                });
+            }
+            let (failed, effect) = match sent {
                 Ok(reply) => {
                     self.is_known.store(true, Ordering::Relaxed);
                     return Ok(Reply {
@@ -235,6 +250,7 @@ impl Endpoint {
             }
             debug!(endpoint = %base, ?delay, problem, "trying again");
             self.rest(delay).await;
+            retried = Some(failed);
         }
     }
 
@@ -326,6 +342,7 @@ impl Endpoint {
             let message = format!("{} served the model {served}", replica.base());
             let failed = FailedTry {
                 reach: Reach::Endpoint,
+                usage: reply.usage,
                 ..FailedTry::new(FailureKind::Response, message)
             };
             return Err((failed, effect));
@@ -386,6 +403,24 @@ impl Endpoint {
         );
         failed
     }
+}
+
+/// Holds the dollars of the next request; false if `--max-cost` does not allow it.
+async fn hold(reservation: Option<&Reservation>) -> bool {
+    match reservation {
+        Some(reservation) => reservation.hold().await,
+        None => true,
+    }
+}
+
+/// The failure of a question that is not asked again because of `--max-cost`.
+fn over_budget(last: Option<FailedTry>) -> FailedTry {
+    let Some(mut failed) = last else {
+        let message = "not asked again: --max-cost does not allow it".to_owned();
+        return FailedTry::new(FailureKind::Connection, message);
+    };
+    failed.failure.message += " (not asked again: --max-cost does not allow it)";
+    failed
 }
 
 /// The failure of a request that was charged for as many attempts as `--paid-retries` allows.

@@ -57,6 +57,12 @@ const OWNED: [(&str, &str); 15] = [
 /// Fields without which no request can be sent.
 const NEEDED: [&str; 4] = ["model", "messages", "input", "stream"];
 
+/// Fields that carry the token limit of a reply.
+const TOKEN_LIMITS: [&str; 3] = ["max_tokens", "max_completion_tokens", "max_output_tokens"];
+
+/// Fields that limit the tokens of thinking: DashScope's and Google's, Anthropic's, and that of llama.cpp.
+const THINKING_BUDGETS: [&str; 3] = ["thinking_budget", "budget_tokens", "reasoning_budget"];
+
 /// What the user adds to the body of every request or leaves out, and what tells two models of one name apart.
 ///
 /// The JSON form is part of the key of each trial. What is not set is not written, so that the keys of runs without it stay.
@@ -170,6 +176,18 @@ impl ExtraFields {
         object.is_some_and(|object| object.contains_key(field))
     }
 
+    /// Whether a field that carries the token limit is left out or removed.
+    pub(super) fn omits_token_limit(&self) -> bool {
+        self.omit
+            .iter()
+            .any(|field| TOKEN_LIMITS.contains(&&**field))
+    }
+
+    /// The limit of thinking tokens that the user's fields state, at any depth; `None` if they state none.
+    pub(super) fn thinking_budget(&self) -> Option<ThinkingBudget> {
+        thinking_budget(&self.body)
+    }
+
     /// A body, given as JSON without its messages, with the user's fields: the body is merged by JSON merge patch (RFC 7396), then
     /// the omitted fields are removed. Unchanged to the byte if the user sets nothing; else keys are sorted.
     pub(super) fn apply(&self, json: String) -> Result<String, serde_json::Error> {
@@ -183,6 +201,26 @@ impl ExtraFields {
         }
         serde_json::to_string(&fields)
     }
+}
+
+/// The limit of the tokens that a model may think.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ThinkingBudget {
+    Tokens(u64),
+    /// As many as the model likes: a negative number, by Google's convention.
+    Unlimited,
+}
+
+/// The budget in the first field for it.
+fn thinking_budget(fields: &Map<String, Value>) -> Option<ThinkingBudget> {
+    fields.iter().find_map(|(name, value)| match value {
+        Value::Object(inner) => thinking_budget(inner),
+        Value::Number(tokens) if THINKING_BUDGETS.contains(&&**name) => {
+            let budget = tokens.as_u64().map(ThinkingBudget::Tokens);
+            Some(budget.unwrap_or(ThinkingBudget::Unlimited))
+        }
+        _ => None,
+    })
 }
 
 /// Merges a patch into an object (RFC 7396, section 2).
@@ -300,6 +338,22 @@ mod tests {
             ..RequestArgs::default()
         };
         assert!(resolve(&args).is_err());
+    }
+
+    #[test]
+    fn thinking_budgets_are_found_at_any_depth() {
+        let budget = |body: &Value| {
+            let fields = ExtraFields {
+                body: object(body),
+                ..ExtraFields::default()
+            };
+            fields.thinking_budget()
+        };
+        let google = json!({"google": {"thinking_config": {"thinking_budget": -1}}});
+        assert_eq!(budget(&google), Some(ThinkingBudget::Unlimited));
+        let own = json!({"enable_thinking": true, "thinking_budget": 2048});
+        assert_eq!(budget(&own), Some(ThinkingBudget::Tokens(2048)));
+        assert_eq!(budget(&json!({"top_k": -1})), None);
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::field::AdaptableField;
+use super::spending::Charge;
 use crate::types::{Failure, FailureKind, LostAttempts, Usage};
 
 /// The requests that a failure affects.
@@ -37,6 +38,15 @@ pub struct AskError {
 }
 
 impl AskError {
+    /// A question whose request was given up while it was in flight. It may be paid for, and the same command asks it again.
+    pub(crate) fn given_up() -> Self {
+        let message = "given up while in flight, because the run was interrupted".to_owned();
+        Self {
+            reach: Reach::Interrupted,
+            ..Self::new(FailureKind::Timeout, message, 1)
+        }
+    }
+
     /// A failure without an HTTP status, which does not affect other questions.
     pub(super) fn new(kind: FailureKind, message: String, attempts: u32) -> Self {
         FailedTry::new(kind, message).after(attempts, LostAttempts::default())
@@ -63,16 +73,19 @@ pub(super) struct FailedTry {
     pub(super) wait: Option<Duration>,
     /// The field that the server refused, if the program can change how it is sent.
     pub(super) refused_field: Option<AdaptableField>,
-    /// The tokens that it was charged; `None` if it was charged none, as far as is known.
+    /// The tokens that it was charged; `None` if the server stated none.
     pub(super) usage: Option<Usage>,
+    /// Whether it may have been charged although the server stated no tokens: the server may have worked on it.
+    pub(super) may_be_charged: bool,
     /// The word for the reason why the model stopped, if that is why there is no reply.
     pub(super) finish: Option<String>,
 }
 
 impl FailedTry {
-    /// A failed request without an HTTP status, which is not retried.
+    /// A failed request without an HTTP status, which is not retried. It may have been charged if it timed out or has a reply.
     pub(super) fn new(kind: FailureKind, message: String) -> Self {
         Self {
+            may_be_charged: matches!(kind, FailureKind::Timeout | FailureKind::Response),
             failure: Failure {
                 kind,
                 status: None,
@@ -84,6 +97,16 @@ impl FailedTry {
             refused_field: None,
             usage: None,
             finish: None,
+        }
+    }
+
+    /// The charge for the request.
+    pub(super) fn charge(&self) -> Charge {
+        let stated = self.usage.filter(|usage| usage.total() > Some(0));
+        match stated {
+            Some(usage) => Charge::Stated(usage),
+            None if self.may_be_charged => Charge::Unknown,
+            None => Charge::Nothing,
         }
     }
 

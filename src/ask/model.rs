@@ -12,6 +12,7 @@ use super::parameters::Parameters;
 use super::random::Random;
 use super::remote::Remote;
 use super::script::Script;
+use super::spending::Reservation;
 use crate::error::Result;
 use crate::types::{Digest, Reply};
 
@@ -112,6 +113,18 @@ impl Model {
         Some(self.remote()?.parameters().max_tokens.get())
     }
 
+    /// The most tokens that a reply is charged, hidden reasoning included, if the server keeps to its limits; `None` if no limit holds
+    /// for all of them.
+    pub(crate) fn reply_limit(&self) -> Option<u64> {
+        self.remote()?.reply_limit()
+    }
+
+    /// The text of a request besides the question, in bytes: the system message.
+    pub(crate) fn system_bytes(&self) -> usize {
+        let system = self.remote().map(|model| &model.parameters().extra.system);
+        system.and_then(Option::as_ref).map_or(0, String::len)
+    }
+
     /// The body of a request as it would be sent now; `None` for models without requests.
     #[must_use]
     pub fn body(
@@ -190,8 +203,20 @@ impl Model {
 
     /// Asks one question. The future may be dropped at any time, which gives up the request.
     pub async fn ask(&self, call: Call<'_>) -> Result<Reply, AskError> {
+        self.ask_within(call, None).await
+    }
+
+    /// Asks one question; each of its requests holds this reservation while it is in flight.
+    pub(crate) async fn ask_within(
+        &self,
+        call: Call<'_>,
+        reservation: Option<&Reservation>,
+    ) -> Result<Reply, AskError> {
         match self {
-            Self::Remote(model) => model.ask(call.message, call.query.choices()).await,
+            Self::Remote(model) => {
+                let choices = call.query.choices();
+                model.ask_within(call.message, choices, reservation).await
+            }
             Self::Random(random) => {
                 let question = call.query.choice()?;
                 Ok(Reply::local(random.answer(question, call)))

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
+use super::token_bound::TokenBound;
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::types::Usage;
@@ -29,6 +30,13 @@ impl Price {
     #[must_use]
     pub(crate) fn of(&self, prompt: f64, reply: f64) -> f64 {
         (prompt * self.input + reply * self.output) / 1e6
+    }
+
+    /// The most that a request within a bound costs, in dollars.
+    #[must_use]
+    pub(crate) fn most(&self, bound: TokenBound) -> f64 {
+        let input = self.input.max(self.cached_input.unwrap_or(self.input));
+        (bound.prompt as f64 * input + bound.reply as f64 * self.output) / 1e6
     }
 
     /// The price in dollars of a request; tokens that the server did not state count as 0.

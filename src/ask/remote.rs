@@ -10,12 +10,16 @@ use tracing::warn;
 use super::call::Message;
 use super::constraint::letter_of;
 use super::endpoint::Endpoint;
+use super::extra_fields::ThinkingBudget;
 use super::failure::{AskError, Reach};
 use super::failure_class::FailureClass;
 use super::field::{AdaptableField, RequestFields, SentFields};
 use super::parameters::{Constrain, Parameters};
 use super::request::Request;
 use super::service::ModelNumber;
+use super::spending::Reservation;
+use super::thinking::Thinking;
+use super::token_field::TokenField;
 use super::vendor::Vendor;
 use crate::error::{Error, Result};
 use crate::types::{FailureKind, LostAttempts, Reply};
@@ -99,6 +103,27 @@ impl Remote {
         &self.parameters
     }
 
+    /// The most tokens that a reply is charged, hidden reasoning included, if the server keeps to its limits; `None` if no limit holds
+    /// for all of them.
+    pub(super) fn reply_limit(&self) -> Option<u64> {
+        let parameters = &self.parameters;
+        let field = self.fields().token_field;
+        let is_sent = field != TokenField::Omit && !parameters.extra.omits_token_limit();
+        let limit = u64::from(parameters.max_tokens.get());
+        let budget = parameters.extra.thinking_budget();
+        let is_apart = self
+            .endpoint
+            .vendor()
+            .is_some_and(|vendor| vendor.thinks_beyond_limit);
+        match budget {
+            _ if !is_sent => None,
+            Some(ThinkingBudget::Unlimited) => None,
+            _ if !is_apart || parameters.thinking == Some(Thinking::Off) => Some(limit),
+            Some(ThinkingBudget::Tokens(tokens)) => Some(limit.saturating_add(tokens)),
+            None => None,
+        }
+    }
+
     /// The changes to requests after the server refused a field: settings that are left to the program (`auto`) are adapted
     /// once for all requests, and never for a single one.
     #[must_use]
@@ -118,12 +143,22 @@ impl Remote {
 
     /// Sends the single message of a conversation with this number of choices; 0 if the question is open.
     pub async fn ask(&self, message: Message<'_>, choices: usize) -> Result<Reply, AskError> {
+        self.ask_within(message, choices, None).await
+    }
+
+    /// As [`Self::ask`]; each request holds the reservation while it is in flight.
+    pub(super) async fn ask_within(
+        &self,
+        message: Message<'_>,
+        choices: usize,
+        reservation: Option<&Reservation>,
+    ) -> Result<Reply, AskError> {
         let mut scout = self.scout.lock().await;
         match &*scout {
             Scout::Waiting => {}
             Scout::Ended => {
                 drop(scout);
-                let outcome = self.ask_adapting(message, choices).await;
+                let outcome = self.ask_adapting(message, choices, reservation).await;
                 return outcome.map_err(|error| reaching(error, Reach::Trial));
             }
             Scout::Refused(error) => {
@@ -134,7 +169,7 @@ impl Remote {
                 });
             }
         }
-        let outcome = self.ask_adapting(message, choices).await;
+        let outcome = self.ask_adapting(message, choices, reservation).await;
         let outcome = outcome.map_err(|error| reaching(error, Reach::Endpoint));
         *scout = match &outcome {
             Err(error) if error.reach == Reach::Endpoint => Scout::Refused(error.clone()),
@@ -145,11 +180,16 @@ impl Remote {
     }
 
     /// Asks, and again after each field that is adapted.
-    async fn ask_adapting(&self, message: Message<'_>, choices: usize) -> Result<Reply, AskError> {
+    async fn ask_adapting(
+        &self,
+        message: Message<'_>,
+        choices: usize,
+        reservation: Option<&Reservation>,
+    ) -> Result<Reply, AskError> {
         let (mut attempts, mut lost) = (0, LostAttempts::default());
         loop {
             let fields = self.fields();
-            match self.ask_with(fields, message, choices).await {
+            match self.ask_with(fields, message, choices, reservation).await {
                 Err(error) if self.adapt(fields, error.refused_field) => {
                     attempts += error.attempts;
                     lost = lost.plus(*error.lost);
@@ -206,6 +246,7 @@ impl Remote {
         fields: RequestFields,
         message: Message<'_>,
         choices: usize,
+        reservation: Option<&Reservation>,
     ) -> Result<Reply, AskError> {
         let parameters = &self.parameters;
         let body = fields.wire.body(parameters, fields, message, choices);
@@ -225,6 +266,7 @@ impl Remote {
                 has_key: self.endpoint.has_key(),
             },
             affinity: affinity(message),
+            reservation,
         };
         self.endpoint.ask(&request).await
     }

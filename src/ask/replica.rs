@@ -17,6 +17,7 @@ use super::request::Request;
 use super::sending::Sending;
 use super::url::BaseUrl;
 use super::vendor::Vendor;
+use super::wire::body_usage;
 use super::wire_kind::Wire;
 use crate::error::Result;
 use crate::types::{Failure, FailureKind, Finish, Reply};
@@ -191,7 +192,8 @@ impl Replica {
             again,
             wait,
             refused_field: class.refused_field,
-            usage: None,
+            usage: body_usage(&String::from_utf8_lossy(&answer.body)),
+            may_be_charged: status >= 500 && !refuses_work(status),
             finish: None,
         };
         self.pause(status, sent, &mut failed);
@@ -265,6 +267,11 @@ fn cut_reply(unreadable: &Unreadable, limit: Option<u32>) -> Option<Reply> {
         usage: unreadable.usage,
         ..Reply::local(String::new())
     })
+}
+
+/// Whether a server error means that the request was not worked on.
+fn refuses_work(status: u16) -> bool {
+    asks_for_pause(status) || matches!(status, 501 | 505)
 }
 
 /// Whether a status means that the server accepts no request at the moment.

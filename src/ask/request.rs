@@ -5,6 +5,7 @@ use reqwest::header::HeaderMap;
 use super::body::Parts;
 use super::field::SentFields;
 use super::service::ModelNumber;
+use super::spending::Reservation;
 use super::wire_kind::Wire;
 
 /// One request, which may be sent several times.
@@ -18,4 +19,6 @@ pub(super) struct Request<'a> {
     pub(super) sent: SentFields<'a>,
     /// A number that is the same for requests about the same images.
     pub(super) affinity: u64,
+    /// The dollars that each sending holds; `None` if the model has no known price.
+    pub(super) reservation: Option<&'a Reservation>,
 }

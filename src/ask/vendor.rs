@@ -30,6 +30,9 @@ pub struct Vendor {
     /// The field that carries the token limit.
     #[serde(default)]
     token_field: LimitField,
+    /// Whether the tokens of thinking do not count toward the token limit.
+    #[serde(default)]
+    pub(super) thinks_beyond_limit: bool,
     /// The largest image file, in bytes.
     pub(super) image_bytes: Option<usize>,
     /// The longest side of an image, in pixels.

@@ -1,20 +1,26 @@
 //! Cost of a run and its limit: [`Budget`].
 
-use crate::ask::Price;
+use std::sync::Arc;
+
+use crate::ask::{Price, PricedRequest, ReplyExcess, Reservation, Spending, TokenBound};
 use crate::engine::models::ModelUnderTest;
 use crate::engine::money::MoneySettings;
+use crate::engine::prompt_bounds::{self, PromptBounds, PromptFacts};
 use crate::error::{Error, Result};
 use crate::images::trial::{Item, Prompt, Trial};
 use crate::run_reports;
 use crate::store::StoredTrial;
 use crate::types::manifest::RunManifest;
-use crate::types::{ImageFacts, LostAttempts, Usage, Via};
+use crate::types::{ImageFacts, Unstated, Usage, Via};
 
 /// Characters of English text per token, by the rule of thumb of every provider.
 const CHARACTERS_PER_TOKEN: f64 = 4.0;
 
 /// Tokens of a message besides its text and images.
 const MESSAGE_TOKENS: f64 = 10.0;
+
+/// Tokens reserved for the first reply of a model without a token limit; chosen.
+const UNLIMITED_REPLY: u64 = 4096;
 
 /// Whose replies a run has: the models of all its phases, and those that its manifest knows from earlier commands.
 #[derive(Debug, Clone, Copy)]
@@ -36,17 +42,34 @@ impl Answering<'_> {
     }
 }
 
-/// The sum of what replies cost, and the decision whether one more question is within `--max-cost`.
+/// Cost of a run so far and the upper bounds of its requests, which `--max-cost` limits.
 #[derive(Debug)]
 pub(crate) struct Budget {
-    /// Price of each model; `None` if it is free or unknown.
-    prices: Vec<Option<Price>>,
-    /// Limit in US dollars; `None` for no limit.
-    max_cost: Option<f64>,
-    /// US dollars spent so far.
-    spent: f64,
-    /// Cost of the most expensive reply so far, in US dollars; `None` before the first reply.
-    highest_cost: Option<f64>,
+    models: Vec<ModelBudget>,
+    spending: Arc<Spending>,
+    /// Stored requests without stated tokens: their number, and the most that they can have cost, in US dollars.
+    unstated: (u32, f64),
+}
+
+/// Price and bounds of the requests to one model.
+#[derive(Debug)]
+struct ModelBudget {
+    /// `None` if the model is free, or its price is unknown.
+    price: Option<Price>,
+    prompts: PromptBounds,
+    /// Replies beyond the token limit.
+    excess: Arc<ReplyExcess>,
+}
+
+/// Whether a question may be asked now.
+#[derive(Debug)]
+pub(crate) enum Permit {
+    /// It costs nothing, as far as is known.
+    Free,
+    /// It may cost as much as is reserved.
+    Reserved(Box<Reservation>),
+    /// It may not be asked before others have ended.
+    Refused,
 }
 
 impl Budget {
@@ -77,12 +100,16 @@ impl Budget {
         answering: Answering<'_>,
         stored: &[StoredTrial],
     ) -> Result<Self> {
-        let price = |model: &ModelUnderTest| model.price(&money.prices);
-        let prices: Vec<Option<Price>> = models.iter().map(price).collect();
+        let budgets = models.iter().map(|model| ModelBudget {
+            price: model.price(&money.prices),
+            prompts: PromptBounds::new(),
+            excess: Arc::default(),
+        });
+        let budgets: Vec<ModelBudget> = budgets.collect();
         let unknown = models
             .iter()
-            .zip(&prices)
-            .find(|(model, price)| model.model.is_remote() && price.is_none());
+            .zip(&budgets)
+            .find(|(model, budget)| model.model.is_remote() && budget.price.is_none());
         if let (Some(_), Some((model, _))) = (money.max_cost, unknown) {
             return Err(Error::usage(
                 "--max-cost",
@@ -93,66 +120,85 @@ impl Budget {
                 ),
             ));
         }
-        let mut budget = Self {
-            prices,
-            max_cost: money.max_cost,
-            spent: 0.0,
-            highest_cost: None,
+        let costs = stored.iter().filter_map(|record| {
+            let price = answering.price(money, &record.model)?;
+            Some(share(money, record.via) * charged(price, record))
+        });
+        let unstated = stored.iter().filter_map(|record| {
+            let price = answering.price(money, &record.model)?;
+            let unstated = record.lost()?.unstated;
+            let dollars = share(money, record.via) * price.most(bound(unstated));
+            Some((unstated.requests, dollars))
+        });
+        Ok(Self {
+            unstated: unstated.fold((0, 0.0), |(count, sum), (requests, dollars)| {
+                (count + requests, sum + dollars)
+            }),
+            models: budgets,
+            spending: Arc::new(Spending::new(money.max_cost, costs.sum())),
+        })
+    }
+
+    /// The same budget, with this much in US dollars that requests without a record may cost: those of batches that have not ended, and
+    /// those of killed processes.
+    pub(crate) fn with_unrecorded(self, dollars: f64) -> Self {
+        let max_cost = self.spending.limit();
+        let spending = Spending::new(max_cost, self.spending.spent()).with_elsewhere(dollars);
+        Self {
+            spending: Arc::new(spending),
+            ..self
+        }
+    }
+
+    /// Permission to ask a question now: its first request, at the upper bound of its cost.
+    pub(crate) fn permit<'a, I: Item>(
+        &self,
+        model: &ModelUnderTest,
+        trial: &Trial<I>,
+        images: impl Iterator<Item = &'a ImageFacts> + Clone,
+    ) -> Permit {
+        let Some(request) = self.request(model, trial, images) else {
+            return Permit::Free;
         };
-        for record in stored {
-            let Some(price) = answering.price(money, &record.model) else {
-                continue;
-            };
-            if let Some(lost) = record.lost() {
-                let share = match record.via {
-                    Via::Direct | Via::File => 1.0,
-                    Via::Batch => money.prices.batch,
-                };
-                budget.spent += share * price.charged(lost);
-            }
-            let Some(usage) = record.usage() else {
-                continue;
-            };
-            let dollars = price.charged(usage);
-            match record.via {
-                Via::Direct | Via::File => budget.add(dollars),
-                // A batch price does not tell what a direct request costs, so it does not enter `highest_cost`.
-                Via::Batch => budget.spent += money.prices.batch * dollars,
-            }
-        }
-        Ok(budget)
+        let reservation = self.spending.reserve(request);
+        reservation.map_or(Permit::Refused, |held| Permit::Reserved(Box::new(held)))
     }
 
-    /// Adds the cost of a reply. If the server reports no usage, the cost follows from the expected tokens of prompt and reply.
-    pub(crate) fn record(&mut self, model: usize, usage: Option<Usage>, prompt: f64, reply: f64) {
-        match (usage, self.prices[model]) {
-            (Some(usage), _) => self.charge(model, usage),
-            (None, Some(price)) => self.add(price.of(prompt, reply)),
-            (None, None) => {}
-        }
+    /// A trial's request with the upper bound of its tokens; `None` if its model has no known price.
+    pub(crate) fn request<'a, I: Item>(
+        &self,
+        model: &ModelUnderTest,
+        trial: &Trial<I>,
+        images: impl Iterator<Item = &'a ImageFacts> + Clone,
+    ) -> Option<PricedRequest> {
+        let budget = &self.models[trial.model];
+        let price = budget.price?;
+        let sizes = prompt_bounds::sizes(images.clone());
+        let image_tokens = self.expected_image_tokens((trial.model, model), images);
+        let facts = facts(model, trial, &sizes, image_tokens);
+        Some(PricedRequest {
+            price,
+            bound: TokenBound {
+                prompt: budget.prompts.bound(facts),
+                reply: model.model.reply_limit().unwrap_or(UNLIMITED_REPLY),
+            },
+            excess: Arc::clone(&budget.excess),
+        })
     }
 
-    /// Adds the cost of attempts without a reply.
-    pub(crate) fn record_lost(&mut self, model: usize, lost: LostAttempts) {
-        if let Some(price) = self.prices[model].filter(|_| !lost.is_none()) {
-            self.spent += price.charged(lost.usage);
-            let each = price.charged(lost.usage) / f64::from(lost.attempts);
-            self.highest_cost = Some(self.highest_cost.map_or(each, |highest| highest.max(each)));
-        }
-    }
-
-    fn charge(&mut self, model: usize, usage: Usage) {
-        if let Some(price) = self.prices[model] {
-            self.add(price.charged(usage));
-        }
-    }
-
-    fn add(&mut self, dollars: f64) {
-        self.spent += dollars;
-        self.highest_cost = Some(
-            self.highest_cost
-                .map_or(dollars, |highest_cost| highest_cost.max(dollars)),
-        );
+    /// Takes the charged tokens of a trial's prompt into account for the bounds of later ones.
+    pub(crate) fn observe<'a, I: Item>(
+        &mut self,
+        model: &ModelUnderTest,
+        trial: &Trial<I>,
+        images: impl Iterator<Item = &'a ImageFacts> + Clone,
+        usage: Usage,
+    ) {
+        let sizes = prompt_bounds::sizes(images.clone());
+        let image_tokens = self.expected_image_tokens((trial.model, model), images);
+        let facts = facts(model, trial, &sizes, image_tokens);
+        let charged = usage.prompt_tokens.unwrap_or(0);
+        self.models[trial.model].prompts.observe(facts, charged);
     }
 
     /// Expected tokens of a trial's prompt: its text by length, its images by the model's family.
@@ -162,7 +208,7 @@ impl Budget {
         trial: &Trial<I>,
         images: impl Iterator<Item = &'a ImageFacts>,
     ) -> f64 {
-        let price = self.prices[trial.model];
+        let price = self.models[trial.model].price;
         let images = images.map(|image| image_tokens(model, price, image.width, image.height));
         text_tokens(&trial.prompt) + images.map(|tokens| tokens.unwrap_or(0.0)).sum::<f64>()
     }
@@ -173,7 +219,7 @@ impl Budget {
         (index, model): (usize, &ModelUnderTest),
         mut images: impl Iterator<Item = &'a ImageFacts>,
     ) -> Option<f64> {
-        let price = self.prices[index];
+        let price = self.models[index].price;
         images.try_fold(0.0, |sum, image| {
             Some(sum + image_tokens(model, price, image.width, image.height)?)
         })
@@ -181,46 +227,74 @@ impl Budget {
 
     /// US dollars spent so far; `None` if no model has a price.
     pub(crate) fn spent(&self) -> Option<f64> {
-        self.prices
-            .iter()
-            .any(Option::is_some)
-            .then_some(self.spent)
-    }
-
-    /// Whether a model has a price.
-    pub(crate) fn is_paid(&self, model: usize) -> bool {
-        self.prices[model].is_some()
+        let mut models = self.models.iter();
+        models
+            .any(|model| model.price.is_some())
+            .then(|| self.spending.spent())
     }
 
     /// US dollars spent so far, by all models with a price.
     pub(crate) fn charged(&self) -> f64 {
-        self.spent
+        self.spending.spent()
+    }
+
+    /// Stored requests without stated tokens: their number, and the most that they can have cost, in US dollars.
+    pub(crate) fn unstated(&self) -> (u32, f64) {
+        self.unstated
+    }
+
+    /// The dollars that all requests share.
+    pub(crate) fn spending(&self) -> &Arc<Spending> {
+        &self.spending
+    }
+
+    /// Replies of a model beyond the token limit.
+    pub(crate) fn excess(&self, model: usize) -> &ReplyExcess {
+        &self.models[model].excess
     }
 
     /// Expected cost of a request to a model, in US dollars; `None` if it has no known price.
     pub(crate) fn expected_cost(&self, model: usize, prompt: f64, reply: f64) -> Option<f64> {
-        Some(self.prices[model]?.of(prompt, reply))
+        Some(self.models[model].price?.of(prompt, reply))
     }
+}
 
-    /// Whether one more question is within `--max-cost`, if each request in flight costs as much as the most expensive reply so
-    /// far. Until the first reply, one question is asked at a time, because the length of the model's reasoning is unknown.
-    pub(crate) fn can_afford(
-        &self,
-        in_flight: usize,
-        model: usize,
-        prompt: f64,
-        reply: f64,
-    ) -> bool {
-        let (Some(max_cost), Some(price)) = (self.max_cost, self.prices[model]) else {
-            return true;
-        };
-        let expected = price.of(prompt, reply);
-        match self.highest_cost {
-            None => in_flight == 0 && expected <= max_cost,
-            Some(highest_cost) => {
-                self.spent + highest_cost.max(expected) * (in_flight + 1) as f64 <= max_cost
-            }
-        }
+/// Share of its price that a trial costs, by the way in which it was asked.
+fn share(money: &MoneySettings, via: Via) -> f64 {
+    match via {
+        Via::Direct | Via::File => 1.0,
+        Via::Batch => money.prices.batch,
+    }
+}
+
+/// US dollars that all requests of a stored trial were charged, or may have been charged.
+fn charged(price: Price, record: &StoredTrial) -> f64 {
+    let reply = record.usage().map_or(0.0, |usage| price.charged(usage));
+    let others = record.lost();
+    reply
+        + others.map_or(0.0, |lost| {
+            price.charged(lost.usage) + price.most(bound(lost.unstated))
+        })
+}
+
+fn bound(unstated: Unstated) -> TokenBound {
+    TokenBound {
+        prompt: unstated.prompt_tokens,
+        reply: unstated.completion_tokens,
+    }
+}
+
+fn facts<'a, I: Item>(
+    model: &ModelUnderTest,
+    trial: &'a Trial<I>,
+    sizes: &'a [(usize, usize)],
+    image_tokens: Option<f64>,
+) -> PromptFacts<'a> {
+    PromptFacts {
+        prompt: &trial.prompt,
+        sizes,
+        system_bytes: model.model.system_bytes(),
+        image_tokens,
     }
 }
 

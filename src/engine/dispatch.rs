@@ -7,12 +7,15 @@ use std::time::{Duration, Instant};
 
 use tokio::runtime;
 use tokio::sync::mpsc::{self, Receiver, Sender};
+use tokio::sync::watch;
 use tokio::task::{JoinError, JoinSet};
 use tokio::time::timeout;
 
-use crate::ask::{AskError, Call, Reach};
-use crate::engine::budget::{Budget, text_tokens};
+use crate::ask::{AskError, Call, Reach, Reservation};
+use crate::engine::budget::{Budget, Permit, text_tokens};
+use crate::engine::budget_notes::BudgetNotes;
 use crate::engine::circuit_breaker::{CircuitBreaker, EndReason};
+use crate::engine::in_flight_cost::InFlightCost;
 use crate::engine::interrupt::Interrupt;
 use crate::engine::lanes::{Lanes, PreparedTrial};
 use crate::engine::measured_tokens::MeasuredTokens;
@@ -28,7 +31,7 @@ use crate::images::trial::{Item, PreparedGroup};
 use crate::images::workers::unstarted;
 use crate::score::record::answered;
 use crate::store::Store;
-use crate::types::{Failure, FailureKind, Finish, Record, Reply};
+use crate::types::{Failure, FailureKind, Finish, LostAttempts, Record, Reply};
 
 /// Number of finished groups that may wait until they are asked about.
 const GROUPS_AHEAD: usize = 2;
@@ -39,6 +42,7 @@ pub(crate) struct Dispatcher<'a> {
     pub(crate) progress: &'a Progress,
     pub(crate) settings: &'a JobSettings,
     pub(crate) timings: &'a Timings,
+    pub(crate) in_flight_cost: InFlightCost,
 }
 
 /// The numbers of all trials and of those answered, in one phase.
@@ -82,6 +86,10 @@ impl Dispatcher<'_> {
             truncation: TruncationCheck::default(),
             measured: MeasuredTokens::new(self.models.len()),
             said_difference: vec![Said::NotYet; self.models.len()],
+            first_questions: vec![FirstQuestion::NotAsked; self.models.len()],
+            limits: BudgetNotes::new(self.models),
+            given_up: watch::Sender::new(false),
+            in_flight_cost: self.in_flight_cost,
         };
         std::thread::scope(|scope| {
             scope.spawn(move || make(&sender));
@@ -123,6 +131,21 @@ struct ReplySink<'a, I: Item> {
     measured: MeasuredTokens,
     /// Of each model, whether the user knows how far the estimate is from what is charged.
     said_difference: Vec<Said>,
+    /// The first question to each model.
+    first_questions: Vec<FirstQuestion>,
+    /// Notices about the limit of cost.
+    limits: BudgetNotes<'a>,
+    /// Whether the requests in flight are given up.
+    given_up: watch::Sender<bool>,
+    in_flight_cost: InFlightCost,
+}
+
+/// The first question to a model. With `--max-cost` others wait for its end, as the tokens of prompts are only estimated before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum FirstQuestion {
+    NotAsked,
+    InFlight,
+    Ended,
 }
 
 /// Whether something was said, or need not be said any more.
@@ -140,15 +163,21 @@ impl<I: Item> ReplySink<'_, I> {
         let mut interrupt = Interrupt::listen()?;
         let mut grace = None;
         let mut more_groups = true;
+        let spending = Arc::clone(self.budget.spending());
+        self.limits.say_unlimited(&spending);
         loop {
             while let Some(ready) = self.next(&mut lanes) {
-                if self.can_afford(&lanes, &ready) {
-                    let model = &self.dispatcher.models[ready.trial.model];
-                    in_flight.spawn(send(model.clone(), ready));
-                } else {
-                    lanes.put_back(ready);
+                match self.permit(&ready) {
+                    Permit::Refused => lanes.put_back(ready),
+                    permit => {
+                        self.note_in_flight()?;
+                        let model = &self.dispatcher.models[ready.trial.model];
+                        let given_up = self.given_up.subscribe();
+                        in_flight.spawn(send(model.clone(), ready, permit, given_up));
+                    }
                 }
             }
+            self.show_counts(lanes.is_held_back());
             if in_flight.is_empty() && !lanes.is_empty() {
                 self.breaker.over_budget();
             }
@@ -188,6 +217,7 @@ impl<I: Item> ReplySink<'_, I> {
                     }
                     None => more_groups = false,
                 },
+                () = spending.released(), if lanes.is_held_back() => lanes.release(),
             }
         }
         // The image pipeline ends as soon as this channel is closed.
@@ -203,6 +233,7 @@ impl<I: Item> ReplySink<'_, I> {
             );
         }
         self.store.sync()?;
+        self.in_flight_cost.end(self.store.folder())?;
         Ok(self.breaker.into_end())
     }
 
@@ -228,14 +259,44 @@ impl<I: Item> ReplySink<'_, I> {
         )
     }
 
-    /// Whether `--max-cost` allows a trial, which is counted in its lane already.
-    fn can_afford(&self, lanes: &Lanes<'_, I>, ready: &PreparedTrial<I>) -> bool {
-        let (model, prompt_tokens) = (ready.trial.model, self.expected_tokens(ready));
-        let paid = lanes.in_flight(|model| self.budget.is_paid(model));
-        let others = paid.saturating_sub(1);
-        let reply_tokens = ready.trial.item.reply_tokens();
-        self.budget
-            .can_afford(others, model, prompt_tokens, reply_tokens)
+    /// Whether a trial may be asked now.
+    fn permit(&mut self, ready: &PreparedTrial<I>) -> Permit {
+        let index = ready.trial.model;
+        let is_limited = self.budget.spending().limit().is_some();
+        if is_limited && self.first_questions[index] == FirstQuestion::InFlight {
+            return Permit::Refused;
+        }
+        let model = &self.dispatcher.models[index];
+        let images = ready.stimulus.images.iter().map(|image| image.facts());
+        let permit = self.budget.permit(model, &ready.trial, images);
+        if let (Permit::Reserved(_), FirstQuestion::NotAsked) =
+            (&permit, self.first_questions[index])
+        {
+            self.first_questions[index] = FirstQuestion::InFlight;
+        }
+        permit
+    }
+
+    /// Notes the cost of the requests in flight, if it is limited.
+    fn note_in_flight(&mut self) -> Result<()> {
+        let spending = self.budget.spending();
+        if spending.limit().is_none() {
+            return Ok(());
+        }
+        let reserved = spending.reserved();
+        self.in_flight_cost.raise(self.store.folder(), reserved)
+    }
+
+    /// Shows the numbers of trials and the cost so far, and whether `--max-cost` keeps requests back.
+    fn show_counts(&self, is_held_back: bool) {
+        let pace = if is_held_back {
+            " · slowed by --max-cost"
+        } else {
+            ""
+        };
+        let failures = self.breaker.failures();
+        self.bar
+            .count(self.answered, failures, self.budget.spent(), pace);
     }
 
     /// Adds the time waited in a state to the timings.
@@ -297,17 +358,10 @@ impl<I: Item> ReplySink<'_, I> {
                     "requests given up while in flight: {}; they may be paid for, and the same command asks them again",
                     in_flight.len()
                 );
-                in_flight.abort_all();
+                self.given_up.send_replace(true);
             }
         }
         Ok(())
-    }
-
-    /// Expected tokens of a trial's prompt.
-    fn expected_tokens(&self, ready: &PreparedTrial<I>) -> f64 {
-        let model = &self.dispatcher.models[ready.trial.model];
-        let images = ready.stimulus.images.iter().map(|image| image.facts());
-        self.budget.expected_tokens(model, &ready.trial, images)
     }
 
     /// The trials of a group, ready to be asked. If the images could not be made, all of them fail instead.
@@ -392,10 +446,15 @@ impl<I: Item> ReplySink<'_, I> {
             Err(panic) => std::panic::resume_unwind(panic.into_panic()),
         };
         let trial = &ready.trial;
-        let lost = result
+        // Trials without an image are not asked.
+        if result
             .as_ref()
-            .map_or_else(|error| *error.lost, |reply| reply.lost);
-        self.budget.record_lost(trial.model, lost);
+            .map_or_else(|error| error.attempts, |reply| reply.attempts)
+            > 0
+        {
+            self.first_questions[trial.model] = FirstQuestion::Ended;
+        }
+        self.limits.say_exceeded(trial.model, &self.budget);
         match &result {
             Ok(_) => {
                 self.breaker.succeeded(trial.model);
@@ -412,8 +471,8 @@ impl<I: Item> ReplySink<'_, I> {
                 let may_be_cause = self.suspects.may_be_cause(trial.model, source);
                 self.breaker
                     .failed(trial.model, error, source, may_be_cause);
-                // If the endpoint is the cause or the run ends, the trial does not count as asked.
-                if error.reach != Reach::Trial {
+                // If the endpoint is the cause or the run ends, the trial does not count as asked, unless it cost something.
+                if error.reach != Reach::Trial && error.lost.is_none() {
                     return Ok(());
                 }
             }
@@ -422,13 +481,12 @@ impl<I: Item> ReplySink<'_, I> {
             self.answered += 1;
             self.truncation.count(reply);
             self.compare_with_estimate(&ready, reply);
-            let (model, prompt_tokens) = (ready.trial.model, self.expected_tokens(&ready));
-            let reply_tokens = ready.trial.item.reply_tokens();
-            self.budget
-                .record(model, reply.usage, prompt_tokens, reply_tokens);
+            if let Some(usage) = reply.usage {
+                let model = &self.dispatcher.models[trial.model];
+                let images = ready.stimulus.images.iter().map(|image| image.facts());
+                self.budget.observe(model, trial, images, usage);
+            }
         }
-        self.bar
-            .count(self.answered, self.breaker.failures(), self.budget.spent());
         let model = &self.dispatcher.models[ready.trial.model];
         let blank = I::blank(&ready.trial, &ready.stimulus, &model.name);
         self.store.append(&match result {
@@ -442,8 +500,13 @@ impl<I: Item> ReplySink<'_, I> {
     }
 }
 
-/// Sends one trial to its model; the trial with its reply or error.
-async fn send<I: Item>(model: ModelUnderTest, ready: PreparedTrial<I>) -> Finished<I> {
+/// Sends one trial to its model, unless it is given up before; the trial with its reply or error, and all that either may have cost.
+async fn send<I: Item>(
+    model: ModelUnderTest,
+    ready: PreparedTrial<I>,
+    permit: Permit,
+    mut given_up: watch::Receiver<bool>,
+) -> Finished<I> {
     let PreparedTrial { trial, stimulus } = &ready;
     let call = Call {
         query: trial.item.query(),
@@ -451,6 +514,29 @@ async fn send<I: Item>(model: ModelUnderTest, ready: PreparedTrial<I>) -> Finish
         message: trial.prompt.message(&stimulus.images),
         turn: trial.item.turn(),
     };
-    let result = model.model.ask(call).await;
+    let reservation = match &permit {
+        Permit::Reserved(reservation) => Some(&**reservation),
+        Permit::Free | Permit::Refused => None,
+    };
+    let asked = tokio::select! {
+        biased;
+        result = model.model.ask_within(call, reservation) => Some(result),
+        _ = given_up.wait_for(|given_up| *given_up) => None,
+    };
+    let charged = reservation.map_or_else(LostAttempts::default, Reservation::charged);
+    let result = match asked {
+        Some(Ok(mut reply)) => {
+            reply.lost.unstated = charged.unstated;
+            Ok(reply)
+        }
+        Some(Err(mut error)) => {
+            error.lost.unstated = charged.unstated;
+            Err(error)
+        }
+        None => Err(AskError {
+            lost: Box::new(charged),
+            ..AskError::given_up()
+        }),
+    };
     (ready, result)
 }

@@ -144,16 +144,18 @@ impl<'a, I> Lanes<'a, I> {
     pub(crate) fn ended(&mut self, model: usize) {
         let lane = &mut self.all[self.of_model[model]];
         lane.in_flight = lane.in_flight.saturating_sub(1);
-        self.all.iter_mut().for_each(|lane| lane.is_held = false);
+        self.release();
     }
 
-    /// The number of trials in flight of models for which `is_counted` holds, by lane.
-    pub(crate) fn in_flight(&self, is_counted: impl Fn(usize) -> bool) -> usize {
-        let lanes = self
-            .all
-            .iter()
-            .filter(|lane| lane.models.iter().any(|model| is_counted(*model)));
-        lanes.map(|lane| lane.in_flight).sum()
+    /// Whether the budget keeps back a trial that its endpoint would take now.
+    pub(crate) fn is_held_back(&self) -> bool {
+        let mut lanes = self.all.iter();
+        lanes.any(|lane| lane.is_held && lane.in_flight < self.width(lane))
+    }
+
+    /// Tries again the trials that the budget did not allow.
+    pub(crate) fn release(&mut self) {
+        self.all.iter_mut().for_each(|lane| lane.is_held = false);
     }
 
     /// Whether no trial waits.

@@ -6,6 +6,7 @@
 
 pub(crate) mod batch;
 pub(crate) mod budget;
+pub(crate) mod budget_notes;
 pub(crate) mod circuit_breaker;
 pub(crate) mod dark_already;
 pub(crate) mod dispatch;
@@ -13,6 +14,7 @@ pub(crate) mod estimate;
 pub(crate) mod experiment;
 pub(crate) mod folder;
 pub(crate) mod identity;
+pub(crate) mod in_flight_cost;
 pub(crate) mod interrupt;
 pub(crate) mod job;
 pub(crate) mod key_facts;
@@ -25,6 +27,7 @@ pub(crate) mod observer;
 pub(crate) mod open_run;
 pub(crate) mod plan_costs;
 pub(crate) mod planned_images;
+pub(crate) mod prompt_bounds;
 pub(crate) mod settings;
 pub(crate) mod suspects;
 pub(crate) mod truncation;

@@ -1,16 +1,18 @@
 //! A run that is open for writing: [`OpenRun`].
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::fmt::Write as _;
 use std::path::Path;
 use std::time::Instant;
 
 use crate::ask::ImageLimit;
+use crate::engine::batch::journal::Journal;
 use crate::engine::budget::{Answering, Budget};
 use crate::engine::circuit_breaker::EndReason;
 use crate::engine::dark_already;
 use crate::engine::dispatch::{Dispatcher, TrialCounts};
 use crate::engine::experiment::{DetailOf, Experiment};
+use crate::engine::in_flight_cost::InFlightCost;
 use crate::engine::manifest;
 use crate::engine::models::{self, ModelUnderTest};
 use crate::engine::settings::JobSettings;
@@ -29,9 +31,11 @@ use crate::images::thumbnail::MissingThumbnails;
 use crate::images::timings::Timings;
 use crate::images::workers::Workers;
 use crate::report::forecast::money;
+use crate::report::words::counted;
 use crate::runs::first_source::first_source;
 use crate::runs::other_parts::OtherParts;
 use crate::runs::outcome::Outcome;
+use crate::runs::over_budget::OverBudget;
 use crate::runs::part_cost::PartCost;
 use crate::runs::record_table;
 use crate::runs::stored::StoredRun;
@@ -39,6 +43,9 @@ use crate::store::now;
 use crate::store::{self, Store, StoredTrial};
 use crate::types::manifest::{Counts, RunManifest};
 use crate::types::{EnhancerName, TrialKey, View};
+
+/// Share of `--max-cost` below which a cost that no server stated is not mentioned; chosen.
+const SMALL_SHARE: f64 = 0.01;
 
 /// A run folder that no other process writes to, with all that asking needs.
 pub(crate) struct OpenRun<'a, E: Experiment> {
@@ -95,21 +102,63 @@ impl<E: Experiment> OpenRun<'_, E> {
             let adapted = models::adapted(self.experiment.models(phase));
             self.manifest.settings.extend(adapted);
         }
+        self.note_cost()?;
+        self.finish(end)
+    }
+
+    /// Notes in the manifest what the run cost beyond its limit, and what a shard has left of its share.
+    pub(crate) fn note_cost(&mut self) -> Result<()> {
+        let settings = self.experiment.settings();
+        let Some(limit) = settings.money.max_cost else {
+            return Ok(());
+        };
         let models = every_model(self.experiment);
         let answering = Answering {
             models: &models,
             manifest: Some(&self.manifest),
         };
-        if let Some(share) = settings.money.max_cost.filter(|_| settings.shard.is_part()) {
-            let trials = self.store.trials()?;
-            let budget = Budget::of_run(&settings.money, &[], answering, &trials)?;
-            let cost = PartCost::new(share, budget.charged());
+        let trials = self.store.trials()?;
+        let budget = Budget::of_run(&settings.money, &[], answering, &trials)?;
+        let spent = budget.charged();
+        let over = (budget.spending().overrun() > 0.0).then(|| OverBudget {
+            limit,
+            spent,
+            longer_replies: longer_replies(&models, &trials),
+        });
+        OverBudget::note(over.as_ref(), &mut self.manifest);
+        self.say_unstated(&budget)?;
+        if let Some(over) = over {
+            tracing::warn!("{}", over.sentence());
+        }
+        if settings.shard.is_part() {
+            let cost = PartCost::new(limit, spent);
             cost.note(&mut self.manifest);
             let shard = settings.shard;
             self.progress
                 .note(&format!("shard {shard}: {}", cost.words()));
         }
-        self.finish(end)
+        Ok(())
+    }
+
+    /// Says how much of the cost is not stated by a server, if that is more than a small part of it.
+    fn say_unstated(&self, budget: &Budget) -> Result<()> {
+        let killed = InFlightCost::open(self.store.folder())?.killed();
+        let least = SMALL_SHARE * budget.spending().limit().unwrap_or(0.0);
+        let (requests, dollars) = budget.unstated();
+        if dollars > least {
+            tracing::warn!(
+                "--max-cost: {} without stated tokens may have cost up to {}, and count so",
+                counted(requests as usize, "request"),
+                money(dollars)
+            );
+        }
+        if killed > least {
+            tracing::warn!(
+                "--max-cost: requests that were in flight when this run was killed may have cost up to {}, and count so (in_flight.json)",
+                money(killed)
+            );
+        }
+        Ok(())
     }
 
     /// The trials of a phase that have no reply and wait for no batch. Replies that parts of another division have are copied first.
@@ -199,7 +248,10 @@ impl<E: Experiment> OpenRun<'_, E> {
             models: &all,
             manifest: Some(&self.manifest),
         };
+        let batches = Journal::open(self.store.folder(), &self.manifest)?.most_dollars();
         let budget = Budget::of_run(&settings.money, models, answering, &stored)?;
+        let in_flight_cost = InFlightCost::open(self.store.folder())?;
+        let budget = budget.with_unrecorded(batches + in_flight_cost.killed());
         let counts = TrialCounts {
             trials: plan.keys.len(),
             answered: plan.keys.len() - plan.remaining(),
@@ -240,6 +292,7 @@ impl<E: Experiment> OpenRun<'_, E> {
             progress: self.progress,
             settings,
             timings: &timings,
+            in_flight_cost,
         };
         let missing = missing_notes(experiment, self.store.folder())?;
         let started = Instant::now();
@@ -346,6 +399,23 @@ impl<E: Experiment> OpenRun<'_, E> {
             _ => Ok(outcome),
         }
     }
+}
+
+/// Numbers of replies that were charged more tokens than the limit of their model, by model.
+fn longer_replies(models: &[&ModelUnderTest], trials: &[StoredTrial]) -> BTreeMap<String, usize> {
+    let mut longer = BTreeMap::new();
+    for trial in trials {
+        let tokens = trial.usage().and_then(|usage| usage.completion_tokens);
+        let model = models.iter().find(|model| *model.name == **trial.model);
+        let limit = model.and_then(|model| model.model.reply_limit());
+        if tokens
+            .zip(limit)
+            .is_some_and(|(tokens, limit)| tokens > limit)
+        {
+            *longer.entry(trial.model.to_string()).or_default() += 1;
+        }
+    }
+    longer
 }
 
 /// The models of all phases of an experiment.

@@ -70,11 +70,12 @@ impl Progress {
         let bar = self.bars.add(bar);
         bar.reset_eta();
         bar.enable_steady_tick(Duration::from_millis(500));
-        let style = ProgressStyle::with_template("{wide_bar} {msg} of {len} · {rate} · {eta} left");
+        let style =
+            ProgressStyle::with_template("{wide_bar} {msg} of {len}{prefix} · {rate} · {eta} left");
         let bar = StepBar(style.map_or(bar.clone(), |style| {
             bar.with_style(style.with_key("rate", rate))
         }));
-        bar.count(answered, 0, None);
+        bar.count(answered, 0, None, "");
         bar
     }
 }
@@ -97,8 +98,9 @@ impl StepBar {
         self.0.inc(steps as u64);
     }
 
-    /// Shows the numbers of answered and failed trials, and the US dollars spent.
-    pub(crate) fn count(&self, answered: usize, failed: usize, spent: Option<f64>) {
+    /// Shows the numbers of answered and failed trials, the US dollars spent, and a note about the pace.
+    pub(crate) fn count(&self, answered: usize, failed: usize, spent: Option<f64>, pace: &str) {
+        self.0.set_prefix(pace.to_owned());
         self.0.set_position((answered + failed) as u64);
         let spent = spent.map_or(String::new(), |dollars| format!(", {}", money(dollars)));
         self.0

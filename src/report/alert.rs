@@ -33,6 +33,8 @@ pub enum AlertKind {
     NotComplete,
     /// Trials without a reply, which are not scored.
     Failed,
+    /// Requests that cost more than their limit.
+    Cost,
     /// Replies in which no answer can be read, above 2 %.
     Unread,
     /// Answers of people that are no choice of their question.

@@ -7,6 +7,7 @@ pub(crate) mod first_source;
 pub(crate) mod mark_index;
 pub(crate) mod other_parts;
 pub(crate) mod outcome;
+pub(crate) mod over_budget;
 pub(crate) mod part;
 pub(crate) mod part_args;
 pub(crate) mod part_cost;

@@ -39,9 +39,9 @@ impl StoredTrial {
         self.lost.as_ref().map_or(0, |lost| lost.attempts)
     }
 
-    /// The tokens of these attempts; `None` if there are none.
-    pub(crate) fn lost(&self) -> Option<Usage> {
-        self.lost.as_ref().map(|lost| lost.usage)
+    /// These attempts, and the requests of which the server stated no tokens; `None` if there are none.
+    pub(crate) fn lost(&self) -> Option<&LostAttempts> {
+        self.lost.as_deref()
     }
 
     /// Adds the attempts of an earlier record of the same trial. A reply is followed only by other readings of itself, which repeat its
@@ -78,7 +78,7 @@ mod tests {
         last.follow(&trial("{}", 2));
         last.follow(&trial("null", 1));
         assert_eq!(last.lost_attempts(), 3, "another reading repeats its own");
-        assert_eq!(last.lost().unwrap().prompt_tokens, Some(300));
+        assert_eq!(last.lost().unwrap().usage.prompt_tokens, Some(300));
     }
 
     #[test]

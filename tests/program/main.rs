@@ -44,6 +44,7 @@ mod models_listing;
 mod models_trust;
 mod models_wires;
 mod money;
+mod money_simulation;
 mod mutations;
 mod observer;
 mod openeqa;

@@ -1,8 +1,17 @@
 //! What a run would cost, what it has cost, and where it stops.
+#[cfg(unix)]
+use std::process::Stdio;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use serde_json::{Value, json};
+
 use crate::support::endpoint::{Answer, MockEndpoint};
-use crate::support::run::{Bench, model_args, records, words};
-use crate::support::table::check_rows;
-use serde_json::Value;
+#[cfg(unix)]
+use crate::support::process::{signal, wait_until};
+use crate::support::run::{Bench, Called, model_args, records, words};
+use crate::support::table::{check_rows, check_rows_at_once};
 
 const PRICES: &str = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 1000, output = 0, image-tokens = 70 }\n";
 
@@ -154,4 +163,255 @@ fn the_estimate_is_corrected_by_what_prompts_are_charged() {
     let more = "--out right --prices prices.toml";
     let quiet = bench_of_ten.call(&args(&base, more));
     assert_eq!((quiet.code, quiet.stderr.as_str()), (Some(0), ""));
+}
+
+/// Prices of a short prompt and a long reply: 100 tokens of prompt and 1024 of reply cost $0.1025.
+const DEAR: &str = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 1, output = 100, image-tokens = 80 }\n";
+
+/// The tokens of a reply at [`DEAR`], in dollars.
+fn dollars(replies: u64) -> f64 {
+    (100 + replies * 100) as f64 / 1e6
+}
+
+/// A reply that is charged so many tokens; `usage` changes what is stated of them.
+fn charged(tokens: u64, usage: &Value) -> Answer {
+    let mut body = json!({
+        "choices": [{"message": {"content": "C"}, "finish_reason": "stop"}],
+        "usage": {"prompt_tokens": 100, "completion_tokens": tokens},
+    });
+    if let Some(other) = usage.as_object() {
+        body["usage"] = other.clone().into();
+    }
+    Answer::json(200, &body)
+}
+
+/// Answers by their number, each with the tokens of its reply that are charged. The cost of all so far comes with them.
+fn counting(
+    answer: impl Fn(u64) -> (Answer, u64) + Send + Sync + 'static,
+) -> (MockEndpoint, Arc<Mutex<f64>>) {
+    let cost = Arc::new(Mutex::new(0.0));
+    let number = AtomicU64::new(0);
+    let mock = MockEndpoint::answering({
+        let cost = Arc::clone(&cost);
+        move |_| {
+            let (answer, tokens) = answer(number.fetch_add(1, Ordering::SeqCst));
+            *cost.lock().unwrap() += dollars(tokens);
+            std::thread::sleep(Duration::from_millis(20));
+            answer
+        }
+    });
+    (mock, cost)
+}
+
+/// A run with a limit, and the cost of all its requests.
+fn limited(
+    bench: &Bench,
+    mock: &MockEndpoint,
+    cost: &Mutex<f64>,
+    (limit, more): (f64, &str),
+) -> (Called, f64) {
+    bench.file("prices.toml", DEAR);
+    let base = mock.base_url();
+    let line = format!("--out run --prices prices.toml --max-cost {limit} {more}");
+    let called = bench.call(&args(&base, &line));
+    let cost = *cost.lock().unwrap();
+    (called, cost)
+}
+
+/// What a server may charge for without a word, with short and long replies in any order.
+#[test]
+fn a_limit_holds_whatever_is_charged_for() {
+    type Answers = fn(u64) -> (Answer, u64);
+    let rows: [(&str, Answers, f64); 9] = [
+        (
+            "a short reply before long ones",
+            |i| {
+                let tokens = if i == 0 { 1 } else { 1024 };
+                (charged(tokens, &Value::Null), tokens)
+            },
+            0.8,
+        ),
+        (
+            "no choices",
+            |i| {
+                if i % 2 == 0 {
+                    (charged(1, &Value::Null), 1)
+                } else {
+                    let usage = json!({"prompt_tokens": 100, "completion_tokens": 1000});
+                    (
+                        Answer::json(200, &json!({"choices": [], "usage": usage})),
+                        1000,
+                    )
+                }
+            },
+            0.6,
+        ),
+        (
+            "no tokens stated",
+            |_| (charged(1024, &json!({})), 1024),
+            0.8,
+        ),
+        (
+            "zero tokens stated",
+            |_| {
+                let zero = json!({"prompt_tokens": 0, "completion_tokens": 0, "total_tokens": 0});
+                (charged(1024, &zero), 1024)
+            },
+            0.8,
+        ),
+        (
+            "only the prompt stated",
+            |_| (charged(1024, &json!({"prompt_tokens": 100})), 1024),
+            0.8,
+        ),
+        (
+            "an error after the work",
+            |i| match i % 3 {
+                0 => (Answer::error(500, "x", "oops"), 1024),
+                _ => (charged(1024, &Value::Null), 1024),
+            },
+            0.8,
+        ),
+        (
+            "a cut reply",
+            |i| match i % 3 {
+                0 => (charged(1024, &Value::Null).cut(20), 1024),
+                _ => (charged(1024, &Value::Null), 1024),
+            },
+            0.8,
+        ),
+        (
+            "a time-out",
+            |i| match i % 3 {
+                1 => (Answer::silent(), 1024),
+                _ => (charged(1024, &Value::Null), 1024),
+            },
+            0.8,
+        ),
+        (
+            "an error that states its charge",
+            |i| {
+                if i % 2 == 0 {
+                    (charged(1, &Value::Null), 1)
+                } else {
+                    let usage = json!({"prompt_tokens": 100, "completion_tokens": 1000});
+                    let error = json!({"error": {"message": "no"}, "usage": usage});
+                    (Answer::json(500, &error), 1000)
+                }
+            },
+            0.6,
+        ),
+    ];
+    check_rows_at_once(rows, |(case, answers, used)| {
+        let bench = Bench::with_questions(40);
+        let (mock, cost) = counting(answers);
+        let more = "--concurrency 16 --timeout 0.7";
+        let mut last = 0.0;
+        for _ in 0..3 {
+            // The same command again asks nothing more.
+            let (called, cost) = limited(&bench, &mock, &cost, (0.75, more));
+            assert_eq!(called.code, Some(3), "{case}: {called:?}");
+            assert!(cost <= 0.75 + 1e-9, "{case}: {cost}: {called:?}");
+            assert!(cost >= 0.75 * used, "{case}: only {cost}");
+            last = cost;
+        }
+        let (called, cost) = limited(&bench, &mock, &cost, (1.2, more));
+        assert!(
+            cost > last && cost <= 1.2 + 1e-9,
+            "{case}: {cost}: {called:?}"
+        );
+    });
+}
+
+/// A refusal is not charged, and takes nothing of the limit.
+#[test]
+fn refusals_cost_nothing() {
+    let bench = Bench::with_questions(12);
+    let (mock, cost) = counting(|i| match i % 2 {
+        0 => (
+            Answer::error(429, "rate_limit_exceeded", "slow down").header("retry-after", "0"),
+            0,
+        ),
+        _ => (charged(1, &Value::Null), 1),
+    });
+    let (called, _) = limited(&bench, &mock, &cost, (0.11, "--concurrency 4"));
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_eq!(records(&bench.path("run")).len(), 12);
+}
+
+/// A server that charges more than the token limit, once it is seen, exceeds the limit by the requests in flight at most.
+#[test]
+fn replies_beyond_their_limit_are_said() {
+    let bench = Bench::with_questions(40);
+    let (mock, cost) = counting(|i| {
+        let tokens = if i < 2 { 1 } else { 5000 };
+        (charged(tokens, &Value::Null), tokens)
+    });
+    let (called, cost) = limited(&bench, &mock, &cost, (0.75, "--concurrency 16"));
+    assert_eq!(called.code, Some(3), "{called:?}");
+    // Seven of up to $0.1026 fit at once.
+    assert!(cost <= 7.0 * dollars(5000) + 0.001, "{cost}");
+    assert!(
+        called.stderr.contains("more than its limit of 1024"),
+        "{called:?}"
+    );
+    let requests = mock.requests().len() as u64;
+    let sentence = format!("than --max-tokens: m ({})", requests - 2);
+    for text in [&called.stderr, &called.stdout] {
+        let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(text.contains(&sentence), "{sentence}: {called:?}");
+    }
+    // The same command asks nothing more.
+    let (again, _) = limited(&bench, &mock, &Mutex::new(0.0), (0.75, ""));
+    assert_eq!(
+        (again.code, mock.requests().len() as u64),
+        (Some(3), requests)
+    );
+}
+
+/// Without a token limit the cost has no bound, which is said before anything is sent.
+#[test]
+fn a_limit_without_a_token_limit_is_no_bound() {
+    for more in [
+        "--token-field none",
+        "--extra-body {\"google\":{\"thinking_config\":{\"thinking_budget\":-1}}}",
+        "--omit-field max_tokens",
+    ] {
+        let bench = Bench::with_questions(3);
+        let (mock, cost) = counting(|_| (charged(1, &Value::Null), 1));
+        let (called, _) = limited(&bench, &mock, &cost, (1.0, more));
+        assert_eq!(called.code, Some(0), "{called:?}");
+        let said = "m: no token limit holds";
+        assert_eq!(called.stderr.matches(said).count(), 1, "{more}: {called:?}");
+    }
+    let bench = Bench::with_questions(3);
+    let (mock, cost) = counting(|_| (charged(1, &Value::Null), 1));
+    let (called, _) = limited(&bench, &mock, &cost, (1.0, ""));
+    assert_eq!((called.code, called.stderr.as_str()), (Some(0), ""));
+}
+
+/// Requests that are given up while they are in flight may be charged; the next command counts them.
+#[cfg(unix)]
+#[test]
+fn requests_that_are_given_up_count() {
+    let bench = Bench::with_questions(40);
+    bench.file("prices.toml", DEAR);
+    let (mock, cost) = counting(|i| match i {
+        0 => (charged(1, &Value::Null), 1),
+        _ => (Answer::silent(), 1024),
+    });
+    let base = mock.base_url();
+    let line =
+        "--out run --prices prices.toml --max-cost 0.75 --concurrency 4 --timeout 60 --grace 0.1";
+    let mut first = bench.spawn(&args(&base, line), Stdio::null());
+    wait_until(|| mock.requests().len() == 5);
+    signal(&first, "-INT");
+    assert_eq!(first.wait().unwrap().code(), Some(130));
+    let (again, cost) = limited(
+        &bench,
+        &mock,
+        &cost,
+        (0.75, "--concurrency 16 --timeout 0.5 --retries 0"),
+    );
+    assert!(cost <= 0.75, "{cost}: {again:?}");
 }

@@ -301,7 +301,8 @@ fn a_part_may_cost_its_share_of_the_estimate() {
     });
     bench.file("set.jsonl", lines.collect::<String>());
     let base = mock.base_url();
-    let flags = format!("--model gpt-4o --base-url {base} --levels L0 --data set.jsonl");
+    let flags =
+        format!("--model gpt-4o --base-url {base} --levels L0 --data set.jsonl --max-tokens 16");
     bench.complete(&words(&format!("plan {flags} --out run")));
     let frames = self::lines(&bench.path("run/plan/frames.jsonl"));
     let dollars: Vec<f64> = frames
@@ -312,13 +313,13 @@ fn a_part_may_cost_its_share_of_the_estimate() {
     assert!((dollars[0] / whole - 0.1).abs() < 0.02, "{dollars:?}");
     let estimate = &json(&bench.path("run/plan/plan.json"))["estimate"];
     assert!((estimate["dollars"].as_f64().unwrap() - whole).abs() < 1e-9);
-    // Twice what all is estimated to cost: half of it would be enough for either part. Of a limit of a sixth of the estimate the
+    // Four times what all is estimated to cost: the upper bound of each request is up to twice its estimate. Of a limit of a sixth of the estimate the
     // first part has a sixtieth, which is less than its one request, and an equal share would be enough for it.
     let part = |part: u32, limit: f64| {
         let line = format!("{flags} --out run --shard {part}/2 --max-cost {limit:.9}");
         bench.call(&words(&line)).code
     };
     assert_eq!(part(1, whole / 6.0), Some(3));
-    assert_eq!(part(1, 2.0 * whole), Some(0));
-    assert_eq!(part(2, 2.0 * whole), Some(0));
+    assert_eq!(part(1, 4.0 * whole), Some(0));
+    assert_eq!(part(2, 4.0 * whole), Some(0));
 }

@@ -14,6 +14,7 @@ const ONE: ModelNumber = ModelNumber(0);
 fn failed(kind: FailureKind, status: Option<u16>, reach: Reach) -> FailedTry {
     FailedTry {
         usage: None,
+        may_be_charged: false,
         finish: None,
         failure: Failure {
             kind,

@@ -106,8 +106,8 @@ pub(super) fn batch_reply(body: &str) -> Result<Reply, UnreadableReply> {
     wire.reply(body.as_bytes(), "application/json")
 }
 
-/// The tokens that a body in a batch's file was charged; `None` if it does not say.
-pub(super) fn batch_usage(body: &str) -> Option<Usage> {
+/// The tokens that a body states, of a reply or of a failure; `None` if it states none.
+pub(super) fn body_usage(body: &str) -> Option<Usage> {
     let body: Value = serde_json::from_str(body).ok()?;
     usage::read(body.get("usage"))
 }

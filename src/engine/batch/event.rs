@@ -28,12 +28,36 @@ pub(crate) struct PartFacts {
     pub tokens: f64,
     /// Expected cost in US dollars, at the price of batches; `None` if the model has no known price.
     pub dollars: Option<f64>,
+    /// The most that all requests can cost, in US dollars at the price of batches; `None` if the model has no known price, and in the
+    /// journals of earlier versions.
+    #[serde(default)]
+    pub most_dollars: Option<f64>,
+    /// The most that one of the requests can cost.
+    #[serde(default)]
+    pub most_dollars_each: Option<f64>,
 }
 
 impl PartFacts {
     /// What a limit of waiting tokens holds for: address and model.
     pub(super) fn place(&self) -> (String, String) {
         (self.base.clone(), self.model.clone())
+    }
+
+    /// The most that the requests can cost, in US dollars; 0 if the model has no known price.
+    pub(super) fn most_cost(&self) -> f64 {
+        self.most_dollars.or(self.dollars).unwrap_or(0.0)
+    }
+
+    /// The number of requests that can cost this much in US dollars together; all if the model has no known price.
+    pub(super) fn requests_within(&self, dollars: f64) -> usize {
+        let each = self.most_dollars_each;
+        let each = each.unwrap_or(self.most_cost() / self.requests.max(1) as f64);
+        let within = if each > 0.0 {
+            dollars / each
+        } else {
+            f64::INFINITY
+        };
+        (within.max(0.0) as usize).min(self.requests)
     }
 
     /// Whether a model of this name and id is the one that is asked.

@@ -8,6 +8,7 @@ use sha2::{Digest as _, Sha256};
 
 use super::event::PartFacts;
 use super::journal::Journal;
+use crate::ask::TokenBound;
 use crate::error::{Error, Result};
 use crate::score::record::Detail;
 use crate::store::Store;
@@ -32,6 +33,10 @@ pub(crate) struct RequestCost {
     pub(crate) tokens: f64,
     /// US dollars; `None` if the model has no known price.
     pub(crate) dollars: Option<f64>,
+    /// The most that it can cost, in US dollars; `None` if the model has no known price.
+    pub(crate) most_dollars: Option<f64>,
+    /// The most tokens that it can have; `None` if the model has no known price.
+    pub(crate) bound: Option<TokenBound>,
 }
 
 /// Where the model of the files is asked, as it enters the facts of a part.
@@ -71,6 +76,10 @@ struct OpenFile<D> {
     tokens: f64,
     /// US dollars; `None` if the model has no known price.
     dollars: Option<f64>,
+    /// The most that all requests can cost, in US dollars.
+    most_dollars: Option<f64>,
+    /// The most that one of them can cost, in US dollars.
+    most_dollars_each: Option<f64>,
     hash: Sha256,
     /// The trials in the file, as records without an outcome.
     blanks: Vec<Record<D>>,
@@ -135,6 +144,10 @@ impl<D: Detail> ModelInputFiles<D> {
         open.bytes += size;
         open.tokens += cost.tokens;
         open.dollars = open.dollars.zip(cost.dollars).map(|(sum, one)| sum + one);
+        let most = open.most_dollars.zip(cost.most_dollars);
+        open.most_dollars = most.map(|(sum, one)| sum + one);
+        let each = open.most_dollars_each.zip(cost.most_dollars);
+        open.most_dollars_each = each.map(|(most, one)| most.max(one));
         open.blanks.push(blank);
         Ok(())
     }
@@ -162,6 +175,8 @@ impl<D: Detail> ModelInputFiles<D> {
             bytes: 0,
             tokens: 0.0,
             dollars: Some(0.0),
+            most_dollars: Some(0.0),
+            most_dollars_each: Some(0.0),
             hash: Sha256::new(),
             blanks: Vec::new(),
         })
@@ -201,6 +216,8 @@ impl<D: Detail> ModelInputFiles<D> {
                     url,
                     tokens: open.tokens.round(),
                     dollars: open.dollars,
+                    most_dollars: open.most_dollars,
+                    most_dollars_each: open.most_dollars_each,
                 },
             )?;
         }
@@ -216,10 +233,4 @@ pub(super) fn hexadecimal(bytes: &[u8]) -> String {
     let digit = |half: u8| char::from_digit(half.into(), 16).unwrap_or('0');
     let digits = bytes.iter().flat_map(|byte| [byte >> 4, byte & 15]);
     digits.map(digit).collect()
-}
-
-/// A text as a part of a file's name: other characters than letters, digits, `-`, `_` and `.` are replaced.
-pub(super) fn file_name(text: &str) -> String {
-    let safe = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
-    text.replace(|c| !safe(c), "_")
 }

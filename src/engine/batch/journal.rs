@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::event::{Event, PartFacts};
 use super::part::{Part, Stage};
+use super::part_name::file_name;
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::store::BATCH;
@@ -34,6 +35,33 @@ struct Line {
     event: Event,
     /// Time in UTC.
     at: String,
+}
+
+impl Line {
+    /// Checks that the file of each part is a plain name, so that nothing outside the batch folder is read or written.
+    fn check(&self) -> std::result::Result<(), String> {
+        let pieces = match &self.event {
+            Event::Split { into } => &into[..],
+            _ => &[],
+        };
+        let names = pieces.iter().map(|piece| &piece.file);
+        let mut names = std::iter::once(&self.file).chain(names);
+        names
+            .find(|name| !is_part_name(name))
+            .map_or(Ok(()), |name| {
+                Err(format!(
+                    "{name:?} is no name of a part, such as part-1-m-001.jsonl"
+                ))
+            })
+    }
+}
+
+/// Whether a text is the name of a part's file: `part-`, then characters that no path is made of, then `.jsonl`.
+fn is_part_name(text: &str) -> bool {
+    let middle = text
+        .strip_prefix("part-")
+        .and_then(|rest| rest.strip_suffix(".jsonl"));
+    middle.is_some_and(|middle| file_name(middle) == middle)
 }
 
 /// The parts of a run and what happened to them.
@@ -74,6 +102,8 @@ impl Journal {
             }
             let line: Line =
                 serde_json::from_slice(line).map_err(|e| Error::json_line(&path, index + 1, &e))?;
+            line.check()
+                .map_err(|problem| Error::line(&path, index + 1, problem))?;
             journal.apply(&line.file, &line.event, &line.at);
         }
         Ok(journal)
@@ -118,6 +148,12 @@ impl Journal {
         let open = |part: &&Part| !matches!(part.stage, Stage::TakenOver | Stage::Ended);
         let open = self.parts.iter().filter(open);
         open.map(|part| part.facts.requests).sum()
+    }
+
+    /// The most that batches can cost whose replies are not imported yet, in US dollars.
+    pub(crate) fn most_dollars(&self) -> f64 {
+        let parts = self.parts.iter().filter(|part| part.may_cost());
+        parts.map(|part| part.facts.most_cost()).sum()
     }
 
     /// Records that a file was written as a part.

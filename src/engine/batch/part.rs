@@ -81,6 +81,11 @@ impl Part {
         matches!(self.stage, Stage::Creating | Stage::Created)
     }
 
+    /// Whether its batch costs something that the records do not have yet, or may cost it.
+    pub(super) fn may_cost(&self) -> bool {
+        self.is_out() || matches!(self.stage, Stage::Fetched { .. })
+    }
+
     /// Whether its batch still has to be made.
     pub(super) fn is_unsubmitted(&self) -> bool {
         matches!(

@@ -5,11 +5,12 @@ use std::time::Duration;
 use tokio::time::Instant;
 
 use super::driver::{Driver, Step, Until};
-use super::event::Event;
+use super::event::{Event, PartFacts};
 use super::part::Part;
 use super::requests::SHARE_OF_QUOTA;
 use crate::ask::batch_api::QuotaRefusal;
 use crate::engine::budget::{Answering, Budget};
+use crate::engine::in_flight_cost::InFlightCost;
 use crate::error::Result;
 use crate::score::record::Detail;
 
@@ -55,30 +56,56 @@ impl<D: Detail> Driver<'_, D> {
         learned.copied().or(flag)
     }
 
-    /// Into how many pieces a part must be divided, because it is larger than what may wait, or was refused several times although
-    /// nothing of this run waits; `None` if it may stay.
-    pub(super) fn too_large(&self, part: usize) -> Option<usize> {
+    /// Into how many pieces a part must be divided, because it is larger than what may wait or than what `--max-cost` allows, or was
+    /// refused several times although nothing of this run waits; `None` if it may stay.
+    pub(super) fn too_large(&self, part: usize) -> Result<Option<usize>> {
         if matches!(self.until, Until::LookedAt | Until::Cancelled) {
-            return None;
+            return Ok(None);
         }
         let of = self.part(part);
-        let limit = self.limit(part)? as f64;
+        if let Some(requests) = self.requests_within_budget(&of.facts)? {
+            return Ok(Some(of.facts.requests.div_ceil(requests)));
+        }
+        let Some(limit) = self.limit(part) else {
+            return Ok(None);
+        };
+        let limit = limit as f64;
         let refusals = self.notes.refused_parts.get(&part).copied().unwrap_or(0);
         // A request alone is tried: its tokens are only estimated.
         if of.facts.tokens > limit && (of.facts.requests > 1 || refusals > 0) {
-            return Some((of.facts.tokens / (SHARE_OF_QUOTA * limit)).ceil() as usize);
+            let pieces = (of.facts.tokens / (SHARE_OF_QUOTA * limit)).ceil() as usize;
+            return Ok(Some(pieces));
         }
         let place = of.facts.place();
         let mut others = self.journal.parts.iter();
         let is_alone = !others.any(|other| other.is_out() && other.facts.place() == place);
-        (is_alone && refusals >= REFUSALS_TO_SPLIT && of.facts.requests > 1).then_some(2)
+        let is_refused = refusals >= REFUSALS_TO_SPLIT && of.facts.requests > 1;
+        Ok((is_alone && is_refused).then_some(2))
     }
 
-    /// Whether a part, with all that was charged and all that is out, is within `--max-cost`.
+    /// Whether a part at its upper bound, with all that was charged and all that batches may cost, is within `--max-cost`.
     fn is_affordable(&self, part: &Part) -> Result<bool> {
+        let left = self.left()?;
+        Ok(left.is_none_or(|left| part.facts.most_cost() <= left))
+    }
+
+    /// The number of requests of a part that `--max-cost` allows, if it allows some, but not all, and no batch is out whose end would
+    /// allow more.
+    fn requests_within_budget(&self, facts: &PartFacts) -> Result<Option<usize>> {
+        let is_waited_for = self.journal.most_dollars() > 0.0;
+        let Some(left) = self.left()?.filter(|_| !is_waited_for) else {
+            return Ok(None);
+        };
+        let requests = facts.requests_within(left);
+        let is_some = (1..facts.requests).contains(&requests) && facts.most_cost() > left;
+        Ok(is_some.then_some(requests))
+    }
+
+    /// Remaining US dollars of `--max-cost`, after all charges and the upper bounds of batches; `None` without a limit.
+    fn left(&self) -> Result<Option<f64>> {
         let limit = self.money.and_then(|money| Some((money, money.max_cost?)));
         let Some((money, max_cost)) = limit else {
-            return Ok(true);
+            return Ok(None);
         };
         let charged = if let Some(charged) = self.notes.charged.get() {
             charged
@@ -91,9 +118,9 @@ impl<D: Detail> Driver<'_, D> {
             Budget::of_run(money, &[], answering, &trials)?.charged()
         };
         self.notes.charged.set(Some(charged));
-        let out = self.journal.parts.iter().filter(|part| part.is_out());
-        let out: f64 = out.filter_map(|part| part.facts.dollars).sum();
-        Ok(charged + out + part.facts.dollars.unwrap_or(0.0) <= max_cost)
+        let killed = InFlightCost::open(self.store.folder())?.killed();
+        let left = max_cost - charged - killed - self.journal.most_dollars();
+        Ok(Some(left))
     }
 
     /// Whether nothing is out, and no part that is left is within `--max-cost`.
@@ -136,7 +163,7 @@ impl<D: Detail> Driver<'_, D> {
             ),
         };
         self.warn_once(line);
-        Ok(match self.too_large(part) {
+        Ok(match self.too_large(part)? {
             Some(_) => Step::Moved,
             None => Step::Waiting,
         })

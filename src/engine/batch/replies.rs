@@ -5,15 +5,15 @@ use std::fmt::Write;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
-use crate::ask::Constrain;
 use crate::ask::batch::{BatchLine, with_letter};
+use crate::ask::{Constrain, TokenBound};
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::score::record::{Detail, answered};
 use crate::store::Store;
 use crate::types::flag::read_word;
 use crate::types::manifest::RunManifest;
-use crate::types::{Failure, FailureKind, Record, Reply, TrialKey};
+use crate::types::{Failure, FailureKind, LostAttempts, Record, Reply, TrialKey, Unstated, Usage};
 
 /// Numbers of lines, by what they led to.
 #[derive(Debug, Default)]
@@ -71,20 +71,33 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
             self.counts.imported_before += 1;
             return Ok(Imported::Nothing);
         }
-        let blank = blank.clone().batched();
+        let mut blank = blank.clone().batched();
+        let bound = std::mem::take(&mut blank.lost.unstated);
         let reply = match line.result {
             Ok(reply) => reply,
             Err(failure) => {
-                let mut blank = blank;
                 blank.lost.add(line.charged);
+                if line.charged.is_none() && may_be_charged(failure.kind) {
+                    blank.lost.unstated = bound;
+                }
                 return self.store_failure(blank, failure);
             }
+        };
+        let unstated = match reply.usage {
+            _ if bound.is_none() => bound,
+            Some(usage) => missing(bound, usage),
+            None => bound,
+        };
+        let lost = LostAttempts {
+            unstated,
+            ..reply.lost
         };
         self.counts.answered += 1;
         let constrain = constrain(self.manifest, &blank.model)?;
         let choices = blank.detail.choices().len();
         let reply = Reply {
             attempts: 1,
+            lost,
             ..with_letter(reply, constrain, choices)
         };
         self.store.append(&answered(blank, reply)?)?;
@@ -96,7 +109,9 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
         if self.waiting.remove(&key)
             && let Some(blank) = self.blanks.get(&key)
         {
-            self.store_failure(blank.clone().batched(), failure)?;
+            let mut blank = blank.clone().batched();
+            blank.lost = LostAttempts::default();
+            self.store_failure(blank, failure)?;
         }
         Ok(())
     }
@@ -113,6 +128,23 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
         self.store.sync()?;
         Ok(self.counts)
     }
+}
+
+/// The part of a bound that a server leaves open with these stated tokens.
+fn missing(bound: Unstated, usage: Usage) -> Unstated {
+    let tokens = TokenBound {
+        prompt: bound.prompt_tokens,
+        reply: bound.completion_tokens,
+    };
+    match tokens.missing_from(usage) {
+        missing if missing == TokenBound::default() => Unstated::default(),
+        missing => missing.unstated(),
+    }
+}
+
+/// Whether a request of a batch may have been charged although it failed and the server stated no tokens.
+fn may_be_charged(kind: FailureKind) -> bool {
+    matches!(kind, FailureKind::Server | FailureKind::Response)
 }
 
 /// Imports the replies of output and error files; a summary for the user. Each reply is imported once, even if a file is named again.

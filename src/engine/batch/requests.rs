@@ -5,7 +5,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::BatchFileArgs;
-use super::file::{Destination, FileLimits, ModelInputFiles, Register, RequestCost, file_name};
+use super::file::{Destination, FileLimits, ModelInputFiles, Register, RequestCost};
+use super::part_name::file_name;
 use super::servers::account;
 use crate::ask::BatchInterface;
 use crate::engine::models::ModelUnderTest;
@@ -101,8 +102,12 @@ impl<'a, I: Item> Requests<'a, I> {
             let Some(line) = line.map_err(|e| Error::data(query.id(), e))? else {
                 continue;
             };
-            let blank = I::blank(trial, stimulus, &under_test.name);
+            let mut blank = I::blank(trial, stimulus, &under_test.name);
             let cost = (self.cost)(trial, stimulus);
+            // What a reply without stated tokens may have cost.
+            if let Some(bound) = cost.bound {
+                blank.lost.unstated = bound.unstated();
+            }
             self.files[trial.model].add(&line, blank, cost, &mut self.register)?;
         }
         Ok(())

@@ -16,10 +16,11 @@ use super::settings::BatchRunArgs;
 use super::stopped::Stopped;
 use super::summary;
 use crate::engine::budget::{Answering, Budget};
+use crate::engine::budget_notes::BudgetNotes;
 use crate::engine::circuit_breaker::EndReason;
 use crate::engine::experiment::Experiment;
 use crate::engine::interrupt::Interrupt;
-use crate::engine::models;
+use crate::engine::models::{self, ModelUnderTest};
 use crate::engine::open_run::{OpenRun, Remaining, answered, every_model};
 use crate::error::{Error, Result};
 use crate::images::enhancers::{self, OpenEnhancers};
@@ -27,6 +28,7 @@ use crate::images::trial::Item as _;
 use crate::images::workers::unstarted;
 use crate::report::forecast::money;
 use crate::runs::outcome::Outcome;
+use crate::store::StoredTrial;
 use crate::types::TrialKey;
 use crate::types::manifest::Status;
 
@@ -78,6 +80,19 @@ pub(crate) fn run<E: Experiment>(
         end = EndReason::ModelsStopped(batches.stopped.take_errors());
     }
     batches.finish(end)
+}
+
+/// The mean tokens of each model's stored replies; `None` if none states them.
+fn reply_lengths(models: &[ModelUnderTest], stored: &[StoredTrial]) -> Vec<Option<f64>> {
+    let lengths = models.iter().map(|model| {
+        let replies = stored.iter().filter(|trial| **trial.model == *model.name);
+        let tokens = replies.filter_map(|trial| trial.usage()?.completion_tokens);
+        let (count, sum) = tokens.fold((0.0, 0.0), |(count, sum), tokens| {
+            (count + 1.0, sum + tokens as f64)
+        });
+        (count > 0.0).then(|| sum / count)
+    });
+    lengths.collect()
 }
 
 /// An open run with its batches.
@@ -233,15 +248,25 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
             manifest: Some(&self.run.manifest),
         };
         let budget = Budget::of_run(money, models, answering, &remaining.stored)?;
+        if self.args.no_scout {
+            BudgetNotes::new(models).say_unlimited(budget.spending());
+        }
+        let replies = reply_lengths(models, &remaining.stored);
         let cost = |trial: &_, stimulus: &crate::images::trial::Stimulus| {
             let trial: &crate::images::trial::Trial<E::Item> = trial;
+            let model = &models[trial.model];
             let images = stimulus.images.iter().map(|image| image.facts());
-            let tokens = budget.expected_tokens(&models[trial.model], trial, images);
-            let reply = trial.item.reply_tokens();
+            let tokens = budget.expected_tokens(model, trial, images.clone());
+            let reply = replies[trial.model].unwrap_or_else(|| trial.item.reply_tokens());
             let dollars = budget.expected_cost(trial.model, tokens, reply);
+            let request = budget.request(model, trial, images);
             RequestCost {
                 tokens,
                 dollars: dollars.map(|dollars| money.prices.batch * dollars),
+                most_dollars: request
+                    .as_ref()
+                    .map(|request| money.prices.batch * request.most()),
+                bound: request.map(|request| request.current_bound()),
             }
         };
         let quota = self.args.enqueued_tokens.map(std::num::NonZeroU64::get);
@@ -330,7 +355,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         Outcome::text(status, output)
     }
 
-    fn finish(self, end: EndReason) -> Result<Outcome> {
+    fn finish(mut self, end: EndReason) -> Result<Outcome> {
         if let EndReason::Interrupted = end {
             let folder = self.run.store.folder().display();
             let line = if self.journal.has_batches() {
@@ -344,6 +369,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
             };
             self.run.progress.note(&line);
         }
+        self.run.note_cost()?;
         self.run.finish(end)
     }
 

@@ -72,6 +72,11 @@ impl<D: Detail> Driver<'_, D> {
                 requests: writer.requests,
                 tokens: (of.facts.tokens * share).round(),
                 dollars: of.facts.dollars.map(|dollars| dollars * share),
+                // Its requests may be those that can cost more than others.
+                most_dollars: of
+                    .facts
+                    .most_dollars_each
+                    .map(|each| each * writer.requests as f64),
                 ..of.facts.clone()
             };
             let path = self

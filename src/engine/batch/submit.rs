@@ -5,6 +5,7 @@ use super::event::Event;
 use crate::ask::BatchInterface;
 use crate::ask::batch_api::{ApiFailure, BatchState, Effect, NewBatch, Readiness, RemoteBatch};
 use crate::error::{Error, Result};
+use crate::report::forecast::money;
 use crate::score::record::Detail;
 
 /// How many uploads or creations in a row at which the server fails end the work for a model; chosen: 15 minutes by
@@ -14,7 +15,7 @@ const MOST_FAILED: u32 = 5;
 impl<D: Detail> Driver<'_, D> {
     /// Uploads the file of a part, if its batch may be made.
     pub(super) async fn upload(&mut self, part: usize) -> Result<Step> {
-        if let Some(pieces) = self.too_large(part) {
+        if let Some(pieces) = self.too_large(part)? {
             return self.split(part, pieces).await;
         }
         if self.is_held(part)? {
@@ -80,7 +81,7 @@ impl<D: Detail> Driver<'_, D> {
 
     /// Makes the batch of a part, if it may be made now and the server has read the file.
     pub(super) async fn create(&mut self, part: usize) -> Result<Step> {
-        if let Some(pieces) = self.too_large(part) {
+        if let Some(pieces) = self.too_large(part)? {
             return self.split(part, pieces).await;
         }
         if self.is_held(part)? {
@@ -173,8 +174,15 @@ impl<D: Detail> Driver<'_, D> {
     }
 
     fn created(&mut self, part: usize, id: String) -> Result<Step> {
-        let requests = self.part(part).facts.requests;
-        self.say(part, &format!("batch {id} of {requests} requests"));
+        let facts = &self.part(part).facts;
+        let cost = match facts.dollars.zip(facts.most_dollars) {
+            Some((expected, most)) => {
+                format!(", about {} and at most {}", money(expected), money(most))
+            }
+            None => String::new(),
+        };
+        let line = format!("batch {id} of {} requests{cost}", facts.requests);
+        self.say(part, &line);
         self.journal.record(part, Event::Created { id })?;
         // The first look is worth a wait.
         self.notes.looked_at.insert(part);

@@ -20,6 +20,7 @@ use super::enhancers::of_enhancers;
 use super::join::{Joined, JoinedRun};
 use crate::report::alert::{Alert, AlertKind};
 use crate::report::words::{counted, plural};
+use crate::runs::over_budget::OverBudget;
 use crate::score::cluster::{ClusterUnit, MIN_SCENES};
 use crate::score::findings::Findings;
 use crate::score::pair_darkness::PairDarkness;
@@ -128,6 +129,7 @@ fn unnamed_scenes(combined: &Combined, frames: &BTreeSet<&FrameId>) -> Option<St
 /// The alerts that follow from manifests and the questions asked, of runs of either kind.
 pub(super) fn of_runs<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut alerts = of_progress(&joined.runs);
+    alerts.extend(of_costs(&joined.runs));
     alerts.extend(servers::of_servers(joined));
     alerts.extend(providers::of_providers(&joined.trials));
     alerts.extend(of_enhancers(&joined.runs));
@@ -141,6 +143,19 @@ pub(super) fn of_runs<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     }
     alerts.sort_by_key(|alert| alert.kind);
     alerts
+}
+
+/// One alert for each run that cost more than its limit.
+fn of_costs(runs: &[JoinedRun]) -> Vec<Alert> {
+    let over = runs.iter().filter_map(|run| {
+        let sentence = OverBudget::read(&run.manifest)?.sentence();
+        let text = match runs {
+            [_] => sentence,
+            _ => format!("{}: {sentence}", run.name),
+        };
+        Some(Alert::new(AlertKind::Cost, text))
+    });
+    over.collect()
 }
 
 /// What became of the runs when they were joined: models that stand apart, and runs that add nothing to the others.

@@ -1,9 +1,9 @@
 //! Batches by the folder of their run.
 
 use super::{QUESTIONS, answered, assert_each_once, blind, call_with};
-use crate::support::batches::{Course, Line};
+use crate::support::batches::{Course, Line, MockBatches};
 use crate::support::endpoint::Answer;
-use crate::support::run::{Bench, words};
+use crate::support::run::{Bench, called, words};
 
 #[test]
 fn a_detached_run_is_looked_at_fetched_and_cancelled_by_its_folder() {
@@ -112,4 +112,67 @@ fn another_address_than_that_of_the_batches_is_left_alone() {
     assert_eq!(mock.count("POST batches/id/cancel"), 0);
     let fetched = bench.call(&words("batch fetch run"));
     assert_eq!((fetched.code, answered(&bench).len()), (Some(0), QUESTIONS));
+}
+
+/// A stranger's folder may name any address, and may name parts by paths.
+#[test]
+fn no_key_goes_to_an_address_that_only_the_folder_names() {
+    let (bench, _, _) = blind(&[Course::of(&"in_progress ".repeat(100))], "--detach");
+    let stranger = MockBatches::start([Course::of("in_progress")]);
+    let state = bench.path("run/batch/state.jsonl");
+    let text = std::fs::read_to_string(&state).unwrap();
+    let mut lines = text
+        .lines()
+        .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+    let own = lines.next().unwrap()["base"].as_str().unwrap().to_owned();
+    std::fs::write(&state, text.replace(&own, &stranger.base_url())).unwrap();
+    for task in ["status", "fetch", "cancel"] {
+        let line = format!("batch {task} run");
+        let refused = called(
+            bench
+                .command(&words(&line))
+                .env("OPENAI_API_KEY", "sk-campus-key-4711"),
+        );
+        assert_eq!(refused.code, Some(2), "{refused:?}");
+        assert!(refused.stderr.contains("--base-url"), "{refused:?}");
+    }
+    assert!(stranger.requests().is_empty());
+    // An address of the user's own gets it.
+    let base = stranger.base_url();
+    let line = format!("batch status run --base-url {base}");
+    let shown = called(
+        bench
+            .command(&words(&line))
+            .env("OPENAI_API_KEY", "sk-campus-key-4711"),
+    );
+    assert_eq!(
+        (shown.code, stranger.requests().len()),
+        (Some(0), 1),
+        "{shown:?}"
+    );
+    // Another machine is refused without a key, too; no other header goes anywhere.
+    std::fs::write(&state, text.replace(&own, "https://gateway.example/v1")).unwrap();
+    let other = bench.call(&words("batch fetch run"));
+    assert!(other.stderr.contains("may be a stranger's"), "{other:?}");
+}
+
+#[test]
+fn a_part_is_a_name_and_not_a_path() {
+    let (bench, _, _) = blind(&[Course::of("completed")], "--detach");
+    let state = bench.path("run/batch/state.jsonl");
+    let text = std::fs::read_to_string(&state).unwrap();
+    for name in [
+        "../../part-1.jsonl",
+        "/tmp/part-1.jsonl",
+        "part-a/b.jsonl",
+        "notes.jsonl",
+        "",
+    ] {
+        std::fs::write(&state, text.replace("part-1-m-001.jsonl", name)).unwrap();
+        for task in ["status", "fetch", "cancel"] {
+            let refused = bench.call(&words(&format!("batch {task} run")));
+            assert_eq!(refused.code, Some(2), "{name}: {refused:?}");
+            assert!(refused.stderr.contains("no name of a part"), "{refused:?}");
+        }
+    }
 }

@@ -91,14 +91,15 @@ fn a_limit_of_cost_is_kept_at_the_price_of_batches() {
     let bench = Bench::with_questions(QUESTIONS);
     bench.file("prices.toml", prices);
     let mock = MockBatches::start([Course::of("completed")]);
-    // A reply is charged 91 tokens at half of 10 dollars a million: $0.000455. A question a part.
+    // A reply is charged 91 tokens at half of 10 dollars a million: $0.000455. A question a part, which may cost up to $0.0012: the bytes
+    // of its text, 64 and 16 tokens.
     let limited = |limit: &str| {
         let more = format!(
-            "--prices prices.toml --file-requests 1 --enqueued-tokens 60 --max-cost {limit}"
+            "--prices prices.toml --file-requests 1 --enqueued-tokens 60 --max-tokens 16 --max-cost {limit}"
         );
         call_with(BLIND, &bench, &mock, &more)
     };
-    let called = limited("0.001");
+    let called = limited("0.002");
     assert_eq!(called.code, Some(3), "{called:?}");
     assert!(called.stderr.contains("--max-cost"), "{called:?}");
     assert_eq!(answered(&bench).len(), 2, "{called:?}");
@@ -128,16 +129,61 @@ fn a_limit_of_cost_is_kept_for_models_of_a_file() {
         let limited = |limit: &str| {
             let line = format!(
                 "batch run --data set.jsonl --models models.toml --out run --poll 0.02 --no-scout --prices prices.toml \
-                 --file-requests 1 --enqueued-tokens 60 --max-cost {limit}"
+                 --file-requests 1 --enqueued-tokens 60 --max-tokens 16 --max-cost {limit}"
             );
             bench.call(&words(&line))
         };
         // Two replies of $0.000455.
-        let called = limited("0.001");
+        let called = limited("0.002");
         assert_eq!(called.code, Some(3), "{called:?}");
         assert_eq!(answered(&bench).len(), 2, "{called:?}");
         let called = limited("0.01");
         assert_eq!(called.code, Some(0), "{called:?}");
         assert_each_once(&bench, &mock, QUESTIONS);
     }
+}
+
+/// Replies that are as long as their limit, where a letter was expected.
+#[test]
+fn a_batch_is_bounded_by_its_token_limit() {
+    let bench = Bench::with_questions(40);
+    let prices = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 1, output = 100 }\n";
+    bench.file("prices.toml", prices);
+    let mock = MockBatches::start([Course::of("completed").tokens(1024)]);
+    let more = "--prices prices.toml --max-cost 1";
+    let called = call_with(BLIND, &bench, &mock, more);
+    assert_eq!(called.code, Some(3), "{called:?}");
+    // $0.0513 each.
+    let sent = mock.asked().concat().len();
+    assert!((16..=19).contains(&sent), "{sent}: {called:?}");
+    assert_eq!(answered(&bench).len(), sent);
+    // Short replies release what was reserved for long ones, so all are asked, one batch after the other.
+    let bench = Bench::with_questions(40);
+    bench.file("prices.toml", prices);
+    let mock = MockBatches::start([Course::of("completed")]);
+    let called = call_with(BLIND, &bench, &mock, more);
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_each_once(&bench, &mock, 40);
+    assert!(mock.asked().len() > 1);
+}
+
+/// Batches that are out count against the limit of a run that asks directly.
+#[test]
+fn a_direct_run_leaves_room_for_its_batches() {
+    let bench = Bench::with_questions(QUESTIONS);
+    let prices = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 1, output = 100 }\n";
+    bench.file("prices.toml", prices);
+    let mock = MockBatches::start([Course::of(&"in_progress ".repeat(99))]);
+    let more = "--prices prices.toml --max-cost 0.25 --detach --limit 3";
+    let called = call_with(BLIND, &bench, &mock, more);
+    assert_eq!(called.code, Some(0), "{called:?}");
+    // Three requests of up to $0.0513 are out, so one of $0.1026 does not fit.
+    let direct =
+        "--data set.jsonl --blind-model m --resume run --prices prices.toml --max-cost 0.25";
+    let called = call_with(direct, &bench, &mock, "");
+    assert_eq!(
+        (called.code, mock.count("POST chat/completions")),
+        (Some(3), 0),
+        "{called:?}"
+    );
 }

@@ -88,7 +88,7 @@ pub use pixels::Pixels;
 pub use question::Truths;
 pub use question::{Answer, Choices, Family, Question, QuestionId, UnreadReason};
 pub use record::{Failure, FailureKind, StoredDetail, Via, View};
-pub use reply::{Finish, LostAttempts, Reply, Usage};
+pub use reply::{Finish, LostAttempts, Reply, Unstated, Usage};
 pub use run_question::RunQuestion;
 pub use set_light::SetLight;
 pub use severity::{Axis, Severity};

@@ -78,20 +78,24 @@ impl Usage {
     }
 }
 
-/// Attempts that were charged and gave no reply, with their tokens.
+/// Attempts that were charged and gave no reply, with their tokens; and requests of which the server stated no tokens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct LostAttempts {
     /// The number of attempts.
     pub attempts: u32,
     /// The tokens of all of them.
     pub usage: Usage,
+    /// The requests that may have been charged, without tokens stated by the server; that of the reply is one of them. Not in the
+    /// file if there are none.
+    #[serde(default, skip_serializing_if = "Unstated::is_none")]
+    pub unstated: Unstated,
 }
 
 impl LostAttempts {
     /// Whether there is none.
     #[must_use]
     pub fn is_none(&self) -> bool {
-        self.attempts == 0
+        self.attempts == 0 && self.unstated.is_none()
     }
 
     /// Adds an attempt without a reply; one that was not charged does not count.
@@ -108,6 +112,38 @@ impl LostAttempts {
         Self {
             attempts: self.attempts.saturating_add(more.attempts),
             usage: self.usage.plus(more.usage),
+            unstated: self.unstated.plus(more.unstated),
+        }
+    }
+}
+
+/// Requests that may have been charged although the server stated no tokens, or not all.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Unstated {
+    /// The number of requests.
+    pub requests: u32,
+    /// Upper bound of the prompt tokens that were not stated.
+    pub prompt_tokens: u64,
+    /// Upper bound of the reply tokens that were not stated, hidden reasoning included.
+    pub completion_tokens: u64,
+}
+
+impl Unstated {
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        self.requests == 0
+    }
+
+    /// The requests of both.
+    #[must_use]
+    pub fn plus(self, more: Self) -> Self {
+        Self {
+            requests: self.requests.saturating_add(more.requests),
+            prompt_tokens: self.prompt_tokens.saturating_add(more.prompt_tokens),
+            completion_tokens: self
+                .completion_tokens
+                .saturating_add(more.completion_tokens),
         }
     }
 }

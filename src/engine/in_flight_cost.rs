@@ -1,0 +1,110 @@
+//! The cost of requests in flight, noted in the run folder: [`InFlightCost`]. A process that is killed leaves the note, so that the next
+//! one counts the requests that may have been charged and have no record.
+
+use std::fs;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, Result};
+use crate::files;
+use crate::files::reading;
+
+/// Name of the note in a run folder; it is there while requests are in flight, and after a killed process.
+const NOTE: &str = "in_flight.json";
+
+/// Factor by which a note exceeds what is reserved, so that few notes are written; chosen.
+const MARGIN: f64 = 1.25;
+
+/// Cost that no record has, in US dollars.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+pub(crate) struct InFlightCost {
+    /// Upper bound of the requests in flight when earlier processes were killed.
+    killed: f64,
+    /// Upper bound of the requests in flight now.
+    in_flight: f64,
+}
+
+impl InFlightCost {
+    /// The note in a run folder. What is noted as in flight was so when a process was killed.
+    ///
+    /// # Errors
+    /// If the note cannot be read.
+    pub(crate) fn open(folder: &Path) -> Result<Self> {
+        let path = folder.join(NOTE);
+        let text = match reading::read(&path) {
+            Ok(text) => text,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Self::default()),
+            Err(e) => return Err(Error::file(path, "read", e)),
+        };
+        let note: Self =
+            serde_json::from_slice(&text).map_err(|e| Error::json_line(&path, 1, &e))?;
+        let is_cost = |dollars: f64| dollars.is_finite() && dollars >= 0.0;
+        if !is_cost(note.killed) || !is_cost(note.in_flight) {
+            let problem = "costs of 0 or more expected".to_owned();
+            return Err(Error::Run { path, problem });
+        }
+        Ok(Self {
+            killed: note.killed + note.in_flight,
+            in_flight: 0.0,
+        })
+    }
+
+    /// US dollars that killed processes may have spent without a record.
+    pub(crate) fn killed(self) -> f64 {
+        self.killed
+    }
+
+    /// Notes that this much is in flight, if more than before.
+    pub(crate) fn raise(&mut self, folder: &Path, dollars: f64) -> Result<()> {
+        if dollars <= self.in_flight {
+            return Ok(());
+        }
+        self.in_flight = dollars * MARGIN;
+        self.write(folder)
+    }
+
+    /// Notes that nothing is in flight: all requests have a record.
+    pub(crate) fn end(&mut self, folder: &Path) -> Result<()> {
+        if self.in_flight <= 0.0 {
+            return Ok(());
+        }
+        self.in_flight = 0.0;
+        if self.killed > 0.0 {
+            return self.write(folder);
+        }
+        let path = folder.join(NOTE);
+        fs::remove_file(&path).map_err(|e| Error::file(path, "delete", e))
+    }
+
+    fn write(self, folder: &Path) -> Result<()> {
+        let path = folder.join(NOTE);
+        let text = serde_json::to_vec(&self).map_err(|e| Error::file(&path, "write", e.into()))?;
+        files::write(&path, &text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_killed_process_leaves_a_cost() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path();
+        let mut cost = InFlightCost::open(path).unwrap();
+        cost.raise(path, 4.0).unwrap();
+        cost.raise(path, 3.0).unwrap();
+        cost.end(path).unwrap();
+        assert_eq!(fs::read_dir(path).unwrap().count(), 0);
+        cost.raise(path, 4.0).unwrap();
+        let mut next = InFlightCost::open(path).unwrap();
+        assert!((next.killed() - 5.0).abs() < 1e-9);
+        next.raise(path, 1.0).unwrap();
+        next.end(path).unwrap();
+        let third = InFlightCost::open(path).unwrap();
+        assert!((third.killed() - 5.0).abs() < 1e-9, "it counts once");
+        fs::write(path.join(NOTE), "{\"killed\":-1,\"in_flight\":0}").unwrap();
+        assert!(InFlightCost::open(path).is_err());
+    }
+}

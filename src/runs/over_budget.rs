@@ -1,0 +1,77 @@
+//! The note in a manifest that a run cost more than `--max-cost`: [`OverBudget`].
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+use crate::report::forecast::money;
+use crate::types::manifest::RunManifest;
+
+/// The entry of a manifest's settings with the cost beyond `--max-cost`.
+const ENTRY: &str = "--max-cost exceeded";
+
+/// Cost of a run beyond its limit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct OverBudget {
+    /// The limit, in US dollars.
+    pub(crate) limit: f64,
+    /// The cost, in US dollars.
+    pub(crate) spent: f64,
+    /// Numbers of replies that were charged more tokens than their limit, by model.
+    #[serde(default)]
+    pub(crate) longer_replies: BTreeMap<String, usize>,
+}
+
+impl OverBudget {
+    /// Replaces the note in a manifest; a run within its limit has none.
+    pub(crate) fn note(over: Option<&Self>, manifest: &mut RunManifest) {
+        manifest.settings.remove(ENTRY);
+        if let Some(over) = over {
+            manifest.settings.insert(ENTRY.to_owned(), json!(over));
+        }
+    }
+
+    /// The note in a manifest; `None` if there is none.
+    pub(crate) fn read(manifest: &RunManifest) -> Option<Self> {
+        serde_json::from_value(manifest.settings.get(ENTRY)?.clone()).ok()
+    }
+
+    /// The cost in a sentence, with the cause if it is known.
+    pub(crate) fn sentence(&self) -> String {
+        let replies = self.longer_replies.iter();
+        let replies: Vec<String> = replies
+            .map(|(model, count)| format!("{model} ({count})"))
+            .collect();
+        let cause = match &replies[..] {
+            [] => String::new(),
+            replies => format!(
+                "; replies that were charged more tokens than --max-tokens: {}",
+                replies.join(", ")
+            ),
+        };
+        format!(
+            "The requests cost {}, more than the {} of --max-cost{cause}.",
+            money(self.spent),
+            money(self.limit)
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sentence_names_the_models_that_exceeded_their_limit() {
+        let mut over = OverBudget {
+            limit: 0.5,
+            spent: 2.0,
+            longer_replies: BTreeMap::new(),
+        };
+        let plain = "The requests cost $2.00, more than the $0.5000 of --max-cost.";
+        assert_eq!(over.sentence(), plain);
+        over.longer_replies.insert("m".to_owned(), 3);
+        assert!(over.sentence().ends_with("than --max-tokens: m (3)."));
+    }
+}
