@@ -67,6 +67,8 @@ impl Wording {
 
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
+
     use super::*;
 
     #[test]
@@ -87,25 +89,33 @@ mod tests {
 
     #[test]
     fn words_of_servers_have_their_cause() {
+        let error = |message: &str| json!({"error": {"message": message}}).to_string();
+        let flat = |message: &str| {
+            json!({"object": "error", "message": message, "type": "BadRequestError", "code": 400})
+                .to_string()
+        };
         for (body, flag) in [
-            (
-                r#"{"error":"Model does not support images. Please use a model that does."}"#,
-                "--blind",
-            ),
-            (
-                r#"{"object":"error","message":"This model's maximum context length is 4096 tokens. However, you requested 5000 tokens","code":400}"#,
-                "--max-tokens",
-            ),
-            (
-                r#"{"object":"error","message":"The decoder prompt (length 5000) is longer than the maximum model length of 4096.","code":400}"#,
-                "--max-side",
-            ),
-            (
-                r#"[{"error":{"code":400,"message":"Bad key","status":"INVALID_ARGUMENT","details":[{"reason":"API_KEY_INVALID"}]}}]"#,
-                "--api-key-env",
-            ),
+            (flat("facebook/opt-125m is not a multimodal model None"), "--blind"),
+            (json!({"error": "Model does not support images. Please use a model that does."}).to_string(), "--blind"),
+            (error("Error in iterating prediction stream: ValueError: Vision add-on is not loaded, but images were provided for processing"), "--blind"),
+            (error("this model is missing data required for image input"), "--blind"),
+            (error("image input is not supported by this server"), "--blind"),
+            (error("Failed to deserialize the JSON body into the target type: messages[1]: unknown variant `image_url`, expected `text` at line 1 column 690848"), "--blind"),
+            (error("Failed to deserialize the JSON body into the target type: messages[1]: data did not match any variant of untagged enum ChatCompletionRequestContent at line 1 column 18231"), "--blind"),
+            (error("messages[1].content must be a string"), "--blind"),
+            (json!({"object": "Error", "message": "Image input is not enabled for this model", "code": 3051}).to_string(), "--blind"),
+            (error("prompting with images is incompatible with system messages"), "--system"),
+            (flat("At most 0 image(s) may be provided in one request."), "--blind"),
+            (flat("At most 1 image(s) may be provided in one request."), "--limit-mm-per-prompt"),
+            (flat("This model's maximum context length is 4096 tokens. However, you requested 5000 tokens"), "--max-tokens"),
+            (flat("The decoder prompt (length 5000) is longer than the maximum model length of 4096."), "--max-side"),
+            (flat("The input (61709 tokens) is longer than the model's context length (40960 tokens)."), "--max-side"),
+            (json!({"error": {"code": 400, "message": "too long", "type": "exceed_context_size_error", "n_ctx": 256}}).to_string(), "--max-side"),
+            (json!({"error": "Trying to keep the first 111490 tokens when context the overflows. However, the model is loaded with context length of only 32768 tokens"}).to_string(), "--max-side"),
+            (json!({"error": {"message": "Please reduce the length of the messages or completion.", "code": "context_length_exceeded"}}).to_string(), "--max-side"),
+            (json!([{"error": {"code": 400, "message": "Bad key", "details": [{"reason": "API_KEY_INVALID"}]}}]).to_string(), "--api-key-env"),
         ] {
-            let wording = Wording::find(&Complaint::of_body(body), true);
+            let wording = Wording::find(&Complaint::of_body(&body), true);
             let hint = wording.unwrap_or_else(|| panic!("{body}")).hint();
             assert!(hint.contains(flag), "{body}: {hint}");
         }

@@ -91,6 +91,7 @@ mod tests {
             "Cancelled",
             "network_error",
             "insufficient-system-resource",
+            "MALFORMED_FUNCTION_CALL",
         ] {
             let broken = read(word, None).unwrap_err();
             assert!(
@@ -106,6 +107,19 @@ mod tests {
         let unknown = read("zeitgeist", None).unwrap_err();
         assert!(unknown.what.contains("\"zeitgeist\" is not known"));
         assert_eq!(read("END_TURN", None), Ok(Finish::Stop));
+        assert_eq!(
+            read("tool_use", None),
+            Ok(Finish::Other("tool_use".to_owned()))
+        );
+        assert_eq!(read("MAX_TOKENS", None), Ok(Finish::Length));
+        for word in [
+            "SAFETY",
+            "RECITATION",
+            "PROHIBITED_CONTENT",
+            "guardrail_intervened",
+        ] {
+            assert_eq!(read(word, None), Ok(Finish::Filter), "{word}");
+        }
         assert_eq!(read("", None), Ok(Finish::Unknown));
     }
 }
