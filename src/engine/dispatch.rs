@@ -27,11 +27,12 @@ use crate::error::{Error, Result};
 use crate::images::image_pipeline::EnhancerStopper;
 use crate::images::progress::{Progress, StepBar};
 use crate::images::timings::{TimedStep, Timings};
-use crate::images::trial::{Item, PreparedGroup};
+use crate::images::trial::{Item, PreparedGroup, Trial};
 use crate::images::workers::unstarted;
+use crate::score::image_dependence::{ImageDependence, LitReply};
 use crate::score::record::answered;
 use crate::store::Store;
-use crate::types::{Failure, FailureKind, Finish, LostAttempts, Record, Reply};
+use crate::types::{Digest, Failure, FailureKind, Finish, LostAttempts, Record, Reply, SetLight};
 
 /// Number of finished groups that may wait until they are asked about.
 const GROUPS_AHEAD: usize = 2;
@@ -85,6 +86,7 @@ impl Dispatcher<'_> {
             answered: counts.answered,
             truncation: TruncationCheck::default(),
             measured: MeasuredTokens::new(self.models.len()),
+            dependence: vec![ImageDependence::default(); self.models.len()],
             said_difference: vec![Said::NotYet; self.models.len()],
             first_questions: vec![FirstQuestion::NotAsked; self.models.len()],
             limits: BudgetNotes::new(self.models),
@@ -129,6 +131,8 @@ struct ReplySink<'a, I: Item> {
     truncation: TruncationCheck,
     /// What the images of the replies were charged.
     measured: MeasuredTokens,
+    /// Of each model, whether its replies depend on the image.
+    dependence: Vec<ImageDependence>,
     /// Of each model, whether the user knows how far the estimate is from what is charged.
     said_difference: Vec<Said>,
     /// The first question to each model.
@@ -489,14 +493,31 @@ impl<I: Item> ReplySink<'_, I> {
         }
         let model = &self.dispatcher.models[ready.trial.model];
         let blank = I::blank(&ready.trial, &ready.stimulus, &model.name);
-        self.store.append(&match result {
+        let record = match result {
             Ok(reply) => answered(blank, reply)?,
             Err(error) => Record {
                 lost: *error.lost,
                 finish: error.finish.map(|word| Finish::Other(word).shortened()),
                 ..blank.failed_by(error.failure, error.attempts)
             },
-        })
+        };
+        self.store.append(&record)?;
+        self.check_dependence(&ready.trial, &record);
+        Ok(())
+    }
+
+    /// Warns once of each model at an endpoint if its replies do not depend on the image. Photographs taken in the dark do not show that.
+    fn check_dependence(&mut self, trial: &Trial<I>, record: &Record<I::Detail>) {
+        let model = &self.dispatcher.models[trial.model];
+        if !model.model.is_remote() || self.dispatcher.settings.set_light == SetLight::Dark {
+            return;
+        }
+        let wording = || Digest::of_parts(trial.prompt.parts().map(str::as_bytes));
+        let reply = LitReply::from_record(record, wording);
+        let found = reply.and_then(|reply| self.dependence[trial.model].add(reply));
+        if let Some(found) = found {
+            tracing::warn!("{}", found.words(&model.name));
+        }
     }
 }
 

@@ -39,6 +39,7 @@ use crate::runs::over_budget::OverBudget;
 use crate::runs::part_cost::PartCost;
 use crate::runs::record_table;
 use crate::runs::stored::StoredRun;
+use crate::score::image_dependence::FEWEST;
 use crate::store::now;
 use crate::store::{self, Store, StoredTrial};
 use crate::types::manifest::{Counts, RunManifest};
@@ -46,6 +47,10 @@ use crate::types::{EnhancerName, TrialKey, View};
 
 /// Share of `--max-cost` below which a cost that no server stated is not mentioned; chosen.
 const SMALL_SHARE: f64 = 0.01;
+
+/// Number of trials about untouched images that each model is asked first, if the run has as many; chosen, so that a server that drops
+/// every second image is noticed by then.
+const UNTOUCHED_FIRST: usize = 128;
 
 /// A run folder that no other process writes to, with all that asking needs.
 pub(crate) struct OpenRun<'a, E: Experiment> {
@@ -285,6 +290,12 @@ impl<E: Experiment> OpenRun<'_, E> {
             let names = models.iter().map(|model| model.name.as_ref());
             let first = first_source(names, settings.shard, plan.sources.len());
             plan.sources.rotate_left(first);
+        }
+        if models.iter().any(|model| model.model.is_remote()) {
+            let of_all = |trials: usize| trials * models.len();
+            plan.ask_untouched_first(of_all(FEWEST), of_all(UNTOUCHED_FIRST), |source| {
+                sources[source].frames.len() == 1
+            });
         }
         let stoppers = pipeline.stoppers();
         let dispatcher = Dispatcher {

@@ -76,6 +76,39 @@ impl<I> Plan<I> {
         before - self.remaining()
     }
 
+    /// Moves untouched images to the front, source by source, until they have this many trials; nothing is moved if there are fewer than
+    /// `fewest`. They show whether a server looks at the images at all. Only sources for which `is_cheap` holds are moved, because their
+    /// frames are read twice.
+    pub(crate) fn ask_untouched_first(
+        &mut self,
+        fewest: usize,
+        trials: usize,
+        is_cheap: impl Fn(usize) -> bool,
+    ) {
+        let is_untouched = |group: &TrialGroup<I>| group.condition == Some(Condition::L0);
+        let untouched = self.groups().filter(|(_, group)| is_untouched(group));
+        let available: usize = untouched.map(|(_, group)| group.trials.len()).sum();
+        if available < fewest {
+            return;
+        }
+        let mut first = Vec::new();
+        let mut moved = 0;
+        for part in self.sources.iter_mut().filter(|part| is_cheap(part.source)) {
+            if moved < trials
+                && part.groups.len() > 1
+                && let Some(place) = part.groups.iter().position(is_untouched)
+            {
+                moved += part.groups[place].trials.len();
+                first.push(SourcePlan {
+                    source: part.source,
+                    groups: vec![part.groups.remove(place)],
+                });
+            }
+        }
+        first.append(&mut self.sources);
+        self.sources = first;
+    }
+
     /// Number of trials that remain to be asked.
     pub(crate) fn remaining(&self) -> usize {
         self.sources.iter().map(SourcePlan::trials).sum()

@@ -27,6 +27,8 @@ impl Alert {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AlertKind {
+    /// Replies that do not depend on the image.
+    ImageIgnored,
     /// A run that is named again, or that adds no reply to those of the others.
     Runs,
     /// A run in which trials have no reply yet.

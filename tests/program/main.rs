@@ -32,6 +32,7 @@ mod golden;
 mod hm3d;
 mod hostile;
 mod identity;
+mod image_ignored;
 mod image_store;
 mod import;
 mod inputs;

@@ -3,6 +3,7 @@
 mod adapted;
 mod confidence;
 mod constraints;
+mod images;
 mod models;
 mod noise;
 mod providers;
@@ -38,6 +39,7 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
     alerts.extend(replies::of_replies(&findings.health, "count as wrong"));
     alerts.extend(replies::of_broken_off(combined));
     alerts.extend(replies::of_people(combined));
+    alerts.extend(images::of_images(combined));
     alerts.extend(readings::of_readings(combined));
     alerts.extend(confidence::of_confidence(&combined.runs, &combined.trials));
     alerts.extend(constraints::of_constraints(

@@ -45,6 +45,7 @@ pub mod flips;
 pub mod grid;
 mod head;
 pub mod health;
+pub mod image_dependence;
 pub mod llm_match;
 pub mod observed;
 pub mod open;

@@ -20,6 +20,9 @@ pub trait Detail: StoredDetail {
     /// # Errors
     /// If the choices of the detail are not valid.
     fn read(&mut self, reply: &Reply) -> Result<()>;
+
+    /// Index of the choice in the lenient reading; `None` if none was read.
+    fn chosen(&self) -> Option<usize>;
 }
 
 impl Detail for ChoiceDetail {
@@ -53,6 +56,10 @@ impl Detail for ChoiceDetail {
         }
         Ok(())
     }
+
+    fn chosen(&self) -> Option<usize> {
+        self.lenient?.chosen
+    }
 }
 
 impl Detail for OpenDetail {
@@ -65,6 +72,10 @@ impl Detail for OpenDetail {
             self.tolerant = mark(&reply.text, Protocol::Tolerant);
         }
         Ok(())
+    }
+
+    fn chosen(&self) -> Option<usize> {
+        None
     }
 }
 

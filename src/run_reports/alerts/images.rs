@@ -1,0 +1,56 @@
+//! Models whose replies do not depend on the image: [`of_images`].
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use crate::report::alert::{Alert, AlertKind};
+use crate::run_reports::combine::Combined;
+use crate::score::image_dependence::{Independence, LitReply};
+use crate::score::subject::without_run;
+use crate::types::{Digest, QuestionId, RunQuestion, SetLight};
+
+/// One alert for each model at an endpoint whose replies about untouched images do not depend on the image. Photographs taken in the dark
+/// do not show that.
+pub(super) fn of_images(combined: &Combined) -> Vec<Alert> {
+    if combined.set().light == SetLight::Dark {
+        return Vec::new();
+    }
+    let questions: HashMap<&QuestionId, &RunQuestion> = combined
+        .questions
+        .iter()
+        .map(|question| (&question.id, question))
+        .collect();
+    let mut replies = BTreeMap::<&str, Vec<LitReply>>::new();
+    let built_in = built_in(combined);
+    for trial in combined.trials.iter() {
+        let Some(question) = questions.get(trial.question()) else {
+            continue;
+        };
+        if built_in.contains(trial.model()) {
+            continue;
+        }
+        let words = std::iter::once(&question.text).chain(trial.choices());
+        let wording = || Digest::of_parts(words.map(String::as_bytes));
+        if let Some(reply) = LitReply::from_trial(trial, wording) {
+            replies.entry(trial.model()).or_default().push(reply);
+        }
+    }
+    let found = replies
+        .into_iter()
+        .filter_map(|(model, replies)| Some(Independence::find(&replies)?.words(model)));
+    found
+        .map(|text| Alert::new(AlertKind::ImageIgnored, text))
+        .collect()
+}
+
+/// The names of the models that are asked at no endpoint.
+fn built_in(combined: &Combined) -> BTreeSet<&str> {
+    let is_built_in = |model: &str| {
+        let mut runs = combined.runs.iter();
+        runs.any(|run| run.manifest.is_built_in(without_run(model)))
+    };
+    let asked = combined.trials.asked().into_iter().flatten();
+    asked
+        .map(|(model, _)| model)
+        .filter(|model| is_built_in(model))
+        .collect()
+}
