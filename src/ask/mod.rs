@@ -76,6 +76,7 @@ pub(crate) use local::{Local, LocalAnswer};
 pub use model::Model;
 pub(crate) use pace::Bounds;
 pub use pace::Quota;
+pub(crate) use parameters::by_flag;
 pub use parameters::{Constrain, ImageDetail, Parameters, Temperature};
 pub(crate) use prices::{Price, Prices};
 pub use prompt::Prompts;

@@ -125,6 +125,11 @@ impl Model {
         system.and_then(Option::as_ref).map_or(0, String::len)
     }
 
+    /// The token limit of its replies, if it is larger than the one that the run began with.
+    pub(crate) fn grown_limit(&self) -> Option<u32> {
+        self.remote()?.parameters().grown_limit()
+    }
+
     /// The body of a request as it would be sent now; `None` for models without requests.
     #[must_use]
     pub fn body(

@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::extra_fields::ExtraFields;
 use super::thinking::Thinking;
@@ -39,6 +39,10 @@ pub struct Parameters {
     /// A letter needs 16; a reasoning model uses hundreds before it.
     #[arg(long, value_name = "N", default_value_t = Self::MAX_TOKENS, add = Decides::Reply)]
     pub max_tokens: NonZeroU32,
+    /// The smaller limit that the run began with, which stays in the keys of its trials; `None` if it has not grown.
+    #[arg(skip)]
+    #[serde(skip)]
+    pub first_max_tokens: Option<NonZeroU32>,
     /// The field that carries that limit; auto is what is known of the endpoint, else max_tokens, and the other one if the server asks for
     /// it
     #[arg(long, value_name = "FIELD", value_enum, default_value_t = TokenField::Auto, add = Decides::Reply)]
@@ -87,6 +91,7 @@ impl Parameters {
             top_p: None,
             seed: None,
             max_tokens: Self::MAX_TOKENS,
+            first_max_tokens: None,
             token_field: TokenField::Auto,
             reasoning_effort: None,
             thinking: None,
@@ -101,6 +106,31 @@ impl Parameters {
     /// The token limit that is sent; `None` if none is sent.
     pub(super) fn limit(&self) -> Option<u32> {
         (self.token_field != TokenField::Omit).then_some(self.max_tokens.get())
+    }
+
+    /// The token limit that is sent, if it is larger than the one that the run began with.
+    pub(super) fn grown_limit(&self) -> Option<u32> {
+        self.limit().filter(|_| self.first_max_tokens.is_some())
+    }
+
+    /// The same settings in a run that began with a smaller token limit, which stays in the keys of its trials; `None` if this one is not
+    /// larger or not sent.
+    pub(crate) fn grown_from(&self, first: NonZeroU32) -> Option<Self> {
+        let is_larger = self.limit()? > first.get();
+        is_larger.then(|| Self {
+            first_max_tokens: Some(first),
+            ..self.clone()
+        })
+    }
+
+    /// Whether the settings that decide a reply are those of a run's column, whose address is left aside.
+    pub(crate) fn are_of_column(&self, column: &Value) -> bool {
+        let Value::Object(own) = self.content() else {
+            return false;
+        };
+        let mut column = column.as_object().cloned().unwrap_or_default();
+        column.remove("--base-url");
+        by_flag(own) == column
     }
 
     /// Checks that the temperature does not change the probabilities of tokens.
@@ -120,9 +150,27 @@ impl Parameters {
     /// The settings that can change a reply, the API among them. Whether a token limit is sent is one of them; the name of its field is not.
     pub(super) fn content(&self) -> Value {
         let mut content = json!(self);
-        content["max_tokens"] = self.limit().into();
+        let first = self.first_max_tokens.map(NonZeroU32::get);
+        content["max_tokens"] = first.or(self.limit()).into();
         content["wire"] = self.wire.content().into();
         content
+    }
+}
+
+/// The settings of a model, by the flag that sets each.
+pub(crate) fn by_flag(content: Map<String, Value>) -> Map<String, Value> {
+    let fields = content.into_iter();
+    fields.map(|(name, value)| (flag(&name), value)).collect()
+}
+
+/// The flag that sets a parameter.
+fn flag(parameter: &str) -> String {
+    match parameter {
+        "seed" => "--sampling-seed".to_owned(),
+        // Keys of a file of models that are no flags.
+        "deployment" => "deployment".to_owned(),
+        "reply_headers" => "reply-headers".to_owned(),
+        name => format!("--{}", name.replace('_', "-")),
     }
 }
 
@@ -244,5 +292,15 @@ mod tests {
             ..base.clone()
         };
         assert_eq!(renamed.content(), base.content());
+        let mut grown = base.clone();
+        grown.max_tokens = NonZeroU32::new(4096).unwrap();
+        assert_ne!(grown.content(), base.content());
+        let grown = grown.grown_from(base.max_tokens).unwrap();
+        assert_eq!(grown.content(), base.content());
+        assert_eq!(
+            (grown.limit(), grown.grown_limit()),
+            (Some(4096), Some(4096))
+        );
+        assert_eq!(base.grown_from(grown.max_tokens), None);
     }
 }

@@ -492,7 +492,7 @@ impl<I: Item> ReplySink<'_, I> {
             }
         }
         let model = &self.dispatcher.models[ready.trial.model];
-        let blank = I::blank(&ready.trial, &ready.stimulus, &model.name);
+        let blank = model.blank(&ready.trial, &ready.stimulus);
         let record = match result {
             Ok(reply) => answered(blank, reply)?,
             Err(error) => Record {

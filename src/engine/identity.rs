@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
 
+use crate::ask::by_flag;
 use crate::engine::models::ModelUnderTest;
 use crate::engine::settings::JobSettings;
 use crate::enhance::{self, SizeArgs, Tiling};
@@ -82,22 +83,10 @@ pub(crate) fn columns<'a>(
 pub(crate) fn model(model: &ModelUnderTest) -> Value {
     let mut content = model.model.content();
     if let (Some(address), Some(fields)) = (model.address(), content.as_object_mut()) {
-        let own = std::mem::take(fields).into_iter();
-        fields.extend(own.map(|(name, value)| (flag(&name), value)));
+        *fields = by_flag(std::mem::take(fields));
         fields.insert("--base-url".to_owned(), json!(address));
     }
     content
-}
-
-/// The flag that sets a parameter.
-fn flag(parameter: &str) -> String {
-    match parameter {
-        "seed" => "--sampling-seed".to_owned(),
-        // Keys of a file of models that are no flags.
-        "deployment" => "deployment".to_owned(),
-        "reply_headers" => "reply-headers".to_owned(),
-        name => format!("--{}", name.replace('_', "-")),
-    }
 }
 
 /// Settings that decide the pixels of an enhancer. Automatic tiles are not among them: at most one sample in a thousand differs from

@@ -10,7 +10,7 @@ use crate::engine::experiment::{DetailOf, Experiment};
 use crate::engine::folder;
 use crate::engine::manifest;
 use crate::engine::measured_tokens::MeasuredTokens;
-use crate::engine::open_run::{OpenRun, answered, lost_for_good, pipeline};
+use crate::engine::open_run::{OpenRun, answered, lost_for_good, pipeline, truncated};
 use crate::enhance::ModelFile;
 use crate::error::Result;
 use crate::images::enhancers::OpenEnhancers;
@@ -118,7 +118,8 @@ impl<'a, E: Experiment> Job<'a, E> {
                 experiment.sources(),
                 &stored,
             ));
-            plan.exclude(|key| answered.contains(key));
+            let again = truncated(&stored, experiment.models(phase));
+            plan.exclude(|key| answered.contains(key) && !again.contains(key));
             plans.push(plan);
         }
         if plans.iter().any(|plan| !plan.conditions().is_empty()) {

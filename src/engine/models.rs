@@ -21,8 +21,9 @@ use serde_json::{Value, json};
 
 use crate::ask::{Endpoint, Model, Parameters, Price, Prices, Remote, Script, Server};
 use crate::error::{Error, Result};
+use crate::images::trial::{Item, Stimulus, Trial};
 use crate::runs::renamed::ADAPTED_FOR;
-use crate::types::{Condition, View};
+use crate::types::{Condition, Record, View};
 
 pub(crate) use args::ModelArgs;
 pub(crate) use asking::AskingArgs;
@@ -83,6 +84,18 @@ impl ModelUnderTest {
         let remote = self.model.is_remote();
         let of_table = || prices.of(self.model.name());
         remote.then(|| self.price.or_else(of_table)).flatten()
+    }
+
+    /// The record of a trial, without an outcome.
+    pub(crate) fn blank<I: Item>(
+        &self,
+        trial: &Trial<I>,
+        stimulus: &Stimulus,
+    ) -> Record<I::Detail> {
+        Record {
+            max_tokens: self.model.grown_limit(),
+            ..I::blank(trial, stimulus, &self.name)
+        }
     }
 
     /// Whether it is asked the question at this place among the selected ones.

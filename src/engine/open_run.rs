@@ -1,6 +1,6 @@
 //! A run that is open for writing: [`OpenRun`].
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt::Write as _;
 use std::path::Path;
 use std::time::Instant;
@@ -31,7 +31,7 @@ use crate::images::thumbnail::MissingThumbnails;
 use crate::images::timings::Timings;
 use crate::images::workers::Workers;
 use crate::report::forecast::money;
-use crate::report::words::counted;
+use crate::report::words::{counted, plural};
 use crate::runs::first_source::first_source;
 use crate::runs::other_parts::OtherParts;
 use crate::runs::outcome::Outcome;
@@ -181,7 +181,15 @@ impl<E: Experiment> OpenRun<'_, E> {
             stored = self.store.trials()?;
             answered = self::answered(&stored);
         }
-        plan.exclude(|key| answered.contains(key));
+        let again = truncated(&stored, self.experiment.models(phase));
+        plan.exclude(|key| answered.contains(key) && !again.contains(key));
+        let asked_again = plan.remaining_of(|key| again.contains(key));
+        if asked_again > 0 {
+            let replies = plural(asked_again, "truncated reply is", "truncated replies are");
+            self.progress.note(&format!(
+                "{replies} asked again with the larger --max-tokens"
+            ));
+        }
         let paid_for = lost_for_good(&stored, self.experiment.settings());
         let not_again = plan.exclude(|key| paid_for.contains(key));
         if not_again > 0 {
@@ -489,6 +497,20 @@ pub(crate) fn lost_for_good(stored: &[StoredTrial], settings: &JobSettings) -> H
         .iter()
         .filter(|trial| trial.failed() && trial.lost_attempts() > most);
     lost.map(|trial| trial.key).collect()
+}
+
+/// Keys of the trials whose reply was truncated at a limit below that of their model now.
+pub(crate) fn truncated(stored: &[StoredTrial], models: &[ModelUnderTest]) -> HashSet<TrialKey> {
+    let limits: HashMap<&str, u32> = models
+        .iter()
+        .filter_map(|model| Some((&*model.name, model.model.grown_limit()?)))
+        .collect();
+    let is_truncated = |trial: &&StoredTrial| {
+        let limit = limits.get(trial.model.as_str());
+        limit.is_some_and(|limit| trial.is_truncated_below(*limit))
+    };
+    let truncated = stored.iter().filter(is_truncated);
+    truncated.map(|trial| trial.key).collect()
 }
 
 /// Keys of the trials that have a reply.

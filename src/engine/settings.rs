@@ -24,8 +24,10 @@ use crate::picture::{ImageArgs, PayloadFormat};
 use crate::runs::outcome::{RecordTable, ShowArgs, StdoutFormat};
 use crate::runs::run_plan::RunPlan;
 use crate::runs::shard::Shard;
+use crate::store;
 use crate::synthesis::{LightArgs, LightSettings};
 use crate::types::flag::seconds;
+use crate::types::manifest::Columns;
 use crate::types::{Decides, SetLight, View};
 
 /// The flags that every experiment has.
@@ -269,10 +271,13 @@ impl JobArgs {
             data: experiment.data.as_deref(),
             text_baseline: experiment.text_baseline,
         };
+        let mut ask = AskSettings::resolve(&self.models, &asking, context)?;
+        let place = RunPlace::from(self.output.clone()).checked()?;
+        ask.continue_from(&place.for_shard(shard).columns());
         Ok(JobSettings {
             light: LightSettings::resolve(&self.light, experiment.set_light)?,
             set_light: experiment.set_light,
-            ask: AskSettings::resolve(&self.models, &asking, context)?,
+            ask,
             enhancers: self.enhancers.for_set(experiment.set_light),
             loading: self.loading,
             format: self.images.image,
@@ -286,7 +291,7 @@ impl JobArgs {
             show: self.output.show.format(),
             table: self.output.show.table(),
             access: FolderAccess::new(self.output.shared),
-            place: RunPlace::from(self.output).checked()?,
+            place,
             image_flags: self.image_flags,
         })
     }
@@ -325,6 +330,17 @@ impl RunPlace {
         match self {
             Self::Named(folder) | Self::Resume(folder) => RunPlan::of(folder),
             Self::Automatic => Ok(None),
+        }
+    }
+
+    /// The columns of the run in the folder that is named. There are none if there is no run, or if its manifest cannot be read, which opening
+    /// the folder reports.
+    fn columns(&self) -> Columns {
+        match self {
+            Self::Named(folder) | Self::Resume(folder) => {
+                store::read_columns(folder).unwrap_or_default()
+            }
+            Self::Automatic => Columns::default(),
         }
     }
 

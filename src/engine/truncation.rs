@@ -40,7 +40,8 @@ impl TruncationCheck {
         } else if self.is_large() {
             self.has_warned = true;
             tracing::warn!(
-                "{} of {} replies so far were cut at the token limit: a larger --max-tokens, or a lower --reasoning-effort, lets them end",
+                "{} of {} replies so far were cut at the token limit: the same command with a larger --max-tokens and --resume DIR asks these \
+                 alone again",
                 self.cut,
                 self.replies
             );

@@ -109,6 +109,12 @@ impl<I> Plan<I> {
         self.sources = first;
     }
 
+    /// Number of trials that remain to be asked and have keys for which `is_counted` holds.
+    pub(crate) fn remaining_of(&self, is_counted: impl Fn(&TrialKey) -> bool) -> usize {
+        let trials = self.groups().flat_map(|(_, group)| &group.trials);
+        trials.filter(|trial| is_counted(&trial.key)).count()
+    }
+
     /// Number of trials that remain to be asked.
     pub(crate) fn remaining(&self) -> usize {
         self.sources.iter().map(SourcePlan::trials).sum()

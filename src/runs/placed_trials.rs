@@ -10,7 +10,7 @@ use crate::score::record::Detail;
 use crate::store::{RecordLog, Store, each_record};
 use crate::types::manifest::RunManifest;
 use crate::types::recorded_names::RecordedNames;
-use crate::types::{KeptTrial, Record, TextPlace, TrialKey, Trials};
+use crate::types::{Record, TextPlace, TrialKey, Trials};
 
 /// The bytes of records that are written at once. Chosen: fewer calls of the system than records.
 const CHUNK: usize = 1 << 20;
@@ -43,7 +43,7 @@ pub(crate) fn read_part<D: Detail>(
 pub(crate) fn trials_of<D: Detail>(folder: &Path, manifest: &RunManifest) -> Result<Trials<D>> {
     let mut trials = Trials::default();
     read_part(&mut trials, folder, manifest, 0)?;
-    trials.each_key_once(|_, _| Ok(KeptTrial::Later))?;
+    trials.each_key_once(|first, later| Ok(first.or_later(later)))?;
     Ok(trials)
 }
 

@@ -13,8 +13,8 @@ use crate::score::record::Detail;
 use crate::store;
 use crate::types::manifest::RunManifest;
 use crate::types::{
-    ChoiceDetail, ImageFidelity, KeptTrial, ListedModel, ModelListing, OpenDetail, QuestionId,
-    Record, RunQuestion, StoredDetail as _, TextPlace, Thumbnail, TrialRef, Trials,
+    ChoiceDetail, ImageFidelity, ListedModel, ModelListing, OpenDetail, QuestionId, Record,
+    RunQuestion, StoredDetail as _, TextPlace, Thumbnail, TrialRef, Trials,
 };
 
 /// The models of a run that a report shows.
@@ -103,7 +103,7 @@ impl<D: Detail> StoredRun<D> {
         files: RunFiles,
     ) -> Result<Self> {
         renamed::rename_trials(&mut trials, &manifest);
-        trials.each_key_once(|_, _| Ok(KeptTrial::Later))?;
+        trials.each_key_once(|first, later| Ok(first.or_later(later)))?;
         let ids = files.questions.iter().map(|question| &question.id);
         sort(&mut trials, ids, &manifest.models);
         Ok(Self {

@@ -16,7 +16,9 @@ use crate::error::{Error, Result};
 use crate::files::folder_access::FolderAccess;
 use crate::files::{self, is_unfinished, reading};
 use crate::score::record::Detail;
-use crate::types::manifest::{ColumnDifference, JUDGES, RunManifest, differences, judge_flag};
+use crate::types::manifest::{
+    ColumnDifference, Columns, JUDGES, RunManifest, differences, judge_flag,
+};
 use crate::types::recorded_names::RecordedNames;
 use crate::types::{Distinct, ImageFidelity, Record, RunQuestion, Thumbnail, TrialKey};
 
@@ -75,7 +77,13 @@ pub(super) fn write_manifest(folder: &Path, manifest: &RunManifest) -> Result<()
 /// The last record of each trial in a run folder, in the order of each trial's first record. An incomplete last line is
 /// skipped.
 pub(crate) fn read_records<D: Detail>(folder: &Path) -> Result<Vec<Record<D>>> {
-    last_of_each(folder, |record: &Record<D>| record.key, |_| (), |_, _| ())
+    // A failure does not replace a reply.
+    let follow = |last: &mut Record<D>, earlier: &Record<D>| {
+        if last.failed() && !earlier.failed() {
+            last.clone_from(earlier);
+        }
+    };
+    last_of_each(folder, |record: &Record<D>| record.key, |_| (), follow)
 }
 
 /// The last state of each trial in a run folder, in the order of [`read_records`].
@@ -91,7 +99,7 @@ pub(crate) fn read_trials(folder: &Path) -> Result<Vec<StoredTrial>> {
 }
 
 /// The last line of each key among the records, at the place of its first one, after `share` has seen it, and `follow` the earlier
-/// lines of its key.
+/// lines of its key, the latest first.
 fn last_of_each<T: StoredLine>(
     folder: &Path,
     key: impl Fn(&T) -> TrialKey,
@@ -110,7 +118,7 @@ fn last_of_each<T: StoredLine>(
     let again = keys.chunk_by(|one, next| one.0 == next.0);
     for places in again.filter(|places| places.len() > 1) {
         let (first, last) = (places[0].1 as usize, places[places.len() - 1].1 as usize);
-        for (_, place) in &places[..places.len() - 1] {
+        for (_, place) in places[..places.len() - 1].iter().rev() {
             let (earlier, later) = all.split_at_mut(last);
             follow(&mut later[0], &earlier[*place as usize]);
         }
@@ -218,6 +226,11 @@ pub(crate) fn read_manifest(folder: &Path, schema: &str) -> Result<Option<RunMan
     let problem = schema_problem(&manifest.schema, schema, &manifest.version);
     let path = folder.join(MANIFEST);
     Err(Error::Run { path, problem })
+}
+
+/// The columns in the manifest of a run of any kind; none without a manifest.
+pub(crate) fn read_columns(folder: &Path) -> Result<Columns> {
+    Ok(any_manifest(folder)?.map_or_else(Columns::default, |manifest| manifest.columns))
 }
 
 /// The error text for a run with another schema than expected.

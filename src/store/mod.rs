@@ -55,8 +55,8 @@ pub(crate) use stored_trial::StoredTrial;
 
 pub(crate) use folder::{
     AddressChange, BATCH, PLAN, each_placed_question, each_question, find, holds_run, is_locked,
-    now, read_fidelity, read_manifest, read_questions, read_records, read_thumbnails, read_trials,
-    schema,
+    now, read_columns, read_fidelity, read_manifest, read_questions, read_records, read_thumbnails,
+    read_trials, schema,
 };
 
 /// The trials that were sent in batches.
@@ -316,14 +316,19 @@ impl<D: Detail> Store<D> {
     /// The trials whose batch has no result yet: they have no reply, and were sent more often than they failed.
     pub(crate) fn pending_in_batches(&self) -> Result<BTreeSet<TrialKey>> {
         let mut pending = HashMap::<TrialKey, usize>::new();
+        let mut limits = HashMap::<TrialKey, u32>::new();
         for record in self.batch_trials()? {
             *pending.entry(record.key).or_default() += 1;
+            limits.extend(record.max_tokens.map(|limit| (record.key, limit)));
         }
         if pending.is_empty() {
             return Ok(BTreeSet::new());
         }
         each_line(&self.folder.join(RECORDS), |record: StoredTrial| {
-            if !record.failed() {
+            // A truncated reply does not answer a request that was sent again with a larger limit.
+            let limit = limits.get(&record.key);
+            let is_truncated = limit.is_some_and(|limit| record.is_truncated_below(*limit));
+            if !record.failed() && !is_truncated {
                 pending.remove(&record.key);
             } else if record.via == Via::Batch
                 && let Some(times) = pending.get_mut(&record.key)

@@ -1,10 +1,12 @@
 //! What a run that goes on needs of a trial that it has: [`StoredTrial`].
 
-use serde::Deserialize;
+use std::num::NonZeroU32;
+
 use serde::de::IgnoredAny;
+use serde::{Deserialize, Deserializer};
 
 use crate::types::small_number::{SmallNumber, Tokens};
-use crate::types::{LostAttempts, Shared, TrialKey, Usage, Via};
+use crate::types::{Finish, LostAttempts, Shared, TrialKey, Usage, Via};
 
 /// A trial of a run, without what was asked and what was answered: 56 bytes.
 #[derive(Debug, Clone, Deserialize)]
@@ -15,6 +17,10 @@ pub(crate) struct StoredTrial {
     #[serde(default)]
     pub(crate) via: Via,
     failure: Option<IgnoredAny>,
+    #[serde(default, rename = "finish", deserialize_with = "is_length")]
+    is_truncated: bool,
+    /// The limit of the reply's tokens, if it is larger than that of the run's first call.
+    max_tokens: Option<NonZeroU32>,
     #[serde(default)]
     usage: Tokens,
     #[serde(default)]
@@ -27,6 +33,15 @@ impl StoredTrial {
     /// Whether no reply came, so that the trial is asked again.
     pub(crate) fn failed(&self) -> bool {
         self.failure.is_some()
+    }
+
+    /// Whether the reply was truncated at a limit below this one.
+    pub(crate) fn is_truncated_below(&self, limit: u32) -> bool {
+        self.is_truncated && !self.failed() && self.limit() < Some(limit)
+    }
+
+    fn limit(&self) -> Option<u32> {
+        self.max_tokens.map(NonZeroU32::get)
     }
 
     /// The tokens that the server charged; `None` if it did not say.
@@ -44,19 +59,34 @@ impl StoredTrial {
         self.lost.as_deref()
     }
 
-    /// Adds the attempts of an earlier record of the same trial. A reply is followed only by other readings of itself, which repeat its
-    /// attempts.
+    /// Adds what was paid for an earlier record of the same trial, the latest first. A reply is followed by other readings of itself, which
+    /// repeat its attempts, by a reply with a larger limit, or by a failure to get one, which does not replace it.
     pub(super) fn follow(&mut self, earlier: &Self) {
-        if let Some(before) = earlier.lost.as_deref().filter(|_| earlier.failed()) {
-            let own = self.lost.as_deref().copied().unwrap_or_default();
-            self.lost = Some(Box::new(before.plus(own)));
+        let own = self.lost.as_deref().copied().unwrap_or_default();
+        let before = earlier.lost.as_deref().copied().unwrap_or_default();
+        let mut lost = own;
+        if self.failed() && !earlier.failed() {
+            self.clone_from(earlier);
+            lost = own.plus(before);
+        } else if earlier.failed() {
+            lost = own.plus(before);
+        } else if earlier.limit() < self.limit() {
+            lost = own.plus(before);
+            lost.add(earlier.usage());
         }
+        self.lost = (!lost.is_none()).then(|| Box::new(lost));
     }
 
     /// The duration of the last try, in milliseconds.
     pub(crate) fn latency_ms(&self) -> Option<u64> {
         self.latency_ms.get()
     }
+}
+
+/// Whether a reason why a model stopped is the token limit.
+fn is_length<'de, D: Deserializer<'de>>(deserializer: D) -> Result<bool, D::Error> {
+    let finish = Option::<Finish>::deserialize(deserializer)?;
+    Ok(finish == Some(Finish::Length))
 }
 
 #[cfg(test)]
@@ -79,6 +109,32 @@ mod tests {
         last.follow(&trial("null", 1));
         assert_eq!(last.lost_attempts(), 3, "another reading repeats its own");
         assert_eq!(last.lost().unwrap().usage.prompt_tokens, Some(300));
+    }
+
+    #[test]
+    fn a_truncated_reply_is_paid_for_besides_the_next() {
+        let reply = |limit: &str, finish: &str| -> StoredTrial {
+            let key = "0".repeat(32);
+            let line = format!(
+                r#"{{"key":"{key}","model":"m","failure":null,"finish":"{finish}","max_tokens":{limit},"usage":{{"prompt_tokens":10,"completion_tokens":5}}}}"#
+            );
+            serde_json::from_str(&line).unwrap()
+        };
+        let first = reply("null", "length");
+        assert!(
+            first.is_truncated_below(2000) && !reply("2000", "length").is_truncated_below(2000)
+        );
+        assert!(!reply("null", "stop").is_truncated_below(2000));
+        let mut last = reply("2000", "stop");
+        last.follow(&first);
+        assert_eq!(
+            (last.lost_attempts(), last.lost().unwrap().prompt_tokens),
+            (1, Some(10))
+        );
+        let mut failed = trial("{}", 2);
+        failed.follow(&first);
+        assert!(!failed.failed() && failed.is_truncated_below(2000));
+        assert_eq!(failed.lost_attempts(), 2);
     }
 
     #[test]

@@ -113,6 +113,7 @@ async fn what_is_set_is_sent_and_what_is_not_is_left_out() {
         top_p: Some(0.25),
         seed: Some(1234),
         max_tokens: NonZeroU32::new(16).unwrap(),
+        first_max_tokens: None,
         token_field: TokenField::MaxCompletionTokens,
         reasoning_effort: Some("low".into()),
         thinking: None,

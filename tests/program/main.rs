@@ -78,6 +78,7 @@ mod statistics;
 mod strange_runs;
 mod strange_texts;
 mod synthesize;
+mod truncated;
 mod unlabelled;
 mod walks;
 mod walks_in_parts;

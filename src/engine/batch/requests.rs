@@ -102,7 +102,7 @@ impl<'a, I: Item> Requests<'a, I> {
             let Some(line) = line.map_err(|e| Error::data(query.id(), e))? else {
                 continue;
             };
-            let mut blank = I::blank(trial, stimulus, &under_test.name);
+            let mut blank = under_test.blank(trial, stimulus);
             let cost = (self.cost)(trial, stimulus);
             // What a reply without stated tokens may have cost.
             if let Some(bound) = cost.bound {

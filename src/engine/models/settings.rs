@@ -17,6 +17,7 @@ use super::trust::{self, Trust};
 use crate::ask::{AccessArgs, Parameters, Price, Sending, Server};
 use crate::error::{Error, Result};
 use crate::runs::shard::Shard;
+use crate::types::manifest::Columns;
 use crate::types::model_views::Views;
 use crate::types::{ListedModel, View};
 
@@ -166,6 +167,36 @@ impl AskSettings {
                 listed,
             }),
         })
+    }
+
+    /// Goes on with a run with these columns: a token limit that has grown since does not make other trials. A model with the settings of
+    /// another name in the run has been renamed.
+    pub(crate) fn continue_from(&mut self, columns: &Columns) {
+        let Some(stored) = columns.get("model") else {
+            return;
+        };
+        for model in &mut self.models {
+            let ModelName::Remote(id) = &model.id else {
+                continue;
+            };
+            let own = Parameters {
+                model: id.clone(),
+                ..model.parameters.clone()
+            };
+            let mut others = stored.values();
+            if others.any(|column| own.are_of_column(column)) {
+                continue;
+            }
+            let Some(column) = stored.get(&model.name) else {
+                continue;
+            };
+            let first = column["--max-tokens"].as_u64();
+            let first = first.and_then(|first| NonZeroU32::new(u32::try_from(first).ok()?));
+            let grown = first.and_then(|first| own.grown_from(first));
+            if let Some(grown) = grown.filter(|grown| grown.are_of_column(column)) {
+                model.parameters = grown;
+            }
+        }
     }
 
     /// Whether a model of this name is shown images.

@@ -4,6 +4,7 @@ mod adapted;
 mod confidence;
 mod constraints;
 mod images;
+mod limits;
 mod models;
 mod noise;
 mod providers;
@@ -134,6 +135,7 @@ pub(super) fn of_runs<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     alerts.extend(of_costs(&joined.runs));
     alerts.extend(servers::of_servers(joined));
     alerts.extend(providers::of_providers(&joined.trials));
+    alerts.extend(limits::of_limits(joined));
     alerts.extend(of_enhancers(&joined.runs));
     alerts.extend(of_inputs(&joined.runs));
     alerts.extend(adapted::of_adaptations(&joined.runs));

@@ -18,7 +18,7 @@ pub(super) fn each_once<D: Detail>(trials: &mut Trials<D>, folders: &[&Path]) ->
     let mut twice = 0;
     trials.each_key_once(|first, later| {
         if first.text().log() == later.text().log() {
-            return Ok(KeptTrial::Later);
+            return Ok(first.or_later(later));
         }
         let lines = [logs.line(first.text())?, logs.line(later.text())?];
         // A part that goes on with the work of another has a copy of its lines.

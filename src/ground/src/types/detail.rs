@@ -38,6 +38,8 @@ macro_rules! details {
             #[serde(default)]
             via: Via,
             failure: Option<Failure>,
+            #[serde(default)]
+            max_tokens: Option<u32>,
             usage: Option<Usage>,
             served_model: Option<String>,
             #[serde(default)]
@@ -64,6 +66,7 @@ macro_rules! details {
                     finish: line.finish,
                     via: line.via,
                     failure: line.failure,
+                    max_tokens: line.max_tokens,
                     usage: line.usage,
                     served_model: line.served_model,
                     provider: line.provider,

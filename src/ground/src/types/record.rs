@@ -38,6 +38,9 @@ pub struct Record<D> {
     pub via: Via,
     /// The reason why no reply came; `None` if one came.
     pub failure: Option<Failure>,
+    /// The limit of the reply's tokens, if it is larger than that of the run's first call; not in the file otherwise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_tokens: Option<u32>,
     /// The tokens that the server charged; `None` if it did not say.
     pub usage: Option<Usage>,
     /// The model's name in the server's reply.
@@ -137,6 +140,7 @@ impl<D> Record<D> {
             finish: None,
             via: Via::Direct,
             failure: None,
+            max_tokens: None,
             usage: None,
             served_model: None,
             provider: None,

@@ -39,7 +39,7 @@ impl Finish {
 }
 
 /// The tokens that the server charged for a request; `None` where it did not say.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash, Serialize, Deserialize)]
 pub struct Usage {
     /// The number of tokens in the prompt, image included.
     pub prompt_tokens: Option<u64>,
@@ -79,7 +79,7 @@ impl Usage {
 }
 
 /// Attempts that were charged and gave no reply, with their tokens; and requests of which the server stated no tokens.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash, Serialize, Deserialize)]
 pub struct LostAttempts {
     /// The number of attempts.
     pub attempts: u32,

@@ -1,6 +1,7 @@
 //! Who was asked and what was shown: [`AskedModel`]; and how that ended: [`Ending`].
 
 use crate::types::Condition;
+use crate::types::LostAttempts;
 use crate::types::record::{FailureKind, Via, View};
 
 /// A model, and the condition of the images that it was shown.
@@ -26,4 +27,8 @@ pub(super) struct Ending {
     pub(super) broken_off: Option<String>,
     /// Number of requests that were sent.
     pub(super) attempts: u32,
+    /// The attempts that were charged and gave no reply, or one that was asked again.
+    pub(super) lost: LostAttempts,
+    /// The limit of the reply's tokens, if it is larger than that of the run's first call.
+    pub(super) max_tokens: Option<u32>,
 }

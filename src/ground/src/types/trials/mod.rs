@@ -31,7 +31,9 @@ use values::Values;
 use crate::error::Error;
 
 use super::record::{Record, StoredDetail};
-use super::{ChoiceDetail, Condition, Distinct, Family, Finish, FrameId, QuestionId, TrialKey};
+use super::{
+    ChoiceDetail, Condition, Distinct, Family, Finish, FrameId, LostAttempts, QuestionId, TrialKey,
+};
 
 /// Trials with what they refer to.
 #[derive(Debug, Clone)]
@@ -104,6 +106,8 @@ impl<D: StoredDetail> Trials<D> {
             failure,
             broken_off,
             attempts: record.attempts,
+            lost: record.lost,
+            max_tokens: record.max_tokens,
         });
         self.keys.push(record.key);
         self.logs = self.logs.max(text.log() + 1);
@@ -299,7 +303,8 @@ impl<D: StoredDetail> Trials<D> {
         item
     }
 
-    /// Keeps one trial of each key. `choose` is asked about each two in the order in which they were added.
+    /// Keeps one trial of each key. `choose` is asked about each two in the order in which they were added. What was paid for a trial that
+    /// is not kept is added to the one of the same file that is.
     ///
     /// # Errors
     /// What `choose` returns.
@@ -310,6 +315,7 @@ impl<D: StoredDetail> Trials<D> {
         let hashes = DefaultHashBuilder::default();
         let mut kept_of_key = HashTable::<u32>::with_capacity(self.keys.len());
         let mut kept = vec![true; self.facts.len()];
+        let mut paid = BTreeMap::<usize, LostAttempts>::new();
         for (later, key) in self.keys.iter().enumerate() {
             let is_same = |place: &u32| self.keys[*place as usize] == *key;
             let rehash = |place: &u32| hashes.hash_one(self.keys[*place as usize]);
@@ -319,17 +325,27 @@ impl<D: StoredDetail> Trials<D> {
                 }
                 Entry::Occupied(mut known) => {
                     let first = *known.get() as usize;
-                    match choose(self.at(first), self.at(later))? {
-                        KeptTrial::First => kept[later] = false,
-                        KeptTrial::Later => {
-                            kept[first] = false;
-                            *known.get_mut() = later as u32;
-                        }
+                    let (one, dropped) = match choose(self.at(first), self.at(later))? {
+                        KeptTrial::First => (first, later),
+                        KeptTrial::Later => (later, first),
+                    };
+                    kept[dropped] = false;
+                    *known.get_mut() = one as u32;
+                    if self.at(one).text().log() == self.at(dropped).text().log() {
+                        let earlier = paid.remove(&dropped).unwrap_or_default();
+                        let more = earlier.plus(self.at(dropped).paid_besides(self.at(one)));
+                        let sum = paid.entry(one).or_default();
+                        *sum = sum.plus(more);
                     }
                 }
             }
         }
         drop(kept_of_key);
+        for (place, more) in paid.into_iter().filter(|(_, more)| !more.is_none()) {
+            let ending = self.endings.get(self.facts[place].ending).clone();
+            let lost = ending.lost.plus(more);
+            self.facts[place].ending = self.endings.number(Ending { lost, ..ending });
+        }
         self.keep(&kept);
         Ok(())
     }

@@ -2,11 +2,11 @@
 
 use super::asked_model::Ending;
 use super::trial_facts::TrialFacts;
-use super::{AskedItem, SentImages, TextPlace, Trials};
+use super::{AskedItem, KeptTrial, SentImages, TextPlace, Trials};
 use crate::types::record::{FailureKind, StoredDetail, Via, View};
 use crate::types::{
-    AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, Observed, OpenDetail,
-    OptionProbabilities, QuestionId, Record, Step, TrialKey, TrialOutcome, Usage,
+    AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, LostAttempts, Observed,
+    OpenDetail, OptionProbabilities, QuestionId, Record, Step, TrialKey, TrialOutcome, Usage,
 };
 
 /// One of several trials.
@@ -180,6 +180,42 @@ impl<'t, D: StoredDetail> TrialRef<'t, D> {
     #[must_use]
     pub fn attempts(self) -> u32 {
         self.ending().attempts
+    }
+
+    /// The attempts that were charged and gave no reply, or one that was asked again with a larger limit.
+    #[must_use]
+    pub fn lost(self) -> LostAttempts {
+        self.ending().lost
+    }
+
+    /// The limit of the reply's tokens, if it is larger than that of the run's first call.
+    #[must_use]
+    pub fn max_tokens(self) -> Option<u32> {
+        self.ending().max_tokens
+    }
+
+    /// Which of two trials of one key counts, of which `later` was stored later: a failure does not replace a reply.
+    #[must_use]
+    pub fn or_later(self, later: Self) -> KeptTrial {
+        if later.failed() && !self.failed() {
+            KeptTrial::First
+        } else {
+            KeptTrial::Later
+        }
+    }
+
+    /// What was paid for this trial besides another of its key, which counts in its place. A reply with the same limit is the same
+    /// reply, read again.
+    pub(super) fn paid_besides(self, other: Self) -> LostAttempts {
+        let is_asked_again = self.max_tokens() < other.max_tokens();
+        let mut paid = LostAttempts::default();
+        if self.failed() || is_asked_again {
+            paid = self.lost();
+        }
+        if !self.failed() && is_asked_again {
+            paid.add(self.usage());
+        }
+        paid
     }
 
     /// The name of what was shown: the frame or the walk.

@@ -1,0 +1,46 @@
+//! Replies with different token limits, because truncated ones were asked again: [`of_limits`].
+
+use std::collections::BTreeMap;
+
+use crate::report::alert::{Alert, AlertKind};
+use crate::report::words::plural;
+use crate::run_reports::join::{Joined, JoinedRun};
+use crate::score::record::Detail;
+use crate::score::subject::without_run;
+
+/// One line for each model some of whose replies have a larger limit than the first ones, with the number of replies by limit.
+pub(super) fn of_limits<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
+    let mut counts = BTreeMap::<&str, BTreeMap<Option<u32>, usize>>::new();
+    for trial in joined.trials.iter().filter(|trial| trial.has_reply()) {
+        let limits = counts.entry(trial.model()).or_default();
+        *limits.entry(trial.max_tokens()).or_default() += 1;
+    }
+    let grown = counts
+        .iter()
+        .filter(|(_, limits)| limits.keys().any(Option::is_some));
+    let alerts = grown.map(|(model, limits)| {
+        let first = first_limit(&joined.runs, without_run(model));
+        let words = limits.iter().map(|(limit, count)| {
+            let limit = limit.map_or_else(|| first.clone(), |limit| limit.to_string());
+            format!("{} with {limit}", plural(*count, "reply", "replies"))
+        });
+        let words: Vec<String> = words.collect();
+        let text = format!(
+            "{model} was asked with several token limits (--max-tokens): {}. A truncated reply is asked again when the limit grows.",
+            words.join(", ")
+        );
+        Alert::new(AlertKind::Parameters, text)
+    });
+    alerts.collect()
+}
+
+/// The token limit with which the runs of a model began, in words.
+fn first_limit(runs: &[JoinedRun], model: &str) -> String {
+    let limits = runs.iter().filter_map(|run| {
+        let models = run.manifest.columns.get("model")?;
+        models.get(model)?.get("--max-tokens")?.as_u64()
+    });
+    limits
+        .min()
+        .map_or_else(|| "the first limit".to_owned(), |limit| limit.to_string())
+}
