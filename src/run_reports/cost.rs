@@ -7,34 +7,52 @@ use serde_json::Value;
 use crate::ask::{Price, Prices};
 use crate::error::Result;
 use crate::report::forecast::money;
+use crate::report::words;
 use crate::score::record::Detail;
 use crate::types::manifest::RunManifest;
 use crate::types::{TrialRef, Via};
 
-/// The cost of replies of a model at list prices, in US dollars; `None` if the model has no known price or no reply says its tokens.
+/// The cost of a model's trials at list prices, in US dollars, attempts without a reply included; `None` if the model has no known price or no
+/// reply says its tokens.
 pub(super) fn dollars<'t, D: Detail + 't>(
     model: &str,
     trials: impl Iterator<Item = TrialRef<'t, D>>,
 ) -> Result<Option<f64>> {
     let prices = Prices::built_in()?;
-    let replies = trials.filter(|trial| trial.has_reply());
-    let charged = replies.filter_map(|trial| charged(&prices, model, trial));
-    let charged: Vec<f64> = charged.collect();
+    let Some(price) = prices.of(model) else {
+        return Ok(None);
+    };
+    let charged = trials.flat_map(|trial| {
+        let charged = Charged::new(price, prices.batch, trial);
+        [charged.reply, charged.lost]
+    });
+    let charged: Vec<f64> = charged.flatten().collect();
     Ok((!charged.is_empty()).then(|| charged.iter().sum()))
 }
 
-/// The cost of a reply; `None` if it is not known.
-fn charged<D: Detail>(prices: &Prices, model: &str, trial: TrialRef<'_, D>) -> Option<f64> {
-    charged_at(prices.of(model)?, prices.batch, trial)
+/// The cost of a trial, in US dollars.
+#[derive(Debug, Clone, Copy)]
+struct Charged {
+    /// `None` without a reply, or if the server did not state its tokens.
+    reply: Option<f64>,
+    /// The cost of attempts without a usable reply; `None` if there are none.
+    lost: Option<f64>,
 }
 
-/// The cost of a reply at this price; `batch` is the share of it that a batch costs.
-fn charged_at<D: Detail>(price: Price, batch: f64, trial: TrialRef<'_, D>) -> Option<f64> {
-    let share = match trial.via() {
-        Via::Direct | Via::File => 1.0,
-        Via::Batch => batch,
-    };
-    Some(share * price.charged(trial.usage()?))
+impl Charged {
+    /// The cost at a price; `batch` is the share of it that a batch costs.
+    fn new<D: Detail>(price: Price, batch: f64, trial: TrialRef<'_, D>) -> Self {
+        let share = match trial.via() {
+            Via::Direct | Via::File => 1.0,
+            Via::Batch => batch,
+        };
+        let lost = Some(trial.lost()).filter(|lost| !lost.is_none());
+        let usage = trial.usage().filter(|_| trial.has_reply());
+        Self {
+            reply: usage.map(|usage| share * price.charged(usage)),
+            lost: lost.map(|lost| share * price.charged(lost.usage)),
+        }
+    }
 }
 
 /// The price of a model of a run: the one that its file of models states, else that of the table by the name that the endpoint knows.
@@ -55,31 +73,47 @@ pub(crate) fn price(prices: &Prices, manifest: &RunManifest, model: &str) -> Opt
     stated.or_else(|| prices.of(id.unwrap_or(model)))
 }
 
-/// The cost of a run's replies at list prices, as text; `None` if no model of the run has a known price.
+/// The cost of a run's replies at list prices, as text, attempts without a usable reply included; `None` if no model of the run has a known
+/// price.
 pub(super) fn cost<'t, D: Detail + 't>(
     trials: impl Iterator<Item = TrialRef<'t, D>>,
     manifest: &RunManifest,
 ) -> Result<Option<String>> {
     let prices = Prices::built_in()?;
     let (mut dollars, mut counted, mut unknown) = (0.0, 0_usize, 0_usize);
+    let (mut lost_dollars, mut attempts) = (0.0, 0_u32);
     let mut by_model = HashMap::new();
-    for trial in trials.filter(|trial| trial.has_reply()) {
+    for trial in trials.filter(|trial| trial.has_reply() || !trial.lost().is_none()) {
         let model = trial.model();
         let price = by_model
             .entry(model)
             .or_insert_with(|| price(&prices, manifest, model));
-        match price.and_then(|price| charged_at(price, prices.batch, trial)) {
+        let charged = price.map(|price| Charged::new(price, prices.batch, trial));
+        match charged.and_then(|charged| charged.reply) {
             Some(cost) => {
                 dollars += cost;
                 counted += 1;
             }
-            None => unknown += 1,
+            None => unknown += usize::from(trial.has_reply()),
+        }
+        if let Some(lost) = charged.and_then(|charged| charged.lost) {
+            lost_dollars += lost;
+            attempts += trial.lost().attempts;
         }
     }
+    let lost = match attempts {
+        0 => String::new(),
+        attempts => format!(
+            ", {} of it for {} without a usable reply",
+            money(lost_dollars),
+            words::counted(attempts as usize, "attempt")
+        ),
+    };
     let note = match unknown {
         0 => String::new(),
         n => format!("; {n} replies without a known price or usage"),
     };
-    let date = &prices.as_of;
-    Ok((counted > 0).then(|| format!("{} at the list prices of {date}{note}", money(dollars))))
+    let (date, all) = (&prices.as_of, money(dollars + lost_dollars));
+    Ok((counted > 0 || attempts > 0)
+        .then(|| format!("{all} at the list prices of {date}{lost}{note}")))
 }

@@ -415,3 +415,104 @@ fn requests_that_are_given_up_count() {
     );
     assert!(cost <= 0.75, "{cost}: {again:?}");
 }
+
+/// A file of models with one model at this endpoint, which charges $1 for 1,000 tokens of a prompt or 100 of a reply.
+fn priced(bench: &Bench, mock: &MockEndpoint) {
+    let table = format!(
+        "[[model]]\nid = \"m\"\nendpoints = [\"{}\"]\nkey-env = \"none\"\nprice = {{ input = 1000, output = 10000 }}\n",
+        mock.base_url()
+    );
+    bench.file("models.toml", table);
+}
+
+const PRICED: &str = "--models models.toml --data set.jsonl --levels L0 --out run --concurrency 1";
+
+/// A reply that is charged as a vendor states it.
+fn billed(usage: &Value) -> Answer {
+    let message = json!({"role": "assistant", "content": "C"});
+    let choice = json!({"index": 0, "message": message, "finish_reason": "stop"});
+    Answer::json(
+        200,
+        &json!({"model": "m", "choices": [choice], "usage": usage}),
+    )
+}
+
+#[test]
+fn the_bill_is_that_of_the_vendors() {
+    // By hand, in dollars: the tokens of the prompt by 1,000 and those of the reply by 100.
+    let vendors = [
+        // OpenAI: reasoning within the reply.
+        (
+            json!({"prompt_tokens": 1000, "completion_tokens": 600, "total_tokens": 1600,
+                "completion_tokens_details": {"reasoning_tokens": 512}}),
+            1.0 + 6.0,
+        ),
+        // xAI: reasoning outside the reply.
+        (
+            json!({"prompt_tokens": 1000, "completion_tokens": 100, "total_tokens": 6100,
+                "completion_tokens_details": {"reasoning_tokens": 5000}}),
+            1.0 + 51.0,
+        ),
+        // Gemini: reasoning in the total alone.
+        (
+            json!({"prompt_tokens": 1000, "completion_tokens": 5, "total_tokens": 1805}),
+            1.0 + 8.05,
+        ),
+        // Perplexity: reasoning beside both.
+        (
+            json!({"prompt_tokens": 1000, "completion_tokens": 30, "total_tokens": 1030, "reasoning_tokens": 400}),
+            1.0 + 4.3,
+        ),
+        // DeepSeek: what the cache had is in the prompt.
+        (
+            json!({"prompt_tokens": 1000, "completion_tokens": 9, "total_tokens": 1009,
+                "prompt_cache_hit_tokens": 900, "prompt_cache_miss_tokens": 100}),
+            1.0 + 0.09,
+        ),
+        // Anthropic behind a gateway: what the cache had is outside the prompt.
+        (
+            json!({"prompt_tokens": 100, "completion_tokens": 10, "total_tokens": 1010, "cache_read_input_tokens": 900}),
+            1.0 + 0.1,
+        ),
+        // A gateway that writes texts and fractions.
+        (
+            json!({"prompt_tokens": "1000", "completion_tokens": 20.0, "total_tokens": " 1060.5 "}),
+            1.0 + 0.61,
+        ),
+    ];
+    let bench = Bench::with_questions(vendors.len());
+    let mock = MockEndpoint::start(vendors.iter().map(|(usage, _)| billed(usage)));
+    priced(&bench, &mock);
+    bench.complete(&words(PRICED));
+    let by_hand: f64 = vendors.iter().map(|(_, dollars)| dollars).sum();
+    assert!((by_hand - 77.15).abs() < 1e-9);
+    let page = std::fs::read_to_string(bench.path("run/report.html")).unwrap();
+    assert!(page.contains("$77.15 at the list prices"), "{by_hand}");
+    let mut all = records(&bench.path("run"));
+    all.sort_by_key(|record| record["question"].to_string());
+    let totals: Vec<&Value> = all
+        .iter()
+        .map(|record| &record["usage"]["total_tokens"])
+        .collect();
+    assert_eq!(totals[1], 6100, "the record keeps the stated total");
+    // What is paid counts against the limit of the next call.
+    let over = bench.call(&words(&format!(
+        "{PRICED} --limit 7 --max-cost 77 --repeats 2"
+    )));
+    assert_eq!((over.code, mock.requests().len()), (Some(3), 7), "{over:?}");
+}
+
+#[test]
+fn the_cost_of_attempts_without_a_reply_is_in_the_report() {
+    let bench = Bench::with_questions(1);
+    let usage = json!({"prompt_tokens": 1000, "completion_tokens": 100});
+    let empty = Answer::json(200, &json!({"model": "m", "choices": [], "usage": usage}));
+    let reply = billed(&json!({"prompt_tokens": 500, "completion_tokens": 10}));
+    let mock = MockEndpoint::start([empty, reply]);
+    priced(&bench, &mock);
+    bench.complete(&words(PRICED));
+    let page = std::fs::read_to_string(bench.path("run/report.html")).unwrap();
+    let cost = page.split("at the list prices").next().unwrap();
+    assert!(cost.ends_with("$2.60 "), "{}", &cost[cost.len() - 60..]);
+    assert!(page.contains(", $2.00 of it for 1 attempt without a usable reply"));
+}

@@ -118,7 +118,7 @@ impl LostAttempts {
 }
 
 /// Requests that may have been charged although the server stated no tokens, or not all.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash, Serialize, Deserialize)]
 pub struct Unstated {
     /// The number of requests.
     pub requests: u32,
