@@ -1,5 +1,9 @@
 //! RAW → sRGB: the simple image processing of the paper, as a `Developer`.
 //!
+//! Two steps are not in the paper's list. The brightness gain is applied again, because the processing is "an inverse operation of
+//! unprocessing", which divides by it; the paper names white balance alone. Light is clipped to [0, 1] before demosaicing and after
+//! the matrix, as in the code of Brooks et al. 2019 (`process.py`), so that noise below 0 becomes black. `departures` measures both.
+//!
 //! The steps: white balance and brightness gains, clip; bilinear demosaic; camera → sRGB, clip; exposure drop; gamma
 //! compression; 8 bit. Because (2^−ΔEV · x)^(1/2.2) is 2^(−ΔEV/2.2) · x^(1/2.2), the drop is applied as a factor after the
 //! gamma, and all before it is done once for all levels.

@@ -106,6 +106,8 @@ pub fn degrade(
 }
 
 #[cfg(test)]
+mod departures;
+#[cfg(test)]
 mod signal_to_noise;
 #[cfg(test)]
 mod statistics;

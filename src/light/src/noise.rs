@@ -4,7 +4,8 @@
 //!
 //! In the paper's words, the ratio r belongs to the shot noise alone ("reduce the signal by r, add Poisson noise, amplify
 //! back by r"): read, row and quantisation noise are added to the amplified signal. In ELD all four are added to the
-//! attenuated signal. [`Amplify`] chooses between the two.
+//! attenuated signal. [`Amplify`] chooses between the two. In the first form the three terms add less than 0.1 codes to an image
+//! (`departures` measures it).
 
 use rayon::prelude::*;
 
@@ -66,6 +67,9 @@ pub fn read(adu: &mut Lanes<f32>, scale: f32, shape: &Quantile, offset: f32, wor
 }
 
 /// Row noise: one number of N(0, σ_r²) for a whole sensor row, that is for both of its planes (Wei et al. 2021).
+///
+/// The paper writes "each row" of a RAW image of H/2 × W/2 × 4 samples. Circuits read out rows of the sensor, two of which are one
+/// such row, so each has its own number.
 #[must_use]
 pub fn row(deviation: f64, stream: Stream, row: usize) -> f32 {
     (deviation * stream.at(Site::new(row, 0)).normal()) as f32

@@ -11,7 +11,8 @@ use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::flag::flag_words;
 use darkqa_ground::types::{Degradation, ReadingName};
 
-/// Choices that define the sensor branch. The default follows the paper to the letter.
+/// Choices that define the sensor branch. The default follows the paper's words; where they leave a choice, `src/docs/method.md`
+/// states it with its effect.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Synthesis {
     /// Noise terms that the ratio r amplifies.
@@ -29,7 +30,7 @@ pub struct Synthesis {
 /// A named way to understand the paper's noise model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LightReading {
-    /// The DarkQA paper to the letter.
+    /// The words of the DarkQA paper. Read, row and quantisation noise act after the amplification, and add less than 0.1 codes.
     #[default]
     Paper,
     /// The ratio amplifies all noise, as in ELD (Wei et al. 2020).
