@@ -71,5 +71,5 @@ fn open_questions_with_marks_and_an_enhancer() {
 }
 
 const EVALUATION: &str = "45424bdaaaa698c2";
-const READINGS: &str = "7dd1c3480f882b09";
+const READINGS: &str = "7ddc3b03e6bd6a9b";
 const OPENEQA: &str = "3b7d31e990034f68";

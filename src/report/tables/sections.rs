@@ -47,7 +47,7 @@ pub(in crate::report) const SECTIONS: [Section; 15] = [
         "Known-signal observer",
         "Which answers one could still read from the pixels who is given the untouched frame, and must only confirm each thing piece by \
          piece. It is no model, no bound for models, and no part of any ranking. A lower line after an enhancer says that less of the \
-         outlines agrees with a global tone curve, not that evidence was destroyed. A thing is seen if at least half of its outline is \
+         outlines agrees with a tone curve in smooth light, not that evidence was destroyed. A thing is seen if at least half of its outline is \
          confirmed, and detected if its whole outline, taken together, stands out of the noise. The control is the same observer with the image of \
          another scene: its score must be that of chance.",
         &[],

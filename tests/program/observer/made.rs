@@ -19,6 +19,8 @@ use rayon::prelude::*;
 pub(super) struct Asked {
     pub(super) id: FrameId,
     pub(super) image: Rgb,
+    /// Segment of each pixel, row by row.
+    pub(super) segments: Vec<u32>,
     pub(super) known: ObservedFrame,
     pub(super) questions: Vec<Question>,
 }
@@ -84,6 +86,7 @@ impl Set {
             questions: questions.get(&frame.id).cloned().unwrap_or_default(),
             id: frame.id.clone(),
             image: frame.rgb.clone(),
+            segments: frame.segments.iter().flatten().copied().collect(),
         });
         Self {
             frames: frames.collect(),
@@ -180,25 +183,27 @@ impl Set {
         )
     }
 
+    /// The expected score of a question.
+    pub(super) fn score(&self, seen: &Observation, question: &Question) -> f64 {
+        match seen.answer(question, &self.rules, &self.palette) {
+            None => 1.0 / question.choices.len() as f64,
+            Some(choice) => f64::from(u8::from(Some(choice) == question.choices.truth())),
+        }
+    }
+
     /// The scores by frame of two kinds of image, the second less the first, with the interval of their paired difference.
     pub(super) fn gain(
         &self,
         before: impl Fn(usize, &Asked) -> Rgb + Sync,
         after: impl Fn(usize, &Asked) -> Rgb + Sync,
     ) -> Estimate {
-        let score = |seen: &Observation, question: &Question| -> f64 {
-            match seen.answer(question, &self.rules, &self.palette) {
-                None => 1.0 / question.choices.len() as f64,
-                Some(choice) => f64::from(u8::from(Some(choice) == question.choices.truth())),
-            }
-        };
         let frames = self.frames.par_iter().enumerate();
         let sums = frames.map(|(place, asked)| {
             let looks = [before(place, asked), after(place, asked)];
             let [before, after] = looks.map(|image| asked.known.look(&image));
             let questions = asked.questions.iter();
-            let differences =
-                questions.map(|question| score(&after, question) - score(&before, question));
+            let differences = questions
+                .map(|question| self.score(&after, question) - self.score(&before, question));
             [differences.sum(), asked.questions.len() as f64]
         });
         let sums: Vec<[f64; 2]> = sums.collect();
@@ -207,7 +212,7 @@ impl Set {
 }
 
 /// The mean, and the 2.5 % and 97.5 % quantiles of 2,000 resamples of the frames.
-fn interval(sums: &[[f64; 2]], n: usize) -> Estimate {
+pub(super) fn interval(sums: &[[f64; 2]], n: usize) -> Estimate {
     let mean = |of: &mut dyn Iterator<Item = &[f64; 2]>| {
         let [sum, count] = of.fold([0.0, 0.0], |[sum, count], [s, c]| [sum + s, count + c]);
         sum / f64::max(count, 1.0)
@@ -251,7 +256,7 @@ pub(super) fn degraded(asked: &Asked, how: &str, reading: &Synthesis) -> Rgb {
 }
 
 /// Random numbers: `SplitMix64`.
-struct Draws(u64);
+pub(super) struct Draws(pub(super) u64);
 
 impl Draws {
     fn next(&mut self) -> u64 {
@@ -262,11 +267,11 @@ impl Draws {
         value ^ (value >> 31)
     }
 
-    fn below(&mut self, count: usize) -> usize {
+    pub(super) fn below(&mut self, count: usize) -> usize {
         (self.next() % count as u64) as usize
     }
 
-    fn unit(&mut self) -> f64 {
+    pub(super) fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1_u64 << 53) as f64
     }
 

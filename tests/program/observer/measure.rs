@@ -7,6 +7,7 @@
 use darkqa_eval::internals::questions::Control;
 use darkqa_eval::internals::rooms::Rooms;
 
+use super::local::{CHANGES, Elsewhere};
 use super::made::{Asked, INVENTING, Outcome, Set, degraded, invented};
 use super::{physical, spoiled};
 
@@ -21,8 +22,11 @@ fn rooms() -> Set {
     Set::rooms(rooms, |id| id.0.ends_with("/eye"))
 }
 
+fn percent(share: f64) -> String {
+    format!("{:.1}", 100.0 * share)
+}
+
 fn row(name: &str, found: &Outcome) {
-    let percent = |share: f64| format!("{:.1}", 100.0 * share);
     let n = found.score.n;
     println!(
         "| {name} | {} [{}, {}] | {} | {} | {} | {} | {n} |",
@@ -81,6 +85,57 @@ fn the_share_of_the_outline() {
         ] {
             let found = set.look_with(share, |place, asked| spoiled(&set, place, asked, control));
             row(&format!("{share}, {control}"), &found);
+        }
+    }
+}
+
+/// 96 frames: all views of 48 rooms.
+#[test]
+#[ignore = "measures"]
+fn local_changes() {
+    let rooms = Rooms {
+        frames: 96,
+        seed: 7,
+        size: [640, 480],
+        ..Rooms::default()
+    };
+    let set = Set::rooms(rooms, |_| true);
+    head("Local changes", &set);
+    row("none", &set.look(|_, asked| asked.image.clone()));
+    for change in CHANGES {
+        let found = set.look(|place, asked| change.apply(&asked.image, place as u64));
+        row(&format!("{change:?}"), &found);
+    }
+    println!("\n| change | n | score without | with it | seen without | with it |");
+    for change in CHANGES.into_iter().filter(|change| change.is_partial()) {
+        let Elsewhere { scores, seen } = Elsewhere::of(&set, change);
+        let n = scores[0].n;
+        let scores = scores.map(|score| {
+            let [value, low, high] = [score.value, score.low, score.high].map(percent);
+            format!("{value} [{low}, {high}]")
+        });
+        println!(
+            "| {change:?} | {n} | {} | {} | {} | {} |",
+            scores[0], scores[1], seen[0], seen[1]
+        );
+    }
+}
+
+/// The controls, and with a local change: the image of another room with a box in it is still the image of another room.
+#[test]
+#[ignore = "measures"]
+fn controls_with_local_changes() {
+    let set = rooms();
+    head("Controls", &set);
+    for control in Control::ALL {
+        let image = |place: usize, asked: &Asked| spoiled(&set, place, asked, control);
+        row(control.name(), &set.look(image));
+        if [Control::OtherRoom, Control::Mirrored].contains(&control) {
+            for change in CHANGES {
+                let image =
+                    |place: usize, asked: &Asked| change.apply(&image(place, asked), place as u64);
+                row(&format!("{control}, {change:?}"), &set.look(image));
+            }
         }
     }
 }

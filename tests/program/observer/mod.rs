@@ -1,5 +1,6 @@
 //! The observer answers from the pixels and not from the labels: what it must not see, what it must, and what changes nothing.
 
+mod local;
 mod made;
 mod measure;
 mod run;
@@ -11,8 +12,9 @@ use darkqa_eval::Rgb;
 use darkqa_eval::internals::questions::{self, Control};
 use darkqa_eval::internals::rooms::Rooms;
 use darkqa_eval::synthesis::{CameraModel, LightReading, Synthesis};
-use darkqa_eval::types::Digest;
+use darkqa_eval::types::{Digest, Family};
 
+use local::{CHANGES, Change, Elsewhere};
 use made::{Asked, Outcome, Set, degraded, invented, mapped};
 
 /// Forty-eight small frames with some two hundred questions.
@@ -131,6 +133,72 @@ fn what_is_invented_adds_nothing() {
             assert!(gain.low <= 0.0, "{name}: {gain:?}");
         },
     );
+}
+
+#[test]
+fn a_covered_part_hides_nothing_elsewhere() {
+    let set = &*SMALL;
+    let covered = CHANGES.into_iter().filter(|change| change.is_partial());
+    check_rows(covered, |change| {
+        let Elsewhere { scores, seen } = Elsewhere::of(set, change);
+        let [without, with] = scores.map(|score| score.value);
+        // Nine questions at least: one of them may be lost.
+        assert!(with >= 0.88 * without, "{change:?}: {scores:?}");
+        assert!(10 * seen[1] >= 8 * seen[0], "{change:?}: {seen:?}");
+    });
+}
+
+#[test]
+fn uneven_light_hides_little() {
+    let set = &*SMALL;
+    check_rows(
+        [Change::Lamp, Change::Gradient, Change::StrayLight],
+        |change| {
+            let found = set.look(|place, asked| change.apply(&asked.image, place as u64));
+            assert!(found.score.value >= 0.85, "{change:?}: {found:?}");
+        },
+    );
+}
+
+#[test]
+fn local_changes_of_another_room_show_nothing() {
+    let set = &*SMALL;
+    check_rows(CHANGES, |change| {
+        let image = |place: usize, _: &Asked| change.apply(&set.other(place).image, place as u64);
+        let found = set.look(image);
+        assert!(found.is_chance(), "{change:?}: {found:?}");
+        assert!(200 * found.seen <= found.things, "{change:?}: {found:?}");
+    });
+}
+
+/// A thing that is painted in another colour has that colour, and not the one that is known: its own light does not hide it.
+#[test]
+fn a_repainted_thing_loses_its_colour() {
+    let set = &*SMALL;
+    let repainted = |asked: &Asked| {
+        let colored = asked
+            .questions
+            .iter()
+            .find(|question| question.family == Family::Color)?;
+        let id = colored.evidence["segments"][0]["id"].as_u64()?;
+        let image = mapped(&asked.image, |y, x, channel, code| {
+            let own = u64::from(asked.segments[y * asked.image.width() + x]) == id;
+            let painted = [0.3, 0.7, 1.0][channel] * code;
+            if own { painted } else { code }
+        });
+        let answer = |image: &Rgb| {
+            asked
+                .known
+                .look(image)
+                .answer(colored, &set.rules, &set.palette)
+        };
+        Some([&asked.image, &image].map(|image| answer(image) == colored.choices.truth()))
+    };
+    let found: Vec<[bool; 2]> = set.frames.iter().filter_map(repainted).collect();
+    let right = |image: usize| found.iter().filter(|right| right[image]).count();
+    assert!(found.len() >= 5, "{found:?}");
+    assert_eq!(right(0), found.len());
+    assert!(2 * right(1) <= right(0), "{found:?}");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The places at which contrast is measured: [`Cells`] of a frame, and the [`Element`]s of its outlines at three scales.
 //!
 //! The frame is cut into square cells. The pixels of one mask in one cell are a patch. A cell of two or four times the side is
-//! four or sixteen small ones, so that sums over it are sums of theirs.
+//! four or sixteen small ones, so that sums over it are sums of theirs. A cell of the coarsest scale is a tile.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,10 @@ const CELLS: usize = 60;
 
 /// Sides of the cells of each scale, relative to the smallest. An observer that knows the signal averages over area: with one
 /// scale an enhancer that removes noise would seem to add evidence.
-pub(super) const SCALES: [usize; 3] = [1, 2, 4];
+pub(super) const SCALES: [usize; 3] = [1, 2, TILE];
+
+/// Side of a tile, relative to the smallest cells.
+pub(super) const TILE: usize = 4;
 
 /// Pixels side by side in one row that belong to one patch.
 #[derive(Debug, Clone, Copy)]
@@ -37,6 +40,8 @@ pub(super) struct Element {
     pub(super) patch: usize,
     /// Index of the cell.
     pub(super) cell: usize,
+    /// Index of the tile that the cell lies in.
+    pub(super) tile: usize,
     /// The mask, from 1.
     pub(super) mask: u32,
     /// Number of pixels of the mask in the cell.
@@ -145,7 +150,10 @@ impl Scale {
         let patches: Vec<Patch> = patches.collect();
         let cells = patches.last().map_or(0, |last| last.cell + 1);
         Self {
-            elements: elements(&patches, cells, side * scale),
+            elements: elements(&patches, cells, side * scale, |cell| {
+                let finer = TILE / scale;
+                cell / wide / finer * columns.div_ceil(TILE) + cell % wide / finer
+            }),
             part_of,
             patches,
             cells,
@@ -154,7 +162,12 @@ impl Scale {
 }
 
 /// The elements among patches: the mask, and all else, each have at least 1/16 of the cell, and three pixels.
-fn elements(patches: &[Patch], cells: usize, side: usize) -> Vec<Element> {
+fn elements(
+    patches: &[Patch],
+    cells: usize,
+    side: usize,
+    tile_of: impl Fn(usize) -> usize,
+) -> Vec<Element> {
     let least = (side * side / 16).max(3) as u32;
     let mut totals = vec![0; cells];
     for patch in patches {
@@ -165,6 +178,7 @@ fn elements(patches: &[Patch], cells: usize, side: usize) -> Vec<Element> {
         (patch.mask > 0 && patch.count.min(outside) >= least).then(|| Element {
             patch: index,
             cell: patch.cell,
+            tile: tile_of(patch.cell),
             mask: patch.mask,
             inside: f64::from(patch.count),
             outside: f64::from(outside),

@@ -4,42 +4,16 @@
 //! by pool adjacent violators: Ayer et al., Ann. Math. Stat. 26:641, 1955). What is left counts as noise. A global tone curve
 //! or gain therefore changes nothing, and what an enhancer invents is no function of the untouched code, so that it is noise.
 
-use darkqa_ground::types::Rgb;
-
-/// Number of codes of a channel.
-const CODES: usize = 256;
+use super::local::{self, TileFit};
+use super::tiles::{CODES, SameCode, TileSums, Tiles};
 
 /// The variance of a code is pooled over this many codes on either side, so that rare codes have one too (chosen).
 const POOLED: usize = 8;
 
-/// Sums over the pixels whose untouched code is the same, in one channel.
-#[derive(Debug, Clone, Copy, Default)]
-struct CodeSums {
-    /// Sum of the received codes.
-    received: u64,
-    /// Sum of their squares.
-    squares: u64,
-}
-
-/// Number of pixels of each code, for each channel.
-pub(super) type Histogram = [[u64; CODES]; 3];
-
-/// The histogram of an image.
-pub(super) fn histogram(image: &Rgb) -> Histogram {
-    let mut counts = [[0; CODES]; 3];
-    let (pixels, _) = image.samples().as_chunks::<3>();
-    for pixel in pixels {
-        for (counts, code) in counts.iter_mut().zip(pixel) {
-            counts[usize::from(*code)] += 1;
-        }
-    }
-    counts
-}
-
 /// Tone curve and noise of one channel.
 #[derive(Debug, Clone)]
 pub(super) struct ChannelFit {
-    /// Expected received code for each untouched code; never decreases.
+    /// Expected received code for each untouched code in light of gain 1; never decreases.
     pub(super) curve: [f64; CODES],
     /// Mean squared residual of each untouched code, pooled over 17 codes, in codes squared.
     pub(super) variance: [f64; CODES],
@@ -49,146 +23,184 @@ pub(super) struct ChannelFit {
 #[derive(Debug, Clone)]
 pub(super) struct Fit {
     pub(super) channels: [ChannelFit; 3],
-    /// R² = 1 − Σ(R − P)² / Σ(R − mean)² over all pixels and channels, from 0 to 1; 0 for a constant image.
+    /// Light and noise of each tile.
+    pub(super) tiles: Vec<TileFit>,
+    /// Whether light and noise differ from tile to tile.
+    pub(super) is_local: bool,
+    /// R² = 1 − Σ(R − P)² / Σ(R − mean)² over all pixels and channels of one curve for the whole image, from 0 to 1; 0 for a
+    /// constant image.
     pub(super) explained: f64,
 }
 
 impl Fit {
-    /// Fits the channels of a received image. `untouched` has the same size and this histogram.
-    pub(super) fn of(untouched: &[u8], counts: &Histogram, received: &Rgb) -> Self {
-        let sums = sums(untouched, received.samples());
+    /// Fits the channels of a received image: tile by tile if most tiles agree with one curve, else all pixels alike.
+    pub(super) fn new(tiles: &Tiles, sums: &TileSums) -> Self {
+        let whole = Self::whole(tiles, sums);
+        local::fit(tiles, sums, &whole).unwrap_or(whole)
+    }
+
+    /// Fits one curve for each channel to all pixels alike.
+    fn whole(tiles: &Tiles, sums: &TileSums) -> Self {
         let (mut residual, mut total) = (0.0, 0.0);
         let channels = [0, 1, 2].map(|channel| {
-            let (counts, sums) = (&counts[channel], &sums[channel]);
-            let curve = curve(counts, sums);
-            let residuals = residuals(counts, sums, &curve);
-            residual += residuals.iter().sum::<f64>();
-            total += spread(counts, sums);
-            ChannelFit {
-                variance: pooled(counts, &residuals),
-                curve,
+            let mut codes = CodeTotals::default();
+            for tile in 0..tiles.len() {
+                codes.add(tiles.by_code(sums, tile, channel), 1.0, 1.0);
             }
+            let fit = codes.fit();
+            residual += codes.residuals(&fit.curve).iter().sum::<f64>();
+            total += codes.spread();
+            fit
         });
-        let explained = if total > 0.0 {
-            (1.0 - residual / total).clamp(0.0, 1.0)
-        } else {
-            0.0
-        };
         Self {
             channels,
-            explained,
+            tiles: vec![TileFit::default(); tiles.len()],
+            is_local: false,
+            explained: if total > 0.0 {
+                (1.0 - residual / total).clamp(0.0, 1.0)
+            } else {
+                0.0
+            },
         }
     }
 }
 
-/// The sums of each untouched code, for each channel.
-fn sums(untouched: &[u8], received: &[u8]) -> [[CodeSums; CODES]; 3] {
-    let mut sums = [[CodeSums::default(); CODES]; 3];
-    let (untouched, _) = untouched.as_chunks::<3>();
-    let (received, _) = received.as_chunks::<3>();
-    for (untouched, received) in untouched.iter().zip(received) {
-        for ((sums, code), received) in sums.iter_mut().zip(untouched).zip(received) {
-            let received = u64::from(*received);
-            let sum = &mut sums[usize::from(*code)];
-            sum.received += received;
-            sum.squares += received * received;
-        }
-    }
-    sums
+/// Sums over the pixels of each untouched code, in one channel. Each pixel has a weight, and the gain of the light at its place.
+#[derive(Debug, Clone)]
+pub(super) struct CodeTotals {
+    /// Σ weight.
+    weight: [f64; CODES],
+    /// Σ weight · gain².
+    power: [f64; CODES],
+    /// Σ weight · gain · received code.
+    received: [f64; CODES],
+    /// Σ weight · received code².
+    squares: [f64; CODES],
 }
 
-/// The increasing curve nearest to the mean received codes. Codes without a pixel lie on straight lines between the others.
-fn curve(counts: &[u64; CODES], sums: &[CodeSums; CODES]) -> [f64; CODES] {
-    // Value, weight and last code of each block of codes with the same value.
-    let mut blocks: Vec<(f64, f64, usize)> = Vec::new();
-    for code in (0..CODES).filter(|code| counts[*code] > 0) {
-        let weight = counts[code] as f64;
-        let mut block = (sums[code].received as f64 / weight, weight, code);
-        while let Some(&(value, weight, _)) = blocks.last()
-            && value >= block.0
-        {
-            blocks.pop();
-            let sum = weight + block.1;
-            block = ((value * weight + block.0 * block.1) / sum, sum, code);
+impl Default for CodeTotals {
+    fn default() -> Self {
+        Self {
+            weight: [0.0; CODES],
+            power: [0.0; CODES],
+            received: [0.0; CODES],
+            squares: [0.0; CODES],
         }
-        blocks.push(block);
     }
-    let mut curve = [0.0; CODES];
-    let mut known: Option<usize> = None;
-    let mut blocks = blocks.into_iter().peekable();
-    for code in (0..CODES).filter(|code| counts[*code] > 0) {
-        let Some(&(value, _, last)) = blocks.peek() else {
-            break;
-        };
-        match known {
-            None => curve[..=code].fill(value),
-            Some(before) => {
-                let step = (value - curve[before]) / (code - before) as f64;
-                for between in before + 1..code {
-                    curve[between] = curve[before] + step * (between - before) as f64;
+}
+
+impl CodeTotals {
+    /// Adds pixels with a common gain and weight.
+    pub(super) fn add(&mut self, pixels: impl Iterator<Item = SameCode>, gain: f64, weight: f64) {
+        for same in pixels {
+            self.weight[same.code] += weight * same.count;
+            self.power[same.code] += weight * gain * gain * same.count;
+            self.received[same.code] += weight * gain * same.received;
+            self.squares[same.code] += weight * same.squares;
+        }
+    }
+
+    /// The curve nearest to the received codes, and the noise about it.
+    fn fit(&self) -> ChannelFit {
+        let curve = self.curve();
+        ChannelFit {
+            variance: self.noise(&curve),
+            curve,
+        }
+    }
+
+    /// The increasing curve nearest to the received codes. Codes without a pixel lie on straight lines between the others.
+    pub(super) fn curve(&self) -> [f64; CODES] {
+        let occurs = |code: &usize| self.power[*code] > 0.0;
+        // Value, weight and last code of each block of codes with the same value.
+        let mut blocks: Vec<(f64, f64, usize)> = Vec::new();
+        for code in (0..CODES).filter(occurs) {
+            let weight = self.power[code];
+            let mut block = (self.received[code] / weight, weight, code);
+            while let Some(&(value, weight, _)) = blocks.last()
+                && value >= block.0
+            {
+                blocks.pop();
+                let sum = weight + block.1;
+                block = ((value * weight + block.0 * block.1) / sum, sum, code);
+            }
+            blocks.push(block);
+        }
+        let mut curve = [0.0; CODES];
+        let mut known: Option<usize> = None;
+        let mut blocks = blocks.into_iter().peekable();
+        for code in (0..CODES).filter(occurs) {
+            let Some(&(value, _, last)) = blocks.peek() else {
+                break;
+            };
+            match known {
+                None => curve[..=code].fill(value),
+                Some(before) => {
+                    let step = (value - curve[before]) / (code - before) as f64;
+                    for between in before + 1..code {
+                        curve[between] = curve[before] + step * (between - before) as f64;
+                    }
+                    curve[code] = value;
                 }
-                curve[code] = value;
+            }
+            known = Some(code);
+            if code == last {
+                blocks.next();
             }
         }
-        known = Some(code);
-        if code == last {
-            blocks.next();
+        if let Some(last) = known {
+            let value = curve[last];
+            curve[last..].fill(value);
+        }
+        curve
+    }
+
+    /// The mean squared residual of each code and its neighbours.
+    pub(super) fn noise(&self, curve: &[f64; CODES]) -> [f64; CODES] {
+        let residuals = self.residuals(curve);
+        std::array::from_fn(|code| {
+            let near = code.saturating_sub(POOLED)..(code + POOLED + 1).min(CODES);
+            let weight: f64 = self.weight[near.clone()].iter().sum();
+            let residual: f64 = residuals[near].iter().sum();
+            if weight > 0.0 { residual / weight } else { 0.0 }
+        })
+    }
+
+    /// The sum of squared residuals of each code.
+    fn residuals(&self, curve: &[f64; CODES]) -> [f64; CODES] {
+        std::array::from_fn(|code| {
+            let fitted = curve[code];
+            let sum = self.squares[code] - 2.0 * fitted * self.received[code]
+                + fitted * fitted * self.power[code];
+            sum.max(0.0)
+        })
+    }
+
+    /// The sum of squared differences of the received codes from their mean, if all gains are 1.
+    fn spread(&self) -> f64 {
+        let [weight, received, squares] =
+            [&self.weight, &self.received, &self.squares].map(|sums| sums.iter().sum::<f64>());
+        if weight > 0.0 {
+            squares - received * received / weight
+        } else {
+            0.0
         }
     }
-    if let Some(last) = known {
-        let value = curve[last];
-        curve[last..].fill(value);
-    }
-    curve
-}
-
-/// The sum of squared residuals of each code.
-fn residuals(
-    counts: &[u64; CODES],
-    sums: &[CodeSums; CODES],
-    curve: &[f64; CODES],
-) -> [f64; CODES] {
-    std::array::from_fn(|code| {
-        let CodeSums { received, squares } = sums[code];
-        let fitted = curve[code];
-        let sum =
-            squares as f64 - 2.0 * fitted * received as f64 + fitted * fitted * counts[code] as f64;
-        sum.max(0.0)
-    })
-}
-
-/// The sum of squared differences of the received codes from their mean.
-fn spread(counts: &[u64; CODES], sums: &[CodeSums; CODES]) -> f64 {
-    let pixels: u64 = counts.iter().sum();
-    let received: u64 = sums.iter().map(|sum| sum.received).sum();
-    let squares: u64 = sums.iter().map(|sum| sum.squares).sum();
-    let received = received as f64;
-    squares as f64 - received * received / pixels.max(1) as f64
-}
-
-/// The mean squared residual of each code and its neighbours.
-fn pooled(counts: &[u64; CODES], residuals: &[f64; CODES]) -> [f64; CODES] {
-    std::array::from_fn(|code| {
-        let near = code.saturating_sub(POOLED)..(code + POOLED + 1).min(CODES);
-        let pixels: u64 = counts[near.clone()].iter().sum();
-        residuals[near].iter().sum::<f64>() / pixels.max(1) as f64
-    })
 }
 
 #[cfg(test)]
 mod tests {
+    use darkqa_ground::types::Rgb;
+
     use super::*;
 
     /// The fit of a row of grey pixels.
     fn fit(untouched: &[u8], received: &[u8]) -> Fit {
         let grey = |codes: &[u8]| -> Vec<u8> { codes.iter().flat_map(|code| [*code; 3]).collect() };
-        let image = |codes: &[u8]| Rgb::new(1, codes.len(), grey(codes)).unwrap();
-        let untouched = image(untouched);
-        Fit::of(
-            untouched.samples(),
-            &histogram(&untouched),
-            &image(received),
-        )
+        let untouched = Rgb::new(1, untouched.len(), grey(untouched)).unwrap();
+        let tiles = Tiles::new(&untouched, 16);
+        let sums = tiles.sums(untouched.samples(), &grey(received));
+        Fit::whole(&tiles, &sums)
     }
 
     #[test]
@@ -226,9 +238,7 @@ mod tests {
             assert!((curve[0] - curve[255]).abs() < 1e-9);
             assert!(found.explained.abs() < 1e-9, "{}", found.explained);
         }
-        // One code only, and no pixel at all.
+        // One code only.
         assert!(fit(&[9, 9], &[1, 3]).explained.abs() < 1e-9);
-        let empty = Fit::of(&[], &[[0; 256]; 3], &Rgb::black(1, 1));
-        assert!(empty.explained.abs() < 1e-9);
     }
 }

@@ -9,9 +9,11 @@
 //!
 //! 1. The channel (`channel`): an increasing curve for each colour channel from untouched to received codes, and the noise that
 //!    is left. So a global tone curve or gain changes nothing, and what an enhancer invents counts as noise.
-//! 2. The outline (`cells`, `outlines`): in each piece of outline, at three scales, the contrast is compared with the predicted
+//! 2. Light and noise by the place (`local`): if most of the image agrees with one curve, the gain of the light and the noise are
+//!    those of each tile. So uneven light changes little, and what covers a part of the image changes nothing elsewhere.
+//! 3. The outline (`cells`, `outlines`): in each piece of outline, at three scales, the contrast is compared with the predicted
 //!    one. A thing is seen if at least half of the pieces at one scale are confirmed.
-//! 3. The answer (`answers`): by the rules, from the seen things alone. If nothing that is seen bears on a question, there is
+//! 4. The answer (`answers`): by the rules, from the seen things alone. If nothing that is seen bears on a question, there is
 //!    no answer, and the caller guesses.
 //!
 //! What follows: for one who knows frame, place and appearance, and only has to confirm each thing piece by piece, this share of
@@ -20,8 +22,8 @@
 //! - that a model could do this: to know the signal exactly is far more than a viewer knows;
 //! - a bound: the covariance is diagonal with two measured factors, half of an outline is a rule, and one who uses the inside
 //!   of things, or knows rooms, may do better;
-//! - that an enhancer destroyed evidence where the line is lower: local tone, sharpening and halos are no function of the
-//!   untouched code, and count as noise.
+//! - that an enhancer destroyed evidence where the line is lower: sharpening and halos are no function of the untouched code and
+//!   of smooth light, and count as noise.
 //!
 //! Changed geometry is another image: a shift by four pixels at 640×480 is enough. `controls` spoils images in ways that leave
 //! nothing to see; the answers must then be guesses.
@@ -30,11 +32,13 @@ mod answers;
 mod cells;
 mod channel;
 pub mod controls;
+mod local;
 mod outlines;
 mod resample;
 mod shade;
 #[cfg(test)]
 mod tests;
+mod tiles;
 mod wording;
 
 use std::collections::BTreeMap;
@@ -47,22 +51,23 @@ use super::statistics::{FrameStatistics, measure};
 use darkqa_ground::error::Result;
 use darkqa_ground::types::{Digest, Frame, Labels, Rgb};
 
-use cells::Cells;
-use channel::{Fit, Histogram, histogram};
+use cells::{Cells, TILE};
+use channel::Fit;
 use outlines::{MIN_CONFIRMED, Outline, outlines, patch_sums};
 use resample::area_mean;
-use shade::Shade;
+use shade::{Light, Shade};
+use tiles::Tiles;
 pub use wording::understood;
 
 /// Version of the observer's method; it enters the digest of the model.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 
 /// What the observer knows of a frame: its untouched pixels, and the place of every segment.
 #[derive(Debug)]
 pub struct ObservedFrame {
     untouched: Rgb,
-    histogram: Histogram,
     cells: Cells,
+    tiles: Tiles,
     /// Number of each mask in the map of segments.
     numbers: Vec<u32>,
     statistics: Arc<FrameStatistics>,
@@ -77,10 +82,11 @@ impl ObservedFrame {
         let key = Digest::of(frame.id.0.as_bytes());
         let statistics = measure(frame, labels, rules, palette, key)?;
         let scene = SceneMaps::of(frame, labels)?;
+        let cells = Cells::of(&scene.masks, scene.size);
         Ok(Self {
             untouched: frame.rgb.clone(),
-            histogram: histogram(&frame.rgb),
-            cells: Cells::of(&scene.masks, scene.size),
+            tiles: Tiles::new(&frame.rgb, TILE * cells.side),
+            cells,
             numbers: scene.numbers,
             statistics: Arc::new(statistics),
         })
@@ -97,9 +103,9 @@ impl ObservedFrame {
     pub fn look_with(&self, image: &Rgb, min_confirmed: f64) -> Observation {
         let image = area_mean(image, [self.untouched.width(), self.untouched.height()]);
         let untouched = self.untouched.samples();
-        let fit = Fit::of(untouched, &self.histogram, &image);
+        let fit = Fit::new(&self.tiles, &self.tiles.sums(untouched, image.samples()));
         let sums = patch_sums(&self.cells, untouched, &fit, &image);
-        let outlines = outlines(&self.cells, &sums);
+        let outlines = outlines(&self.cells, &sums, &fit.tiles);
         // The rules know the segments that are not tiny.
         let segments = &self.statistics.segments;
         let masks: BTreeMap<u32, usize> = self.numbers.iter().copied().zip(1..).collect();
@@ -113,10 +119,8 @@ impl ObservedFrame {
         let seen = outlines
             .iter()
             .filter(|(_, outline)| outline.confirmed >= min_confirmed);
-        let shades = seen.map(|(id, _)| {
-            let mask = masks[id] as u32;
-            (*id, Shade::of(&self.cells, &sums, &fit, mask))
-        });
+        let light = Light::new(&self.cells, &self.tiles, &sums, &fit);
+        let shades = seen.map(|(id, _)| (*id, light.shade(masks[id] as u32)));
         let shades: BTreeMap<u32, Option<Shade>> = shades.collect();
         Observation {
             explained: fit.explained,

@@ -4,10 +4,12 @@
 //! is predicted: a matched filter whose template is the prediction, whitened by measured variances. Its amplitude is 1 where the
 //! contrast is as predicted and 0 where it is not there; its detectability d′ is the signal-to-noise ratio of the prediction.
 //! Noise is neither white nor independent along an outline. Two factors say by how much, each measured in the same image from
-//! what is left of the contrasts, and never below 1.
+//! what is left of the contrasts, and never below 1. Those of disturbed tiles are measured apart from those of all others, so that
+//! what covers a part of the image changes nothing elsewhere.
 
 use super::cells::{Cells, Element, Scale};
 use super::channel::Fit;
+use super::local::TileFit;
 use darkqa_ground::types::Rgb;
 
 /// Value of normal noise that is exceeded with probability 0.001 / 3: one false alarm in a thousand tests, over three scales
@@ -40,7 +42,7 @@ pub(super) struct PatchSums {
 }
 
 impl PatchSums {
-    fn add(&mut self, other: &Self) {
+    pub(super) fn add(&mut self, other: &Self) {
         for channel in 0..3 {
             self.received[channel] += other.received[channel];
             for part in 0..2 {
@@ -50,7 +52,7 @@ impl PatchSums {
     }
 
     /// The means of received codes, predicted codes and variances of a channel, over `count` pixels.
-    fn means(&self, channel: usize, count: f64) -> [f64; 3] {
+    pub(super) fn means(&self, channel: usize, count: f64) -> [f64; 3] {
         let [predicted, variance] = self.predicted[channel];
         [
             self.received[channel] as f64 / count,
@@ -76,6 +78,7 @@ pub(super) fn patch_sums(
     fit: &Fit,
     image: &Rgb,
 ) -> Vec<PatchSums> {
+    // Converting to an integer clamps to its range, which curves leave only in light near 0.
     let fixed = |value: f64| (value * FIXED + 0.5) as u32;
     let tables: [[[u32; 2]; 256]; 3] = [0, 1, 2].map(|channel| {
         let fit = &fit.channels[channel];
@@ -125,11 +128,11 @@ impl Outline {
 }
 
 /// The outline of each mask; index 0 is unused.
-pub(super) fn outlines(cells: &Cells, sums: &[PatchSums]) -> Vec<Outline> {
+pub(super) fn outlines(cells: &Cells, sums: &[PatchSums], tiles: &[TileFit]) -> Vec<Outline> {
     let mut outlines = vec![Outline::default(); cells.masks + 1];
     for (index, scale) in cells.scales.iter().enumerate() {
         let min_elements = if index == 0 { 1 } else { MIN_ELEMENTS };
-        measure(scale, sums, min_elements, &mut outlines);
+        measure(scale, sums, tiles, min_elements, &mut outlines);
     }
     outlines
 }
@@ -171,16 +174,28 @@ impl Filter {
 }
 
 /// Measures the elements of one scale, and raises the outlines that they confirm better than another scale.
-fn measure(scale: &Scale, sums: &[PatchSums], min_elements: u32, outlines: &mut [Outline]) {
-    let filters = filters(scale, sums);
+fn measure(
+    scale: &Scale,
+    sums: &[PatchSums],
+    tiles: &[TileFit],
+    min_elements: u32,
+    outlines: &mut [Outline],
+) {
+    let filters = filters(scale, sums, tiles);
     let mut whole = vec![Filter::default(); outlines.len()];
     for (element, filter) in scale.elements.iter().zip(&filters) {
         whole[element.mask as usize].add(filter);
     }
-    let single = inflation(&filters);
-    let shared = inflation(&whole);
+    let single = [false, true].map(|is_disturbed| {
+        let elements = scale.elements.iter().zip(&filters);
+        let alike =
+            elements.filter(|(element, _)| tiles[element.tile].is_disturbed == is_disturbed);
+        inflation(alike.map(|(_, filter)| filter))
+    });
+    let shared = inflation(whole.iter());
     let mut counts = vec![[0_u32; 2]; outlines.len()];
     for (element, filter) in scale.elements.iter().zip(&filters) {
+        let single = single[usize::from(tiles[element.tile].is_disturbed)];
         let is_confirmed = filter.z(single).is_some_and(|z| z >= THRESHOLD);
         let [confirmed, all] = &mut counts[element.mask as usize];
         *confirmed += u32::from(is_confirmed);
@@ -196,9 +211,9 @@ fn measure(scale: &Scale, sums: &[PatchSums], min_elements: u32, outlines: &mut 
 }
 
 /// By how much the outputs of filters scatter more than their power says; at least 1.
-fn inflation(filters: &[Filter]) -> f64 {
-    let power: f64 = filters.iter().map(|filter| filter.power).sum();
-    let squares: f64 = filters.iter().map(|filter| filter.rest * filter.rest).sum();
+fn inflation<'a>(filters: impl Iterator<Item = &'a Filter> + Clone) -> f64 {
+    let power: f64 = filters.clone().map(|filter| filter.power).sum();
+    let squares: f64 = filters.map(|filter| filter.rest * filter.rest).sum();
     if power > 0.0 {
         (squares / power).max(1.0)
     } else {
@@ -207,7 +222,7 @@ fn inflation(filters: &[Filter]) -> f64 {
 }
 
 /// The filter of each element, after the variance of each channel is raised to what is left of its contrasts.
-fn filters(scale: &Scale, smallest: &[PatchSums]) -> Vec<Filter> {
+fn filters(scale: &Scale, smallest: &[PatchSums], tiles: &[TileFit]) -> Vec<Filter> {
     let mut sums = vec![PatchSums::default(); scale.patches.len()];
     for (part, whole) in smallest.iter().zip(&scale.part_of) {
         sums[*whole as usize].add(part);
@@ -219,20 +234,19 @@ fn filters(scale: &Scale, smallest: &[PatchSums]) -> Vec<Filter> {
     let contrasts: Vec<[Contrast; 3]> = scale
         .elements
         .iter()
-        .map(|element| contrast(element, &sums[element.patch], &totals[element.cell]))
+        .map(|element| {
+            let [inside, cell] = [&sums[element.patch], &totals[element.cell]];
+            contrast(element, inside, cell, &tiles[element.tile])
+        })
         .collect();
-    let excess = [0, 1, 2].map(|channel| {
-        let terms = contrasts.iter().map(|contrast| {
-            let Contrast {
-                received,
-                predicted,
-                variance,
-            } = contrast[channel];
-            (received - predicted) * (received - predicted) / variance
-        });
-        (terms.sum::<f64>() / contrasts.len().max(1) as f64).max(1.0)
+    let elements = || scale.elements.iter().zip(&contrasts);
+    let excess = [false, true].map(|is_disturbed| {
+        let alike =
+            elements().filter(|(element, _)| tiles[element.tile].is_disturbed == is_disturbed);
+        [0, 1, 2].map(|channel| excess(alike.clone().map(|(_, contrast)| contrast[channel])))
     });
-    let filter = |contrast: &[Contrast; 3]| {
+    let filter = |(element, contrast): (&Element, &[Contrast; 3])| {
+        let excess = excess[usize::from(tiles[element.tile].is_disturbed)];
         let mut filter = Filter::default();
         for (contrast, excess) in contrast.iter().zip(excess) {
             let (predicted, variance) = (contrast.predicted, contrast.variance * excess);
@@ -244,19 +258,34 @@ fn filters(scale: &Scale, smallest: &[PatchSums]) -> Vec<Filter> {
         }
         filter
     };
-    contrasts.iter().map(filter).collect()
+    elements().map(filter).collect()
 }
 
-fn contrast(element: &Element, inside: &PatchSums, cell: &PatchSums) -> [Contrast; 3] {
+/// By how much the contrasts scatter about the predicted ones more than their variances say; at least 1.
+fn excess(contrasts: impl Iterator<Item = Contrast>) -> f64 {
+    let [sum, count] = contrasts.fold([0.0, 0.0], |[sum, count], contrast| {
+        let rest = contrast.received - contrast.predicted;
+        [sum + rest * rest / contrast.variance, count + 1.0]
+    });
+    (sum / f64::max(count, 1.0)).max(1.0)
+}
+
+fn contrast(
+    element: &Element,
+    inside: &PatchSums,
+    cell: &PatchSums,
+    tile: &TileFit,
+) -> [Contrast; 3] {
     let outside = cell.without(inside);
     [0, 1, 2].map(|channel| {
         let [received, predicted, noise] = inside.means(channel, element.inside);
         let [around, expected, noise_around] = outside.means(channel, element.outside);
+        let (gain, scale) = (tile.gain[channel], tile.noise[channel]);
         Contrast {
             received: received - around,
-            predicted: predicted - expected,
-            variance: noise.max(ROUNDING) / element.inside
-                + noise_around.max(ROUNDING) / element.outside,
+            predicted: gain * (predicted - expected),
+            variance: (scale * noise).max(ROUNDING) / element.inside
+                + (scale * noise_around).max(ROUNDING) / element.outside,
         }
     })
 }

@@ -1,12 +1,18 @@
-//! The colour of a thing in the untouched frame, inferred from the received pixels: [`Shade`].
+//! The colour of a thing in the untouched frame, inferred from the received pixels in the light of its surroundings: [`Shade`].
 
 use super::cells::Cells;
 use super::channel::{ChannelFit, Fit};
+use super::local::{Equations, MIN_GAIN};
 use super::outlines::{PatchSums, ROUNDING};
+use super::tiles::Tiles;
 use crate::colors::{Color, Palette};
 
 /// Largest standard deviation of an inferred code with which a colour is named, in codes (chosen).
 const MAX_DEVIATION: f64 = 48.0;
+
+/// Standard deviation of the weights with which the surroundings of a thing show the light on it, in longer sides of the frame
+/// (chosen).
+const SMOOTHED: f64 = 0.125;
 
 /// Ratio of the standard deviation of normal numbers to their median absolute deviation.
 const DEVIATION: f64 = 1.4826;
@@ -30,23 +36,163 @@ struct Posterior {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Shade([Posterior; 3]);
 
-impl Shade {
-    /// The shade of a mask; `None` if it has an eighth of no cell.
-    pub(super) fn of(cells: &Cells, sums: &[PatchSums], fit: &Fit, mask: u32) -> Option<Self> {
-        let least = (cells.side * cells.side / 8).max(3) as u32;
-        let patches = cells.scales[0].patches.iter().zip(sums);
-        let patches = patches.filter(|(patch, _)| patch.mask == mask && patch.count >= least);
-        let means: Vec<[f64; 3]> = patches
-            .map(|(patch, sums)| sums.received.map(|sum| sum as f64 / f64::from(patch.count)))
-            .collect();
-        (!means.is_empty()).then(|| {
-            Self([0, 1, 2].map(|channel| {
-                let means = means.iter().map(|means| means[channel]).collect();
-                Posterior::of(&fit.channels[channel], means)
-            }))
+/// The light on the things of a frame, as their surroundings show it. The colour of a thing says nothing of the light on it: in
+/// local light of its own, each thing would have the colour that is expected.
+pub(super) struct Light<'a> {
+    cells: &'a Cells,
+    tiles: &'a Tiles,
+    sums: &'a [PatchSums],
+    fit: &'a Fit,
+    /// Patches of the coarsest scale in tiles that are not disturbed; empty if the light is the same everywhere.
+    pieces: Vec<Piece>,
+}
+
+/// The pixels of one mask in one tile.
+struct Piece {
+    mask: u32,
+    place: [f64; 2],
+    pixels: f64,
+    /// Mean received code of each channel.
+    received: [f64; 3],
+    /// Mean predicted code of each channel, in light of gain 1.
+    predicted: [f64; 3],
+}
+
+/// Linear fields of light about a place, one for each channel.
+struct LightField {
+    middle: [f64; 2],
+    channels: [[f64; 3]; 3],
+}
+
+impl LightField {
+    /// Gain of the light in each channel.
+    fn at(&self, place: [f64; 2]) -> [f64; 3] {
+        let terms = linear_terms(place, self.middle);
+        self.channels.map(|channel| {
+            let gain: f64 = channel.iter().zip(terms).map(|(c, term)| c * term).sum();
+            gain.max(MIN_GAIN)
         })
     }
+}
 
+fn linear_terms(place: [f64; 2], middle: [f64; 2]) -> [f64; 3] {
+    [1.0, place[0] - middle[0], place[1] - middle[1]]
+}
+
+impl<'a> Light<'a> {
+    pub(super) fn new(
+        cells: &'a Cells,
+        tiles: &'a Tiles,
+        sums: &'a [PatchSums],
+        fit: &'a Fit,
+    ) -> Self {
+        let mut light = Self {
+            cells,
+            tiles,
+            sums,
+            fit,
+            pieces: Vec::new(),
+        };
+        if fit.is_local {
+            light.pieces = light.pieces();
+        }
+        light
+    }
+
+    fn pieces(&self) -> Vec<Piece> {
+        let [.., coarsest] = &self.cells.scales;
+        let mut sums = vec![PatchSums::default(); coarsest.patches.len()];
+        for (part, whole) in self.sums.iter().zip(&coarsest.part_of) {
+            sums[*whole as usize].add(part);
+        }
+        let patches = coarsest.patches.iter().zip(&sums);
+        let undisturbed = patches.filter(|(patch, _)| !self.fit.tiles[patch.cell].is_disturbed);
+        undisturbed
+            .map(|(patch, sums)| {
+                let pixels = f64::from(patch.count);
+                let means = [0, 1, 2].map(|channel| sums.means(channel, pixels));
+                Piece {
+                    mask: patch.mask,
+                    place: self.tiles.place(patch.cell),
+                    pixels,
+                    received: means.map(|[received, ..]| received),
+                    predicted: means.map(|[_, predicted, _]| predicted),
+                }
+            })
+            .collect()
+    }
+
+    /// The shade of a mask; `None` if it has an eighth of no cell.
+    pub(super) fn shade(&self, mask: u32) -> Option<Shade> {
+        let least = (self.cells.side * self.cells.side / 8).max(3) as u32;
+        let [finest, _, coarsest] = &self.cells.scales;
+        let patches = finest.patches.iter().zip(self.sums).zip(&coarsest.part_of);
+        // The tile, the number of pixels and the sums of each patch of the mask.
+        let patches: Vec<(usize, f64, &PatchSums)> = patches
+            .filter(|((patch, _), _)| patch.mask == mask && patch.count >= least)
+            .map(|((patch, sums), part_of)| {
+                let tile = coarsest.patches[*part_of as usize].cell;
+                (tile, f64::from(patch.count), sums)
+            })
+            .collect();
+        let is_disturbed = |tile: usize| self.fit.tiles[tile].is_disturbed;
+        let all_are = patches.iter().all(|(tile, ..)| is_disturbed(*tile));
+        let patches = patches.into_iter();
+        let patches: Vec<_> = patches
+            .filter(|(tile, ..)| all_are || !is_disturbed(*tile))
+            .collect();
+        let places: Vec<[f64; 2]> = patches
+            .iter()
+            .map(|(tile, ..)| self.tiles.place(*tile))
+            .collect();
+        if places.is_empty() {
+            return None;
+        }
+        let field = self.field_around(mask, &places);
+        let gains: Vec<[f64; 3]> = places.iter().map(|place| field.at(*place)).collect();
+        Some(Shade([0, 1, 2].map(|channel| {
+            let means = patches
+                .iter()
+                .zip(&gains)
+                .map(|((_, pixels, sums), gains)| {
+                    sums.received[channel] as f64 / pixels / gains[channel]
+                });
+            let gain = gains.iter().map(|gains| gains[channel]).sum::<f64>() / gains.len() as f64;
+            Posterior::of(&self.fit.channels[channel], means.collect(), gain)
+        })))
+    }
+
+    /// The light on a mask at these places, from the pieces of all others: a local linear regression (Cleveland, J. Am. Stat.
+    /// Assoc. 74:829, 1979).
+    fn field_around(&self, mask: u32, places: &[[f64; 2]]) -> LightField {
+        let middle = [0, 1].map(|axis| {
+            let sum: f64 = places.iter().map(|place| place[axis]).sum();
+            sum / places.len() as f64
+        });
+        let rows = self.tiles.len().div_ceil(self.tiles.columns);
+        let width = rows.max(self.tiles.columns) as f64 * SMOOTHED;
+        let mut equations = [0, 1, 2].map(|_| Equations::<3>::default());
+        for piece in self.pieces.iter().filter(|piece| piece.mask != mask) {
+            let terms = linear_terms(piece.place, middle);
+            let distance = (terms[1] * terms[1] + terms[2] * terms[2]) / (width * width);
+            let weight = piece.pixels * libm::exp(-0.5 * distance);
+            for (channel, equations) in equations.iter_mut().enumerate() {
+                let (received, predicted) = (piece.received[channel], piece.predicted[channel]);
+                equations.add(
+                    &terms,
+                    weight * predicted * predicted,
+                    weight * predicted * received,
+                );
+            }
+        }
+        LightField {
+            middle,
+            channels: equations.map(Equations::solve),
+        }
+    }
+}
+
+impl Shade {
     /// The most probable of the offered colours. `None` if a channel is too uncertain, or none of them is possible.
     pub(super) fn name(&self, palette: &Palette, offered: &[Color]) -> Option<Color> {
         if self
@@ -56,7 +202,7 @@ impl Shade {
         {
             return None;
         }
-        let codes = [0, 1, 2].map(|channel| self.0[channel].mean as u8);
+        let codes = [0, 1, 2].map(|channel| self.0[channel].mean.round() as u8);
         let first = palette.color(codes).filter(|color| offered.contains(color));
         first.or_else(|| self.most_probable(palette, offered))
     }
@@ -88,12 +234,13 @@ impl Shade {
 }
 
 impl Posterior {
-    /// The posterior of the code behind the median of these means, with a flat prior over all codes.
-    fn of(fit: &ChannelFit, mut means: Vec<f64>) -> Self {
+    /// The posterior of the code behind the median of these means, with a flat prior over all codes. The means are received codes
+    /// divided by the gain of the light.
+    fn of(fit: &ChannelFit, mut means: Vec<f64>, gain: f64) -> Self {
         let middle = median(&mut means);
         let mut distances: Vec<f64> = means.iter().map(|mean| (mean - middle).abs()).collect();
         let error = DEVIATION * median(&mut distances) * MEDIAN_ERROR / (means.len() as f64).sqrt();
-        let variance = ROUNDING + error * error;
+        let variance = ROUNDING / (gain * gain) + error * error;
         let distance = |code: usize| (middle - fit.curve[code]) * (middle - fit.curve[code]);
         let mut likelihood: [f64; 256] =
             std::array::from_fn(|code| libm::exp(-0.5 * distance(code) / variance));

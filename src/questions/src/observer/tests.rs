@@ -1,8 +1,9 @@
 //! The observer on a disc in noise: its numbers are those of the textbook.
 
-use super::cells::Cells;
-use super::channel::{Fit, histogram};
+use super::cells::{Cells, TILE};
+use super::channel::Fit;
 use super::outlines::{Outline, outlines, patch_sums};
+use super::tiles::Tiles;
 use crate::pick::Picker;
 use darkqa_ground::types::{FrameId, Rgb};
 
@@ -54,13 +55,35 @@ fn image(code: impl Fn(usize) -> f64) -> Rgb {
     Rgb::new(height, width, samples.collect()).unwrap()
 }
 
+/// What is known of an image.
+struct Untouched<'a> {
+    image: &'a Rgb,
+    cells: Cells,
+    tiles: Tiles,
+}
+
+impl<'a> Untouched<'a> {
+    fn new(masks: &[u32], image: &'a Rgb) -> Self {
+        let cells = Cells::of(masks, SIZE);
+        let tiles = Tiles::new(image, TILE * cells.side);
+        Self {
+            image,
+            cells,
+            tiles,
+        }
+    }
+
+    fn look(&self, received: &Rgb) -> Vec<Outline> {
+        let untouched = self.image.samples();
+        let sums = self.tiles.sums(untouched, received.samples());
+        let fit = Fit::new(&self.tiles, &sums);
+        let sums = patch_sums(&self.cells, untouched, &fit, received);
+        outlines(&self.cells, &sums, &fit.tiles)
+    }
+}
+
 fn look(masks: &[u32], untouched: &Rgb, received: &Rgb) -> Vec<Outline> {
-    let cells = Cells::of(masks, SIZE);
-    let fit = Fit::of(untouched.samples(), &histogram(untouched), received);
-    outlines(
-        &cells,
-        &patch_sums(&cells, untouched.samples(), &fit, received),
-    )
+    Untouched::new(masks, untouched).look(received)
 }
 
 /// Codes of a disc on a background, and the same in noise of a standard deviation, independent in every sample.
@@ -161,8 +184,7 @@ fn noise_alone_shows_nothing() {
     let [width, height] = SIZE;
     let masks = discs(4, 22.0);
     let untouched = image(|i| if masks[i] == 1 { 100.0 } else { 140.0 });
-    let cells = Cells::of(&masks, SIZE);
-    let counts = histogram(&untouched);
+    let known = Untouched::new(&masks, &untouched);
     let (mut things, mut detected, mut seen) = (0_u32, [0_u32; 3], [0_u32; 3]);
     for seed in 0..280 {
         for kind in 0..3 {
@@ -181,9 +203,7 @@ fn noise_alone_shows_nothing() {
                 };
                 100.0 + 8.0 * noise
             });
-            let fit = Fit::of(untouched.samples(), &counts, &received);
-            let sums = patch_sums(&cells, untouched.samples(), &fit, &received);
-            for outline in &outlines(&cells, &sums)[2..] {
+            for outline in &known.look(&received)[2..] {
                 things += 1;
                 detected[kind] += u32::from(outline.is_detected());
                 seen[kind] += u32::from(outline.confirmed >= 0.5);
