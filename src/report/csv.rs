@@ -58,7 +58,8 @@ pub(super) fn fields(cell: &TableCell, names: usize) -> impl Iterator<Item = Csv
         | TableCell::Below(e)
         | TableCell::Guess(e)
         | TableCell::Strict(e, _)
-        | TableCell::Changed(e, _) => {
+        | TableCell::Changed(e, _)
+        | TableCell::Effect(e, _) => {
             fields = [e.value, e.low, e.high, 0.0].map(CsvField::Number);
             fields[3] = CsvField::Count(e.n);
         }

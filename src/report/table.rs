@@ -6,7 +6,7 @@ use crate::score::significance::Significance;
 use crate::score::threshold::Threshold;
 
 /// A table of numbers. A format for which it has no title leaves it out.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Table {
     /// Name of its CSV file without the extension. Tables with the same name are parts of one file.
     pub name: &'static str,
@@ -36,6 +36,8 @@ pub struct TableRow {
     pub cells: Vec<TableCell>,
     /// The heading above it and the rows after it with the same one; `None` without one.
     pub group: Option<String>,
+    /// Whether its name is bold in tables of papers: the model is shown to be better than every other.
+    pub is_best: bool,
     /// Formats that leave the row out.
     pub hidden_in: Vec<TableFormat>,
 }
@@ -45,8 +47,7 @@ impl TableRow {
     fn wide() -> Self {
         Self {
             cells: Vec::with_capacity(12),
-            group: None,
-            hidden_in: Vec::new(),
+            ..Self::default()
         }
     }
 }
@@ -135,6 +136,8 @@ pub enum TableCell {
     Strict(Estimate, f64),
     /// A score, and its difference from the score on the clean frames, if that is known.
     Changed(Estimate, Option<f64>),
+    /// A difference of shares, and the result of its test.
+    Effect(Estimate, Significance),
     /// A threshold, and the exposure drop of the darkest level, in EV.
     Threshold(Threshold, f64),
     /// Result of a significance test.
@@ -197,15 +200,8 @@ impl<T> TableBuilder<T> {
         let items: Vec<T> = items.into_iter().collect();
         let table = Table {
             name,
-            section: "",
-            caption: String::new(),
-            is_folded: false,
-            heading: None,
-            notes: Vec::new(),
-            foot: None,
-            latex: None,
-            columns: Vec::new(),
             rows: items.iter().map(|_| TableRow::wide()).collect(),
+            ..Table::default()
         };
         Self { table, items }
     }

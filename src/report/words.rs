@@ -119,7 +119,10 @@ pub(super) fn interval(kind: ColumnKind, cell: &TableCell) -> Option<Estimate> {
     match (kind, cell) {
         (
             _,
-            TableCell::Below(share) | TableCell::Strict(share, _) | TableCell::Changed(share, _),
+            TableCell::Below(share)
+            | TableCell::Strict(share, _)
+            | TableCell::Changed(share, _)
+            | TableCell::Effect(share, _),
         )
         | (ColumnKind::Accuracy | ColumnKind::Percent, TableCell::Estimate(share)) => Some(*share),
         _ => None,
@@ -163,6 +166,7 @@ pub(super) fn words(kind: ColumnKind, cell: &TableCell) -> String {
         TableCell::Changed(share, Some(change)) => {
             format!("{} ({})", percent(share.value), points(*change))
         }
+        TableCell::Effect(difference, _) => points(difference.value),
         TableCell::Threshold(threshold, darkest) => {
             let reach = reach(threshold.low, threshold.high, *darkest);
             format!("{} [{reach}]", stops(threshold.value, *darkest))

@@ -24,7 +24,7 @@ use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
 pub(crate) use names::{KnownNames, Names};
 pub(crate) use overview::{OverviewPanels, overview};
 pub(crate) use story::{StoryCurves, story_curves};
-pub(crate) use tables::{PaperCell, PaperMark, PaperRow, PaperTable, paper_tables};
+pub(crate) use tables::paper_tables;
 pub(crate) use thresholds::without_threshold;
 
 /// One figure of a report, before it is drawn.

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::{Names, Overview};
-use crate::report::words::{family as family_name, points};
+use crate::report::table::{Column, ColumnHeads, ColumnKind, Table, TableCell, TableRow};
+use crate::report::words::family as family_name;
 use crate::score::choice::ReadingMode;
 use crate::score::estimate::Estimate;
 use crate::score::findings::Findings;
@@ -12,58 +13,14 @@ use crate::score::subject::Subject;
 use crate::types::degradation::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
 
-/// A table of a paper.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct PaperTable {
-    /// Caption as plain text.
-    pub caption: String,
-    /// The names of the columns after the first one.
-    pub heads: Vec<String>,
-    /// Blocks of rows with a heading, which may be empty.
-    pub blocks: Vec<(String, Vec<PaperRow>)>,
-}
-
-/// A row of a table of a paper.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct PaperRow {
-    pub name: String,
-    /// Whether the name is bold: the model is shown to be better than every other.
-    pub is_best: bool,
-    pub cells: Vec<PaperCell>,
-}
-
-/// A cell of a table of a paper.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum PaperCell {
-    Empty,
-    /// A number in percent or points, with its interval.
-    Interval {
-        value: String,
-        ends: Estimate,
-        mark: PaperMark,
-    },
-    /// A number without an interval.
-    Number(String),
-}
-
-/// What is said of a number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum PaperMark {
-    None,
-    /// Shown to be below the answers without images.
-    Below,
-    /// A difference that is shown.
-    Shown,
-}
-
 /// The words about marks in captions.
 const BELOW: &str = "↓: shown to be below the answers without images.";
 
 /// The tables for which there are records: accuracy by level, accuracy by family at L0 and at the darkest level, and each enhancer.
-pub(crate) fn paper_tables(findings: &Findings<'_>, names: &Names) -> Vec<PaperTable> {
+pub(crate) fn paper_tables(findings: &Findings<'_>, names: &Names) -> Vec<Table> {
     let overview = Overview::new(findings, names);
     let variants = overview.tested_variants();
-    let mut tables: Vec<PaperTable> = variants
+    let mut tables: Vec<Table> = variants
         .iter()
         .map(|variant| overview.by_level(variant))
         .collect();
@@ -73,15 +30,51 @@ pub(crate) fn paper_tables(findings: &Findings<'_>, names: &Names) -> Vec<PaperT
             tables.extend(overview.by_enhancer(variant, enhancer));
         }
     }
-    tables.retain(|table| table.blocks.iter().any(|(_, rows)| !rows.is_empty()));
+    tables.retain(|table| !table.rows.is_empty());
     tables
 }
 
-fn share(of: Estimate, mark: PaperMark) -> PaperCell {
-    PaperCell::Interval {
-        value: format!("{:.1}", 100.0 * of.value),
-        ends: of,
-        mark,
+/// A table with the names of its columns after the first one, which holds the names of its rows.
+fn table(caption: String, heads: impl IntoIterator<Item = String>, rows: Vec<TableRow>) -> Table {
+    let names = Column {
+        kind: ColumnKind::Text,
+        heads: ColumnHeads::default(),
+    };
+    let numbers = heads.into_iter().map(|head| Column {
+        kind: ColumnKind::Accuracy,
+        heads: ColumnHeads {
+            page: Some(head),
+            ..ColumnHeads::default()
+        },
+    });
+    Table {
+        name: "paper",
+        caption,
+        columns: std::iter::once(names).chain(numbers).collect(),
+        rows,
+        ..Table::default()
+    }
+}
+
+/// A row with its name, below a heading.
+fn row(
+    name: String,
+    group: Option<&str>,
+    numbers: impl IntoIterator<Item = TableCell>,
+) -> TableRow {
+    TableRow {
+        cells: std::iter::once(name.into()).chain(numbers).collect(),
+        group: group.map(str::to_owned),
+        ..TableRow::default()
+    }
+}
+
+/// An accuracy, marked if it is below that without images.
+fn accuracy(of: Estimate, is_below: bool) -> TableCell {
+    if is_below {
+        TableCell::Below(of)
+    } else {
+        TableCell::Estimate(of)
     }
 }
 
@@ -96,16 +89,8 @@ impl Overview<'_> {
         )
     }
 
-    /// The name of a level, with its value on the axis.
-    fn heads(levels: &[AxisLevel]) -> Vec<String> {
-        levels.iter().map(ToString::to_string).collect()
-    }
-
-    fn by_level(&self, variant: &KindReading) -> PaperTable {
-        let on = |level: &&AxisLevel| {
-            let axis = variant.kind.map_or(Axis::LIGHT, Kind::axis);
-            level.is_shown_on(axis)
-        };
+    fn by_level(&self, variant: &KindReading) -> Table {
+        let axis = variant.kind.map_or(Axis::LIGHT, Kind::axis);
         let rows = self.models.iter().map(|model| {
             let mut below = Vec::new();
             let points = self.points(model, variant, None, |subject| {
@@ -114,71 +99,60 @@ impl Overview<'_> {
                 }
                 self.accuracy_of(subject, None)
             });
-            let cells = points.into_iter().map(|(level, of)| {
-                let mark = if below.contains(&level) {
-                    PaperMark::Below
-                } else {
-                    PaperMark::None
-                };
-                (level, share(of, mark))
-            });
+            let cells = points
+                .into_iter()
+                .map(|(level, of)| (level, accuracy(of, below.contains(&level))));
             (*model, cells.collect())
         });
-        let rows: Vec<(&str, BTreeMap<AxisLevel, PaperCell>)> = rows.collect();
-        let has = |level: &&AxisLevel| rows.iter().any(|(_, cells)| cells.contains_key(level));
-        let levels: Vec<AxisLevel> = self.levels.iter().filter(on).filter(has).copied().collect();
-        let rows = rows.into_iter().map(|(model, mut cells)| PaperRow {
-            name: self.names.of(model),
-            is_best: self.is_best(model, variant),
-            cells: levels
+        let rows: Vec<(&str, BTreeMap<AxisLevel, TableCell>)> = rows.collect();
+        let levels: Vec<AxisLevel> = self
+            .levels
+            .iter()
+            .copied()
+            .filter(|level| level.is_shown_on(axis))
+            .filter(|level| rows.iter().any(|(_, cells)| cells.contains_key(level)))
+            .collect();
+        let rows = rows.into_iter().map(|(model, mut cells)| {
+            let numbers = levels
                 .iter()
-                .map(|level| cells.remove(level).unwrap_or(PaperCell::Empty))
-                .collect(),
+                .map(|level| cells.remove(level).unwrap_or(TableCell::Blank));
+            TableRow {
+                is_best: self.is_best(model, variant),
+                ..row(self.names.of(model), None, numbers)
+            }
         });
-        let rows = rows.collect();
-        let axis = variant.kind.map_or(Axis::LIGHT, Kind::axis);
-        let values = levels.iter().map(|of| format!("{of} {}", of.value()));
-        let values: Vec<String> = values.collect();
-        PaperTable {
-            caption: format!(
-                "Accuracy in % by level, {} ({} in {}: {}). {} {BELOW} Bold: shown to be better than every other model over the levels.",
-                self.light(variant, None),
-                axis.title,
-                axis.unit,
-                values.join(", "),
-                self.basis()
-            ),
-            blocks: vec![
-                (String::new(), rows),
-                (
-                    "without images".to_owned(),
-                    self.without_images(None, levels.len()),
-                ),
-            ],
-            heads: Self::heads(&levels),
-        }
+        let rows = rows.chain(self.without_images(levels.len())).collect();
+        let values: Vec<String> = levels
+            .iter()
+            .map(|of| format!("{of} {}", of.value()))
+            .collect();
+        let caption = format!(
+            "Accuracy in % by level, {} ({} in {}: {}). {} {BELOW} Bold: shown to be better than every other model over the levels.",
+            self.light(variant, None),
+            axis.title,
+            axis.unit,
+            values.join(", "),
+            self.basis()
+        );
+        table(caption, levels.iter().map(ToString::to_string), rows)
     }
 
     /// Models without images, and chance, in the first of `columns` cells.
-    fn without_images(&self, family: Option<&Family>, columns: usize) -> Vec<PaperRow> {
-        let cells = self.findings.summary.of(family, ReadingMode::Strict);
+    fn without_images(&self, columns: usize) -> impl Iterator<Item = TableRow> {
+        let cells = self.findings.summary.of(None, ReadingMode::Strict);
         let cells = cells.filter(|cell| cell.subject.view != Some(View::Image));
-        let rows = cells.filter_map(|cell| {
+        cells.filter_map(move |cell| {
             let of = cell.accuracy?;
             let first = match cell.subject.view {
                 // The expected share of guesses is known without an interval.
-                None => PaperCell::Number(format!("{:.1}", 100.0 * of.value)),
-                Some(_) => share(of, PaperMark::None),
+                None => TableCell::Guess(of),
+                Some(_) => TableCell::Estimate(of),
             };
-            let mut cells = vec![PaperCell::Empty; columns];
-            *cells.first_mut()? = first;
-            Some(PaperRow {
-                name: self.names.of(&cell.subject.model),
-                is_best: false,
-                cells,
-            })
-        });
-        rows.collect()
+            let mut numbers = vec![TableCell::Blank; columns];
+            *numbers.first_mut()? = first;
+            let name = self.names.of(&cell.subject.model);
+            Some(row(name, Some("without images"), numbers))
+        })
     }
 
     fn is_best(&self, model: &str, variant: &KindReading) -> bool {
@@ -190,7 +164,7 @@ impl Overview<'_> {
         })
     }
 
-    fn by_family(&self, variant: &KindReading) -> PaperTable {
+    fn by_family(&self, variant: &KindReading) -> Table {
         let families = self.findings.grid.families();
         let of_variant = self.models.iter().flat_map(|model| {
             let points = self.points(model, variant, None, |subject| {
@@ -199,31 +173,27 @@ impl Overview<'_> {
             points.into_iter().map(|(level, _)| level)
         });
         let darkest = of_variant.max().unwrap_or(AxisLevel::L0);
-        let blocks = [AxisLevel::L0, darkest].map(|level| {
-            let rows = self.models.iter().map(|model| PaperRow {
-                name: self.names.of(model),
-                is_best: false,
-                cells: families
-                    .iter()
-                    .map(|family| self.at(model, level, variant, family))
-                    .collect(),
-            });
-            (level.to_string(), rows.collect())
-        });
-        PaperTable {
-            caption: format!(
-                "Accuracy in % by family at L0 and at {darkest} ({} {}), {}. {} {BELOW}",
-                darkest.value(),
-                darkest.axis().unwrap_or(Axis::LIGHT).unit,
-                self.light(variant, None),
-                self.basis()
-            ),
-            heads: families
+        let rows = [AxisLevel::L0, darkest]
+            .into_iter()
+            .flat_map(|level| self.models.iter().map(move |model| (level, *model)));
+        let rows = rows.map(|(level, model)| {
+            let numbers = families
                 .iter()
-                .map(|family| self.names.of(family_name(Some(family))))
-                .collect(),
-            blocks: blocks.to_vec(),
-        }
+                .map(|family| self.at(model, level, variant, family));
+            row(self.names.of(model), Some(&level.to_string()), numbers)
+        });
+        let rows = rows.collect();
+        let caption = format!(
+            "Accuracy in % by family at L0 and at {darkest} ({} {}), {}. {} {BELOW}",
+            darkest.value(),
+            darkest.axis().unwrap_or(Axis::LIGHT).unit,
+            self.light(variant, None),
+            self.basis()
+        );
+        let heads = families
+            .iter()
+            .map(|family| self.names.of(family_name(Some(family))));
+        table(caption, heads, rows)
     }
 
     /// The accuracy of a model on a family at a level.
@@ -233,24 +203,19 @@ impl Overview<'_> {
         level: AxisLevel,
         variant: &KindReading,
         family: &Family,
-    ) -> PaperCell {
+    ) -> TableCell {
         let grid = &self.findings.grid;
         let place = grid.stand_in(&Subject::seeing(model, level, variant, None));
         let subject = place.map(|place| &grid.subjects[place]);
         let of = subject.and_then(|subject| {
             let below = !self.findings.below_blind(subject, Some(family)).is_empty();
-            let mark = if below {
-                PaperMark::Below
-            } else {
-                PaperMark::None
-            };
-            Some(share(self.accuracy_of(subject, Some(family))?, mark))
+            Some(accuracy(self.accuracy_of(subject, Some(family))?, below))
         });
-        of.unwrap_or(PaperCell::Empty)
+        of.unwrap_or(TableCell::Blank)
     }
 
     /// The effect of an enhancer over the models, then the accuracy of each model with it; `None` if it was not asked in the variant.
-    fn by_enhancer(&self, variant: &KindReading, enhancer: &EnhancerName) -> Option<PaperTable> {
+    fn by_enhancer(&self, variant: &KindReading, enhancer: &EnhancerName) -> Option<Table> {
         let pooled = self.findings.pooled.iter().filter(|of| {
             of.kind == PooledKind::Enhancer
                 && of.family.is_none()
@@ -277,46 +242,30 @@ impl Overview<'_> {
         let models = pooled.first().map_or(0, |of| of.models.len());
         let effect = levels.iter().map(|level| {
             let of = pooled.iter().find(|of| of.level == *level);
-            of.map_or(PaperCell::Empty, |of| PaperCell::Interval {
-                value: points(of.strict.difference.value),
-                ends: of.strict.difference,
-                mark: if of.strict.verdict.is_shown() {
-                    PaperMark::Shown
-                } else {
-                    PaperMark::None
-                },
+            of.map_or(TableCell::Blank, |of| {
+                TableCell::Effect(of.strict.difference, of.strict.verdict)
             })
         });
-        let effect = PaperRow {
-            name: match models {
-                1 => "enhanced − raw".to_owned(),
-                several => format!("{several} models, enhanced − raw"),
-            },
-            is_best: false,
-            cells: effect.collect(),
+        let name = match models {
+            1 => "enhanced − raw".to_owned(),
+            several => format!("{several} models, enhanced − raw"),
         };
-        let cells = |points: &[(AxisLevel, Estimate)], level: &AxisLevel| {
-            let at = points.iter().find(|(at, _)| at == level);
-            at.map_or(PaperCell::Empty, |(_, of)| share(*of, PaperMark::None))
-        };
+        let effect = row(name, None, effect);
         let own = rows.iter().filter(|(_, points)| !points.is_empty());
-        let own = own.map(|(model, points)| PaperRow {
-            name: self.names.of(model),
-            is_best: false,
-            cells: levels.iter().map(|level| cells(points, level)).collect(),
+        let own = own.map(|(model, points)| {
+            let numbers = levels.iter().map(|level| {
+                let at = points.iter().find(|(at, _)| at == level);
+                at.map_or(TableCell::Blank, |(_, of)| TableCell::Estimate(*of))
+            });
+            row(self.names.of(model), Some(""), numbers)
         });
-        Some(PaperTable {
-            caption: format!(
-                "Effect of {} in points, and accuracy with it in %, {}. {} Bold: a difference that is shown (p < 0.05 after Holm's correction over the levels).",
-                self.names.of(enhancer.as_str()),
-                self.light(variant, None),
-                self.basis()
-            ),
-            heads: Self::heads(&levels),
-            blocks: vec![
-                (String::new(), vec![effect]),
-                (String::new(), own.collect()),
-            ],
-        })
+        let rows = std::iter::once(effect).chain(own).collect();
+        let caption = format!(
+            "Effect of {} in points, and accuracy with it in %, {}. {} Bold: a difference that is shown (p < 0.05 after Holm's correction over the levels).",
+            self.names.of(enhancer.as_str()),
+            self.light(variant, None),
+            self.basis()
+        );
+        Some(table(caption, levels.iter().map(ToString::to_string), rows))
     }
 }

@@ -9,8 +9,9 @@ use std::ops::Range;
 
 use super::font::Font;
 use super::look::Look;
-use crate::report::figures::{PaperCell, PaperMark, PaperRow, PaperTable};
 use crate::report::latex::{MOST_ROWS, escaped};
+use crate::report::table::{Column, ColumnKind, Table, TableCell, TableFormat, TableRow};
+use crate::report::words::{interval, words};
 
 /// Heights of letters of tables and of intervals, in points.
 const LETTERS: f64 = 8.0;
@@ -45,20 +46,15 @@ struct Form {
     ends: Ends,
     /// Room for names, in points.
     names: f64,
-    /// The columns of each part.
+    /// The columns of each part; the first column of a table is its names.
     parts: Vec<Range<usize>>,
 }
 
 /// The files of the tables by name, and the number of long tables: `tables.tex`, and `tables-full.tex` if there are tables of more than
 /// forty rows.
-pub(crate) fn tables(
-    all: &[PaperTable],
-    look: &Look,
-    is_wide: bool,
-) -> (Vec<(String, Vec<u8>)>, usize) {
-    let (long, short): (Vec<&PaperTable>, Vec<&PaperTable>) = all
-        .iter()
-        .partition(|table| table.rows().count() > MOST_ROWS);
+pub(crate) fn tables(all: &[Table], look: &Look, is_wide: bool) -> (Vec<(String, Vec<u8>)>, usize) {
+    let (long, short): (Vec<&Table>, Vec<&Table>) =
+        all.iter().partition(|table| table.rows.len() > MOST_ROWS);
     let float = if is_wide { "table*" } else { "table" };
     let mut text =
         format!("% Tables of darkqa-eval. In the preamble: \\usepackage{{booktabs}}\n{COMMANDS}");
@@ -78,20 +74,9 @@ pub(crate) fn tables(
     (files, long.len())
 }
 
-impl PaperTable {
-    fn rows(&self) -> impl Iterator<Item = &PaperRow> {
-        self.blocks.iter().flat_map(|(_, rows)| rows)
-    }
-}
-
 /// The ends of an interval in tiny letters.
-fn ends(cell: &PaperCell, ends: Ends) -> Option<String> {
-    let PaperCell::Interval {
-        value, ends: of, ..
-    } = cell
-    else {
-        return None;
-    };
+fn ends(cell: &TableCell, ends: Ends) -> Option<String> {
+    let of = interval(ColumnKind::Accuracy, cell)?;
     let number = |share: f64| {
         let text = match ends {
             Ends::Tenths => format!("{:.1}", 100.0 * share),
@@ -104,7 +89,7 @@ fn ends(cell: &PaperCell, ends: Ends) -> Option<String> {
         }
     };
     // "to" is a comma where ends have signs.
-    let between = if value.contains(['+', '−']) {
+    let between = if value(cell).contains(['+', '−']) {
         ", "
     } else {
         "–"
@@ -112,28 +97,30 @@ fn ends(cell: &PaperCell, ends: Ends) -> Option<String> {
     Some(format!("{}{between}{}", number(of.low), number(of.high)))
 }
 
-fn value(cell: &PaperCell) -> &str {
-    match cell {
-        PaperCell::Empty => "",
-        PaperCell::Interval { value, .. } | PaperCell::Number(value) => value,
-    }
+fn value(cell: &TableCell) -> String {
+    words(ColumnKind::Accuracy, cell)
+}
+
+fn name(row: &TableRow) -> String {
+    words(ColumnKind::Text, &row.cells[0])
+}
+
+fn head(column: &Column) -> &str {
+    column.heads.page.as_deref().unwrap_or_default()
 }
 
 /// Width in points of a column of numbers.
-fn column_width(table: &PaperTable, column: usize, form: Ends) -> f64 {
+fn column_width(table: &Table, column: usize, form: Ends) -> f64 {
     let font = Font::bundled();
-    let head = head_lines(&table.heads[column]);
+    let head = head_lines(head(&table.columns[column]));
     let head = head.iter().map(|line| font.width(line, LETTERS));
-    let cells = table.rows().map(|row| {
+    let cells = table.rows.iter().map(|row| {
         let cell = &row.cells[column];
         let arrow = match cell {
-            PaperCell::Interval {
-                mark: PaperMark::Below,
-                ..
-            } => font.width("↓", LETTERS),
+            TableCell::Below(_) => font.width("↓", LETTERS),
             _ => 0.0,
         };
-        let value = font.width(value(cell), LETTERS) * WIDER + arrow;
+        let value = font.width(&value(cell), LETTERS) * WIDER + arrow;
         value.max(ends(cell, form).map_or(0.0, |ends| font.width(&ends, TINY) * TINY_WIDER))
     });
     head.chain(cells).fold(0.0, f64::max)
@@ -145,17 +132,16 @@ fn head_lines(head: &str) -> Vec<&str> {
 }
 
 /// Width in points of the widest name, all on one line.
-fn names_width(table: &PaperTable) -> f64 {
+fn names_width(table: &Table) -> f64 {
     let font = Font::bundled();
-    let widths = table
-        .rows()
-        .map(|row| font.width(&row.name, LETTERS) * WIDER);
+    let rows = table.rows.iter();
+    let widths = rows.map(|row| font.width(&name(row), LETTERS) * WIDER);
     widths.fold(0.0, f64::max)
 }
 
 /// The first form in which the table is no wider than `width` points.
-fn form(table: &PaperTable, width: f64) -> Form {
-    let columns = table.heads.len();
+fn form(table: &Table, width: f64) -> Form {
+    let columns = table.columns.len();
     let room = |ends: Ends, part: &Range<usize>| {
         let numbers: f64 = part
             .clone()
@@ -169,7 +155,7 @@ fn form(table: &PaperTable, width: f64) -> Form {
         (Ends::Tenths, names.min(AMPLE_NAME)),
         (Ends::Whole, names.min(LEAST_NAME)),
     ] {
-        let all = 0..columns;
+        let all = 1..columns;
         let room = room(ends, &all);
         if room >= least {
             return Form {
@@ -180,9 +166,9 @@ fn form(table: &PaperTable, width: f64) -> Form {
         }
     }
     let least = names.min(LEAST_NAME);
-    for number in 2..=columns.max(2) {
-        let each = columns.div_ceil(number).max(1);
-        let starts = (0..columns).step_by(each);
+    for number in 2..columns.max(3) {
+        let each = (columns - 1).div_ceil(number).max(1);
+        let starts = (1..columns).step_by(each);
         let parts: Vec<Range<usize>> = starts
             .map(|start| start..(start + each).min(columns))
             .collect();
@@ -199,7 +185,7 @@ fn form(table: &PaperTable, width: f64) -> Form {
     Form {
         ends: Ends::Whole,
         names: least,
-        parts: std::iter::once(0..columns).collect(),
+        parts: std::iter::once(1..columns).collect(),
     }
 }
 
@@ -230,8 +216,8 @@ fn name_lines(name: &str, room: f64) -> Vec<String> {
         .collect()
 }
 
-fn name_text(row: &PaperRow, room: f64) -> String {
-    let lines = name_lines(&row.name, room);
+fn name_text(row: &TableRow, room: f64) -> String {
+    let lines = name_lines(&name(row), room);
     let lines = lines.iter().map(|line| {
         let line = text(line);
         if row.is_best {
@@ -254,28 +240,24 @@ fn text(plain: &str) -> String {
         .replace('↓', "$\\downarrow$")
 }
 
-fn cell_text(cell: &PaperCell, form: Ends) -> String {
-    let number = text(value(cell));
-    let (number, ends) = match (cell, ends(cell, form)) {
-        (PaperCell::Interval { mark, .. }, Some(ends)) => {
-            let number = match mark {
-                PaperMark::None => number,
-                PaperMark::Below => format!("{number}$\\downarrow$"),
-                PaperMark::Shown => format!("\\textbf{{{number}}}"),
-            };
-            (number, ends)
-        }
-        _ => return number,
+fn cell_text(cell: &TableCell, form: Ends) -> String {
+    let number = text(&value(cell));
+    let Some(ends) = ends(cell, form) else {
+        return number;
     };
-    let ends = text(&ends);
-    format!("\\dqci{{{number}}}{{{ends}}}")
+    let number = match cell {
+        TableCell::Below(_) => format!("{number}$\\downarrow$"),
+        TableCell::Effect(_, result) if result.is_shown() => format!("\\textbf{{{number}}}"),
+        _ => number,
+    };
+    format!("\\dqci{{{number}}}{{{}}}", text(&ends))
 }
 
-/// The rows of a part with rules between blocks; `between` is written after the heads.
-fn body(table: &PaperTable, form: &Form, part: &Range<usize>, after_heads: &str) -> String {
+/// The rows of a part with rules between their groups; `after_heads` is written after the heads.
+fn body(table: &Table, form: &Form, part: &Range<usize>, after_heads: &str) -> String {
     let mut body = String::from("    \\toprule\n   ");
-    for head in &table.heads[part.clone()] {
-        let lines: Vec<String> = head_lines(head).into_iter().map(text).collect();
+    for column in &table.columns[part.clone()] {
+        let lines: Vec<String> = head_lines(head(column)).into_iter().map(text).collect();
         match &*lines {
             [single] => {
                 let _ = write!(body, " & {single}");
@@ -287,12 +269,12 @@ fn body(table: &PaperTable, form: &Form, part: &Range<usize>, after_heads: &str)
     }
     body += " \\\\\n";
     body += after_heads;
-    for (heading, rows) in &table.blocks {
-        if rows.is_empty() {
-            continue;
+    let rows = table.headed_rows_in(TableFormat::Latex);
+    for (index, (heading, row)) in rows.enumerate() {
+        if index == 0 || heading.is_some() {
+            body += "    \\midrule\n";
         }
-        body += "    \\midrule\n";
-        if !heading.is_empty() {
+        if let Some(heading) = heading.filter(|heading| !heading.is_empty()) {
             let _ = writeln!(
                 body,
                 "    \\multicolumn{{{}}}{{@{{}}l@{{}}}}{{\\textit{{{}}}}} \\\\",
@@ -300,17 +282,15 @@ fn body(table: &PaperTable, form: &Form, part: &Range<usize>, after_heads: &str)
                 text(heading)
             );
         }
-        for row in rows {
-            let cells = row.cells[part.clone()].iter();
-            let cells: Vec<String> = cells.map(|cell| cell_text(cell, form.ends)).collect();
-            let name = name_text(row, form.names);
-            let _ = writeln!(body, "    {name} & {} \\\\", cells.join(" & "));
-        }
+        let cells = row.cells[part.clone()].iter();
+        let cells: Vec<String> = cells.map(|cell| cell_text(cell, form.ends)).collect();
+        let name = name_text(row, form.names);
+        let _ = writeln!(body, "    {name} & {} \\\\", cells.join(" & "));
     }
     body + "    \\bottomrule\n"
 }
 
-fn floating(table: &PaperTable, float: &str, width: f64) -> String {
+fn floating(table: &Table, float: &str, width: f64) -> String {
     let form = form(table, width);
     let mut all = format!(
         "\n\\begin{{{float}}}\n  \\centering\n  \\caption{{{}}}\n  \\fontsize{{8}}{{9.5}}\\selectfont\\setlength{{\\tabcolsep}}{{{TABCOLSEP}pt}}\n",
@@ -330,7 +310,7 @@ fn floating(table: &PaperTable, float: &str, width: f64) -> String {
     all + &format!("\\end{{{float}}}\n")
 }
 
-fn breaking(table: &PaperTable, width: f64) -> String {
+fn breaking(table: &Table, width: f64) -> String {
     let form = form(table, width);
     let mut all =
         String::from("\n{\\fontsize{8}{9.5}\\selectfont\\setlength{\\tabcolsep}{2.6pt}\n");
@@ -350,42 +330,50 @@ fn breaking(table: &PaperTable, width: f64) -> String {
 mod tests {
     use super::*;
     use crate::report::paper::Palette;
+    use crate::report::table::ColumnHeads;
     use crate::score::estimate::Estimate;
 
-    fn table(names: &[&str], columns: usize) -> PaperTable {
-        let cell = |mark| PaperCell::Interval {
-            value: "100.0".to_owned(),
-            ends: Estimate {
-                value: 1.0,
-                low: 0.788,
-                high: 1.0,
-                n: 40,
+    fn table(names: &[&str], columns: usize) -> Table {
+        let cell = TableCell::Below(Estimate {
+            value: 1.0,
+            low: 0.788,
+            high: 1.0,
+            n: 40,
+        });
+        let column = |head: String| Column {
+            kind: ColumnKind::Accuracy,
+            heads: ColumnHeads {
+                page: Some(head),
+                ..ColumnHeads::default()
             },
-            mark,
         };
-        PaperTable {
+        let heads = (0..columns).map(|level| format!("L{level}"));
+        let rows = names.iter().map(|name| TableRow {
+            cells: std::iter::once(TableCell::from(*name))
+                .chain(vec![cell.clone(); columns])
+                .collect(),
+            group: Some("raw".to_owned()),
+            is_best: *name == names[0],
+            ..TableRow::default()
+        });
+        Table {
             caption: "50 % of a_b & c".to_owned(),
-            heads: (0..columns).map(|level| format!("L{level}")).collect(),
-            blocks: vec![(
-                "raw".to_owned(),
-                names
-                    .iter()
-                    .map(|name| PaperRow {
-                        name: (*name).to_owned(),
-                        is_best: *name == names[0],
-                        cells: vec![cell(PaperMark::Below); columns],
-                    })
-                    .collect(),
-            )],
+            columns: std::iter::once(String::new())
+                .chain(heads)
+                .map(column)
+                .collect(),
+            rows: rows.collect(),
+            ..Table::default()
         }
     }
 
     /// The width of a part in a form, by the widths of the letters.
-    fn width(table: &PaperTable, form: &Form, part: &Range<usize>) -> f64 {
+    fn width(table: &Table, form: &Form, part: &Range<usize>) -> f64 {
         let font = Font::bundled();
         let names = table
-            .rows()
-            .flat_map(|row| name_lines(&row.name, form.names));
+            .rows
+            .iter()
+            .flat_map(|row| name_lines(&name(row), form.names));
         let names = names
             .map(|line| font.width(&line, LETTERS))
             .fold(0.0, f64::max);

@@ -154,6 +154,7 @@ fn add_always(table: &mut Table, ladder: &Ladder<'_, AccuracyCell>) {
             cells: names.into_iter().chain(shares).collect(),
             group: table.rows[index].group.clone(),
             hidden_in: vec![TableFormat::Page, TableFormat::Latex],
+            ..TableRow::default()
         };
         table.rows.insert(index + 1, row);
     }

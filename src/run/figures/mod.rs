@@ -12,12 +12,12 @@ use crate::files;
 use crate::picture::{pixels_of_url, png};
 use crate::report::chart::drawn::Drawn;
 use crate::report::figures::{
-    Drawing, FIGURES, KnownNames, Names, PaperTable, drawings, overview, paper_tables,
-    without_threshold,
+    Drawing, FIGURES, KnownNames, Names, drawings, overview, paper_tables, without_threshold,
 };
 use crate::report::paper::{
     Look, OverviewSheet, Palette, Sheet, overview_sheet, pdf, sheet, svg, tables, tex,
 };
+use crate::report::table::Table;
 use crate::run_reports::FigureRuns;
 use crate::runs::Outcome;
 use crate::types::Decides;
@@ -251,7 +251,7 @@ impl Files {
         Ok(())
     }
 
-    fn add_tables(&mut self, all: &[PaperTable], args: &FiguresArgs, look: &Look) {
+    fn add_tables(&mut self, all: &[Table], args: &FiguresArgs, look: &Look) {
         if !args.format.contains(&FigureFormat::Tex) {
             // Nobody who draws figures alone waits for tables.
             if !args.only.is_empty() {
