@@ -3,8 +3,10 @@
 //! Lines differ by colour, and also by dash and marker, so that they can be distinguished without colour.
 
 pub(crate) mod bars;
+pub(crate) mod counts;
 pub(crate) mod data;
 pub(crate) mod drawn;
+pub(crate) mod points;
 pub(crate) mod reliability;
 pub(crate) mod thresholds;
 

@@ -9,7 +9,6 @@ pub(crate) mod doctor;
 pub(crate) mod figures;
 pub(crate) mod forecast;
 mod frame_count;
-pub(crate) mod histogram;
 pub(crate) mod json;
 mod ladder;
 mod latex;

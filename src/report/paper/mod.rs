@@ -5,6 +5,7 @@
 
 mod axes;
 mod bars;
+mod counts;
 mod figure;
 mod font;
 mod legend;
@@ -13,7 +14,9 @@ mod look;
 mod overview;
 mod pdf;
 mod pdf_font;
+mod points;
 mod reliability;
+mod rows;
 mod samples;
 mod sheet;
 mod svg;
@@ -22,7 +25,7 @@ mod tex;
 mod thresholds;
 mod title;
 
-pub(crate) use figure::figure;
+pub(crate) use figure::{count_figure, figure, point_figure};
 pub(crate) use look::{Look, Palette};
 pub(crate) use overview::{OverviewSheet, overview_sheet};
 pub(crate) use pdf::pdf;

@@ -2,6 +2,7 @@
 
 use super::lines::lines;
 use super::look::Look;
+use super::rows::{column, in_rows};
 use super::samples::{Pixels, samples};
 use super::sheet::Sheet;
 use crate::error::Result;
@@ -9,8 +10,6 @@ use crate::report::chart::Chart;
 use crate::report::figures::OverviewPanels;
 use crate::types::Thumbnail;
 
-/// Room between two panels, in heights of letters.
-const GAP: f64 = 2.0;
 /// Panels in a row.
 const COLUMNS: usize = 2;
 
@@ -36,8 +35,7 @@ pub(crate) fn overview_sheet(
     look: &Look,
     pixels: Pixels,
 ) -> Result<OverviewSheet> {
-    let width = (look.width - GAP * look.letters) / COLUMNS as f64;
-    let half = Look { width, ..*look };
+    let half = column(COLUMNS, look);
     let mut parts: Vec<(Sheet, String)> = Vec::new();
     let (mut left_out, mut charts) = (Vec::new(), Vec::new());
     for (name, chart) in &panels.charts {
@@ -63,7 +61,7 @@ pub(crate) fn overview_sheet(
         .collect();
     Ok(OverviewSheet {
         caption: format!("{} ({}.)", captions.join(" "), panels.note),
-        sheet: together(parts.into_iter().map(|(sheet, _)| sheet).collect(), look),
+        sheet: in_rows(parts.into_iter().map(|(sheet, _)| sheet), COLUMNS, look),
         left_out,
         charts,
     })
@@ -71,27 +69,4 @@ pub(crate) fn overview_sheet(
 
 fn letter(place: usize) -> char {
     ('a'..='z').nth(place).unwrap_or('z')
-}
-
-/// Sheets in rows.
-fn together(parts: Vec<Sheet>, look: &Look) -> Sheet {
-    let gap = GAP * look.letters;
-    let step = (look.width + gap) / COLUMNS as f64;
-    let mut sheet = Sheet::default();
-    let (mut top, mut height, mut parts) = (0.0, 0.0_f64, parts.into_iter());
-    loop {
-        let row: Vec<Sheet> = parts.by_ref().take(COLUMNS).collect();
-        if row.is_empty() {
-            break;
-        }
-        top += if top > 0.0 { gap / 2.0 } else { 0.0 };
-        let tallest = row.iter().map(|part| part.size[1]).fold(0.0, f64::max);
-        for (column, part) in row.into_iter().enumerate() {
-            sheet.place(part, [step * column as f64, top]);
-        }
-        top += tallest;
-        height = height.max(top);
-    }
-    sheet.size = [look.width, height];
-    sheet
 }

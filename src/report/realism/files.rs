@@ -1,8 +1,10 @@
 //! The files of a comparison: CSV tables, the figure of the residuals, and crops.
 
 use crate::error::Result;
+use crate::report::chart::LineStyle;
+use crate::report::chart::points::{PointPanel, PointSeries};
 use crate::report::csv::csv;
-use crate::report::histogram::{HistogramLine, histogram};
+use crate::report::paper::point_figure;
 use crate::report::sheet::{self, CropRow};
 use crate::report::table::ColumnKind::{Count, Number, Text};
 use crate::report::table::TableBuilder;
@@ -94,17 +96,46 @@ pub(crate) fn by_code(residuals: &PooledResiduals) -> Result<Vec<u8>> {
     csv(&[table])
 }
 
-/// Figure of the histograms of real and synthetic residuals.
+/// Figure of the shares of real and synthetic residuals by their size in 8-bit codes.
 pub(crate) fn figure(residuals: &PooledResiduals) -> Result<String> {
-    let line = |name: String, residuals: &Residuals| HistogramLine {
+    let real = histogram("real".to_owned(), LineStyle::BLACK, residuals.real.shares());
+    let noise = residuals.noise.iter().enumerate();
+    let noise = noise.map(|(style, (method, noise))| {
+        let name = format!("synthetic, {method}");
+        histogram(name, LineStyle(style), noise.shares())
+    });
+    point_figure(&[PointPanel {
+        title: "Residuals over the dropped clean image, all pairs".to_owned(),
+        axes: ["residual in 8-bit codes", "log10 of the share of samples"],
+        series: std::iter::once(real).chain(noise).collect(),
+    }])
+}
+
+/// Smallest share that is drawn.
+const MIN_SHARE: f64 = 1e-7;
+
+/// A line over the sizes of residuals, with a gap where a size does not occur. A size between two that do not occur is a point.
+fn histogram(
+    name: String,
+    style: LineStyle,
+    shares: impl Iterator<Item = (i32, f64)>,
+) -> PointSeries {
+    let shares: Vec<(i32, f64)> = shares.collect();
+    let (points, lines): (Vec<_>, Vec<_>) = shares
+        .split(|(_, share)| *share <= MIN_SHARE)
+        .filter(|run| !run.is_empty())
+        .map(|run| {
+            let places = run.iter();
+            let places = places.map(|(size, share)| [f64::from(*size), libm::log10(*share)]);
+            places.collect::<Vec<_>>()
+        })
+        .partition(|run| run.len() == 1);
+    PointSeries {
         name,
-        shares: residuals.shares().collect(),
-    };
-    let noise = residuals.noise.iter();
-    let noise = noise.map(|(method, noise)| line(format!("synthetic, {method}"), noise));
-    let real = line("real".to_owned(), &residuals.real);
-    let lines: Vec<HistogramLine> = std::iter::once(real).chain(noise).collect();
-    histogram("Residuals over the dropped clean image, all pairs", &lines)
+        style,
+        points: points.concat(),
+        lines,
+    }
 }
 
 /// Crops of pairs, brightened by the exposure drop of each pair: the real image, that of exposure drop alone, and those with noise.
@@ -129,4 +160,27 @@ pub(crate) fn crops<'a>(pairs: impl Iterator<Item = (&'a PairComparison, &'a [Rg
     let columns: Vec<String> = columns.into_iter().chain(noise).collect();
     let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
     sheet::crops(&columns, &rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn histogram_has_gaps_where_nothing_occurs() {
+        let shares = [
+            (-1, 0.1),
+            (0, 0.8),
+            (1, 0.1),
+            (2, 0.0),
+            (3, 0.01),
+            (4, 1e-8),
+        ];
+        let series = histogram("real".to_owned(), LineStyle::BLACK, shares.into_iter());
+        assert_eq!(series.points, [[3.0, -2.0]]);
+        assert_eq!(
+            series.lines,
+            [[[-1.0, -1.0], [0.0, libm::log10(0.8)], [1.0, -1.0]]]
+        );
+    }
 }
