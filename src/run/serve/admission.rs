@@ -1,10 +1,11 @@
 //! The requests that are answered: those of programs on this machine, and of no page of another site: [`admit`].
 
+use std::future::poll_fn;
+use std::pin::Pin;
 use std::time::Duration;
 
-use axum::body::{Body, Bytes, HttpBody as _};
-use axum::extract::Request;
-use axum::http::{HeaderMap, Method, StatusCode, Uri, header};
+use hyper::body::{Body as _, Incoming};
+use hyper::{HeaderMap, Method, Request, StatusCode, Uri, header};
 
 use super::completion::RequestFault;
 
@@ -22,7 +23,7 @@ const LOOPBACK: [&str; 3] = ["127.0.0.1", "localhost", "[::1]"];
 ///
 /// # Errors
 /// 421 for another host, 403 for a page of another site, 415 for a body that is not JSON.
-pub(super) fn admit(request: &Request, port: u16) -> Result<(), RequestFault> {
+pub(super) fn admit(request: &Request<Incoming>, port: u16) -> Result<(), RequestFault> {
     let headers = request.headers();
     let host = request
         .uri()
@@ -55,7 +56,7 @@ pub(super) fn admit(request: &Request, port: u16) -> Result<(), RequestFault> {
 ///
 /// # Errors
 /// If it is too large, does not arrive in time, or breaks off.
-pub(super) async fn body(body: Body) -> Result<Bytes, RequestFault> {
+pub(super) async fn body(body: Incoming) -> Result<Vec<u8>, RequestFault> {
     let too_large = || {
         let message = format!(
             "the body is incomplete, or has more than {} MiB",
@@ -67,12 +68,26 @@ pub(super) async fn body(body: Body) -> Result<Bytes, RequestFault> {
     if body.size_hint().lower() > LARGEST as u64 {
         return Err(too_large());
     }
-    let read = tokio::time::timeout(BODY_TIME, axum::body::to_bytes(body, LARGEST)).await;
+    let read = tokio::time::timeout(BODY_TIME, whole(body)).await;
     let read = read.map_err(|_| {
         let message = format!("the body did not arrive within {} s", BODY_TIME.as_secs());
         RequestFault::new(StatusCode::REQUEST_TIMEOUT, message)
     })?;
-    read.map_err(|_| too_large())
+    read.ok_or_else(too_large)
+}
+
+/// All bytes of a body; `None` if it is too large or breaks off.
+async fn whole(mut body: Incoming) -> Option<Vec<u8>> {
+    let mut bytes = Vec::new();
+    while let Some(frame) = poll_fn(|context| Pin::new(&mut body).poll_frame(context)).await {
+        // A frame without data is of trailers, which are ignored.
+        let data = frame.ok()?.into_data().unwrap_or_default();
+        if bytes.len() + data.len() > LARGEST {
+            return None;
+        }
+        bytes.extend_from_slice(&data);
+    }
+    Some(bytes)
 }
 
 fn text(headers: &HeaderMap, name: header::HeaderName) -> Option<String> {

@@ -1,10 +1,21 @@
 //! The response, a [`Completion`] or a [`RequestFault`], in OpenAI's format.
 
-use axum::Json;
-use axum::http::{StatusCode, header};
-use axum::response::{IntoResponse, Response};
+use hyper::header::{CONTENT_TYPE, HeaderValue};
+use hyper::{Response, StatusCode};
 use jiff::Timestamp;
 use serde_json::{Value, json};
+
+/// The content type of a response that is one JSON value.
+const JSON: &str = "application/json";
+
+/// A response with a body of a content type.
+fn response(status: StatusCode, kind: &'static str, body: String) -> Response<String> {
+    let mut response = Response::new(body);
+    *response.status_mut() = status;
+    let kind = HeaderValue::from_static(kind);
+    response.headers_mut().insert(CONTENT_TYPE, kind);
+    response
+}
 
 /// The form of a response: one JSON body or a stream of events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,15 +65,13 @@ impl Completion {
     }
 }
 
-impl IntoResponse for Completion {
-    fn into_response(self) -> Response {
-        match self.form {
-            ReplyForm::Whole => Json(self.whole()).into_response(),
-            ReplyForm::Stream => {
-                let kind = [(header::CONTENT_TYPE, "text/event-stream")];
-                (kind, self.events()).into_response()
-            }
-        }
+impl From<Completion> for Response<String> {
+    fn from(completion: Completion) -> Self {
+        let (kind, body) = match completion.form {
+            ReplyForm::Whole => (JSON, completion.whole().to_string()),
+            ReplyForm::Stream => ("text/event-stream", completion.events()),
+        };
+        response(StatusCode::OK, kind, body)
     }
 }
 
@@ -95,28 +104,28 @@ impl RequestFault {
     }
 }
 
-impl IntoResponse for RequestFault {
-    fn into_response(self) -> Response {
-        let kind = if self.status.is_server_error() {
+impl From<RequestFault> for Response<String> {
+    fn from(fault: RequestFault) -> Self {
+        let kind = if fault.status.is_server_error() {
             "server_error"
         } else {
             "invalid_request_error"
         };
         let error = json!({
-            "message": self.message,
+            "message": fault.message,
             "type": kind,
-            "param": self.parameter,
-            "code": self.code,
+            "param": fault.parameter,
+            "code": fault.code,
         });
-        (self.status, Json(json!({ "error": error }))).into_response()
+        response(fault.status, JSON, json!({ "error": error }).to_string())
     }
 }
 
 /// The response with the list of models.
-pub(super) fn models<'a>(names: impl Iterator<Item = &'a str>) -> Response {
+pub(super) fn models<'a>(names: impl Iterator<Item = &'a str>) -> Response<String> {
     let models = names.map(
         |name| json!({"id": name, "object": "model", "created": 0, "owned_by": "darkqa-eval"}),
     );
     let list = json!({"object": "list", "data": models.collect::<Vec<_>>()});
-    Json(list).into_response()
+    response(StatusCode::OK, JSON, list.to_string())
 }

@@ -1,14 +1,15 @@
 //! The connections of the server, with bounds on their number and on how long a client may take: [`answer_until`].
 
+use std::convert::Infallible;
 use std::future::Future;
 use std::sync::Arc;
 use std::time::Duration;
 
-use axum::Router;
+use hyper::body::Incoming;
 use hyper::server::conn::http1;
+use hyper::service::HttpService;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;
-use hyper_util::service::TowerToHyperService;
 use tokio::net::TcpListener;
 use tokio::sync::Semaphore;
 
@@ -22,11 +23,16 @@ const LAST_TIME: Duration = Duration::from_secs(10);
 const PAUSE: Duration = Duration::from_millis(100);
 
 /// Answers requests until `end`, and then those that have begun.
-pub(super) async fn answer_until(
+pub(super) async fn answer_until<S>(
     listener: TcpListener,
-    app: Router,
+    service: S,
     end: impl Future<Output = ()>,
-) {
+) where
+    S: HttpService<Incoming, ResBody = String, Error = Infallible, Future: Send>
+        + Clone
+        + Send
+        + 'static,
+{
     let free = Arc::new(Semaphore::new(CONNECTIONS));
     let open = GracefulShutdown::new();
     let mut end = std::pin::pin!(end);
@@ -46,7 +52,7 @@ pub(super) async fn answer_until(
         let connection = http1::Builder::new()
             .timer(TokioTimer::new())
             .header_read_timeout(HEADER_TIME)
-            .serve_connection(TokioIo::new(stream), TowerToHyperService::new(app.clone()));
+            .serve_connection(TokioIo::new(stream), service.clone());
         let connection = open.watch(connection);
         tokio::spawn(async move {
             // A client that breaks off or sends no HTTP has itself alone to tell.

@@ -12,19 +12,17 @@ mod puzzle;
 mod recognise;
 mod request;
 
+use std::convert::Infallible;
 use std::io::Write as _;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::sync::atomic::Ordering::Relaxed;
 
-use axum::Router;
-use axum::extract::{Request, State};
-use axum::http::StatusCode;
-use axum::middleware::{self, Next};
-use axum::response::{IntoResponse as _, Response};
-use axum::routing::{get, post};
 use clap::Args;
+use hyper::body::Incoming;
+use hyper::service::service_fn;
+use hyper::{Method, Request, Response, StatusCode};
 use tokio::runtime;
 use tokio::sync::Semaphore;
 
@@ -47,6 +45,10 @@ use request::ServedQuestion;
 
 /// The requests that are answered at once; further ones wait. Chosen.
 const AT_ONCE: usize = 16;
+
+/// The paths of the server.
+const MODELS: &str = "/v1/models";
+const COMPLETIONS: &str = "/v1/chat/completions";
 
 /// The flags of `serve`.
 #[derive(Debug, Args)]
@@ -134,42 +136,41 @@ async fn listen(listener: TcpListener, state: Arc<ServerState>, progress: &Progr
     let mut out = std::io::stdout().lock();
     let _ = writeln!(out, "http://{address}/v1").and_then(|()| out.flush());
     drop(out);
-    let app = Router::new()
-        .route("/v1/models", get(models))
-        .route("/v1/chat/completions", post(complete))
-        .fallback(not_found)
-        .layer(middleware::from_fn(move |request, next| {
-            admitted(request, next, address.port())
-        }))
-        .with_state(state);
+    let port = address.port();
+    let service = service_fn(move |request| {
+        let state = Arc::clone(&state);
+        async move {
+            let answer = respond(&state, request, port).await;
+            Ok::<_, Infallible>(answer.unwrap_or_else(Into::into))
+        }
+    });
     let mut interrupt = Interrupt::listen()?;
-    connections::answer_until(listener, app, interrupt.next()).await;
+    connections::answer_until(listener, service, interrupt.next()).await;
     Ok(())
 }
 
 /// Answers a request if it may be answered.
-async fn admitted(request: Request, next: Next, port: u16) -> Response {
-    match admit(&request, port) {
-        Ok(()) => next.run(request).await,
-        Err(fault) => fault.into_response(),
-    }
-}
-
-async fn not_found() -> Response {
-    let message = "no such path; use GET /v1/models or POST /v1/chat/completions";
-    RequestFault::new(StatusCode::NOT_FOUND, message).into_response()
-}
-
-async fn models(State(state): State<Arc<ServerState>>) -> Response {
-    completion::models(state.names())
-}
-
-async fn complete(State(state): State<Arc<ServerState>>, request: Request) -> Response {
-    let _place = state.places.acquire().await;
-    let answer = async { state.answer(&body(request.into_body()).await?).await };
-    match answer.await {
-        Ok(completion) => completion.into_response(),
-        Err(fault) => fault.into_response(),
+async fn respond(
+    state: &ServerState,
+    request: Request<Incoming>,
+    port: u16,
+) -> Result<Response<String>, RequestFault> {
+    admit(&request, port)?;
+    match (request.method(), request.uri().path()) {
+        (&Method::GET | &Method::HEAD, MODELS) => Ok(completion::models(state.names())),
+        (&Method::POST, COMPLETIONS) => {
+            let _place = state.places.acquire().await;
+            let body = body(request.into_body()).await?;
+            Ok(state.answer(&body).await?.into())
+        }
+        (_, path) => {
+            let status = match path {
+                MODELS | COMPLETIONS => StatusCode::METHOD_NOT_ALLOWED,
+                _ => StatusCode::NOT_FOUND,
+            };
+            let message = format!("no such path; use GET {MODELS} or POST {COMPLETIONS}");
+            Err(RequestFault::new(status, message))
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use axum::http::StatusCode;
+use hyper::StatusCode;
 use regex::Regex;
 
 use super::completion::RequestFault;

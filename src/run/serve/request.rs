@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use axum::http::StatusCode;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+use hyper::StatusCode;
 use serde::Deserialize;
 
 use super::completion::{ReplyForm, RequestFault};

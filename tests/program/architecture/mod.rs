@@ -45,7 +45,7 @@ const MEMBERS: [&str; 7] = [
 const LIBRARIES: [(&str, &[&str]); 12] = [
     ("anstream", &["cli"]),
     ("anstyle", &["report"]),
-    ("axum", &["run/serve"]),
+    ("hyper", &["ask", "run/serve"]),
     ("saphyr_parser", &["dataset/ready_made/container"]),
     ("noto_sans_mono_bitmap", &["report/sheet"]),
     ("comfy_table", &["report"]),
