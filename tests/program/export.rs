@@ -2,9 +2,10 @@
 
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 
+use crate::support::run::{Called, PROGRAM, called};
 use crate::support::table::check_rows;
-use assert_cmd::Command;
 use darkqa_eval::internals::dataset::{DataPlace, Dataset, SetArgs};
 use darkqa_eval::internals::synthesis::expose;
 use darkqa_eval::types::{Question, Rgb, Severity};
@@ -27,15 +28,15 @@ fn data() -> TempDir {
     folder
 }
 
-fn run(data: &Path, kind: &str, out: &Path, flags: &[&str]) -> assert_cmd::assert::Assert {
-    let mut command = Command::cargo_bin("darkqa-eval").unwrap();
-    command
-        .args(["export", kind])
-        .arg(data)
-        .arg("--out")
-        .arg(out)
-        .args(flags)
-        .assert()
+fn run(data: &Path, kind: &str, out: &Path, flags: &[&str]) -> Called {
+    called(
+        Command::new(PROGRAM)
+            .args(["export", kind])
+            .arg(data)
+            .arg("--out")
+            .arg(out)
+            .args(flags),
+    )
 }
 
 /// The content of questions, in the order of their words.
@@ -88,7 +89,7 @@ fn every_form_is_read_back() {
             out.path(),
             &["--levels", "L0,L2", "--variant", "ev"],
         )
-        .success();
+        .ended(0);
         for (condition, degraded) in [("L0", false), ("L2-ev", true)] {
             let path = out.path().join(file.replace("CONDITION", condition));
             let set =
@@ -110,7 +111,7 @@ fn every_form_is_read_back() {
 #[test]
 fn a_table_holds_each_image_once() {
     let (data, out) = (data(), tempfile::tempdir().unwrap());
-    run(data.path(), "vlmevalkit", out.path(), &["--levels", "L0"]).success();
+    run(data.path(), "vlmevalkit", out.path(), &["--levels", "L0"]).ended(0);
     let table = fs::read_dir(out.path())
         .unwrap()
         .next()
@@ -148,17 +149,16 @@ fn the_noise_is_that_of_an_evaluation() {
         out.path(),
         &["--levels", "L3", "--variant", "noise", "--seed", "5"],
     )
-    .success();
-    let mut command = Command::cargo_bin("darkqa-eval").unwrap();
-    command
-        .arg("synthesize")
-        .arg(data.path())
-        .arg("--out")
-        .arg(dark.path());
-    command
-        .args(["--levels", "L3", "--variant", "noise", "--seed", "5"])
-        .assert()
-        .success();
+    .ended(0);
+    called(
+        Command::new(PROGRAM)
+            .arg("synthesize")
+            .arg(data.path())
+            .arg("--out")
+            .arg(dark.path())
+            .args(["--levels", "L3", "--variant", "noise", "--seed", "5"]),
+    )
+    .ended(0);
     let open = |path: std::path::PathBuf| image::open(path).unwrap().into_rgb8();
     for name in ["a", "b"] {
         let exported = open(out.path().join(format!("L3-noise/images/{name}.png")));
@@ -174,9 +174,10 @@ fn the_noise_is_that_of_an_evaluation() {
 fn nothing_is_written_over_unasked() {
     let (data, out) = (data(), tempfile::tempdir().unwrap());
     let flags = ["--levels", "L0"];
-    run(data.path(), "llava", out.path(), &flags).success();
-    let assert = run(data.path(), "llava", out.path(), &flags).code(2);
-    let message = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
+    run(data.path(), "llava", out.path(), &flags).ended(0);
+    let message = run(data.path(), "llava", out.path(), &flags)
+        .ended(2)
+        .stderr;
     assert!(
         message.contains("questions.jsonl: the set exists already; --force"),
         "{message}"
@@ -187,9 +188,10 @@ fn nothing_is_written_over_unasked() {
         out.path(),
         &["--levels", "L0", "--force"],
     )
-    .success();
-    let assert = run(data.path(), "parquet", out.path(), &flags).code(2);
-    let message = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
+    .ended(0);
+    let message = run(data.path(), "parquet", out.path(), &flags)
+        .ended(2)
+        .stderr;
     assert!(
         message.contains(
             "invalid value 'parquet' for '<KIND>' [possible values: vlmevalkit, imagefolder, llava"

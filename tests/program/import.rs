@@ -2,9 +2,10 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
+use crate::support::run::{Called, PROGRAM, called};
 use crate::support::table::check_rows;
-use assert_cmd::Command;
 use darkqa_eval::internals::dataset::Dataset;
 use darkqa_eval::types::{DepthKind, Frame, FrameId};
 use image::{GrayImage, ImageBuffer, Luma, Rgb, RgbImage, Rgba, RgbaImage};
@@ -77,25 +78,29 @@ impl Scene {
         self.0.path().join("out")
     }
 
-    fn run(&self, kind: &str, flags: &[&str]) -> assert_cmd::assert::Assert {
-        let mut command = Command::cargo_bin("darkqa-eval").unwrap();
-        command
-            .env_clear()
-            .args(["import", kind, "--src"])
-            .arg(self.0.path().join("src"));
-        command.arg("--out").arg(self.out()).args(flags).assert()
+    fn run(&self, kind: &str, flags: &[&str]) -> Called {
+        called(
+            Command::new(PROGRAM)
+                .env_clear()
+                .args(["import", kind, "--src"])
+                .arg(self.0.path().join("src"))
+                .arg("--out")
+                .arg(self.out())
+                .args(flags),
+        )
     }
 
     /// Imports, and reads what came of it.
     fn import(&self, kind: &str, flags: &[&str]) -> Dataset {
-        self.run(kind, flags).success();
+        self.run(kind, flags).ended(0);
         Dataset::of_frames(&self.out(), &[]).unwrap()
     }
 
     /// Imports in vain, and returns what is said.
     fn refused(&self, kind: &str, flags: &[&str]) -> String {
-        let assert = self.run(kind, flags).failure();
-        String::from_utf8(assert.get_output().stderr.clone()).unwrap()
+        let called = self.run(kind, flags);
+        assert_ne!(called.code, Some(0), "{called:?}");
+        called.stderr
     }
 
     fn line(&self, i: usize) -> Value {
@@ -155,8 +160,7 @@ fn habitat() -> Scene {
 #[test]
 fn habitat_renders_of_hm3d() {
     let scene = habitat();
-    let out = scene.run("habitat", &["--every", "2"]).success();
-    let message = String::from_utf8(out.get_output().stdout.clone()).unwrap();
+    let message = scene.run("habitat", &["--every", "2"]).ended(0).stdout;
     assert!(
         message.contains("2 frames of 1 scene") && message.contains("\"bed, made\" 1"),
         "{message}"
@@ -241,8 +245,7 @@ fn what_is_wrong_with_renders_is_said() {
     scene.shallow("00800-x/semantic/001.png", 3, 3);
     fs::remove_file(scene.at("00800-x/semantic/001.npy")).unwrap();
     // 8 bits hold no numbers of instances; the other frames are taken.
-    let assert = scene.run("habitat", &[]).code(1);
-    let message = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
+    let message = scene.run("habitat", &[]).ended(1).stderr;
     assert!(
         message.contains("001.png: a grey PNG of 8 bits; 16-bit grey expected"),
         "{message}"
@@ -259,7 +262,7 @@ fn what_is_wrong_with_renders_is_said() {
             .refused("habitat", &[])
             .contains("the folder has frames already; --force")
     );
-    scene.run("habitat", &["--force", "--count", "2"]).success();
+    scene.run("habitat", &["--force", "--count", "2"]).ended(0);
     assert_eq!(
         Dataset::of_frames(&scene.out(), &[])
             .unwrap()
@@ -398,8 +401,7 @@ fn frames_of_sun_rgb_d() {
     assert_eq!(sides(frame.depth.as_ref()), (2000, 8000));
     // Which of the two was read is said, by frame and in all.
     assert_eq!(scene.line(0)["depth_from"], "depth_bfx");
-    let out = scene.run("sunrgbd", &["--force"]).success();
-    let out = String::from_utf8(out.get_output().stdout.clone()).unwrap();
+    let out = scene.run("sunrgbd", &["--force"]).ended(0).stdout;
     assert!(
         out.contains("frames by the folder of their depth: depth_bfx 1\n"),
         "{out}"
@@ -485,13 +487,14 @@ fn folders_of_images_and_maps() {
     assert_eq!(sides(found.segments.as_ref()), (300, 0));
     // What was imported can be imported again, as for its key frames.
     let again = scene.0.path().join("again");
-    let mut command = Command::cargo_bin("darkqa-eval").unwrap();
-    command
-        .args(["import", "folder", "--count", "1", "--src"])
-        .arg(scene.out())
-        .arg("--out")
-        .arg(&again);
-    command.assert().success();
+    called(
+        Command::new(PROGRAM)
+            .args(["import", "folder", "--count", "1", "--src"])
+            .arg(scene.out())
+            .arg("--out")
+            .arg(&again),
+    )
+    .ended(0);
     let twice = frame(&Dataset::of_frames(&again, &[]).unwrap(), "home/a");
     assert_eq!(
         (twice.depth, twice.semantic, twice.segments),

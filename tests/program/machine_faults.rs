@@ -11,7 +11,7 @@ use std::time::{Duration, SystemTime};
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::house::{House, flags};
 use crate::support::process::{signal, wait_until};
-use crate::support::run::{Bench, Called, assert_same_products, files, records, words};
+use crate::support::run::{Bench, Called, PROGRAM, assert_same_products, files, records, words};
 use crate::support::table::check_rows;
 
 /// An experiment with all that one run of it needs.
@@ -100,12 +100,7 @@ impl Scene {
 
     /// The run as a command of a shell, after other commands.
     fn shell(&self, before: &str, out: &str) -> Output {
-        let program = assert_cmd::cargo::cargo_bin("darkqa-eval");
-        let line = format!(
-            "{before} exec {} {}",
-            program.display(),
-            self.words(out).join(" ")
-        );
+        let line = format!("{before} exec {} {}", PROGRAM, self.words(out).join(" "));
         let mut command = Command::new("sh");
         command.args(["-c", &line]).current_dir(self.bench.path(""));
         command.output().unwrap()
@@ -235,7 +230,7 @@ fn a_folder_that_cannot_be_written_to_costs_no_request() {
         let before = contents(&scene.bench.path("run"));
         // The folder of the build may be closed to other users.
         let program = scene.bench.path("darkqa-eval");
-        fs::copy(assert_cmd::cargo::cargo_bin("darkqa-eval"), &program).unwrap();
+        fs::copy(PROGRAM, &program).unwrap();
         let set_mode = |name: &str, mode: u32| {
             let permissions = fs::Permissions::from_mode(mode);
             fs::set_permissions(scene.bench.path(name), permissions).unwrap();

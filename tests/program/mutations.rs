@@ -17,7 +17,7 @@ use exr::prelude::Compression;
 use crate::support::exr_files::compressed;
 use crate::support::icc_files::{DISPLAY_P3, rgb_profile, srgb_curve};
 use crate::support::image_files::{
-    packed_chunk, png, png_with_profile, turned_png, webp_with_profile, with_chunks,
+    checksum, packed_chunk, png, png_with_profile, turned_png, webp_with_profile, with_chunks,
 };
 
 /// The system's allocator, which remembers the largest single request of each thread.
@@ -171,10 +171,10 @@ fn mend_checksums(file: &mut [u8]) {
         let Some((body, rest)) = rest.split_at_mut_checked(length) else {
             return;
         };
-        let Some((checksum, rest)) = rest.split_first_chunk_mut::<4>() else {
+        let Some((sum, rest)) = rest.split_first_chunk_mut::<4>() else {
             return;
         };
-        *checksum = crc32fast::hash(body).to_be_bytes();
+        *sum = checksum(body);
         chunks = rest;
     }
 }

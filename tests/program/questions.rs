@@ -4,9 +4,10 @@
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
+use crate::support::run::{PROGRAM, called};
 use crate::support::table::check_rows;
-use assert_cmd::Command;
 use darkqa_eval::internals::labels::space;
 use image::{GrayImage, ImageBuffer, Luma, Rgb, RgbImage};
 use serde_json::{Value, json};
@@ -113,7 +114,7 @@ impl Data {
     }
 
     fn ask(&self, out: &Path, flags: &[&str]) -> Outcome {
-        let mut command = Command::cargo_bin("darkqa-eval").unwrap();
+        let mut command = Command::new(PROGRAM);
         let out = out.join("q.jsonl");
         let command = command.arg("questions").arg(self.0.path()).arg("--out");
         let output = command.arg(&out).args(flags).output().unwrap();
@@ -424,15 +425,14 @@ fn the_page_finds_its_images_wherever_it_is() {
             beside.to_str().unwrap(),
         ],
         |page| {
-            let mut command = Command::cargo_bin("darkqa-eval").unwrap();
-            command
-                .current_dir(&root)
-                .arg("questions")
-                .arg(data.0.path());
-            command
-                .args(["--out", "elsewhere/q.jsonl", "--review", page])
-                .assert()
-                .success();
+            called(
+                Command::new(PROGRAM)
+                    .current_dir(&root)
+                    .arg("questions")
+                    .arg(data.0.path())
+                    .args(["--out", "elsewhere/q.jsonl", "--review", page]),
+            )
+            .ended(0);
             let page = root.join(page);
             let html = fs::read_to_string(&page).unwrap();
             let (_, link) = html.split_once("\"image\":\"").unwrap();
@@ -521,15 +521,15 @@ fn questions_are_evaluated_as_they_are() {
     let (data, out) = (Data::of(&[bedroom("s")]), folder());
     let outcome = data.ask(out.path(), &["--balance", "none"]);
     data.write("questions.jsonl", &outcome.questions);
-    let mut command = Command::cargo_bin("darkqa-eval").unwrap();
     let run = out.path().join("run");
-    command
-        .args(["--model", "random", "--levels", "L0,L5", "--data"])
-        .arg(data.0.path())
-        .arg("--out")
-        .arg(&run)
-        .assert()
-        .success();
+    called(
+        Command::new(PROGRAM)
+            .args(["--model", "random", "--levels", "L0,L5", "--data"])
+            .arg(data.0.path())
+            .arg("--out")
+            .arg(&run),
+    )
+    .ended(0);
     let records = walk(&run, "records.jsonl");
     let asked = outcome.lines().len();
     // At L0, and at L5 in both variants.

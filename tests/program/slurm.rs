@@ -8,7 +8,7 @@ use serde_json::json;
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::process::wait_until;
-use crate::support::run::{Bench, assert_same_products, model_args, words};
+use crate::support::run::{Bench, PROGRAM, assert_same_products, model_args, words};
 use crate::support::tools::{skip, succeeds};
 
 /// Frames of the set.
@@ -40,7 +40,7 @@ fn with_set() -> Bench {
 
 /// The script as an array of so many tasks, two at a time, that is waited for.
 fn array(bench: &Bench, tasks: usize, args: &[&str]) -> Command {
-    let program = assert_cmd::cargo::cargo_bin("darkqa-eval");
+    let program = std::path::Path::new(PROGRAM);
     let own = program.parent().map(std::path::Path::to_owned).into_iter();
     let others = std::env::var_os("PATH").unwrap_or_default();
     let search = std::env::join_paths(own.chain(std::env::split_paths(&others))).unwrap();

@@ -59,12 +59,18 @@ pub fn exif(orientation: u16) -> Vec<u8> {
     data
 }
 
+/// The checksum of the kind and the data of a PNG chunk.
+pub fn checksum(body: &[u8]) -> [u8; 4] {
+    let mut sum = flate2::Crc::new();
+    sum.update(body);
+    sum.sum().to_be_bytes()
+}
+
 /// The bytes of a PNG chunk.
 pub fn chunk(kind: [u8; 4], data: &[u8]) -> Vec<u8> {
     let body = [&kind[..], data].concat();
     let length = (data.len() as u32).to_be_bytes();
-    let checksum = crc32fast::hash(&body).to_be_bytes();
-    [&length[..], &body, &checksum].concat()
+    [&length[..], &body, &checksum(&body)].concat()
 }
 
 /// A PNG file with further chunks behind its header.

@@ -4,12 +4,12 @@ use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use super::run::Bench;
+use super::run::{Bench, PROGRAM};
 
 impl Bench {
     /// Starts the program in this folder; standard error is not shown.
     pub fn spawn(&self, args: &[&str], stdout: Stdio) -> Child {
-        Command::new(assert_cmd::cargo::cargo_bin("darkqa-eval"))
+        Command::new(PROGRAM)
             .args(args)
             .current_dir(self.path(""))
             .stdout(stdout)

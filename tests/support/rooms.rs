@@ -6,14 +6,13 @@ use std::process::Command;
 use std::sync::Mutex;
 use std::time::UNIX_EPOCH;
 
-use super::run::{Bench, files};
+use super::run::{Bench, PROGRAM, files};
 
 /// The folder with the first rooms of the default seed. It is kept beside the program, for as long as this is the same file.
 pub fn rooms(frames: usize, size: &str) -> PathBuf {
     static DRAWING: Mutex<()> = Mutex::new(());
     let _one_at_a_time = DRAWING.lock();
-    let program = assert_cmd::cargo::cargo_bin("darkqa-eval");
-    let built = fs::metadata(&program).unwrap().modified().unwrap();
+    let built = fs::metadata(PROGRAM).unwrap().modified().unwrap();
     let built = built.duration_since(UNIX_EPOCH).unwrap().as_nanos();
     let all = Path::new(env!("CARGO_TARGET_TMPDIR")).join("rooms");
     let own = all.join(built.to_string());
@@ -28,7 +27,7 @@ pub fn rooms(frames: usize, size: &str) -> PathBuf {
         let args = [
             "rooms", "--out", "rooms", "--frames", &frames, "--size", size,
         ];
-        let drawn = Command::new(program)
+        let drawn = Command::new(PROGRAM)
             .args(args)
             .current_dir(&made)
             .output()

@@ -2,13 +2,17 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::sync::LazyLock;
 
-use assert_cmd::Command;
+use boon::{Compiler, SchemaIndex, Schemas};
 use serde_json::Value;
 use tempfile::TempDir;
 
 use super::rooms::rooms;
+
+/// The path of the program.
+pub const PROGRAM: &str = env!("CARGO_BIN_EXE_darkqa-eval");
 
 /// An empty folder in which the program is called.
 pub struct Bench {
@@ -21,6 +25,14 @@ pub struct Called {
     pub code: Option<i32>,
     pub stdout: String,
     pub stderr: String,
+}
+
+impl Called {
+    /// The same call, which must have ended with this code.
+    pub fn ended(self, code: i32) -> Self {
+        assert_eq!(self.code, Some(code), "{self:?}");
+        self
+    }
 }
 
 impl Bench {
@@ -61,7 +73,7 @@ impl Bench {
 
     /// The program without any setting of the surroundings, the network's proxies aside.
     pub fn command(&self, words: &[&str]) -> Command {
-        let mut command = Command::cargo_bin("darkqa-eval").unwrap();
+        let mut command = Command::new(PROGRAM);
         for (name, _) in std::env::vars() {
             if ["OPENAI_", "DARKQA_", "RUST_LOG", "CLICOLOR", "NO_COLOR"]
                 .iter()
@@ -111,15 +123,20 @@ pub fn called(command: &mut Command) -> Called {
 }
 
 /// What every line of `records.jsonl` must be: of questions with choices, and of open ones.
-static SCHEMAS: LazyLock<[jsonschema::Validator; 2]> = LazyLock::new(|| {
-    let schemas = [
-        include_str!("../data/record.schema.json"),
-        include_str!("../data/open_record.schema.json"),
-    ];
-    schemas.map(|text| {
-        let schema = serde_json::from_str(text).unwrap();
-        jsonschema::validator_for(&schema).unwrap()
-    })
+static SCHEMAS: LazyLock<(Schemas, [SchemaIndex; 2])> = LazyLock::new(|| {
+    let (mut schemas, mut compiler) = (Schemas::new(), Compiler::new());
+    let indices = [
+        ("choice", include_str!("../data/record.schema.json")),
+        ("open", include_str!("../data/open_record.schema.json")),
+    ]
+    .map(|(name, text)| {
+        let place = format!("memory:///{name}");
+        compiler
+            .add_resource(&place, serde_json::from_str(text).unwrap())
+            .unwrap();
+        compiler.compile(&place, &mut schemas).unwrap()
+    });
+    (schemas, indices)
 });
 
 /// The records of a run, in the order of the file; each is held to the schema of its kind.
@@ -129,8 +146,9 @@ pub fn records(run: &Path) -> Vec<Value> {
     let records: Vec<Value> = lines.collect();
     for record in &records {
         let open = record.get("step").is_some();
-        if let Err(breach) = SCHEMAS[usize::from(open)].validate(record) {
-            panic!("{breach} at {}: {record}", breach.instance_path());
+        let (schemas, indices) = &*SCHEMAS;
+        if let Err(breach) = schemas.validate(record, indices[usize::from(open)]) {
+            panic!("{breach}: {record}");
         }
     }
     records

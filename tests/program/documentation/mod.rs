@@ -16,7 +16,7 @@ use std::process::{Command, Output, Stdio};
 use crate::support::batches::{Course, MockBatches};
 use crate::support::endpoint::Answer;
 use crate::support::rooms::rooms;
-use crate::support::run::Bench;
+use crate::support::run::{Bench, PROGRAM};
 use crate::support::table::check_rows;
 use clap::error::ErrorKind;
 use darkqa_eval::cli;
@@ -125,7 +125,7 @@ fn run(page: &Page, folder: &Path) -> Output {
         let is_judge = body.to_string().contains("Your mark");
         Answer::text(if is_judge { "4" } else { "A" })
     });
-    let program = assert_cmd::cargo::cargo_bin("darkqa-eval");
+    let program = Path::new(PROGRAM);
     let path = std::env::var_os("PATH").unwrap_or_default();
     let folders = program.parent().map(Path::to_owned).into_iter();
     let path = std::env::join_paths(folders.chain(std::env::split_paths(&path))).unwrap();

@@ -1,7 +1,10 @@
 //! The command `enhance`.
 
+use std::process::Command;
+
 use super::{image, map};
 use crate::support::onnx;
+use crate::support::run::PROGRAM;
 use crate::support::table::check_rows;
 
 #[test]
@@ -23,7 +26,7 @@ fn the_command_enhances_files_and_folders() {
     }
     std::fs::write(at("dark/b.png"), "no image").unwrap();
     let call = |args: &[&str]| {
-        let mut command = assert_cmd::Command::cargo_bin("darkqa-eval").unwrap();
+        let mut command = Command::new(PROGRAM);
         let output = command
             .current_dir(folder.path())
             .arg("enhance")

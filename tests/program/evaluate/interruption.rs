@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::process::{signal, wait_until};
-use crate::support::run::{Bench, model_args, records};
+use crate::support::run::{Bench, PROGRAM, model_args, records};
 
 #[test]
 fn an_interrupt_keeps_what_was_answered() {
@@ -40,7 +40,7 @@ fn an_interrupt_gives_up_after_the_grace_what_is_never_answered() {
     let url = endpoint.base_url();
     let args = "--data frames --levels L0 --concurrency 1 --timeout 100000 --out run --grace 1.5";
     let args = model_args(&url, args);
-    let mut program = Command::new(assert_cmd::cargo::cargo_bin("darkqa-eval"))
+    let mut program = Command::new(PROGRAM)
         .args(&args)
         .current_dir(bench.path(""))
         .stdout(Stdio::piped())
@@ -116,10 +116,9 @@ fn a_closed_terminal_interrupts_unless_it_is_ignored() {
         "what is on the wire is waited for: {kept}"
     );
 
-    let program = assert_cmd::cargo::cargo_bin("darkqa-eval");
     let mut ignoring = Command::new("sh")
         .args(["-c", "trap '' HUP; exec \"$0\" \"$@\""])
-        .arg(program)
+        .arg(PROGRAM)
         .args(&args)
         .current_dir(bench.path(""))
         .stdout(Stdio::null())
@@ -146,7 +145,7 @@ fn a_closed_standard_error_ends_nothing() {
     ] {
         let status = Command::new("sh")
             .args(["-c", "\"$0\" \"$@\" 2>&-"])
-            .arg(assert_cmd::cargo::cargo_bin("darkqa-eval"))
+            .arg(PROGRAM)
             .args(&args)
             .current_dir(bench.path(""))
             .stdout(Stdio::null())

@@ -8,6 +8,8 @@ use std::process::{Command, Output};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
+use crate::support::run::PROGRAM;
+
 /// Configurations of a data set: one with annotations, one without.
 pub(super) const ANNOTATED: &str = "annotated.scene_dataset_config.json";
 pub(super) const PLAIN: &str = "plain.scene_dataset_config.json";
@@ -174,7 +176,7 @@ impl House {
     }
 
     fn call(&self, words: &[&str]) -> Output {
-        let mut command = Command::new(assert_cmd::cargo::cargo_bin("darkqa-eval"));
+        let mut command = Command::new(PROGRAM);
         command.args(words).current_dir(self.path("")).env_clear();
         command.output().unwrap()
     }

@@ -8,6 +8,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use crate::support::rooms::rooms;
+use crate::support::run::PROGRAM;
 
 /// The most bytes of a stream that are looked at.
 const MOST_BYTES: usize = 16 << 20;
@@ -18,7 +19,7 @@ const LONGEST_LOOK: Duration = Duration::from_secs(1);
 
 /// The program in a folder, with the few variables that it needs.
 pub(crate) fn program(work: &Path) -> Command {
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin("darkqa-eval"));
+    let mut command = Command::new(PROGRAM);
     command.current_dir(work).env_clear();
     let kept = [
         "PATH",

@@ -1,7 +1,7 @@
 //! Damage to the chunks of PNG files.
 
 use crate::hostile::random::Random;
-use crate::support::image_files::{chunk, exif, profile_chunk};
+use crate::support::image_files::{checksum, chunk, exif, profile_chunk};
 
 const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 
@@ -40,7 +40,7 @@ pub(super) fn mutate(file: &mut Vec<u8>, random: &mut Random) -> bool {
     let is_mended = random.percent(80);
     *file = SIGNATURE.to_vec();
     for chunk in chunks {
-        let mended = crc32fast::hash(&chunk.body).to_be_bytes();
+        let mended = checksum(&chunk.body);
         let checksum = if is_mended { mended } else { chunk.checksum };
         file.extend([&chunk.length[..], &chunk.body, &checksum].concat());
     }
