@@ -110,7 +110,9 @@ impl<'p> Pieces<'p> {
             bytes,
         };
         self.start += piece.bytes.len() as u64;
-        self.lines += memchr::memchr_iter(b'\n', &piece.bytes).count();
+        #[expect(clippy::naive_bytecount, reason = "fast enough without a crate")]
+        let feeds = piece.bytes.iter().filter(|byte| **byte == b'\n').count();
+        self.lines += feeds;
         Ok(Some(piece))
     }
 }

@@ -3,12 +3,11 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use strsim::damerau_levenshtein;
-
 use crate::ask::Prices;
 use crate::engine::observer;
 use crate::error::{Error, Result};
 use crate::types::Control;
+use crate::types::near_name::is_nearly;
 
 /// A model as flags and files name it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -25,9 +24,6 @@ pub(crate) enum ModelName {
 
 /// The words that begin the names of built-in models.
 const BUILT_IN: [&str; 3] = ["random", "observer", "script"];
-
-/// The longest word for which one edit makes another word; longer ones take two. Chosen.
-const SHORT: usize = 6;
 
 impl ModelName {
     /// Checks that the model can answer an open question.
@@ -63,10 +59,9 @@ impl ModelName {
             return Err(Error::usage("--model", problem));
         }
         let word = name.split(':').next().unwrap_or(name).to_lowercase();
-        let mut near = BUILT_IN.into_iter().filter(|built_in| {
-            let most = if built_in.len() <= SHORT { 1 } else { 2 };
-            damerau_levenshtein(built_in, &word) <= most
-        });
+        let mut near = BUILT_IN
+            .into_iter()
+            .filter(|built_in| is_nearly(&word, built_in));
         match near.next() {
             Some(built_in) if Prices::built_in()?.of(name).is_none() => {
                 let hint = if built_in == "script" {

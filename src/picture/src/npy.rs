@@ -3,6 +3,9 @@
 //! The format (`numpy.lib.format`): `\x93NUMPY`, a version, the length of the header, the header, and the numbers row by
 //! row. The header is a Python dictionary with `descr`, `fortran_order` and `shape`. Versions 1 to 3 differ only in the
 //! width of the length field and the encoding of the header.
+//!
+//! The file is read in place: its size is known, so that a header that states more allocates nothing. `ndarray-npy` reads headers with
+//! a parser of all Python literals, in eight more crates.
 
 use std::sync::LazyLock;
 

@@ -3,7 +3,7 @@
 //! Colours stand in the text as ANSI sequences; whoever prints it takes them out where the terminal has none. A sign or a word says
 //! the same as each colour.
 
-use anstyle::{AnsiColor, Style};
+use clap::builder::styling::{AnsiColor, Style};
 
 use super::foot::BELOW;
 use super::wrapped::wrapped;

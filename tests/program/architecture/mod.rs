@@ -42,9 +42,8 @@ const MEMBERS: [&str; 7] = [
 ];
 
 /// The libraries that the program uses in some places (folders or files in `src/`) alone. Test code may use them anywhere.
-const LIBRARIES: [(&str, &[&str]); 12] = [
+const LIBRARIES: [(&str, &[&str]); 11] = [
     ("anstream", &["cli"]),
-    ("anstyle", &["report"]),
     ("hyper", &["ask", "run/serve"]),
     ("saphyr_parser", &["dataset/ready_made/container"]),
     ("noto_sans_mono_bitmap", &["report/sheet"]),

@@ -1,6 +1,6 @@
 //! Which known name is meant by an unknown one: [`nearest`].
 
-use strsim::jaro_winkler;
+use strsim::{damerau_levenshtein, jaro_winkler};
 
 /// Least similarity of two names, by Jaro and Winkler; chosen.
 const ALIKE: f64 = 0.8;
@@ -17,6 +17,15 @@ pub fn nearest<'a, S: AsRef<str> + 'a>(
     // Of equal ones, the minimum is the first, and the maximum the last.
     let nearest = near.min_by(|(a, _), (b, _)| b.total_cmp(a));
     nearest.map(|(_, other)| other)
+}
+
+/// The longest word for which one edit makes another word; longer ones take two. Chosen.
+const SHORT: usize = 6;
+
+/// Whether a word is a known one, or that with a typing error.
+pub fn is_nearly(word: &str, known: &str) -> bool {
+    let most = if known.len() <= SHORT { 1 } else { 2 };
+    damerau_levenshtein(known, word) <= most
 }
 
 /// The most similar of the known names, as a [`question`].

@@ -1,7 +1,8 @@
 //! The facts of a TIFF file in the tags of its first picture: [`TiffOutline`].
 //!
-//! They are read here because the decoder hands out no pictures but the first, and takes the missing part of a truncated file
-//! for samples in some compressions (TIFF 6.0, section 2; BigTIFF as in libtiff).
+//! They are read here because the decoder of the crate `tiff` hands out no tags of a first picture that it cannot decode (a camera's
+//! RAW file, a mask, a broken file), none longer than 1 MiB, as some profiles are, and takes the missing part of a truncated file for
+//! samples in some compressions (TIFF 6.0, section 2; BigTIFF as in libtiff).
 
 /// Most directories of a file that are counted; chosen. It also ends a chain that goes in a circle.
 const MOST_PAGES: usize = 10_000;
