@@ -1,14 +1,14 @@
-//! Images and their maps: [`Frame`], [`FrameId`], [`Rgb`].
+//! Images and their maps: [`Frame`], [`FrameId`].
 
 use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
-use ndarray::{Array2, Array3};
+use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
+use super::image::Rgb;
 use super::labels::SegmentName;
-use crate::error::Error;
 
 /// The name of a frame, unique in its data set: `scene/frame`, or the path of an image in a ready-made set.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -42,67 +42,6 @@ pub const IMAGE_ENDINGS: [&str; 8] = ["png", "jpg", "jpeg", "webp", "tif", "tiff
 pub fn is_image_ending(ending: &str) -> bool {
     let mut known = IMAGE_ENDINGS.iter();
     known.any(|known| ending.eq_ignore_ascii_case(known))
-}
-
-/// An 8-bit sRGB image, height × width × 3, contiguous, at least one pixel.
-#[derive(Clone, PartialEq, Eq)]
-pub struct Rgb(Array3<u8>);
-
-impl Rgb {
-    /// Takes height × width × 3 samples, row by row, red first.
-    ///
-    /// # Errors
-    /// If the number of samples is not `height * width * 3`, or is zero.
-    pub fn new(height: usize, width: usize, samples: Vec<u8>) -> Result<Self, Error> {
-        let found = samples.len();
-        let expected = height
-            .checked_mul(width)
-            .and_then(|n| n.checked_mul(3))
-            .filter(|n| *n > 0 && *n == found);
-        let array = expected.and_then(|_| Array3::from_shape_vec((height, width, 3), samples).ok());
-        array.map(Self).ok_or_else(|| {
-            Error::data(
-                "image",
-                format_args!("{found} samples do not make a {height} × {width} RGB image"),
-            )
-        })
-    }
-
-    /// A black image of at least one pixel.
-    #[must_use]
-    pub fn black(height: usize, width: usize) -> Self {
-        Self(Array3::zeros((height.max(1), width.max(1), 3)))
-    }
-
-    /// The height in pixels.
-    #[must_use]
-    pub fn height(&self) -> usize {
-        self.0.dim().0
-    }
-
-    /// The width in pixels.
-    #[must_use]
-    pub fn width(&self) -> usize {
-        self.0.dim().1
-    }
-
-    /// The samples, row by row, red first.
-    #[must_use]
-    pub fn samples(&self) -> &[u8] {
-        self.0.as_slice().unwrap_or_default()
-    }
-
-    /// The samples, to change them in place.
-    #[must_use]
-    pub fn samples_mut(&mut self) -> &mut [u8] {
-        self.0.as_slice_mut().unwrap_or_default()
-    }
-}
-
-impl fmt::Debug for Rgb {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Rgb({} × {})", self.height(), self.width())
-    }
 }
 
 /// One view of a scene: an image and, if the data set has them, its maps of the same height and width.
@@ -183,14 +122,6 @@ mod tests {
             ("scene/1", "scene/1"),
         ] {
             assert_eq!(FrameId(name.into()).bare(), bare);
-        }
-    }
-
-    #[test]
-    fn images_are_checked() {
-        assert!(Rgb::new(2, 2, vec![0; 12]).is_ok());
-        for (height, width, samples) in [(2, 2, 11), (0, 2, 0), (usize::MAX, 2, 12), (2, 2, 13)] {
-            assert!(Rgb::new(height, width, vec![0; samples]).is_err());
         }
     }
 }

@@ -3,7 +3,6 @@
 
 pub mod axis_level;
 mod canonical;
-mod codes16;
 pub mod condition;
 mod condition_columns;
 pub mod control;
@@ -17,6 +16,7 @@ pub mod exposure_facts;
 pub mod flag;
 mod flaw;
 pub mod frame;
+pub mod image;
 pub mod image_mark;
 pub mod image_notes;
 mod input_note;
@@ -24,7 +24,6 @@ pub mod isa;
 pub mod key_values;
 pub mod kind_set;
 pub mod labels;
-pub mod light;
 pub mod light_group;
 pub mod manifest;
 pub mod model_listing;
@@ -59,7 +58,6 @@ pub mod trials;
 pub mod words;
 
 pub use axis_level::{AxisLevel, KindReading};
-pub use codes16::Codes16;
 pub use condition::{Condition, EnhancerName};
 pub use condition_columns::ConditionColumns;
 pub use control::Control;
@@ -71,12 +69,12 @@ pub use detail::{
 pub use digest::Digest;
 pub use exposure_facts::ExposureFacts;
 pub use flaw::Flaw;
-pub use frame::{DepthKind, Frame, FrameId, Intrinsics, Rgb, Segmentation};
+pub use frame::{DepthKind, Frame, FrameId, Intrinsics, Segmentation};
+pub use image::{Codes16, Image, Light, Rgb};
 pub use image_notes::{ImageFidelity, ObjectCrop, Thumbnail};
 pub use input_note::{ColourHandling, ColourNote, DepthNote, InputNote, InputSummary};
 pub use kind_set::KindSet;
 pub use labels::{Label, Labels, SegmentName};
-pub use light::Light;
 pub use light_group::LightGroup;
 pub use model_listing::{ListedModel, ModelColumn, ModelListing};
 pub use observed::{AnswerSource, Observed};

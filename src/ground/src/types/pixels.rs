@@ -2,9 +2,7 @@
 
 use std::sync::Arc;
 
-use super::codes16::Codes16;
-use super::frame::Rgb;
-use super::light::Light;
+use super::image::{Codes16, Light, Rgb};
 use super::shown_codes::{of_16_bits, of_light};
 /// The pixels of a clean frame. A copy shares them.
 #[derive(Debug, Clone)]

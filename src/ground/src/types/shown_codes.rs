@@ -2,9 +2,7 @@
 
 use std::sync::LazyLock;
 
-use super::codes16::Codes16;
-use super::frame::Rgb;
-use super::light::Light;
+use super::image::{Codes16, Light, Rgb};
 
 /// Exponent between light and codes, the same as of the exposure drop, so that an undarkened image is the drop of 0 EV (DarkQA,
 /// eqs. 1 and 3).
