@@ -89,7 +89,8 @@ mod tests {
     use crate::noise::{Term, add};
     use crate::reading::{Amplify, LightReading, Synthesis};
     use crate::unprocess::unprocess;
-    use crate::{AutoExposure, AutoSettings, CameraModel, CameraState, FrameView, Motion};
+    use crate::{AutoSettings, CameraModel, CameraState, FrameView, Motion};
+    use darkqa_ground::error::Result;
     use darkqa_ground::types::{Degradation, FrameId, Severity};
 
     fn key(frame: &str) -> NoiseKey {
@@ -101,21 +102,31 @@ mod tests {
         Rgb::new(40, 150, (0..3 * 40 * 150).map(sample).collect()).unwrap()
     }
 
-    /// A degradation of a frame with these settings; the sensor's gain and ratio may be pinned, which automatic exposure ignores.
-    fn applied(how: &str, auto: &str, motion: &str) -> AppliedDegradation {
-        let mut camera = CameraModel::default();
-        camera.pin_gain(3.0).unwrap();
-        camera.pin_ratio(7.0).unwrap();
-        let synthesis = Synthesis::of(LightReading::Eld, camera);
+    /// A degradation of a frame with these settings.
+    fn applied_by(
+        synthesis: &Synthesis,
+        how: &str,
+        auto: &str,
+        motion: &str,
+    ) -> Result<AppliedDegradation> {
         let auto: AutoSettings = auto.parse().unwrap();
         let auto = auto.of_camera(&CameraModel::default());
-        let camera: (AutoExposure, Motion) = (auto, motion.parse().unwrap());
+        let motion: Motion = motion.parse().unwrap();
         let how: Degradation = how.parse().unwrap();
         let view = FrameView {
             width: 640,
             focal: None,
         };
-        AppliedDegradation::new(&how, &synthesis, (&camera.0, &camera.1), view, &key("a")).unwrap()
+        AppliedDegradation::new(&how, synthesis, (&auto, &motion), view, &key("a"))
+    }
+
+    /// The same by a sensor whose gain and ratio are pinned, which automatic exposure ignores.
+    fn applied(how: &str, auto: &str, motion: &str) -> AppliedDegradation {
+        let mut camera = CameraModel::default();
+        camera.pin_gain(3.0).unwrap();
+        camera.pin_ratio(7.0).unwrap();
+        let synthesis = Synthesis::of(LightReading::Eld, camera);
+        applied_by(&synthesis, how, auto, motion).unwrap()
     }
 
     fn image(how: &str, auto: &str, motion: &str) -> Rgb {
@@ -303,17 +314,7 @@ mod tests {
     #[test]
     fn a_gain_or_a_path_beyond_the_camera_is_refused() {
         let refused = |how: &str, auto: &str, motion: &str| {
-            let auto: AutoSettings = auto.parse().unwrap();
-            let auto = auto.of_camera(&CameraModel::default());
-            let camera: (AutoExposure, Motion) = (auto, motion.parse().unwrap());
-            let how: Degradation = how.parse().unwrap();
-            let view = FrameView {
-                width: 640,
-                focal: None,
-            };
-            let camera = (&camera.0, &camera.1);
-            let applied =
-                AppliedDegradation::new(&how, &Synthesis::default(), camera, view, &key("a"));
+            let applied = applied_by(&Synthesis::default(), how, auto, motion);
             applied.unwrap_err().to_string()
         };
         let error = refused("L5-auto", "gain=5", "speed=30");

@@ -88,15 +88,6 @@ impl Confusion {
             .map(|(label, row)| (predicted(label), row.iter().sum()))
             .collect()
     }
-
-    /// Share of an answer among all replies, readable or not; 0 if it is not one of the labels.
-    #[must_use]
-    pub fn share_of(&self, answer: &str) -> f64 {
-        let all: usize = self.counts.iter().flatten().sum();
-        let labels = self.labels.iter().zip(self.shares());
-        let given = labels.filter(|(label, _)| *label == answer);
-        given.map(|(_, (given, _))| given).sum::<usize>() as f64 / all as f64
-    }
 }
 
 /// Distribution of the answers given, compared with the true answers. A model that no longer sees gives the same answer
