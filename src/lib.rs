@@ -80,6 +80,7 @@
 //! | `questions` | [`questions`] | a frame with its maps → questions with one true answer, by rule; and the observer: what the rules could still answer from given pixels |
 //! | `enhance` | [`enhance`] | a degraded image → an enhanced one, by the user's ONNX model; `models` has the enhancers that the program carries |
 //! | `score` | [`score`] | a reply → a choice or a mark; records → numbers with their intervals |
+//! | `store` | `store` | the folder of a run, `results/<run>/`: append-only and resumable |
 //!
 //! A [`Frame`](types::Frame) is seen, a [`Question`] is asked, a [`Degradation`] is what was done to a frame, a [`Condition`] is a
 //! degradation with or without an enhancer, a [`Reply`](types::Reply) is what a model sent, and a [`Record`](types::Record) is the result
@@ -89,7 +90,6 @@
 //! - [`import`]: other data sets → frames, one file a kind.
 //! - [`calibrate`]: frames of a sensor → the camera that the synthesis takes its noise from.
 //! - [`ask`]: a prompt and images → a reply; the only asynchronous stage. `ask/wire`: the APIs of endpoints, their requests and replies.
-//! - [`store`]: `results/<run>/`, append-only and resumable.
 //! - `image_store`: a folder of images that were made, shared by runs and processes; it may be deleted at any time.
 //! - [`report`]: tables, figures and one HTML file, from the records alone, and a leaderboard of many; figures of pictures that are handed in.
 //! - `images`: from a frame to the images of a request, made once by one pipeline for everything that is asked or written.
@@ -128,7 +128,6 @@
 //! | `import` | `dataset`, `labels`, `files`, `picture`, `types`, `error` |
 //! | `ask` | `files`, `picture`, `types`, `error` |
 //! | `calibrate` | `dataset`, `synthesis`, `files`, `picture`, `types`, `error` |
-//! | `store` | `score`, `files`, `types`, `error` |
 //! | `image_store` | `files`, `types`, `error` |
 //! | `report` | `types`, `error`, `score`, `questions`, `calibrate` |
 //! | `images` | `report`, `files`, `picture`, `types`, `error`, `rooms`, `labels`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `image_store` |
@@ -157,7 +156,6 @@ mod report;
 mod run;
 mod run_reports;
 mod runs;
-mod store;
 
 pub use darkqa_enhance as enhance;
 pub use darkqa_ground::{error, types};
@@ -167,6 +165,7 @@ pub(crate) use darkqa_picture as picture;
 pub use darkqa_questions as questions;
 pub(crate) use darkqa_scenes as rooms;
 pub use darkqa_score as score;
+pub(crate) use darkqa_store as store;
 
 pub use error::{Error, Result};
 pub use types::degradation::Kind;

@@ -528,8 +528,8 @@ fn class_maps_of_arrays_are_read_and_other_files_are_named() {
     scene.text("home/notes", "");
     let called = scene
         .run("folder", &["--labels", "nyu40", "--count", "2"])
-        .success();
-    let said = String::from_utf8(called.get_output().stdout.clone()).unwrap();
+        .ended(0);
+    let said = called.stdout;
     assert!(
         said.contains("2 frames of 1 scene, chosen from 3"),
         "{said}"
@@ -588,8 +588,8 @@ fn hypersim_is_read_with_its_maps_in_hdf5() {
         .unwrap();
         fs::write(map("world_normal"), "").unwrap();
     }
-    let called = scene.run("hypersim", &[]).success();
-    let said = String::from_utf8(called.get_output().stdout.clone()).unwrap();
+    let called = scene.run("hypersim", &[]).ended(0);
+    let said = called.stdout;
     assert!(said.contains("2 frames of 1 scene"), "{said}");
     assert!(
         said.contains("not read: 2 scene_cam_01_geometry_hdf5/*.hdf5, image.png"),
@@ -660,8 +660,8 @@ fn hdf5(class: u8, bits: u8, size: [u64; 2], data: &[u8]) -> Vec<u8> {
 fn a_folder_without_class_maps_says_so() {
     let scene = Scene::new();
     scene.rgb("rgb/0.png");
-    let called = scene.run("folder", &["--labels", "nyu40"]).success();
-    let said = String::from_utf8(called.get_output().stdout.clone()).unwrap();
+    let called = scene.run("folder", &["--labels", "nyu40"]).ended(0);
+    let said = called.stdout;
     assert!(said.contains("no class maps"), "{said}");
 }
 
@@ -675,28 +675,25 @@ fn folders_are_joined_and_scenes_of_one_name_told_apart() {
         scene.shallow(&format!("{folder}/only-{folder}/sem/0.png"), class, 9);
     }
     let import = |labels: &str| {
-        let mut command = Command::cargo_bin("darkqa-eval").unwrap();
+        let mut command = Command::new(PROGRAM);
         command.args(["import", "folder", "--labels", labels, "--src"]);
         command.arg(scene.0.path().join("src/one")).arg("--src");
         command
             .arg(scene.0.path().join("src/two"))
             .arg("--out")
             .arg(scene.out());
-        command.assert()
+        called(&mut command).ended(0)
     };
-    import("nyu40").success();
+    import("nyu40");
     let set = Dataset::of_frames(&scene.out(), &[]).unwrap();
     let names: Vec<&str> = set.frames().map(|frame| frame.0.as_str()).collect();
     assert_eq!(names, ["1-home/0", "2-home/0", "only-one/0", "only-two/0"]);
     assert_eq!(sides(frame(&set, "1-home/0").semantic.as_ref()), (4, 9));
     assert_eq!(sides(frame(&set, "2-home/0").semantic.as_ref()), (5, 9));
     // Questions name the command that joins.
-    let mut command = Command::cargo_bin("darkqa-eval").unwrap();
-    let refused = command
-        .args(["questions", "one", "two", "--out", "q.jsonl"])
-        .assert()
-        .failure();
-    let said = String::from_utf8(refused.get_output().stderr.clone()).unwrap();
+    let said = called(Command::new(PROGRAM).args(["questions", "one", "two", "--out", "q.jsonl"]))
+        .ended(2)
+        .stderr;
     assert!(
         said.contains("import folder --src one --src two --out JOINED"),
         "{said}"

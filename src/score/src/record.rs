@@ -23,6 +23,12 @@ pub trait Detail: StoredDetail {
 
     /// Index of the choice in the lenient reading; `None` if none was read.
     fn chosen(&self) -> Option<usize>;
+
+    /// Parses the line of a record. Each kind has its own function, so that this crate compiles it, for speed, and not the caller.
+    ///
+    /// # Errors
+    /// If the line is not such a record.
+    fn parse_record(line: &[u8]) -> serde_json::Result<Record<Self>>;
 }
 
 impl Detail for ChoiceDetail {
@@ -60,6 +66,10 @@ impl Detail for ChoiceDetail {
     fn chosen(&self) -> Option<usize> {
         self.lenient?.chosen
     }
+
+    fn parse_record(line: &[u8]) -> serde_json::Result<Record<Self>> {
+        serde_json::from_slice(line)
+    }
 }
 
 impl Detail for OpenDetail {
@@ -76,6 +86,10 @@ impl Detail for OpenDetail {
 
     fn chosen(&self) -> Option<usize> {
         None
+    }
+
+    fn parse_record(line: &[u8]) -> serde_json::Result<Record<Self>> {
+        serde_json::from_slice(line)
     }
 }
 

@@ -17,7 +17,7 @@ use files::Files;
 use map::Map;
 
 /// The crates that the program uses under these names of its root.
-const CRATES: [&str; 10] = [
+const CRATES: [&str; 11] = [
     "enhance",
     "error",
     "files",
@@ -26,12 +26,13 @@ const CRATES: [&str; 10] = [
     "questions",
     "rooms",
     "score",
+    "store",
     "synthesis",
     "types",
 ];
 
 /// The folders of the other crates of the workspace, in `src/`.
-const MEMBERS: [&str; 7] = [
+const MEMBERS: [&str; 8] = [
     "enhance/src/",
     "ground/src/",
     "light/src/",
@@ -39,6 +40,7 @@ const MEMBERS: [&str; 7] = [
     "questions/src/",
     "scenes/src/",
     "score/src/",
+    "store/src/",
 ];
 
 /// The libraries that the program uses in some places (folders or files in `src/`) alone. Test code may use them anywhere.
@@ -58,7 +60,7 @@ const LIBRARIES: [(&str, &[&str]); 11] = [
     ("tiff", &["calibrate/mosaic"]),
     (
         "parquet",
-        &["dataset/ready_made/container", "store/column_file"],
+        &["dataset/ready_made/container", "store/src/column_file"],
     ),
 ];
 

@@ -12,18 +12,18 @@ use super::pieces::{LinePlace, open_if_there};
 use super::stored_trial::StoredTrial;
 use jiff::Timestamp;
 
-use crate::error::{Error, Result};
-use crate::files::folder_access::FolderAccess;
-use crate::files::{self, is_unfinished, reading};
-use crate::score::record::Detail;
-use crate::types::manifest::{
+use darkqa_ground::error::{Error, Result};
+use darkqa_ground::files::folder_access::FolderAccess;
+use darkqa_ground::files::{self, is_unfinished, reading};
+use darkqa_ground::types::manifest::{
     ColumnDifference, Columns, JUDGES, RunManifest, differences, judge_flag,
 };
-use crate::types::recorded_names::RecordedNames;
-use crate::types::{Distinct, ImageFidelity, Record, RunQuestion, Thumbnail, TrialKey};
+use darkqa_ground::types::recorded_names::RecordedNames;
+use darkqa_ground::types::{Distinct, ImageFidelity, Record, RunQuestion, Thumbnail, TrialKey};
+use darkqa_score::record::Detail;
 
 /// The current time in UTC, to the second, as a manifest states it.
-pub(crate) fn now() -> String {
+pub fn now() -> String {
     Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ").to_string()
 }
 
@@ -37,13 +37,13 @@ pub(super) const THUMBNAILS: &str = "thumbnails.jsonl";
 pub(super) const FIDELITY: &str = "fidelity.jsonl";
 
 /// The subfolder of a run for Batch API files.
-pub(crate) const BATCH: &str = "batch";
+pub const BATCH: &str = "batch";
 /// The subfolder of a run for its plan, which is written before the run.
-pub(crate) const PLAN: &str = "plan";
+pub const PLAN: &str = "plan";
 
 /// Whether a stored run may continue at another address of its endpoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum AddressChange {
+pub enum AddressChange {
     /// Accept the new address: the user named this run (`--resume`), which states that it is the same model.
     Allowed,
     /// Refuse it: a different server may serve a different model under the same name.
@@ -76,7 +76,7 @@ pub(super) fn write_manifest(folder: &Path, manifest: &RunManifest) -> Result<()
 
 /// The last record of each trial in a run folder, in the order of each trial's first record. An incomplete last line is
 /// skipped.
-pub(crate) fn read_records<D: Detail>(folder: &Path) -> Result<Vec<Record<D>>> {
+pub fn read_records<D: Detail>(folder: &Path) -> Result<Vec<Record<D>>> {
     // A failure does not replace a reply.
     let follow = |last: &mut Record<D>, earlier: &Record<D>| {
         if last.failed() && !earlier.failed() {
@@ -87,7 +87,7 @@ pub(crate) fn read_records<D: Detail>(folder: &Path) -> Result<Vec<Record<D>>> {
 }
 
 /// The last state of each trial in a run folder, in the order of [`read_records`].
-pub(crate) fn read_trials(folder: &Path) -> Result<Vec<StoredTrial>> {
+pub fn read_trials(folder: &Path) -> Result<Vec<StoredTrial>> {
     let mut models = Distinct::default();
     let share = |trial: &mut StoredTrial| models.share(&mut trial.model);
     last_of_each(
@@ -133,31 +133,28 @@ fn last_of_each<T: StoredLine>(
 }
 
 /// The questions of a run; none if an earlier version made it, which did not store them.
-pub(crate) fn read_questions(folder: &Path) -> Result<Vec<RunQuestion>> {
+pub fn read_questions(folder: &Path) -> Result<Vec<RunQuestion>> {
     lines(&folder.join(QUESTIONS))
 }
 
 /// Hands over the questions of a run in order; none as for [`read_questions`].
-pub(crate) fn each_question(folder: &Path, take: impl FnMut(RunQuestion)) -> Result<()> {
+pub fn each_question(folder: &Path, take: impl FnMut(RunQuestion)) -> Result<()> {
     each_line(&folder.join(QUESTIONS), take)
 }
 
 /// Hands over the questions of a run in order, each with the place of its line.
-pub(crate) fn each_placed_question(
-    folder: &Path,
-    take: impl FnMut(RunQuestion, LinePlace),
-) -> Result<()> {
+pub fn each_placed_question(folder: &Path, take: impl FnMut(RunQuestion, LinePlace)) -> Result<()> {
     each_placed_line(&folder.join(QUESTIONS), take)
 }
 
 /// The small copies of images of a run; none if the run has no such file.
-pub(crate) fn read_thumbnails(folder: &Path) -> Result<Vec<Thumbnail>> {
+pub fn read_thumbnails(folder: &Path) -> Result<Vec<Thumbnail>> {
     lines(&folder.join(THUMBNAILS))
 }
 
 /// The similarity of the images of a run to their clean frames, equal frames and conditions kept once; none if the run has no
 /// such file.
-pub(crate) fn read_fidelity(folder: &Path) -> Result<Vec<ImageFidelity>> {
+pub fn read_fidelity(folder: &Path) -> Result<Vec<ImageFidelity>> {
     let (mut frames, mut conditions) = (Distinct::default(), Distinct::default());
     let mut all: Vec<ImageFidelity> = Vec::new();
     each_line(&folder.join(FIDELITY), |mut image: ImageFidelity| {
@@ -170,7 +167,7 @@ pub(crate) fn read_fidelity(folder: &Path) -> Result<Vec<ImageFidelity>> {
 
 /// The newest run folder in `base` whose name ends in `-<hash>`.
 #[must_use]
-pub(crate) fn find(base: &Path, hash: &str) -> Option<PathBuf> {
+pub fn find(base: &Path, hash: &str) -> Option<PathBuf> {
     let ending = format!("-{hash}");
     let folders = fs::read_dir(base).ok()?.flatten().map(|entry| entry.path());
     folders
@@ -184,7 +181,7 @@ pub(crate) fn find(base: &Path, hash: &str) -> Option<PathBuf> {
 }
 
 /// Whether a folder is that of a run.
-pub(crate) fn holds_run(folder: &Path) -> bool {
+pub fn holds_run(folder: &Path) -> bool {
     folder.join(MANIFEST).is_file()
 }
 
@@ -192,7 +189,7 @@ pub(crate) fn holds_run(folder: &Path) -> bool {
 ///
 /// # Errors
 /// If its records cannot be opened.
-pub(crate) fn is_locked(folder: &Path) -> Result<bool> {
+pub fn is_locked(folder: &Path) -> Result<bool> {
     let path = folder.join(RECORDS);
     let Some(records) = open_if_there(&path)? else {
         return Ok(false);
@@ -208,7 +205,7 @@ pub(crate) fn is_locked(folder: &Path) -> Result<bool> {
 ///
 /// # Errors
 /// If the manifest cannot be read.
-pub(crate) fn schema(folder: &Path) -> Result<Option<String>> {
+pub fn schema(folder: &Path) -> Result<Option<String>> {
     Ok(any_manifest(folder)?.map(|manifest| manifest.schema))
 }
 
@@ -216,7 +213,7 @@ pub(crate) fn schema(folder: &Path) -> Result<Option<String>> {
 ///
 /// # Errors
 /// If it cannot be read, or if its schema is not `schema`.
-pub(crate) fn read_manifest(folder: &Path, schema: &str) -> Result<Option<RunManifest>> {
+pub fn read_manifest(folder: &Path, schema: &str) -> Result<Option<RunManifest>> {
     let Some(manifest) = any_manifest(folder)? else {
         return Ok(None);
     };
@@ -229,7 +226,7 @@ pub(crate) fn read_manifest(folder: &Path, schema: &str) -> Result<Option<RunMan
 }
 
 /// The columns in the manifest of a run of any kind; none without a manifest.
-pub(crate) fn read_columns(folder: &Path) -> Result<Columns> {
+pub fn read_columns(folder: &Path) -> Result<Columns> {
     Ok(any_manifest(folder)?.map_or_else(Columns::default, |manifest| manifest.columns))
 }
 

@@ -5,14 +5,14 @@ use std::hash::Hash;
 use std::path::Path;
 
 use super::folder::{read_fidelity, read_thumbnails};
-use crate::error::Result;
-use crate::types::{FrameId, ImageFidelity, Thumbnail};
+use darkqa_ground::error::Result;
+use darkqa_ground::types::{FrameId, ImageFidelity, Thumbnail};
 
 /// The small copies of images in these folders that are not `present`, each once, of the frames that are wanted.
 ///
 /// # Errors
 /// If a file cannot be read.
-pub(crate) fn more_thumbnails(
+pub fn more_thumbnails(
     present: &[Thumbnail],
     folders: &[&Path],
     is_wanted: impl Fn(&FrameId) -> bool,
@@ -26,7 +26,7 @@ pub(crate) fn more_thumbnails(
 ///
 /// # Errors
 /// If a file cannot be read.
-pub(crate) fn more_fidelity(
+pub fn more_fidelity(
     present: &[ImageFidelity],
     folders: &[&Path],
     is_wanted: impl Fn(&FrameId) -> bool,

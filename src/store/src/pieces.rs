@@ -4,8 +4,8 @@ use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
 
-use crate::error::{Error, Result};
-use crate::files::reading;
+use darkqa_ground::error::{Error, Result};
+use darkqa_ground::files::reading;
 
 /// The bytes that are read at once. A piece is longer only if one line is. Chosen: enough lines for all cores.
 const PIECE_BYTES: u64 = 4 << 20;
@@ -34,9 +34,11 @@ pub(super) struct Piece {
 
 /// The place of a line in its file, with its end, in bytes.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct LinePlace {
-    pub(crate) start: u64,
-    pub(crate) length: usize,
+pub struct LinePlace {
+    /// Offset of its first byte.
+    pub start: u64,
+    /// Length with its end.
+    pub length: usize,
 }
 
 impl LinePlace {

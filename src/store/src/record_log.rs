@@ -9,16 +9,16 @@ use super::lines::each_placed_line;
 use super::pieces::{LinePlace, open_if_there};
 use super::reread_record::RereadRecord;
 use super::trial_line::TrialLine;
-use crate::error::{Error, Result};
-use crate::score::record::Detail;
-use crate::types::Record;
+use darkqa_ground::error::{Error, Result};
+use darkqa_ground::types::Record;
+use darkqa_score::record::Detail;
 
 /// The bytes that are read at once for a single line. Chosen: most lines are shorter.
 const LINE_BYTES: usize = 2048;
 
 /// The file of a run's records, to read single ones.
 #[derive(Debug)]
-pub(crate) struct RecordLog {
+pub struct RecordLog {
     path: PathBuf,
     file: File,
 }
@@ -28,7 +28,7 @@ impl RecordLog {
     ///
     /// # Errors
     /// If there are none.
-    pub(crate) fn open(folder: &Path) -> Result<Self> {
+    pub fn open(folder: &Path) -> Result<Self> {
         let missing = || Error::file(folder.join(RECORDS), "open", ErrorKind::NotFound.into());
         Self::open_if_there(folder)?.ok_or_else(missing)
     }
@@ -37,7 +37,7 @@ impl RecordLog {
     ///
     /// # Errors
     /// If they cannot be opened.
-    pub(crate) fn open_if_there(folder: &Path) -> Result<Option<Self>> {
+    pub fn open_if_there(folder: &Path) -> Result<Option<Self>> {
         let path = folder.join(RECORDS);
         let file = open_if_there(&path)?;
         Ok(file.map(|file| Self { path, file }))
@@ -47,7 +47,7 @@ impl RecordLog {
     ///
     /// # Errors
     /// If the file cannot be read.
-    pub(crate) fn line_from(&self, start: u64) -> Result<Vec<u8>> {
+    pub fn line_from(&self, start: u64) -> Result<Vec<u8>> {
         let mut file = &self.file;
         let line = file.seek(SeekFrom::Start(start)).and_then(|_| {
             let mut line = Vec::new();
@@ -61,7 +61,7 @@ impl RecordLog {
     ///
     /// # Errors
     /// If the file has become shorter.
-    pub(crate) fn lines(&self, places: &[LinePlace]) -> Result<Vec<Vec<u8>>> {
+    pub fn lines(&self, places: &[LinePlace]) -> Result<Vec<Vec<u8>>> {
         let mut in_file: Vec<usize> = (0..places.len()).collect();
         in_file.sort_unstable_by_key(|index| places[*index].start);
         let follows = |one: &usize, next: &usize| places[*one].end() == places[*next].start;
@@ -85,14 +85,14 @@ impl RecordLog {
     ///
     /// # Errors
     /// If the line is not a record.
-    pub(crate) fn record<D: Detail>(&self, line: &[u8]) -> Result<Record<D>> {
-        serde_json::from_slice(line).map_err(|e| Error::file(&self.path, "read", e.into()))
+    pub fn record<D: Detail>(&self, line: &[u8]) -> Result<Record<D>> {
+        D::parse_record(line).map_err(|e| Error::file(&self.path, "read", e.into()))
     }
 }
 
 /// The file of a run's questions, to read single lines.
 #[derive(Debug)]
-pub(crate) struct QuestionFile {
+pub struct QuestionFile {
     path: PathBuf,
     file: File,
 }
@@ -102,7 +102,7 @@ impl QuestionFile {
     ///
     /// # Errors
     /// If they cannot be opened.
-    pub(crate) fn open(folder: &Path) -> Result<Option<Self>> {
+    pub fn open(folder: &Path) -> Result<Option<Self>> {
         let path = folder.join(QUESTIONS);
         let file = open_if_there(&path)?;
         Ok(file.map(|file| Self { path, file }))
@@ -112,7 +112,7 @@ impl QuestionFile {
     ///
     /// # Errors
     /// If the file has become shorter.
-    pub(crate) fn line(&self, place: LinePlace) -> Result<Vec<u8>> {
+    pub fn line(&self, place: LinePlace) -> Result<Vec<u8>> {
         bytes_at(&self.file, place).map_err(|e| Error::file(&self.path, "read", e))
     }
 }
@@ -130,7 +130,7 @@ fn bytes_at(mut file: &File, place: LinePlace) -> std::io::Result<Vec<u8>> {
 ///
 /// # Errors
 /// If a line is not a record.
-pub(crate) fn each_trial(folder: &Path, take: impl FnMut(TrialLine, LinePlace)) -> Result<()> {
+pub fn each_trial(folder: &Path, take: impl FnMut(TrialLine, LinePlace)) -> Result<()> {
     each_placed_line(&folder.join(RECORDS), take)
 }
 
@@ -138,10 +138,7 @@ pub(crate) fn each_trial(folder: &Path, take: impl FnMut(TrialLine, LinePlace)) 
 ///
 /// # Errors
 /// If a line is not a record.
-pub(crate) fn each_record<D: Detail>(
-    folder: &Path,
-    take: impl FnMut(Record<D>, LinePlace),
-) -> Result<()> {
+pub fn each_record<D: Detail>(folder: &Path, take: impl FnMut(Record<D>, LinePlace)) -> Result<()> {
     each_placed_line(&folder.join(RECORDS), take)
 }
 
@@ -149,7 +146,7 @@ pub(crate) fn each_record<D: Detail>(
 ///
 /// # Errors
 /// If a line is not a record, or the choices of a record are not valid.
-pub(crate) fn each_reread_record<D: Detail>(
+pub fn each_reread_record<D: Detail>(
     folder: &Path,
     mut take: impl FnMut(Record<D>, LinePlace),
 ) -> Result<()> {

@@ -5,17 +5,19 @@ use std::num::NonZeroU32;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Deserializer};
 
-use crate::types::small_number::{SmallNumber, Tokens};
-use crate::types::{Finish, LostAttempts, Shared, TrialKey, Usage, Via};
+use darkqa_ground::types::small_number::{SmallNumber, Tokens};
+use darkqa_ground::types::{Finish, LostAttempts, Shared, TrialKey, Usage, Via};
 
 /// A trial of a run, without what was asked and what was answered: 56 bytes.
 #[derive(Debug, Clone, Deserialize)]
-pub(crate) struct StoredTrial {
-    pub(crate) key: TrialKey,
+pub struct StoredTrial {
+    /// The key of the trial.
+    pub key: TrialKey,
     /// The name of the model.
-    pub(crate) model: Shared<String>,
+    pub model: Shared<String>,
+    /// The way by which it was asked.
     #[serde(default)]
-    pub(crate) via: Via,
+    pub via: Via,
     failure: Option<IgnoredAny>,
     #[serde(default, rename = "finish", deserialize_with = "is_length")]
     is_truncated: bool,
@@ -31,12 +33,12 @@ pub(crate) struct StoredTrial {
 
 impl StoredTrial {
     /// Whether no reply came, so that the trial is asked again.
-    pub(crate) fn failed(&self) -> bool {
+    pub fn failed(&self) -> bool {
         self.failure.is_some()
     }
 
     /// Whether the reply was truncated at a limit below this one.
-    pub(crate) fn is_truncated_below(&self, limit: u32) -> bool {
+    pub fn is_truncated_below(&self, limit: u32) -> bool {
         self.is_truncated && !self.failed() && self.limit() < Some(limit)
     }
 
@@ -45,17 +47,17 @@ impl StoredTrial {
     }
 
     /// The tokens that the server charged; `None` if it did not say.
-    pub(crate) fn usage(&self) -> Option<Usage> {
+    pub fn usage(&self) -> Option<Usage> {
         self.usage.usage()
     }
 
     /// Number of attempts that were charged and gave no reply, in all calls.
-    pub(crate) fn lost_attempts(&self) -> u32 {
+    pub fn lost_attempts(&self) -> u32 {
         self.lost.as_ref().map_or(0, |lost| lost.attempts)
     }
 
     /// These attempts, and the requests of which the server stated no tokens; `None` if there are none.
-    pub(crate) fn lost(&self) -> Option<&LostAttempts> {
+    pub fn lost(&self) -> Option<&LostAttempts> {
         self.lost.as_deref()
     }
 
@@ -78,7 +80,7 @@ impl StoredTrial {
     }
 
     /// The duration of the last try, in milliseconds.
-    pub(crate) fn latency_ms(&self) -> Option<u64> {
+    pub fn latency_ms(&self) -> Option<u64> {
         self.latency_ms.get()
     }
 }
@@ -128,7 +130,7 @@ mod tests {
         let mut last = reply("2000", "stop");
         last.follow(&first);
         assert_eq!(
-            (last.lost_attempts(), last.lost().unwrap().prompt_tokens),
+            (last.lost_attempts(), last.lost().unwrap().usage.prompt_tokens),
             (1, Some(10))
         );
         let mut failed = trial("{}", 2);

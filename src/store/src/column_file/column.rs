@@ -8,17 +8,20 @@ use parquet::errors::Result;
 use parquet::schema::types::{Type, TypePtr};
 
 /// A column of a table whose rows are `R`.
-pub(crate) struct Column<R> {
-    pub(crate) name: &'static str,
-    pub(crate) kind: CellKind,
-    pub(crate) presence: Presence,
+pub struct Column<R> {
+    /// The name in the file.
+    pub name: &'static str,
+    /// The type of its values.
+    pub kind: CellKind,
+    /// Whether each row has a value.
+    pub presence: Presence,
     /// The value of a row.
-    pub(crate) value: for<'r> fn(&'r R) -> Cell<'r>,
+    pub value: for<'r> fn(&'r R) -> Cell<'r>,
 }
 
 /// The type of the values of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum CellKind {
+pub enum CellKind {
     /// A text that many rows have.
     Text,
     /// A text of any length, which counts against the size of a row group.
@@ -33,36 +36,46 @@ pub(crate) enum CellKind {
     Int16,
     /// A whole number of 32 bits, with its sign.
     Int32,
+    /// A number of 64 bits with a fraction.
     Double,
+    /// True or false.
     Bool,
 }
 
 /// Whether each row has a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Presence {
+pub enum Presence {
+    /// A value in each row.
     Always,
+    /// Null in some rows.
     MayBeNull,
 }
 
 /// The value of a row in a column.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Cell<'r> {
+pub enum Cell<'r> {
+    /// No value.
     Null,
+    /// For [`CellKind::Text`] and [`CellKind::LongText`].
     Text(Cow<'r, str>),
+    /// For [`CellKind::Key`] and [`CellKind::Digest`].
     Bytes(&'r [u8]),
+    /// For the kinds of whole numbers.
     Int(i128),
+    /// For [`CellKind::Double`].
     Double(f64),
+    /// For [`CellKind::Bool`].
     Bool(bool),
 }
 
 impl<'r> Cell<'r> {
     /// A text that the row holds; null if there is none.
-    pub(crate) fn text(text: Option<&'r str>) -> Self {
+    pub fn text(text: Option<&'r str>) -> Self {
         text.map_or(Self::Null, |text| Self::Text(text.into()))
     }
 
     /// A whole number; null if there is none.
-    pub(crate) fn int<T: TryInto<i128>>(number: Option<T>) -> Self {
+    pub fn int<T: TryInto<i128>>(number: Option<T>) -> Self {
         let number = number.and_then(|number| number.try_into().ok());
         number.map_or(Self::Null, Self::Int)
     }

@@ -2,8 +2,8 @@ use super::*;
 use std::collections::BTreeMap;
 use std::fs;
 
-use crate::types::manifest::{Counts, Status};
-use crate::types::{Digest, Family, FrameId, QuestionId, StoredDetail as _, TrialOutcome};
+use darkqa_ground::types::manifest::{Counts, Status};
+use darkqa_ground::types::{Digest, Family, FrameId, QuestionId, StoredDetail as _, TrialOutcome};
 
 type Store = super::Store;
 

@@ -6,17 +6,17 @@ use std::path::Path;
 
 use rayon::prelude::*;
 use serde::Serialize;
-use serde::de::DeserializeOwned;
+use serde::de::Error as _;
 
 use super::pieces::{FileLine, LinePlace, Pieces};
 use super::reread_record::RereadRecord;
 use super::stored_trial::StoredTrial;
 use super::trial_line::TrialLine;
-use crate::error::{Error, Result};
-use crate::files::reading;
-use crate::files::write_synced;
-use crate::score::record::Detail;
-use crate::types::{ImageFidelity, Record, RunQuestion, Thumbnail, Usage};
+use darkqa_ground::error::{Error, Result};
+use darkqa_ground::files::reading;
+use darkqa_ground::files::write_synced;
+use darkqa_ground::types::{ImageFidelity, Record, RunQuestion, Thumbnail, Usage};
+use darkqa_score::record::{Detail, reread};
 
 /// Appends lines to a file, which is created if it does not exist.
 pub(super) fn append<T: Serialize + StoredLine>(path: &Path, values: &[T]) -> Result<File> {
@@ -68,7 +68,7 @@ pub(super) fn each_placed_line<T: StoredLine>(
         let lines = piece.lines();
         let parsed = lines.par_iter().map(|line| {
             let line = line.bytes.strip_suffix(b"\n").unwrap_or(line.bytes);
-            serde_json::from_slice::<T>(line)
+            T::parse(line)
         });
         let parsed: Vec<serde_json::Result<T>> = parsed.collect();
         for (line, value) in lines.iter().zip(parsed) {
@@ -96,7 +96,7 @@ pub(super) fn set_aside<T: StoredLine>(path: &Path, aside: &Path) -> Result<()> 
     let mut bad: Vec<BadLine> = Vec::new();
     while let Some(piece) = pieces.next()? {
         let lines = piece.lines();
-        let problem = |line: &FileLine<'_>| serde_json::from_slice::<T>(line.bytes).err();
+        let problem = |line: &FileLine<'_>| T::parse(line.bytes).err();
         let problems: Vec<Option<serde_json::Error>> = lines.par_iter().map(problem).collect();
         for (line, problem) in lines.iter().zip(problems) {
             match problem {
@@ -187,43 +187,76 @@ const REMEDY_OF_A_RECORD: &str = "the command that made the run, called again, s
                              or restore the file";
 
 /// The content of one line in a file of a run.
-pub(super) trait StoredLine: DeserializeOwned + Send {
+pub(super) trait StoredLine: Sized + Send {
     /// The name in error messages, with its article.
     const WHAT: &str;
     /// What a user can do about a line that is none.
     const REMEDY: &str = "restore the file, or use another --out";
+
+    /// Parses a line, with or without its end.
+    fn parse(line: &[u8]) -> serde_json::Result<Self>;
 }
 
 impl<D: Detail> StoredLine for Record<D> {
     const WHAT: &str = A_RECORD;
     const REMEDY: &str = REMEDY_OF_A_RECORD;
+
+    fn parse(line: &[u8]) -> serde_json::Result<Self> {
+        D::parse_record(line)
+    }
 }
 
 impl<D: Detail> StoredLine for RereadRecord<D> {
     const WHAT: &str = A_RECORD;
     const REMEDY: &str = REMEDY_OF_A_RECORD;
+
+    fn parse(line: &[u8]) -> serde_json::Result<Self> {
+        reread(D::parse_record(line)?)
+            .map(Self)
+            .map_err(serde_json::Error::custom)
+    }
 }
 
 impl StoredLine for StoredTrial {
     const WHAT: &str = A_RECORD;
     const REMEDY: &str = REMEDY_OF_A_RECORD;
+
+    fn parse(line: &[u8]) -> serde_json::Result<Self> {
+        serde_json::from_slice(line)
+    }
 }
 
 impl StoredLine for TrialLine {
     const WHAT: &str = A_RECORD;
     const REMEDY: &str = REMEDY_OF_A_RECORD;
+
+    fn parse(line: &[u8]) -> serde_json::Result<Self> {
+        serde_json::from_slice(line)
+    }
 }
 
 impl StoredLine for RunQuestion {
     const WHAT: &str = "a question";
+
+    fn parse(line: &[u8]) -> serde_json::Result<Self> {
+        serde_json::from_slice(line)
+    }
 }
 
 impl StoredLine for Thumbnail {
     const WHAT: &str = "a thumbnail";
+
+    fn parse(line: &[u8]) -> serde_json::Result<Self> {
+        serde_json::from_slice(line)
+    }
 }
 
 impl StoredLine for ImageFidelity {
     const WHAT: &str = "the fidelity of an image";
+
+    fn parse(line: &[u8]) -> serde_json::Result<Self> {
+        serde_json::from_slice(line)
+    }
 }
 
 /// Whether a file has lines of a kind: one of the whole lines in its first `complete` bytes does, or without any whole line it begins as
@@ -243,7 +276,7 @@ fn is_of<T: StoredLine>(path: &Path, complete: u64) -> Result<bool> {
         let lines = piece.lines();
         is_blank &= lines.is_empty();
         let mut lines = lines.iter();
-        if lines.any(|line| serde_json::from_slice::<T>(line.bytes).is_ok()) {
+        if lines.any(|line| T::parse(line.bytes).is_ok()) {
             return Ok(true);
         }
     }

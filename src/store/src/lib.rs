@@ -1,9 +1,11 @@
-//! Stage 6, store: the run folder `results/<run>/`.
+//! The folder of a run, `results/<run>/`.
 //!
 //! `records.jsonl` is the source of truth: one line a trial, appended and handed to the operating system as soon as a reply
 //! arrives, so that a killed run loses nothing. `manifest.json` describes the run, `questions.jsonl` has its questions,
 //! `thumbnails.jsonl` small copies of its images, and `fidelity.jsonl` their similarity to the clean frames. All other files are made again from these,
 //! `records.parquet` among them: the records once more, as a table for other programs ([`ColumnFile`]).
+
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
 mod changed_questions;
 mod column_file;
@@ -26,15 +28,15 @@ use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use crate::error::{Error, Result};
-use crate::files::write_with;
-use crate::score::record::Detail;
-use crate::types::manifest::RunManifest;
-use crate::types::recorded_names::RecordedNames;
-use crate::types::{
+use darkqa_ground::error::{Error, Result};
+use darkqa_ground::files::write_with;
+use darkqa_ground::types::manifest::RunManifest;
+use darkqa_ground::types::recorded_names::RecordedNames;
+use darkqa_ground::types::{
     ChoiceDetail, Distinct, FrameId, ImageFidelity, InputSummary, QuestionId, Record, RunQuestion,
     Thumbnail, TrialKey, Via,
 };
+use darkqa_score::record::Detail;
 
 use changed_questions::ChangedQuestions;
 use folder::{
@@ -44,16 +46,14 @@ use lines::{append, each_line, json_lines, lines, repair, set_aside};
 
 use own_files::check_own;
 
-pub(crate) use column_file::{
-    CREATED_BY, Cell, CellKind, Column, ColumnFile, FileMetadata, Presence,
-};
-pub(crate) use image_notes::{more_fidelity, more_thumbnails};
-pub(crate) use log_mark::LogMark;
-pub(crate) use pieces::LinePlace;
-pub(crate) use record_log::{QuestionFile, RecordLog, each_record, each_reread_record, each_trial};
-pub(crate) use stored_trial::StoredTrial;
+pub use column_file::{CREATED_BY, Cell, CellKind, Column, ColumnFile, FileMetadata, Presence};
+pub use image_notes::{more_fidelity, more_thumbnails};
+pub use log_mark::LogMark;
+pub use pieces::LinePlace;
+pub use record_log::{QuestionFile, RecordLog, each_record, each_reread_record, each_trial};
+pub use stored_trial::StoredTrial;
 
-pub(crate) use folder::{
+pub use folder::{
     AddressChange, BATCH, PLAN, each_placed_question, each_question, find, holds_run, is_locked,
     now, read_columns, read_fidelity, read_manifest, read_questions, read_records, read_thumbnails,
     read_trials, schema,
@@ -71,7 +71,7 @@ const SYNC_EVERY: Duration = Duration::from_secs(2);
 
 /// An open run folder, locked by this process.
 #[derive(Debug)]
-pub(crate) struct Store<D = ChoiceDetail> {
+pub struct Store<D = ChoiceDetail> {
     folder: PathBuf,
     records: File,
     synced: Instant,
@@ -89,7 +89,7 @@ impl<D: Detail> Store<D> {
     /// # Errors
     /// If the folder holds other files or another run (the message names the flag that differs), or if another process has
     /// locked it.
-    pub(crate) fn open(
+    pub fn open(
         folder: &Path,
         manifest: &RunManifest,
         address_change: AddressChange,
@@ -100,7 +100,7 @@ impl<D: Detail> Store<D> {
     }
 
     /// Opens a run folder as [`open`](Self::open). Its records were read without an error, so that none is looked at again.
-    pub(crate) fn open_read(
+    pub fn open_read(
         folder: &Path,
         manifest: &RunManifest,
         address_change: AddressChange,
@@ -137,12 +137,12 @@ impl<D: Detail> Store<D> {
     }
 
     /// The last record of each trial, in the order of each trial's first record.
-    pub(crate) fn records(&self) -> Result<Vec<Record<D>>> {
+    pub fn records(&self) -> Result<Vec<Record<D>>> {
         read_records(&self.folder).map(|records| self.shown(records))
     }
 
     /// The last state of each trial, in the order of [`records`](Self::records).
-    pub(crate) fn trials(&self) -> Result<Vec<StoredTrial>> {
+    pub fn trials(&self) -> Result<Vec<StoredTrial>> {
         let mut trials = read_trials(&self.folder)?;
         let mut models = Distinct::default();
         for trial in &mut trials {
@@ -180,7 +180,7 @@ impl<D: Detail> Store<D> {
     }
 
     /// Appends trials that are sent in a batch to the list of such trials.
-    pub(crate) fn append_to_batch(&mut self, records: &[Record<D>]) -> Result<()> {
+    pub fn append_to_batch(&mut self, records: &[Record<D>]) -> Result<()> {
         let path = self.folder.join(BATCH).join(TRIALS);
         let records: Vec<Record<D>> = records
             .iter()
@@ -192,7 +192,7 @@ impl<D: Detail> Store<D> {
     }
 
     /// Appends a small copy of an image.
-    pub(crate) fn append_thumbnail(&mut self, thumbnail: &Thumbnail) -> Result<()> {
+    pub fn append_thumbnail(&mut self, thumbnail: &Thumbnail) -> Result<()> {
         append(
             &self.folder.join(THUMBNAILS),
             std::slice::from_ref(thumbnail),
@@ -204,7 +204,7 @@ impl<D: Detail> Store<D> {
     ///
     /// # Errors
     /// If a file cannot be read or written.
-    pub(crate) fn add_thumbnails_of(
+    pub fn add_thumbnails_of(
         &mut self,
         folders: &[&Path],
         is_wanted: impl Fn(&FrameId) -> bool,
@@ -220,7 +220,7 @@ impl<D: Detail> Store<D> {
     ///
     /// # Errors
     /// If a file cannot be read or written.
-    pub(crate) fn add_fidelity_of(
+    pub fn add_fidelity_of(
         &mut self,
         folders: &[&Path],
         is_wanted: impl Fn(&FrameId) -> bool,
@@ -233,7 +233,7 @@ impl<D: Detail> Store<D> {
     }
 
     /// Appends the similarity of an image to its clean frame.
-    pub(crate) fn append_fidelity(&mut self, fidelity: &ImageFidelity) -> Result<()> {
+    pub fn append_fidelity(&mut self, fidelity: &ImageFidelity) -> Result<()> {
         append(&self.folder.join(FIDELITY), std::slice::from_ref(fidelity)).map(drop)
     }
 
@@ -241,7 +241,7 @@ impl<D: Detail> Store<D> {
     ///
     /// # Errors
     /// If a stored question differs in a part that decides its replies or its score. The error names the part.
-    pub(crate) fn add_questions(
+    pub fn add_questions(
         &self,
         mut questions: Vec<RunQuestion>,
         inputs: Option<&InputSummary>,
@@ -287,7 +287,7 @@ impl<D: Detail> Store<D> {
     }
 
     /// Replaces the stored questions of the run.
-    pub(crate) fn write_questions(&self, questions: &[RunQuestion]) -> Result<()> {
+    pub fn write_questions(&self, questions: &[RunQuestion]) -> Result<()> {
         self.write(
             QUESTIONS,
             &json_lines(&self.folder.join(QUESTIONS), questions)?,
@@ -295,7 +295,7 @@ impl<D: Detail> Store<D> {
     }
 
     /// Replaces the stored questions of the run by lines that `write` hands over, as they are in the file of another run.
-    pub(crate) fn write_question_lines(
+    pub fn write_question_lines(
         &self,
         write: impl FnOnce(&mut dyn FnMut(&[u8]) -> Result<()>) -> Result<()>,
     ) -> Result<()> {
@@ -309,12 +309,12 @@ impl<D: Detail> Store<D> {
     }
 
     /// The trials that were sent in batches, without replies; a trial that was sent again is in the list again.
-    pub(crate) fn batch_trials(&self) -> Result<Vec<Record<D>>> {
+    pub fn batch_trials(&self) -> Result<Vec<Record<D>>> {
         lines(&self.folder.join(BATCH).join(TRIALS)).map(|records| self.shown(records))
     }
 
     /// The trials whose batch has no result yet: they have no reply, and were sent more often than they failed.
-    pub(crate) fn pending_in_batches(&self) -> Result<BTreeSet<TrialKey>> {
+    pub fn pending_in_batches(&self) -> Result<BTreeSet<TrialKey>> {
         let mut pending = HashMap::<TrialKey, usize>::new();
         let mut limits = HashMap::<TrialKey, u32>::new();
         for record in self.batch_trials()? {
@@ -340,19 +340,19 @@ impl<D: Detail> Store<D> {
         Ok(pending.map(|(key, _)| key).collect())
     }
 
-    #[must_use]
-    pub(crate) fn folder(&self) -> &Path {
+    /// The run folder.
+    pub fn folder(&self) -> &Path {
         &self.folder
     }
 
     /// Appends one record. After this returns, a killed process cannot lose it.
-    pub(crate) fn append(&mut self, record: &Record<D>) -> Result<()> {
+    pub fn append(&mut self, record: &Record<D>) -> Result<()> {
         let line = self.line(record)?;
         self.append_lines(&line)
     }
 
     /// The line of a record, with its end.
-    pub(crate) fn line(&self, record: &Record<D>) -> Result<Vec<u8>> {
+    pub fn line(&self, record: &Record<D>) -> Result<Vec<u8>> {
         let mut line = serde_json::to_vec(&*self.recorded(record))
             .map_err(|e| Error::file(self.folder.join(RECORDS), "write", e.into()))?;
         line.push(b'\n');
@@ -360,7 +360,7 @@ impl<D: Detail> Store<D> {
     }
 
     /// Appends the lines of records, with their ends, as they are in the file of another run with the same names of models.
-    pub(crate) fn append_lines(&mut self, lines: &[u8]) -> Result<()> {
+    pub fn append_lines(&mut self, lines: &[u8]) -> Result<()> {
         self.records
             .write_all(lines)
             .map_err(|e| Error::file(self.folder.join(RECORDS), "write", e))?;
@@ -372,19 +372,20 @@ impl<D: Detail> Store<D> {
     }
 
     /// Forces all records to the disk.
-    pub(crate) fn sync(&mut self) -> Result<()> {
+    pub fn sync(&mut self) -> Result<()> {
         self.synced = Instant::now();
         self.records
             .sync_data()
             .map_err(|e| Error::file(self.folder.join(RECORDS), "write", e))
     }
 
-    pub(crate) fn write_manifest(&self, manifest: &RunManifest) -> Result<()> {
+    /// Replaces the manifest.
+    pub fn write_manifest(&self, manifest: &RunManifest) -> Result<()> {
         write_manifest(&self.folder, manifest)
     }
 
     /// Writes a file into the run folder, completely or not at all; a file with the same content is left untouched.
-    pub(crate) fn write(&self, name: &str, content: &[u8]) -> Result<()> {
+    pub fn write(&self, name: &str, content: &[u8]) -> Result<()> {
         write(&self.folder, name, content)
     }
 }

@@ -7,7 +7,7 @@ use std::fs::{self, DirEntry, Metadata};
 use std::path::Path;
 
 use super::folder::{BATCH, FIDELITY, RECORDS, THUMBNAILS};
-use crate::error::{Error, Result};
+use darkqa_ground::error::{Error, Result};
 
 /// The subfolders of a run that lines are appended in.
 const INNER: [&str; 1] = [BATCH];

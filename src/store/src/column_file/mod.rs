@@ -19,11 +19,11 @@ use parquet::schema::types::{ColumnPath, Type};
 use rayon::prelude::*;
 
 use self::chunk::Chunk;
-use crate::error::{Error, Result};
-use crate::files::unfinished;
+use darkqa_ground::error::{Error, Result};
+use darkqa_ground::files::unfinished;
 
-pub(crate) use self::column::{Cell, CellKind, Column, Presence};
-pub(crate) use self::metadata::{CREATED_BY, FileMetadata};
+pub use self::column::{Cell, CellKind, Column, Presence};
+pub use self::metadata::{CREATED_BY, FileMetadata};
 
 /// How large a row group may become, which is in memory until it ends.
 #[derive(Debug, Clone, Copy)]
@@ -40,7 +40,7 @@ const LIMITS: GroupLimits = GroupLimits {
 };
 
 /// A table whose rows are `R`. The file has its name only once it is complete.
-pub(crate) struct ColumnFile<'c, R> {
+pub struct ColumnFile<'c, R> {
     path: PathBuf,
     part: PathBuf,
     columns: &'c [Column<R>],
@@ -57,11 +57,7 @@ impl<'c, R: Sync> ColumnFile<'c, R> {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub(crate) fn create(
-        path: &Path,
-        columns: &'c [Column<R>],
-        metadata: &FileMetadata,
-    ) -> Result<Self> {
+    pub fn create(path: &Path, columns: &'c [Column<R>], metadata: &FileMetadata) -> Result<Self> {
         let part = unfinished(path);
         let file = File::create(&part).map_err(|e| Error::file(&part, "write", e))?;
         let wrong = |e: ParquetError| unwritable(&part, e);
@@ -89,7 +85,7 @@ impl<'c, R: Sync> ColumnFile<'c, R> {
     ///
     /// # Errors
     /// If a row does not fit the columns, or the file cannot be written.
-    pub(crate) fn append(&mut self, mut rows: &[R]) -> Result<()> {
+    pub fn append(&mut self, mut rows: &[R]) -> Result<()> {
         while !rows.is_empty() {
             if self.group.is_empty() {
                 let columns = self.file.schema_descr().columns().iter();
@@ -132,7 +128,7 @@ impl<'c, R: Sync> ColumnFile<'c, R> {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub(crate) fn finish(mut self) -> Result<BTreeMap<&'static str, usize>> {
+    pub fn finish(mut self) -> Result<BTreeMap<&'static str, usize>> {
         let ended = if self.group.is_empty() {
             Ok(())
         } else {

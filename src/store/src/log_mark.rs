@@ -4,16 +4,16 @@ use std::io::{ErrorKind, Read, Seek, SeekFrom};
 use std::path::Path;
 
 use super::folder::{MANIFEST, QUESTIONS, RECORDS};
-use crate::error::{Error, Result};
-use crate::files::reading;
-use crate::types::Digest;
+use darkqa_ground::error::{Error, Result};
+use darkqa_ground::files::reading;
+use darkqa_ground::types::Digest;
 
 /// How much of the end of the records is looked at, in bytes. Records are appended: whatever changes them changes their end.
 const TAIL: u64 = 64 << 10;
 
 /// Digests by which a file that was made from a run folder is known to be as new as the records.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct LogMark {
+pub struct LogMark {
     /// The digest of `manifest.json`.
     manifest: Digest,
     /// The digest of `questions.jsonl`; of nothing if there is none.
@@ -29,7 +29,7 @@ impl LogMark {
     ///
     /// # Errors
     /// If a file cannot be read.
-    pub(crate) fn of(folder: &Path) -> Result<Self> {
+    pub fn of(folder: &Path) -> Result<Self> {
         let whole = |name: &str| {
             let path = folder.join(name);
             match reading::read(&path) {
@@ -56,7 +56,7 @@ impl LogMark {
     }
 
     /// The mark as pairs of key and value.
-    pub(crate) fn pairs(&self) -> [(&'static str, String); 4] {
+    pub fn pairs(&self) -> [(&'static str, String); 4] {
         [
             ("darkqa.manifest", self.manifest.to_string()),
             ("darkqa.questions", self.questions.to_string()),

@@ -6,20 +6,20 @@ use std::path::Path;
 
 use parquet::file::metadata::ParquetMetaDataReader;
 
-use crate::error::{Error, Result};
-use crate::files::guarded::guarded;
-use crate::files::reading;
+use darkqa_ground::error::{Error, Result};
+use darkqa_ground::files::guarded::guarded;
+use darkqa_ground::files::reading;
 
 /// What the program writes of itself into its Parquet files.
-pub(crate) const CREATED_BY: &str = concat!("darkqa-eval version ", env!("CARGO_PKG_VERSION"));
+pub const CREATED_BY: &str = concat!("darkqa-eval version ", env!("CARGO_PKG_VERSION"));
 
 /// The metadata of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct FileMetadata {
+pub struct FileMetadata {
     /// The program that wrote it.
-    pub(crate) created_by: String,
+    pub created_by: String,
     /// Values by key.
-    pub(crate) pairs: BTreeMap<String, String>,
+    pub pairs: BTreeMap<String, String>,
 }
 
 impl FileMetadata {
@@ -27,7 +27,7 @@ impl FileMetadata {
     ///
     /// # Errors
     /// If it cannot be read.
-    pub(crate) fn of(path: &Path) -> Result<Option<Self>> {
+    pub fn of(path: &Path) -> Result<Option<Self>> {
         let file = match reading::open(path) {
             Ok(file) => file,
             Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
