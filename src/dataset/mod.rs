@@ -206,10 +206,10 @@ impl Dataset {
             )
         });
         let asked = Self {
-            questions,
             scenes,
-            form,
+            questions,
             reading,
+            form,
             rows,
             ..self
         };

@@ -341,9 +341,18 @@ fn without_maps(written: &[WrittenFrame]) -> String {
         if lacking == written.len() && key == "sem" {
             note += "no class maps: there will be no questions by rule\n";
         } else if lacking > 0 && lacking < written.len() {
-            note += &format!(
-                "without {noun}: {lacking} of {}\n",
-                counted(written.len(), "frame")
+            let frames = counted(written.len(), "frame");
+            note.push_str(
+                &[
+                    "without ",
+                    noun,
+                    ": ",
+                    &lacking.to_string(),
+                    " of ",
+                    &frames,
+                    "\n",
+                ]
+                .concat(),
             );
         }
     }

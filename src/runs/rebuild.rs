@@ -51,6 +51,7 @@ pub(crate) struct ImageRebuilder {
 }
 
 /// The frames of a data set or of walks.
+#[allow(clippy::large_enum_variant, reason = "a run has one")]
 enum FrameFolder {
     Frames(Dataset),
     Walks(WalkFolder, Walk),

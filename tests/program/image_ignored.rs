@@ -39,7 +39,8 @@ fn bench() -> Bench {
                 "question": format!("Question {question}?"), "choices": choices,
                 "answer": choices[truth(frame, question)],
             });
-            lines += &format!("{line}\n");
+            lines.push_str(&line.to_string());
+            lines.push('\n');
         }
     }
     bench.file("set.jsonl", lines);
@@ -120,9 +121,12 @@ fn images_that_every_second_request_loses_are_found() {
 
 #[test]
 fn a_model_that_falls_back_on_the_words_in_the_dark_is_not_named() {
-    let (called, alerts) = call(|asked| match asked.is_dark {
-        true => asked.by_words(),
-        false => asked.by_image(),
+    let (called, alerts) = call(|asked| {
+        if asked.is_dark {
+            asked.by_words()
+        } else {
+            asked.by_image()
+        }
     });
     assert!(!called.stderr.contains("depend on the image"), "{called:?}");
     assert!(alerts.iter().all(|alert| alert["kind"] != "image_ignored"));

@@ -483,7 +483,8 @@ fn with_unusable(unusable: &[(usize, Option<Vec<u8>>)]) -> Bench {
         let picture = image::RgbImage::from_pixel(32, 24, image::Rgb([number as u8 * 9, 60, 30]));
         picture.save(bench.path(&name)).unwrap();
         let line = json!({"id": number.to_string(), "image": name, "question": "Which?", "choices": ["x", "y"], "answer": "x"});
-        lines += &format!("{line}\n");
+        lines.push_str(&line.to_string());
+        lines.push('\n');
     }
     for (number, bytes) in unusable {
         let path = bench.path(&format!("img/{number}.png"));
@@ -524,7 +525,7 @@ fn an_image_that_cannot_be_used_is_left_out_and_counted() {
         let called = run("--out run");
         assert_eq!(called.code, Some(2), "{called:?}");
         assert!(
-            called.stderr.contains("--bad skip") && called.stderr.contains("7"),
+            called.stderr.contains("--bad skip") && called.stderr.contains('7'),
             "{}",
             called.stderr
         );
@@ -608,7 +609,7 @@ fn a_changed_image_is_named_when_a_run_goes_on() {
     let called = run();
     assert_eq!(called.code, Some(2), "{called:?}");
     assert!(
-        called.stderr.contains("the image \"img/4.png\" of question \"4\" has changed since the run began; so has 1 more question; restore the file, or use another --out"),
+        called.stderr.contains("the image \"img/4.png\" of question \"4\" has changed since the run began; so has 1 more question; restore the file or its --data, or use another --out"),
         "{}",
         called.stderr
     );
@@ -627,7 +628,7 @@ fn a_changed_image_is_named_when_a_run_goes_on() {
     );
     let called = run();
     assert!(
-        called.stderr.contains("question \"0\" has another answer than in this run: \"y\", before \"x\"; restore the questions"),
+        called.stderr.contains("question \"0\" has another answer than in this run: \"y\", before \"x\"; restore --data and --questions"),
         "{}",
         called.stderr
     );

@@ -328,6 +328,10 @@ fn an_item_is_drawn_as_one_picture() {
 }
 
 #[test]
+#[allow(
+    clippy::too_many_lines,
+    reason = "one study, from its pack to its report"
+)]
 fn people_enter_as_a_model() {
     let bench = Bench::with_questions(6);
     bench.file("said.jsonl", "{\"default\": \"A\"}\n");

@@ -252,7 +252,7 @@ fn the_images_of_a_walk_are_made_again_and_proved() {
     assert!(
         refused
             .stderr
-            .contains("has changed since the run began; restore the file"),
+            .contains("has changed since the run began; so has 1 more question; restore the file"),
         "{}",
         refused.stderr
     );

@@ -324,7 +324,7 @@ fn finish(
     hint: Option<String>,
 ) -> Result<Finished> {
     leave_out_unusable(opened, &mut set, &frames)?;
-    let mut ids = frames.ids(&set.answered)?;
+    let mut ids = frames.ids(&set.answered).map_err(with_skip)?;
     if !ids.contradictory().is_empty() {
         let pairs = ids.contradictory();
         leave_out(
@@ -335,7 +335,7 @@ fn finish(
             pairs,
         )
         .map_err(|problem| Error::data(opened.place.display(), problem))?;
-        ids = frames.ids(&set.answered)?;
+        ids = frames.ids(&set.answered).map_err(with_skip)?;
     }
     let family = FamilyOf::of(opened.table, &opened.roles.families, &set.answered);
     let groups = (&family, &set.groups);

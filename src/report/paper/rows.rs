@@ -13,7 +13,7 @@ pub(super) fn column(columns: usize, look: &Look) -> Look {
     Look { width, ..*look }
 }
 
-/// Sheets of the width of a [`column`], in rows.
+/// Sheets of the width of a [`column()`], in rows.
 pub(super) fn in_rows(
     parts: impl IntoIterator<Item = Sheet>,
     columns: usize,

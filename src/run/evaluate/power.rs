@@ -46,7 +46,7 @@ pub(super) fn asked_sets(conditions: &[Condition], models: usize) -> AskedSets {
     let variants: BTreeSet<KindReading> = conditions.iter().map(Condition::kind_reading).collect();
     let last = variants.iter().filter_map(|variant| variant.kind).max();
     let lights = variants.iter().filter(|variant| variant.kind == last);
-    let base = last.and_then(|kind| kind.base());
+    let base = last.and_then(darkqa_ground::types::degradation::Kind::base);
     let enhancers: BTreeSet<_> = conditions
         .iter()
         .filter_map(|condition| condition.enhancer.as_ref())

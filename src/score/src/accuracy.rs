@@ -144,7 +144,7 @@ fn cell(
 /// True if a person said that they cannot tell: that is read, and is no choice.
 fn cannot_tell(grid: &Grid<'_>, subject: usize, item: usize) -> bool {
     let trial = grid.trial(subject, item);
-    let strict = trial.and_then(|trial| trial.strict());
+    let strict = trial.and_then(darkqa_ground::types::TrialRef::strict);
     strict.and_then(|reading| reading.why) == Some(UnreadReason::CannotTell)
 }
 

@@ -68,7 +68,7 @@ impl Coverage {
     }
 
     /// The levels at which less is answered than [`LEAST_SHARE`] of what `most` has, with both numbers of items.
-    pub(super) fn lacking(&self, most: &Self) -> Vec<(AxisLevel, [usize; 2])> {
+    pub(super) fn lacking(&self, most: &Self) -> Lacking {
         let levels = most.0.keys();
         let counts = levels.map(|level| (*level, self.of_level(most, *level)));
         counts
@@ -77,10 +77,13 @@ impl Coverage {
     }
 }
 
+/// Levels with the numbers of items that the others and a model answered there.
+pub(super) type Lacking = Vec<(AxisLevel, [usize; 2])>;
+
 /// What a mean is about: of all coverages that of which most answers remain if the models that lack some of it stand apart; of several
 /// the larger one, then the first. So neither a model that was asked less nor one that was asked more takes away what is said of the
 /// others. `None` without models.
-pub(super) fn shared<'c>(coverages: &'c [Coverage]) -> Option<&'c Coverage> {
+pub(super) fn shared(coverages: &[Coverage]) -> Option<&Coverage> {
     let mut seen = BTreeSet::new();
     let mut best: Option<((usize, usize), &Coverage)> = None;
     for coverage in coverages {

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::choice::ReadingMode;
 use super::claim::{Claim, ParsedFinding};
-use super::coverage::{Coverage, shared};
+use super::coverage::{Coverage, Lacking, shared};
 use super::estimate::Estimate;
 use super::grid::{Grid, TrialResult};
 use super::paired::{ClusterNet, PairedTest};
@@ -284,7 +284,7 @@ struct SetModels<'g> {
     /// The models of each pair, first and second side.
     pooled: Vec<[&'g str; 2]>,
     /// The models that answered too little, with the levels and the numbers of items of [`Coverage::lacking`].
-    apart: Vec<(&'g str, Vec<(AxisLevel, [usize; 2])>)>,
+    apart: Vec<(&'g str, Lacking)>,
     /// The pooled models that were asked at more levels than the others, with these levels.
     more: Vec<(&'g str, Vec<AxisLevel>)>,
 }

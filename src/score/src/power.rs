@@ -57,7 +57,7 @@ impl PlannedSample {
         let is_possible = least_p(self.questions.len()) < self.level && self.finds(high, clusters);
         // Bisection: the power grows with the difference.
         for _ in 0..40 {
-            let middle = (low + high) / 2.0;
+            let middle = f64::midpoint(low, high);
             if self.finds(middle, clusters) {
                 high = middle;
             } else {
@@ -74,7 +74,7 @@ impl PlannedSample {
     fn clusters_for(&self, difference: f64) -> usize {
         let (mut low, mut high) = (2.0, MAX_CLUSTERS);
         while high - low > 1.0 {
-            let middle = ((low + high) / 2.0_f64).floor();
+            let middle = f64::midpoint(low, high).floor();
             if self.finds(difference, middle) {
                 high = middle;
             } else {
@@ -162,7 +162,7 @@ mod tests {
     fn power(sample: &PlannedSample, difference: f64, random: &mut StdRng) -> f64 {
         let runs = 400;
         let changed = CHANGED + difference / 2.0;
-        let better = (changed + difference) / 2.0;
+        let better = f64::midpoint(changed, difference);
         let found = (0..runs).filter(|_| {
             let mut squares = 0.0;
             let clusters = sample.questions.iter().map(|items| {

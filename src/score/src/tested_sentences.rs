@@ -68,7 +68,7 @@ impl AskedSets {
     /// costs. Later tests of the same questions have the same level or a larger one.
     #[must_use]
     pub fn first_level(self) -> f64 {
-        let rank = if self.models > 1 { 1 } else { 0 };
+        let rank = u32::from(self.models > 1);
         let main = MAIN * f64::from(1 + rank + self.enhancers as u32);
         let noise = if self.has_noise { NOISE } else { 0.0 };
         let share = ALPHA * MAIN / (main + noise + FURTHER) / self.lights.max(1) as f64;

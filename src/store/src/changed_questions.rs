@@ -32,11 +32,11 @@ impl ChangedQuestions {
             count => format!("; so have {} more questions", count - 1),
         };
         let remedy = match part {
-            QuestionPart::Image if reads_alike() => "restore the file",
+            QuestionPart::Image if reads_alike() => "restore the file or its --data",
             QuestionPart::Image => {
                 "restore the file, and flags that decide how it is read (--colour, --transfer)"
             }
-            _ => "restore the questions",
+            _ => "restore --data and --questions",
         };
         Some(format!("{first}{more}; {remedy}, or use another --out"))
     }

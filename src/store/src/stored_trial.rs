@@ -130,7 +130,10 @@ mod tests {
         let mut last = reply("2000", "stop");
         last.follow(&first);
         assert_eq!(
-            (last.lost_attempts(), last.lost().unwrap().usage.prompt_tokens),
+            (
+                last.lost_attempts(),
+                last.lost().unwrap().usage.prompt_tokens
+            ),
             (1, Some(10))
         );
         let mut failed = trial("{}", 2);

@@ -95,7 +95,7 @@ fn replies(bench: &Bench) {
     let batch = json!({
         "id": "batch_1", "object": "batch", "endpoint": "/v1/chat/completions", "errors": null, "input_file_id": "file-1",
         "completion_window": "24h", "status": "completed", "output_file_id": "file-2", "error_file_id": null,
-        "created_at": 1, "request_counts": {"total": 6, "completed": 6, "failed": 0}, "metadata": {},
+        "created_at": 1, "request_counts": {"total": 3, "completed": 3, "failed": 0}, "metadata": {},
     });
     bench.file("reply/POST-batches.json", batch.to_string());
     bench.file("reply/GET-batches-id.json", batch.to_string());

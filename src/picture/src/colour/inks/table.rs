@@ -24,6 +24,7 @@ pub(super) struct InkTable {
 
 /// The steps from the values of the grid to the values of colours.
 #[derive(Debug)]
+#[allow(clippy::large_enum_variant, reason = "a profile has one")]
 enum After {
     /// A curve each, as values at equal distances.
     Tables([Vec<f64>; 3]),
@@ -197,7 +198,7 @@ fn values(table: &LutStore) -> Vec<f64> {
 /// A table of one channel after another; `None` if a channel has fewer than two values.
 fn channels<const N: usize>(values: &[f64]) -> Option<[Vec<f64>; N]> {
     let length = values.len() / N;
-    if length < 2 || values.len() % N != 0 {
+    if length < 2 || !values.len().is_multiple_of(N) {
         return None;
     }
     let channels: Vec<Vec<f64>> = values.chunks_exact(length).map(<[f64]>::to_vec).collect();
