@@ -383,7 +383,7 @@ fn the_page_without_true_answers_works_in_a_browser() {
         counts[0] > 0 && counts[1] > 0 && counts[0] + counts[1] == 9,
         "{counts:?}"
     );
-    let title = browser.evaluate("document.querySelector('#i-choices .true').title");
+    let title = browser.evaluate("document.querySelector('#i-choices .before').title");
     assert_eq!(title, "its answer at L0");
     let reading = browser.evaluate("document.querySelector('#r-mark').textContent");
     assert!(
