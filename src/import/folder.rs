@@ -6,9 +6,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs, labels};
-use super::files::{
-    IMAGES, MAPS, check_same_size, classes, depth_of, files, first_folder, folders, segments,
-};
+use super::files::{IMAGES, MAPS, files, first_folder, folders};
+use super::map_files::MapFiles;
 use crate::dataset::image_names::ImageNames;
 use crate::error::{Error, Result};
 use crate::files::reading::entries;
@@ -40,7 +39,7 @@ const SEGMENTS: [&str; 6] = [
 #[derive(Debug)]
 pub(super) struct Folder {
     pub(super) listing: Listing,
-    maps: Vec<FolderMaps>,
+    maps: Vec<MapFiles>,
     depth_scale: Option<f64>,
     /// Conversion from the numbers of the class maps to those of the label space.
     offset: NumberOffset,
@@ -57,13 +56,6 @@ pub(super) enum NumberOffset {
     None,
     /// Numbers that are one less, with 255 for void.
     One,
-}
-
-#[derive(Debug)]
-struct FolderMaps {
-    depth: Option<PathBuf>,
-    classes: Option<PathBuf>,
-    segments: Option<PathBuf>,
 }
 
 impl Folder {
@@ -136,7 +128,7 @@ impl Folder {
         let mut classes = in_any(&CLASSES, &MAPS)?;
         let mut segments = in_any(&SEGMENTS, &MAPS)?;
         for (frame, rgb) in images {
-            self.maps.push(FolderMaps {
+            self.maps.push(MapFiles {
                 depth: depths.remove(&frame),
                 classes: classes.remove(&frame),
                 segments: segments.remove(&frame),
@@ -172,32 +164,19 @@ impl Adapter for Folder {
     }
 
     fn further_files(&self) -> Vec<PathBuf> {
-        let maps = self
-            .maps
-            .iter()
-            .flat_map(|maps| [&maps.depth, &maps.classes, &maps.segments]);
-        maps.chain([&self.labels_file]).flatten().cloned().collect()
+        MapFiles::paths(&self.maps)
+            .chain(&self.labels_file)
+            .cloned()
+            .collect()
     }
 
     fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
-        let maps = &self.maps[frame.index];
-        let mut result = FrameMaps {
-            depth: depth_of(maps.depth.as_deref(), self.depth_scale, rgb)?,
-            ..FrameMaps::default()
-        };
-        if let Some(path) = &maps.classes {
-            let mut classes = classes(path)?;
-            check_same_size(path, &classes, rgb)?;
-            if self.offset == NumberOffset::One {
-                classes.mapv_inplace(|id| if id == 255 { 0 } else { id + 1 });
-            }
-            result.semantic = Some(classes);
+        let mut maps = self.maps[frame.index].read(self.depth_scale, rgb)?;
+        if let Some(classes) = &mut maps.semantic
+            && self.offset == NumberOffset::One
+        {
+            classes.mapv_inplace(|id| if id == 255 { 0 } else { id + 1 });
         }
-        if let Some(path) = &maps.segments {
-            let segments = segments(path)?;
-            check_same_size(path, &segments, rgb)?;
-            result.segments = Some(segments);
-        }
-        Ok(result)
+        Ok(maps)
     }
 }

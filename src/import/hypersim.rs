@@ -7,7 +7,8 @@
 use std::path::{Path, PathBuf};
 
 use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs, labels};
-use super::files::{check_same_size, classes, depth_of, file_name, files, folders, segments};
+use super::files::{file_name, files, folders};
+use super::map_files::MapFiles;
 use crate::error::Result;
 use crate::types::{DepthKind, Rgb};
 
@@ -21,14 +22,7 @@ const IMAGES: [&str; 2] = [".tonemap.jpg", ".tonemap.png"];
 #[derive(Debug)]
 pub(super) struct Hypersim {
     listing: Listing,
-    maps: Vec<HypersimMaps>,
-}
-
-#[derive(Debug)]
-struct HypersimMaps {
-    depth: Option<PathBuf>,
-    classes: Option<PathBuf>,
-    segments: Option<PathBuf>,
+    maps: Vec<MapFiles>,
 }
 
 impl Hypersim {
@@ -75,7 +69,7 @@ impl Hypersim {
             let mut semantics = files(&geometry, &[".semantic.hdf5"])?;
             let mut instances = files(&geometry, &[".semantic_instance.hdf5"])?;
             for (frame, rgb) in files(&preview, &IMAGES)? {
-                self.maps.push(HypersimMaps {
+                self.maps.push(MapFiles {
                     depth: depths.remove(&frame),
                     classes: semantics.remove(&frame),
                     segments: instances.remove(&frame),
@@ -105,29 +99,10 @@ impl Adapter for Hypersim {
     }
 
     fn further_files(&self) -> Vec<PathBuf> {
-        let maps = self
-            .maps
-            .iter()
-            .flat_map(|maps| [&maps.depth, &maps.classes, &maps.segments]);
-        maps.flatten().cloned().collect()
+        MapFiles::paths(&self.maps).cloned().collect()
     }
 
     fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
-        let maps = &self.maps[frame.index];
-        let depth = depth_of(maps.depth.as_deref(), None, rgb)?;
-        let semantic = maps.classes.as_deref().map(classes).transpose()?;
-        if let (Some(path), Some(classes)) = (&maps.classes, &semantic) {
-            check_same_size(path, classes, rgb)?;
-        }
-        let segments = maps.segments.as_deref().map(segments).transpose()?;
-        if let (Some(path), Some(segments)) = (&maps.segments, &segments) {
-            check_same_size(path, segments, rgb)?;
-        }
-        Ok(FrameMaps {
-            depth,
-            semantic,
-            segments,
-            room: None,
-        })
+        self.maps[frame.index].read(None, rgb)
     }
 }

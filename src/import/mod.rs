@@ -13,6 +13,7 @@ mod interface;
 mod joined;
 pub(crate) mod keyframes;
 mod left_over;
+mod map_files;
 mod mp3d;
 mod nyu;
 mod polygons;
