@@ -68,7 +68,7 @@ const AWAITS: [&str; 3] = ["ask", "engine", "run/serve"];
 const MOST_LINES: usize = 600;
 
 /// The circles of files that may be, each with its reason, or with how to cut it.
-const CIRCLES: [(&[&str], &str); 5] = [
+const CIRCLES: [(&[&str], &str); 4] = [
     (
         &[
             "score/src/choice/lenient.rs",
@@ -83,14 +83,6 @@ const CIRCLES: [(&[&str], &str); 5] = [
             "ground/src/types/trials/trial_ref.rs",
         ],
         "it stays: a trial is read through the tables of all, which hand it out",
-    ),
-    (
-        &[
-            "questions/src/observer/channel.rs",
-            "questions/src/observer/local.rs",
-            "questions/src/observer/outlines.rs",
-        ],
-        "to cut it, move the structures Fit, ChannelFit and CodeTotals out of channel.rs; the fit by tile begins with that of the whole image",
     ),
     (
         &["dataset/frames.rs", "dataset/mod.rs"],

@@ -4,11 +4,13 @@
 //! by pool adjacent violators: Ayer et al., Ann. Math. Stat. 26:641, 1955). What is left counts as noise. A global tone curve
 //! or gain therefore changes nothing, and what an enhancer invents is no function of the untouched code, so that it is noise.
 
-use super::local::{self, TileFit};
 use super::tiles::{CODES, SameCode, TileSums, Tiles};
 
 /// The variance of a code is pooled over this many codes on either side, so that rare codes have one too (chosen).
 const POOLED: usize = 8;
+
+/// Variance of rounding to whole codes, in codes squared.
+pub(super) const ROUNDING: f64 = 1.0 / 12.0;
 
 /// Tone curve and noise of one channel.
 #[derive(Debug, Clone)]
@@ -17,6 +19,27 @@ pub(super) struct ChannelFit {
     pub(super) curve: [f64; CODES],
     /// Mean squared residual of each untouched code, pooled over 17 codes, in codes squared.
     pub(super) variance: [f64; CODES],
+}
+
+/// Light and noise of a tile.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TileFit {
+    /// Gain of the light in each channel, relative to the curve.
+    pub(super) gain: [f64; 3],
+    /// Variance of the noise in each channel, relative to that of the codes.
+    pub(super) noise: [f64; 3],
+    /// Whether something other than light and noise disturbs the tile, such as a box that covers a part of it.
+    pub(super) is_disturbed: bool,
+}
+
+impl Default for TileFit {
+    fn default() -> Self {
+        Self {
+            gain: [1.0; 3],
+            noise: [1.0; 3],
+            is_disturbed: false,
+        }
+    }
 }
 
 /// The channels of an image, and the share of its variance that they explain.
@@ -33,14 +56,8 @@ pub(super) struct Fit {
 }
 
 impl Fit {
-    /// Fits the channels of a received image: tile by tile if most tiles agree with one curve, else all pixels alike.
-    pub(super) fn new(tiles: &Tiles, sums: &TileSums) -> Self {
-        let whole = Self::whole(tiles, sums);
-        local::fit(tiles, sums, &whole).unwrap_or(whole)
-    }
-
     /// Fits one curve for each channel to all pixels alike.
-    fn whole(tiles: &Tiles, sums: &TileSums) -> Self {
+    pub(super) fn whole(tiles: &Tiles, sums: &TileSums) -> Self {
         let (mut residual, mut total) = (0.0, 0.0);
         let channels = [0, 1, 2].map(|channel| {
             let mut codes = CodeTotals::default();

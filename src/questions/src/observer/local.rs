@@ -9,8 +9,7 @@
 //! Unless at least half of them agree, the image is another one, and there is no local fit. So an image of another room is judged by
 //! all of its pixels, and cannot be confirmed by the few tiles that happen to look alike.
 
-use super::channel::{ChannelFit, CodeTotals, Fit};
-use super::outlines::ROUNDING;
+use super::channel::{ChannelFit, CodeTotals, Fit, ROUNDING, TileFit};
 use super::tiles::{CODES, TileSums, Tiles};
 
 /// Rounds of reweighting without a field of light, so that a covered part is not taken for a bright one (chosen).
@@ -41,30 +40,15 @@ const MAX_UNEXPLAINED: f64 = 0.25;
 /// Number of pixels by which the noise of a tile is drawn to that of all tiles (chosen).
 const SHARED_PIXELS: f64 = 64.0;
 
-/// Light and noise of a tile.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct TileFit {
-    /// Gain of the light in each channel, relative to the curve.
-    pub(super) gain: [f64; 3],
-    /// Variance of the noise in each channel, relative to that of the codes.
-    pub(super) noise: [f64; 3],
-    /// Whether something other than light and noise disturbs the tile, such as a box that covers a part of it.
-    pub(super) is_disturbed: bool,
-}
-
-impl Default for TileFit {
-    fn default() -> Self {
-        Self {
-            gain: [1.0; 3],
-            noise: [1.0; 3],
-            is_disturbed: false,
-        }
-    }
+/// Fits the channels of a received image: tile by tile if most tiles agree with one curve, else all pixels alike.
+pub(super) fn fit(tiles: &Tiles, sums: &TileSums) -> Fit {
+    let whole = Fit::whole(tiles, sums);
+    by_tile(tiles, sums, &whole).unwrap_or(whole)
 }
 
 /// The fit with light and noise of each tile; `None` unless at least half of the tiles with contrast agree. `whole` is the fit to
 /// all pixels.
-pub(super) fn fit(tiles: &Tiles, sums: &TileSums, whole: &Fit) -> Option<Fit> {
+fn by_tile(tiles: &Tiles, sums: &TileSums, whole: &Fit) -> Option<Fit> {
     let curves = curves(tiles, sums, whole);
     let moments = moments(tiles, sums, &curves);
     let found: Vec<Contrast> = moments.iter().map(Contrast::of).collect();

@@ -52,7 +52,6 @@ use darkqa_ground::error::Result;
 use darkqa_ground::types::{Digest, Frame, Labels, Rgb};
 
 use cells::{Cells, TILE};
-use channel::Fit;
 use outlines::{MIN_CONFIRMED, Outline, outlines, patch_sums};
 use resample::area_mean;
 use shade::{Light, Shade};
@@ -103,7 +102,7 @@ impl ObservedFrame {
     pub fn look_with(&self, image: &Rgb, min_confirmed: f64) -> Observation {
         let image = area_mean(image, [self.untouched.width(), self.untouched.height()]);
         let untouched = self.untouched.samples();
-        let fit = Fit::new(&self.tiles, &self.tiles.sums(untouched, image.samples()));
+        let fit = local::fit(&self.tiles, &self.tiles.sums(untouched, image.samples()));
         let sums = patch_sums(&self.cells, untouched, &fit, &image);
         let outlines = outlines(&self.cells, &sums, &fit.tiles);
         // The rules know the segments that are not tiny.

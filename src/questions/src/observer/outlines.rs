@@ -8,8 +8,7 @@
 //! what covers a part of the image changes nothing elsewhere.
 
 use super::cells::{Cells, Element, Scale};
-use super::channel::Fit;
-use super::local::TileFit;
+use super::channel::{Fit, ROUNDING, TileFit};
 use darkqa_ground::types::Rgb;
 
 /// Value of normal noise that is exceeded with probability 0.001 / 3: one false alarm in a thousand tests, over three scales
@@ -25,9 +24,6 @@ pub(super) const MIN_CONFIRMED: f64 = 0.5;
 /// Fewest elements of a thing at which a coarser scale counts, so that one lucky element does not make a thing seen (chosen).
 /// The finest scale always counts.
 const MIN_ELEMENTS: u32 = 3;
-
-/// Variance of rounding to whole codes, in codes squared.
-pub(super) const ROUNDING: f64 = 1.0 / 12.0;
 
 /// Fixed-point numbers have 16 binary digits after the point, so that sums are exact and have no order.
 const FIXED: f64 = 65_536.0;

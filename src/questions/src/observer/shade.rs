@@ -1,9 +1,9 @@
 //! The colour of a thing in the untouched frame, inferred from the received pixels in the light of its surroundings: [`Shade`].
 
 use super::cells::Cells;
-use super::channel::{ChannelFit, Fit};
+use super::channel::{ChannelFit, Fit, ROUNDING};
 use super::local::{Equations, MIN_GAIN};
-use super::outlines::{PatchSums, ROUNDING};
+use super::outlines::PatchSums;
 use super::tiles::Tiles;
 use crate::colors::{Color, Palette};
 

@@ -1,7 +1,7 @@
 //! The observer on a disc in noise: its numbers are those of the textbook.
 
 use super::cells::{Cells, TILE};
-use super::channel::Fit;
+use super::local;
 use super::outlines::{Outline, outlines, patch_sums};
 use super::tiles::Tiles;
 use crate::pick::Picker;
@@ -76,7 +76,7 @@ impl<'a> Untouched<'a> {
     fn look(&self, received: &Rgb) -> Vec<Outline> {
         let untouched = self.image.samples();
         let sums = self.tiles.sums(untouched, received.samples());
-        let fit = Fit::new(&self.tiles, &sums);
+        let fit = local::fit(&self.tiles, &sums);
         let sums = patch_sums(&self.cells, untouched, &fit, received);
         outlines(&self.cells, &sums, &fit.tiles)
     }
