@@ -178,18 +178,10 @@ impl Look {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::paper::Palette;
     use crate::report::paper::font::Font;
+    use crate::report::paper::look::column_look as look;
     use crate::types::Severity;
     use crate::types::degradation::Kind;
-
-    fn look() -> Look {
-        Look {
-            width: 252.0,
-            letters: 8.0,
-            palette: Palette::Colour,
-        }
-    }
 
     fn share(value: f64) -> Estimate {
         Estimate {

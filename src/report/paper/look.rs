@@ -34,6 +34,16 @@ pub(crate) struct Look {
     pub palette: Palette,
 }
 
+/// The look of a figure that is a column wide.
+#[cfg(test)]
+pub(super) fn column_look() -> Look {
+    Look {
+        width: 252.0,
+        letters: 8.0,
+        palette: Palette::Colour,
+    }
+}
+
 /// The mark at each point of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Marker {

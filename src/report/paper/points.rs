@@ -158,16 +158,8 @@ impl Scale {
 mod tests {
     use super::*;
     use crate::report::chart::LineStyle;
-    use crate::report::paper::Palette;
+    use crate::report::paper::look::column_look as look;
     use crate::report::paper::sheet::Mark;
-
-    fn look() -> Look {
-        Look {
-            width: 252.0,
-            letters: 8.0,
-            palette: Palette::Colour,
-        }
-    }
 
     fn panel(series: Vec<PointSeries>) -> PointPanel {
         PointPanel {
