@@ -1,6 +1,7 @@
 //! `import`: writing the frames of another data set in the common interface.
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::path::{Component, Path, PathBuf};
 
 use clap::Args;
@@ -342,18 +343,7 @@ fn without_maps(written: &[WrittenFrame]) -> String {
             note += "no class maps: there will be no questions by rule\n";
         } else if lacking > 0 && lacking < written.len() {
             let frames = counted(written.len(), "frame");
-            note.push_str(
-                &[
-                    "without ",
-                    noun,
-                    ": ",
-                    &lacking.to_string(),
-                    " of ",
-                    &frames,
-                    "\n",
-                ]
-                .concat(),
-            );
+            let _ = writeln!(note, "without {noun}: {lacking} of {frames}");
         }
     }
     note

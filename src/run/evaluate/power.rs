@@ -6,6 +6,7 @@ use crate::dataset::Dataset;
 use crate::report::power::PowerForecast;
 use crate::score::cluster::{Clusters, FrameTies};
 use crate::score::tested_sentences::AskedSets;
+use crate::types::degradation::Kind;
 use crate::types::{Condition, KindReading, Question};
 
 /// What questions about these data can detect; `None` without questions, or if nobody knows their answers.
@@ -46,7 +47,7 @@ pub(super) fn asked_sets(conditions: &[Condition], models: usize) -> AskedSets {
     let variants: BTreeSet<KindReading> = conditions.iter().map(Condition::kind_reading).collect();
     let last = variants.iter().filter_map(|variant| variant.kind).max();
     let lights = variants.iter().filter(|variant| variant.kind == last);
-    let base = last.and_then(darkqa_ground::types::degradation::Kind::base);
+    let base = last.and_then(Kind::base);
     let enhancers: BTreeSet<_> = conditions
         .iter()
         .filter_map(|condition| condition.enhancer.as_ref())

@@ -52,13 +52,15 @@ impl PlannedSample {
     #[must_use]
     pub fn detectable(&self) -> Detectable {
         let clusters = self.questions.len() as f64;
+        let design = Design::new(self);
         let mut low = 0.0;
         let mut high = 1.0;
-        let is_possible = least_p(self.questions.len()) < self.level && self.finds(high, clusters);
+        let is_possible =
+            least_p(self.questions.len()) < self.level && design.finds(high, clusters);
         // Bisection: the power grows with the difference.
         for _ in 0..40 {
             let middle = f64::midpoint(low, high);
-            if self.finds(middle, clusters) {
+            if design.finds(middle, clusters) {
                 high = middle;
             } else {
                 low = middle;
@@ -66,7 +68,33 @@ impl PlannedSample {
         }
         Detectable {
             difference: is_possible.then_some(high),
-            clusters_for_target: self.clusters_for(TARGET),
+            clusters_for_target: design.clusters_for(TARGET),
+        }
+    }
+}
+
+/// The pairs of a sample, by cluster.
+#[derive(Debug)]
+struct Design {
+    /// Mean number of pairs of a cluster.
+    pairs: f64,
+    /// Design effect of the clusters.
+    effect: f64,
+    /// Level of the test.
+    level: f64,
+}
+
+impl Design {
+    fn new(sample: &PlannedSample) -> Self {
+        let pairs = sample.questions.iter().map(|count| count * sample.models);
+        let [sum, squares] = pairs.fold([0.0, 0.0], |[sum, squares], pairs| {
+            let pairs = pairs as f64;
+            [sum + pairs, squares + pairs * pairs]
+        });
+        Self {
+            pairs: sum / sample.questions.len() as f64,
+            effect: (1.0 + (squares / sum - 1.0) * CORRELATION).max(1.0),
+            level: sample.level,
         }
     }
 
@@ -86,15 +114,10 @@ impl PlannedSample {
 
     /// Whether a difference is detected with [`POWER`] in this many clusters like these.
     fn finds(&self, difference: f64, clusters: f64) -> bool {
-        let replies = self.questions.iter().map(|count| count * self.models);
-        let replies: Vec<f64> = replies.map(|count| count as f64).collect();
-        let sum: f64 = replies.iter().sum();
-        let squares: f64 = replies.iter().map(|count| count * count).sum();
-        let design = (1.0 + (squares / sum - 1.0) * CORRELATION).max(1.0);
-        let n = sum / replies.len() as f64 * clusters;
+        let n = self.pairs * clusters;
         // An effect turns some answers that would change the other way, and some that would not change.
         let changed = (CHANGED + difference / 2.0).max(difference);
-        let degrees = if design > 1.0 {
+        let degrees = if self.effect > 1.0 {
             clusters / 2.0
         } else {
             clusters - 1.0
@@ -103,7 +126,7 @@ impl PlannedSample {
             [1.0 - self.level / 2.0, POWER].map(|share| quantile(share, degrees.max(1.0)));
         let spread =
             test * changed.sqrt() + power * (changed - difference * difference).max(0.0).sqrt();
-        n * difference * difference >= design * spread * spread
+        n * difference * difference >= self.effect * spread * spread
     }
 }
 

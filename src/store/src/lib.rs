@@ -249,7 +249,7 @@ impl<D: Detail> Store<D> {
         let mut changed = ChangedQuestions::default();
         let ids = questions.iter().map(|question| question.id.clone());
         let places: HashMap<QuestionId, usize> = ids.zip(0..).collect();
-        for stored in read_questions(&self.folder)? {
+        for mut stored in read_questions(&self.folder)? {
             let Some(&place) = places.get(&stored.id) else {
                 questions.push(stored);
                 continue;
@@ -259,11 +259,8 @@ impl<D: Detail> Store<D> {
             if question.scene.is_empty() {
                 question.scene.clone_from(&stored.scene);
             }
-            let in_scene = RunQuestion {
-                scene: question.scene.clone(),
-                ..stored.clone()
-            };
-            if let Some(part) = in_scene.difference(question) {
+            stored.scene.clone_from(&question.scene);
+            if let Some(part) = stored.difference(question) {
                 changed.add(part, &stored, question);
                 continue;
             }
