@@ -53,10 +53,11 @@ pub mod score {
     pub use crate::score::chance::OfferedChoices;
     pub use crate::score::cluster::{Clusters, FrameTies};
     pub use crate::score::curve::curves;
+    pub use crate::score::estimate::ClusterCount;
     pub use crate::score::estimate::Estimate;
     pub use crate::score::fidelity::FidelityFindings;
     pub use crate::score::findings::Findings;
-    pub use crate::score::grid::{ClusterCount, Grid};
+    pub use crate::score::grid::Grid;
     pub use crate::score::open::{
         AnswerOutcome, Baseline, Group, OpenSummary, QuestionGroups, ScoredAnswer, open_summary,
     };

@@ -79,7 +79,9 @@
 //! | `scenes` | `rooms` | the built-in rooms, drawn by a seed with all their maps |
 //! | `questions` | [`questions`] | a frame with its maps → questions with one true answer, by rule; and the observer: what the rules could still answer from given pixels |
 //! | `enhance` | [`enhance`] | a degraded image → an enhanced one, by the user's ONNX model; `models` has the enhancers that the program carries |
-//! | `score` | [`score`] | a reply → a choice or a mark; records → numbers with their intervals |
+//! | `choice` | [`score::choice`] | a reply → a choice or a mark |
+//! | `statistics` | [`score`] | estimates with intervals, tests and thresholds of clustered replies |
+//! | `score` | [`score`] | records → numbers with their intervals |
 //! | `store` | `store` | the folder of a run, `results/<run>/`: append-only and resumable |
 //!
 //! A [`Frame`](types::Frame) is seen, a [`Question`] is asked, a [`Degradation`] is what was done to a frame, a [`Condition`] is a
@@ -91,7 +93,9 @@
 //! - [`calibrate`]: frames of a sensor → the camera that the synthesis takes its noise from.
 //! - [`ask`]: a prompt and images → a reply; the only asynchronous stage. `ask/wire`: the APIs of endpoints, their requests and replies.
 //! - `image_store`: a folder of images that were made, shared by runs and processes; it may be deleted at any time.
-//! - [`report`]: tables, figures and one HTML file, from the records alone, and a leaderboard of many; figures of pictures that are handed in.
+//! - `text`: words, and the table model with its formats for the terminal, CSV and LaTeX.
+//! - `sentences`: the findings of a report; `tables`: its tables; `drawing`: its figures, and figures of images that are handed in.
+//! - [`report`]: the page, the files and the text of a report, from the records alone, and a leaderboard of many.
 //! - `images`: from a frame to the images of a request, made once by one pipeline for everything that is asked or written.
 //! - `runs`: runs on disk, read from their folders, joined from parts, and tabled.
 //! - `run_reports`: reports on one run or several, from their records alone.
@@ -129,13 +133,17 @@
 //! | `ask` | `files`, `picture`, `types`, `error` |
 //! | `calibrate` | `dataset`, `synthesis`, `files`, `picture`, `types`, `error` |
 //! | `image_store` | `files`, `types`, `error` |
-//! | `report` | `types`, `error`, `score`, `questions`, `calibrate` |
-//! | `images` | `report`, `files`, `picture`, `types`, `error`, `rooms`, `labels`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `image_store` |
-//! | `runs` | `images`, `ask`, `synthesis`, `files`, `picture`, `types`, `error`, `dataset`, `enhance`, `score`, `store`, `image_store`, `report` |
-//! | `run_reports` | `runs`, `images`, `ask`, `files`, `types`, `error`, `questions`, `score`, `store`, `report` |
-//! | `engine` | `run_reports`, `runs`, `images`, `files`, `picture`, `types`, `error`, `rooms`, `labels`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `image_store`, `report` |
-//! | `run` | `engine`, `run_reports`, `runs`, `images`, `files`, `picture`, `types`, `error`, `rooms`, `labels`, `import`, `dataset`, `calibrate`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `image_store`, `report` |
-//! | `internals` | `picture`, `ask`, `dataset`, `enhance`, `labels`, `questions`, `report`, `rooms`, `score`, `synthesis`, `types`, `error` |
+//! | `text` | `types`, `error`, `score` |
+//! | `sentences` | `text`, `types`, `error`, `score` |
+//! | `tables` | `sentences`, `text`, `types`, `error`, `score` |
+//! | `drawing` | `tables`, `sentences`, `text`, `types`, `error`, `score` |
+//! | `report` | `drawing`, `tables`, `sentences`, `text`, `types`, `error`, `score`, `questions`, `calibrate` |
+//! | `images` | `text`, `sentences`, `tables`, `drawing`, `report`, `files`, `picture`, `types`, `error`, `rooms`, `labels`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `image_store` |
+//! | `runs` | `images`, `ask`, `synthesis`, `files`, `picture`, `types`, `error`, `dataset`, `enhance`, `score`, `store`, `image_store`, `text`, `sentences`, `tables`, `drawing`, `report` |
+//! | `run_reports` | `runs`, `images`, `ask`, `files`, `types`, `error`, `questions`, `score`, `store`, `text`, `sentences`, `tables`, `drawing`, `report` |
+//! | `engine` | `run_reports`, `runs`, `images`, `files`, `picture`, `types`, `error`, `rooms`, `labels`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `image_store`, `text`, `sentences`, `tables`, `drawing`, `report` |
+//! | `run` | `engine`, `run_reports`, `runs`, `images`, `files`, `picture`, `types`, `error`, `rooms`, `labels`, `import`, `dataset`, `calibrate`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `image_store`, `text`, `sentences`, `tables`, `drawing`, `report` |
+//! | `internals` | `picture`, `ask`, `dataset`, `enhance`, `labels`, `questions`, `text`, `sentences`, `tables`, `drawing`, `report`, `rooms`, `score`, `synthesis`, `types`, `error` |
 //! | `cli` | `run`, `engine`, `run_reports`, `runs`, `images`, `picture`, `image_store`, `files`, `rooms`, `dataset`, `ask`, `enhance`, `score`, `synthesis`, `types`, `error` |
 //! | `main` | `cli`, `enhance` |
 
@@ -146,6 +154,7 @@ mod calibrate;
 #[doc(hidden)]
 pub mod cli;
 mod dataset;
+mod drawing;
 mod engine;
 mod image_store;
 mod images;
@@ -156,6 +165,9 @@ mod report;
 mod run;
 mod run_reports;
 mod runs;
+mod sentences;
+mod tables;
+mod text;
 
 pub use darkqa_enhance as enhance;
 pub use darkqa_ground::{error, types};

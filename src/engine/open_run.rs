@@ -31,7 +31,6 @@ use crate::images::thumbnail::MissingThumbnails;
 use crate::images::timings::Timings;
 use crate::images::workers::Workers;
 use crate::report::forecast::money;
-use crate::report::words::{counted, plural};
 use crate::runs::first_source::first_source;
 use crate::runs::other_parts::OtherParts;
 use crate::runs::outcome::Outcome;
@@ -42,6 +41,7 @@ use crate::runs::stored::StoredRun;
 use crate::score::image_dependence::FEWEST;
 use crate::store::now;
 use crate::store::{self, Store, StoredTrial};
+use crate::text::words::{counted, plural};
 use crate::types::manifest::{Counts, RunManifest};
 use crate::types::{EnhancerName, TrialKey, View};
 

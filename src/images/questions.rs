@@ -16,7 +16,7 @@ use crate::images::progress::Progress;
 use crate::images::questions_by_rule::by_rule;
 use crate::picture::ReadingRule;
 use crate::questions::rules::Rules;
-use crate::report::words::counted;
+use crate::text::words::counted;
 use crate::types::{Digest, Family, FrameId, Question};
 
 /// The rulebook in a file; without one, the one built in.

@@ -1,10 +1,10 @@
 //! All that a report of questions with choices shows: [`ChoiceReport`].
 
-use super::alert::{Alert, AlertKind};
-use super::sentences::{Sentence, sentences};
-use super::table::Table;
-use super::tables::{EnhancerRow, enhancers, observer_notes, tables};
 use crate::score::findings::Findings;
+use crate::sentences::{Sentence, sentences};
+use crate::tables::{EnhancerRow, enhancers, observer_notes, tables};
+use crate::text::alert::{Alert, AlertKind};
+use crate::text::table::Table;
 
 /// The findings of one run or several, in words and as tables. The terminal, the page and all files are made from it.
 #[derive(Debug)]

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::template::filled;
 use crate::error::Result;
+use crate::report::template::filled;
 
 /// Template of the page.
 const PAGE: &str = include_str!("doctor.html");

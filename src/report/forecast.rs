@@ -5,12 +5,12 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use super::power::PowerForecast;
-use super::table::ColumnKind::{Count, Text};
-use super::table::TableBuilder;
-use super::terminal;
-use super::words::counted;
 use crate::error::{Error, Result};
+use crate::report::power::PowerForecast;
+use crate::text::table::ColumnKind::{Count, Text};
+use crate::text::table::TableBuilder;
+use crate::text::terminal;
+use crate::text::words::counted;
 use crate::types::ReadingName;
 
 /// Estimate of the requests that are left for one model.

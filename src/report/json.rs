@@ -5,14 +5,14 @@ use std::path::Path;
 
 use serde::{Serialize, Serializer};
 
-use super::alert::Alert;
-use super::choice_report::ChoiceReport;
-use super::csv::fields;
-use super::light_readings::LightReadings;
-use super::sentences::Sentence;
-use super::table::{Table, TableRow};
-use super::tables::{BASELINE, strict_groups, summary_rows};
 use crate::error::{Error, Result};
+use crate::report::choice_report::ChoiceReport;
+use crate::sentences::Sentence;
+use crate::tables::{BASELINE, strict_groups, summary_rows};
+use crate::text::alert::Alert;
+use crate::text::csv::fields;
+use crate::text::light_readings::LightReadings;
+use crate::text::table::{Table, TableRow};
 use crate::types::UnreadReason;
 use crate::types::manifest::RunManifest;
 

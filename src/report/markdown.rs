@@ -2,15 +2,15 @@
 
 use std::fmt::Write;
 
-use super::alert::Alert;
-use super::choice_report::ChoiceReport;
-use super::openeqa::{OpenReport, coverage};
-use super::readable::readable;
-use super::self_agreement::{self, AgreementReport};
-use super::sentences::{HOW_TO_READ, Sentence};
-use super::short::head;
-use super::table::{Column, ColumnKind, Table, TableFormat};
-use super::words::{ends, interval, words};
+use crate::report::choice_report::ChoiceReport;
+use crate::report::openeqa::{OpenReport, coverage};
+use crate::report::self_agreement::{self, AgreementReport};
+use crate::report::short::head;
+use crate::sentences::{HOW_TO_READ, Sentence};
+use crate::text::alert::Alert;
+use crate::text::readable::readable;
+use crate::text::table::{Column, ColumnKind, Table, TableFormat};
+use crate::text::words::{ends, interval, words};
 
 /// Name of the table by level of accuracies and scores.
 const LEVELS: &str = "levels";
@@ -197,9 +197,9 @@ fn block(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::table::ColumnKind::{Accuracy, Text};
-    use crate::report::table::TableBuilder;
     use crate::score::estimate::Estimate;
+    use crate::text::table::ColumnKind::{Accuracy, Text};
+    use crate::text::table::TableBuilder;
 
     #[test]
     fn nothing_in_a_name_is_markup() {

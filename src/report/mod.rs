@@ -1,40 +1,19 @@
-//! Stage 7, SHOW: reports from the records alone, and [`sheet`], figures of images that the caller passes in.
+//! Reports from the records alone: the text for the terminal, the page, the files, and one file for each kind of report.
 
-pub(crate) mod alert;
 pub(crate) mod calibration;
-pub(crate) mod chart;
 pub(crate) mod choice_report;
-mod csv;
 pub(crate) mod doctor;
-pub(crate) mod figures;
 pub(crate) mod forecast;
-mod frame_count;
 pub(crate) mod json;
-mod ladder;
-mod latex;
-mod light_readings;
 pub(crate) mod markdown;
 pub(crate) mod openeqa;
-pub(crate) mod outcome_words;
 pub(crate) mod page;
-pub(crate) mod paper;
 pub(crate) mod power;
 pub(crate) mod products;
 pub(crate) mod questions;
-mod readable;
 pub(crate) mod realism;
-mod samples;
-mod script;
 pub(crate) mod self_agreement;
-pub(crate) mod sentences;
-pub(crate) mod sheet;
 pub(crate) mod short;
 pub(crate) mod site;
 pub(crate) mod study;
-pub(crate) mod table;
-pub(crate) mod tables;
 mod template;
-pub(crate) mod terminal;
-mod views;
-mod width;
-pub(crate) mod words;

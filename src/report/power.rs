@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
-use super::words::counted;
 use crate::score::cluster::{ClusterUnit, Clusters};
 use crate::score::paired::POWER;
 use crate::score::power::{CHANGED, CORRELATION, Detectable, PlannedSample, TARGET};
 use crate::score::tested_sentences::AskedSets;
+use crate::text::words::counted;
 
 /// The difference between two conditions that a run detects, and the frames that 5 points need.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -1,15 +1,18 @@
 //! All files of a report: [`products`].
 
-use super::chart::Figure;
-use super::choice_report::ChoiceReport;
-use super::figures::{Names, drawings};
-use super::page::{PageInputs, page};
-use super::paper::figure;
-use super::samples::{self, samples};
-use super::sentences::Sentence;
-use super::table::Table;
-use super::{chart, csv, latex, views};
+use crate::drawing::chart;
+use crate::drawing::chart::Figure;
+use crate::drawing::figures::{Names, drawings};
+use crate::drawing::paper::figure;
+use crate::drawing::samples::{self, samples};
+use crate::drawing::views;
 use crate::error::Result;
+use crate::report::choice_report::ChoiceReport;
+use crate::report::page::{PageInputs, page};
+use crate::sentences::Sentence;
+use crate::text::csv;
+use crate::text::latex;
+use crate::text::table::Table;
 
 /// Files of a report by name: numbers as CSV, the main tables as LaTeX, figures as SVG, and the HTML page.
 ///
@@ -52,7 +55,11 @@ pub(super) fn table_files(
     head: &str,
 ) -> Result<Vec<(String, Vec<u8>)>> {
     let mut files = csv::files(tables)?;
-    let tables = latex::tables(head, sentences, tables);
+    let findings: Vec<String> = sentences
+        .iter()
+        .map(|sentence| format!("{} ({})", sentence.text, sentence.detail))
+        .collect();
+    let tables = latex::tables(head, &findings, tables);
     files.push(("tables.tex".to_owned(), tables.into_bytes()));
     Ok(files)
 }

@@ -3,7 +3,6 @@
 mod foot;
 pub(super) mod marked;
 mod name_column;
-pub(super) mod wrapped;
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -11,19 +10,18 @@ use std::path::Path;
 
 use self::foot::BELOW;
 use self::name_column::{LEVEL, NameColumn};
-use self::wrapped::WIDTH;
-pub(super) use self::wrapped::wrapped;
-use super::alert::lines;
-use super::choice_report::ChoiceReport;
-use super::frame_count::frames;
-use super::ladder::{Ladder, SeriesByLevel};
-use super::light_readings::LightReadings;
-use super::sentences::{FIRST, HOW_TO_READ, Sentence};
-use super::terminal::{line as line_of, render};
-use super::words::{counted, percent, reach_of};
+use crate::report::choice_report::ChoiceReport;
 use crate::score::accuracy::AccuracyCell;
 use crate::score::choice::ReadingMode;
 use crate::score::health::Health;
+use crate::sentences::{FIRST, HOW_TO_READ, Sentence};
+use crate::text::alert::lines;
+use crate::text::frame_count::frames;
+use crate::text::ladder::{Ladder, SeriesByLevel};
+use crate::text::light_readings::LightReadings;
+use crate::text::terminal::{line as line_of, render};
+use crate::text::words::{counted, percent, reach_of};
+use crate::text::wrapped::{WIDTH, wrapped};
 use crate::types::manifest::RunManifest;
 use crate::types::{Axis, AxisLevel};
 

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::script::embedded;
 use crate::error::Result;
+use crate::text::script::embedded;
 use crate::types::Digest;
 
 /// The template of the page.

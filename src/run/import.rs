@@ -21,8 +21,8 @@ use crate::import::{
 };
 use crate::picture::ImageFile;
 use crate::picture::png;
-use crate::report::words::counted;
 use crate::runs::Outcome;
+use crate::text::words::counted;
 use crate::types::manifest::Status;
 use crate::types::{Decides, FrameId, InputNote, Rgb};
 

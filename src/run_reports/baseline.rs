@@ -7,10 +7,7 @@ use super::combine::{Combined, check_comparable, clusters};
 use super::cost::dollars;
 use super::join::join;
 use crate::error::{Error, Result};
-use crate::report::alert::Alert;
 use crate::report::choice_report::ChoiceReport;
-use crate::report::sentences::{against_baseline, no_verdict};
-use crate::report::tables::baseline;
 use crate::runs::stored::StoredRun;
 use crate::score::baseline::{BaselineRow, baseline_rows};
 use crate::score::cluster::ClusterUnit;
@@ -18,6 +15,9 @@ use crate::score::grid::Grid;
 use crate::score::health::healths;
 use crate::score::significance::Significance;
 use crate::score::subject::{Subject, is_control, is_observer};
+use crate::sentences::{against_baseline, no_verdict};
+use crate::tables::baseline;
+use crate::text::alert::Alert;
 use crate::types::{ChoiceDetail, TrialRef};
 
 /// The flag that makes a worse model a failure.

@@ -14,12 +14,12 @@ use crate::report::json::{RunList, summary};
 use crate::report::markdown::MarkdownReport;
 use crate::report::products::{PAGE, products};
 use crate::report::short::{findings, full, short};
-use crate::report::tables::{FLIPS, write_flips};
 use crate::runs::outcome::Outcome;
 use crate::runs::outcome::StdoutFormat;
 use crate::runs::stored::{ShownModels, StoredRun, name};
 use crate::score::findings::Findings;
 use crate::store::Store;
+use crate::tables::{FLIPS, write_flips};
 use crate::types::manifest::RunManifest;
 use crate::types::{ChoiceDetail, Truths};
 

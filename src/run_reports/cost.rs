@@ -7,8 +7,8 @@ use serde_json::Value;
 use crate::ask::{Price, Prices};
 use crate::error::Result;
 use crate::report::forecast::money;
-use crate::report::words;
 use crate::score::record::Detail;
+use crate::text::words;
 use crate::types::manifest::RunManifest;
 use crate::types::{TrialRef, Via};
 

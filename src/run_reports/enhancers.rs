@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 
 use super::join::JoinedRun;
-use crate::report::alert::{Alert, AlertKind};
-use crate::report::tables::EnhancerRow;
-use crate::report::words::counted;
+use crate::tables::EnhancerRow;
+use crate::text::alert::{Alert, AlertKind};
+use crate::text::words::counted;
 use crate::types::enhancer_note::{EnhancerNote, JudgedImages, ProbeOutcome};
 
 /// A row for each enhancer; several runs that used it in the same way have one.

@@ -7,10 +7,10 @@ use super::combine::{Combined, combine};
 use super::runs::distinct;
 use super::whole_report::no_records;
 use crate::error::{Error, Result};
-use crate::report::alert::Alert;
 use crate::runs::run_parts::choice_run;
 use crate::runs::stored::{ShownModels, StoredRun};
 use crate::score::findings::Findings;
+use crate::text::alert::Alert;
 use crate::types::{ChoiceDetail, Thumbnail, Truths};
 
 /// Runs of questions with choices, joined as the report joins them.

@@ -15,25 +15,25 @@ use super::listing::listing;
 use super::report_folder::ReportFolder;
 use super::whole_report::{WholeReport, with_summary};
 use crate::error::{Error, Result};
-use crate::report::alert::{Alert, AlertKind};
 use crate::report::markdown::MarkdownReport;
 use crate::report::openeqa::{OpenReport, ReportedAnswer, products, render, summary_json, tables};
-use crate::report::outcome_words;
 use crate::report::products::PAGE;
-use crate::report::table::Table;
-use crate::report::tables::EnhancerRow;
 use crate::runs::mark_index::MarkIndex;
 use crate::runs::mark_index::{JUDGE, PROTOCOL};
 use crate::runs::outcome::Outcome;
 use crate::runs::outcome::StdoutFormat;
 use crate::runs::predictions::{AnswerState, Prediction, predictions};
 use crate::runs::stored::{RunLayout, ShownModels, StoredRun, sort};
-use crate::score::llm_match::{Protocol, mark};
+use crate::score::choice::llm_match::{Protocol, mark};
 use crate::score::open::{
     AnswerOutcome, OpenSummary, QuestionGroups, ScoredAnswer, open_summary_listed,
 };
 use crate::score::subject::Subject;
 use crate::store::Store;
+use crate::tables::EnhancerRow;
+use crate::text::alert::{Alert, AlertKind};
+use crate::text::outcome_words;
+use crate::text::table::Table;
 use crate::types::flag::read_word;
 use crate::types::manifest::{RunManifest, Status};
 use crate::types::{

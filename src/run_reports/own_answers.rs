@@ -8,7 +8,6 @@ use super::enhancers;
 use super::report_folder::ReportFolder;
 use super::whole_report::{WholeReport, with_summary};
 use crate::error::Result;
-use crate::report::alert::Alert;
 use crate::report::json::RunList;
 use crate::report::markdown::MarkdownReport;
 use crate::report::products::PAGE;
@@ -16,6 +15,7 @@ use crate::report::self_agreement::{AgreementReport, TextLength, products, summa
 use crate::runs::StdoutFormat;
 use crate::runs::stored::name;
 use crate::score::self_agreement::SelfAgreement;
+use crate::text::alert::Alert;
 use crate::types::ChoiceDetail;
 use crate::types::manifest::RunManifest;
 

@@ -1,8 +1,8 @@
 //! The curves of the picture that tells a run's story: [`story_curves`].
 
 use super::combine::combine;
+use crate::drawing::figures::{self, StoryCurves};
 use crate::error::Result;
-use crate::report::figures::{self, StoryCurves};
 use crate::runs::stored::StoredRun;
 use crate::types::ChoiceDetail;
 

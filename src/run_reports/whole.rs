@@ -7,9 +7,9 @@ use super::{choice, enhancers, open, own_answers};
 use crate::error::Result;
 use crate::report::choice_report::ChoiceReport;
 use crate::report::json::RunList;
-use crate::report::tables::{FLIPS, write_flips};
 use crate::runs::StdoutFormat;
 use crate::runs::stored::{AnyRun, StoredRun};
+use crate::tables::{FLIPS, write_flips};
 use crate::types::{ChoiceDetail, OpenDetail, Truths};
 
 /// The report of a run with the models that it shows now.

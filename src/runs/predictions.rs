@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
 
 use crate::ask::openeqa::blind_answer;
-use crate::score::llm_match::{Protocol, shortened};
+use crate::score::choice::llm_match::{Protocol, shortened};
 use crate::score::subject::Subject;
 use crate::types::{OpenDetail, QuestionId, Record, Step, Via, View};
 

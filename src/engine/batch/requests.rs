@@ -12,8 +12,8 @@ use crate::ask::BatchInterface;
 use crate::engine::models::ModelUnderTest;
 use crate::error::{Error, Result};
 use crate::images::trial::{Item, PreparedGroup, Stimulus, Trial};
-use crate::report::words::counted;
 use crate::store::BATCH;
+use crate::text::words::counted;
 
 /// The share of the tokens that may wait for batches that one part takes, so that one part can wait while another is worked on; chosen.
 pub(super) const SHARE_OF_QUOTA: f64 = 0.45;

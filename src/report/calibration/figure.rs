@@ -1,10 +1,10 @@
 //! The figure of a measured camera, as SVG: [`figure`].
 
 use crate::calibrate::{CameraFit, NoiseLine, SettingFit};
+use crate::drawing::chart::LineStyle;
+use crate::drawing::chart::points::{PointPanel, PointSeries};
+use crate::drawing::paper::point_figure;
 use crate::error::Result;
-use crate::report::chart::LineStyle;
-use crate::report::chart::points::{PointPanel, PointSeries};
-use crate::report::paper::point_figure;
 
 /// Photon transfer with its lines, the probability plots of the read noise, and both deviations over K.
 ///

@@ -4,12 +4,12 @@ mod figure;
 
 pub(crate) use figure::figure;
 
-use super::table::ColumnKind::Text;
-use super::table::TableBuilder;
-use super::terminal;
-use super::words::counted;
 use crate::calibrate::{CameraFit, Measured, NoiseLine, SettingFit, SlopeSource};
 use crate::error::{Error, Result};
+use crate::text::table::ColumnKind::Text;
+use crate::text::table::TableBuilder;
+use crate::text::terminal;
+use crate::text::words::counted;
 
 /// The numbers of a camera as JSON.
 ///

@@ -2,12 +2,12 @@
 
 use super::open_report::OpenReport;
 use super::tables::ladder;
+use crate::drawing::chart::drawn::Drawn;
+use crate::drawing::chart::{Chart, Figure, LineStyle, Panel, PanelContent, PlotLine};
+use crate::drawing::paper::figure;
 use crate::error::Result;
-use crate::report::chart::drawn::Drawn;
-use crate::report::chart::{Chart, Figure, LineStyle, Panel, PanelContent, PlotLine};
-use crate::report::ladder::Ladder;
-use crate::report::paper::figure;
 use crate::score::open::{Group, OpenCell};
+use crate::text::ladder::Ladder;
 use crate::types::AxisLevel;
 
 /// Scores by level: all questions together, and by category if there are several.

@@ -8,9 +8,9 @@ use crate::report::page::data::{
     ABSENT, Distinct, FAILED, Item, PageData, PageKind, Question, SizeLimit, Subject, UNREAD,
     levels, packed_by, shortened, sizes, thumbnails,
 };
-use crate::report::words;
 use crate::score::open::{AnswerOutcome, Group};
 use crate::score::subject;
+use crate::text::words;
 use crate::types::{AxisLevel, View};
 
 /// Why an answer has no mark, by the index that `why` has of it.

@@ -18,13 +18,15 @@ pub(crate) use open_report::{OpenReport, ReportedAnswer};
 pub(crate) use tables::tables;
 
 pub(super) use self::coverage::coverage;
+use crate::drawing::chart;
 use crate::error::Result;
-use crate::report::alert::{Alert, lines};
-use crate::report::light_readings::LightReadings;
+use crate::report::json;
 use crate::report::products::{PAGE, table_files};
-use crate::report::short::wrapped;
-use crate::report::table::Table;
-use crate::report::{chart, json, terminal};
+use crate::text::alert::{Alert, lines};
+use crate::text::light_readings::LightReadings;
+use crate::text::table::Table;
+use crate::text::terminal;
+use crate::text::wrapped::wrapped;
 use crate::types::manifest::RunManifest;
 
 /// Files of a run by name: numbers as CSV, the table as LaTeX, figures as SVG, answers and marks in upstream's format, and the

@@ -1,11 +1,11 @@
 //! The data of a report on open questions: [`OpenReport`].
 
-use crate::report::alert::Alert;
-use crate::report::light_readings::LightReadings;
-use crate::report::tables::EnhancerRow;
-use crate::score::llm_match::Protocol;
+use crate::score::choice::llm_match::Protocol;
 use crate::score::open::{AnswerOutcome, OpenSummary};
 use crate::score::subject::Subject;
+use crate::tables::EnhancerRow;
+use crate::text::alert::Alert;
+use crate::text::light_readings::LightReadings;
 use crate::types::manifest::RunManifest;
 use crate::types::{RunQuestion, Thumbnail};
 

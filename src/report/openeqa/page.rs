@@ -6,12 +6,12 @@ use super::coverage::coverage;
 use super::items::packed;
 use super::open_report::OpenReport;
 use super::tables::SECTION;
+use crate::drawing::chart::Figure;
 use crate::error::Result;
-use crate::report::chart::Figure;
 use crate::report::page::{OpenContent, page_of_open_questions};
-use crate::report::table::Table;
-use crate::report::tables::Section;
 use crate::score::open::AnswerOutcome;
+use crate::tables::Section;
+use crate::text::table::Table;
 
 /// The sections of the page before the items.
 const SECTIONS: [Section; 1] = [(SECTION, "Scores", "", &["scores", "categories"])];

@@ -1,16 +1,17 @@
 //! Tables of a run of open questions: [`tables`].
 
 use super::open_report::OpenReport;
-use crate::report::ladder::{Ladder, Series, SeriesByLevel};
-use crate::report::latex::escaped;
-use crate::report::table::ColumnKind::{Accuracy, Count, Points, Share, Text};
-use crate::report::table::{ColumnKind, Table, TableBuilder, TableCell};
-use crate::report::tables::{SUMMARY, enhancers, reading};
-use crate::report::terminal::texts;
-use crate::report::words::ends;
 use crate::score::estimate::Estimate;
 use crate::score::open::{Baseline, Group, OpenCell, OpenSummary};
 use crate::score::subject::Subject;
+use crate::tables::{enhancers, reading};
+use crate::text::ladder::{Ladder, Series, SeriesByLevel};
+use crate::text::latex::escaped;
+use crate::text::table::ColumnKind::{Accuracy, Count, Points, Share, Text};
+use crate::text::table::SUMMARY;
+use crate::text::table::{ColumnKind, Table, TableBuilder, TableCell};
+use crate::text::terminal::texts;
+use crate::text::words::ends;
 use crate::types::degradation::Axis;
 
 /// Name of the page section that has all tables.

@@ -9,11 +9,11 @@ use super::data::{
 use super::inputs::PageInputs;
 use super::sample::sample;
 use crate::error::Result;
-use crate::report::outcome_words;
-use crate::report::words::family;
 use crate::score::choice::ReadingMode;
 use crate::score::confusion;
 use crate::score::grid::{Grid, TrialResult};
+use crate::text::outcome_words;
+use crate::text::words::family;
 use crate::types::{AxisLevel, FailureKind, QuestionId, RunQuestion, TrialRef, UnreadReason, View};
 
 /// Everything that the script shows, as compressed JSON in base64.
@@ -125,12 +125,12 @@ fn code(result: TrialResult, mode: ReadingMode) -> u8 {
 
 fn subjects<'a>(grid: &'a Grid<'_>) -> Vec<Subject<'a>> {
     let subject = |subject: &'a crate::score::subject::Subject| Subject {
-        name: crate::report::words::name(subject),
+        name: crate::text::words::name(subject),
         model: &subject.model,
         condition: subject.condition(),
         light: match subject.view {
             Some(View::Blind) => "blind".to_owned(),
-            _ => crate::report::words::light(&subject.variant, subject.enhancer.as_ref()),
+            _ => crate::text::words::light(&subject.variant, subject.enhancer.as_ref()),
         },
         level: subject.level,
         variant: subject.variant.to_string(),

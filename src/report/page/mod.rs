@@ -19,19 +19,19 @@ pub(crate) use run_usage::RunUsage;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::alert::Alert;
-use super::chart::Figure;
-use super::choice_report::ChoiceReport;
-use super::frame_count::frames;
-use super::light_readings::LightReadings;
-use super::sentences::{HOW_TO_READ, Sentence};
-use super::table::Table;
-use super::tables::{SECTIONS, Section};
-use super::template::filled;
+use crate::drawing::chart::Figure;
 use crate::error::Result;
+use crate::report::choice_report::ChoiceReport;
+use crate::report::template::filled;
 use crate::score::confusion::Confusion;
 use crate::score::findings::Findings;
 use crate::score::grid::Grid;
+use crate::sentences::{HOW_TO_READ, Sentence};
+use crate::tables::{SECTIONS, Section};
+use crate::text::alert::Alert;
+use crate::text::frame_count::frames;
+use crate::text::light_readings::LightReadings;
+use crate::text::table::Table;
 use crate::types::Truths;
 use crate::types::manifest::RunManifest;
 

@@ -3,10 +3,10 @@
 use serde::Serialize;
 
 use super::tables;
-use crate::report::chart::Figure;
-use crate::report::samples::{SamplePage, samples};
-use crate::report::table::Table;
-use crate::report::tables::{ENHANCERS, Section};
+use crate::drawing::chart::Figure;
+use crate::drawing::samples::{SamplePage, samples};
+use crate::tables::{ENHANCERS, Section};
+use crate::text::table::Table;
 use crate::types::Thumbnail;
 
 /// A section as the template reads it.

@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
-use super::super::table::ColumnKind::Text;
-use super::super::table::TableBuilder;
-use super::super::terminal;
 use crate::questions::colors::{Color, NONE};
 use crate::questions::look::{FrameLook, STEEP};
+use crate::text::table::ColumnKind::Text;
+use crate::text::table::TableBuilder;
+use crate::text::terminal;
 
 /// Two sets of frames, compared by how they look.
 #[derive(Debug, Serialize)]

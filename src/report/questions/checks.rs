@@ -4,12 +4,12 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 
-use super::super::table::ColumnKind::{Count, Text};
-use super::super::table::TableBuilder;
-use super::super::terminal;
-use super::super::words::with_interval;
 use crate::score::checks::{Checks, agreements, shares};
 use crate::score::estimate::Estimate;
+use crate::text::table::ColumnKind::{Count, Text};
+use crate::text::table::TableBuilder;
+use crate::text::terminal;
+use crate::text::words::with_interval;
 use crate::types::Family;
 
 /// The table of each person's findings by family, with a line about each two people; empty without checks.

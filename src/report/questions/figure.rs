@@ -1,9 +1,9 @@
 //! Bar charts of a set of questions, as SVG: [`figure`].
 
+use crate::drawing::chart::counts::CountPanel;
+use crate::drawing::paper::count_figure;
 use crate::error::Result;
 use crate::questions::summary::{ClassCoverage, QuestionSummary};
-use crate::report::chart::counts::CountPanel;
-use crate::report::paper::count_figure;
 use crate::types::Family;
 
 /// Bars with counts and shares: questions by family, frames by room, answers by family, and classes by questions, segments

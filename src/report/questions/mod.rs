@@ -10,13 +10,14 @@ use std::fmt::{Display, Write as _};
 use against::LookComparison;
 use serde::Serialize;
 
-use super::table::ColumnKind::{Count, Text};
-use super::table::TableBuilder;
-use super::words::counted;
-use super::{csv as files, terminal};
 use crate::error::{Error, Result};
 use crate::questions::summary::{Baselines, CandidateCounts, QuestionSummary};
 use crate::score::checks::Checks;
+use crate::text::csv as files;
+use crate::text::table::ColumnKind::{Count, Text};
+use crate::text::table::TableBuilder;
+use crate::text::terminal;
+use crate::text::words::counted;
 use crate::types::Family;
 
 /// Maximum number of reasons in a line of the table.

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::error::Result;
 use crate::questions::GeneratedQuestion;
-use crate::report::script::embedded;
+use crate::text::script::embedded;
 use crate::types::Digest;
 
 /// The template of the page.

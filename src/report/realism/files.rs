@@ -1,17 +1,17 @@
 //! The files of a comparison: CSV tables, the figure of the residuals, and crops.
 
+use crate::drawing::chart::LineStyle;
+use crate::drawing::chart::points::{PointPanel, PointSeries};
+use crate::drawing::paper::point_figure;
+use crate::drawing::sheet::{self, CropRow};
 use crate::error::Result;
-use crate::report::chart::LineStyle;
-use crate::report::chart::points::{PointPanel, PointSeries};
-use crate::report::csv::csv;
-use crate::report::paper::point_figure;
-use crate::report::sheet::{self, CropRow};
-use crate::report::table::ColumnKind::{Count, Number, Text};
-use crate::report::table::TableBuilder;
 use crate::score::realism::residual::Residuals;
 use crate::score::realism::{
     CameraOrigin, ImageComparison, NoiseComparison, NoiseMethod, PairComparison,
 };
+use crate::text::csv::csv;
+use crate::text::table::ColumnKind::{Count, Number, Text};
+use crate::text::table::TableBuilder;
 use crate::types::Rgb;
 
 /// One way to make the image of one pair; no noise for exposure drop alone.

@@ -1,12 +1,12 @@
 //! The table and the file of fitted gains: [`table`], [`by_pair`] and [`csv()`].
 
 use crate::error::Result;
-use crate::report::csv;
-use crate::report::table::ColumnKind::{Number, Text};
-use crate::report::table::TableBuilder;
-use crate::report::terminal;
 use crate::score::realism::gain::{FitOutcome, PairFit, PooledGain, ReadingFit};
 use crate::score::realism::mean::Mean;
+use crate::text::csv;
+use crate::text::table::ColumnKind::{Number, Text};
+use crate::text::table::TableBuilder;
+use crate::text::terminal;
 
 /// What a gain of a picture is, in words that stand beside every gain.
 pub(crate) const AS_SAVED: &str =

@@ -10,15 +10,15 @@ pub(crate) use files::{PooledResiduals, by_code, crops, figure, pairs};
 pub(crate) use fits::{AS_SAVED, csv as fits_csv};
 use rows::{MethodRow, NoiseRow, difference_text, mean_text};
 
-use super::table::ColumnKind::{Count, Text};
-use super::table::TableBuilder;
-use super::terminal;
-use super::words::counted;
 use crate::error::{Error, Result};
 use crate::score::realism::gain::ReadingFit;
 use crate::score::realism::mean::{LEAST_VALUES, Mean};
 use crate::score::realism::residual::{Bins, EmptyBins};
 use crate::score::realism::{ImageComparison, PairComparison};
+use crate::text::table::ColumnKind::{Count, Text};
+use crate::text::table::TableBuilder;
+use crate::text::terminal;
+use crate::text::words::counted;
 
 /// Summary over all pairs.
 #[derive(Debug, Serialize)]

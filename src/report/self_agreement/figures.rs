@@ -1,13 +1,13 @@
 //! Figures of a run without true answers: [`figures`].
 
+use crate::drawing::chart::drawn::Drawn;
+use crate::drawing::chart::{Chart, Figure, LineStyle, Panel, PanelContent, PlotLine};
+use crate::drawing::paper::figure;
 use crate::error::Result;
-use crate::report::chart::drawn::Drawn;
-use crate::report::chart::{Chart, Figure, LineStyle, Panel, PanelContent, PlotLine};
-use crate::report::ladder::{Ladder, Series, SeriesByLevel};
-use crate::report::paper::figure;
 use crate::score::estimate::Estimate;
 use crate::score::self_agreement::SelfAgreement;
 use crate::score::self_agreement::cell::{AgreementCell, CellRole};
+use crate::text::ladder::{Ladder, Series, SeriesByLevel};
 use crate::types::AxisLevel;
 
 /// Agreement by level with its floor, and the evidence kept, for each light. Empty if only one level was asked.

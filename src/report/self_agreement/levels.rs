@@ -3,14 +3,14 @@
 use std::collections::BTreeSet;
 
 use super::measure::AGREEMENT;
-use crate::report::ladder::{Ladder, Series, SeriesByLevel};
-use crate::report::table::ColumnKind::{Accuracy, Text};
-use crate::report::table::{Table, TableBuilder, TableCell};
-use crate::report::words::{percent, with_interval};
 use crate::score::estimate::Estimate;
 use crate::score::self_agreement::SelfAgreement;
 use crate::score::self_agreement::cell::{AgreementCell, CellRole};
 use crate::score::self_agreement::evidence::{MIN_DISTANCE, NoEvidence};
+use crate::text::ladder::{Ladder, Series, SeriesByLevel};
+use crate::text::table::ColumnKind::{Accuracy, Text};
+use crate::text::table::{Table, TableBuilder, TableCell};
+use crate::text::words::{percent, with_interval};
 use crate::types::{Axis, AxisLevel};
 
 /// A measure of a series: a row of the table.

@@ -13,16 +13,16 @@ mod text;
 
 use serde::Serialize;
 
-use super::alert::Alert;
-use super::json::{Rows, RunList, RunsHead, document};
-use super::light_readings::LightReadings;
-use super::page::{PageContent, PageInputs, page_of};
-use super::products::files;
-use super::sentences::Sentence;
-use super::table::Table;
-use super::words::counted;
 use crate::error::Result;
+use crate::report::json::{Rows, RunList, RunsHead, document};
+use crate::report::page::{PageContent, PageInputs, page_of};
+use crate::report::products::files;
 use crate::score::self_agreement::SelfAgreement;
+use crate::sentences::Sentence;
+use crate::text::alert::Alert;
+use crate::text::light_readings::LightReadings;
+use crate::text::table::Table;
+use crate::text::words::counted;
 
 pub(crate) use agreement_report::AgreementReport;
 pub(crate) use text::{TextLength, text};

@@ -1,6 +1,6 @@
 //! Sections of the page of a run without true answers: [`SECTIONS`].
 
-use crate::report::tables::{ENHANCERS, Section};
+use crate::tables::{ENHANCERS, Section};
 
 /// The sections of the page in order.
 pub(super) const SECTIONS: [Section; 8] = [

@@ -2,12 +2,6 @@
 
 use super::levels::{levels, why};
 use super::measure::AGREEMENT;
-use crate::report::table::ColumnKind::{self, Count, Number, Percent, Ratio, Share, Text};
-use crate::report::table::{Table, TableBuilder, TableCell};
-use crate::report::tables::{
-    SUMMARY, commonest_answers, comparisons_of, counted_answers, health, level_words, reading,
-};
-use crate::report::words::{counted, light};
 use crate::score::choice::ReadingMode;
 use crate::score::confusion::{Confusion, Hallucination};
 use crate::score::self_agreement::SelfAgreement;
@@ -15,6 +9,13 @@ use crate::score::self_agreement::cell::{AgreementCell, CellRole};
 use crate::score::self_agreement::evidence::{EvidenceCurve, NoHalf};
 use crate::score::self_agreement::models_in_light::ModelsInLight;
 use crate::score::self_agreement::question_in_light::QuestionInLight;
+use crate::tables::{
+    commonest_answers, comparisons_of, counted_answers, health, level_words, reading,
+};
+use crate::text::table::ColumnKind::{self, Count, Number, Percent, Ratio, Share, Text};
+use crate::text::table::SUMMARY;
+use crate::text::table::{Table, TableBuilder, TableCell};
+use crate::text::words::{counted, light};
 use crate::types::LightGroup;
 
 /// Name of the table of all agreements.
@@ -254,7 +255,7 @@ fn questions(found: &SelfAgreement<'_>) -> Table {
         for (row, question) in table.rows.iter_mut().zip(&found.questions) {
             if question.is_informative() {
                 row.hidden_in
-                    .push(crate::report::table::TableFormat::Terminal);
+                    .push(crate::text::table::TableFormat::Terminal);
             }
         }
     }

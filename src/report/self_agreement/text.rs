@@ -6,12 +6,13 @@ use std::path::Path;
 use super::agreement_report::AgreementReport;
 use super::levels::{levels, notes};
 use super::measure::HOW_TO_READ;
-use crate::report::alert::lines;
-use crate::report::light_readings::LightReadings;
-use crate::report::short::{marked, wrapped};
-use crate::report::terminal::{line, render, table};
-use crate::report::words::counted;
+use crate::report::short::marked;
 use crate::score::health::Health;
+use crate::text::alert::lines;
+use crate::text::light_readings::LightReadings;
+use crate::text::terminal::{line, render, table};
+use crate::text::words::counted;
+use crate::text::wrapped::wrapped;
 use crate::types::manifest::RunManifest;
 
 /// How much of a report is printed.

@@ -1,14 +1,14 @@
 //! The lines below the short table: models without images and chance ([`baselines`]), and marks and facts of models
 //! ([`about_models`]).
 
-use super::wrapped::wrapped;
 use crate::report::choice_report::ChoiceReport;
-use crate::report::ladder::Ladder;
-use crate::report::tables::{unread, what_it_is};
-use crate::report::words::{percent, with_interval};
 use crate::score::accuracy::AccuracyCell;
 use crate::score::choice::ReadingMode;
 use crate::score::subject::{CHANCE, is_observer, without_run};
+use crate::tables::{unread, what_it_is};
+use crate::text::ladder::Ladder;
+use crate::text::words::{percent, with_interval};
+use crate::text::wrapped::wrapped;
 use crate::types::control::OBSERVER;
 
 /// Mark of an accuracy that is shown to be below that without images.

@@ -6,9 +6,9 @@
 use clap::builder::styling::{AnsiColor, Style};
 
 use super::foot::BELOW;
-use super::wrapped::wrapped;
-use crate::report::alert::Alert;
-use crate::report::sentences::{Sentence, Tone};
+use crate::sentences::{Sentence, Tone};
+use crate::text::alert::Alert;
+use crate::text::wrapped::wrapped;
 use crate::types::shown_text::shown;
 
 /// An alert, wrapped.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::report::words::shortened;
+use crate::text::words::shortened;
 
 /// Width of the column of a level, in characters.
 pub(super) const LEVEL: usize = 7;

@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use crate::report::readable::readable;
-use crate::report::table::{ColumnKind, TableCell};
-use crate::report::words::{ends, interval, words};
+use crate::text::readable::readable;
+use crate::text::table::{ColumnKind, TableCell};
+use crate::text::words::{ends, interval, words};
 
 /// A table as the template reads it.
 #[derive(Serialize)]

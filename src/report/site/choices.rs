@@ -2,10 +2,6 @@
 
 use super::board::{BoardCell, BoardRow, BoardTable};
 use super::run_link::{GroupDigests, RunLink};
-use crate::report::table::ColumnKind::{Count, Points, Share, Text, Threshold};
-use crate::report::table::{ColumnKind, Table, TableBuilder, TableCell};
-use crate::report::tables::level_words as why;
-use crate::report::words::points;
 use crate::score::choice::ReadingMode;
 use crate::score::comparison::{Comparison, ComparisonKind};
 use crate::score::curve::Curve;
@@ -15,6 +11,10 @@ use crate::score::ranks::RankRange;
 use crate::score::significance::Significance;
 use crate::score::subject::{Subject, is_reference};
 use crate::score::threshold::{NoThreshold, Threshold as EvThreshold};
+use crate::tables::level_words as why;
+use crate::text::table::ColumnKind::{Count, Points, Share, Text, Threshold};
+use crate::text::table::{ColumnKind, Table, TableBuilder, TableCell};
+use crate::text::words::points;
 use crate::types::{AxisLevel, KindReading, View};
 
 /// A model of a run.

@@ -9,10 +9,10 @@ mod run_link;
 
 use serde::Serialize;
 
-use super::csv;
-use super::json::Rows;
-use super::table::Table;
 use crate::error::{Error, Result};
+use crate::report::json::Rows;
+use crate::text::csv;
+use crate::text::table::Table;
 
 pub(crate) use choices::{ChoiceRow, choice_rows};
 pub(crate) use content::{DATA, GroupDifference, GroupRows, Ranking, Site, SiteGroup};

@@ -4,11 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::board::{BoardCell, BoardRow, BoardTable};
 use super::run_link::{GroupDigests, RunLink};
-use crate::report::table::ColumnKind::{Count, Share, Text};
-use crate::report::table::{Table, TableBuilder, TableCell};
-use crate::report::words::light;
 use crate::score::estimate::Estimate;
 use crate::score::open::{Group, OpenSummary};
+use crate::text::table::ColumnKind::{Count, Share, Text};
+use crate::text::table::{Table, TableBuilder, TableCell};
+use crate::text::words::light;
 use crate::types::{AxisLevel, View};
 
 /// A model of a run in one light, raw or with an enhancer, with its score (LLM-Match) at each level.

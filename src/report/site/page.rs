@@ -7,8 +7,8 @@ use super::content::{DATA, GroupRows, Site, SiteGroup};
 use super::{choices, open};
 use crate::error::Result;
 use crate::report::page::STYLE;
-use crate::report::readable::readable;
 use crate::report::template::filled;
+use crate::text::readable::readable;
 
 const PAGE: &str = include_str!("index.html");
 const OWN_STYLE: &str = include_str!("site.css");
@@ -67,7 +67,7 @@ pub(super) fn index(site: &Site, downloads: &[String]) -> Result<String> {
         link: run.path(),
         why: readable(why),
     });
-    let counted = |number: usize, noun: &str| crate::report::words::counted(number, noun);
+    let counted = |number: usize, noun: &str| crate::text::words::counted(number, noun);
     filled(
         PAGE,
         Page {

@@ -5,12 +5,12 @@ use std::path::Path;
 
 use clap::Args;
 
+use crate::drawing::sheet::{ContactColumn, contact};
 use crate::enhance::{Enhancer, Examination, ImageOutput, Settled};
 use crate::error::{Error, Result};
 use crate::files::write;
 use crate::picture::{Payload, PayloadFormat, png};
 use crate::report::doctor::{DoctorCell, DoctorColumn, DoctorPage, page};
-use crate::report::sheet::{ContactColumn, contact};
 use crate::runs::Outcome;
 use crate::types::manifest::Status;
 use crate::types::{Decides, Rgb};

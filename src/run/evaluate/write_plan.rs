@@ -10,9 +10,9 @@ use crate::error::{Error, Result};
 use crate::files::folder_access::FolderAccess;
 use crate::images::plan::Plan;
 use crate::images::progress::Progress;
-use crate::report::words::counted;
 use crate::runs::Outcome;
 use crate::runs::run_plan::{NewPlan, PlannedFrame, recorded_command};
+use crate::text::words::counted;
 use crate::types::manifest::Status;
 
 /// Writes the plan of a run into its folder. Nothing is asked.

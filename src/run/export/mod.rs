@@ -26,11 +26,11 @@ use crate::images::source::{Source, input_summary, inspect_all, warn_of_inputs};
 use crate::images::timings::Timings;
 use crate::images::workers::pool;
 use crate::picture::png;
-use crate::report::words::counted;
 use crate::runs::Outcome;
 use crate::runs::part_args::{PartArgs, keep_part};
 use crate::runs::shard::Shard;
 use crate::synthesis::{LightArgs, LightSettings};
+use crate::text::words::counted;
 use crate::types::manifest::Status;
 use crate::types::{Condition, Decides, FrameId, Question};
 

@@ -7,19 +7,19 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
+use crate::drawing::chart::drawn::Drawn;
+use crate::drawing::figures::{
+    Drawing, FIGURES, KnownNames, Names, drawings, overview, paper_tables, without_threshold,
+};
+use crate::drawing::paper::{
+    Look, OverviewSheet, Palette, Sheet, overview_sheet, pdf, sheet, svg, tables, tex,
+};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::picture::{pixels_of_url, png};
-use crate::report::chart::drawn::Drawn;
-use crate::report::figures::{
-    Drawing, FIGURES, KnownNames, Names, drawings, overview, paper_tables, without_threshold,
-};
-use crate::report::paper::{
-    Look, OverviewSheet, Palette, Sheet, overview_sheet, pdf, sheet, svg, tables, tex,
-};
-use crate::report::table::Table;
 use crate::run_reports::FigureRuns;
 use crate::runs::Outcome;
+use crate::text::table::Table;
 use crate::types::Decides;
 use crate::types::manifest::Status;
 

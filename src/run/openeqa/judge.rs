@@ -10,7 +10,7 @@ use crate::ask::{AccessArgs, KeyHeader, Parameters, Server, Temperature};
 use crate::engine::models::ModelName;
 use crate::engine::settings::JobArgs;
 use crate::error::Result;
-use crate::score::llm_match::Protocol;
+use crate::score::choice::llm_match::Protocol;
 use crate::types::Decides;
 
 /// The flags of the judge, the model that marks the answers.

@@ -14,7 +14,7 @@ use crate::engine::settings::{ExperimentSettings, JobArgs, JobSettings};
 use crate::error::{Error, Result};
 use crate::images::walk::Walk;
 use crate::picture::ReadingRule;
-use crate::score::llm_match::Protocol;
+use crate::score::choice::llm_match::Protocol;
 use crate::types::Decides;
 
 /// The flags of `openeqa`.

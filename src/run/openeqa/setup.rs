@@ -17,8 +17,8 @@ use crate::images::progress::Progress;
 use crate::images::recipe::Recipe;
 use crate::images::source::Source;
 use crate::images::walk::WalkFolder;
-use crate::report::words::counted;
 use crate::runs::part::part;
+use crate::text::words::counted;
 use crate::types::manifest::PartPlace;
 use crate::types::{Condition, FrameId, OpenDetail, QuestionId, Record, View};
 

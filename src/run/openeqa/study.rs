@@ -18,8 +18,8 @@ use crate::images::timings::Timings;
 use crate::images::workers::pool;
 use crate::picture::Payload;
 use crate::report::study::{StudyImage, StudyQuestion, page};
-use crate::report::words::counted;
 use crate::runs::Outcome;
+use crate::text::words::counted;
 use crate::types::manifest::Status;
 use crate::types::{Condition, Digest};
 

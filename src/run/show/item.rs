@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use crate::error::Result;
-use crate::report::outcome_words;
 use crate::runs::stored::AnyRun;
+use crate::text::outcome_words;
 use crate::types::manifest::RunManifest;
 use crate::types::question::letter;
 use crate::types::{Condition, Digest, FrameId, OpenDetail, Record, RunQuestion};

@@ -6,12 +6,12 @@ use std::sync::Arc;
 
 use super::item::choice_text;
 use super::settings::ShowArgs;
+use crate::drawing::figures::StoryCurves;
+use crate::drawing::sheet::{Story, StoryCell, StoryMark, StoryRow, story};
 use crate::error::{Error, Result};
 use crate::files::write;
 use crate::images::montage::montage;
 use crate::picture::{Payload, PayloadFormat};
-use crate::report::figures::StoryCurves;
-use crate::report::sheet::{Story, StoryCell, StoryMark, StoryRow, story};
 use crate::run_reports::story_curves;
 use crate::runs::Outcome;
 use crate::runs::rebuild::ImageRebuilder;

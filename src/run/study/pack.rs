@@ -11,10 +11,10 @@ use crate::files::write;
 use crate::images::progress::Progress;
 use crate::picture::Payload;
 use crate::report::study::{StudyImage, StudyQuestion, page};
-use crate::report::words::counted;
 use crate::runs::Outcome;
 use crate::runs::rebuild::{ImageRebuilder, RebuildArgs};
 use crate::runs::stored::StoredRun;
+use crate::text::words::counted;
 use crate::types::manifest::Status;
 use crate::types::{
     ChoiceDetail, Condition, Decides, Digest, FrameId, QuestionId, RunQuestion, Trials,

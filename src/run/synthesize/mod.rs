@@ -23,10 +23,10 @@ use crate::images::recipe::Recipe;
 use crate::images::source::Frames;
 use crate::images::timings::Timings;
 use crate::images::workers::{ThreadArgs, pool};
-use crate::report::words::counted;
 use crate::runs::Outcome;
 use crate::runs::part_args::{PartArgs, keep_part};
 use crate::synthesis::{LightArgs, LightSettings, NoiseKey};
+use crate::text::words::counted;
 use crate::types::manifest::Status;
 use crate::types::{Condition, Decides, Degradation, FrameId, Rgb, SetLight};
 

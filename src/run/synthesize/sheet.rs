@@ -1,5 +1,5 @@
 //! The figures of `synthesize --sheet`: [`Sheet`], with what they are made from, [`SheetRecipe`]. They are drawn by
-//! [`crate::report::sheet`].
+//! [`crate::drawing::sheet`].
 
 use std::fmt;
 
@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::dataset::Picture;
+use crate::drawing::sheet::{self, LevelBlock, LevelImage, LevelRow, Signal};
 use crate::error::Result;
 use crate::images::frame_work::FrameWork;
 use crate::images::placed_image::ImageOrigin;
-use crate::report::sheet::{self, LevelBlock, LevelImage, LevelRow, Signal};
 use crate::synthesis::bayer::Bayer;
 use crate::synthesis::noise::{self, Term};
 use crate::synthesis::unprocess::unprocess_up_to;

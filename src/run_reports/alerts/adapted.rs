@@ -2,10 +2,10 @@
 
 use serde_json::Value;
 
-use crate::report::alert::{Alert, AlertKind};
 use crate::run_reports::join::JoinedRun;
 use crate::run_reports::settings::listed;
 use crate::runs::renamed::ADAPTED_FOR;
+use crate::text::alert::{Alert, AlertKind};
 
 /// One alert for each model whose requests were changed in a run.
 pub(super) fn of_adaptations(runs: &[JoinedRun]) -> Vec<Alert> {

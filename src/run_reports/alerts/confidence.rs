@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::Value;
 
-use crate::report::alert::{Alert, AlertKind};
 use crate::run_reports::join::JoinedRun;
+use crate::text::alert::{Alert, AlertKind};
 use crate::types::{ChoiceDetail, TrialRef, Trials};
 
 /// One alert for each model that was asked with `--probabilities` and has no reply with any.

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::report::alert::{Alert, AlertKind};
-use crate::report::words::plural;
 use crate::run_reports::join::JoinedRun;
+use crate::text::alert::{Alert, AlertKind};
+use crate::text::words::plural;
 use crate::types::{ChoiceDetail, Trials};
 
 /// One alert for each model that was asked with `--constrain` and has replies of another form. A reply that keeps it is stored as its

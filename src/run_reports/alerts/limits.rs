@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use crate::report::alert::{Alert, AlertKind};
-use crate::report::words::plural;
 use crate::run_reports::join::{Joined, JoinedRun};
 use crate::score::record::Detail;
 use crate::score::subject::without_run;
+use crate::text::alert::{Alert, AlertKind};
+use crate::text::words::plural;
 
 /// One line for each model some of whose replies have a larger limit than the first ones, with the number of replies by limit.
 pub(super) fn of_limits<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {

@@ -20,8 +20,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::combine::Combined;
 use super::enhancers::of_enhancers;
 use super::join::{Joined, JoinedRun};
-use crate::report::alert::{Alert, AlertKind};
-use crate::report::words::{counted, plural};
 use crate::runs::over_budget::OverBudget;
 use crate::score::cluster::{ClusterUnit, MIN_SCENES};
 use crate::score::findings::Findings;
@@ -30,6 +28,8 @@ use crate::score::photographed_set::PhotographedSet;
 use crate::score::record::Detail;
 use crate::score::self_agreement::SelfAgreement;
 use crate::score::suggested_scenes::SuggestedScenes;
+use crate::text::alert::{Alert, AlertKind};
+use crate::text::words::{counted, plural};
 use crate::types::manifest::Status;
 use crate::types::{FrameId, InputSummary};
 

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use super::words::names;
-use crate::report::alert::{Alert, AlertKind};
 use crate::run_reports::join::{Joined, JoinedRun};
 use crate::run_reports::models::ModelApart;
 use crate::run_reports::settings::{Setting, listed};
 use crate::score::record::Detail;
+use crate::text::alert::{Alert, AlertKind};
 
 /// The fields of a built-in model in a manifest, in words.
 const FIELDS: [(&str, &str); 3] = [

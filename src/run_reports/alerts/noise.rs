@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use serde_json::Value;
 
-use crate::report::alert::{Alert, AlertKind};
 use crate::run_reports::join::Joined;
 use crate::score::record::Detail;
+use crate::text::alert::{Alert, AlertKind};
 use crate::types::degradation::Kind;
 use crate::types::{Condition, Degradation, Severity, TrialRef};
 

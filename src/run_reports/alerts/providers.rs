@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::report::alert::{Alert, AlertKind};
-use crate::report::words::plural;
 use crate::score::record::Detail;
+use crate::text::alert::{Alert, AlertKind};
+use crate::text::words::plural;
 use crate::types::Trials;
 
 /// One alert for each model whose replies name several providers, with the number of replies of each.

@@ -1,8 +1,8 @@
 //! Replies that were read by another version of the lenient reading: [`of_readings`].
 
-use crate::report::alert::{Alert, AlertKind};
 use crate::run_reports::combine::Combined;
 use crate::run_reports::rereading::LenientChange;
+use crate::text::alert::{Alert, AlertKind};
 use crate::types::TrialRef;
 
 /// How the lenient reading of each run would change by the rules of this version.

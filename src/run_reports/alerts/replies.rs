@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use crate::report::alert::{Alert, AlertKind, MAX_UNREAD};
-use crate::report::words::counted;
 use crate::run_reports::combine::Combined;
 use crate::run_reports::settings::is_of_people;
 use crate::score::health::Health;
+use crate::text::alert::{Alert, AlertKind, MAX_UNREAD};
+use crate::text::words::counted;
 use crate::types::{TrialRef, UnreadReason};
 
 /// Replies that could not be read, with what they count as, and trials without a reply.

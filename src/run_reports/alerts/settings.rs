@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 
 use super::words::{names, sentence};
-use crate::report::alert::{Alert, AlertKind};
 use crate::run_reports::join::Joined;
 use crate::run_reports::settings::{
     ENCODING, Setting, Settings, differing, light, listed, parameter_flags, some, without_repeated,
 };
 use crate::score::record::Detail;
+use crate::text::alert::{Alert, AlertKind};
 use crate::types::manifest::RunManifest;
 
 /// The flags that decide the orders in which choices are shown.

@@ -10,7 +10,7 @@ use super::row::{Row, SentImage, Tabled};
 use crate::error::Result;
 use crate::runs::mark_index::{JUDGE, MarkIndex, PROTOCOL};
 use crate::runs::predictions::{AnswerState, answer_state};
-use crate::score::llm_match::{Protocol, mark};
+use crate::score::choice::llm_match::{Protocol, mark};
 use crate::score::open::AnswerOutcome;
 use crate::store::CellKind::{Double, Int32, LongText, Text};
 use crate::store::Presence::{Always, MayBeNull};

@@ -7,8 +7,9 @@ use serde::Serialize;
 
 use super::chance::{OfferedChoices, chance, chance_of_questions};
 use super::choice::ReadingMode;
+use super::estimate::ClusterCount;
 use super::estimate::Estimate;
-use super::grid::{ClusterCount, Grid, GridItem, TrialResult};
+use super::grid::{Grid, GridItem, TrialResult};
 use super::health::Health;
 use super::subject::{CHANCE, Subject};
 use darkqa_ground::types::{Family, KindReading, UnreadReason};

@@ -2,10 +2,11 @@
 
 use super::choice::ReadingMode;
 use super::comparison::{ComparisonKind, pairs};
+use super::estimate::ClusterCount;
 use super::estimate::Estimate;
-use super::grid::{ClusterCount, Grid};
-use super::quantiles::{degrees_of_freedom, student};
+use super::grid::Grid;
 use super::subject::Subject;
+use darkqa_statistics::quantiles::{degrees_of_freedom, student};
 
 /// Agreement of two models in one condition, in the strict reading.
 #[derive(Debug, Clone, PartialEq)]

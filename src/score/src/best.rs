@@ -5,8 +5,9 @@ use std::ops::Range;
 
 use super::choice::ReadingMode;
 use super::coverage::{Coverage, shared};
+use super::estimate::ClusterCount;
 use super::estimate::Estimate;
-use super::grid::{ClusterCount, Grid};
+use super::grid::Grid;
 use super::paired::{ClusterNet, PairedTest};
 use super::pooled::pool;
 use super::significance::{ALPHA, Significance, SwapMethod, holm, least_p};

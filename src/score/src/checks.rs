@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::agreement::{AgreementCounts, clustered_kappa, kappa};
+use super::estimate::ClusterCount;
 use super::estimate::Estimate;
-use super::grid::ClusterCount;
 use darkqa_ground::types::{Family, QuestionId};
 
 /// What a person found about a question.

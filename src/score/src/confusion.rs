@@ -3,8 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::choice::ReadingMode;
+use super::estimate::ClusterCount;
 use super::estimate::Estimate;
-use super::grid::{ClusterCount, Grid, GridItem};
+use super::grid::{Grid, GridItem};
 use super::paired::PairedComparison;
 use super::significance::ALPHA;
 use super::subject::Subject;

@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use super::auc::{Auc, PairCounts, RankedReply};
 use super::choice::ReadingMode;
 use super::grid::Grid;
 use super::significance::{Significance, holm};
@@ -10,6 +9,7 @@ use super::subject::{Subject, pooled_models};
 use darkqa_ground::types::{
     AxisLevel, Digest, EnhancerName, Family, FrameId, ImageFidelity, KindReading, View,
 };
+use darkqa_statistics::auc::{Auc, PairCounts, RankedReply};
 
 /// What the similarity of images to their clean frames says about the answers.
 ///

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::choice::ReadingMode;
 use super::cluster::Clusters;
+use super::estimate::ClusterCount;
 use super::subject::Subject;
 use darkqa_ground::types::degradation::Kind;
 use darkqa_ground::types::{
@@ -92,15 +93,6 @@ pub struct Grid<'a> {
     trials: &'a Trials<ChoiceDetail>,
     /// Place of the trial behind each result; [`u32::MAX`] if there is none.
     places: Vec<u32>,
-}
-
-/// Numbers of replies and of right replies in a cluster.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct ClusterCount {
-    /// Number of right replies.
-    pub right: u32,
-    /// Number of replies, right or wrong.
-    pub replies: u32,
 }
 
 impl<'a> Grid<'a> {

@@ -17,8 +17,8 @@ use std::collections::BTreeMap;
 use statrs::function::beta::beta_reg;
 
 use super::record::Detail;
-use super::split_mix::SplitMix;
 use darkqa_ground::types::{Condition, Digest, Record, Treatment, TrialRef, Via};
+use darkqa_statistics::split_mix::SplitMix;
 
 /// A reply about an untouched image whose true answer is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -1,4 +1,5 @@
-//! Stage 5, JUDGE: from a reply to a choice, and from records to numbers.
+//! From records to numbers with their intervals. [`choice`] reads a reply; the primitives ([`estimate`], [`bootstrap`],
+//! [`significance`], [`threshold`]) are of the crate `darkqa-statistics`.
 //!
 //! [`findings`] is the entry point. It arranges the records as a [`grid`] and computes from it the accuracies
 //! ([`accuracy`]), the paired differences ([`comparison`]), the curves over the levels ([`curve`]), the answers given
@@ -22,15 +23,12 @@
 
 pub mod accuracy;
 pub mod agreement;
-pub mod auc;
 pub mod baseline;
 pub mod best;
-pub mod bootstrap;
 pub mod by_reading;
 pub mod calibration;
 pub mod chance;
 pub mod checks;
-pub mod choice;
 pub mod claim;
 pub mod cluster;
 pub mod common;
@@ -38,7 +36,6 @@ pub mod comparison;
 pub mod confusion;
 mod coverage;
 pub mod curve;
-pub mod estimate;
 pub mod fidelity;
 pub mod findings;
 pub mod flips;
@@ -46,29 +43,24 @@ pub mod grid;
 mod head;
 pub mod health;
 pub mod image_dependence;
-pub mod llm_match;
 pub mod observed;
 pub mod open;
-mod option_probabilities;
 pub mod pair_darkness;
 pub mod paired;
 pub mod photographed_set;
 pub mod pooled;
 pub mod pooled_kind;
 pub mod power;
-mod quantiles;
 pub mod ranks;
 pub mod realism;
 pub mod record;
-mod residuals;
 pub mod self_agreement;
-pub mod significance;
-mod split_mix;
 pub mod strict_score;
 pub mod subject;
 pub mod suggested_scenes;
 pub mod tested_sentences;
 #[cfg(test)]
 mod tests;
-pub mod threshold;
-mod trapezoid;
+
+pub use darkqa_choice as choice;
+pub use darkqa_statistics::{auc, bootstrap, estimate, significance, threshold};

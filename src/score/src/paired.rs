@@ -3,10 +3,10 @@
 use super::choice::ReadingMode;
 use super::estimate::Estimate;
 use super::grid::{Grid, GridItem};
-use super::quantiles::{beyond, degrees_of_freedom, quantile};
-use super::residuals::{residuals, unknown_design_effect};
 use super::significance::{ALPHA, SwapMethod, mcnemar, swap_test};
 use darkqa_ground::types::Family;
+use darkqa_statistics::quantiles::{beyond, degrees_of_freedom, quantile};
+use darkqa_statistics::residuals::{residuals, unknown_design_effect};
 
 /// Accuracy of one subject against another on the items to which both replied.
 #[derive(Debug, Clone, PartialEq)]
@@ -276,8 +276,8 @@ const ROUNDING: f64 = 1e-9;
 
 #[cfg(test)]
 mod tests {
-    use super::super::quantiles::student;
     use super::*;
+    use darkqa_statistics::quantiles::student;
 
     /// A small generator of whole numbers, for designs of many shapes.
     fn designs() -> impl Iterator<Item = Vec<ClusterNet>> {

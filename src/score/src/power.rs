@@ -12,8 +12,8 @@
 use serde::Serialize;
 
 use super::paired::POWER;
-use super::quantiles::quantile;
 use super::significance::least_p;
+use darkqa_statistics::quantiles::quantile;
 
 /// Share of the answers that change between two conditions without any effect, half of them in each direction; assumed. It is that of the
 /// simulated runs of `src/docs/numbers.md`.

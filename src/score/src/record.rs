@@ -1,8 +1,8 @@
 //! Reading of a reply into the record of its trial, for both experiments: [`Detail`], [`answered`], [`reread`].
 
 use super::choice::{LENIENT_VERSION, readings};
-use super::llm_match::{Protocol, mark};
-use super::option_probabilities::option_probabilities;
+use crate::choice::llm_match::{Protocol, mark};
+use crate::choice::option_probabilities::option_probabilities;
 use darkqa_ground::error::Result;
 use darkqa_ground::types::record::Record;
 use darkqa_ground::types::{

@@ -3,8 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::choice::ReadingMode;
+use super::estimate::ClusterCount;
 use super::estimate::Estimate;
-use super::grid::{ClusterCount, Grid, TrialResult};
+use super::grid::{Grid, TrialResult};
 use super::subject::Subject;
 use darkqa_ground::types::{Family, QuestionId, RunQuestion, StrictGroup};
 

@@ -11,7 +11,7 @@ use crate::enhance::brightness;
 use crate::error::Result;
 use crate::images::progress::Progress;
 use crate::images::source::first_asked;
-use crate::report::words::counted;
+use crate::text::words::counted;
 use crate::types::{Digest, FrameId, InputNote, InputSummary, Question};
 
 /// Whether the pixels of images are looked at.

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashMap};
 
 use super::findings::{Findings, Mark};
-use crate::report::words::counted;
+use crate::text::words::counted;
 use crate::types::Question;
 use crate::types::question::letter;
 use crate::types::shown_text::excerpt;

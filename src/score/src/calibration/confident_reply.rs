@@ -1,7 +1,8 @@
 //! One reply with the model's confidence: [`ConfidentReply`].
 
+use crate::estimate::ClusterCount;
 use crate::estimate::Estimate;
-use crate::grid::{ClusterCount, Grid};
+use crate::grid::Grid;
 use darkqa_ground::types::{OptionProbabilities, TrialOutcome, TrialRef};
 
 /// The least probability of a true choice that is not listed and has no bound, either: probabilities are kept to six decimals.

@@ -14,13 +14,13 @@ mod tested;
 
 use std::collections::BTreeMap;
 
-use super::auc::{Auc, PairCounts, RankedReply};
 use super::bootstrap::Resamples;
 use super::estimate::Estimate;
 use super::grid::Grid;
 use super::subject::Subject;
 use confident_reply::{ConfidentReply, accuracy, confident_replies};
 use darkqa_ground::types::AxisLevel;
+use darkqa_statistics::auc::{Auc, PairCounts, RankedReply};
 
 pub use positions::PositionShare;
 pub use reliability::ReliabilityBin;

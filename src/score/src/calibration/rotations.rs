@@ -3,8 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::confident_reply::usable;
+use crate::estimate::ClusterCount;
 use crate::estimate::Estimate;
-use crate::grid::{ClusterCount, Grid};
+use crate::grid::Grid;
 use darkqa_ground::types::QuestionId;
 
 /// The orders of one question in one repeat.

@@ -1,6 +1,6 @@
 //! One open answer and its outcome: [`ScoredAnswer`], [`AnswerOutcome`].
 
-use crate::llm_match::points;
+use crate::choice::llm_match::points;
 use crate::subject::Subject;
 
 /// Outcome of an open answer.

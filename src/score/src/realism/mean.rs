@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::quantiles::student;
+use darkqa_statistics::quantiles::student;
 
 /// The number of values that an interval needs (chosen). With two values, each half is more than 6 times their distance from each
 /// other, which can be wider than the scale of the number.

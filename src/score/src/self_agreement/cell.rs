@@ -10,8 +10,9 @@ use super::light::{is_refused, is_way_out};
 use super::question_in_light::QuestionInLight;
 use crate::bootstrap::Resamples;
 use crate::choice::ReadingMode;
+use crate::estimate::ClusterCount;
 use crate::estimate::Estimate;
-use crate::grid::{ClusterCount, Grid, TrialResult};
+use crate::grid::{Grid, TrialResult};
 use crate::subject::Subject;
 use darkqa_ground::types::{AxisLevel, Family, View};
 

@@ -4,8 +4,9 @@
 use crate::bootstrap::Resamples;
 use crate::choice::ReadingMode;
 use crate::curve::CurvePoints;
+use crate::estimate::ClusterCount;
 use crate::estimate::Estimate;
-use crate::grid::{ClusterCount, Grid};
+use crate::grid::Grid;
 use crate::subject::Subject;
 use crate::threshold::{LevelCounts, NoThreshold, Threshold};
 use darkqa_ground::types::{AxisLevel, EnhancerName, Family, KindReading};

@@ -1,9 +1,9 @@
 //! Agreement beyond what equal habits give: [`kappa`].
 
 use super::counts::{AnswerCounts, BankCounts};
+use crate::estimate::ClusterCount;
 use crate::estimate::Estimate;
-use crate::grid::ClusterCount;
-use crate::quantiles::{degrees_of_freedom, student};
+use darkqa_statistics::quantiles::{degrees_of_freedom, student};
 
 /// Expected agreement above which κ is not defined: everything agrees by habit alone.
 const CERTAIN: f64 = 1.0 - 1e-9;

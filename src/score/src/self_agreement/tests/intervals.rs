@@ -2,8 +2,8 @@
 
 use super::simulated::{Draws, cell, record};
 use crate::self_agreement::evidence::NoEvidence;
-use crate::split_mix::SplitMix;
 use darkqa_ground::types::Record;
+use darkqa_statistics::split_mix::SplitMix;
 
 /// Records of 30 images with eight questions each. The share of its answers that a model keeps differs from image to image, evenly from 0 to
 /// 1, so that items of an image are far from independent; asked again it keeps 95 %.

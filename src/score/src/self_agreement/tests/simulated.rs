@@ -5,12 +5,12 @@ use serde_json::json;
 use crate::cluster::FrameTies;
 use crate::self_agreement::SelfAgreement;
 use crate::self_agreement::cell::AgreementCell;
-use crate::split_mix::SplitMix;
 use darkqa_ground::types::run_question::BANK_ID;
 use darkqa_ground::types::{
     AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, ModelListing, QuestionId,
     Record, RunQuestion, TrialOutcome, UnreadReason,
 };
+use darkqa_statistics::split_mix::SplitMix;
 
 /// 72 images with 25 questions each: 1,800 items.
 pub(super) const IMAGES: usize = 72;

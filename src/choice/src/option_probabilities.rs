@@ -1,0 +1,259 @@
+//! How likely a model held each choice, from the likeliest tokens of its reply: [`option_probabilities`].
+
+use std::ops::Range;
+
+use darkqa_ground::types::question::letter;
+use darkqa_ground::types::{OptionProbabilities, Thought, TokenChances, TokenPosition};
+
+/// The number of tokens among which the first one of the answer is looked for; chosen.
+const FIRST_TOKENS: usize = 8;
+
+/// The least probability of all tokens that name a choice; chosen. With less, the model did not begin with a choice.
+const LEAST_MASS: f64 = 0.5;
+
+/// Numbers are kept to this many decimals.
+const DECIMALS: f64 = 1e6;
+
+/// The longest token that is kept, in characters.
+const LONGEST: usize = 40;
+
+/// The probabilities of these choices in the order shown; `None` if the reply does not begin with one.
+///
+/// The tokens are those at the first position that is more than white space, brackets, marks or the word “Answer”; in a JSON object,
+/// those of its value. Tokens count for the choice of their letter, without regard to case, spaces and brackets (“ B”, “(b”); if they name
+/// no letters, for the choice whose text alone begins with them. Their probabilities are scaled to 1.
+pub fn option_probabilities(
+    chances: &TokenChances,
+    choices: &[String],
+) -> Option<OptionProbabilities> {
+    let position = &chances.positions[answer_position(&chances.positions)?];
+    let by = |option: &dyn Fn(&str) -> Option<usize>| masses(position, choices.len(), option);
+    let letters = by(&|token| of_letter(token, choices.len()));
+    let masses = if letters.iter().sum::<f64>() >= LEAST_MASS {
+        letters
+    } else {
+        by(&|token| of_text(token, choices))
+    };
+    let mass: f64 = masses.iter().sum();
+    if mass < LEAST_MASS {
+        return None;
+    }
+    let rounded = |value: f64| (value * DECIMALS).round() / DECIMALS;
+    Some(OptionProbabilities {
+        p: masses.iter().map(|own| rounded(own / mass)).collect(),
+        mass: rounded(mass),
+        bound: rounded(bound(position)),
+        token: position.token.chars().take(LONGEST).collect(),
+        reasoned: chances.thought == Thought::Before,
+    })
+}
+
+/// The index of the position at which the answer stands; `None` if the reply has none there.
+fn answer_position(positions: &[TokenPosition]) -> Option<usize> {
+    let first = positions.iter().position(|at| !is_before_answer(&at.token));
+    let first = first.filter(|index| *index < FIRST_TOKENS);
+    let whole: String = positions.iter().map(|at| at.token.as_str()).collect();
+    if !whole.trim_start().starts_with('{') {
+        return first;
+    }
+    let value = value_in(&whole)?;
+    let ends = positions.iter().scan(0, |end, at| {
+        *end += at.token.len();
+        Some(*end)
+    });
+    ends.enumerate()
+        .find(|(_, end)| *end > value.start)
+        .map(|(index, _)| index)
+}
+
+/// The place of the value of `"answer"` in the beginning of a JSON object, without its quotation mark.
+fn value_in(object: &str) -> Option<Range<usize>> {
+    const FIELD: &str = "\"answer\"";
+    let field = object.find(FIELD)? + FIELD.len();
+    let behind = object.get(field..)?;
+    let start = behind.find(|c: char| !c.is_whitespace() && c != ':' && c != '"')?;
+    Some(field + start..object.len())
+}
+
+/// Whether a token stands before an answer: nothing but white space and marks, or the word “Answer”.
+fn is_before_answer(token: &str) -> bool {
+    let bare = bare(token);
+    bare.is_empty() || bare == "answer" || bare == "answer:"
+}
+
+/// A token in small letters without the marks of tokenizers for a space (`Ġ` of byte-level BPE, `▁` of SentencePiece), white space,
+/// brackets, quotation marks and punctuation around it.
+fn bare(token: &str) -> String {
+    const AROUND: &str = "\"'`“”‘’*#([{<.:,)]}>\u{120}\u{2581}\u{10a}";
+    let inner = token.trim_matches(|c: char| c.is_whitespace() || AROUND.contains(c));
+    inner.to_lowercase()
+}
+
+/// The choice of a letter.
+fn of_letter(token: &str, choices: usize) -> Option<usize> {
+    (0..choices).find(|index| letter(*index).to_lowercase().eq(token.chars()))
+}
+
+/// The choice whose text alone begins with a token; one letter is too little, unless it is the whole text.
+fn of_text(token: &str, choices: &[String]) -> Option<usize> {
+    let begins = |text: &&String| {
+        let text = text.to_lowercase();
+        text == token || (token.chars().count() > 1 && text.starts_with(token))
+    };
+    let mut named = choices.iter().enumerate().filter(|(_, text)| begins(text));
+    let (index, _) = named.next()?;
+    named.next().is_none().then_some(index)
+}
+
+/// The probabilities of the tokens of each choice, added up.
+fn masses(
+    position: &TokenPosition,
+    choices: usize,
+    option: &dyn Fn(&str) -> Option<usize>,
+) -> Vec<f64> {
+    let mut masses = vec![0.0; choices];
+    for (token, logprob) in &position.likeliest {
+        if let Some(index) = option(&bare(token)) {
+            masses[index] += libm::exp(*logprob);
+        }
+    }
+    masses
+}
+
+/// The most that a token can have that is not listed: less than the least likely one that is, and no more than what they leave.
+fn bound(position: &TokenPosition) -> f64 {
+    let listed = position
+        .likeliest
+        .iter()
+        .map(|(_, logprob)| libm::exp(*logprob));
+    let least = listed.clone().fold(f64::INFINITY, f64::min);
+    let rest = (1.0 - listed.sum::<f64>()).max(0.0);
+    least.min(rest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(token: &str, likeliest: &[(&str, f64)]) -> TokenPosition {
+        let likeliest = likeliest.iter();
+        TokenPosition {
+            token: token.to_owned(),
+            likeliest: likeliest
+                .map(|(token, logprob)| ((*token).to_owned(), *logprob))
+                .collect(),
+        }
+    }
+
+    fn read(positions: &[TokenPosition], choices: &[&str]) -> Option<OptionProbabilities> {
+        let choices: Vec<String> = choices.iter().map(|&text| text.to_owned()).collect();
+        let chances = TokenChances {
+            positions: positions.to_vec(),
+            thought: Thought::None,
+        };
+        option_probabilities(&chances, &choices)
+    }
+
+    const FOUR: [&str; 4] = ["chair", "table", "lamp", "bed"];
+
+    #[test]
+    fn tokens_of_a_letter_are_added_up_and_scaled() {
+        // e^-0.1 + e^-3.0 of B, e^-3.2 of A, e^-5.0 of C; e^-6.0 names no choice.
+        let position = at(
+            "B",
+            &[
+                ("B", -0.1),
+                (" B", -3.0),
+                ("A", -3.2),
+                ("C", -5.0),
+                ("The", -6.0),
+            ],
+        );
+        let options = read(&[position], &FOUR).unwrap();
+        let masses = [
+            (-3.2_f64).exp(),
+            (-0.1_f64).exp() + (-3.0_f64).exp(),
+            (-5.0_f64).exp(),
+        ];
+        let mass: f64 = masses.iter().sum();
+        for (p, own) in options.p.iter().zip(masses) {
+            assert!((p - own / mass).abs() < 1e-6, "{options:?}");
+        }
+        assert!(options.p[3] == 0.0);
+        assert!((options.mass - mass).abs() < 1e-6);
+        // What is not listed has at most what is left, e^-6.0 being less or more than that.
+        let rest = 1.0 - mass - (-6.0_f64).exp();
+        assert!((options.bound - rest.max(0.0).min((-6.0_f64).exp())).abs() < 1e-6);
+        assert!((options.confidence() - options.p[1]).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_position_is_the_first_of_the_answer() {
+        let sure = [("B", -0.01), ("A", -5.0)];
+        let marks = |tokens: &[&str]| -> Vec<TokenPosition> {
+            let marks = tokens.iter().map(|token| at(token, &[(*token, 0.0)]));
+            marks.chain([at("B", &sure)]).collect()
+        };
+        for before in [
+            &[][..],
+            &["\n", "**", "("],
+            &["Answer", ":", " "],
+            &["\u{120}", "\u{2581}"],
+            &["{\"", "answer", "\":", " \""],
+            &["{", "\n", "  ", "\"answer\"", ": ", "\""],
+        ] {
+            let options = read(&marks(before), &FOUR);
+            assert!(options.is_some_and(|o| o.p[1] > 0.9), "{before:?}");
+        }
+        // A quotation mark may be in the token of the letter.
+        let quoted = [at("{\"answer\":", &[]), at("\"B", &[("\"B", -0.01)])];
+        assert!(read(&quoted, &FOUR).is_some());
+        // A reply that does not begin with a choice says nothing of them.
+        for before in [&["The", " answer", " is"][..], &[" "; 8]] {
+            assert_eq!(read(&marks(before), &FOUR), None, "{before:?}");
+        }
+        assert_eq!(read(&[], &FOUR), None);
+        assert_eq!(read(&[at("{\"", &[]), at("why", &[])], &FOUR), None);
+    }
+
+    #[test]
+    fn every_spelling_of_a_letter_counts() {
+        for token in [
+            "B",
+            " B",
+            "b",
+            "B.",
+            "(B",
+            "(B)",
+            "\u{120}B",
+            "\u{2581}b",
+            "**B",
+            "\"B\"",
+            "B:",
+        ] {
+            let options = read(&[at(token, &[(token, -0.2)])], &FOUR).unwrap();
+            assert_eq!(options.p, [0.0, 1.0, 0.0, 0.0], "{token}");
+        }
+        for token in ["E", "BB", "Because", "1"] {
+            assert_eq!(read(&[at(token, &[(token, -0.2)])], &FOUR), None, "{token}");
+        }
+    }
+
+    #[test]
+    fn texts_count_where_no_letter_is_named() {
+        let position = at("Yes", &[("Yes", -0.5), ("no", -1.2), (" no", -3.0)]);
+        let options = read(&[position], &["yes", "no"]).unwrap();
+        let no = (-1.2_f64).exp() + (-3.0_f64).exp();
+        assert!((options.p[1] - no / (no + (-0.5_f64).exp())).abs() < 1e-6);
+        // Texts that begin alike are not told apart by their first token.
+        let position = at("dark", &[("dark", -0.1)]);
+        assert_eq!(read(&[position], &["dark red", "dark blue"]), None);
+    }
+
+    #[test]
+    fn half_of_the_probability_must_name_a_choice() {
+        let position = |logprob: f64| at("A", &[("A", logprob), ("I", -0.7)]);
+        assert!(read(&[position(-0.69)], &FOUR).is_some());
+        assert_eq!(read(&[position(-0.70)], &FOUR), None);
+    }
+}

@@ -1,0 +1,364 @@
+//! Every rule of reading, on a table of replies, and properties that hold for any reply.
+
+#![allow(clippy::unwrap_used)]
+
+mod by_rule;
+mod properties;
+mod words;
+
+use proptest::prelude::*;
+use serde::Deserialize;
+
+use super::{ReadingMode, read, readings};
+use darkqa_ground::types::question::{Answer, Choices, UnreadReason};
+use darkqa_ground::types::reply::{Finish, Reply};
+
+/// One line of the table: the set of choices, the reply, and the expected answer in each mode.
+#[derive(Deserialize)]
+struct Case {
+    of: String,
+    reply: String,
+    strict: Reading,
+    lenient: Reading,
+}
+
+#[derive(Deserialize, Clone, Copy)]
+#[serde(untagged)]
+enum Reading {
+    Chosen(usize),
+    Unparsed(UnreadReason),
+}
+
+impl From<Reading> for Answer {
+    fn from(reading: Reading) -> Self {
+        match reading {
+            Reading::Chosen(index) => Self::Chosen(index),
+            Reading::Unparsed(why) => Self::Unparsed(why),
+        }
+    }
+}
+
+const SETS: [(&str, &[&str]); 9] = [
+    ("rooms", &["bedroom", "kitchen", "bathroom", "garage"]),
+    ("yes_no", &["yes", "no"]),
+    ("numbers", &["1", "2", "3", "4"]),
+    (
+        "tables",
+        &["table", "dining table", "coffee table", "chair"],
+    ),
+    (
+        "six",
+        &["bed", "sofa", "lamp", "desk", "rug", "none of the above"],
+    ),
+    ("chinese", &["卧室", "厨房", "浴室", "车库"]),
+    ("letters", &["D", "C", "B", "A"]),
+    ("signs", &["C++", "C#", ".*", "[a-z]+", "(x)"]),
+    ("left_right", &["left", "right", "in front", "behind"]),
+];
+
+/// Number of leading sets whose texts are words, so that no letter or sign in them can be read as something else.
+const PLAIN_SETS: usize = 6;
+
+fn choices(set: &str) -> Choices {
+    let texts = match SETS.iter().find(|(name, _)| *name == set) {
+        Some((_, texts)) => texts.iter().map(|&text| text.to_owned()).collect(),
+        None => (1..=26).map(|i| format!("item{i}")).collect(),
+    };
+    Choices::new(texts, 0).unwrap()
+}
+
+/// Choices with these texts.
+fn choices_of(texts: &[&str]) -> Choices {
+    Choices::new(texts.iter().map(|&text| text.to_owned()).collect(), 0).unwrap()
+}
+
+/// The replies of the table.
+fn table_of_replies() -> Vec<String> {
+    let lines = include_str!("../../../tests/data/replies.jsonl").lines();
+    lines
+        .map(|line| serde_json::from_str::<Case>(line).unwrap().reply)
+        .collect()
+}
+
+#[test]
+fn the_table_of_replies_is_read() {
+    let mut wrong = Vec::new();
+    for line in include_str!("../../../tests/data/replies.jsonl").lines() {
+        let case: Case = serde_json::from_str(line).unwrap();
+        for (mode, want) in [
+            (ReadingMode::Strict, case.strict),
+            (ReadingMode::Lenient, case.lenient),
+        ] {
+            let found = read(&case.reply, &choices(&case.of), mode);
+            if found != want.into() {
+                wrong.push(format!("{mode:?} {line}: {found:?}"));
+            }
+        }
+    }
+    assert!(
+        wrong.is_empty(),
+        "{} wrong:\n{}",
+        wrong.len(),
+        wrong.join("\n")
+    );
+}
+
+/// Text inside the marks of reasoning never gives the answer; text behind them is read strictly.
+#[test]
+fn marks_of_reasoning_are_those_of_the_table() {
+    let rooms = choices_of(&["kitchen", "bedroom", "bathroom"]);
+    for (begin, end) in [
+        ("<think>", "</think>"),
+        ("<|channel>thought\n", "<channel|>"),
+        ("[THINK]", "[/THINK]"),
+        ("◁think▷", "◁/think▷"),
+        ("<|START_THINKING|>", "<|END_THINKING|>"),
+        (
+            "<|channel|>analysis<|message|>",
+            "<|channel|>final<|message|>",
+        ),
+    ] {
+        let thought = "It could be A. The answer is C at first sight.\n";
+        for (reply, expected) in [
+            (format!("{begin}{thought}{end}B"), Answer::Chosen(1)),
+            (format!("{begin}{end}\n(B) bedroom"), Answer::Chosen(1)),
+            (format!("{thought}{end}B"), Answer::Chosen(1)),
+            (
+                format!("{begin}{thought}"),
+                Answer::Unparsed(UnreadReason::Truncated),
+            ),
+        ] {
+            for mode in ReadingMode::ALL {
+                assert_eq!(read(&reply, &rooms, mode), expected, "{reply:?}");
+            }
+        }
+    }
+}
+
+/// A server that drops special tokens leaves the name of Gemma's channel; where the reasoning ends is not known then.
+#[test]
+fn reasoning_without_its_marks_gives_no_answer() {
+    let rooms = choices_of(&["kitchen", "bedroom", "bathroom"]);
+    let reply = "thought\nThe image is dark. The answer is C at first sight, hmm.\nB";
+    for mode in ReadingMode::ALL {
+        let unread = Answer::Unparsed(UnreadReason::Truncated);
+        assert_eq!(read(reply, &rooms, mode), unread);
+        assert_eq!(read("thought\n\nB", &rooms, mode), Answer::Chosen(1));
+    }
+}
+
+#[test]
+fn full_width_letters_are_read_strictly() {
+    let rooms = choices_of(&["厨房", "卧室"]);
+    for reply in ["（B）", "B、", "B．", "B：", "（B） 卧室", "B、卧室"] {
+        assert_eq!(
+            read(reply, &rooms, ReadingMode::Strict),
+            Answer::Chosen(1),
+            "{reply}"
+        );
+    }
+    let wrong = Answer::Unparsed(UnreadReason::Contradiction);
+    assert_eq!(read("（B）厨房", &rooms, ReadingMode::Strict), wrong);
+}
+
+#[test]
+fn the_end_of_a_reply_is_considered() {
+    let rooms = choices("rooms");
+    let reply = |text: &str, finish: Finish, refusal: Option<&str>| Reply {
+        finish,
+        refusal: refusal.map(str::to_owned),
+        ..Reply::local(text.to_owned())
+    };
+    let both = |answer: Answer| (answer, answer);
+    let unparsed = |why: UnreadReason| both(Answer::Unparsed(why));
+    for (reply, want) in [
+        (reply("B", Finish::Stop, None), both(Answer::Chosen(1))),
+        (
+            reply("It is B.", Finish::Stop, None),
+            (Answer::Unparsed(UnreadReason::NoChoice), Answer::Chosen(1)),
+        ),
+        (reply("", Finish::Stop, None), unparsed(UnreadReason::Empty)),
+        (
+            reply("", Finish::Stop, Some("I cannot.")),
+            unparsed(UnreadReason::Refused),
+        ),
+        (
+            reply("Option B", Finish::Stop, Some("I cannot.")),
+            unparsed(UnreadReason::Refused),
+        ),
+        (
+            reply("", Finish::Filter, None),
+            unparsed(UnreadReason::Filtered),
+        ),
+        (
+            reply("", Finish::Length, None),
+            unparsed(UnreadReason::Truncated),
+        ),
+        (reply("B", Finish::Length, None), both(Answer::Chosen(1))),
+        (
+            reply("The answer is B", Finish::Length, None),
+            unparsed(UnreadReason::Truncated),
+        ),
+        (
+            reply("", Finish::Other("x".into()), None),
+            unparsed(UnreadReason::Empty),
+        ),
+    ] {
+        assert_eq!(readings(&reply, &rooms), want, "{reply:?}");
+    }
+}
+
+#[test]
+fn long_replies_are_read() {
+    let rooms = choices("rooms");
+    let answered = format!(
+        "There is a stove. {}\nAnswer: B",
+        "It is dim here. ".repeat(10_000)
+    );
+    let found = read(&answered, &rooms, ReadingMode::Lenient);
+    assert_eq!(found, Answer::Chosen(1));
+    // Repetitions of what the steps search for. If one step were quadratic, this test would take very long.
+    for piece in [
+        "answer: ",
+        "answer is ",
+        "option ",
+        "is ",
+        "\\boxed{",
+        "{\"answer\":",
+        "<answer>",
+        "<|im_end|>",
+        "B",
+        "B ",
+        "B, ",
+        "(",
+        "kitchen ",
+        "kitchen",
+        "not ",
+        "\n",
+        "**",
+        "|",
+        "\\text{",
+        "Question: x\n",
+        "答案",
+        "A bedroom. ",
+    ] {
+        let long = piece.repeat(20_000 / piece.len());
+        let _ = read(&long, &rooms, ReadingMode::Lenient);
+    }
+}
+
+/// Fragments that the steps search for, so that random strings of them reach every step.
+const FRAGMENTS: [&str; 64] = [
+    "A",
+    "B",
+    "C",
+    "D",
+    "E",
+    "I",
+    "a",
+    "b",
+    "(B)",
+    "[C]",
+    "B.",
+    "c)",
+    "A:",
+    "kitchen",
+    "Kitchen.",
+    "bathroom",
+    "bedroom",
+    "garage",
+    "kitchens",
+    "yes",
+    "no",
+    "1",
+    "2",
+    "2.5",
+    "answer",
+    "Answer:",
+    "The answer is",
+    "option",
+    "correct",
+    "I choose",
+    "is",
+    "not",
+    "isn't",
+    "or",
+    "and",
+    ",",
+    ".",
+    ":",
+    "-",
+    "?",
+    "!",
+    "\n",
+    "\n\n",
+    " ",
+    " ",
+    "**",
+    "`",
+    "\"",
+    "'",
+    "$",
+    "\\boxed{",
+    "}",
+    "{\"answer\": \"",
+    "\"}",
+    "<answer>",
+    "</answer>",
+    "<think>",
+    "</think>",
+    "<|im_end|>",
+    "答案",
+    "是",
+    "Question:",
+    "\u{200b}",
+    "❌",
+];
+
+fn reply() -> impl Strategy<Value = String> {
+    let fragments = prop::collection::vec(prop::sample::select(&FRAGMENTS[..]), 0..14);
+    let spaced = (fragments.clone(), Just(" ")).prop_map(|(parts, gap)| parts.join(gap));
+    prop_oneof![
+        fragments.prop_map(|parts| parts.concat()),
+        spaced,
+        any::<String>(),
+        "\\PC{0,40}"
+    ]
+}
+
+proptest! {
+    #[test]
+    fn the_modes_never_disagree(reply in reply(), set in 0..SETS.len()) {
+        let choices = choices(SETS[set].0);
+        let strict = read(&reply, &choices, ReadingMode::Strict);
+        let lenient = read(&reply, &choices, ReadingMode::Lenient);
+        match (strict, lenient) {
+            (Answer::Chosen(strict), lenient) => {
+                prop_assert_eq!(lenient, Answer::Chosen(strict));
+                prop_assert!(strict < choices.len());
+            }
+            (Answer::Unparsed(_), Answer::Chosen(index)) => prop_assert!(index < choices.len()),
+            (strict, lenient) => prop_assert_eq!(strict, lenient),
+        }
+    }
+
+    #[test]
+    fn every_form_of_every_choice_is_read(set in 0..PLAIN_SETS, pick in 0..100usize, form in 0..8usize) {
+        let choices = choices(SETS[set].0);
+        let index = pick % choices.len();
+        let letter = darkqa_ground::types::question::letter(index);
+        let text = &choices.texts()[index];
+        let (reply, strict) = match form {
+            0 => (letter.to_string(), true),
+            1 => (format!("({letter}) {text}"), true),
+            2 => (text.to_uppercase(), true),
+            3 => (format!("{letter}.\n{text}."), true),
+            4 => (format!("The answer is {letter}."), false),
+            5 => (format!("Answer: {text}"), false),
+            6 => (format!("{{\"answer\": \"{text}\"}}"), false),
+            _ => (format!("**{letter}. {text}**"), false),
+        };
+        prop_assert_eq!(read(&reply, &choices, ReadingMode::Lenient), Answer::Chosen(index), "{}", reply);
+        prop_assert_eq!(read(&reply, &choices, ReadingMode::Strict) == Answer::Chosen(index), strict, "{}", reply);
+    }
+}

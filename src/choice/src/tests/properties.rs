@@ -1,0 +1,131 @@
+//! Properties of the lenient reading that hold for any reply.
+
+use std::time::{Duration, Instant};
+
+use proptest::prelude::*;
+
+use super::by_rule::choices;
+use super::reply;
+use crate::words::{Role, lists};
+use crate::{ReadingMode, read};
+use darkqa_ground::types::question::Answer;
+
+const SETS: [&str; 6] = ["home", "yes_no", "colors", "things", "sofas", "numbers"];
+
+fn lenient(reply: &str, set: &str) -> Answer {
+    read(reply, &choices(set), ReadingMode::Lenient)
+}
+
+/// Sentences around a lone name.
+const SENTENCES: [&str; 6] = [
+    "{}.",
+    "It is the {}.",
+    "I see a {} here.",
+    "We are in front of a {}",
+    "This looks like the {}!",
+    "the {}, I think",
+];
+
+/// The replies of the table that end with a sentence and hold no markup that a question could be inside of.
+fn whole_sentences() -> Vec<String> {
+    let mut replies = super::table_of_replies();
+    replies.retain(|reply| {
+        reply.ends_with(['.', '!']) && !reply.contains(['{', '<', '[', '`', '\\', '?', '◁'])
+    });
+    replies
+}
+
+proptest! {
+    #[test]
+    fn a_denial_before_a_lone_name_never_yields_it(
+        set in prop::sample::select(vec!["home", "things", "sofas"]),
+        pick in 0..100usize,
+        denial in 0..1000usize,
+    ) {
+        let lists = lists();
+        let denials: Vec<&String> = [Role::Exclude, Role::Not].iter().flat_map(|role| &lists[role]).collect();
+        let denial = denials[denial % denials.len()];
+        let texts = choices(set);
+        let name = &texts.texts()[pick % texts.len()];
+        for reply in [
+            format!("{denial} {name}"),
+            format!("{denial} the {name}."),
+            format!("It is {denial} a {name}."),
+            format!("I think that this is {denial} a {name}!"),
+            format!("{denial} {}", darkqa_ground::types::question::letter(pick % texts.len())),
+        ] {
+            prop_assert!(matches!(lenient(&reply, set), Answer::Unparsed(_)), "{}", reply);
+        }
+    }
+
+    #[test]
+    fn a_hyphen_for_a_blank_in_a_name_changes_nothing(
+        sentence in prop::sample::select(&SENTENCES[..]),
+        hyphen in prop::sample::select(&["-", "\u{2010}", "\u{2011}", "\u{2012}", "\u{2013}", "\u{2212}"][..]),
+        name in prop::sample::select(&["living room", "sofa bed", "dining table", "dark blue"][..]),
+    ) {
+        let set = match name {
+            "living room" => "home",
+            "sofa bed" => "sofas",
+            "dining table" => "tables",
+            _ => "shades",
+        };
+        let with = |name: &str| lenient(&sentence.replace("{}", name), set);
+        let blank = with(name);
+        prop_assert!(matches!(blank, Answer::Chosen(_)), "{} {:?}", name, blank);
+        prop_assert_eq!(with(&name.replace(' ', hyphen)), blank);
+        prop_assert_eq!(with(&name.replace(' ', "")), blank);
+    }
+
+    #[test]
+    fn an_appended_question_changes_nothing(
+        reply in prop::sample::select(whole_sentences()),
+        question in prop::sample::select(&["Is it a kitchen?", "Could this be B?", "Do you agree?", "Or is it the bathroom?"][..]),
+    ) {
+        let before = lenient(&reply, "home");
+        if let Answer::Chosen(index) = before {
+            prop_assert_eq!(lenient(&format!("{reply} {question}"), "home"), Answer::Chosen(index));
+        } else {
+            let after = lenient(&format!("{reply} {question}"), "home");
+            prop_assert!(matches!(after, Answer::Unparsed(_)), "{} {}", reply, question);
+        }
+    }
+
+    #[test]
+    fn the_text_of_what_is_read_reads_the_same(reply in reply(), set in prop::sample::select(&SETS[..])) {
+        if let Answer::Chosen(index) = lenient(&reply, set) {
+            let texts = choices(set);
+            for mode in ReadingMode::ALL {
+                prop_assert_eq!(read(&texts.texts()[index], &texts, mode), Answer::Chosen(index));
+            }
+        }
+    }
+}
+
+/// A step whose time grew with the square of the length would take hours.
+#[test]
+fn two_megabytes_of_any_word_are_read() {
+    /// Time for one such reply in a build without optimization; a release build takes less than a second.
+    const LIMIT: Duration = Duration::from_secs(30);
+    const LENGTH: usize = 2_000_000;
+    let signs = [
+        "✅ kitchen\n",
+        "A\n",
+        "B, ",
+        "kitchen ",
+        "bedroom, kitchen, ",
+        "no, ",
+        "(",
+        "[x] A ",
+        "? ",
+    ];
+    let lists = lists();
+    // One entry of each list; all of them are looked up in the same way.
+    let words = lists.values().map(|list| list[0].clone() + " ");
+    for piece in signs.into_iter().map(str::to_owned).chain(words) {
+        let long = piece.repeat(LENGTH / piece.len() / if cfg!(debug_assertions) { 10 } else { 1 });
+        let start = Instant::now();
+        let _ = lenient(&long, "home");
+        assert!(start.elapsed() < LIMIT, "{piece:?}: {:?}", start.elapsed());
+    }
+}

@@ -1,0 +1,169 @@
+//! What the figures of reports show: a [`Chart`] of lines over the levels, and others.
+//!
+//! Lines differ by colour, and also by dash and marker, so that they can be distinguished without colour.
+
+pub(crate) mod bars;
+pub(crate) mod counts;
+pub(crate) mod data;
+pub(crate) mod drawn;
+pub(crate) mod points;
+pub(crate) mod reliability;
+pub(crate) mod thresholds;
+
+use serde::Serialize;
+
+use crate::score::estimate::Estimate;
+use crate::types::AxisLevel;
+use crate::types::degradation::Axis;
+
+/// Colour of axes and text, and of lines that belong to no model.
+pub(crate) const INK: [u8; 3] = [34, 34, 34];
+
+/// Six colours, found by search: contrast with white of 3.1 at least, and a distance by CIEDE2000 of any two of 21 at least in normal,
+/// protanopic, deuteranopic and tritanopic sight (Machado, Oliveira and Fernandes 2009, severity 1).
+pub(crate) const COLOURS: [[u8; 3]; 6] = [
+    [0x01, 0x97, 0xea],
+    [0x72, 0x11, 0x57],
+    [0x7a, 0x82, 0x02],
+    [0xb3, 0x62, 0x81],
+    [0x24, 0x05, 0xf4],
+    [0x2d, 0x45, 0x19],
+];
+
+/// One figure of a report.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct Figure {
+    /// Name of the figure in files.
+    pub name: &'static str,
+    /// Caption, with the note of the chart.
+    pub caption: String,
+    /// The figure as SVG.
+    pub svg: String,
+    /// What it shows, for the script of the page; `None` of a figure that the page shows as it is.
+    pub data: Option<String>,
+}
+
+/// Figures as files: name and contents.
+pub(crate) fn files(figures: Vec<Figure>) -> impl Iterator<Item = (String, Vec<u8>)> {
+    figures.into_iter().map(|figure| {
+        let name = format!("figures/{}.svg", figure.name);
+        (name, figure.svg.into_bytes())
+    })
+}
+
+/// Colour, dash and marker of a line. The same number gives the same style in every figure of a report.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct LineStyle(pub usize);
+
+impl LineStyle {
+    /// Style of lines that belong to no model: chance, and the most frequent true answer.
+    pub(crate) const REFERENCE: Self = Self(27);
+    /// Style of the model that a reader asked to be drawn black.
+    pub(crate) const BLACK: Self = Self(1000);
+
+    /// Red, green and blue of the colour.
+    pub(crate) fn rgb(self) -> [u8; 3] {
+        match self {
+            Self::REFERENCE => INK,
+            Self::BLACK => [0; 3],
+            Self(number) => COLOURS[number % COLOURS.len()],
+        }
+    }
+}
+
+/// Data of a line in a panel.
+#[derive(Debug, Clone)]
+pub(crate) enum PanelContent {
+    /// Points over the levels, with a band of their intervals.
+    Curve(Vec<(AxisLevel, Estimate)>),
+    /// A share that is the same at all levels.
+    Flat(f64),
+    /// Shares at a darkness that is no level.
+    Marks(Vec<DarkMark>),
+}
+
+/// A share at a darkness that is no level: a photograph in the dark. It is never joined to a curve, which is of synthetic images.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct DarkMark {
+    /// Lower quartile, median and upper quartile of the exposure drop, in EV.
+    pub ev: [f64; 3],
+    /// The share with its interval.
+    pub share: Estimate,
+}
+
+/// One line of a panel.
+#[derive(Debug, Clone)]
+pub(crate) struct PlotLine {
+    /// Name in the legend. Lines with the same name share one entry.
+    pub name: String,
+    pub style: LineStyle,
+    pub content: PanelContent,
+    /// The model that it is about; `None` of a line about several, or about none.
+    pub model: Option<String>,
+}
+
+/// One panel of a chart.
+#[derive(Debug, Clone)]
+pub(crate) struct Panel {
+    /// Title, with the number of questions.
+    pub title: String,
+    pub lines: Vec<PlotLine>,
+    /// The model that all its lines are about; `None` if there are several.
+    pub model: Option<String>,
+}
+
+impl PlotLine {
+    /// Whether nothing of the line is drawn.
+    pub(crate) fn is_empty(&self) -> bool {
+        match &self.content {
+            PanelContent::Curve(points) => points.is_empty(),
+            PanelContent::Marks(marks) => marks.is_empty(),
+            PanelContent::Flat(_) => false,
+        }
+    }
+}
+
+impl Panel {
+    /// The levels of its curves, from L0.
+    pub(crate) fn levels(&self) -> Vec<AxisLevel> {
+        let levels = self.lines.iter().flat_map(|line| match &line.content {
+            PanelContent::Curve(points) => points.iter().map(|(level, _)| *level).collect(),
+            PanelContent::Flat(_) | PanelContent::Marks(_) => Vec::new(),
+        });
+        let mut levels: Vec<AxisLevel> = levels.collect();
+        levels.sort_unstable();
+        levels.dedup();
+        levels
+    }
+
+    /// The right end of the axis, in the unit of the levels.
+    pub(crate) fn farthest(&self) -> f64 {
+        let marks = self.lines.iter().flat_map(|line| match &line.content {
+            PanelContent::Marks(marks) => &marks[..],
+            PanelContent::Flat(_) | PanelContent::Curve(_) => &[],
+        });
+        let marks = marks.map(|mark| mark.ev[2]);
+        let levels = self.levels().into_iter().map(AxisLevel::value);
+        levels.chain(marks).fold(0.0, f64::max)
+    }
+
+    /// Title of the horizontal axis.
+    pub(crate) fn axis_title(&self) -> String {
+        let axis = self.levels().into_iter().find_map(AxisLevel::axis);
+        let Axis { title, unit, .. } = axis.unwrap_or(Axis::LIGHT);
+        format!("level; {title} in {unit}")
+    }
+}
+
+/// A figure of panels with one legend.
+#[derive(Debug, Clone)]
+pub(crate) struct Chart {
+    /// Title of the vertical axis, with its unit.
+    pub measure: &'static str,
+    /// The panels, row by row.
+    pub panels: Vec<Panel>,
+    /// Number of panels in a row.
+    pub columns: usize,
+    /// What the caption says besides.
+    pub note: String,
+}

@@ -1,0 +1,194 @@
+//! A reliability diagram at the width of a column: [`reliability`].
+
+use super::axes::shares;
+use super::font::Font;
+use super::legend::{Entry, Legend, Sample};
+use super::look::Look;
+use super::sheet::{Anchor, Place, Sheet, Turn};
+use super::title::Title;
+use crate::drawing::chart::INK;
+use crate::drawing::chart::reliability::{ReliabilityChart, ReliabilityPanel};
+
+/// Least width of a panel, in heights of letters.
+const LEAST: f64 = 14.0;
+/// Most panels in a row.
+const COLUMNS: usize = 3;
+
+/// The chart as a sheet of square panels.
+pub(super) fn reliability(chart: &ReliabilityChart, look: &Look) -> Sheet {
+    let room = (look.width / (LEAST * look.letters)) as usize;
+    let columns = COLUMNS.min(room).min(chart.panels.len()).max(1);
+    let left = Font::bundled().width("100", look.small()) + 1.9 * look.letters;
+    let step = look.width / columns as f64;
+    let side = (step - left - 0.6 * look.letters).min(22.0 * look.letters);
+    let mut sheet = Sheet::default();
+    let mut top = 0.0;
+    for row in chart.panels.chunks(columns) {
+        let titles = row.iter();
+        let titles = titles.map(|panel| Title::new(&panel.title, look, side));
+        let titles: Vec<Title> = titles.collect();
+        top += Title::highest(&titles, look) + 0.65 * look.letters;
+        for (index, (panel, title)) in row.iter().zip(&titles).enumerate() {
+            let corner = [index as f64 * step + left, top];
+            title.draw(&mut sheet, look, [corner[0], top - 0.6 * look.letters]);
+            draw(&mut sheet, look, panel, Square { corner, side });
+        }
+        top += side + 1.5 * look.small() + 2.0 * look.letters;
+    }
+    let legend = legend(chart, look);
+    legend.draw(&mut sheet, look, top);
+    sheet.size = [look.width, top + legend.height];
+    sheet
+}
+
+/// The square between the axes of a panel: both go from 0 to 1.
+#[derive(Debug, Clone, Copy)]
+struct Square {
+    corner: Place,
+    side: f64,
+}
+
+impl Square {
+    fn place(self, confidence: f64, accuracy: f64) -> Place {
+        let [left, top] = self.corner;
+        let part = |share: f64| self.side * share.clamp(0.0, 1.0);
+        [left + part(confidence), top + self.side - part(accuracy)]
+    }
+}
+
+fn draw(sheet: &mut Sheet, look: &Look, panel: &ReliabilityPanel, square: Square) {
+    axes(sheet, look, square);
+    sheet.line(
+        &[square.place(0.0, 0.0), square.place(1.0, 1.0)],
+        &look.dots(),
+    );
+    for line in &panel.lines {
+        let pen = look.pen(line.style);
+        for (confidence, accuracy) in &line.bins {
+            let ends = [accuracy.low, accuracy.high].map(|share| square.place(*confidence, share));
+            sheet.line(&ends, &look.thin(pen.stroke.colour));
+        }
+        let places = line.bins.iter();
+        let places: Vec<Place> = places
+            .map(|(confidence, accuracy)| square.place(*confidence, accuracy.value))
+            .collect();
+        sheet.line(&places, &pen.stroke);
+        for place in places {
+            look.mark(sheet, &pen, place);
+        }
+    }
+}
+
+fn axes(sheet: &mut Sheet, look: &Look, square: Square) {
+    let small = look.small();
+    let ends = [square.place(0.0, 0.0), square.place(1.0, 0.0)];
+    shares(sheet, look, ends.map(|[x, _]| x), |share| {
+        square.place(0.0, share)[1]
+    });
+    for step in 0..=5 {
+        let [x, bottom] = square.place(f64::from(step) / 5.0, 0.0);
+        sheet.line(&[[x, bottom], [x, bottom + 0.25 * small]], &look.thin(INK));
+        let place = [x, bottom + 1.15 * small];
+        sheet.words(&(step * 20).to_string(), place, small, Anchor::Middle);
+    }
+    sheet.line(&ends, &look.thin(INK));
+    let [middle, bottom] = square.place(0.5, 0.0);
+    let below = [middle, bottom + 1.3 * small + 0.95 * look.letters];
+    sheet.words("confidence in %", below, look.letters, Anchor::Middle);
+    let [left, middle] = square.place(0.0, 0.5);
+    let numbers = Font::bundled().width("100", small) + 0.9 * look.letters;
+    let beside = [left - numbers, middle];
+    sheet.turned_words(
+        "accuracy in %",
+        beside,
+        look.letters,
+        Anchor::Middle,
+        Turn::Up,
+    );
+}
+
+/// An entry for each name of a line.
+fn legend<'a>(chart: &'a ReliabilityChart, look: &Look) -> Legend<'a> {
+    let lines = chart.panels.iter().flat_map(|panel| &panel.lines);
+    let entries = lines.map(|line| Entry {
+        name: &line.name,
+        style: line.style,
+        sample: Sample::Curve,
+    });
+    Legend::new(entries, look)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::drawing::chart::LineStyle;
+    use crate::drawing::chart::reliability::ReliabilityLine;
+    use crate::drawing::paper::Palette;
+    use crate::drawing::paper::sheet::Mark;
+    use crate::score::estimate::Estimate;
+
+    #[test]
+    fn a_bin_lies_where_the_axes_say_and_its_interval_stands_beside() {
+        let share = |value: f64| Estimate {
+            value,
+            low: value - 0.2,
+            high: value + 0.1,
+            n: 40,
+        };
+        let lines = ["L0", "L5"].into_iter().enumerate();
+        let lines = lines.map(|(style, name)| ReliabilityLine {
+            name: name.to_owned(),
+            style: LineStyle(style),
+            bins: vec![(0.25, share(0.5)), (0.75, share(0.6)), (1.0, share(0.8))],
+        });
+        let chart = ReliabilityChart {
+            panels: vec![ReliabilityPanel {
+                title: "a model".to_owned(),
+                lines: lines.collect(),
+            }],
+            note: String::new(),
+        };
+        let look = Look {
+            width: 252.0,
+            letters: 8.0,
+            palette: Palette::Colour,
+        };
+        let sheet = reliability(&chart, &look);
+        let drawn: Vec<&Vec<Place>> = sheet
+            .marks
+            .iter()
+            .filter_map(|mark| match mark {
+                Mark::Line { places, .. } if places.len() == 3 => Some(places),
+                _ => None,
+            })
+            .collect();
+        // One curve a level. Distances along both axes are as the numbers: the square has one scale.
+        assert_eq!(drawn.len(), 2);
+        let [first, second, last] = [drawn[0][0], drawn[0][1], drawn[0][2]];
+        let scale = (second[0] - first[0]) / 0.5;
+        assert!(((last[0] - second[0]) / 0.25 - scale).abs() < 1e-9);
+        assert!(((first[1] - second[1]) / 0.1 - scale).abs() < 1e-9);
+        assert!(((second[1] - last[1]) / 0.2 - scale).abs() < 1e-9);
+        let bar = sheet.marks.iter().find_map(|mark| match mark {
+            Mark::Line { places, .. }
+                if places.len() == 2
+                    && places
+                        .iter()
+                        .all(|place| (place[0] - first[0]).abs() < 1e-9) =>
+            {
+                Some(places.clone())
+            }
+            _ => None,
+        });
+        let bar = bar.expect("a bin has a bar");
+        assert!(((bar[0][1] - bar[1][1]) / 0.3 - scale).abs() < 1e-9);
+        for name in ["L0", "L5", "a model"] {
+            let is_written = |mark: &Mark| matches!(mark, Mark::Words(words) if words.text == name);
+            assert_eq!(
+                sheet.marks.iter().filter(|mark| is_written(mark)).count(),
+                1,
+                "{name}"
+            );
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! The figure of accuracy over confidence: [`drawing`].
+
+use std::collections::BTreeSet;
+
+use crate::drawing::chart::LineStyle;
+use crate::drawing::chart::drawn::Drawn;
+use crate::drawing::chart::reliability::{ReliabilityChart, ReliabilityLine, ReliabilityPanel};
+use crate::drawing::figures::Drawing;
+use crate::score::calibration::Calibration;
+use crate::score::findings::Findings;
+use crate::text::words::light;
+use crate::types::AxisLevel;
+
+/// Most levels of a panel: L0, the darkest, and what lies between, spread.
+const MOST_LEVELS: usize = 4;
+
+/// Accuracy over confidence of each model in the main variant, raw, a line a level; `None` without probabilities of choices.
+pub(super) fn drawing(findings: &Findings<'_>) -> Option<Drawing> {
+    let variant = findings.grid.main_variant();
+    let rows = findings.calibrations.iter();
+    let rows: Vec<(&Calibration, AxisLevel)> = rows
+        .filter(|row| !row.bins.is_empty() && row.subject.enhancer.is_none())
+        .filter_map(|row| Some((row, row.subject.level?)))
+        .filter(|(row, level)| {
+            *level == AxisLevel::L0 || Some(&row.subject.variant) == variant.as_ref()
+        })
+        .collect();
+    let levels: BTreeSet<AxisLevel> = rows.iter().map(|(_, level)| *level).collect();
+    let levels = spread(&levels.into_iter().collect::<Vec<_>>());
+    let mut panels: Vec<ReliabilityPanel> = Vec::new();
+    for (row, level) in rows {
+        let Some(style) = levels.iter().position(|shown| *shown == level) else {
+            continue;
+        };
+        let line = ReliabilityLine {
+            name: level.to_string(),
+            style: LineStyle(style),
+            bins: row
+                .bins
+                .iter()
+                .map(|bin| (bin.confidence, bin.accuracy))
+                .collect(),
+        };
+        match panels
+            .iter_mut()
+            .find(|panel| panel.title == row.subject.model)
+        {
+            Some(panel) => panel.lines.push(line),
+            None => panels.push(ReliabilityPanel {
+                title: row.subject.model.clone(),
+                lines: vec![line],
+            }),
+        }
+    }
+    if panels.is_empty() {
+        return None;
+    }
+    let dark = variant.map_or_else(String::new, |variant| {
+        format!("; dark images {}", light(&variant, None))
+    });
+    let chart = ReliabilityChart {
+        panels,
+        note: format!(
+            "bins of about as many replies each, ten at most; bars are 95 % intervals by {}; strict reading{dark}",
+            findings.unit
+        ),
+    };
+    Some(Drawing {
+        name: "reliability",
+        caption: "Is a model as often right as it is confident? Accuracy over confidence; on the dotted diagonal both are equal, below it \
+                  the model is overconfident."
+            .to_owned(),
+        chart: Drawn::Reliability(chart),
+    })
+}
+
+/// At most [`MOST_LEVELS`] of these levels, with the first and the last.
+fn spread(levels: &[AxisLevel]) -> Vec<AxisLevel> {
+    let last = levels.len().saturating_sub(1);
+    if levels.len() <= MOST_LEVELS {
+        return levels.to_vec();
+    }
+    (0..MOST_LEVELS)
+        .map(|place| levels[(place * last).div_ceil(MOST_LEVELS - 1)])
+        .collect()
+}

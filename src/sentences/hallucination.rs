@@ -1,0 +1,159 @@
+//! Sentences about what is answered when little is seen: false answers about presence, and one answer to everything.
+
+use std::collections::BTreeSet;
+
+use super::pooled::{detail, of_verdict, runs};
+use super::sentence::{Numbers, Sentence, Tone};
+use crate::score::cluster::ClusterUnit;
+use crate::score::confusion::{Collapse, FalseAnswer, MIN_EXCESS};
+use crate::score::findings::Findings;
+use crate::score::pooled::PooledFinding;
+use crate::score::significance::Significance;
+use crate::score::subject::Subject;
+use crate::text::words::family as family_name;
+use crate::types::{AxisLevel, Family, KindReading};
+
+/// How often a false answer is given at the darkest level at which its rate is shown to grow.
+pub(super) fn false_answers(
+    levels: &[&PooledFinding],
+    answer: FalseAnswer,
+    unit: ClusterUnit,
+) -> Option<Sentence> {
+    let shown = of_verdict(levels, Significance::Worse);
+    let worst = shown.last()?;
+    let mut numbers = Numbers::of(unit);
+    let of_what = match answer {
+        FalseAnswer::No => "that are there",
+        FalseAnswer::Yes => "that are not there",
+    };
+    let text = format!(
+        "At {} “{}” is answered to {} % of the objects {of_what} ({} % at L0).",
+        worst.level,
+        answer.word(),
+        numbers.percent("rate", worst.strict.first),
+        numbers.percent("L0", worst.strict.second)
+    );
+    let more = format!("; an increase is shown at {}", runs(&shown, levels));
+    let detail = detail(worst, &mut numbers, &more);
+    Some(numbers.sentence("hallucination", Tone::Worse, text, detail))
+}
+
+/// The answer that a model gives most often to the questions of a family at the darkest level.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TopAnswer<'f> {
+    pub(super) model: &'f str,
+    pub(super) family: &'f Family,
+    pub(super) level: AxisLevel,
+    pub(super) collapse: &'f Collapse,
+}
+
+impl<'f> TopAnswer<'f> {
+    /// The top answers to raw images of the darkest level of a variant, of the models over which findings are pooled.
+    pub(super) fn all(findings: &'f Findings<'_>, variant: &KindReading) -> Vec<Self> {
+        let grid = &findings.grid;
+        let models = findings.models_of(variant);
+        let of_variant = |subject: &Subject| {
+            subject.variant == *variant
+                && subject.enhancer.is_none()
+                && models.contains(&&*subject.model)
+        };
+        let asked = grid.subjects.iter().filter(|subject| of_variant(subject));
+        let Some(level) = asked.filter_map(|subject| subject.level).max() else {
+            return Vec::new();
+        };
+        let confusions = findings.confusions.iter().filter(|confusion| {
+            of_variant(&confusion.subject) && confusion.subject.level == Some(level)
+        });
+        let answers = confusions.filter_map(|confusion| {
+            let subject = &confusion.subject;
+            let collapse = confusion.collapse.as_ref()?;
+            Some(Self {
+                model: &subject.model,
+                family: &confusion.family,
+                level,
+                collapse,
+            })
+        });
+        answers.collect()
+    }
+
+    /// By how much the answer is given too often.
+    fn excess(&self) -> f64 {
+        self.collapse.share.value - self.collapse.truth
+    }
+}
+
+/// That a model gives one answer far too often: of the family and the model with the largest excess over the true share. It is said only
+/// if the answer is detected to be more frequent than at L0, in both parsings and after the correction over all sentences.
+pub(super) fn collapse(answers: &[TopAnswer<'_>], unit: ClusterUnit) -> Option<Sentence> {
+    let shown = answers.iter().filter(|answer| answer.collapse.is_shown());
+    let largest = shown.clone().reduce(|largest, next| {
+        if next.excess() > largest.excess() {
+            next
+        } else {
+            largest
+        }
+    })?;
+    let of_family = answers
+        .iter()
+        .filter(|answer| answer.family == largest.family);
+    let collapsed = shown
+        .clone()
+        .filter(|answer| answer.family == largest.family);
+    let mut numbers = Numbers::of(unit);
+    let (level, model, top) = (largest.level, largest.model, &largest.collapse.top);
+    let name = family_name(Some(largest.family));
+    let share = numbers.percent("share", largest.collapse.share.value);
+    let truth = numbers.percent("true_share", largest.collapse.truth);
+    let text = match (collapsed.count(), of_family.count()) {
+        (_, 1) => format!(
+            "At {level} {share} % of the replies about {name} are “{top}”, which is true of {truth} %."
+        ),
+        (1, _) => format!(
+            "At {level} {share} % of the replies of {model} about {name} are “{top}”, which is true of {truth} %."
+        ),
+        (collapsed, models) => format!(
+            "At {level} {} of {} models give one answer about {name} far more often than it is true: {share} % of the replies of {model} \
+             are “{top}”, which is true of {truth} %.",
+            numbers.count("collapsed", collapsed),
+            numbers.count("models", models)
+        ),
+    };
+    let others: BTreeSet<&str> = shown
+        .filter(|answer| answer.family != largest.family)
+        .map(|answer| family_name(Some(answer.family)))
+        .collect();
+    let others: Vec<&str> = others.into_iter().collect();
+    let detail = collapse_detail(largest, &mut numbers);
+    let detail = if others.is_empty() {
+        detail
+    } else {
+        format!("{detail}; also in {}", others.join(", "))
+    };
+    Some(numbers.sentence("collapse", Tone::Worse, text, detail))
+}
+
+/// Share, interval, the share at L0, the limit and n of an answer.
+fn collapse_detail(answer: &TopAnswer<'_>, numbers: &mut Numbers) -> String {
+    let share = answer.collapse.share;
+    let ends = [
+        ("share", share.value),
+        ("low", share.low),
+        ("high", share.high),
+    ];
+    let [value, low, high] = ends.map(|(name, share)| numbers.percent(name, share));
+    let clean = answer.collapse.clean.as_ref().map(|clean| {
+        let share = numbers.percent("L0", clean.strict.second);
+        let difference = numbers.difference("_from_L0", clean.strict.difference);
+        let p = numbers.p("p", clean.p_report[0].unwrap_or(1.0));
+        format!(", {share} % at L0 ({difference} points, {p})")
+    });
+    let limit = numbers.number("limit", 100.0 * MIN_EXCESS, 0);
+    let n = numbers.count("n", share.n);
+    let clusters = numbers.clusters(answer.collapse.clusters);
+    format!(
+        "{}: {value} % [{low}, {high}]{}; limit: {limit} points above the true share; n = {n} in {clusters}",
+        answer.model,
+        clean.unwrap_or_default()
+    )
+}

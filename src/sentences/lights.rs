@@ -1,0 +1,100 @@
+//! The lights that sentences are about, and the findings about one of them.
+
+use super::sample::is_impossible;
+use super::sentence::Sentence;
+use crate::score::findings::Findings;
+use crate::score::pooled::PooledFinding;
+use crate::score::pooled_kind::PooledKind;
+use crate::text::words::light;
+use crate::types::KindReading;
+use crate::types::degradation::Kind;
+
+/// The variants that sentences speak of together: a kind and those that extend it.
+#[derive(Debug)]
+pub(super) struct Topic<'f> {
+    /// The variants of the last kind, one for each light.
+    pub(super) lights: Vec<&'f KindReading>,
+    /// The variants of the other kinds.
+    pub(super) others: Vec<&'f KindReading>,
+    /// Whether another topic has the same levels, so that the level does not tell what a sentence is about.
+    shares_levels: bool,
+}
+
+impl<'f> Topic<'f> {
+    /// The topics of all variants that were asked, in the order of tables. The first one is the main one.
+    pub(super) fn all(findings: &'f Findings<'_>) -> Vec<Self> {
+        let mut topics: Vec<Self> = Vec::new();
+        let variants: Vec<&KindReading> = findings.grid.variants().into_iter().collect();
+        let root = |variant: &KindReading| variant.kind.map(Kind::root);
+        let axis = |variant: &KindReading| variant.kind.map(Kind::axis);
+        for group in variants.chunk_by(|a, b| root(a) == root(b)) {
+            let last = group.last().map(|variant| variant.kind);
+            let (lights, others) = group
+                .iter()
+                .copied()
+                .partition(|variant| Some(variant.kind) == last);
+            let mut earlier = topics.iter().flat_map(|topic| &topic.lights);
+            let shares_levels = earlier.any(|other| axis(other) == axis(group[0]));
+            topics.push(Self {
+                lights,
+                others,
+                shares_levels,
+            });
+        }
+        topics
+    }
+
+    /// A sentence about a variant, which is named if there are several lights, or if the levels do not tell it.
+    pub(super) fn named(&self, variant: &KindReading, mut sentence: Sentence) -> Sentence {
+        if self.lights.len() > 1 || self.shares_levels {
+            sentence.text = format!("{}: {}", light(variant, None), sentence.text);
+        }
+        sentence
+    }
+}
+
+/// Sentences about the last kind of each topic. If it was asked in several lights, each sentence names its own.
+pub(super) fn in_each_light(
+    findings: &Findings<'_>,
+    about: fn(&Findings<'_>, &KindReading) -> Vec<Sentence>,
+) -> Vec<Sentence> {
+    let mut sentences = Vec::new();
+    for topic in Topic::all(findings) {
+        for variant in &topic.lights {
+            let of_light = about(findings, variant).into_iter();
+            sentences.extend(of_light.map(|sentence| topic.named(variant, sentence)));
+        }
+    }
+    sentences
+}
+
+/// The findings over several levels together of one kind and variant, in the order of enhancers.
+pub(super) fn means_of_set<'f>(
+    findings: &'f Findings<'_>,
+    kind: PooledKind,
+    variant: &KindReading,
+) -> Vec<&'f PooledFinding> {
+    let averaged = findings.averaged.iter();
+    averaged
+        .filter(|mean| mean.kind == kind && mean.variant == *variant)
+        .collect()
+}
+
+/// The findings of one kind and variant over all families that the kind is about, in the order of enhancers and levels. Sets in which
+/// no verdict is possible are left out.
+pub(super) fn of_set<'f>(
+    findings: &'f Findings<'_>,
+    kind: PooledKind,
+    variant: &KindReading,
+) -> Vec<&'f PooledFinding> {
+    let pooled = findings.pooled.iter();
+    let of_set = pooled.filter(|finding| {
+        finding.kind == kind
+            && finding.family.as_ref() == kind.only_family()
+            && finding.variant == *variant
+    });
+    let of_set: Vec<&PooledFinding> = of_set.collect();
+    let sets = of_set.chunk_by(|a, b| a.enhancer == b.enhancer);
+    let possible = sets.filter(|set| !is_impossible(set));
+    possible.flatten().copied().collect()
+}

@@ -1,0 +1,130 @@
+//! Findings in words: [`Sentence`]s that say what was shown, and no more than its test.
+//!
+//! Each sentence comes from typed results and from fixed wording. The terminal, the page, `summary.json` and `tables.tex` show the
+//! same strings. Rules:
+//!
+//! - A sentence has a sign, and the words “costs”, “harms”, “helps” and “falls below”, only if p is below 0.05 after the correction over
+//!   all tests that sentences rest on, in the strict and in the lenient parsing, with the same direction.
+//! - If only the strict parsing detects a difference, the sentence is about the answer format.
+//! - If nothing is detected, the sentence says so, with the interval. It never says that there is no difference.
+//! - A sentence is about the models of the run and names their number; it does not speak of models in general.
+
+mod answers;
+mod apart;
+mod baseline;
+mod confidence;
+mod darkness;
+mod format;
+mod hallucination;
+mod lights;
+mod models;
+mod pooled;
+mod readings;
+mod real;
+mod sample;
+mod self_agreement;
+mod sentence;
+mod words_alone;
+
+pub(crate) use baseline::{against_baseline, no_verdict};
+pub(crate) use models::dark_levels;
+pub(crate) use sample::left_out;
+pub(crate) use self_agreement::self_agreement;
+pub(crate) use sentence::{Sentence, Tone};
+
+use std::collections::BTreeSet;
+
+use self::confidence::Confidence;
+use self::hallucination::TopAnswer;
+use self::lights::{in_each_light, means_of_set, of_set};
+use crate::score::confusion::FalseAnswer;
+use crate::score::findings::Findings;
+use crate::score::pooled_kind::PooledKind;
+use crate::types::{Family, KindReading};
+
+/// Largest number of sentences that are shown first; the others follow on request.
+pub(crate) const FIRST: usize = 8;
+
+/// What is said about the sentences as a whole, in the line below them.
+pub(crate) const HOW_TO_READ: &str = "Signs and p are corrected over all tests behind these sentences: a report without any effect has a sign with a probability of 5 % at most (an old run: 5 % over its models and conditions). A sign holds in the strict and the lenient parsing. An interval is of one test: it leaves out 0 if and only if the uncorrected p is below 0.05.";
+
+/// All sentences, in the order of their importance.
+#[must_use]
+pub(crate) fn sentences(findings: &Findings<'_>) -> Vec<Sentence> {
+    let mut sentences = Vec::new();
+    sentences.extend(sample::impossible(findings));
+    sentences.extend(sample::left_out(findings));
+    sentences.extend(readings::readings(&findings.by_reading, findings.unit));
+    sentences.extend(darkness::darkness(findings));
+    sentences.extend(real::real(findings));
+    sentences.extend(in_each_light(findings, about_light));
+    sentences.extend(words_alone::untouched(findings));
+    sentences.extend(about_clean(findings));
+    sentences.extend(models::best(findings));
+    sentences.extend(apart::apart(findings));
+    sentences.extend(in_each_light(findings, about_answers));
+    sentences.extend(answers::fidelity(findings));
+    sentences.extend(answers::unread(findings));
+    sentences.extend(sample::power(&findings.pooled, findings.unit));
+    sentences
+}
+
+/// Sentences about noise, enhancers and words alone.
+fn about_light(findings: &Findings<'_>, variant: &KindReading) -> Vec<Sentence> {
+    let unit = findings.unit;
+    let of = |kind| of_set(findings, kind, variant);
+    let mut sentences = Vec::new();
+    let means = |kind| means_of_set(findings, kind, variant);
+    sentences.extend(pooled::noise(
+        &of(PooledKind::Noise),
+        &means(PooledKind::Noise),
+        unit,
+    ));
+    sentences.extend(pooled::enhancers(
+        &of(PooledKind::Enhancer),
+        &means(PooledKind::Enhancer),
+        unit,
+    ));
+    let blind = of(PooledKind::Blind);
+    sentences.extend(words_alone::pooled(&blind, unit));
+    let by_family = words_alone::by_family(findings, variant);
+    sentences.extend(words_alone::in_a_family(&by_family, &blind, unit));
+    sentences
+}
+
+/// Sentences about enhancers on the clean frames.
+fn about_clean(findings: &Findings<'_>) -> Vec<Sentence> {
+    let clean = findings
+        .pooled
+        .iter()
+        .filter(|finding| finding.kind == PooledKind::Enhancer && finding.variant.kind.is_none());
+    let clean: BTreeSet<&KindReading> = clean.map(|finding| &finding.variant).collect();
+    let sentences = clean.into_iter().flat_map(|variant| {
+        let levels = of_set(findings, PooledKind::Enhancer, variant);
+        pooled::enhancers(&levels, &[], findings.unit)
+    });
+    sentences.collect()
+}
+
+/// Sentences about false answers, one answer to everything, confidence, and the families.
+fn about_answers(findings: &Findings<'_>, variant: &KindReading) -> Vec<Sentence> {
+    let unit = findings.unit;
+    let mut sentences = Vec::new();
+    for answer in [FalseAnswer::No, FalseAnswer::Yes] {
+        let levels = of_set(findings, PooledKind::Hallucination(answer), variant);
+        sentences.extend(hallucination::false_answers(&levels, answer, unit));
+    }
+    let mut answers = TopAnswer::all(findings, variant);
+    // “no” to most questions about presence is one finding, not two.
+    if !sentences.is_empty() {
+        answers.retain(|answer| *answer.family != Family::Presence);
+    }
+    sentences.extend(hallucination::collapse(&answers, unit));
+    let confidence = Confidence::all(findings, variant);
+    sentences.extend(confidence::confidence(&confidence, unit));
+    sentences.extend(models::families(findings, variant));
+    sentences
+}
+
+#[cfg(test)]
+mod tests;

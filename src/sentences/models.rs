@@ -1,0 +1,159 @@
+//! Sentences about single models and single families: which model sees best in the dark, and which family loses most.
+
+use super::lights::Topic;
+use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
+use crate::score::best::{BestInTheDark, Crossing};
+use crate::score::claim::Claim;
+use crate::score::findings::Findings;
+use crate::score::pooled::PooledFinding;
+use crate::score::pooled_kind::PooledKind;
+use crate::score::significance::Significance;
+use crate::text::words::family;
+use crate::types::KindReading;
+use crate::types::degradation::{Axis, Kind};
+
+/// The model that sees best in the dark, and those that it is not shown to be better than; if the order of the leaders in the light
+/// and in the dark changes with the level, that in its place.
+pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
+    let best = findings.best.as_ref().filter(|best| best.is_possible())?;
+    let lenient = findings.lenient_best.as_ref()?;
+    let (leader, second) = (best.leader(), best.models.get(1)?);
+    let mut numbers = Numbers::of(findings.unit);
+    let over = dark_levels(best);
+    let axis = best.variant.kind.map_or(Axis::LIGHT, Kind::axis);
+    let place = axis.place;
+    let is_same = lenient.is_detected() && lenient.leader().model == leader.model;
+    let (tone, text) = if let Some(crossing) = crossing(best, lenient) {
+        let ((before, last), (after, first)) = (&crossing.before, &crossing.after);
+        let text = format!("{before} is better to {last}, {after} from {first}.");
+        (Tone::Note, text)
+    } else if best.is_detected() && is_same {
+        let text = format!("{} sees best {place} ({over}).", leader.model);
+        (Tone::Better, text)
+    } else {
+        let others = match &best.not_shown_better_than[..] {
+            [] => "the others".to_owned(),
+            others => others.join(", "),
+        };
+        let text = format!(
+            "{} has the highest mean accuracy {place} ({over}), but was not detected to be better than {others}.",
+            leader.model
+        );
+        (Tone::NotShown, text)
+    };
+    let value = numbers.percent("mean", leader.mean.value);
+    let low = numbers.percent("mean_low", leader.mean.low);
+    let high = numbers.percent("mean_high", leader.mean.high);
+    let loss = leader.loss.map(|loss| {
+        let loss = numbers.difference("_from_L0", loss);
+        format!(", {loss} points from L0")
+    });
+    let loss = loss.unwrap_or_default();
+    let test = if let Some(crossing) = crossing(best, lenient) {
+        let lead = numbers.difference("_before", crossing.lead);
+        let lag = numbers.difference("_after", crossing.lag);
+        let p = numbers.p("p", crossing.p_report.unwrap_or(crossing.p));
+        format!(
+            "{} less {}: {lead} to {}, {lag} from {}, {p}",
+            crossing.before.0, crossing.after.0, crossing.before.1, crossing.after.1
+        )
+    } else {
+        let mut pairs = best.pairs.iter();
+        let pair = pairs.find(|pair| pair.first == leader.model && pair.second == second.model)?;
+        let difference = numbers.difference("", pair.difference);
+        let p = numbers.p("p", best.p_report.unwrap_or(pair.holm));
+        format!("{difference} against {}, {p}", second.model)
+    };
+    let format = if best.is_detected() && !is_same {
+        ", detected in the strict parsing alone"
+    } else {
+        ""
+    };
+    let items = numbers.count("n", best.items);
+    let clusters = numbers.clusters(best.clusters);
+    let without = match &best.without[..] {
+        [] => String::new(),
+        models => format!("; without {}, not asked in this way", models.join(", ")),
+    };
+    let detail = format!(
+        "{} over {over}: {value} % [{low}, {high}]{loss}; {test}{format}; n = {items} in {clusters}{without}",
+        leader.model
+    );
+    let sentence = numbers.sentence("best", tone, text, detail);
+    let topics = Topic::all(findings);
+    Some(match topics.first() {
+        Some(main) => main.named(&best.variant, sentence),
+        None => sentence,
+    })
+}
+
+/// The change of order of two models, if it is detected in both parsings.
+fn crossing<'b>(best: &'b BestInTheDark, lenient: &BestInTheDark) -> Option<&'b Crossing> {
+    let detected = |of: &'b BestInTheDark| of.crossing.as_ref().filter(|found| found.is_detected());
+    let strict = detected(best)?;
+    let lenient = lenient
+        .crossing
+        .as_ref()
+        .filter(|found| found.is_detected())?;
+    let is_same = strict.before.0 == lenient.before.0 && strict.after.0 == lenient.after.0;
+    is_same.then_some(strict)
+}
+
+/// The dark levels that the comparison of models rests on, as `L3–L5`.
+pub(crate) fn dark_levels(best: &BestInTheDark) -> String {
+    level_runs(&best.levels, &best.asked)
+}
+
+/// The families that lose most and least at the darkest level, one against the other, if a loss over all families is detected there and
+/// their intervals do not meet. This is a description without a sign: the two families were chosen by the data.
+pub(super) fn families(findings: &Findings<'_>, variant: &KindReading) -> Option<Sentence> {
+    let pooled = findings.pooled.iter();
+    let of_families = pooled.filter(|finding| {
+        finding.kind == PooledKind::Darkness
+            && finding.family.is_some()
+            && finding.variant == *variant
+    });
+    let darkest = of_families.clone().map(|finding| finding.level).max()?;
+    let of_families: Vec<&PooledFinding> = of_families
+        .filter(|finding| finding.level == darkest)
+        .collect();
+    let by_value = |a: &&&PooledFinding, b: &&&PooledFinding| {
+        let value = |of: &PooledFinding| of.strict.difference.value;
+        value(a).total_cmp(&value(b))
+    };
+    let most = of_families.iter().min_by(by_value)?;
+    let least = of_families.iter().max_by(by_value)?;
+    let mut whole = findings.pooled.iter();
+    let is_lost = whole.any(|finding| {
+        finding.kind == PooledKind::Darkness
+            && finding.family.is_none()
+            && finding.variant == *variant
+            && finding.level == darkest
+            && finding.claim() == Claim::Detected(Significance::Worse)
+    });
+    let (of_most, of_least) = (most.strict.difference, least.strict.difference);
+    if !is_lost || most.strict.verdict != Significance::Worse || of_most.high >= of_least.low {
+        return None;
+    }
+    let mut numbers = Numbers::of(findings.unit);
+    let text = format!(
+        "{} costs more in {} ({} points at {darkest}) than in {} ({}).",
+        capitalised(darkest.axis().unwrap_or(Axis::LIGHT).cause),
+        family(most.family.as_ref()),
+        numbers.points("effect_most", of_most.value),
+        family(least.family.as_ref()),
+        numbers.points("effect_least", of_least.value)
+    );
+    let [of_most, of_least] = [("_most", of_most), ("_least", of_least)]
+        .map(|(at, difference)| numbers.difference(at, difference));
+    let sample = [("n_most", most), ("n_least", least)]
+        .map(|(name, finding)| numbers.count(name, finding.items));
+    let p = numbers.p("p", most.strict.holm);
+    let detail = format!(
+        "{of_most}, n = {}, against {of_least}, n = {}: the two intervals do not meet, which is no test; {p} is that of the loss in {}",
+        sample[0],
+        sample[1],
+        family(most.family.as_ref())
+    );
+    Some(numbers.sentence("families", Tone::Note, text, detail))
+}

@@ -1,0 +1,120 @@
+//! Sentences about photographs in the dark: what they cost, whether synthetic images stand for them, and what an enhancer does to them.
+
+use super::sentence::{Numbers, Sentence, Tone};
+use crate::score::claim::Claim;
+use crate::score::cluster::ClusterUnit;
+use crate::score::comparison::{Comparison, ComparisonKind};
+use crate::score::findings::Findings;
+use crate::score::pair_darkness::PairDarkness;
+use crate::score::significance::Significance;
+use crate::score::subject::judged;
+use crate::text::words::light;
+
+/// Sentences about each model and each photograph: against the light, against synthetic images that are as dark, and enhanced.
+pub(super) fn real(findings: &Findings<'_>) -> Vec<Sentence> {
+    let models = judged(findings.grid.subjects.iter().map(|subject| &*subject.model));
+    let mut sentences = Vec::new();
+    for pair in &findings.pairs {
+        let rows = findings.comparisons.iter().filter(|row| {
+            row.family.is_none()
+                && row.first.variant.photograph() == Some(&pair.name)
+                && models.contains(&*row.first.model)
+        });
+        let rows: Vec<&Comparison> = rows.collect();
+        let of = |kind: ComparisonKind| rows.iter().copied().filter(move |row| row.kind == kind);
+        sentences.extend(of(ComparisonKind::Level).map(|row| cost(row, pair, findings.unit)));
+        let raw = of(ComparisonKind::RealSynthetic).filter(|row| row.first.enhancer.is_none());
+        sentences.extend(raw.map(|row| against_synthetic(row, findings.unit)));
+        sentences.extend(of(ComparisonKind::RealEnhanced).map(|row| enhanced(row, findings.unit)));
+    }
+    sentences
+}
+
+/// What the dark costs a model in photographs.
+fn cost(row: &Comparison, pair: &PairDarkness, unit: ClusterUnit) -> Sentence {
+    let mut numbers = Numbers::of(unit);
+    let least = if pair.is_lower_bound { "≥ " } else { "" };
+    let ev = numbers.number("ev", pair.ev[1], 1);
+    let place = format!("Photographed in the dark ({}, {least}{ev} EV)", pair.name);
+    let model = &row.first.model;
+    let text = match verdict(row) {
+        Significance::Worse | Significance::Better => {
+            let does = if verdict(row) == Significance::Worse {
+                "loses"
+            } else {
+                "gains"
+            };
+            let size = numbers.size("effect", row.strict.paired.difference.value);
+            format!("{place}, {model} {does} {size} points against the light.")
+        }
+        _ => format!("{place}, no loss of {model} is shown."),
+    };
+    sentence("real darkness", row, numbers, text)
+}
+
+/// Whether synthetic images stand for photographs.
+fn against_synthetic(row: &Comparison, unit: ClusterUnit) -> Sentence {
+    let mut numbers = Numbers::of(unit);
+    let (model, synthetic) = (&row.first.model, light(&row.second.variant, None));
+    let level = row.second.condition();
+    let (name, size) = (row.first.condition(), row.strict.paired.difference.value);
+    let text = match verdict(row) {
+        Significance::Worse | Significance::Better => {
+            let harder = if verdict(row) == Significance::Worse {
+                "harder"
+            } else {
+                "easier"
+            };
+            let size = numbers.size("effect", size);
+            format!("{name} is {harder} for {model} than {synthetic} ({level}), by {size} points.")
+        }
+        _ => format!(
+            "It is not shown that {name} is harder or easier for {model} than {synthetic} ({level})."
+        ),
+    };
+    sentence("real against synthetic", row, numbers, text)
+}
+
+/// What an enhancer does to photographs.
+fn enhanced(row: &Comparison, unit: ClusterUnit) -> Sentence {
+    let mut numbers = Numbers::of(unit);
+    let name = row.first.enhancer.as_ref().map_or("", |name| name.as_str());
+    let (model, raw) = (&row.first.model, row.second.condition());
+    let text = match verdict(row) {
+        Significance::Worse | Significance::Better => {
+            let does = if verdict(row) == Significance::Worse {
+                "harms"
+            } else {
+                "helps"
+            };
+            let size = numbers.size("effect", row.strict.paired.difference.value);
+            format!("{name} {does} {model} with {raw}, by {size} points.")
+        }
+        _ => format!("Neither help nor harm of {name} is shown for {model} with {raw}."),
+    };
+    sentence("real enhanced", row, numbers, text)
+}
+
+/// What is detected, in both parsings and after the correction over all sentences.
+fn verdict(row: &Comparison) -> Significance {
+    match row.claim() {
+        Claim::Detected(verdict) => verdict,
+        _ => Significance::NotShown,
+    }
+}
+
+/// A sentence with the difference, its interval, its test and its sample.
+fn sentence(kind: &'static str, row: &Comparison, mut numbers: Numbers, text: String) -> Sentence {
+    let paired = &row.strict.paired;
+    let difference = numbers.difference("", paired.difference);
+    let p = numbers.p("p", row.strict.p_report.unwrap_or(row.strict.holm));
+    let n = numbers.count("n", paired.difference.n);
+    let clusters = numbers.clusters(paired.clusters);
+    let detail = format!("{difference}, {p}, n = {n} in {clusters}");
+    let tone = if row.claim() == Claim::Impossible {
+        Tone::Note
+    } else {
+        Tone::from(verdict(row))
+    };
+    numbers.sentence(kind, tone, text, detail)
+}

@@ -1,0 +1,198 @@
+//! Sentences about the sample: what so few clusters cannot show, and which models are left out.
+
+use super::sentence::{Numbers, Sentence, Tone, level_runs};
+use crate::score::cluster::ClusterUnit;
+use crate::score::findings::Findings;
+use crate::score::pooled::{ModelsLeftOut, PooledFinding};
+use crate::score::pooled_kind::PooledKind;
+use crate::text::words::light;
+use crate::types::{EnhancerName, KindReading};
+
+/// Half-width of an interval in points above which the sample is called small.
+pub(super) const WIDE: f64 = 0.05;
+
+/// Largest number of models that a sentence names.
+const MAX_NAMED: usize = 3;
+
+/// What findings of a kind are about.
+fn topic(kind: PooledKind, variant: &KindReading, enhancer: Option<&EnhancerName>) -> String {
+    match (kind, enhancer) {
+        (PooledKind::Enhancer, Some(name)) => name.to_string(),
+        (PooledKind::Blind, _) => "dark images against the words alone".to_owned(),
+        _ => kind.name_on(variant.kind).to_owned(),
+    }
+}
+
+/// Whether no finding of a set can have a verdict, because the clusters are too few for any corrected p-value.
+pub(super) fn is_impossible(set: &[&PooledFinding]) -> bool {
+    set.iter()
+        .all(|finding| !finding.strict.verdict.is_possible())
+}
+
+/// On what no verdict is possible with so few clusters; `None` if one is possible on everything. A set of which another light has
+/// verdicts is named with its light.
+pub(super) fn impossible(findings: &Findings<'_>) -> Option<Sentence> {
+    let last = findings
+        .grid
+        .main_variant()
+        .and_then(|variant| variant.kind);
+    let whole = findings.pooled.iter();
+    let whole: Vec<&PooledFinding> = whole.filter(|finding| finding.family.is_none()).collect();
+    let is_one_set = |a: &&PooledFinding, b: &&PooledFinding| {
+        (a.kind, &a.variant, &a.enhancer) == (b.kind, &b.variant, &b.enhancer)
+    };
+    let (without, with): (Vec<_>, Vec<_>) = whole
+        .chunk_by(is_one_set)
+        .partition(|set| is_impossible(set));
+    let (mut topics, mut least) = (Vec::<String>::new(), Vec::new());
+    for set in without {
+        let first = set[0];
+        if first.variant.kind != last {
+            continue;
+        }
+        let mut topic = topic(first.kind, &first.variant, first.enhancer.as_ref());
+        let is_same = |other: &PooledFinding| {
+            (other.kind, &other.enhancer) == (first.kind, &first.enhancer)
+                && other.variant.kind.is_some()
+        };
+        if with.iter().any(|other| is_same(other[0])) {
+            topic = format!("{topic} {}", light(&first.variant, None));
+        }
+        if !topics.contains(&topic) {
+            topics.push(topic);
+        }
+        least.extend(
+            set.iter()
+                .map(|finding| (finding.least_holm, finding.clusters)),
+        );
+    }
+    if let Some(best) = findings.best.as_ref().filter(|best| !best.is_possible()) {
+        topics.push("the best model".to_owned());
+        least.push((best.pairs.len() as f64 * best.least_p, best.clusters));
+    }
+    let (p, clusters) = least.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let mut numbers = Numbers::of(findings.unit);
+    let text = format!(
+        "With {} no verdict on {} is possible, however large the effect.",
+        numbers.clusters(clusters),
+        listed(&topics)
+    );
+    let p = numbers.p("least_p", p.min(1.0));
+    let detail = format!("the smallest possible {p}; take more {}s", findings.unit);
+    Some(numbers.sentence("no verdict", Tone::Note, text, detail))
+}
+
+/// How wide the intervals are, if the widest is wide: from the narrowest to the widest. This is no power: what so small a sample
+/// would show of a true effect depends on more than the intervals.
+pub(super) fn power(all: &[PooledFinding], unit: ClusterUnit) -> Option<Sentence> {
+    let whole = all.iter().filter(|finding| finding.family.is_none());
+    let which = if whole
+        .clone()
+        .all(|finding| finding.strict.verdict.is_possible())
+    {
+        "the findings"
+    } else {
+        "the findings that may have a verdict"
+    };
+    let whole = whole.filter(|finding| finding.strict.verdict.is_possible());
+    let half = |finding: &PooledFinding| {
+        (finding.strict.difference.high - finding.strict.difference.low) / 2.0
+    };
+    let by_width = |a: &&PooledFinding, b: &&PooledFinding| half(a).total_cmp(&half(b));
+    let narrowest = half(whole.clone().min_by(by_width)?);
+    let widest = whole.max_by(by_width)?;
+    if half(widest) <= WIDE {
+        return None;
+    }
+    let mut numbers = Numbers::of(unit);
+    let mut points = |name, half: f64| numbers.number(name, 100.0 * half, 0);
+    let [least, most] = [
+        points("narrowest", narrowest),
+        points("widest", half(widest)),
+    ];
+    let range = if least == most {
+        most
+    } else {
+        format!("{least} to {most}")
+    };
+    let text = format!(
+        "With {} the intervals of {which} reach about {range} points to each side.",
+        numbers.clusters(widest.clusters)
+    );
+    let detail = "over all families; an effect much smaller than that cannot be shown with so small a sample";
+    Some(numbers.sentence("power", Tone::Note, text, detail.to_owned()))
+}
+
+/// The models that are left out of findings, because they answered less than others: a sentence for the same levels and models. False
+/// answers are left out at the levels of darkness.
+pub(crate) fn left_out(findings: &Findings<'_>) -> Vec<Sentence> {
+    let mut grouped: Vec<(&ModelsLeftOut, Vec<String>)> = Vec::new();
+    for set in &findings.left_out {
+        if matches!(set.kind, PooledKind::Hallucination(_)) {
+            continue;
+        }
+        let about = format!(
+            "{} ({})",
+            topic(set.kind, &set.variant, set.enhancer.as_ref()),
+            light(&set.variant, None)
+        );
+        let is_same = |other: &ModelsLeftOut| {
+            runs(other) == runs(set) && other.models == set.models && other.items == set.items
+        };
+        match grouped.iter_mut().find(|(other, _)| is_same(other)) {
+            Some((_, topics)) => topics.push(about),
+            None => grouped.push((set, vec![about])),
+        }
+    }
+    let sentences = grouped.into_iter().map(|(set, topics)| {
+        let mut numbers = Numbers::of(findings.unit);
+        let is_one = set.models.len() == 1;
+        let models = if set.models.len() > MAX_NAMED {
+            format!("{} models", numbers.count("models", set.models.len()))
+        } else {
+            listed(&set.models)
+        };
+        if set.is_more {
+            let were = if is_one { "was" } else { "were" };
+            let text = format!(
+                "Only {models} {were} asked at {}: no mean is made there.",
+                runs(set)
+            );
+            let detail = format!("left out of the findings about {}", listed(&topics));
+            return numbers.sentence("left out", Tone::Note, text, detail);
+        }
+        let [all, answered] = set.items;
+        let why = match (answered, is_one) {
+            (0, true) => "it was not asked".to_owned(),
+            (0, false) => "they were not asked".to_owned(),
+            (_, is_one) => format!(
+                "{} answered {} of {} questions",
+                if is_one { "it" } else { "each" },
+                numbers.count("answered", answered),
+                numbers.count("questions", all)
+            ),
+        };
+        let text = format!(
+            "{models} {} apart from the other models: {why} at {}.",
+            if is_one { "stands" } else { "stand" },
+            runs(set)
+        );
+        let detail = format!("in no mean about {}", listed(&topics));
+        numbers.sentence("left out", Tone::Note, text, detail)
+    });
+    sentences.collect()
+}
+
+/// The levels at which models answered less.
+fn runs(set: &ModelsLeftOut) -> String {
+    level_runs(&set.levels, &set.asked)
+}
+
+/// Things in words, as `a, b and c`.
+pub(super) fn listed(things: &[String]) -> String {
+    match things {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}

@@ -1,0 +1,373 @@
+//! Sentences about agreement with a model's own answers at L0: [`self_agreement`].
+
+use std::collections::BTreeSet;
+
+use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
+use crate::score::claim::Claim;
+use crate::score::comparison::{Comparison, ComparisonKind};
+use crate::score::self_agreement::SelfAgreement;
+use crate::score::self_agreement::cell::{AgreementCell, CellRole};
+use crate::score::self_agreement::light::LightReplies;
+use crate::score::significance::Significance;
+use crate::score::subject::judged;
+use crate::text::words::light;
+use crate::types::{AxisLevel, EnhancerName, KindReading, SetLight};
+
+/// All sentences of a run without true answers: models against each other at L0 first, then each model.
+#[must_use]
+pub(crate) fn self_agreement(found: &SelfAgreement<'_>) -> Vec<Sentence> {
+    let mut sentences = between(found);
+    for model in found.models() {
+        let light = found.light_of(model);
+        if light.is_some_and(LightReplies::is_unread) {
+            sentences.push(unread(found, model));
+            continue;
+        }
+        if found.cannot_tell(model) {
+            sentences.push(cannot_tell(found, model));
+            continue;
+        }
+        for variant in variants(found, model) {
+            sentences.extend(darkness(found, model, &variant));
+            for enhancer in enhancers(found, model) {
+                sentences.extend(enhanced(found, model, &variant, &enhancer));
+            }
+        }
+        for enhancer in enhancers(found, model) {
+            sentences.extend(enhanced(found, model, &KindReading::NONE, &enhancer));
+        }
+        sentences.extend(way_out(found, model));
+    }
+    sentences
+}
+
+/// The sentence in place of a verdict: no reply at L0 could be read.
+fn unread(found: &SelfAgreement<'_>, model: &str) -> Sentence {
+    let text = format!(
+        "Nothing is known about {model}: no answer could be read in any of its replies at L0, so that there is nothing to compare it with."
+    );
+    let detail = "--constrain choice makes a server allow letters alone; --max-tokens may be too low for a model that thinks first";
+    let numbers = Numbers::of(found.unit);
+    numbers.sentence(
+        "no_answer_in_the_light",
+        Tone::Note,
+        text,
+        detail.to_owned(),
+    )
+}
+
+/// The sentence in place of a verdict: all questions have one answer about nearly all images.
+fn cannot_tell(found: &SelfAgreement<'_>, model: &str) -> Sentence {
+    let mut numbers = Numbers::of(found.unit);
+    let (_, all) = found.informative(model);
+    let all = numbers.count("questions", all);
+    let text = format!(
+        "This bank does not show what {model} sees: at L0 its answer to each of the {all} questions is the same about 95 % of the images \
+         or more."
+    );
+    let own = found.questions.iter();
+    let images = own.filter(|question| question.model == model);
+    let images = images.map(|question| question.images);
+    let (least, greatest) = (images.clone().min(), images.max());
+    let fewest = numbers.count("fewest_images", least.unwrap_or_default());
+    let most = numbers.count("most_images", greatest.unwrap_or_default());
+    let images = match (least, greatest) {
+        (Some(1), Some(1)) => "1 image".to_owned(),
+        (least, greatest) if least == greatest => format!("{most} images"),
+        _ => format!("{fewest} to {most} images"),
+    };
+    let detail = format!(
+        "each question has an answer about {images}; such a model agrees with itself whether it sees or not: ask other questions, \
+         or about more images"
+    );
+    numbers.sentence("bank_cannot_tell", Tone::Note, text, detail)
+}
+
+/// Each pair of models at L0.
+fn between(found: &SelfAgreement<'_>) -> Vec<Sentence> {
+    let models = judged(found.models());
+    let pairs = found.between.iter();
+    let pairs =
+        pairs.filter(|pair| models.contains(&*pair.first) && models.contains(&*pair.second));
+    let sentences = pairs.map(|pair| {
+        let mut numbers = Numbers::of(found.unit);
+        let same = numbers.percent("same", pair.same.value);
+        let text = format!(
+            "At L0 {} and {} give the same answer to {same} % of the questions that both answer.",
+            pair.first, pair.second
+        );
+        let [low, high] = [("low", pair.same.low), ("high", pair.same.high)]
+            .map(|(name, value)| numbers.percent(name, value));
+        let kappa = match pair.kappa {
+            Some(kappa) => format!("κ {}", numbers.number("kappa", kappa.value, 2)),
+            None => "κ not defined".to_owned(),
+        };
+        let n = numbers.count("n", pair.same.n);
+        let detail = format!(
+            "[{low}, {high}] %, {kappa}, n = {n}; each is compared with itself, so that their agreements in the dark can be compared only as far as this"
+        );
+        numbers.sentence("models_in_light", Tone::Note, text, detail)
+    });
+    sentences.collect()
+}
+
+/// The degraded variants of a model, sorted.
+fn variants(found: &SelfAgreement<'_>, model: &str) -> BTreeSet<KindReading> {
+    let cells = found.whole().filter(|cell| cell.subject.model == model);
+    let variants = cells.map(|cell| cell.subject.variant.clone());
+    variants.filter(|variant| variant.kind.is_some()).collect()
+}
+
+fn enhancers(found: &SelfAgreement<'_>, model: &str) -> BTreeSet<EnhancerName> {
+    let cells = found.whole().filter(|cell| cell.subject.model == model);
+    cells
+        .filter_map(|cell| cell.subject.enhancer.clone())
+        .collect()
+}
+
+/// The comparisons of one kind of a model, over all families.
+fn compared<'f>(
+    found: &'f SelfAgreement<'_>,
+    kind: ComparisonKind,
+    model: &str,
+) -> impl Iterator<Item = &'f Comparison> {
+    let all = found.comparisons.iter();
+    all.filter(move |comparison| comparison.kind == kind && comparison.family.is_none())
+        .filter(move |comparison| comparison.first.model == model)
+}
+
+/// What the darkest level of a variant leaves of a model's answers.
+fn darkness(found: &SelfAgreement<'_>, model: &str, variant: &KindReading) -> Option<Sentence> {
+    let mut cells = found.whole().filter(|cell| cell.subject.model == model);
+    let raw =
+        |cell: &&AgreementCell| cell.subject.variant == *variant && cell.subject.enhancer.is_none();
+    let dark = cells
+        .clone()
+        .filter(raw)
+        .max_by_key(|cell| cell.subject.level)?;
+    let level = dark.subject.level?;
+    let agreement = dark.agreement?;
+    let mut numbers = Numbers::of(found.unit);
+    let share = numbers.percent("agreement", agreement.value);
+    let ceiling = cells.clone().find(|cell| cell.role() == CellRole::Ceiling);
+    let floor = cells.find(|cell| cell.role() == CellRole::Floor);
+    let mut beside = Vec::new();
+    for (name, words, cell) in [
+        ("ceiling", "asked again at L0", ceiling),
+        ("floor", "without an image", floor),
+    ] {
+        if let Some(share) = cell.and_then(|cell| cell.agreement) {
+            beside.push(format!(
+                "{words} to {} %",
+                numbers.percent(name, share.value)
+            ));
+        }
+    }
+    let beside = if beside.is_empty() {
+        String::new()
+    } else {
+        format!("; {}", beside.join(", "))
+    };
+    let text = format!(
+        "At {level} ({}) {model} gives its answer at L0 to {share} % of the questions{beside}.",
+        light(variant, None)
+    );
+    let test = compared(found, ComparisonKind::Level, model)
+        .find(|comparison| comparison.first == dark.subject);
+    let detail = darkness_detail(found, dark, level, test, &mut numbers);
+    let tone = test.map_or(Tone::Note, |test| test.claim().into());
+    Some(numbers.sentence("agreement_in_the_dark", tone, text, detail))
+}
+
+/// What stands beside the agreement at the darkest level.
+fn darkness_detail(
+    found: &SelfAgreement<'_>,
+    dark: &AgreementCell,
+    level: AxisLevel,
+    test: Option<&Comparison>,
+    numbers: &mut Numbers,
+) -> String {
+    let model = &*dark.subject.model;
+    let mut parts = Vec::new();
+    if let Some(Ok(kept)) = dark.evidence {
+        let [value, low, high] = [
+            ("evidence", kept.value),
+            ("evidence_low", kept.low),
+            ("evidence_high", kept.high),
+        ]
+        .map(|(name, value)| numbers.percent(name, value));
+        parts.push(format!("evidence kept {value} % [{low}, {high}]"));
+    }
+    parts.push(match dark.kappa {
+        Some(kappa) => format!("κ {}", numbers.number("kappa", kappa.value, 2)),
+        None => "κ not defined".to_owned(),
+    });
+    if let [Some(clean), Some(here)] = dark.entropies {
+        let clean = numbers.number("entropy_light", clean, 2);
+        let here = numbers.number("entropy", here, 2);
+        parts.push(format!(
+            "entropy of its answers {clean} at L0, {here} at {level}"
+        ));
+    }
+    if let Some(test) = test {
+        let difference = numbers.difference("", test.strict.paired.difference);
+        let p = numbers.p("p", test.strict.p_report.unwrap_or(test.strict.holm));
+        parts.push(format!("{difference} points against L0 asked again, {p}"));
+    }
+    let curve = found.curves.iter().find(|curve| {
+        curve.model == model && curve.variant == dark.subject.variant && curve.enhancer.is_none()
+    });
+    if let Some(threshold) = curve.and_then(|curve| curve.threshold.as_ref().ok())
+        && threshold.value.is_finite()
+    {
+        let unit = level.axis().map_or("EV", |axis| axis.unit);
+        let value = numbers.number("threshold", threshold.value, 1);
+        parts.push(format!("half is left at {value} {unit}"));
+    }
+    if let Some(read) = found.light_of(model).and_then(|light| light.read) {
+        let read = numbers.percent("read_in_light", read.value);
+        parts.push(format!("{read} % had an answer at L0"));
+    }
+    let (informative, all) = found.informative(model);
+    if informative < all {
+        let (informative, all) = (
+            numbers.count("informative", informative),
+            numbers.count("questions", all),
+        );
+        parts.push(format!("{informative} of {all} questions are informative"));
+    }
+    parts.join(", ")
+}
+
+/// What an enhancer does to a model's agreement, over the levels of a variant; at L0 if there is none.
+fn enhanced(
+    found: &SelfAgreement<'_>,
+    model: &str,
+    variant: &KindReading,
+    enhancer: &EnhancerName,
+) -> Option<Sentence> {
+    let all = compared(found, ComparisonKind::Enhancer, model);
+    let own = all.filter(|comparison| {
+        let subject = &comparison.first;
+        subject.variant == *variant && subject.enhancer.as_ref() == Some(enhancer)
+    });
+    let own: Vec<&Comparison> = own.collect();
+    let levels: Vec<AxisLevel> = own.iter().filter_map(|c| c.first.level).collect();
+    let at = |significance: Significance| {
+        let shown = own
+            .iter()
+            .filter(|c| c.claim() == Claim::Detected(significance));
+        let shown: Vec<AxisLevel> = shown.filter_map(|c| c.first.level).collect();
+        (!shown.is_empty()).then(|| level_runs(&shown, &levels))
+    };
+    let strongest = own.iter().max_by(|one, other| {
+        let size = |c: &Comparison| c.strict.paired.difference.value.abs();
+        size(one).total_cmp(&size(other))
+    })?;
+    let levels = (at(Significance::Better), at(Significance::Worse));
+    let (tone, text) = if found.set.light == SetLight::Dark && *variant == KindReading::NONE {
+        of_photographs(enhancer, model, strongest.claim())
+    } else {
+        of_levels(enhancer, model, &light(variant, None), levels)
+    };
+    let mut numbers = Numbers::of(found.unit);
+    let level = strongest.first.level?;
+    let difference = numbers.difference("", strongest.strict.paired.difference);
+    let p = numbers.p(
+        "p",
+        strongest.strict.p_report.unwrap_or(strongest.strict.holm),
+    );
+    let against = if level == AxisLevel::L0 {
+        "L0 asked again"
+    } else {
+        "raw"
+    };
+    let detail =
+        format!("largest at {level}: {difference} points of agreement against {against}, {p}");
+    Some(numbers.sentence("agreement_enhanced", tone, capitalised(&text), detail))
+}
+
+/// What an enhancer of images in the light of `of` does to the answers of a model, with the levels at which it makes them more and less
+/// like those at L0.
+fn of_levels(
+    enhancer: &EnhancerName,
+    model: &str,
+    of: &str,
+    levels: (Option<String>, Option<String>),
+) -> (Tone, String) {
+    match levels {
+        (Some(levels), None) => (
+            Tone::Better,
+            format!("{enhancer} brings answers of {model} back at {levels} ({of})."),
+        ),
+        (None, Some(levels)) if levels == "L0" => (
+            Tone::Worse,
+            format!(
+                "{enhancer} changes answers of {model} in the light: harm where nothing was dark."
+            ),
+        ),
+        (None, Some(levels)) => (
+            Tone::Worse,
+            format!("{enhancer} takes {model} further from its answers at L0 at {levels} ({of})."),
+        ),
+        (Some(better), Some(worse)) => (
+            Tone::Note,
+            format!(
+                "{enhancer} brings answers of {model} back at {better}, and changes others at {worse} ({of})."
+            ),
+        ),
+        (None, None) => (
+            Tone::NotShown,
+            format!("That {enhancer} brings answers of {model} back is not shown ({of})."),
+        ),
+    }
+}
+
+/// What an enhancer of photographs in the dark does to the answers of a model. The answers at L0 were given in the dark themselves, so
+/// that a change is neither help nor harm.
+fn of_photographs(enhancer: &EnhancerName, model: &str, change: Claim) -> (Tone, String) {
+    match change {
+        Claim::Detected(Significance::Worse) => (
+            Tone::Note,
+            format!(
+                "{enhancer} changes answers of {model} to these photographs: whether for the better is not known."
+            ),
+        ),
+        Claim::Detected(_) => (
+            Tone::Note,
+            format!(
+                "{model} answers with {enhancer} as at L0, more often than the same photographs asked about again."
+            ),
+        ),
+        _ => (
+            Tone::NotShown,
+            format!(
+                "That {enhancer} changes answers of {model} to these photographs is not shown."
+            ),
+        ),
+    }
+}
+
+/// How often a model says that it cannot tell, where it may.
+fn way_out(found: &SelfAgreement<'_>, model: &str) -> Option<Sentence> {
+    let light = found.light_of(model).filter(|light| light.has_way_out)?;
+    let cells = found.whole().filter(|cell| {
+        cell.subject.model == model
+            && cell.role() == CellRole::Other
+            && cell.subject.enhancer.is_none()
+    });
+    let dark = cells.max_by_key(|cell| cell.subject.level)?;
+    let (level, share) = (dark.subject.level?, dark.cannot_tell?);
+    let mut numbers = Numbers::of(found.unit);
+    let in_light = light.cannot_tell as f64 / light.replies().max(1) as f64;
+    let in_light = numbers.percent("light", in_light);
+    let here = numbers.percent("share", share.value);
+    let text = format!(
+        "{model} says “cannot tell” to {in_light} % of the questions at L0, and to {here} % at {level}."
+    );
+    let [low, high] = [("low", share.low), ("high", share.high)]
+        .map(|(name, value)| numbers.percent(name, value));
+    let n = numbers.count("n", share.n);
+    let detail = format!("[{low}, {high}] % at {level}, n = {n}");
+    Some(numbers.sentence("cannot_tell", Tone::Note, text, detail))
+}

@@ -1,0 +1,250 @@
+//! One finding in words: [`Sentence`], with the numbers that it contains.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::score::claim::Claim;
+use crate::score::cluster::ClusterUnit;
+use crate::score::estimate::Estimate;
+use crate::score::pooled::PooledFinding;
+use crate::score::significance::{Significance, SwapMethod};
+use crate::text::words::{counted, p, points};
+
+/// A finding in words.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Sentence {
+    /// What the finding is about.
+    pub kind: &'static str,
+    /// What was shown.
+    #[serde(rename = "verdict")]
+    pub tone: Tone,
+    /// One sentence.
+    pub text: String,
+    /// Effect, interval, p and n.
+    pub detail: String,
+    /// Every number of both, by name, as it is written there.
+    pub values: BTreeMap<String, f64>,
+}
+
+/// What a sentence shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub(crate) enum Tone {
+    /// An improvement is shown.
+    #[serde(rename = "better")]
+    Better,
+    /// A loss is shown.
+    #[serde(rename = "worse")]
+    Worse,
+    /// Nothing is shown.
+    #[serde(rename = "not shown")]
+    NotShown,
+    /// The sentence reports no test.
+    #[serde(rename = "note")]
+    Note,
+}
+
+impl Tone {
+    /// The sign before the sentence.
+    #[must_use]
+    pub(crate) fn sign(self) -> char {
+        match self {
+            Self::Better => '+',
+            Self::Worse => '−',
+            Self::NotShown | Self::Note => '·',
+        }
+    }
+
+    /// The word of the verdict, for style sheets.
+    pub(crate) fn class(self) -> &'static str {
+        match self {
+            Self::Better => "better",
+            Self::Worse => "worse",
+            Self::NotShown | Self::Note => "unshown",
+        }
+    }
+}
+
+impl From<Claim> for Tone {
+    fn from(claim: Claim) -> Self {
+        match claim {
+            Claim::Detected(verdict) => verdict.into(),
+            _ => Self::NotShown,
+        }
+    }
+}
+
+impl From<Significance> for Tone {
+    fn from(significance: Significance) -> Self {
+        match significance {
+            Significance::Better => Self::Better,
+            Significance::Worse => Self::Worse,
+            _ => Self::NotShown,
+        }
+    }
+}
+
+/// The numbers of a sentence. Each method returns a number as text, and notes it under a name.
+#[derive(Debug)]
+pub(super) struct Numbers {
+    values: BTreeMap<String, f64>,
+    unit: ClusterUnit,
+}
+
+impl Numbers {
+    /// No numbers yet; clusters are of this unit.
+    pub(super) fn of(unit: ClusterUnit) -> Self {
+        let values = BTreeMap::new();
+        Self { values, unit }
+    }
+
+    /// The sentence with these numbers.
+    pub(super) fn sentence(
+        self,
+        kind: &'static str,
+        tone: Tone,
+        text: String,
+        detail: String,
+    ) -> Sentence {
+        Sentence {
+            kind,
+            tone,
+            text,
+            detail,
+            values: self.values,
+        }
+    }
+
+    fn note(&mut self, name: &str, value: f64, decimals: i32) {
+        let scale = 10_f64.powi(decimals);
+        self.values
+            .insert(name.to_owned(), (value * scale).round() / scale);
+    }
+
+    /// A number of things.
+    pub(super) fn count(&mut self, name: &str, count: usize) -> String {
+        self.note(name, count as f64, 0);
+        grouped(count)
+    }
+
+    /// A plain number.
+    pub(super) fn number(&mut self, name: &str, value: f64, decimals: u8) -> String {
+        self.note(name, value, i32::from(decimals));
+        format!("{value:.*}", usize::from(decimals)).replace('-', "−")
+    }
+
+    /// A share in percent, without the sign.
+    pub(super) fn percent(&mut self, name: &str, share: f64) -> String {
+        self.number(name, 100.0 * share, 1)
+    }
+
+    /// The size of a difference in points, without its sign.
+    pub(super) fn size(&mut self, name: &str, difference: f64) -> String {
+        self.number(name, 100.0 * difference.abs(), 1)
+    }
+
+    /// A difference in points with its sign, as `−4.8`.
+    pub(super) fn points(&mut self, name: &str, difference: f64) -> String {
+        self.note(name, 100.0 * difference, 1);
+        points(difference)
+    }
+
+    /// A difference in points with its interval, as `−4.8 [−8.5, −1.0]`. The names end in `at`.
+    pub(super) fn difference(&mut self, at: &str, difference: Estimate) -> String {
+        let ends = [
+            ("difference", difference.value),
+            ("low", difference.low),
+            ("high", difference.high),
+        ];
+        let [value, low, high] =
+            ends.map(|(name, value)| self.points(&format!("{name}{at}"), value));
+        format!("{value} [{low}, {high}]")
+    }
+
+    /// A p-value, as `p = 0.036` or `p < 0.001`.
+    pub(super) fn p(&mut self, name: &str, value: f64) -> String {
+        if value < 0.001 {
+            self.note(name, 0.001, 3);
+            "p < 0.001".to_owned()
+        } else {
+            let text = p(value);
+            // As it is written: halves are not rounded the same way everywhere.
+            self.values
+                .insert(name.to_owned(), text.parse().unwrap_or(value));
+            format!("p = {text}")
+        }
+    }
+
+    /// The number of clusters, as `30 scenes`.
+    pub(super) fn clusters(&mut self, count: usize) -> String {
+        self.count("clusters", count);
+        counted(count, &self.unit.to_string())
+    }
+
+    /// The number of questions and clusters of a finding, with what is left out.
+    pub(super) fn sample(&mut self, finding: &PooledFinding) -> String {
+        let items = self.count("n", finding.items);
+        let mut parts = vec![format!(
+            "n = {items} in {}",
+            self.clusters(finding.clusters)
+        )];
+        let all = finding.items + finding.dropped;
+        // Above 5 % the reader should know that the items are not those of the tables.
+        if 20 * finding.dropped > all {
+            let dropped = self.count("dropped", finding.dropped);
+            parts.push(format!("{dropped} left out because a model has no reply"));
+        }
+        match finding.strict.p_by {
+            SwapMethod::Counted => {}
+            SwapMethod::Drawn(draws) => {
+                let draws = self.count("draws", draws);
+                parts.push(format!("p by {draws} random swaps"));
+            }
+            SwapMethod::Normal => parts.push("p by the normal distribution".to_owned()),
+        }
+        parts.join(", ")
+    }
+}
+
+/// A whole number with its thousands apart, as `26,781`.
+fn grouped(number: usize) -> String {
+    let digits = number.to_string();
+    let mut text = String::new();
+    for (place, digit) in digits.chars().enumerate() {
+        if place > 0 && (digits.len() - place).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// Models in words: the name of one, or how many there are.
+pub(super) fn models(names: &[String], numbers: &mut Numbers) -> String {
+    match names {
+        [one] => one.clone(),
+        several => format!(
+            "mean of these {} models",
+            numbers.count("models", several.len())
+        ),
+    }
+}
+
+/// A text with its first letter as a capital.
+pub(super) fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().into_iter().flat_map(char::to_uppercase);
+    first.chain(letters).collect()
+}
+
+/// Levels that follow each other in `all` joined by a dash, as `L1–L3, L5`.
+pub(super) fn level_runs<T: PartialEq + ToString>(levels: &[T], all: &[T]) -> String {
+    let place = |level: &T| all.iter().position(|other| other == level);
+    let runs = levels.chunk_by(|a, b| place(a).map(|place| place + 1) == place(b));
+    let texts = runs.map(|run| match run {
+        [one] => one.to_string(),
+        [first, .., last] => format!("{}–{}", first.to_string(), last.to_string()),
+        [] => String::new(),
+    });
+    texts.collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,109 @@
+//! Golden sentences about what models know of their own sight.
+
+use super::checked;
+use crate::score::calibration::{Calibration, RiskCoverage, TestedConfidence};
+use crate::score::cluster::ClusterUnit;
+use crate::score::estimate::Estimate;
+use crate::score::subject::Subject;
+use crate::sentences::confidence::{Confidence, confidence};
+use crate::types::degradation::Kind;
+use crate::types::{AxisLevel, KindReading, Severity};
+
+fn around(value: f64) -> Estimate {
+    Estimate {
+        value,
+        low: value - 0.05,
+        high: value + 0.05,
+        n: 1200,
+    }
+}
+
+/// A number that is detected if it is more than 5 points from 0.
+fn tested(value: f64) -> TestedConfidence {
+    TestedConfidence {
+        estimate: around(value),
+        p: 0.0004,
+        p_report: Some(if value.abs() > 0.05 { 0.0004 } else { 0.3 }),
+    }
+}
+
+/// A model's confidence and accuracy.
+fn calibration(confidence: f64, accuracy: f64) -> Calibration {
+    let zero = around(0.0);
+    Calibration {
+        subject: Subject::seeing("a", AxisLevel::L0, &KindReading::NONE, None),
+        replies: 1200,
+        reasoned: 0,
+        unstated: 0,
+        confidence: around(confidence),
+        accuracy: around(accuracy),
+        overconfidence: tested(confidence - accuracy),
+        growth: Some(tested(confidence - accuracy - 0.02)),
+        error: None,
+        brier: zero,
+        skill: zero,
+        nll: zero,
+        risk: RiskCoverage {
+            at_100: 0.0,
+            at_80: 0.0,
+            at_50: 0.0,
+            area: 0.0,
+        },
+        auroc: None,
+        blind_shift: None,
+        over_orders: None,
+        bins: Vec::new(),
+        positions: Vec::new(),
+    }
+}
+
+#[test]
+fn a_model_that_stays_sure_in_the_dark_is_said_to_not_know_it() {
+    let level = AxisLevel::new(Kind::Sensor, Severity::LADDER[4]);
+    let say = |models: &[(&str, &Calibration, Option<&Calibration>)]| {
+        let all = models.iter().map(|&(model, dark, clean)| Confidence {
+            model,
+            level,
+            dark,
+            clean,
+        });
+        let said = confidence(&all.collect::<Vec<_>>(), ClusterUnit::Scene);
+        said.as_ref().map(checked)
+    };
+    let clean = calibration(0.9, 0.88);
+    let (blind, modest, always) = (
+        calibration(0.85, 0.4),
+        calibration(0.42, 0.4),
+        calibration(0.95, 0.88),
+    );
+    assert_eq!(
+        say(&[("a", &blind, Some(&clean))]).unwrap(),
+        "− a does not know how little it sees at L5: its mean confidence is 85.0 %, and 40.0 % of its replies are right. \
+         (confidence less accuracy: +45.0 [+40.0, +50.0] points, p < 0.001, +2.0 [−3.0, +7.0] at L0; n = 1,200 replies with probabilities)"
+    );
+    // The one that is furthest off is named, with how many are.
+    let several = say(&[
+        ("b", &modest, Some(&clean)),
+        ("a", &blind, Some(&clean)),
+        ("c", &modest, None),
+    ]);
+    let several = several.unwrap();
+    assert!(
+        several.starts_with("− a does not know") && several.contains("shown of 1 of 3 models"),
+        "{several}"
+    );
+    // Off by no more than at L0, or L0 was not asked: that is no matter of the dark.
+    for clean in [Some(&clean), None] {
+        let said = say(&[("a", &always, clean)]).unwrap();
+        assert!(
+            said.starts_with("− At L5 a is surer than it is right: its mean confidence is 95.0 %"),
+            "{said}"
+        );
+    }
+    let said = say(&[("b", &modest, Some(&clean))]).unwrap();
+    assert!(
+        said.starts_with("· b was not detected to be surer than it is right at L5"),
+        "{said}"
+    );
+    assert_eq!(say(&[]), None);
+}

@@ -1,0 +1,182 @@
+//! Golden sentences about false answers and one answer to everything.
+
+use super::{checked, findings};
+use crate::score::cluster::ClusterUnit;
+use crate::score::confusion::{AgainstClean, Collapse, FalseAnswer};
+use crate::score::estimate::Estimate;
+use crate::score::paired::{PairedComparison, Spread};
+use crate::score::pooled::PooledFinding;
+use crate::score::pooled_kind::PooledKind;
+use crate::score::significance::Significance::{self, Better, NotShown, Worse};
+use crate::sentences::hallucination::{self, TopAnswer};
+use crate::types::degradation::Kind;
+use crate::types::{AxisLevel, Family, Severity};
+
+#[test]
+fn false_answers_are_said_where_they_are_shown_to_grow() {
+    let say = |answer: FalseAnswer, levels: &[(f64, Significance)]| {
+        let mut all = findings(PooledKind::Hallucination(answer), levels);
+        for finding in &mut all {
+            let strict = &mut finding.strict;
+            (strict.first, strict.second) = (0.05 + strict.difference.value, 0.05);
+            finding.family = Some(Family::Presence);
+        }
+        let all: Vec<&PooledFinding> = all.iter().collect();
+        let said = hallucination::false_answers(&all, answer, ClusterUnit::Scene);
+        said.as_ref().map(checked)
+    };
+    // A rate that grows is worse; the darkest level is not shown here.
+    let grown = [
+        (0.1, NotShown),
+        (0.4, Worse),
+        (0.84, Worse),
+        (0.9, NotShown),
+    ];
+    assert_eq!(
+        say(FalseAnswer::No, &grown).unwrap(),
+        "− At L3 “no” is answered to 89.0 % of the objects that are there (5.0 % at L0). (mean of these 2 models: +84.0 [+80.0, +88.0], \
+         p < 0.001; an increase is shown at L2–L3; n = 1,237 in 30 scenes)"
+    );
+    let said = say(FalseAnswer::Yes, &[(0.4, Worse)]).unwrap();
+    assert!(
+        said.starts_with(
+            "− At L1 “yes” is answered to 45.0 % of the objects that are not there (5.0 % at L0). ("
+        ),
+        "{said}"
+    );
+    assert_eq!(say(FalseAnswer::No, &[(0.5, NotShown)]), None);
+    assert_eq!(say(FalseAnswer::No, &[(-0.03, Better)]), None);
+    assert_eq!(say(FalseAnswer::No, &[]), None);
+}
+
+/// What a model answers most often: its share, its true share, and what a guess would give.
+fn collapse(share: f64, truth: f64, guess: f64) -> Collapse {
+    Collapse {
+        top: "living room".to_owned(),
+        share: Estimate {
+            value: share,
+            low: share - 0.1,
+            high: share + 0.1,
+            n: 45,
+        },
+        truth,
+        guess,
+        entropy: 1.0,
+        true_entropy: 2.0,
+        clusters: 24,
+        clean: Some(AgainstClean {
+            strict: at_clean(share),
+            lenient: at_clean(share),
+            is_commonest: true,
+            p_report: [Some(0.0012); 2],
+        }),
+    }
+}
+
+/// The share of the same answer at L0.
+fn at_clean(share: f64) -> PairedComparison {
+    let difference = share - 0.305;
+    PairedComparison {
+        first: share,
+        second: 0.305,
+        difference: Estimate {
+            value: difference,
+            low: difference - 0.1,
+            high: difference + 0.1,
+            n: 45,
+        },
+        gained: 20,
+        lost: 3,
+        clusters: 24,
+        mcnemar: 0.001,
+        p: 0.001,
+        spread: Spread {
+            error: 0.05,
+            degrees: 23.0,
+        },
+    }
+}
+
+#[test]
+fn a_collapse_that_is_no_more_than_at_l0_is_not_said() {
+    let mut found = collapse(0.67, 0.32, 0.25);
+    assert!(found.is_shown());
+    found.clean.as_mut().unwrap().p_report[1] = Some(0.2);
+    assert!(!found.is_shown(), "only the strict parsing shows it");
+    found.clean = None;
+    assert!(!found.is_shown(), "there is no L0");
+}
+
+#[test]
+fn one_answer_to_everything_is_named_or_counted() {
+    let level = AxisLevel::new(Kind::Sensor, Severity::LADDER[4]);
+    let say = |families: &[(&Family, &[(&str, Collapse)])]| {
+        let answers = families.iter().flat_map(|(family, models)| {
+            models.iter().map(move |(model, collapse)| TopAnswer {
+                model,
+                family,
+                level,
+                collapse,
+            })
+        });
+        let answers: Vec<TopAnswer<'_>> = answers.collect();
+        let said = hallucination::collapse(&answers, ClusterUnit::Scene);
+        said.as_ref().map(checked)
+    };
+    let room = Family::RoomType;
+    let seeing = collapse(0.4, 0.32, 0.25);
+    let blind = collapse(0.67, 0.32, 0.25);
+    assert_eq!(
+        say(&[(&room, &[("sim-F", blind.clone())])]).unwrap(),
+        "− At L5 67.0 % of the replies about room type are “living room”, which is true of 32.0 %. (sim-F: 67.0 % [57.0, 77.0], 30.5 % at \
+         L0 (+36.5 [+26.5, +46.5] points, p = 0.001); limit: 20 points above the true share; n = 45 in 24 scenes)"
+    );
+    let one = [("sim-A", seeing.clone()), ("sim-F", blind.clone())];
+    let said = say(&[(&room, &one)]).unwrap();
+    assert!(
+        said.starts_with(
+            "− At L5 67.0 % of the replies of sim-F about room type are “living room”, which is true of 32.0 %. ("
+        ),
+        "{said}"
+    );
+    let two = [
+        ("sim-A", seeing.clone()),
+        ("sim-B", collapse(0.6, 0.32, 0.25)),
+        ("sim-F", blind.clone()),
+    ];
+    // The models are those of the family with the largest excess.
+    let color = [("sim-A", collapse(0.5, 0.29, 0.25))];
+    let said = say(&[(&Family::Color, &color), (&room, &two)]).unwrap();
+    assert!(
+        said.starts_with(
+            "− At L5 2 of 3 models give one answer about room type far more often than it is true: 67.0 % of the replies of sim-F are \
+             “living room”, which is true of 32.0 %. ("
+        ),
+        "{said}"
+    );
+    assert!(
+        said.ends_with("in 24 scenes; also in object colour)"),
+        "{said}"
+    );
+    // 19 points; an interval with the true share; a model that draws one of two words; too few clusters.
+    for not_shown in [
+        collapse(0.51, 0.32, 0.25),
+        Collapse {
+            share: Estimate {
+                low: 0.3,
+                ..blind.share
+            },
+            ..blind.clone()
+        },
+        collapse(0.55, 0.2, 0.5),
+        Collapse {
+            clusters: 7,
+            ..blind.clone()
+        },
+    ] {
+        assert_eq!(say(&[(&room, &[("sim-F", not_shown)])]), None);
+    }
+    // Exactly 20 points, as 0.6 and 0.4 are not in binary.
+    assert!(say(&[(&room, &[("sim-F", collapse(0.6, 0.4, 0.25))])]).is_some());
+    assert_eq!(say(&[]), None);
+}

@@ -1,0 +1,585 @@
+//! Sentences from made records, through all tests: what is named, counted, and left out.
+
+use super::checked;
+use crate::score::cluster::FrameTies;
+use crate::score::findings::Findings;
+use crate::sentences::{Sentence, Tone, sentences};
+use crate::types::{
+    AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, LightGroup, ModelListing,
+    QuestionId, Record, TrialOutcome, UnreadReason,
+};
+
+/// Number of frames, each with two questions: one about colour and one about the room.
+const FRAMES: usize = 12;
+
+/// The records of a model in some conditions, about `frames` frames. The share of right replies is 0 or 1, or alternates for 0.5.
+fn asked(model: &str, frames: usize, conditions: &[(&str, f64)]) -> Vec<Record> {
+    let mut records = Vec::new();
+    for (name, share) in conditions {
+        let condition: Option<Condition> = (*name != "blind").then(|| name.parse().unwrap());
+        for item in 0..2 * frames {
+            let wrong = usize::from(((item / 2 % 2) as f64) >= 2.0 * share);
+            let reading = Some(AnswerReading {
+                chosen: Some(wrong),
+                why: None,
+            });
+            let detail = ChoiceDetail {
+                strict: reading,
+                lenient: reading,
+                outcome: if wrong == 0 {
+                    TrialOutcome::Right
+                } else {
+                    TrialOutcome::Wrong
+                },
+                ..unanswered(
+                    format!("f{:02}", item / 2),
+                    [Family::Color, Family::RoomType][item % 2].clone(),
+                    &["a", "b", "c"],
+                )
+            };
+            let key = Digest::of(format!("{item} {model} {name}").as_bytes()).into();
+            let question = QuestionId(format!("q{item:02}"));
+            records.push(Record::blank(
+                key,
+                question,
+                model,
+                condition.clone(),
+                detail,
+            ));
+        }
+    }
+    records
+}
+
+/// A question about a frame whose first choice is true, without an answer.
+pub(super) fn unanswered(frame: String, family: Family, choices: &[&str]) -> ChoiceDetail {
+    ChoiceDetail {
+        frame: FrameId(frame),
+        family,
+        choices: choices.iter().map(|text| (*text).to_owned()).collect(),
+        truth: Some(0),
+        repeat: 0,
+        strict: None,
+        lenient: None,
+        outcome: TrialOutcome::Wrong,
+        image: None,
+        more_images: Vec::new(),
+        shown_frame: None,
+        observed: None,
+        options: None,
+    }
+}
+
+/// All sentences about records.
+fn said(records: &[Record]) -> Vec<Sentence> {
+    let trials = records.iter().cloned().collect();
+    sentences(&Findings::new(&trials, &FrameTies::default(), [], &[]))
+}
+
+/// The sentences of a kind, each with its detail.
+fn of_kind(said: &[Sentence], kind: &str) -> Vec<String> {
+    let of_kind = said.iter().filter(|sentence| sentence.kind == kind);
+    of_kind.map(checked).collect()
+}
+
+#[test]
+fn references_are_neither_ranked_nor_mixed() {
+    let levels = [("L0", 1.0), ("L3-noise", 1.0), ("L5-noise", 1.0)];
+    let dark = [("L0", 0.5), ("L3-noise", 0.0), ("L5-noise", 0.0)];
+    let mut all = [
+        asked("observer", FRAMES, &levels),
+        asked("random", FRAMES, &dark),
+    ]
+    .concat();
+    let alone = said(&all);
+    assert!(of_kind(&alone, "best").is_empty());
+    let darkness = of_kind(&alone, "darkness");
+    assert!(
+        darkness[0].starts_with("· No loss by darkness was detected at any level;")
+            && darkness[0].contains(" (observer: 0.0 "),
+        "{darkness:?}"
+    );
+    all.extend(asked("a", FRAMES, &levels));
+    assert!(of_kind(&said(&all), "best").is_empty());
+    all.extend(asked("b", FRAMES, &dark));
+    let best = of_kind(&said(&all), "best");
+    assert!(
+        best[0].starts_with("+ a sees best in the dark (L3–L5). ("),
+        "{best:?}"
+    );
+}
+
+#[test]
+fn what_images_give_over_the_words_alone_is_said_at_l0() {
+    let say = |with: f64, without: f64| {
+        let all = asked("m", FRAMES, &[("blind", without), ("L0", with)]);
+        let images = of_kind(&said(&all), "images");
+        assert_eq!(images.len(), 1, "{images:?}");
+        images[0].clone()
+    };
+    for (with, without, start) in [
+        (
+            1.0,
+            0.0,
+            "+ At L0 images give 100.0 points over the words alone: 100.0 % with them, 0.0 % without. (",
+        ),
+        (
+            0.0,
+            1.0,
+            "− At L0 images cost 100.0 points against the words alone: 0.0 % with them, 100.0 % without. (",
+        ),
+        (
+            0.5,
+            0.5,
+            "· No gain by images was detected at L0: 50.0 % with them, 50.0 % without. (",
+        ),
+    ] {
+        let said = say(with, without);
+        assert!(said.starts_with(start), "{said}");
+    }
+    // Without a model that was asked without images, there is nothing to say.
+    let seen = said(&asked("m", FRAMES, &[("L0", 1.0)]));
+    assert!(of_kind(&seen, "images").is_empty());
+}
+
+#[test]
+fn darkness_names_the_variant_that_shows_it() {
+    let say = |ev: f64, noise: f64| {
+        let all = asked(
+            "m",
+            FRAMES,
+            &[("L0", 1.0), ("L5-ev", ev), ("L5-noise", noise)],
+        );
+        of_kind(&said(&all), "darkness")
+    };
+    let both = say(0.0, 0.0);
+    assert!(
+        both.len() == 1
+            && both[0].starts_with("− Darkness costs 100.0 points at L5, from 100.0 % at L0. ("),
+        "{both:?}"
+    );
+    let neither = say(1.0, 1.0);
+    assert!(
+        neither.len() == 1 && neither[0].starts_with("· No loss by darkness was detected"),
+        "{neither:?}"
+    );
+    let noise = say(1.0, 0.0);
+    assert!(
+        noise.len() == 1
+            && noise[0].starts_with("− With noise, darkness costs 100.0 points at L5, from"),
+        "{noise:?}"
+    );
+    let ev = say(0.0, 1.0);
+    assert_eq!(ev.len(), 2, "{ev:?}");
+    assert!(
+        ev[0].starts_with("· With noise, no loss by darkness was detected at any level;"),
+        "{ev:?}"
+    );
+    assert!(
+        ev[1].starts_with(
+            "− By the exposure drop alone, darkness costs 100.0 points at L5, from 100.0 % at L0. ("
+        ),
+        "{ev:?}"
+    );
+    let one = of_kind(
+        &said(&asked("m", FRAMES, &[("L0", 1.0), ("L5-ev", 0.0)])),
+        "darkness",
+    );
+    assert!(
+        one[0].starts_with("− Darkness costs 100.0 points"),
+        "{one:?}"
+    );
+}
+
+#[test]
+fn too_few_clusters_are_no_verdict_set_by_set() {
+    let levels = [
+        ("blind", 0.0),
+        ("L0", 1.0),
+        ("L1-ev", 0.0),
+        ("L2-ev", 0.0),
+        ("L3-ev", 0.0),
+        ("L4-ev", 0.0),
+        ("L5-ev", 0.0),
+        ("L1-noise", 0.0),
+        ("L2-noise", 0.0),
+        ("L3-noise", 0.0),
+        ("L4-noise", 0.0),
+        ("L5-noise", 0.0),
+        ("L3-noise+lift", 1.0),
+    ];
+    // Seven frames: 5 · 2 / 2⁷ is above 0.05, and one level alone is not.
+    let few = said(&asked("m", 7, &levels));
+    for kind in ["darkness", "noise", "below blind"] {
+        assert!(of_kind(&few, kind).is_empty(), "{kind}");
+    }
+    let without = of_kind(&few, "no verdict");
+    assert_eq!(
+        without[0],
+        "· With 7 frames no verdict on darkness, noise and dark images against the words alone is possible, however large the effect. (the smallest \
+         possible p = 0.078; take more frames)"
+    );
+    let lift = of_kind(&few, "enhancer");
+    assert!(
+        lift[0].starts_with("+ lift helps at L3, by 100.0 points. ("),
+        "{lift:?}"
+    );
+    let models = [asked("a", 4, &levels), asked("b", 4, &levels)].concat();
+    let fewer = said(&models);
+    assert!(of_kind(&fewer, "best").is_empty());
+    let without = of_kind(&fewer, "no verdict");
+    assert!(
+        without[0].starts_with("· With 4 frames no verdict on darkness, noise, lift, dark images against the words alone and the best model is possible,"),
+        "{without:?}"
+    );
+    let enough = said(&asked("m", 8, &levels));
+    assert_eq!(of_kind(&enough, "darkness").len(), 1);
+    assert!(of_kind(&enough, "no verdict").is_empty());
+}
+
+/// Sentences that do not say who is apart.
+fn about_others(said: &[Sentence]) -> Vec<String> {
+    let others = said
+        .iter()
+        .filter(|sentence| !["apart", "left out"].contains(&sentence.kind));
+    others.map(checked).collect()
+}
+
+#[test]
+fn a_model_that_lacks_levels_changes_nothing_about_others() {
+    let all_levels = [
+        ("L0", 1.0),
+        ("L1-noise", 1.0),
+        ("L2-noise", 1.0),
+        ("L3-noise", 0.0),
+        ("L4-noise", 0.0),
+        ("L5-noise", 0.0),
+    ];
+    let one = asked("a", FRAMES, &all_levels);
+    let alone = said(&one);
+    assert!(of_kind(&alone, "left out").is_empty() && of_kind(&alone, "apart").is_empty());
+    // What a reference was asked is no level of the models.
+    let with_random = [
+        one.clone(),
+        asked("random", FRAMES, &[("L0", 1.0), ("L1-ev", 1.0)]),
+    ]
+    .concat();
+    assert!(of_kind(&said(&with_random), "left out").is_empty());
+    let both = [one, asked("b", FRAMES, &[("L0", 1.0), ("L3-noise", 0.5)])].concat();
+    let both = said(&both);
+    assert_eq!(
+        of_kind(&both, "left out"),
+        [
+            "· b stands apart from the other models: it was not asked at L1–L2, L4–L5. (in no mean about darkness (with noise))"
+        ]
+    );
+    assert_eq!(about_others(&both), about_others(&alone));
+    let apart = of_kind(&both, "apart");
+    assert!(
+        apart.len() == 1
+            && apart[0].starts_with(
+                "· With noise, b: 100.0 % at L0, 50.0 % at L3; a: 100.0 % and 0.0 % on the same questions. (L0 ["
+            ),
+        "{apart:?}"
+    );
+}
+
+#[test]
+fn models_without_a_common_level_stand_apart() {
+    let records = [
+        asked("a", FRAMES, &[("L0", 1.0), ("L1-noise", 1.0)]),
+        asked("b", FRAMES, &[("L0", 1.0), ("L3-noise", 1.0)]),
+    ]
+    .concat();
+    let seen = said(&records);
+    let darkness = of_kind(&seen, "darkness");
+    assert!(darkness[0].contains(" (a: 0.0 "), "{darkness:?}");
+    let left_out = of_kind(&seen, "left out");
+    assert!(
+        left_out[0]
+            .starts_with("· b stands apart from the other models: it was not asked at L1. ("),
+        "{left_out:?}"
+    );
+}
+
+#[test]
+fn a_model_with_part_of_the_questions_changes_nothing_about_others() {
+    let levels = [("L0", 1.0), ("L3-noise", 0.5), ("L5-noise", 0.0)];
+    let two = [asked("a", FRAMES, &levels), asked("b", FRAMES, &levels)].concat();
+    let part = asked("part", 3, &levels);
+    let with_part = said(&[two.clone(), part].concat());
+    let but_best = |said: &[Sentence]| -> Vec<String> {
+        let all = about_others(said).into_iter();
+        all.filter(|said| !said.contains("the highest mean accuracy"))
+            .collect()
+    };
+    assert_eq!(but_best(&with_part), but_best(&said(&two)));
+    let best = of_kind(&with_part, "best");
+    assert!(
+        best[0].contains("n = 24 in 12 frames; without part,"),
+        "{best:?}"
+    );
+    let left_out = of_kind(&with_part, "left out");
+    assert!(
+        left_out[0].starts_with(
+            "· part stands apart from the other models: it answered 12 of 48 questions at L3–L5. ("
+        ),
+        "{left_out:?}"
+    );
+    let apart = of_kind(&with_part, "apart");
+    assert!(
+        apart[0].contains("part: 100.0 % at L0, 0.0 % at L5; the mean of 2 models: 100.0 % and 0.0 % on the same questions."),
+        "{apart:?}"
+    );
+}
+
+#[test]
+fn people_are_in_no_mean_even_if_they_answered_everything() {
+    let levels = [("L0", 1.0), ("L3-noise", 0.5), ("L5-noise", 0.0)];
+    let bright = [("L0", 1.0), ("L3-noise", 1.0), ("L5-noise", 1.0)];
+    let two = [asked("a", FRAMES, &levels), asked("b", FRAMES, &levels)].concat();
+    let mut people = asked("human", FRAMES, &bright);
+    let cannot_tell = people.iter_mut().rev().take(3);
+    for record in cannot_tell {
+        let reading = Some(AnswerReading {
+            chosen: None,
+            why: Some(UnreadReason::CannotTell),
+        });
+        (record.detail.strict, record.detail.lenient) = (reading, reading);
+        record.detail.outcome = TrialOutcome::Unparsed;
+    }
+    let mut listing = ModelListing::default();
+    listing.add_people("human".to_owned());
+    let say = |records: &[Record]| {
+        let trials = records.iter().cloned().collect();
+        let findings = Findings::listed(&trials, &FrameTies::default(), [], &[], &listing);
+        assert!(findings.common.is_none());
+        sentences(&findings)
+    };
+    let with_people = say(&[two.clone(), people.clone()].concat());
+    assert_eq!(about_others(&with_people), about_others(&say(&two)));
+    let apart = of_kind(&with_people, "apart");
+    assert!(
+        apart[0].starts_with("· With noise, human: 100.0 % at L0, 87.5 % at L5; the mean of 2 models: 100.0 % and 0.0 % on the same questions. (people; L0 ["),
+        "{apart:?}"
+    );
+    assert!(
+        apart[0].contains(", n = 24, 3 “I cannot tell”; in no mean)"),
+        "{apart:?}"
+    );
+    // Alone they are what the report is about.
+    assert!(of_kind(&say(&people), "darkness")[0].contains("human: "));
+}
+
+#[test]
+fn the_best_model_has_its_light_and_each_level_once() {
+    // Two runs show other images: the clean ones and the dark ones stand apart.
+    let mut all = Vec::new();
+    for (run, name) in ["d0", "d1"].into_iter().enumerate() {
+        for (model, dark) in [("a", 1.0), ("b", 0.0)] {
+            let mut records = asked(model, FRAMES, &[("L0", 1.0), ("L3-noise", dark)]);
+            for record in &mut records {
+                let condition = record.condition.as_mut().unwrap();
+                condition.group = Some(LightGroup::new(name, &[run]));
+            }
+            all.extend(records);
+        }
+    }
+    let trials = all.iter().cloned().collect();
+    let findings = Findings::new(&trials, &FrameTies::default(), [], &[]);
+    let best = findings.best.as_ref().unwrap();
+    let names: Vec<String> = best.levels.iter().map(ToString::to_string).collect();
+    assert_eq!(names, ["L3"]);
+    let said = of_kind(&sentences(&findings), "best");
+    assert!(
+        said[0].starts_with("+ with noise @d0: a sees best in the dark (L3). ("),
+        "{said:?}"
+    );
+}
+
+#[test]
+fn families_are_compared_two_by_two() {
+    let mut all = asked("m", FRAMES, &[("L0", 1.0), ("L5-noise", 0.0)]);
+    for record in &mut all {
+        let is_dark = record
+            .condition
+            .as_ref()
+            .is_some_and(|condition| condition.degradation().is_some());
+        if is_dark && record.detail.family == Family::RoomType {
+            let right = Some(AnswerReading {
+                chosen: Some(0),
+                why: None,
+            });
+            (record.detail.strict, record.detail.lenient) = (right, right);
+        }
+    }
+    let families = of_kind(&said(&all), "families");
+    assert!(
+        families[0].starts_with("· Darkness costs more in object colour (−100.0 points at L5) than in room type (0.0). ("),
+        "{families:?}"
+    );
+    assert!(
+        families[0].ends_with(
+            "the two intervals do not meet, which is no test; p < 0.001 is that of the loss in object colour)"
+        ),
+        "{families:?}"
+    );
+}
+
+/// The records of a model about 60 frames, right in a percentage of the replies of each condition.
+fn scripted(model: &str, conditions: &[(&str, usize)]) -> Vec<Record> {
+    let names: Vec<(&str, f64)> = conditions.iter().map(|(name, _)| (*name, 1.0)).collect();
+    let mut records = asked(model, 60, &names);
+    for (answers, (_, percent)) in records.chunks_mut(120).zip(conditions) {
+        for (item, record) in answers.iter_mut().enumerate() {
+            // A step of 37 visits all hundredths in a mixed order.
+            let chosen = usize::from(item * 37 % 100 >= *percent);
+            let reading = Some(AnswerReading {
+                chosen: Some(chosen),
+                why: None,
+            });
+            (record.detail.strict, record.detail.lenient) = (reading, reading);
+        }
+    }
+    records
+}
+
+/// Makes every fifth reply of a condition a sentence that only the lenient parsing reads.
+fn wordy(records: &mut [Record], condition: &str) {
+    let name = |record: &Record| record.condition.as_ref().map(ToString::to_string);
+    let own = records
+        .iter_mut()
+        .filter(|record| name(record).as_deref() == Some(condition));
+    for record in own.step_by(5) {
+        record.detail.strict = Some(AnswerReading {
+            chosen: None,
+            why: Some(UnreadReason::NoChoice),
+        });
+    }
+}
+
+const SEEING: [(&str, usize); 7] = [
+    ("blind", 40),
+    ("L0", 100),
+    ("L3-ev", 100),
+    ("L5-ev", 100),
+    ("L3-noise", 100),
+    ("L5-noise", 100),
+    ("L5-noise+lift", 100),
+];
+
+/// The signed sentences about darkness, noise, enhancers and words alone.
+fn signed(said: &[Sentence]) -> Vec<String> {
+    let signed = said.iter().filter(|sentence| {
+        matches!(sentence.tone, Tone::Better | Tone::Worse) && sentence.kind != "images"
+    });
+    signed.map(checked).collect()
+}
+
+#[test]
+fn replies_in_another_format_are_no_blindness() {
+    let mut one = scripted("m", &SEEING);
+    wordy(&mut one, "L5-noise");
+    let seen = said(&one);
+    assert_eq!(signed(&seen), Vec::<String>::new());
+    let format = of_kind(&seen, "format");
+    assert!(
+        format[0].starts_with(
+            "· At L5 with noise, 20.0 % fewer replies keep to the answer format; no loss of accuracy was detected (0.0 [−"
+        ),
+        "{format:?}"
+    );
+    assert!(of_kind(&seen, "darkness").is_empty(), "{seen:?}");
+    // The enhanced images of that level are read as before: that is no help, either.
+    assert!(
+        format.iter().any(|said| said.starts_with(
+            "· With lift at L5, 20.0 % more replies keep to the answer format; no gain of accuracy was detected"
+        )),
+        "{format:?}"
+    );
+    // Several models, and a loss that both parsings show.
+    let mut several: Vec<Record> = ["a", "b", "c"]
+        .into_iter()
+        .flat_map(|model| scripted(model, &SEEING))
+        .collect();
+    wordy(&mut several, "L5-noise");
+    let seen = said(&several);
+    assert_eq!(signed(&seen), Vec::<String>::new());
+    assert!(of_kind(&seen, "format")[0].contains("(mean of these 3 models: 80.0 % keep to it"));
+    let mut lost = SEEING;
+    lost[5].1 = 50;
+    let mut blind = scripted("m", &lost);
+    wordy(&mut blind, "L5-noise");
+    let darkness = of_kind(&said(&blind), "darkness");
+    assert!(
+        darkness[0].starts_with("− With noise, darkness costs "),
+        "{darkness:?}"
+    );
+}
+
+#[test]
+fn an_enhancer_that_only_spoils_the_format_does_not_harm() {
+    let mut records = scripted("m", &SEEING);
+    wordy(&mut records, "L5-noise+lift");
+    let seen = said(&records);
+    assert!(of_kind(&seen, "enhancer").is_empty(), "{seen:?}");
+    let format = of_kind(&seen, "format");
+    assert!(
+        format.len() == 1
+            && format[0]
+                .starts_with("· With lift at L5, 20.0 % fewer replies keep to the answer format;"),
+        "{format:?}"
+    );
+}
+
+#[test]
+fn a_model_that_only_spoils_the_format_is_not_beaten() {
+    let mut records = [scripted("a", &SEEING), scripted("b", &SEEING)].concat();
+    let split = records.len() / 2;
+    wordy(&mut records[split..], "L5-noise");
+    let best = of_kind(&said(&records), "best");
+    assert!(
+        best[0].starts_with("· a has the highest mean accuracy"),
+        "{best:?}"
+    );
+    assert!(
+        best[0].contains("detected in the strict parsing alone"),
+        "{best:?}"
+    );
+}
+
+#[test]
+fn the_best_in_the_dark_is_the_best_at_dark_levels() {
+    let conditions = |percents: [usize; 6]| {
+        let names = [
+            "L0", "L1-noise", "L2-noise", "L3-noise", "L4-noise", "L5-noise",
+        ];
+        let mut all = [("", 0); 6];
+        for (place, pair) in all.iter_mut().zip(names.into_iter().zip(percents)) {
+            *place = pair;
+        }
+        all
+    };
+    let bright = scripted("bright", &conditions([99, 97, 97, 45, 35, 35]));
+    let steady = scripted("steady", &conditions([62, 58, 59, 61, 50, 51]));
+    let two = [bright.clone(), steady.clone()].concat();
+    let best = of_kind(&said(&two), "best");
+    assert!(
+        best[0].starts_with("· bright is better to L2, steady from L3. (steady over L3–L5: "),
+        "{best:?}"
+    );
+    // A third model that is worse everywhere changes nothing.
+    let third = scripted("third", &conditions([40, 40, 40, 34, 30, 28]));
+    let best = of_kind(&said(&[two, third].concat()), "best");
+    assert!(
+        best[0].starts_with("· bright is better to L2, steady from L3. ("),
+        "{best:?}"
+    );
+    // Without a change of order the best at L3 to L5 is named, not the best of all levels.
+    let even = scripted("even", &conditions([62, 62, 62, 30, 25, 25]));
+    let best = of_kind(&said(&[steady, even].concat()), "best");
+    assert!(
+        best[0].starts_with("+ steady sees best in the dark (L3–L5). ("),
+        "{best:?}"
+    );
+}

@@ -1,0 +1,431 @@
+//! Simulated runs with known truth: how often sentences claim what is not there, and how often they find what is.
+
+use std::fmt::Write as _;
+
+use rand::rngs::StdRng;
+use rand::{RngExt as _, SeedableRng as _};
+use rand_distr::{Distribution, StandardNormal};
+
+use super::made::unanswered;
+use crate::score::baseline::baseline_rows;
+use crate::score::cluster::{Clusters, FrameTies};
+use crate::score::findings::Findings;
+use crate::score::grid::Grid;
+use crate::score::health::healths;
+use crate::score::pooled_kind::PooledKind;
+use crate::score::significance::Significance;
+use crate::score::subject::Subject;
+use crate::sentences::{Sentence, Tone, sentences};
+use crate::types::{
+    AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, OptionProbabilities,
+    QuestionId, Record, TrialOutcome,
+};
+
+/// What a simulated run asks, and what is true.
+#[derive(Debug, Clone, Copy)]
+struct Design {
+    models: usize,
+    profiles: usize,
+    enhancers: usize,
+    /// Number of frames, each with four questions: two about objects, one about colour and one about the room.
+    frames: usize,
+    /// Share of right replies that the first enhancer adds at L4 and L5.
+    gain: f64,
+    /// Share of right replies that L4 and L5 with noise take away.
+    loss: f64,
+    /// Whether the second half of the models are the first half, asked again.
+    twins: bool,
+}
+
+/// Names of noise profiles in conditions; the first one is the paper's.
+const PROFILES: [&str; 4] = ["", "@eld", "@level", "@physical"];
+
+/// Questions of each frame, with their choices.
+const QUESTIONS: [(Family, &[&str]); 4] = [
+    (Family::Presence, &["yes", "no"]),
+    (Family::Presence, &["no", "yes"]),
+    (Family::Color, &["red", "green", "blue", "white"]),
+    (
+        Family::RoomType,
+        &["kitchen", "bedroom", "bathroom", "hall"],
+    ),
+];
+
+impl Design {
+    /// The conditions of each model; an empty name is without images.
+    fn conditions(&self) -> Vec<String> {
+        let mut all = vec![String::new(), "L0".to_owned()];
+        for level in 1..=5 {
+            all.push(format!("L{level}-ev"));
+            for profile in &PROFILES[..self.profiles] {
+                all.push(format!("L{level}-noise{profile}"));
+                let enhancers = 0..self.enhancers;
+                all.extend(enhancers.map(|number| format!("L{level}-noise{profile}+e{number}")));
+            }
+        }
+        all
+    }
+
+    /// Change of the share of right replies in a condition.
+    fn effect(&self, condition: &str) -> f64 {
+        let is_dark = condition.starts_with("L4-noise") || condition.starts_with("L5-noise");
+        let loss = if is_dark { -self.loss } else { 0.0 };
+        let gain = if is_dark && condition.ends_with("+e0") {
+            self.gain
+        } else {
+            0.0
+        };
+        gain + loss
+    }
+
+    /// All records, without answers.
+    fn records(&self) -> Vec<Record> {
+        let mut records = Vec::new();
+        for model in 0..self.models {
+            let model = format!("m{model:02}");
+            for name in self.conditions() {
+                let condition: Option<Condition> =
+                    (!name.is_empty()).then(|| name.parse().unwrap());
+                for item in 0..4 * self.frames {
+                    let (family, choices) = &QUESTIONS[item % 4];
+                    let detail = unanswered(format!("f{:03}", item / 4), family.clone(), choices);
+                    let key = Digest::of(format!("{item} {model} {name}").as_bytes()).into();
+                    let question = QuestionId(format!("q{item:04}"));
+                    records.push(Record::blank(
+                        key,
+                        question,
+                        &model,
+                        condition.clone(),
+                        detail,
+                    ));
+                }
+            }
+        }
+        records
+    }
+
+    /// Gives all records new answers. Items, frames and models differ; conditions differ by a frame's luck and, for three answers of
+    /// ten, by a new draw; on average only by [`Design::effect`]. The confidence of a reply is the true probability that it is right.
+    fn answer(&self, random: &mut StdRng, records: &mut [Record]) {
+        let items = 4 * self.frames;
+        let mut normals = |count: usize, spread: f64| -> Vec<f64> {
+            let mut normal = || -> f64 { StandardNormal.sample(random) };
+            (0..count).map(|_| spread * normal()).collect()
+        };
+        let (frames, difficulties) = (normals(self.frames, 0.5), normals(items, 0.8));
+        let conditions = self.conditions();
+        let different = if self.twins {
+            self.models / 2
+        } else {
+            self.models
+        };
+        let models: Vec<(f64, Vec<f64>)> = (0..different)
+            .map(|_| {
+                let skill = 1.2 + 0.3 * Distribution::<f64>::sample(&StandardNormal, random);
+                let fixed = (0..items).map(|_| random.random_range(0.0..1.0));
+                (skill, fixed.collect())
+            })
+            .collect();
+        for (number, of_model) in records.chunks_mut(conditions.len() * items).enumerate() {
+            let (skill, fixed) = &models[number % different];
+            for (name, answers) in conditions.iter().zip(of_model.chunks_mut(items)) {
+                let luck: Vec<f64> = (0..self.frames)
+                    .map(|_| 0.3 * Distribution::<f64>::sample(&StandardNormal, random))
+                    .collect();
+                for (item, record) in answers.iter_mut().enumerate() {
+                    let frame = item / 4;
+                    let logit = skill + frames[frame] + difficulties[item] + luck[frame];
+                    let p = 1.0 / (1.0 + (-logit).exp());
+                    let p = p.clamp(0.55, 0.98) + self.effect(name);
+                    let drawn = if random.random_bool(0.3) {
+                        random.random_range(0.0..1.0)
+                    } else {
+                        fixed[item]
+                    };
+                    set_answer(&mut record.detail, p, drawn);
+                }
+            }
+        }
+    }
+}
+
+/// Sets an answer that is right with probability `p`, by a draw between 0 and 1.
+fn set_answer(detail: &mut ChoiceDetail, p: f64, drawn: f64) {
+    let choices = detail.choices.len();
+    let is_right = drawn < p;
+    let chosen = if is_right {
+        0
+    } else {
+        1 + ((drawn - p) / (1.0 - p) * (choices - 1) as f64) as usize
+    };
+    let chosen = chosen.min(choices - 1);
+    let reading = Some(AnswerReading {
+        chosen: Some(chosen),
+        why: None,
+    });
+    (detail.strict, detail.lenient) = (reading, reading);
+    detail.outcome = if is_right {
+        TrialOutcome::Right
+    } else {
+        TrialOutcome::Wrong
+    };
+    // A model that is less sure than of the other choices together would have chosen another one.
+    let confidence = p.clamp(0.51, 0.99);
+    let rest = (1.0 - confidence) / (choices - 1) as f64;
+    let mut probabilities = vec![rest; choices];
+    probabilities[chosen] = confidence;
+    detail.options = Some(OptionProbabilities {
+        p: probabilities,
+        mass: 1.0,
+        bound: 0.0,
+        token: String::new(),
+        reasoned: false,
+    });
+}
+
+/// Whether a sentence claims an effect.
+fn is_claim(sentence: &Sentence) -> bool {
+    matches!(sentence.tone, Tone::Better | Tone::Worse) || sentence.kind == "collapse"
+}
+
+/// What became of the runs of a design.
+#[derive(Debug, Default)]
+struct Counts {
+    runs: usize,
+    /// Runs with any signed sentence.
+    signed: usize,
+    /// Runs in which a set of findings has a verdict after the correction within the set alone.
+    own: usize,
+    /// Runs in which a finding by noise profile is decided.
+    decided: usize,
+    /// Runs in which the first enhancer is detected to help, and the same within its set alone.
+    helped: [usize; 2],
+    /// Runs in which darkness is detected to cost, and the same within its set alone.
+    lost: [usize; 2],
+    /// Signed sentences by kind.
+    kinds: std::collections::BTreeMap<&'static str, usize>,
+}
+
+fn simulate(design: &Design, runs: usize, seed: u64) -> Counts {
+    let mut random = StdRng::seed_from_u64(seed);
+    let mut records = design.records();
+    let mut counts = Counts::default();
+    for _ in 0..runs {
+        design.answer(&mut random, &mut records);
+        let trials = records.iter().cloned().collect();
+        let findings = Findings::sentences_only(&trials, &FrameTies::default());
+        let said = sentences(&findings);
+        let claims: Vec<&Sentence> = said.iter().filter(|sentence| is_claim(sentence)).collect();
+        counts.runs += 1;
+        counts.signed += usize::from(!claims.is_empty());
+        for claim in &claims {
+            *counts.kinds.entry(claim.kind).or_default() += 1;
+        }
+        let whole = || {
+            let pooled = findings.pooled.iter();
+            pooled.filter(|finding| finding.family.as_ref() == finding.kind.only_family())
+        };
+        counts.own += usize::from(whole().any(|finding| finding.strict.verdict.is_shown()));
+        let is_decided = findings
+            .by_reading
+            .iter()
+            .any(|finding| finding.robustness.word() != "open");
+        counts.decided += usize::from(is_decided);
+        for (kind, verdict, name, found) in [
+            (
+                PooledKind::Enhancer,
+                Significance::Better,
+                "enhancer",
+                &mut counts.helped,
+            ),
+            (
+                PooledKind::Darkness,
+                Significance::Worse,
+                "darkness",
+                &mut counts.lost,
+            ),
+        ] {
+            let sign = Tone::from(verdict);
+            let mut own = whole().filter(|finding| finding.kind == kind);
+            found[0] += usize::from(
+                claims
+                    .iter()
+                    .any(|claim| claim.kind == name && claim.tone == sign),
+            );
+            found[1] += usize::from(own.any(|finding| finding.strict.verdict == verdict));
+        }
+    }
+    counts
+}
+
+/// A share in percent with Wilson's interval.
+fn percent(count: usize, runs: usize) -> String {
+    let share = crate::score::estimate::Estimate::share(count, runs).unwrap();
+    let [value, low, high] = [share.value, share.low, share.high].map(|x| 100.0 * x);
+    format!("{value:.1} [{low:.1}, {high:.1}]")
+}
+
+fn runs() -> usize {
+    let runs = std::env::var("DARKQA_RUNS").ok();
+    runs.and_then(|runs| runs.parse().ok()).unwrap_or(300)
+}
+
+/// The numbers of models to simulate: those in `DARKQA_MODELS`, separated by commas, or all.
+fn model_counts(all: &[usize]) -> Vec<usize> {
+    let named = std::env::var("DARKQA_MODELS").unwrap_or_default();
+    let named: Vec<usize> = named
+        .split(',')
+        .filter_map(|count| count.parse().ok())
+        .collect();
+    if named.is_empty() {
+        all.to_vec()
+    } else {
+        named
+    }
+}
+
+#[test]
+#[ignore = "takes an hour; prints a table of src/docs/numbers.md"]
+#[expect(clippy::print_stdout, reason = "the table")]
+fn null_reports_have_no_sign() {
+    println!(
+        "| models | profiles | enhancers | runs | any sign, % | within sets alone, % | decided by profile, % | kinds |"
+    );
+    let (mut all, mut signed) = (0, 0);
+    for models in model_counts(&[1, 3, 6, 12]) {
+        for profiles in [1, 4] {
+            for enhancers in [0, 1, 4] {
+                let design = Design {
+                    models,
+                    profiles,
+                    enhancers,
+                    frames: 42,
+                    gain: 0.0,
+                    loss: 0.0,
+                    twins: false,
+                };
+                let counts = simulate(
+                    &design,
+                    runs(),
+                    (100 * models + 10 * profiles + enhancers) as u64,
+                );
+                all += counts.runs;
+                signed += counts.signed;
+                println!(
+                    "| {models} | {profiles} | {enhancers} | {} | {} | {} | {} | {:?} |",
+                    counts.runs,
+                    percent(counts.signed, counts.runs),
+                    percent(counts.own, counts.runs),
+                    percent(counts.decided, counts.runs),
+                    counts.kinds
+                );
+            }
+        }
+    }
+    println!("all: {}", percent(signed, all));
+}
+
+#[test]
+#[ignore = "takes half an hour; prints a table of src/docs/numbers.md"]
+#[expect(clippy::print_stdout, reason = "the table")]
+fn effects_are_found() {
+    println!(
+        "| models | profiles | enhancers | effect | runs | help, % | help within its set, % | loss, % | loss within its set, % |"
+    );
+    for models in model_counts(&[1, 6]) {
+        for (profiles, enhancers) in [(1, 1), (1, 4), (4, 1)] {
+            for effect in [0.05, 0.1] {
+                let design = Design {
+                    models,
+                    profiles,
+                    enhancers,
+                    frames: 42,
+                    gain: effect,
+                    loss: 0.0,
+                    twins: false,
+                };
+                let seed = (100 * models + 10 * profiles + enhancers) as u64;
+                let helped = simulate(&design, runs(), seed).helped;
+                let design = Design {
+                    gain: 0.0,
+                    loss: effect,
+                    ..design
+                };
+                let lost = simulate(&design, runs(), seed).lost;
+                let mut cells = String::new();
+                for count in helped.into_iter().chain(lost) {
+                    let _ = write!(cells, " {} |", percent(count, runs()));
+                }
+                println!(
+                    "| {models} | {profiles} | {enhancers} | {} | {} |{cells}",
+                    100.0 * effect,
+                    runs()
+                );
+            }
+        }
+    }
+}
+
+/// Share of unchanged sets of models in which some model is called worse than in the old run.
+fn false_alarms(models: usize, conditions: usize, runs: usize) -> usize {
+    let design = Design {
+        models: 2 * models,
+        profiles: 1,
+        enhancers: 4,
+        frames: 42,
+        gain: 0.0,
+        loss: 0.0,
+        twins: true,
+    };
+    let mut random = StdRng::seed_from_u64((100 * models + conditions) as u64);
+    let mut records = design.records();
+    let kept: Vec<Option<Condition>> = design.conditions()[1..=conditions]
+        .iter()
+        .map(|name| Some(name.parse().unwrap()))
+        .collect();
+    let alarms = (0..runs).filter(|_| {
+        design.answer(&mut random, &mut records);
+        let asked = records
+            .iter()
+            .filter(|record| kept.contains(&record.condition));
+        let trials = asked.cloned().collect();
+        let units = Clusters::new(asked_pairs(&records), &FrameTies::default());
+        let grid = Grid::new(&trials, &units);
+        let pairs = grid
+            .subjects
+            .iter()
+            .enumerate()
+            .filter_map(|(index, subject)| {
+                let number: usize = subject.model[1..].parse().ok()?;
+                let old = Subject {
+                    model: format!("m{:02}", number + models),
+                    ..subject.clone()
+                };
+                Some((index, grid.find(&old)?))
+            });
+        let rows = baseline_rows(&grid, &healths(&grid), &pairs.collect::<Vec<_>>(), |_| None);
+        rows.iter()
+            .any(|row| row.significance == Significance::Worse)
+    });
+    alarms.count()
+}
+
+fn asked_pairs(records: &[Record]) -> impl Iterator<Item = (&QuestionId, &FrameId)> {
+    records
+        .iter()
+        .map(|record| (&record.question, &record.detail.frame))
+}
+
+#[test]
+#[ignore = "takes minutes; prints a table of src/docs/numbers.md"]
+#[expect(clippy::print_stdout, reason = "the table")]
+fn unchanged_models_are_not_called_worse() {
+    for (models, conditions) in [(1, 3), (1, 17), (6, 3), (6, 17), (12, 3), (12, 17)] {
+        let alarms = false_alarms(models, conditions, runs());
+        println!(
+            "| {models} | {conditions} | {} | {} |",
+            runs(),
+            percent(alarms, runs())
+        );
+    }
+}

@@ -1,0 +1,150 @@
+//! Golden sentences about models that fall below the words alone.
+
+use super::{checked, finding};
+use crate::score::cluster::ClusterUnit;
+use crate::score::comparison::{Comparison, ComparisonKind, TestedComparison};
+use crate::score::estimate::Estimate;
+use crate::score::paired::{PairedComparison, Spread};
+use crate::score::pooled::PooledFinding;
+use crate::score::pooled_kind::PooledKind;
+use crate::score::significance::Significance::{self, Better, NotShown, Worse};
+use crate::score::subject::Subject;
+use crate::sentences::words_alone;
+use crate::types::degradation::Kind;
+use crate::types::{AxisLevel, Family, KindReading, Severity};
+
+/// A model against words alone in a family.
+fn against_words(
+    (model, other): (&str, &str),
+    family: &Family,
+    level: usize,
+    (difference, significance): (f64, Significance),
+) -> Comparison {
+    let level = AxisLevel::new(Kind::Sensor, Severity::LADDER[level - 1]);
+    let variant = KindReading {
+        kind: Some(Kind::Sensor),
+        ..KindReading::NONE
+    };
+    Comparison {
+        kind: ComparisonKind::Blind,
+        first: Subject::seeing(model, level, &variant, None),
+        second: Subject::new(other, None),
+        family: Some(family.clone()),
+        strict: tested(difference, significance),
+        lenient: tested(difference, significance),
+        least_holm: 1e-6,
+    }
+}
+
+fn tested(difference: f64, significance: Significance) -> TestedComparison {
+    TestedComparison {
+        paired: PairedComparison {
+            first: 0.3,
+            second: 0.3 - difference,
+            difference: Estimate {
+                value: difference,
+                low: difference - 0.1,
+                high: difference + 0.1,
+                n: 45,
+            },
+            gained: 1,
+            lost: 9,
+            clusters: 24,
+            mcnemar: 0.02,
+            p: 0.001,
+            spread: Spread {
+                error: 0.05,
+                degrees: 23.0,
+            },
+        },
+        holm: 0.0123,
+        significance,
+        p_report: Some(if significance.is_shown() { 0.0123 } else { 0.3 }),
+    }
+}
+
+#[test]
+fn a_family_below_the_words_alone_is_said_once() {
+    let color = &Family::Color;
+    let own = ("sim-F", "sim-F");
+    let one = [
+        against_words(own, color, 3, (-0.05, NotShown)),
+        against_words(own, color, 4, (-0.2, Worse)),
+        against_words(own, color, 5, (-0.3, Worse)),
+        against_words(("sim-A", "sim-A"), color, 5, (0.2, Better)),
+        against_words(own, &Family::RoomType, 5, (-0.25, Worse)),
+    ];
+    let say = |all: &[Comparison], pooled: &[&PooledFinding]| {
+        let all: Vec<&Comparison> = all.iter().collect();
+        let said = words_alone::in_a_family(&all, pooled, ClusterUnit::Scene);
+        said.as_ref().map(checked)
+    };
+    assert_eq!(
+        say(&one, &[]).unwrap(),
+        "− Object colour: sim-F falls below the words alone at L4–L5. (sim-F at L5: −30.0 [−40.0, −20.0], p = 0.012; n = 45 in 24 scenes)"
+    );
+    let two = [
+        &one[..],
+        &[against_words(("sim-B", "sim-B"), color, 5, (-0.2, Worse))],
+    ];
+    let said = say(&two.concat(), &[]).unwrap();
+    assert!(
+        said.starts_with(
+            "− Object colour: 2 of 3 models fall below the words alone. (sim-F at L5: "
+        ),
+        "{said}"
+    );
+    // Without words of its own.
+    let other = [against_words(("sim-F", "c"), color, 5, (-0.3, Worse))];
+    let said = say(&other, &[]).unwrap();
+    assert!(
+        said.starts_with(
+            "− Object colour: sim-F falls below c without images at L5. (sim-F at L5 against c: "
+        ),
+        "{said}"
+    );
+    assert_eq!(say(&one[..1], &[]), None);
+    // The findings over all families say it of this model alone, of several models, or do not say it.
+    let mut pooled = finding(PooledKind::Blind, 5, -0.2, Worse);
+    assert!(say(&one, &[&pooled]).is_some());
+    pooled.models = vec!["sim-F".to_owned()];
+    assert_eq!(say(&one, &[&pooled]), None);
+    pooled.strict.p_report = Some(0.2);
+    assert!(say(&one, &[&pooled]).is_some());
+}
+
+#[test]
+fn below_whose_words_is_said() {
+    let say = |models: &[&str], blind: &[&str]| {
+        let mut finding = finding(PooledKind::Blind, 5, -0.2, Worse);
+        let [models, blind] = [models, blind].map(|names| names.iter().map(|&n| n.to_owned()));
+        (finding.models, finding.blind_models) = (models.collect(), blind.collect());
+        let said = words_alone::pooled(&[&finding], ClusterUnit::Scene);
+        said.unwrap().text
+    };
+    let rows: [(&[&str], &[&str], &str); 4] = [
+        (
+            &["a"],
+            &["a"],
+            "In the dark a falls below the words alone at L5.",
+        ),
+        (
+            &["a"],
+            &["random"],
+            "In the dark a falls below random without images at L5.",
+        ),
+        (
+            &["a", "b"],
+            &["b"],
+            "In the dark the models fall below the words alone at L5.",
+        ),
+        (
+            &["a", "b"],
+            &["c", "d"],
+            "In the dark the models fall below the models without images at L5.",
+        ),
+    ];
+    for (models, blind, expected) in rows {
+        assert_eq!(say(models, blind), expected);
+    }
+}

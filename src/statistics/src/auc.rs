@@ -1,0 +1,238 @@
+//! How well a number tells right from wrong replies: [`PairCounts`], the area under the receiver operating characteristic (AUC)
+//! with clustered replies.
+
+use super::estimate::Estimate;
+use super::quantiles::{degrees_of_freedom, student};
+use statrs::distribution::{ContinuousCDF as _, StudentsT};
+
+/// Minimum number of clusters for an interval (chosen): with fewer, their spread is estimated too poorly.
+const MIN_CLUSTERS: usize = 8;
+
+/// Minimum number of right and of wrong replies for an interval (chosen).
+const MIN_REPLIES: usize = 10;
+
+/// A reply with the number that may predict it.
+#[derive(Debug, Clone, Copy)]
+pub struct RankedReply {
+    /// Index of its cluster.
+    pub cluster: u32,
+    /// The number, for example the fidelity of the image.
+    pub number: f64,
+    pub right: bool,
+}
+
+/// Pairs of a right and a wrong reply of one stratum, summed over strata.
+///
+/// A pair is concordant if the right reply has the higher number; ties count half. The share of concordant pairs is the AUC
+/// (Hanley and McNeil 1982, Radiology 143:29). Its variance is that between clusters: each cluster's pairs with all others are its
+/// influence (Obuchowski 1997, Biometrics 53:567), as the replies of a cluster are not independent.
+#[derive(Debug, Clone)]
+pub struct PairCounts {
+    /// Concordant pairs and all pairs of each cluster, counted on the side of either reply.
+    clusters: Vec<[f64; 2]>,
+    concordant: f64,
+    pairs: f64,
+    right: usize,
+    wrong: usize,
+}
+
+/// An AUC with its test against ½.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Auc {
+    /// Share of concordant pairs, with its interval; `n` is the number of replies.
+    pub estimate: Estimate,
+    /// Two-sided p-value of the hypothesis that the AUC is ½, by Student's t.
+    pub p: f64,
+}
+
+impl PairCounts {
+    pub fn new(clusters: usize) -> Self {
+        Self {
+            clusters: vec![[0.0; 2]; clusters],
+            concordant: 0.0,
+            pairs: 0.0,
+            right: 0,
+            wrong: 0,
+        }
+    }
+
+    /// Adds the pairs within one stratum. Sorts `replies` by their numbers.
+    pub fn add(&mut self, replies: &mut [RankedReply]) {
+        replies.sort_by(|a, b| a.number.total_cmp(&b.number));
+        let right = replies.iter().filter(|reply| reply.right).count();
+        let wrong = replies.len() - right;
+        if right == 0 || wrong == 0 {
+            return;
+        }
+        self.right += right;
+        self.wrong += wrong;
+        let (mut right_below, mut wrong_below) = (0.0, 0.0);
+        for tied in replies.chunk_by(|a, b| a.number.total_cmp(&b.number).is_eq()) {
+            let right_here = tied.iter().filter(|reply| reply.right).count() as f64;
+            let wrong_here = tied.len() as f64 - right_here;
+            for reply in tied {
+                let (concordant, all) = if reply.right {
+                    (wrong_below + wrong_here / 2.0, wrong as f64)
+                } else {
+                    let above = right as f64 - right_below - right_here;
+                    (above + right_here / 2.0, right as f64)
+                };
+                let cluster = &mut self.clusters[reply.cluster as usize];
+                cluster[0] += concordant;
+                cluster[1] += all;
+            }
+            self.concordant += right_here * (wrong_below + wrong_here / 2.0);
+            right_below += right_here;
+            wrong_below += wrong_here;
+        }
+        self.pairs += right as f64 * wrong as f64;
+    }
+
+    /// Adds the pairs of other strata.
+    pub fn extend(&mut self, other: &Self) {
+        for (sums, more) in self.clusters.iter_mut().zip(&other.clusters) {
+            sums[0] += more[0];
+            sums[1] += more[1];
+        }
+        self.concordant += other.concordant;
+        self.pairs += other.pairs;
+        self.right += other.right;
+        self.wrong += other.wrong;
+    }
+
+    /// The AUC with its interval on the logit scale. `None` if there are too few replies or clusters, or if all pairs agree, so that
+    /// no variance can be estimated.
+    pub fn auc(&self) -> Option<Auc> {
+        let used = self.clusters.iter().filter(|cluster| cluster[1] > 0.0);
+        let count = used.clone().count();
+        if count < MIN_CLUSTERS || self.right.min(self.wrong) < MIN_REPLIES {
+            return None;
+        }
+        let (c, value) = (count as f64, self.concordant / self.pairs);
+        let influences = used.map(|[concordant, pairs]| (concordant - value * pairs) / self.pairs);
+        let influences: Vec<f64> = influences.collect();
+        let squares: f64 = influences
+            .iter()
+            .map(|influence| influence * influence)
+            .sum();
+        let error = (c / (c - 1.0) * squares).sqrt();
+        let slope = value * (1.0 - value);
+        if error <= 0.0 || slope <= 0.0 {
+            return None;
+        }
+        let logit = libm::log(value / (1.0 - value));
+        let degrees = degrees_of_freedom(&influences);
+        let half = student(degrees) * error / slope;
+        let at = |logit: f64| 1.0 / (1.0 + libm::exp(-logit));
+        let distribution = StudentsT::new(0.0, 1.0, degrees).ok()?;
+        // The same scale as the interval, so that it leaves out ½ exactly if p is below 0.05.
+        let p = 2.0 * distribution.sf(logit.abs() * slope / error);
+        Some(Auc {
+            estimate: Estimate {
+                value,
+                low: at(logit - half),
+                high: at(logit + half),
+                n: self.right + self.wrong,
+            },
+            p: p.min(1.0),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn replies(list: &[(u32, f64, bool)]) -> Vec<RankedReply> {
+        let reply = |&(cluster, number, right)| RankedReply {
+            cluster,
+            number,
+            right,
+        };
+        list.iter().map(reply).collect()
+    }
+
+    /// Replies of `clusters` clusters with eight each; a step of the golden ratio spreads their numbers evenly.
+    fn spread(clusters: u32, slope: f64) -> Vec<RankedReply> {
+        let number = |i: u32| (f64::from(i) * 0.618_033_988_749_895).fract();
+        let of = |cluster: u32| {
+            (0..8).map(move |i| {
+                let place = 8 * cluster + i;
+                let right = place.is_multiple_of(2);
+                let number = number(place) + if right { slope } else { 0.0 };
+                (cluster, number, right)
+            })
+        };
+        replies(&(0..clusters).flat_map(of).collect::<Vec<_>>())
+    }
+
+    fn auc(replies: &[RankedReply], clusters: usize) -> Option<Auc> {
+        let mut counts = PairCounts::new(clusters);
+        counts.add(&mut replies.to_vec());
+        counts.auc()
+    }
+
+    #[test]
+    fn pairs_are_counted_as_by_hand() {
+        let mut counts = PairCounts::new(2);
+        // Right: 1, 2, 3; wrong: 0, 2. Pairs: 1>0, 2>0, 3>0, 3>2 are concordant, 2=2 is tied, 1<2 is not.
+        counts.add(&mut replies(&[
+            (0, 1.0, true),
+            (0, 0.0, false),
+            (1, 2.0, true),
+            (1, 2.0, false),
+            (1, 3.0, true),
+        ]));
+        let sums = [counts.concordant, counts.pairs];
+        assert!((sums[0] - 4.5).abs() < 1e-12 && (sums[1] - 6.0).abs() < 1e-12);
+        // Each pair is counted for both of its replies.
+        let sums = counts.clusters.iter().map(|cluster| cluster[0]);
+        assert!((sums.sum::<f64>() - 9.0).abs() < 1e-12);
+        // A stratum of right replies alone has no pairs.
+        counts.add(&mut replies(&[(0, 9.0, true)]));
+        assert!((counts.pairs - 6.0).abs() < 1e-12);
+        assert_eq!(counts.auc(), None, "two clusters give no interval");
+    }
+
+    #[test]
+    fn a_number_that_tells_right_from_wrong_is_found_and_noise_is_not() {
+        let none = auc(&spread(20, 0.0), 20).unwrap();
+        assert!(
+            (none.estimate.value - 0.5).abs() < 0.05 && none.p > 0.05,
+            "{none:?}"
+        );
+        let some = auc(&spread(20, 0.3), 20).unwrap();
+        assert!(some.estimate.low > 0.5 && some.p < 0.001, "{some:?}");
+        let reversed = auc(&spread(20, -0.3), 20).unwrap();
+        assert!((some.estimate.value + reversed.estimate.value - 1.0).abs() < 0.1);
+        assert_eq!(auc(&spread(7, 0.3), 7), None);
+        assert_eq!(auc(&spread(20, 3.0), 20), None, "all pairs agree");
+    }
+
+    #[test]
+    fn the_same_replies_in_more_conditions_are_no_more_evidence() {
+        let mut once = PairCounts::new(12);
+        once.add(&mut spread(12, 0.2));
+        let mut pooled = once.clone();
+        for _ in 1..15 {
+            pooled.extend(&once);
+        }
+        let (once, pooled) = (once.auc().unwrap(), pooled.auc().unwrap());
+        assert!(
+            (once.p - pooled.p).abs() < 1e-9 && once.p > 1e-6,
+            "{once:?}"
+        );
+        let (once, pooled) = (once.estimate, pooled.estimate);
+        assert!((once.low - pooled.low).abs() < 1e-9, "{pooled:?}");
+        assert!((once.high - pooled.high).abs() < 1e-9, "{pooled:?}");
+    }
+
+    #[test]
+    fn p_and_interval_agree() {
+        for step in 0..40 {
+            let found = auc(&spread(12, f64::from(step) * 0.01), 12).unwrap();
+            let excludes = found.estimate.low > 0.5 || found.estimate.high < 0.5;
+            assert_eq!(excludes, found.p < 0.05, "{found:?}");
+        }
+    }
+}

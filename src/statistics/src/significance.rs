@@ -1,0 +1,420 @@
+//! Tests of paired differences: [`mcnemar`], [`sign_flip`] and [`swap_test`], the correction [`holm`], and what comes of them:
+//! [`Significance`].
+
+use std::fmt;
+
+use super::split_mix::SplitMix;
+
+/// The level of the tests (chosen, as usual).
+pub const ALPHA: f64 = 0.05;
+
+/// Result of a comparison at the 5 % level, after Holm's correction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Significance {
+    /// The first side is better.
+    Better,
+    /// The first side is worse.
+    Worse,
+    /// No difference is shown. This does not show that the two are equal.
+    NotShown,
+    /// No verdict is possible: with so few clusters and so many tests the corrected p cannot be below 0.05, however large the
+    /// difference is.
+    TooFewClusters,
+    /// Fewer items are shared than a verdict needs ([`MIN_PAIRS`](super::comparison::MIN_PAIRS)).
+    TooFew,
+}
+
+impl Significance {
+    /// Result of a difference from its corrected p-value, and from the smallest corrected one that the clusters allow.
+    #[must_use]
+    pub fn of(difference: f64, holm: f64, least_holm: f64) -> Self {
+        if least_holm >= ALPHA {
+            Self::TooFewClusters
+        } else if holm >= ALPHA {
+            Self::NotShown
+        } else if difference > 0.0 {
+            Self::Better
+        } else {
+            Self::Worse
+        }
+    }
+
+    /// Whether a difference is shown, in either direction.
+    #[must_use]
+    pub fn is_shown(self) -> bool {
+        matches!(self, Self::Better | Self::Worse)
+    }
+
+    /// Whether there is a verdict at all.
+    #[must_use]
+    pub fn is_possible(self) -> bool {
+        !matches!(self, Self::TooFew | Self::TooFewClusters)
+    }
+
+    /// The word for the result in tables; empty if no verdict is possible.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Better => "better",
+            Self::Worse => "worse",
+            Self::NotShown => "not shown",
+            Self::TooFewClusters => "",
+            Self::TooFew => "too few",
+        }
+    }
+}
+
+/// Result of swapping two sides in whole clusters.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SwapTest {
+    /// Two-sided p-value.
+    pub p: f64,
+    /// How it was found.
+    pub by: SwapMethod,
+}
+
+/// How the share of the swaps that are at least as extreme was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SwapMethod {
+    /// All swaps were counted.
+    Counted,
+    /// So many random swaps were counted.
+    Drawn(usize),
+    /// The total difference of the swaps was taken as normally distributed.
+    Normal,
+}
+
+impl fmt::Display for SwapMethod {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Counted => f.write_str("all swaps"),
+            Self::Drawn(draws) => write!(f, "{draws} random swaps"),
+            Self::Normal => f.write_str("normal distribution"),
+        }
+    }
+}
+
+/// Most cells of the table of exact masses (clusters × possible sums) that are filled; 0.3 s on one core (chosen).
+const MAX_CELLS: u64 = 1 << 28;
+/// Number of random swaps where the table would be larger (chosen): p = 0.05 is then known to ± 0.0014.
+const SWAPS: usize = 100_000;
+/// Least number of clusters that must carry a difference for the normal distribution (chosen; see [`normal_swaps`]).
+const MIN_CARRYING: f64 = 1000.0;
+/// Seed of the random swaps (chosen). It is fixed, so that the same records give the same p-value.
+const SEED: u64 = 0x7377_6170;
+
+/// [`sign_flip`] where its table has at most 2²⁸ cells. Else [`normal_swaps`] if so many clusters carry the difference that it is
+/// exact to 10⁻⁴, and the Monte Carlo estimate (1 + hits) / (1 + draws) from 100,000 seeded swaps if they do not (Phipson and Smyth
+/// 2010, Stat. Appl. Genet. Mol. Biol. 9:39), which is never below the exact size.
+#[must_use]
+pub fn swap_test(differences: &[i64]) -> SwapTest {
+    let reduced = reduced(differences);
+    let sums = reduced.iter().map(|difference| difference.unsigned_abs());
+    let cells = (sums.sum::<u64>() + 1).saturating_mul(reduced.len() as u64);
+    let (p, by) = if cells <= MAX_CELLS {
+        (sign_flip(differences), SwapMethod::Counted)
+    } else if carrying(&reduced) >= MIN_CARRYING {
+        (normal_swaps(&reduced), SwapMethod::Normal)
+    } else {
+        let by = SwapMethod::Drawn(SWAPS);
+        (drawn_swaps(differences, SWAPS), by)
+    };
+    SwapTest { p, by }
+}
+
+/// The number of equal clusters whose total difference would be as near to normal: (Σ d²)² / Σ d⁴. The excess kurtosis of the total
+/// is −2 divided by it.
+fn carrying(differences: &[i64]) -> f64 {
+    let power = |n: i32| -> f64 {
+        let powers = differences.iter().map(|d| (*d as f64).powi(n));
+        powers.sum()
+    };
+    let squares = power(2);
+    squares * squares / power(4)
+}
+
+/// [`sign_flip`] of differences without a common divisor, with the total of the swaps taken as normally distributed.
+///
+/// The total is symmetric about 0, its variance is Σ d², and it changes in steps of 2, so the probability of a total is that of the
+/// normal distribution from 1 below it to 1 above it (continuity correction). The total is symmetric, so that the first term that is
+/// left out is that of the kurtosis (Edgeworth expansion, Feller 1971, volume II, section XVI.4): 10⁻⁴ at p = 0.05 with
+/// [`MIN_CARRYING`] clusters, and a tenth of p at p = 10⁻⁸.
+fn normal_swaps(differences: &[i64]) -> f64 {
+    let total = differences.iter().sum::<i64>().abs() as f64;
+    let squares: f64 = differences.iter().map(|d| (*d as f64).powi(2)).sum();
+    let distance = (total - 1.0).max(0.0) / (2.0 * squares).sqrt();
+    libm::erfc(distance)
+}
+
+/// Monte Carlo p-value of [`sign_flip`] from a number of random swaps.
+fn drawn_swaps(differences: &[i64], draws: usize) -> f64 {
+    let observed = differences.iter().sum::<i64>().abs();
+    let mut random = SplitMix(SEED);
+    let mut swapped_sum = || -> i64 {
+        let blocks = differences.chunks(64);
+        let sums = blocks.map(|block| {
+            let bits = random.bits();
+            let signed = |(bit, d): (usize, &i64)| if bits >> bit & 1 == 0 { *d } else { -d };
+            block.iter().enumerate().map(signed).sum::<i64>()
+        });
+        sums.sum()
+    };
+    let hits = (0..draws).filter(|_| swapped_sum().abs() >= observed);
+    (1 + hits.count()) as f64 / (1 + draws) as f64
+}
+
+/// The smallest two-sided p-value that swaps of so many clusters can give: 2 / 2ᶜ.
+#[must_use]
+pub fn least_p(clusters: usize) -> f64 {
+    (2.0 * libm::exp2(-(clusters as f64))).min(1.0)
+}
+
+/// Differences without zeros, divided by their greatest common divisor. That changes no p-value.
+fn reduced(differences: &[i64]) -> Vec<i64> {
+    let divisor = differences.iter().fold(0, |a, d| gcd(a, d.unsigned_abs()));
+    let some = differences.iter().filter(|difference| **difference != 0);
+    some.map(|difference| difference / divisor as i64).collect()
+}
+
+/// Greatest common divisor; that of 0 and a number is the number.
+#[must_use]
+pub fn gcd(a: u64, b: u64) -> u64 {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
+/// Exact two-sided p-value of McNemar's test (McNemar 1947, Psychometrika 12:153; exact as the binomial sign test).
+///
+/// `gained` and `lost` are the numbers of pairs of which only one side is right. The test treats pairs as independent;
+/// [`sign_flip`] does not.
+#[must_use]
+pub fn mcnemar(gained: usize, lost: usize) -> f64 {
+    let smaller = gained.min(lost);
+    let masses = binomial(gained + lost);
+    let tail: f64 = masses.iter().take(smaller + 1).sum();
+    (2.0 * tail).min(1.0)
+}
+
+/// Exact two-sided p-value of the hypothesis that the two sides can be swapped in every cluster: the share of the 2ᶜ swaps
+/// whose total difference is at least as far from 0 as the observed one.
+///
+/// `differences` holds, for each cluster, the pairs gained minus the pairs lost. With one pair per cluster it is McNemar's
+/// exact test. With more it keeps its size if pairs of a cluster are correlated, which McNemar's test does not (the
+/// permutation form of Durkalski et al. 2003, Stat. Med. 22:2417).
+#[must_use]
+pub fn sign_flip(differences: &[i64]) -> f64 {
+    let reduced = reduced(differences);
+    let total = reduced.iter().sum::<i64>().unsigned_abs() as usize;
+    let sizes = reduced.iter().map(|d| d.unsigned_abs() as usize);
+    let mut sizes: Vec<usize> = sizes.collect();
+    sizes.sort_unstable();
+    // The distribution of the sum k of the sizes with positive sign; the total difference is then 2k − max_total.
+    let mut masses = vec![1.0];
+    let mut rest = &sizes[..];
+    while let Some(&size) = rest.first() {
+        let repeats = rest.partition_point(|other| *other == size);
+        masses = convolved(&masses, &binomial(repeats), size);
+        rest = &rest[repeats..];
+    }
+    let max_total: usize = sizes.iter().sum();
+    let extreme = masses
+        .iter()
+        .enumerate()
+        .filter(|(positive, _)| (2 * positive).abs_diff(max_total) >= total);
+    extreme.map(|(_, mass)| mass).sum::<f64>().min(1.0)
+}
+
+/// Probability masses of a sum of two numbers, the second in steps of `step`.
+fn convolved(masses: &[f64], second: &[f64], step: usize) -> Vec<f64> {
+    let mut sum = vec![0.0; masses.len() + (second.len() - 1) * step];
+    for (index, weight) in second.iter().enumerate().filter(|(_, w)| **w > 0.0) {
+        let at = &mut sum[index * step..][..masses.len()];
+        for (sum, mass) in at.iter_mut().zip(masses) {
+            *sum += weight * mass;
+        }
+    }
+    sum
+}
+
+/// Probability masses of the number of heads among `n` fair coins. Masses below 10⁻⁴⁰ are 0 for n above 1000.
+fn binomial(n: usize) -> Vec<f64> {
+    const MIN_MASS: f64 = 1e-40;
+    let log_factorial = libm::lgamma(n as f64 + 1.0);
+    let log_outcomes = n as f64 * std::f64::consts::LN_2;
+    if n <= 1000 {
+        // 2⁻¹⁰⁰⁰ is not rounded to 0, so that the recurrence is exact up to rounding.
+        let mut masses = Vec::with_capacity(n + 1);
+        let mut mass = libm::exp2(-(n as f64));
+        for k in 0..=n {
+            masses.push(mass);
+            mass *= (n - k) as f64 / (k + 1) as f64;
+        }
+        return masses;
+    }
+    let mass = |k: usize| {
+        let log = log_factorial
+            - libm::lgamma(k as f64 + 1.0)
+            - libm::lgamma((n - k) as f64 + 1.0)
+            - log_outcomes;
+        let mass = libm::exp(log);
+        if mass < MIN_MASS { 0.0 } else { mass }
+    };
+    (0..=n).map(mass).collect()
+}
+
+/// Holm's adjusted p-values (Holm 1979, Scand. J. Stat. 6:65), in the order of `values`. If those below 0.05 are called
+/// significant, the probability of any false positive among them is at most 5 %.
+#[must_use]
+pub fn holm(values: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
+    let mut adjusted = vec![0.0; values.len()];
+    let mut highest = 0.0_f64;
+    for (rank, index) in order.into_iter().enumerate() {
+        highest = highest.max((values.len() - rank) as f64 * values[index]);
+        adjusted[index] = highest.min(1.0);
+    }
+    adjusted
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GOLDEN_MCNEMAR: [(usize, usize, f64); 9] = [
+        (0, 1, 1.0),
+        (3, 9, 0.14599609375),
+        (10, 10, 1.0),
+        (86, 150, 3.7159361395713866e-05),
+        (1, 25, 8.046627044677734e-07),
+        (700, 900, 6.319484959450105e-07),
+        (2000, 2300, 5.079935568924055e-06),
+        (5000, 5100, 0.32458154633139585),
+        (40, 0, 1.8189894035458565e-12),
+    ];
+
+    const GOLDEN_HOLM: [(f64, f64); 8] = [
+        (0.01, 0.06),
+        (0.04, 0.15),
+        (0.03, 0.15),
+        (0.005, 0.035),
+        (0.6, 1.0),
+        (0.0001, 0.0008),
+        (0.03, 0.15),
+        (1.0, 1.0),
+    ];
+
+    #[test]
+    fn mcnemar_is_the_sign_test() {
+        // scipy 1.17.1, binomtest(b, b + c).pvalue.
+        for (gained, lost, expected) in GOLDEN_MCNEMAR {
+            let p = mcnemar(gained, lost);
+            assert!(
+                (p - expected).abs() < 1e-9 && (p / expected - 1.0).abs() < 1e-9,
+                "{gained} {lost}: {p}"
+            );
+            assert!((p - mcnemar(lost, gained)).abs() < 1e-15);
+            let single = [vec![1; gained], vec![-1; lost], vec![0; 5]].concat();
+            assert!((sign_flip(&single) - p).abs() < 1e-9, "{gained} {lost}");
+        }
+    }
+
+    #[test]
+    fn swaps_are_counted() {
+        for differences in [
+            vec![],
+            vec![0, 0],
+            vec![3],
+            vec![2, -1, 3],
+            vec![1, 1, 1, -4, 2, 2, -1, 5],
+        ] {
+            let total: i64 = differences.iter().sum();
+            let n = differences.len();
+            let extreme = (0..1_u32 << n).filter(|signs| {
+                let sum: i64 = (0..n)
+                    .map(|i| {
+                        if signs >> i & 1 == 0 {
+                            differences[i]
+                        } else {
+                            -differences[i]
+                        }
+                    })
+                    .sum();
+                sum.abs() >= total.abs()
+            });
+            let expected = extreme.count() as f64 / f64::from(1_u32 << n);
+            assert!(
+                (sign_flip(&differences) - expected).abs() < 1e-12,
+                "{differences:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn random_swaps_come_near_the_counted_ones() {
+        for differences in [
+            vec![3, -1, 2, 4, 1, 1, 5, -2, 3, 2],
+            vec![2; 9],
+            vec![1, -1],
+        ] {
+            let (counted, drawn) = (sign_flip(&differences), drawn_swaps(&differences, SWAPS));
+            // Four standard errors.
+            let near = 4.0 * (counted * (1.0 - counted) / SWAPS as f64).sqrt() + 2e-5;
+            assert!(
+                (drawn - counted).abs() < near,
+                "{differences:?}: {drawn}, {counted}"
+            );
+        }
+        // 900 clusters whose differences have no common divisor: 10⁹ cells.
+        let large: Vec<i64> = (0..900).map(|i| 1000 + i % 7).collect();
+        let tested = swap_test(&large);
+        let drawn = SwapMethod::Drawn(SWAPS);
+        assert_eq!((tested.p, tested.by), (1.0 / 100_001.0, drawn));
+        let small = swap_test(&[2, 4, 6]);
+        assert_eq!((small.p, small.by), (0.25, SwapMethod::Counted));
+    }
+
+    #[test]
+    fn the_normal_distribution_comes_near_the_counted_swaps() {
+        // Differences of 1 to 5 in a number of clusters that the table just holds; `few` of them fall.
+        for (clusters, few) in [(1800, 860), (1800, 830), (4000, 1900), (4000, 1850)] {
+            let differences: Vec<i64> = (0..clusters)
+                .map(|i| (1 + i % 5) * if i * 7919 % clusters < few { -1 } else { 1 })
+                .collect();
+            assert!(carrying(&differences) >= MIN_CARRYING);
+            let (counted, normal) = (sign_flip(&differences), normal_swaps(&differences));
+            assert!((counted - normal).abs() < 1e-4, "{counted} {normal}");
+        }
+        // Far from 0, beyond what swaps could be drawn for.
+        let far: Vec<i64> = (0..4000).map(|i| if i % 11 < 5 { -1 } else { 1 }).collect();
+        let (counted, normal) = (sign_flip(&far), normal_swaps(&far));
+        assert!(counted < 1e-6 && (normal / counted - 1.0).abs() < 0.05);
+        // 20,000 clusters are too many for the table.
+        let many: Vec<i64> = (0..20_000).map(|i| 1 + i % 5).collect();
+        assert_eq!(swap_test(&many).by, SwapMethod::Normal);
+        // One cluster that carries nearly all of the difference is not normal, however many others there are.
+        let one: Vec<i64> = (0..1500)
+            .map(|i| if i == 0 { 200_001 } else { 1 })
+            .collect();
+        assert_eq!(swap_test(&one).by, SwapMethod::Drawn(SWAPS));
+    }
+
+    #[test]
+    fn no_verdict_is_possible_with_few_clusters() {
+        assert!((least_p(8) - 2.0 / 256.0).abs() < 1e-15);
+        assert!((least_p(0) - 1.0).abs() < 1e-15);
+        let verdict = |least_holm| Significance::of(-0.3, least_holm, least_holm);
+        assert_eq!(verdict(5.0 * least_p(8)), Significance::Worse);
+        assert_eq!(verdict(5.0 * least_p(7)), Significance::TooFewClusters);
+        assert_eq!(Significance::of(0.3, 0.05, 0.01), Significance::NotShown);
+    }
+
+    #[test]
+    fn holm_steps_down() {
+        // statsmodels 0.15.0, multipletests(method="holm").
+        let adjusted = holm(&GOLDEN_HOLM.map(|(p, _)| p));
+        for (adjusted, (p, expected)) in adjusted.iter().zip(GOLDEN_HOLM) {
+            assert!((adjusted - expected).abs() < 1e-9, "{p}");
+        }
+        assert!(holm(&[]).is_empty());
+    }
+}

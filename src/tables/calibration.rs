@@ -1,0 +1,153 @@
+//! The tables of confidence against accuracy, and of probabilities by the place of a choice.
+
+use crate::score::auc::Auc;
+use crate::score::calibration::{Calibration, PositionShare, ReliabilityBin};
+use crate::score::estimate::Estimate;
+use crate::score::findings::Findings;
+use crate::score::subject::Subject;
+use crate::text::table::ColumnKind::{Count, Number, Percent, Points, Ratio, Share, Text};
+use crate::text::table::{Table, TableBuilder, TableCell};
+use crate::text::words::light;
+use crate::types::question::letter;
+
+/// Id of the section of the page.
+pub(super) const CONFIDENCE: &str = "confidence";
+
+/// The tables; none if no probabilities of choices are known.
+pub(super) fn calibration(findings: &Findings<'_>) -> Vec<Table> {
+    let all = &findings.calibrations;
+    if all.is_empty() {
+        return Vec::new();
+    }
+    vec![confidence(findings, all), reliability(all), positions(all)]
+}
+
+/// A number of a row.
+type NumberOf = fn(&Calibration) -> Option<Estimate>;
+
+fn confidence(findings: &Findings<'_>, all: &[Calibration]) -> Table {
+    let mut table = TableBuilder::new("calibration", all)
+        .page(CONFIDENCE, "Confidence against accuracy")
+        .subject(|row| &row.subject, ToString::to_string)
+        .column(Text, "terminal model", |row| row.subject.model.clone())
+        .column(Text, "terminal condition", |row| condition(&row.subject))
+        .column(Count, "csv replies | terminal n | page n", |row| row.replies)
+        .column(Count, "csv reasoned | page reasoned", |row| row.reasoned)
+        .column(Count, "csv unstated | page not stated", |row| row.unstated)
+        .column(
+            Share,
+            "csv confidence confidence_low confidence_high | terminal confidence | page confidence in % [95 %]",
+            |row| row.confidence,
+        )
+        .column(
+            Share,
+            "csv accuracy accuracy_low accuracy_high | terminal accuracy | page accuracy in % [95 %]",
+            |row| row.accuracy,
+        )
+        .column(
+            Points,
+            "csv overconfidence overconfidence_low overconfidence_high | terminal overconfidence, interval | page overconfidence [95 %]",
+            |row| row.overconfidence.estimate,
+        );
+    let numbers: [(&str, NumberOf); 6] = [
+        (
+            "csv ece ece_low ece_high | terminal calibration error | page calibration error [95 %]",
+            |row| row.error,
+        ),
+        (
+            "csv brier brier_low brier_high | page Brier score [95 %]",
+            |row| Some(row.brier),
+        ),
+        (
+            "csv brier_skill brier_skill_low brier_skill_high | terminal Brier skill | page Brier skill [95 %]",
+            |row| Some(row.skill),
+        ),
+        ("csv nll nll_low nll_high | page −ln p [95 %]", |row| {
+            Some(row.nll)
+        }),
+        (
+            "csv auroc auroc_low auroc_high | terminal AUROC | page AUROC [95 %]",
+            |row| row.auroc.map(|Auc { estimate, .. }| estimate),
+        ),
+        (
+            "csv blind_shift blind_shift_low blind_shift_high | terminal blind shift | page blind shift [95 %]",
+            |row| row.blind_shift,
+        ),
+    ];
+    for (heads, number) in numbers {
+        table = table.column(Ratio, heads, move |row| number(row));
+    }
+    let mut table = table
+        .column(Percent, "csv risk_100 | page risk in %", |row| {
+            row.risk.at_100
+        })
+        .column(Percent, "csv risk_80 | page at 80 %", |row| row.risk.at_80)
+        .column(Percent, "csv risk_50 | page at 50 %", |row| row.risk.at_50)
+        .column(Number, "csv aurc | page area under risk", |row| {
+            row.risk.area
+        })
+        .column(
+            Share,
+            "csv over_orders over_orders_low over_orders_high | page over all orders in % [95 %]",
+            |row| row.over_orders,
+        )
+        .build();
+    table.heading = Some(format!(
+        "Confidence (mean greatest probability of a choice) against accuracy in %, with 95 % intervals by {}",
+        findings.unit
+    ));
+    table
+}
+
+/// A condition in the words of tables.
+fn condition(subject: &Subject) -> String {
+    match subject.level {
+        None => "without images".to_owned(),
+        Some(level) => format!(
+            "{level}, {}",
+            light(&subject.variant, subject.enhancer.as_ref())
+        ),
+    }
+}
+
+/// The bins of the reliability diagram.
+fn reliability(all: &[Calibration]) -> Table {
+    let rows = all.iter().flat_map(|row| {
+        let bins = row.bins.iter().enumerate();
+        bins.map(|(number, bin)| (&row.subject, number + 1, *bin))
+    });
+    TableBuilder::new("reliability", rows)
+        .subject(
+            |row: &(&Subject, usize, ReliabilityBin)| row.0,
+            ToString::to_string,
+        )
+        .column(Count, "csv bin", |row| row.1)
+        .column(Number, "csv confidence", |row| row.2.confidence)
+        .column(Share, "csv accuracy accuracy_low accuracy_high n", |row| {
+            row.2.accuracy
+        })
+        .build()
+}
+
+fn positions(all: &[Calibration]) -> Table {
+    let rows = all.iter().flat_map(|row| {
+        let positions = row.positions.iter();
+        positions.map(|share| (&row.subject, *share))
+    });
+    let mut table = TableBuilder::new("positions", rows)
+        .page(CONFIDENCE, "Probability by the place of a choice")
+        .subject(|row: &(&Subject, PositionShare)| row.0, ToString::to_string)
+        .column(Text, "csv letter | page letter", |row| {
+            TableCell::from(letter(row.1.position).to_string())
+        })
+        .column(
+            Percent,
+            "csv probability | page mean probability in %",
+            |row| row.1.p,
+        )
+        .column(Percent, "csv true | page true in %", |row| row.1.truth)
+        .column(Count, "csv n | page n", |row| row.1.n)
+        .build();
+    table.is_folded = true;
+    table
+}

@@ -1,0 +1,337 @@
+//! Tables of all differences with their tests, for each kind of comparison: all families together, and by family.
+
+use super::pooled::too_few_clusters;
+use super::sections::{ENHANCERS, REAL};
+use crate::score::choice::ReadingMode;
+use crate::score::cluster::ClusterUnit;
+use crate::score::comparison::{Comparison, ComparisonKind, MIN_PAIRS};
+use crate::score::findings::Findings;
+use crate::score::significance::Significance;
+use crate::text::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
+use crate::text::table::{Column, Table, TableBuilder, TableCell, TableFormat};
+use crate::text::words::{counted, name};
+
+/// Maximum number of rows of a kind in the terminal. The CSV file has all rows.
+const MAX_ROWS: usize = 40;
+
+pub(super) fn comparisons(findings: &Findings<'_>) -> Vec<Table> {
+    let mut tables = tables_of(&findings.comparisons, findings.unit, titles);
+    for kind in ComparisonKind::ALL {
+        let all = findings.comparisons.iter();
+        let all: Vec<&Comparison> = all.filter(|comparison| comparison.kind == kind).collect();
+        tables.push(table(kind, "", &all, ReadingMode::Lenient).in_files_only());
+    }
+    tables
+}
+
+/// The tables of comparisons of another measure, which the last column of the file names.
+pub(crate) fn comparisons_of(
+    comparisons: &[Comparison],
+    unit: ClusterUnit,
+    measure: &'static str,
+) -> Vec<Table> {
+    let mut tables = tables_of(comparisons, unit, titles_against_light);
+    for table in &mut tables {
+        let caption = format!(
+            "{}, paired by question, in percentage points.",
+            table.caption
+        );
+        table.latex = table.latex.as_ref().map(|_| caption);
+        table.columns.push(Column {
+            kind: Text,
+            heads: "csv measure".into(),
+        });
+        for row in &mut table.rows {
+            for cell in &mut row.cells {
+                // Another answer than at L0 need not be worse.
+                let words = match cell {
+                    TableCell::Significance(Significance::Better) => "agrees more",
+                    TableCell::Significance(Significance::Worse) => "agrees less",
+                    _ => continue,
+                };
+                *cell = TableCell::Text(words.to_owned());
+            }
+            row.cells.push(measure.into());
+        }
+    }
+    tables
+}
+
+/// The tables of each kind of comparison; `titles` returns the caption on the page, and the heading in the terminal.
+fn tables_of(
+    comparisons: &[Comparison],
+    unit: ClusterUnit,
+    titles: fn(ComparisonKind) -> (&'static str, Option<&'static str>),
+) -> Vec<Table> {
+    let mut tables = Vec::new();
+    for kind in ComparisonKind::ALL {
+        let all = comparisons
+            .iter()
+            .filter(|comparison| comparison.kind == kind);
+        let (whole, by_family): (Vec<&Comparison>, Vec<&Comparison>) =
+            all.partition(|comparison| comparison.family.is_none());
+        let (caption, heading) = titles(kind);
+        let least = whole.iter();
+        let least =
+            least.map(|comparison| (comparison.least_holm, comparison.strict.paired.clusters));
+        let note = too_few_clusters(least, &unit.to_string());
+        let mut total = table(kind, caption, &whole, ReadingMode::Strict);
+        total.is_folded = !matches!(
+            kind,
+            ComparisonKind::Enhancer | ComparisonKind::RealSynthetic | ComparisonKind::RealEnhanced
+        );
+        if !whole.is_empty() {
+            total.heading = heading.map(str::to_owned);
+            if kind == ComparisonKind::Enhancer {
+                let caption = "Enhanced against raw, paired by question, in percentage points.";
+                total.latex = Some(caption.to_owned());
+            }
+            shorten(&mut total, kind, &whole);
+            total.notes.extend(note);
+            total.notes.extend(too_few(&whole));
+        }
+        let caption = format!("{caption}, by family");
+        let mut by_family = table(kind, &caption, &by_family, ReadingMode::Strict);
+        by_family.is_folded = true;
+        tables.extend([total, by_family]);
+    }
+    tables
+}
+
+/// The caption on the page, and the heading in the terminal. The kind `Level` has no heading, because the terminal shows
+/// accuracy by level anyway.
+fn titles(kind: ComparisonKind) -> (&'static str, Option<&'static str>) {
+    match kind {
+        ComparisonKind::Level => ("Each dark level less L0, raw", None),
+        ComparisonKind::Variant => (
+            "Sensor noise less exposure drop alone",
+            Some("Sensor noise against exposure drop alone, paired by question"),
+        ),
+        ComparisonKind::Enhancer => (
+            "Enhanced less raw",
+            Some("Enhanced against raw, paired by question"),
+        ),
+        ComparisonKind::Model => (
+            "Model less model",
+            Some("Model against model, paired by question"),
+        ),
+        ComparisonKind::Blind => (
+            "With images less without",
+            Some("With images against without, paired by question"),
+        ),
+        ComparisonKind::Light => (
+            "Light less light",
+            Some("One light against another, same model, paired by question"),
+        ),
+        ComparisonKind::RealSynthetic => (
+            "Photographed in the dark less synthetic",
+            Some("Photographed in the dark against synthetic, paired by question"),
+        ),
+        ComparisonKind::RealEnhanced => (
+            "Photographed in the dark: enhanced less raw",
+            Some("Photographed in the dark, enhanced against raw, paired by question"),
+        ),
+    }
+}
+
+/// The same for agreement with the answers at L0. The level L0 is that of the images asked again.
+fn titles_against_light(kind: ComparisonKind) -> (&'static str, Option<&'static str>) {
+    match kind {
+        ComparisonKind::Level => (
+            "Agreement at each dark level less that of L0 again, raw",
+            Some("Agreement in the dark against that of L0 asked again, paired by question"),
+        ),
+        ComparisonKind::Variant => (
+            "Agreement with sensor noise less exposure drop alone",
+            Some("Agreement with sensor noise against exposure drop alone, paired by question"),
+        ),
+        ComparisonKind::Enhancer => (
+            "Agreement of enhanced less raw",
+            Some("Agreement of enhanced against raw, paired by question"),
+        ),
+        ComparisonKind::Model => ("Model less model", None),
+        ComparisonKind::Blind => (
+            "Agreement with images less without",
+            Some("Agreement with images against without, paired by question"),
+        ),
+        ComparisonKind::Light => (
+            "Agreement in one light less another",
+            Some("Agreement in one light against another, same model, paired by question"),
+        ),
+        ComparisonKind::RealSynthetic => (
+            "Agreement on photographs in the dark less synthetic",
+            Some("Agreement on photographs in the dark against synthetic, paired by question"),
+        ),
+        ComparisonKind::RealEnhanced => (
+            "Agreement on photographs in the dark: enhanced less raw",
+            Some("Agreement on photographs in the dark, enhanced against raw, paired by question"),
+        ),
+    }
+}
+
+/// A line about the rows whose sides share too few items for a verdict.
+fn too_few(comparisons: &[&Comparison]) -> Option<String> {
+    let small = comparisons
+        .iter()
+        .filter(|comparison| comparison.is_too_small());
+    let count = small.count();
+    (count > 0).then(|| {
+        let rows = counted(count, "row");
+        format!(
+            "too few: fewer than {MIN_PAIRS} items are shared in {rows}, so no verdict is given"
+        )
+    })
+}
+
+/// Hides rows in the terminal: those beyond [`MAX_ROWS`] and, for blind models, those that say little.
+fn shorten(table: &mut Table, kind: ComparisonKind, comparisons: &[&Comparison]) {
+    let mut printed: Vec<usize> = (0..comparisons.len()).collect();
+    if kind == ComparisonKind::Blind {
+        // The terminal compares blind models with raw images only; the file also has the enhanced ones.
+        printed.retain(|index| comparisons[*index].first.enhancer.is_none());
+        let is_better =
+            |index: &usize| comparisons[*index].strict.significance == Significance::Better;
+        if !printed.is_empty() && printed.iter().all(is_better) {
+            let line = format!("better in all {} conditions", printed.len());
+            table.notes.push(line);
+            printed.clear();
+        }
+    }
+    if printed.len() > MAX_ROWS {
+        let more = printed.len() - MAX_ROWS;
+        let line = format!("{more} more rows are in comparisons.csv");
+        table.notes.push(line);
+        printed.truncate(MAX_ROWS);
+    }
+    for (index, row) in table.rows.iter_mut().enumerate() {
+        if !printed.contains(&index) {
+            row.hidden_in.push(TableFormat::Terminal);
+        }
+    }
+}
+
+fn table(
+    kind: ComparisonKind,
+    caption: &str,
+    comparisons: &[&Comparison],
+    mode: ReadingMode,
+) -> Table {
+    let section = match kind {
+        ComparisonKind::Enhancer => ENHANCERS,
+        ComparisonKind::RealSynthetic | ComparisonKind::RealEnhanced => REAL,
+        _ => "comparisons",
+    };
+    let builder =
+        TableBuilder::new("comparisons", comparisons.iter().copied()).page(section, caption);
+    let builder = numbers(subjects(builder, kind), mode);
+    builder
+        .column(
+            ColumnKind::Significance,
+            "csv verdict shown | terminal | page | latex",
+            move |comparison| comparison.parsed(mode).significance,
+        )
+        .column(Text, "csv mode", move |_| mode.name())
+        .build()
+}
+
+fn subjects(builder: TableBuilder<&Comparison>, kind: ComparisonKind) -> TableBuilder<&Comparison> {
+    let builder = builder
+        .column(Text, "csv kind", |comparison| comparison.kind.name())
+        .column(Text, "csv model | latex Model", |comparison| {
+            comparison.first.model.clone()
+        })
+        .column(Text, "csv condition | latex Condition", |comparison| {
+            comparison.first.condition()
+        })
+        .column(Text, "csv against_model", |comparison| {
+            comparison.second.model.clone()
+        })
+        .column(Text, "csv against_condition", |comparison| {
+            comparison.second.condition()
+        })
+        .column(Text, "terminal model | page model", |comparison| {
+            comparison.first.model.clone()
+        })
+        .column(Text, "terminal condition | page condition", |comparison| {
+            comparison.first.condition()
+        });
+    let builder = match kind {
+        ComparisonKind::Model
+        | ComparisonKind::Blind
+        | ComparisonKind::Light
+        | ComparisonKind::RealSynthetic => {
+            builder.column(Text, "terminal less | page less", |comparison| {
+                against(comparison)
+            })
+        }
+        // The kind says what the first side is compared with.
+        ComparisonKind::Level
+        | ComparisonKind::Variant
+        | ComparisonKind::Enhancer
+        | ComparisonKind::RealEnhanced => builder,
+    };
+    builder.family(|comparison| comparison.family.as_ref())
+}
+
+fn numbers(builder: TableBuilder<&Comparison>, mode: ReadingMode) -> TableBuilder<&Comparison> {
+    let difference = "csv difference low high | terminal difference, 95 % interval | page difference [95 %] \
+                      | latex Difference [95\\,\\%]";
+    builder
+        .column(Count, "csv n | terminal n", |comparison| {
+            comparison.parsed(mode).paired.difference.n
+        })
+        .column(Number, "csv first", |comparison| {
+            comparison.parsed(mode).paired.first
+        })
+        .column(Percent, "csv second | latex Raw", |comparison| {
+            comparison.parsed(mode).paired.second
+        })
+        .column(Percent, "latex Enhanced", |comparison| {
+            comparison.parsed(mode).paired.first
+        })
+        .column(Points, difference, |comparison| {
+            comparison.parsed(mode).paired.difference
+        })
+        .column(Count, "latex Rescued / harmed", |comparison| {
+            format!(
+                "{} / {}",
+                comparison.parsed(mode).paired.gained,
+                comparison.parsed(mode).paired.lost
+            )
+        })
+        .column(
+            Count,
+            "csv only_first | terminal only first | page only first",
+            |comparison| comparison.parsed(mode).paired.gained,
+        )
+        .column(
+            Count,
+            "csv only_second | terminal only second | page only second",
+            |comparison| comparison.parsed(mode).paired.lost,
+        )
+        .column(Count, "page n", |comparison| {
+            comparison.parsed(mode).paired.difference.n
+        })
+        .column(P, "csv p_mcnemar | page p (McNemar)", |comparison| {
+            comparison.parsed(mode).paired.mcnemar
+        })
+        .column(P, "csv p | page p", |comparison| {
+            comparison.parsed(mode).paired.p
+        })
+        .column(
+            P,
+            "csv p_holm | terminal p (Holm) | page p (Holm) | latex $p$ (Holm)",
+            |comparison| comparison.parsed(mode).holm,
+        )
+}
+
+/// What of the second side the first side does not imply: another model, another condition, or both.
+fn against(comparison: &Comparison) -> String {
+    let (first, second) = (&comparison.first, &comparison.second);
+    match (first.model != second.model, comparison.kind) {
+        (true, ComparisonKind::Light) => name(second),
+        (true, _) => second.model.clone(),
+        (false, ComparisonKind::Light | ComparisonKind::RealSynthetic) => second.condition(),
+        (false, _) => String::new(),
+    }
+}

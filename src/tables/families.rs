@@ -1,0 +1,57 @@
+//! The table of accuracy by family, with a row for each subject. Numbers that are shown to be below those of a model without images
+//! are marked.
+
+use crate::score::choice::ReadingMode;
+use crate::score::findings::Findings;
+use crate::score::subject::Subject;
+use crate::text::latex::escaped;
+use crate::text::table::ColumnKind::{Percent, Text};
+use crate::text::table::{ColumnHeads, Table, TableBuilder, TableCell};
+use crate::text::words::family as family_name;
+use crate::types::Family;
+
+pub(super) fn families(findings: &Findings<'_>) -> Table {
+    let subjects = findings.grid.subjects.iter().map(Some);
+    // The last row is chance.
+    let mut builder = TableBuilder::new("families", subjects.chain([None]))
+        .page("families", "Accuracy in % by family")
+        .column(Text, "page model | latex Model", |subject| {
+            subject
+                .map_or("chance", |subject| &subject.model)
+                .to_owned()
+        })
+        .column(Text, "page condition | latex Condition", |subject| {
+            subject.map_or(String::new(), Subject::condition)
+        });
+    for family in findings.grid.groups() {
+        let name = family_name(family);
+        let names = ColumnHeads {
+            page: Some(name.to_owned()),
+            latex: family.map(|_| escaped(name)),
+            ..ColumnHeads::default()
+        };
+        builder = builder.column(Percent, names, |subject| share(findings, *subject, family));
+    }
+    let mut table = builder.build();
+    table.latex = Some(
+        "Accuracy in \\% by family, with 95\\,\\% intervals. $\\downarrow$: shown to be below a model without images (its own, if it was asked so)."
+            .to_owned(),
+    );
+    table
+}
+
+/// The cell of a subject and a family; `None` is chance.
+fn share(findings: &Findings<'_>, subject: Option<&Subject>, family: Option<&Family>) -> TableCell {
+    let mut cells = findings.summary.of(family, ReadingMode::Strict);
+    let cell = cells.find(|cell| match subject {
+        Some(subject) => cell.subject == *subject,
+        None => cell.subject.view.is_none(),
+    });
+    let below = subject.is_some_and(|subject| !findings.below_blind(subject, family).is_empty());
+    match cell.and_then(|cell| cell.accuracy) {
+        None => TableCell::Missing,
+        Some(chance) if subject.is_none() => TableCell::Number(chance.value),
+        Some(share) if below => TableCell::Below(share),
+        Some(share) => TableCell::Estimate(share),
+    }
+}

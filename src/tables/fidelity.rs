@@ -1,0 +1,122 @@
+//! The table of the similarity of images to their clean frames, and of how well it predicts right answers.
+
+use crate::score::auc::Auc;
+use crate::score::fidelity::{ConditionFidelity, FidelityFindings, Prediction};
+use crate::score::subject::Subject;
+use crate::text::table::ColumnKind::{Count, Number, P, Percent, Ratio, Significance, Text};
+use crate::text::table::{Table, TableBuilder, TableCell};
+use crate::text::words::light;
+use crate::types::View;
+
+/// The measures in the order of [`ConditionFidelity::means`]: name in CSV files, and in text.
+const MEASURES: [(&str, &str); 2] = [("psnr", "PSNR"), ("ssim", "SSIM")];
+
+pub(super) fn fidelity(findings: Option<&FidelityFindings>) -> Option<Table> {
+    let findings = findings?;
+    let caption = "Similarity of the images to their clean frames, and how well it tells right from wrong answers within a \
+                   condition (0.5: not at all)";
+    let mut table = TableBuilder::new("fidelity", &findings.conditions)
+        .page("fidelity", caption)
+        .column(Text, "csv condition", |row| condition(row))
+        .column(Text, "csv level | terminal level | page level", |row| {
+            row.level.to_string()
+        })
+        .column(Text, "csv variant", |row| row.variant.to_string())
+        .column(Text, "csv enhancer", |row| {
+            TableCell::from(row.enhancer.as_ref().map(ToString::to_string))
+        })
+        .column(Text, "terminal light | page light", |row| {
+            light(&row.variant, row.enhancer.as_ref())
+        })
+        .column(Count, "csv images | page images", |row| row.images)
+        .column(
+            Number,
+            "csv psnr | terminal PSNR in dB | page PSNR in dB",
+            |row| row.means[0],
+        )
+        .column(Number, "csv ssim | terminal SSIM | page SSIM", |row| {
+            row.means[1]
+        })
+        .column(Count, "csv n", |row| row.replies)
+        .column(
+            Percent,
+            "csv accuracy | terminal right in % | page right in %",
+            |row| row.accuracy,
+        )
+        .column(Count, "page n", |row| row.replies);
+    for (index, (csv, name)) in MEASURES.into_iter().enumerate() {
+        let auc = move |row: &&ConditionFidelity| row.predicts[index].map(|found| found.auc);
+        let of = move |number: fn(Prediction) -> f64| {
+            move |row: &&ConditionFidelity| row.predicts[index].map(number)
+        };
+        let heads = format!(
+            "csv {csv}_auc {csv}_auc_low {csv}_auc_high | terminal AUC of {name} | page AUC of {name} [95 %]"
+        );
+        table = table
+            .column(Ratio, &*heads, move |row| auc(row).map(|auc| auc.estimate))
+            .column(P, &*format!("csv {csv}_p"), of(|found| found.auc.p))
+            .column(
+                P,
+                &*format!("csv {csv}_p_holm | page p (Holm)"),
+                of(|found| found.holm),
+            )
+            .column(
+                Significance,
+                &*format!("csv {csv}_verdict | page verdict"),
+                move |row| TableCell::from(row.predicts[index].map(|found| found.significance)),
+            );
+    }
+    let mut table = table.build();
+    table.is_folded = true;
+    table.heading = Some("Fidelity: does a better picture mean better answers?".to_owned());
+    table.notes = notes(findings);
+    Some(table)
+}
+
+fn condition(row: &ConditionFidelity) -> String {
+    let subject = Subject {
+        model: String::new(),
+        view: Some(View::Image),
+        level: Some(row.level),
+        variant: row.variant.clone(),
+        enhancer: row.enhancer.clone(),
+    };
+    subject.condition()
+}
+
+/// Notes below the table: the AUC over all conditions, and the correlation between conditions.
+pub(crate) fn notes(findings: &FidelityFindings) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (index, (_, name)) in MEASURES.into_iter().enumerate() {
+        notes.push(within(name, findings.within[index]));
+        if let Some(correlation) = findings.between[index] {
+            let correlation = format!("{correlation:+.2}").replace('-', "−");
+            notes.push(format!(
+                "between {} conditions, the rank correlation of mean {name} and accuracy is {correlation} (a description, without a test)",
+                findings.conditions.len()
+            ));
+        }
+    }
+    notes
+}
+
+fn within(name: &str, auc: Option<Auc>) -> String {
+    let Some(Auc { estimate, .. }) = auc else {
+        return format!(
+            "within conditions, too few right or wrong answers or clusters to know whether {name} tells them apart"
+        );
+    };
+    let numbers = format!(
+        "AUC {:.2} [{:.2}, {:.2}]",
+        estimate.value, estimate.low, estimate.high
+    );
+    if estimate.low > 0.5 {
+        format!("within conditions, {name} tells right from wrong answers: {numbers}")
+    } else if estimate.high < 0.5 {
+        format!("within conditions, a higher {name} goes with wrong answers: {numbers}")
+    } else {
+        format!(
+            "within conditions, it is not shown that {name} tells right from wrong answers: {numbers}, 0.5 is chance"
+        )
+    }
+}

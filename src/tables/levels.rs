@@ -1,0 +1,241 @@
+//! The table of accuracy by level, with a row for each model, variant and enhancer.
+
+use crate::score::accuracy::{AccuracyCell, AccuracySummary};
+use crate::score::choice::ReadingMode;
+use crate::score::findings::Findings;
+use crate::text::ladder::{Ladder, LadderRow};
+use crate::text::table::ColumnKind::Count;
+use crate::text::table::{ColumnKind, Table, TableCell, TableFormat, TableRow};
+use crate::text::terminal::{differing, texts};
+use crate::text::words::{ends, percent};
+use crate::types::UnreadReason;
+use crate::types::degradation::Axis;
+
+/// The tables of all items and, if the models were not asked the same ones, those of the items that they share.
+pub(super) fn levels(findings: &Findings<'_>) -> Vec<Table> {
+    let mut tables = of_summary(findings, &findings.summary, "");
+    if let Some(common) = &findings.common {
+        let what = format!(
+            " on the {} questions that all models with images answered",
+            common.shared_questions
+        );
+        for mut table in of_summary(findings, &common.summary, &what) {
+            table.latex = Some(format!("Accuracy in \\%{what}."));
+            tables.push(table);
+        }
+    }
+    tables
+}
+
+/// The table of each axis; `what` says on which items, if not on all.
+fn of_summary(findings: &Findings<'_>, summary: &AccuracySummary, what: &str) -> Vec<Table> {
+    let strict = summary.of(None, ReadingMode::Strict);
+    let ladder = Ladder::new(strict.map(|cell| (&cell.subject, cell))).in_light_of(findings);
+    let notes = notes(summary, &ladder);
+    let ladders = ladder.by_axis().into_iter();
+    let mut tables: Vec<Table> = ladders
+        .map(|(axis, ladder)| of_axis(findings, summary, what, axis, &ladder))
+        .collect();
+    if let Some(last) = tables.last_mut() {
+        last.notes = notes;
+    }
+    tables
+}
+
+fn of_axis(
+    findings: &Findings<'_>,
+    summary: &AccuracySummary,
+    what: &str,
+    axis: Axis,
+    ladder: &Ladder<'_, AccuracyCell>,
+) -> Table {
+    let caption = match (what, axis == Axis::LIGHT) {
+        ("", true) => "Accuracy in % by level, with 95 % intervals".to_owned(),
+        (_, true) => format!("Accuracy in % by level{what}"),
+        (_, false) => format!("Accuracy in % by {} of {}{what}", axis.title, axis.cause),
+    };
+    let mut table = ladder
+        .table("levels", &findings.grid.listing, |cell| {
+            cell.map_or(TableCell::Blank, |cell| accuracy(summary, cell))
+        })
+        .page("accuracy", &caption)
+        .column(Count, "terminal n", |line| replies(line))
+        .column(Count, "terminal unparsed", |line| {
+            let strict = line.sum(|cell| cell.unparsed).to_string();
+            let lenient =
+                |cell: &AccuracyCell| lenient(summary, cell).map_or(0, |cell| cell.unparsed);
+            let lenient = line.sum(lenient).to_string();
+            format!("{strict}{}", differing(&strict, &lenient))
+        })
+        .column(Count, "terminal failed", |line| {
+            line.sum(|cell| cell.failed)
+        })
+        .build();
+    add_always(&mut table, ladder);
+    let of = if axis == Axis::LIGHT {
+        String::new()
+    } else {
+        format!(" by {} of {}", axis.title, axis.cause)
+    };
+    table.heading = Some(if what.is_empty() {
+        format!(
+            "Accuracy in %{of}: strict (lenient where it differs); n replies at each level; 95 %: how far the widest interval reaches down and up"
+        )
+    } else {
+        format!("Accuracy in %{of}{what}")
+    });
+    table.latex = Some(format!(
+        "Accuracy in \\%{of} (strict reading) with 95\\,\\% intervals by {}; {} items.",
+        findings.unit,
+        findings.grid.items.len()
+    ));
+    table
+}
+
+fn lenient<'a>(summary: &'a AccuracySummary, strict: &AccuracyCell) -> Option<&'a AccuracyCell> {
+    summary.cell(
+        &strict.subject,
+        strict.family.as_ref(),
+        ReadingMode::Lenient,
+    )
+}
+
+fn accuracy(summary: &AccuracySummary, cell: &AccuracyCell) -> TableCell {
+    let Some(strict) = cell.accuracy else {
+        return TableCell::Missing;
+    };
+    if cell.subject.view.is_none() {
+        return TableCell::Guess(strict);
+    }
+    match lenient(summary, cell).and_then(|cell| cell.accuracy) {
+        Some(lenient) => TableCell::Strict(strict, lenient.value),
+        None => TableCell::Estimate(strict),
+    }
+}
+
+/// Smallest and largest number of replies at a level of a series, as text.
+fn replies(line: &LadderRow<'_, AccuracyCell>) -> String {
+    let replies = line.cells().map(AccuracyCell::replies);
+    match (replies.clone().min(), replies.max()) {
+        (Some(min), Some(max)) if min != max => format!("{min}–{max}"),
+        (min, _) => min.unwrap_or(0).to_string(),
+    }
+}
+
+/// Share in percent of questions that were answered correctly every time.
+fn always(cell: &AccuracyCell) -> Option<String> {
+    Some(percent(cell.always?.value))
+}
+
+/// Adds a row below each series whose questions were asked more than once, for the terminal only: the share that was right
+/// every time.
+fn add_always(table: &mut Table, ladder: &Ladder<'_, AccuracyCell>) {
+    for (index, row) in ladder.rows().iter().enumerate().rev() {
+        let LadderRow::Series(_, cells) = row else {
+            continue;
+        };
+        if cells.values().all(|cell| cell.always.is_none()) {
+            continue;
+        }
+        let levels = ladder.levels.iter();
+        let shares = levels.map(
+            |level| match cells.get(level).and_then(|cell| always(cell)) {
+                Some(share) => TableCell::Text(share),
+                None => TableCell::Blank,
+            },
+        );
+        let names = [
+            TableCell::Blank,
+            "  right every time".into(),
+            TableCell::Blank,
+            TableCell::Blank,
+        ];
+        let row = TableRow {
+            cells: names.into_iter().chain(shares).collect(),
+            group: table.rows[index].group.clone(),
+            hidden_in: vec![TableFormat::Page, TableFormat::Latex],
+            ..TableRow::default()
+        };
+        table.rows.insert(index + 1, row);
+    }
+}
+
+/// The notes below the table: models without images, chance, and reasons for unreadable replies.
+fn notes(summary: &AccuracySummary, ladder: &Ladder<'_, AccuracyCell>) -> Vec<String> {
+    let without_level = ladder.without_level.iter().map(|(_, cell)| *cell);
+    let (chance, blind): (Vec<&AccuracyCell>, Vec<&AccuracyCell>) =
+        without_level.partition(|cell| cell.subject.view.is_none());
+    let mut notes: Vec<String> = blind
+        .into_iter()
+        .map(|cell| note_without_images(summary, cell))
+        .collect();
+    let mut all = summary.of(None, ReadingMode::Strict);
+    let unit = if all.any(|cell| cell.always.is_some()) {
+        "orders of choices"
+    } else {
+        "questions"
+    };
+    let chance = chance.into_iter().filter_map(|cell| cell.accuracy);
+    notes.extend(chance.map(|chance| {
+        let share = 100.0 * chance.value;
+        format!("chance: {share:.2} over {} {unit}", chance.n)
+    }));
+    notes.extend(summary.chance_of_questions.map(|once| {
+        let share = 100.0 * once.value;
+        format!(
+            "chance with each question once, as the paper counts: {share:.2} over {} questions",
+            once.n
+        )
+    }));
+    notes.extend(unread(summary));
+    notes
+}
+
+fn note_without_images(summary: &AccuracySummary, cell: &AccuracyCell) -> String {
+    let text = texts(ColumnKind::Accuracy, &accuracy(summary, cell)).concat();
+    let interval = cell.accuracy.map(|share| format!(" [{}]", ends(share)));
+    let accuracy = text + &interval.unwrap_or_default();
+    let always = always(cell).map(|share| format!(", right every time {share}"));
+    let unparsed = cell.unparsed.to_string();
+    let lenient = lenient(summary, cell).map(|cell| cell.unparsed.to_string());
+    let lenient = lenient.map(|lenient| differing(&unparsed, &lenient));
+    format!(
+        "{} without images: {accuracy}, n {}{}, unparsed {unparsed}{}, failed {}",
+        cell.subject.model,
+        cell.replies(),
+        always.unwrap_or_default(),
+        lenient.unwrap_or_default(),
+        cell.failed
+    )
+}
+
+/// Counts of unreadable replies by reason, for reasons that do not concern the form of the answer.
+pub(crate) fn unread(summary: &AccuracySummary) -> Option<String> {
+    let reasons = [
+        (
+            UnreadReason::Truncated,
+            "cut at the token limit (--max-tokens)",
+        ),
+        (UnreadReason::Refused, "refused"),
+        (UnreadReason::Filtered, "withheld by a filter"),
+        (UnreadReason::Empty, "empty"),
+    ];
+    let counts = reasons.iter().filter_map(|(reason, what)| {
+        let count = summary.unread.get(reason).filter(|count| **count > 0)?;
+        Some(format!("{count} {what}"))
+    });
+    let counts: Vec<String> = counts.collect();
+    let unparsed =
+        (!counts.is_empty()).then(|| format!("of the unparsed replies {}", counts.join(", ")));
+    let cannot_tell = summary.unread.get(&UnreadReason::CannotTell);
+    let people = cannot_tell.map(|count| {
+        let answers = if *count == 1 {
+            "answer of people is"
+        } else {
+            "answers of people are"
+        };
+        format!("{count} {answers} “I cannot tell”, which counts as wrong and not as unparsed")
+    });
+    let parts: Vec<String> = unparsed.into_iter().chain(people).collect();
+    (!parts.is_empty()).then(|| parts.join("; "))
+}

@@ -1,0 +1,79 @@
+//! The tables on photographs in the dark: how dark they are, and how far answers agree between lights.
+
+use super::sections::REAL;
+use crate::score::agreement::Agreement;
+use crate::score::pair_darkness::PairDarkness;
+use crate::text::table::ColumnKind::{Count, Number, Ratio, Share, Text};
+use crate::text::table::{Table, TableBuilder};
+
+/// How dark the photographs are beside their frames, by name.
+pub(super) fn darkness(pairs: &[PairDarkness]) -> Table {
+    let mut table = TableBuilder::new("pairs", pairs)
+        .page(
+            REAL,
+            "How much darker the photographs are than their frames",
+        )
+        .column(
+            Text,
+            "csv name | terminal photographs | page photographs",
+            |pair| pair.name.to_string(),
+        )
+        .column(
+            Count,
+            "csv frames | terminal frames | page frames",
+            |pair| pair.frames,
+        )
+        .column(Number, "csv ev_low_quartile", |pair| Some(pair.ev[0]))
+        .column(Number, "csv ev", |pair| Some(pair.ev[1]))
+        .column(Number, "csv ev_high_quartile", |pair| Some(pair.ev[2]))
+        .column(
+            Text,
+            "terminal EV (quartiles) | page EV (quartiles)",
+            |pair| pair.long(),
+        )
+        .column(Text, "csv lower_bound", |pair| {
+            pair.is_lower_bound.to_string()
+        })
+        .column(Count, "csv stated", |pair| pair.stated)
+        .column(Count, "csv unknown", |pair| pair.unknown)
+        .column(Count, "csv not_darker", |pair| pair.brighter)
+        .column(Number, "csv ev_of_pixels", |pair| {
+            pair.mean_and_median.map(|[_, median]| median)
+        })
+        .column(Number, "csv ev_of_synthesis", |pair| Some(pair.synthesis))
+        .build();
+    table.heading = (!pairs.is_empty()).then(|| "Photographed in the dark".to_owned());
+    table.notes = pairs.iter().flat_map(PairDarkness::oddities).collect();
+    table
+}
+
+/// Agreement of each model with itself in two lights.
+pub(super) fn light_agreement(agreements: &[Agreement]) -> Table {
+    let mut table = TableBuilder::new("light_agreement", agreements)
+        .page(REAL, "The same answers in two lights")
+        .column(Text, "csv model | terminal model | page model", |of| {
+            of.first.model.clone()
+        })
+        .column(Text, "csv condition | terminal condition | page condition", |of| {
+            of.first.condition()
+        })
+        .column(Text, "csv against_condition | terminal and | page and", |of| {
+            of.second.condition()
+        })
+        .column(Count, "csv n | terminal n", |of| of.same.n)
+        .column(
+            Share,
+            "csv same_answer same_low same_high | terminal same answer in % | page same answer in % [95 %]",
+            |of| of.same,
+        )
+        .column(
+            Ratio,
+            "csv kappa kappa_low kappa_high | terminal κ | page κ [95 %]",
+            |of| of.kappa,
+        )
+        .column(Count, "page n", |of| of.same.n)
+        .build();
+    table.heading = (!agreements.is_empty())
+        .then(|| "The same answers in two lights, with κ of being right".to_owned());
+    table
+}

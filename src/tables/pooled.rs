@@ -1,0 +1,207 @@
+//! Tables of the differences of all models together, and of the models by area.
+
+use std::collections::BTreeSet;
+
+use crate::score::choice::ReadingMode;
+use crate::score::confusion::FalseAnswer;
+use crate::score::findings::Findings;
+use crate::score::pooled::PooledFinding;
+use crate::score::pooled_kind::PooledKind;
+use crate::score::significance::SwapMethod;
+use crate::sentences::left_out;
+use crate::text::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
+use crate::text::table::{Table, TableBuilder};
+use crate::text::words::{counted, light, p};
+
+/// All families together, then by family.
+pub(super) fn pooled(findings: &Findings<'_>) -> Vec<Table> {
+    let (whole, by_family): (Vec<&PooledFinding>, Vec<&PooledFinding>) = findings
+        .pooled
+        .iter()
+        .partition(|finding| finding.family.is_none());
+    let numbers = findings.pooled.iter().map(|finding| finding.models.len());
+    let numbers: BTreeSet<usize> = numbers.collect();
+    let models = numbers.last().copied();
+    let of_models = if numbers.len() > 1 {
+        // The column of models says over how many each row is pooled.
+        "all models".to_owned()
+    } else {
+        counted(models.unwrap_or(0), "model")
+    };
+    let column = if numbers.len() > 1 {
+        "csv models | terminal models | page models"
+    } else {
+        "csv models"
+    };
+    let caption = format!("Pooled over {of_models}");
+    let all: Vec<&PooledFinding> = whole.iter().copied().chain(&findings.averaged).collect();
+    let mut total = table(&caption, column, &all, ReadingMode::Strict);
+    if models.is_some_and(|models| models > 1) {
+        total.heading = Some(format!(
+            "Pooled over {of_models}, paired by question, in percentage points"
+        ));
+    }
+    let left_out = left_out(findings).into_iter();
+    total.notes = left_out
+        .map(|sentence| sentence.text.trim_end_matches('.').to_owned())
+        .chain(notes(&whole, &findings.unit.to_string()))
+        .collect();
+    let mut by_family = table(
+        &format!("Pooled over {of_models}, by family"),
+        column,
+        &by_family,
+        ReadingMode::Strict,
+    );
+    by_family.is_folded = true;
+    let all = findings.pooled.iter().chain(&findings.averaged);
+    let all: Vec<&PooledFinding> = all.collect();
+    let lenient = table("", column, &all, ReadingMode::Lenient).in_files_only();
+    vec![total, by_family, lenient]
+}
+
+fn table(caption: &str, models: &str, findings: &[&PooledFinding], mode: ReadingMode) -> Table {
+    let builder = TableBuilder::new("pooled", findings.iter().copied())
+        .page("comparisons", caption)
+        .column(Text, "csv kind", |finding| {
+            finding.kind.name_on(finding.variant.kind)
+        })
+        .column(Text, "csv level", |finding| levels(finding))
+        .column(Text, "csv variant", |finding| finding.variant.to_string())
+        .column(Text, "csv enhancer", |finding| {
+            finding.enhancer.as_ref().map(ToString::to_string)
+        })
+        .column(Text, "terminal | page difference", |finding| title(finding))
+        .family(|finding| finding.family.as_ref())
+        .column(Count, models, |finding| finding.models.len());
+    numbers(builder, mode)
+        .column(ColumnKind::Significance, "terminal | page", |finding| {
+            finding.parsed(mode).verdict
+        })
+        .column(Text, "csv verdict", |finding| {
+            finding.parsed(mode).verdict.word()
+        })
+        .column(Text, "csv shown", |finding| {
+            finding.parsed(mode).verdict.is_shown().to_string()
+        })
+        .column(Text, "csv names", |finding| finding.models.join(";"))
+        .column(Text, "csv mode", |_| mode.name())
+        .column(P, "csv p_report", |finding| finding.parsed(mode).p_report)
+        .build()
+}
+
+fn numbers(
+    builder: TableBuilder<&PooledFinding>,
+    mode: ReadingMode,
+) -> TableBuilder<&PooledFinding> {
+    builder
+        .column(Count, "csv n | page n", |finding| finding.items)
+        .column(Count, "csv dropped | page dropped", |finding| {
+            finding.dropped
+        })
+        .column(Count, "csv clusters", |finding| finding.clusters)
+        .column(Number, "csv first", |finding| finding.parsed(mode).first)
+        .column(Number, "csv second", |finding| finding.parsed(mode).second)
+        .column(Percent, "terminal first | page first", |finding| {
+            finding.parsed(mode).first
+        })
+        .column(Percent, "terminal second | page second", |finding| {
+            finding.parsed(mode).second
+        })
+        .column(
+            Points,
+            "csv difference low high | terminal difference, 95 % interval | page difference [95 %]",
+            |finding| finding.parsed(mode).difference,
+        )
+        .column(P, "csv p | page p", |finding| finding.parsed(mode).p)
+        .column(Text, "csv p_by", |finding| {
+            finding.parsed(mode).p_by.to_string()
+        })
+        .column(
+            P,
+            "csv p_holm | terminal p (Holm) | page p (Holm)",
+            |finding| finding.parsed(mode).holm,
+        )
+        .column(Number, "csv p_least", |finding| finding.least_p)
+}
+
+/// The level, or those of a mean, as `L4–L5`.
+fn levels(finding: &PooledFinding) -> String {
+    match &*finding.mean_over {
+        [first, .., last] => format!("{first}–{last}"),
+        _ => finding.level.to_string(),
+    }
+}
+
+/// The two sides in words, as `L3, with noise less L0`.
+fn title(finding: &PooledFinding) -> String {
+    let first = light(&finding.variant, finding.enhancer.as_ref());
+    let second = match finding.kind {
+        PooledKind::Darkness => "L0",
+        PooledKind::Hallucination(answer) => return false_answers(finding, &first, answer),
+        PooledKind::Noise => "exposure drop",
+        PooledKind::Enhancer => "raw",
+        PooledKind::Blind => "without images",
+    };
+    format!("{} {first} − {second}", levels(finding))
+}
+
+/// The two sides of a finding about false answers, and what is counted.
+fn false_answers(finding: &PooledFinding, first: &str, answer: FalseAnswer) -> String {
+    let to = match answer {
+        FalseAnswer::No => "what is there",
+        FalseAnswer::Yes => "what is not there",
+    };
+    format!(
+        "{} {first} − L0, “{}” to {to}",
+        finding.level,
+        answer.word()
+    )
+}
+
+/// Lines below the table: what is left out, and what so few clusters can show.
+fn notes(findings: &[&PooledFinding], unit: &str) -> Vec<String> {
+    let mut notes = Vec::new();
+    let most = findings.iter().max_by_key(|finding| finding.dropped);
+    if let Some(most) = most.filter(|finding| finding.dropped > 0) {
+        notes.push(format!(
+            "left out because a model has no reply: up to {} of {}",
+            most.dropped,
+            counted(most.items + most.dropped, "item")
+        ));
+    }
+    notes.extend(not_counted(findings));
+    let least = findings
+        .iter()
+        .map(|finding| (finding.least_holm, finding.clusters));
+    notes.extend(too_few_clusters(least, unit));
+    notes
+}
+
+/// How p was found where not all swaps were counted.
+fn not_counted(findings: &[&PooledFinding]) -> Option<String> {
+    let methods = findings.iter().map(|finding| finding.strict.p_by);
+    let methods = methods.filter(|method| *method != SwapMethod::Counted);
+    let methods: BTreeSet<String> = methods.map(|method| method.to_string()).collect();
+    let methods: Vec<String> = methods.into_iter().collect();
+    (!methods.is_empty()).then(|| {
+        let methods = methods.join(" or ");
+        format!(
+            "p by {methods} where the table of all swaps would be too large (`p_by` in pooled.csv)"
+        )
+    })
+}
+
+/// The line below a table of tests in which no verdict is possible. `least` holds, for each test, the smallest corrected p-value
+/// that its clusters allow, and their number.
+pub(super) fn too_few_clusters(
+    least: impl Iterator<Item = (f64, usize)>,
+    unit: &str,
+) -> Option<String> {
+    let impossible = least.filter(|(least, _)| *least >= 0.05);
+    let (least, clusters) = impossible.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(format!(
+        "no verdict if p cannot be below 0.05: with {}, p (Holm) is {} at least",
+        counted(clusters, unit),
+        p(least)
+    ))
+}

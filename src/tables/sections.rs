@@ -1,0 +1,133 @@
+//! Sections of the page of an evaluation: [`SECTIONS`].
+
+use super::baseline::BASELINE;
+use super::calibration::CONFIDENCE;
+
+/// A section of the page: its id, its title, the text below the title, and the names of its figures.
+pub(crate) type Section = (
+    &'static str,
+    &'static str,
+    &'static str,
+    &'static [&'static str],
+);
+
+/// The sections of the page in order.
+pub(crate) const SECTIONS: [Section; 15] = [
+    (
+        BASELINE,
+        "Against the baseline",
+        "New less old for each model and condition, paired by item, on the items and images that both have. Replies, failures and \
+         costs are of all trials.",
+        &[],
+    ),
+    (
+        "accuracy",
+        "Accuracy in the dark",
+        "",
+        &["accuracy", "variants", "photographed"],
+    ),
+    (
+        "thresholds",
+        "Darkness threshold",
+        "The exposure drop at which a model has lost half of what it knows in the light: one number a model. The area is the \
+         mean accuracy from L0 to the darkest level, over EV.",
+        &["thresholds", "blur_thresholds"],
+    ),
+    (
+        "readings",
+        "Does each finding hold under every reading?",
+        "The paper’s noise can be read in several ways. Each finding is computed under every reading on the same items, at L1–L5. It \
+         holds where an effect on its side is detected after Holm’s correction over all claims, models and readings, has the opposite \
+         where one on the other side is detected, and is open otherwise; it is reversed only if both are detected. The curves under each \
+         reading are in the figures of accuracy.",
+        &[],
+    ),
+    (
+        "observer",
+        "Known-signal observer",
+        "Which answers one could still read from the pixels who is given the untouched frame, and must only confirm each thing piece by \
+         piece. It is no model, no bound for models, and no part of any ranking. A lower line after an enhancer says that less of the \
+         outlines agrees with a tone curve in smooth light, not that evidence was destroyed. A thing is seen if at least half of its outline is \
+         confirmed, and detected if its whole outline, taken together, stands out of the noise. The control is the same observer with the image of \
+         another scene: its score must be that of chance.",
+        &[],
+    ),
+    (
+        "families",
+        "Families of questions",
+        "Underlined: shown to be below a model without images (its own, if it was asked so). There the model answers better without an image than with the image.",
+        &["families"],
+    ),
+    (
+        "groups",
+        "Whole groups right",
+        "The benchmark’s strict score: a group is right if all its questions are right, every time they were asked. It counts if every \
+         question that the set holds of it has a reply; groups that share frames are one cluster. Chance is the mean over groups of \
+         the product of 1 / number of choices.",
+        &[],
+    ),
+    (
+        ENHANCERS,
+        "Enhancement",
+        "Enhanced less raw, in percentage points. Rescued: wrong raw, right enhanced; harmed: the other way round.",
+        &["enhancers"],
+    ),
+    (
+        "answers",
+        "Hallucination and collapse",
+        "What is said when nothing is seen: objects that are not there, and one answer to everything.",
+        &["hallucination", "collapse"],
+    ),
+    (
+        REAL,
+        "Photographed in the dark",
+        "Photographs of the same scenes in the dark, beside synthetic images that are as dark, and enhanced. How dark they are is log₂ of the \
+         ratio of mean linear luminances, frame by frame, or what the data state. The row of images as dark as real says whether \
+         synthetic darkness stands for real darkness: the difference, the share of the same answers, and κ of being right.",
+        &["real"],
+    ),
+    (
+        CONFIDENCE,
+        "Confidence",
+        "How likely the model held its answer, and how often it was right; replies with reasoning before the answer are left out. \
+         Overconfidence is confidence less accuracy, in points. The calibration error is their root mean square distance over bins of \
+         equal count, less what chance alone makes of it; it needs 100 replies. Brier skill is 0 for a model that holds all choices equally \
+         likely, and 1 at best. AUROC is the share of pairs of a right and a wrong reply in which the right one is more confident. Risk \
+         is the share of wrong replies among all, and among the 80 and 50 % with the most confidence. The blind shift is the distance to \
+         the probabilities without an image, 0 to 1: what the pixels still contribute.",
+        &["confidence", "reliability"],
+    ),
+    (
+        "comparisons",
+        "Comparisons",
+        "Each paired by item, in percentage points.",
+        &[],
+    ),
+    (
+        "fidelity",
+        "Fidelity",
+        "Does a better picture mean better answers? PSNR and SSIM of each image against its clean frame, in the size sent. The AUC \
+         is the share of pairs of a right and a wrong answer, of the same model, family and condition, in which the image of the \
+         right one has the higher value; 0.5 is chance.",
+        &["fidelity"],
+    ),
+    (
+        "agreement",
+        "Agreement between models",
+        "The share of items with the same answer, and Cohen’s κ of being right (0: they err independently).",
+        &[],
+    ),
+    (
+        "health",
+        "Parse health",
+        "What became of the trials besides right and wrong, by the strict reading. Replies that cannot be read count as wrong; \
+         failed trials do not count.",
+        &[],
+    ),
+];
+
+/// Id of the section on photographs in the dark.
+pub(crate) const REAL: &str = "real";
+
+/// Id of the section that has thumbnails of the frames.
+pub(crate) const ENHANCERS: &str = "enhancers";

@@ -1,0 +1,233 @@
+//! The table of the strict score: the share of groups of which all questions are right.
+
+use crate::score::choice::ReadingMode;
+use crate::score::estimate::Estimate;
+use crate::score::findings::Findings;
+use crate::score::strict_score::{GroupCell, GroupChance, StrictScore};
+use crate::score::subject::{CHANCE, Subject};
+use crate::text::table::ColumnKind::{Count, Percent, Share, Text};
+use crate::text::table::{Table, TableBuilder, TableCell, TableFormat};
+use crate::text::words::counted;
+use crate::types::{Family, KindReading, LightGroup};
+
+use super::summary::reading;
+
+/// A row: a cell, or chance.
+enum Line<'a> {
+    Cell(&'a GroupCell),
+    Chance(&'a GroupChance, Subject),
+}
+
+/// All groups, then those of one family; empty if questions have no groups.
+pub(crate) fn strict_groups(findings: &Findings<'_>) -> Vec<Table> {
+    let Some(score) = &findings.strict else {
+        return Vec::new();
+    };
+    let whole = |family: Option<&Family>| family.is_none();
+    let mut all = table(
+        findings,
+        score,
+        "All questions of a group right, in %",
+        whole,
+    );
+    all.heading = Some(
+        "All questions of a group right, in % of the complete groups, with 95 % intervals; accuracy of the same subject beside it"
+            .to_owned(),
+    );
+    all.latex = Some(format!(
+        "Groups of which all questions are right, in \\% of the complete groups (strict reading), with 95\\,\\% intervals; {}.",
+        counted(score.groups, "group")
+    ));
+    all.foot = foot(score);
+    let caption = "All questions of a group right, in %, by family";
+    let mut by_family = table(findings, score, caption, |family| family.is_some());
+    by_family.is_folded = true;
+    vec![all, by_family]
+}
+
+/// What must be known of the groups.
+fn foot(score: &StrictScore) -> Option<String> {
+    let most = score.cells.iter().map(|cell| cell.incomplete).max();
+    let joined = score
+        .cells
+        .iter()
+        .any(|cell| cell.clusters == 1 && cell.share.is_some_and(|share| share.n > 1));
+    let facts = [
+        (score.single > 0).then(|| {
+            format!("{} of one question, whose strict score is accuracy", counted(score.single, "group"))
+        }),
+        (score.across_frames > 0)
+            .then(|| format!("{} about several frames", counted(score.across_frames, "group"))),
+        (score.never_complete > 0).then(|| {
+            format!(
+                "{} of which questions of the set are left out or not drawn, complete for no model",
+                counted(score.never_complete, "group")
+            )
+        }),
+        most.filter(|most| *most > 0).map(|_| {
+            "incomplete groups, of which a question was not asked or has no reply, are not scored".to_owned()
+        }),
+        joined.then(|| {
+            "where all groups share frames, intervals take them as independent".to_owned()
+        }),
+    ];
+    let facts: Vec<String> = facts.into_iter().flatten().collect();
+    (!facts.is_empty()).then(|| facts.join("; "))
+}
+
+fn table(
+    findings: &Findings<'_>,
+    score: &StrictScore,
+    caption: &str,
+    is_shown: impl Fn(Option<&Family>) -> bool,
+) -> Table {
+    let cells = score.cells.iter();
+    let cells = cells.filter(|cell| is_shown(cell.family.as_ref()));
+    let chance = score.chance.iter();
+    let chance = chance.filter(|chance| is_shown(chance.family.as_ref()));
+    let lines = cells
+        .map(Line::Cell)
+        .chain(chance.map(|chance| Line::Chance(chance, guess())));
+    let builder = TableBuilder::new("groups", lines)
+        .page("groups", caption)
+        .subject(Line::subject, |variant| variant.word().into_owned())
+        .column(
+            Text,
+            "terminal subject | latex Subject",
+            |line| match line {
+                Line::Cell(cell) => format!("{} {}", cell.subject.model, cell.subject.condition()),
+                Line::Chance(..) => CHANCE.to_owned(),
+            },
+        )
+        .family(Line::family)
+        .column(Text, "csv mode", |line| match line {
+            Line::Cell(cell) if cell.mode == ReadingMode::Lenient => "lenient",
+            Line::Cell(_) | Line::Chance(..) => "strict",
+        });
+    let builder = numbers(builder, findings, score)
+        .column(Text, "csv reading", |line| reading(line.subject()))
+        .model_facts(&findings.grid.listing, Line::subject);
+    let has_light = score
+        .cells
+        .iter()
+        .any(|cell| light(&cell.subject).is_some());
+    let builder = if has_light {
+        builder.column(Text, "csv light", |line| light(line.subject()))
+    } else {
+        builder
+    };
+    let formats = [TableFormat::Terminal, TableFormat::Page, TableFormat::Latex];
+    let builder = formats.into_iter().fold(builder, |builder, format| {
+        builder.hide(
+            format,
+            |line| matches!(line, Line::Cell(cell) if cell.mode == ReadingMode::Lenient),
+        )
+    });
+    builder.build()
+}
+
+fn numbers<'a>(
+    builder: TableBuilder<Line<'a>>,
+    findings: &Findings<'_>,
+    score: &StrictScore,
+) -> TableBuilder<Line<'a>> {
+    builder
+        .column(
+            Count,
+            "csv n | terminal groups | page groups | latex Groups",
+            |line| line.share().map_or(0, |share| share.n),
+        )
+        .column(Count, "csv right", |line| {
+            line.cell().map(|cell| cell.right)
+        })
+        .column(
+            Count,
+            "csv incomplete | terminal incomplete | page incomplete | latex Incomplete",
+            |line| count(line, |cell| cell.incomplete),
+        )
+        .column(Count, "csv clusters", |line| {
+            line.cell().map(|cell| cell.clusters)
+        })
+        .column(
+            Share,
+            "csv value low high | terminal all right | page all right [95 %] | latex All right",
+            |line| match line {
+                Line::Cell(cell) => TableCell::from(cell.share),
+                Line::Chance(chance, _) => {
+                    chance.share.map_or(TableCell::Missing, TableCell::Guess)
+                }
+            },
+        )
+        .column(Percent, "terminal lenient | page lenient", |line| {
+            let lenient = line.cell().and_then(|cell| score.lenient(cell));
+            match line {
+                Line::Cell(_) => TableCell::from(lenient.and_then(|cell| cell.share)),
+                Line::Chance(..) => TableCell::Blank,
+            }
+        })
+        .column(
+            Percent,
+            "terminal accuracy | page accuracy | latex Accuracy",
+            |line| {
+                let mode = ReadingMode::Strict;
+                let mut cells = findings.summary.of(line.family(), mode);
+                let cell = cells.find(|cell| match line {
+                    Line::Cell(of) => cell.subject == of.subject,
+                    Line::Chance(..) => cell.subject.view.is_none(),
+                });
+                let accuracy = cell.and_then(|cell| cell.accuracy);
+                accuracy.map(|accuracy| accuracy.value)
+            },
+        )
+}
+
+/// A count of a cell; nothing for chance.
+fn count(line: &Line<'_>, of: impl Fn(&GroupCell) -> usize) -> TableCell {
+    line.cell().map_or(TableCell::Blank, |cell| of(cell).into())
+}
+
+impl Line<'_> {
+    fn cell(&self) -> Option<&GroupCell> {
+        match self {
+            Self::Cell(cell) => Some(cell),
+            Self::Chance(..) => None,
+        }
+    }
+
+    fn subject(&self) -> &Subject {
+        match self {
+            Self::Cell(cell) => &cell.subject,
+            Self::Chance(_, subject) => subject,
+        }
+    }
+
+    fn family(&self) -> Option<&Family> {
+        match self {
+            Self::Cell(cell) => cell.family.as_ref(),
+            Self::Chance(chance, _) => chance.family.as_ref(),
+        }
+    }
+
+    fn share(&self) -> Option<Estimate> {
+        match self {
+            Self::Cell(cell) => cell.share,
+            Self::Chance(chance, _) => chance.share,
+        }
+    }
+}
+
+/// The name of the group of runs of a subject, if it has one.
+fn light(subject: &Subject) -> Option<String> {
+    let group = subject.variant.group.as_ref().map(LightGroup::name);
+    group.map(str::to_owned)
+}
+
+fn guess() -> Subject {
+    Subject {
+        model: CHANCE.to_owned(),
+        view: None,
+        level: None,
+        variant: KindReading::NONE,
+        enhancer: None,
+    }
+}

@@ -1,0 +1,36 @@
+//! The table of the accuracy of every subject, with intervals and counts.
+
+use crate::score::accuracy::AccuracySummary;
+use crate::score::choice::ReadingMode;
+use crate::text::table::ColumnKind::{Count, Percent, Share, Text};
+use crate::text::table::{Table, TableBuilder, TableCell};
+
+pub(super) fn subjects(summary: &AccuracySummary) -> Table {
+    let mut table = TableBuilder::new("subjects", summary.of(None, ReadingMode::Strict))
+        .page(
+            "accuracy",
+            "Accuracy of every subject, all families together",
+        )
+        .column(Text, "page model", |cell| cell.subject.model.clone())
+        .column(Text, "page condition", |cell| match cell.subject.view {
+            None => "guessing".to_owned(),
+            Some(_) => cell.subject.condition(),
+        })
+        .column(Share, "page accuracy in % [95 %]", |cell| {
+            match (cell.subject.view, cell.accuracy) {
+                (None, Some(chance)) => TableCell::Guess(chance),
+                (_, accuracy) => TableCell::from(accuracy),
+            }
+        })
+        .column(Percent, "page lenient", |cell| {
+            summary
+                .cell(&cell.subject, None, ReadingMode::Lenient)?
+                .accuracy
+        })
+        .column(Count, "page n", |cell| cell.replies())
+        .column(Count, "page not readable", |cell| cell.unparsed)
+        .column(Count, "page failed", |cell| cell.failed)
+        .build();
+    table.is_folded = true;
+    table
+}

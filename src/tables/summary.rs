@@ -1,0 +1,53 @@
+//! The table of all accuracies: `summary.csv` and the rows of `summary.json`.
+
+use crate::score::accuracy::{AccuracyCell, AccuracySummary};
+use crate::score::choice::ReadingMode;
+use crate::score::subject::Subject;
+use crate::text::table::ColumnKind::{Count, Share, Text};
+use crate::text::table::{SUMMARY, Table, TableBuilder, TableCell};
+use crate::types::{LightGroup, ModelListing, PairDark};
+
+/// A row for each accuracy.
+pub(crate) fn summary(summary: &AccuracySummary, listing: &ModelListing) -> Table {
+    let builder = TableBuilder::new(SUMMARY, &summary.cells)
+        .subject(|cell| &cell.subject, |variant| variant.word().into_owned())
+        .family(|cell| cell.family.as_ref())
+        .column(Text, "csv mode", |cell| match cell.mode {
+            ReadingMode::Strict => "strict",
+            ReadingMode::Lenient => "lenient",
+        })
+        .column(Count, "csv n", |cell| cell.replies())
+        .column(Count, "csv right", |cell| {
+            cell.subject.view.map(|_| cell.right)
+        })
+        .column(Count, "csv unparsed", |cell| cell.unparsed)
+        .column(Count, "csv failed", |cell| cell.failed)
+        .column(Share, "csv value low high", |cell| cell.accuracy);
+    let builder = if summary.cells.iter().any(|cell| cell.always.is_some()) {
+        builder.column(Share, "csv always", |cell| cell.always)
+    } else {
+        builder
+    };
+    let builder = builder.column(Text, "csv reading", |cell| reading(&cell.subject));
+    let builder = builder.model_facts(listing, |cell| &cell.subject);
+    if summary.cells.iter().any(|cell| group(cell).is_some()) {
+        // The run whose images these are, where runs show different ones under one name.
+        return builder
+            .column(Text, "csv light", |cell| group(cell))
+            .build();
+    }
+    builder.build()
+}
+
+/// The name of the group of runs of a cell, if it has one.
+fn group(cell: &AccuracyCell) -> Option<&str> {
+    cell.subject.variant.group.as_ref().map(LightGroup::name)
+}
+
+/// The light reading of a subject, if it has one.
+pub(crate) fn reading(subject: &Subject) -> TableCell {
+    let variant = &subject.variant;
+    let of_pair = variant.pair.as_ref().and_then(PairDark::reading);
+    let reading = variant.reading.as_ref().or(of_pair);
+    TableCell::from(reading.map(ToString::to_string))
+}

@@ -1,0 +1,64 @@
+//! The light readings that a report has noisy images in: [`LightReadings`].
+
+use std::collections::BTreeSet;
+
+use serde::Serialize;
+
+use crate::score::subject::Subject;
+use crate::types::ReadingName;
+
+/// The light readings of the subjects with noise, `paper` first.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(transparent)]
+pub(crate) struct LightReadings(BTreeSet<ReadingName>);
+
+impl LightReadings {
+    pub(crate) fn of<'s>(subjects: impl IntoIterator<Item = &'s Subject>) -> Self {
+        let subjects = subjects.into_iter();
+        Self(
+            subjects
+                .filter_map(|subject| subject.variant.reading.clone())
+                .collect(),
+        )
+    }
+
+    /// What a single reading leaves open, and how the others are asked; `None` without noise or with several readings.
+    pub(crate) fn open_question(&self) -> Option<String> {
+        let mut readings = self.0.iter();
+        let (Some(only), None) = (readings.next(), readings.next()) else {
+            return None;
+        };
+        Some(format!(
+            "One reading of the paper was run ({only}). Whether the findings hold under another is not known: --profile all \
+             --resume DIR, with the flags of the run, asks the missing trials."
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::types::Condition;
+
+    #[test]
+    fn one_reading_alone_leaves_a_question_open() {
+        let of = |conditions: &[&str]| {
+            let conditions = conditions.iter().map(|text| text.parse().unwrap());
+            let conditions: Vec<Condition> = conditions.collect();
+            let subjects = conditions.iter().map(|c| Subject::new("m", Some(c)));
+            let subjects: Vec<Subject> = subjects.collect();
+            LightReadings::of(&subjects)
+        };
+        let one = of(&["L0", "L3-ev", "L3-noise@eld", "L5-noise@eld+lift"]);
+        let said = one.open_question().unwrap();
+        assert!(said.starts_with("One reading of the paper was run (eld). "));
+        for conditions in [&["L0", "L3-ev"][..], &["L3-noise", "L3-noise@physical"]] {
+            assert_eq!(of(conditions).open_question(), None, "{conditions:?}");
+        }
+        let several = of(&["L3-noise@eld", "L3-noise"]);
+        assert_eq!(
+            serde_json::to_string(&several).unwrap(),
+            r#"["paper","eld"]"#
+        );
+    }
+}

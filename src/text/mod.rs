@@ -1,0 +1,16 @@
+//! Numbers as text: words, the [`table`] model, and its formats for the terminal, CSV and LaTeX.
+
+pub(crate) mod alert;
+pub(crate) mod csv;
+pub(crate) mod frame_count;
+pub(crate) mod ladder;
+pub(crate) mod latex;
+pub(crate) mod light_readings;
+pub(crate) mod outcome_words;
+pub(crate) mod readable;
+pub(crate) mod script;
+pub(crate) mod table;
+pub(crate) mod terminal;
+pub(crate) mod width;
+pub(crate) mod words;
+pub(crate) mod wrapped;

@@ -1,0 +1,285 @@
+//! Tables of text that are no wider than the terminal: [`TextTable`].
+
+use std::collections::BTreeSet;
+
+use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
+use comfy_table::{CellAlignment, LineStyle};
+use unicode_width::UnicodeWidthStr;
+
+use crate::text::table::ColumnKind;
+use crate::text::words::shortened;
+
+/// Columns of the terminal that a cell takes besides its text, the gap to the next one included.
+const PADDING: usize = 3;
+/// Least length of a shortened name; chosen.
+const LEAST_NAME: usize = 12;
+/// Columns of names of models.
+const MODELS: [&str; 2] = ["model", "less"];
+/// Columns that are left out where no row has a number but 0.
+const ZEROS: [&str; 2] = ["unparsed", "failed"];
+
+/// A column of text.
+#[derive(Debug, Clone)]
+pub(super) struct TextColumn {
+    pub(super) head: String,
+    pub(super) kind: ColumnKind,
+}
+
+/// A row of text.
+#[derive(Debug, Clone)]
+pub(super) enum TextRow {
+    /// A heading above the rows that follow.
+    Heading(String),
+    /// A cell for each column.
+    Cells(Vec<String>),
+}
+
+/// A table of text.
+#[derive(Debug, Clone)]
+pub(super) struct TextTable {
+    pub(super) columns: Vec<TextColumn>,
+    pub(super) rows: Vec<TextRow>,
+}
+
+impl TextTable {
+    /// The table in lines of at most `most` columns, as far as its longest text allows. Where it is wider, names of models lose their
+    /// middle, columns of zeros become a line below it, and at last its columns are printed in several parts, each with the texts that
+    /// name its rows.
+    pub(super) fn fitted(mut self, most: usize) -> String {
+        if self
+            .rows
+            .iter()
+            .all(|row| matches!(row, TextRow::Heading(_)))
+        {
+            return String::new();
+        }
+        let mut note = String::new();
+        if self.width() > most {
+            self.shorten_models(most);
+        }
+        if self.width() > most {
+            note = self.leave_out_zeros();
+        }
+        let parts = self.parts(most);
+        let printed: Vec<String> = parts.iter().map(|part| self.print(part)).collect();
+        printed.concat() + &note
+    }
+
+    fn cells(&self) -> impl Iterator<Item = &Vec<String>> {
+        self.rows.iter().filter_map(|row| match row {
+            TextRow::Cells(cells) => Some(cells),
+            TextRow::Heading(_) => None,
+        })
+    }
+
+    /// The width of a column with its padding.
+    fn width_of(&self, column: usize) -> usize {
+        let texts = self.rows.iter().filter_map(|row| match row {
+            TextRow::Cells(cells) => Some(cells.get(column)?.width()),
+            // A heading stands in the first column.
+            TextRow::Heading(heading) => (column == 0).then(|| heading.width() + 2),
+        });
+        let longest = texts.max().unwrap_or(0);
+        longest.max(self.columns[column].head.width()) + PADDING
+    }
+
+    fn width(&self) -> usize {
+        let widths = (0..self.columns.len()).map(|column| self.width_of(column));
+        widths.sum::<usize>().saturating_sub(1)
+    }
+
+    /// Shortens the names of models as far as that makes the table fit, and as far as they stay apart.
+    fn shorten_models(&mut self, most: usize) {
+        for column in 0..self.columns.len() {
+            let over = self.width().saturating_sub(most);
+            if !MODELS.contains(&&*self.columns[column].head) || over == 0 {
+                continue;
+            }
+            let names = self.cells().filter_map(|cells| cells.get(column));
+            let names: BTreeSet<String> = names.cloned().collect();
+            let longest = names.iter().map(|name| name.width()).max().unwrap_or(0);
+            let least = longest.saturating_sub(over).max(LEAST_NAME);
+            let differ = |length: &usize| {
+                let short = names.iter().map(|name| shortened(name, *length));
+                short.collect::<BTreeSet<String>>().len() == names.len()
+            };
+            let length = (least..longest).find(differ).unwrap_or(longest);
+            for row in &mut self.rows {
+                if let TextRow::Cells(cells) = row
+                    && let Some(cell) = cells.get_mut(column)
+                {
+                    *cell = shortened(cell, length);
+                }
+            }
+        }
+    }
+
+    /// Takes the columns of zeros out; a line that says so, empty without any.
+    fn leave_out_zeros(&mut self) -> String {
+        let mut names = Vec::new();
+        for column in (0..self.columns.len()).rev() {
+            let is_zero = |cells: &Vec<String>| cells.get(column).is_none_or(|cell| cell == "0");
+            let head = &self.columns[column].head;
+            if !ZEROS.contains(&&**head) || !self.cells().all(is_zero) {
+                continue;
+            }
+            names.insert(0, format!("{head} 0"));
+            self.columns.remove(column);
+            for row in &mut self.rows {
+                if let TextRow::Cells(cells) = row
+                    && column < cells.len()
+                {
+                    cells.remove(column);
+                }
+            }
+        }
+        match &*names {
+            [] => String::new(),
+            names => format!(" {} in every row\n", names.join(", ")),
+        }
+    }
+
+    /// The columns of each part. The texts at the left, which name the rows, stand in every part; on a narrow terminal as many of them as
+    /// leave room for another column.
+    fn parts(&self, most: usize) -> Vec<Vec<usize>> {
+        // The last cell has no gap behind it.
+        let most = most + 1;
+        let width_to = |end: usize| (0..end).map(|column| self.width_of(column)).sum::<usize>();
+        let has_room = |names: usize| {
+            let widest = (names..self.columns.len()).map(|column| self.width_of(column));
+            width_to(names) + widest.max().unwrap_or(0) <= most
+        };
+        let texts = self
+            .columns
+            .iter()
+            .take_while(|column| column.kind == ColumnKind::Text);
+        let texts = texts.count().min(self.columns.len().saturating_sub(1));
+        let names = (1..=texts)
+            .rev()
+            .find(|names| has_room(*names))
+            .unwrap_or(texts.min(1));
+        let named = width_to(names);
+        let mut parts: Vec<Vec<usize>> = Vec::new();
+        let mut width = 0;
+        for column in names..self.columns.len() {
+            let own = self.width_of(column);
+            match parts.last_mut() {
+                Some(part) if width + own <= most => part.push(column),
+                _ => {
+                    parts.push((0..names).chain([column]).collect());
+                    width = named;
+                }
+            }
+            width += own;
+        }
+        parts
+    }
+
+    fn print(&self, columns: &[usize]) -> String {
+        let mut grid = comfy_table::Table::new();
+        grid.load_style(UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()));
+        let heads = columns
+            .iter()
+            .map(|column| self.columns[*column].head.clone());
+        grid.set_header(heads);
+        for row in &self.rows {
+            match row {
+                TextRow::Heading(heading) => grid.add_row([format!("— {heading}")]),
+                TextRow::Cells(cells) => {
+                    let cells = columns.iter().filter_map(|column| cells.get(*column));
+                    grid.add_row(cells)
+                }
+            };
+        }
+        for (place, column) in grid.column_iter_mut().zip(columns) {
+            let is_number = matches!(
+                self.columns[*column].kind,
+                ColumnKind::Count
+                    | ColumnKind::Accuracy
+                    | ColumnKind::Points
+                    | ColumnKind::P
+                    | ColumnKind::Percent
+            );
+            if is_number {
+                place.set_cell_alignment(CellAlignment::Right);
+            }
+        }
+        format!("{grid}\n")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A table of six models of 30 letters at six levels.
+    fn table() -> TextTable {
+        let column = |head: &str, kind| TextColumn {
+            head: head.to_owned(),
+            kind,
+        };
+        let levels = (0..6).map(|level| column(&format!("L{level}"), ColumnKind::Accuracy));
+        let columns = [
+            column("model", ColumnKind::Text),
+            column("light", ColumnKind::Text),
+        ];
+        let counts = ["n", "unparsed", "failed"].map(|head| column(head, ColumnKind::Count));
+        let row = |model: usize| {
+            let names = [
+                format!("a-model-with-30-letters-b72-{model:02}"),
+                "with noise + lift".to_owned(),
+            ];
+            let levels = (0..6).map(|level| format!("{}.{level}", 90 - model));
+            let counts = ["9999", "0", "0"].map(str::to_owned);
+            TextRow::Cells(names.into_iter().chain(levels).chain(counts).collect())
+        };
+        TextTable {
+            columns: columns.into_iter().chain(levels).chain(counts).collect(),
+            rows: std::iter::once(TextRow::Heading("a group".to_owned()))
+                .chain((0..6).map(row))
+                .collect(),
+        }
+    }
+
+    #[test]
+    fn no_line_is_wider_than_the_terminal_and_no_number_is_lost() {
+        for most in [60, 80, 100, 140] {
+            let text = table().fitted(most);
+            let widest = text.lines().map(UnicodeWidthStr::width).max().unwrap();
+            assert!(widest <= most, "{most}: {widest}\n{text}");
+            for number in [
+                "90.0",
+                "85.5",
+                "9999",
+                "with noise + lift",
+                "-05",
+                "a group",
+            ] {
+                assert!(text.contains(number), "{most}: {number}\n{text}");
+            }
+            // What is left out is said.
+            assert!(text.contains("unparsed"), "{text}");
+        }
+        let wide = table().fitted(140);
+        assert!(wide.contains("a-model-with-30-letters-b72-03") && !wide.contains("in every row"));
+        let narrow = table().fitted(80);
+        assert!(
+            narrow.contains("unparsed 0, failed 0 in every row"),
+            "{narrow}"
+        );
+    }
+
+    #[test]
+    fn a_column_with_a_number_stays() {
+        let mut table = table();
+        if let TextRow::Cells(cells) = &mut table.rows[3] {
+            cells[9] = "7".to_owned();
+        }
+        let text = table.fitted(60);
+        assert!(
+            text.contains('7') && text.contains("failed 0 in every row"),
+            "{text}"
+        );
+        assert!(!text.contains("unparsed 0"), "{text}");
+    }
+}
