@@ -6,15 +6,14 @@
 //!
 //! # The library
 //!
-//! The program `darkqa-eval` does all of this from the command line. The library has the three pieces that other programs use:
-//! [`synthesis`], [`enhance`] and [`score::choice`]; with [`questions`], and the vocabulary in [`types`].
+//! The program `darkqa-eval` does all of this from the command line. The library has the pieces that other programs use:
+//! [`synthesis`], [`enhance`], [`questions`] and [`score::choice`]; their vocabulary is at the root.
 //!
 //! Degrade a frame. The noise follows from the seed and the name of the frame, so that the same call gives the same image:
 //!
 //! ```
 //! use darkqa_eval::synthesis::{NoiseKey, Synthesis, degrade};
-//! use darkqa_eval::types::FrameId;
-//! use darkqa_eval::{Degradation, Rgb};
+//! use darkqa_eval::{Degradation, FrameId, Rgb};
 //!
 //! let clean = Rgb::new(2, 2, vec![128; 12])?;
 //! let how: Degradation = "L3-noise".parse()?;
@@ -45,9 +44,8 @@
 //! Read a reply and score it. The strict reading takes the exact words of a choice alone, the lenient one finds them in a sentence:
 //!
 //! ```
-//! use darkqa_eval::Choices;
 //! use darkqa_eval::score::choice::readings;
-//! use darkqa_eval::types::{Answer, Reply};
+//! use darkqa_eval::{Answer, Choices, Reply};
 //!
 //! let choices = Choices::new(vec!["kitchen".to_owned(), "bedroom".to_owned()], 1)?;
 //! let reply = Reply::local("The answer is (B).".to_owned());
@@ -60,49 +58,49 @@
 //!
 //! # The map
 //!
-//! The program is this crate. Its libraries are crates of their own, in `src/CRATE`; this crate names them `crate::types`,
-//! `crate::synthesis` and so on. Data flows one way, and the stages do not know each other:
+//! The program is this crate. Its libraries are crates of their own, in `src/CRATE`, with names that begin with `darkqa-`. Data flows
+//! one way, and the stages do not know each other:
 //!
 //! ```text
 //!                            ┌──────► questions ─────────────┐            (words: what is asked)
 //! labels ► rooms ► dataset ──┤                               ├─► ask → store → score → report
-//!             import ──┘     └──────► synthesis ──► enhance ─┘            (light: what is seen)
+//!             import ──┘     └──────► light ──────► enhance ─┘            (light: what is seen)
 //!
 //! types, error, files = the ground    images → engine = all that is asked    runs, run_reports = what was asked    run = one folder a command    cli = words → calls
 //! ```
 //!
 //! | crate | here | |
 //! |---|---|---|
-//! | `ground` | [`error`], `files`, [`types`], `labels` | the one error type; files read with bounds and written whole; the vocabulary; the label spaces NYU40, mpcat40, ADE150 and NYU13 |
-//! | `light` | [`synthesis`] | a clean image × a degradation → a degraded one; pure, given a noise key |
+//! | `ground` | `error`, `files`, `types`, `labels` | the one error type; files read with bounds and written whole; the vocabulary; the label spaces NYU40, mpcat40, ADE150 and NYU13 |
+//! | `light` | `darkqa_light` | a clean image × a degradation → a degraded one; pure, given a noise key |
 //! | `picture` | `picture` | image files with their colour profiles and orientation, maps of numbers, scaling, and images encoded for a request |
 //! | `scenes` | `rooms` | the built-in rooms, drawn by a seed with all their maps |
-//! | `questions` | [`questions`] | a frame with its maps → questions with one true answer, by rule; and the observer: what the rules could still answer from given pixels |
-//! | `enhance` | [`enhance`] | a degraded image → an enhanced one, by the user's ONNX model; `models` has the enhancers that the program carries |
-//! | `choice` | [`score::choice`] | a reply → a choice or a mark |
-//! | `statistics` | [`score`] | estimates with intervals, tests and thresholds of clustered replies |
-//! | `score` | [`score`] | records → numbers with their intervals |
+//! | `questions` | `darkqa_questions` | a frame with its maps → questions with one true answer, by rule; and the observer: what the rules could still answer from given pixels |
+//! | `enhance` | `darkqa_enhance` | a degraded image → an enhanced one, by the user's ONNX model; `models` has the enhancers that the program carries |
+//! | `choice` | `darkqa_score::choice` | a reply → a choice or a mark |
+//! | `statistics` | `darkqa_score` | estimates with intervals, tests and thresholds of clustered replies |
+//! | `score` | `darkqa_score` | records → numbers with their intervals |
 //! | `store` | `store` | the folder of a run, `results/<run>/`: append-only and resumable |
 //!
-//! A [`Frame`](types::Frame) is seen, a [`Question`] is asked, a [`Degradation`] is what was done to a frame, a [`Condition`] is a
-//! degradation with or without an enhancer, a [`Reply`](types::Reply) is what a model sent, and a [`Record`](types::Record) is the result
+//! A [`Frame`] is seen, a [`Question`] is asked, a [`Degradation`] is what was done to a frame, a [`Condition`] is a
+//! degradation with or without an enhancer, a [`Reply`] is what a model sent, and a `Record` is the result
 //! of one trial: one question to one model in one condition. The modules of this crate:
 //!
-//! - [`dataset`]: a folder, a ready-made set or the built-in rooms → images, their maps and questions.
-//! - [`import`]: other data sets → frames, one file a kind.
-//! - [`calibrate`]: frames of a sensor → the camera that the synthesis takes its noise from.
-//! - [`ask`]: a prompt and images → a reply; the only asynchronous stage. `ask/wire`: the APIs of endpoints, their requests and replies.
+//! - `dataset`: a folder, a ready-made set or the built-in rooms → images, their maps and questions.
+//! - `import`: other data sets → frames, one file a kind.
+//! - `calibrate`: frames of a sensor → the camera that the synthesis takes its noise from.
+//! - `ask`: a prompt and images → a reply; the only asynchronous stage. `ask/wire`: the APIs of endpoints, their requests and replies.
 //! - `image_store`: a folder of images that were made, shared by runs and processes; it may be deleted at any time.
 //! - `text`: words, and the table model with its formats for the terminal, CSV and LaTeX.
 //! - `sentences`: the findings of a report; `tables`: its tables; `drawing`: its figures, and figures of images that are handed in.
-//! - [`report`]: the page, the files and the text of a report, from the records alone, and a leaderboard of many.
+//! - `report`: the page, the files and the text of a report, from the records alone, and a leaderboard of many.
 //! - `images`: from a frame to the images of a request, made once by one pipeline for everything that is asked or written.
 //! - `runs`: runs on disk, read from their folders, joined from parts, and tabled.
 //! - `run_reports`: reports on one run or several, from their records alone.
-//! - [`engine`]: a `Job` carries out an `Experiment`: it plans, has images made, asks, keeps, and has the experiment score. Questions
+//! - `engine`: a `Job` carries out an `Experiment`: it plans, has images made, asks, keeps, and has the experiment score. Questions
 //!   with choices and open ones differ in their `Experiment` alone.
-//! - [`run`]: the commands; `run/evaluate` and `run/openeqa` are the two experiments.
-//! - [`cli`]: the commands. A flag is a field of a structure in the room that uses it, in that room's own types; the environment and
+//! - `run`: the commands; `run/evaluate` and `run/openeqa` are the two experiments.
+//! - `cli`: the commands. A flag is a field of a structure in the room that uses it, in that room's own types; the environment and
 //!   a file of flags are turned into words, and all words are parsed once.
 //! - `internals`: what benchmarks and tests of this repository use besides.
 //!
@@ -131,20 +129,20 @@
 //! | `dataset` | `rooms`, `labels`, `files`, `picture`, `types`, `error` |
 //! | `import` | `dataset`, `labels`, `files`, `picture`, `types`, `error` |
 //! | `ask` | `files`, `picture`, `types`, `error` |
-//! | `calibrate` | `dataset`, `synthesis`, `files`, `picture`, `types`, `error` |
+//! | `calibrate` | `dataset`, `light`, `files`, `picture`, `types`, `error` |
 //! | `image_store` | `files`, `types`, `error` |
 //! | `text` | `types`, `error`, `score` |
 //! | `sentences` | `text`, `types`, `error`, `score` |
 //! | `tables` | `sentences`, `text`, `types`, `error`, `score` |
 //! | `drawing` | `tables`, `sentences`, `text`, `types`, `error`, `score` |
 //! | `report` | `drawing`, `tables`, `sentences`, `text`, `types`, `error`, `score`, `questions`, `calibrate` |
-//! | `images` | `text`, `sentences`, `tables`, `drawing`, `report`, `files`, `picture`, `types`, `error`, `rooms`, `labels`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `image_store` |
-//! | `runs` | `images`, `ask`, `synthesis`, `files`, `picture`, `types`, `error`, `dataset`, `enhance`, `score`, `store`, `image_store`, `text`, `sentences`, `tables`, `drawing`, `report` |
+//! | `images` | `text`, `sentences`, `tables`, `drawing`, `report`, `files`, `picture`, `types`, `error`, `rooms`, `labels`, `dataset`, `questions`, `light`, `enhance`, `ask`, `score`, `store`, `image_store` |
+//! | `runs` | `images`, `ask`, `light`, `files`, `picture`, `types`, `error`, `dataset`, `enhance`, `score`, `store`, `image_store`, `text`, `sentences`, `tables`, `drawing`, `report` |
 //! | `run_reports` | `runs`, `images`, `ask`, `files`, `types`, `error`, `questions`, `score`, `store`, `text`, `sentences`, `tables`, `drawing`, `report` |
-//! | `engine` | `run_reports`, `runs`, `images`, `files`, `picture`, `types`, `error`, `rooms`, `labels`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `image_store`, `text`, `sentences`, `tables`, `drawing`, `report` |
-//! | `run` | `engine`, `run_reports`, `runs`, `images`, `files`, `picture`, `types`, `error`, `rooms`, `labels`, `import`, `dataset`, `calibrate`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `image_store`, `text`, `sentences`, `tables`, `drawing`, `report` |
-//! | `internals` | `picture`, `ask`, `dataset`, `enhance`, `labels`, `questions`, `text`, `sentences`, `tables`, `drawing`, `report`, `rooms`, `score`, `synthesis`, `types`, `error` |
-//! | `cli` | `run`, `engine`, `run_reports`, `runs`, `images`, `picture`, `image_store`, `files`, `rooms`, `dataset`, `ask`, `enhance`, `score`, `synthesis`, `types`, `error` |
+//! | `engine` | `run_reports`, `runs`, `images`, `files`, `picture`, `types`, `error`, `rooms`, `labels`, `dataset`, `questions`, `light`, `enhance`, `ask`, `score`, `store`, `image_store`, `text`, `sentences`, `tables`, `drawing`, `report` |
+//! | `run` | `engine`, `run_reports`, `runs`, `images`, `files`, `picture`, `types`, `error`, `rooms`, `labels`, `import`, `dataset`, `calibrate`, `questions`, `light`, `enhance`, `ask`, `score`, `store`, `image_store`, `text`, `sentences`, `tables`, `drawing`, `report` |
+//! | `internals` | `ask`, `dataset`, `report` |
+//! | `cli` | `run`, `engine`, `run_reports`, `runs`, `images`, `picture`, `image_store`, `files`, `rooms`, `dataset`, `ask`, `enhance`, `score`, `light`, `types`, `error` |
 //! | `main` | `cli`, `enhance` |
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
@@ -169,16 +167,43 @@ mod sentences;
 mod tables;
 mod text;
 
-pub use darkqa_enhance as enhance;
-pub use darkqa_ground::{error, types};
-pub(crate) use darkqa_ground::{files, labels};
-pub use darkqa_light as synthesis;
+pub(crate) use darkqa_ground::{error, files, labels, types};
 pub(crate) use darkqa_picture as picture;
-pub use darkqa_questions as questions;
 pub(crate) use darkqa_scenes as rooms;
-pub use darkqa_score as score;
 pub(crate) use darkqa_store as store;
 
 pub use error::{Error, Result};
 pub use types::degradation::Kind;
-pub use types::{Choices, Condition, Degradation, Digest, Question, Rgb, Severity};
+pub use types::{
+    Answer, Choices, Condition, Degradation, DepthKind, Digest, Family, Frame, FrameId, Intrinsics,
+    Label, Labels, Question, QuestionId, Reply, Rgb, Segmentation, Severity, UnreadReason,
+};
+
+/// Degraded versions of a clean frame, as a camera would take it in less light.
+pub mod synthesis {
+    pub use darkqa_light::{
+        Amplify, CameraModel, CameraState, LightReading, NoiseKey, Sampling, Synthesis, degrade,
+        develop_with_state,
+    };
+}
+
+/// Enhancement of degraded images by an ONNX model.
+pub mod enhance {
+    pub use darkqa_enhance::{
+        Enhancer, Install, MemoryLimit, ModelFile, Runtime, RuntimeSearch, Tiling, TimeLimit,
+    };
+}
+
+/// Questions about a frame from its maps, by rule.
+pub mod questions {
+    pub use darkqa_questions::rules::Rules;
+    pub use darkqa_questions::{Generated, GeneratedQuestion, QuestionRequest, generate};
+}
+
+/// Scores of replies.
+pub mod score {
+    /// The choice in a reply, by exact match.
+    pub mod choice {
+        pub use darkqa_score::choice::{ReadingMode, read, readings};
+    }
+}

@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use darkqa_eval::{cli, enhance};
+use darkqa_eval::cli;
 
 #[expect(
     unsafe_code,
@@ -12,7 +12,7 @@ fn main() -> ExitCode {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     limit_heaps();
     // SAFETY: nothing has started a thread yet.
-    unsafe { enhance::forbid_telemetry() };
+    unsafe { darkqa_enhance::forbid_telemetry() };
     cli::main(std::env::args_os())
 }
 

@@ -1,7 +1,7 @@
 //! Standard errors by the bootstrap over frame pairs: [`Draws`].
 
-use crate::synthesis::{Component, NoiseKey, Site};
 use crate::types::FrameId;
+use darkqa_light::{Component, NoiseKey, Site};
 
 /// Number of draws (chosen: a standard error is then exact to 3 % for itself).
 const DRAWS: usize = 1000;

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::{CameraFit, Measured, NoiseLine, SettingFit, SlopeSource};
 use crate::error::{Error, Result};
-use crate::synthesis::Calibration;
+use darkqa_light::Calibration;
 
 /// The file of a camera. Its comments hold what the numbers were made from, their standard errors, and every doubt.
 ///

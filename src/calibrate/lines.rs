@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::synthesis::Calibration;
+use darkqa_light::Calibration;
 
 /// Least number of settings whose line has a slope of its own.
 const LEAST: usize = 3;

@@ -12,17 +12,17 @@ use crate::dataset::{CodesArgs, SetArgs};
 use crate::engine::batch::{BatchFileArgs, BatchRunArgs};
 use crate::engine::models::ModelName;
 use crate::engine::settings::JobArgs;
-use crate::enhance::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
 use crate::image_store::StoreArgs;
 use crate::picture::ImageArgs;
 use crate::run::evaluate::{EvaluateArgs, ShrinkArgs};
 use crate::run::import::ImportArgs;
 use crate::run::openeqa::{JudgeArgs, OpenEqaArgs};
 use crate::run::synthesize::Sheet;
-use crate::score::realism::residual::Bins;
-use crate::synthesis::{CameraArgs, LightArgs, SensorArgs};
 use crate::types::degradation::Kind;
 use crate::types::{AxisLevel, SetLight};
+use darkqa_enhance::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
+use darkqa_light::{CameraArgs, LightArgs, SensorArgs};
+use darkqa_score::realism::residual::Bins;
 
 /// One line for each reason why flags of the call have no effect.
 pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {

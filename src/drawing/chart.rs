@@ -12,9 +12,9 @@ pub(crate) mod thresholds;
 
 use serde::Serialize;
 
-use crate::score::estimate::Estimate;
 use crate::types::AxisLevel;
 use crate::types::degradation::Axis;
+use darkqa_score::estimate::Estimate;
 
 /// Colour of axes and text, and of lines that belong to no model.
 pub(crate) const INK: [u8; 3] = [34, 34, 34];

@@ -5,11 +5,11 @@ use rayon::prelude::*;
 use crate::dataset::Picture;
 use crate::engine::experiment::Experiment;
 use crate::engine::settings::JobSettings;
-use crate::enhance::{EnhancerArgs, brightness as brightness_in_codes};
 use crate::images::progress::Progress;
 use crate::images::source::{Frames, Source, SourceFrame};
-use crate::synthesis::{LightSettings, mean_luminance};
 use crate::types::{AxisLevel, SetLight};
+use darkqa_enhance::{EnhancerArgs, brightness as brightness_in_codes};
+use darkqa_light::{LightSettings, mean_luminance};
 
 /// Maximum number of frames that are measured; chosen.
 const SAMPLED: usize = 24;

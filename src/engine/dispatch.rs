@@ -29,10 +29,10 @@ use crate::images::progress::{Progress, StepBar};
 use crate::images::timings::{TimedStep, Timings};
 use crate::images::trial::{Item, PreparedGroup, Trial};
 use crate::images::workers::unstarted;
-use crate::score::image_dependence::{ImageDependence, LitReply};
-use crate::score::record::answered;
 use crate::store::Store;
 use crate::types::{Digest, Failure, FailureKind, Finish, LostAttempts, Record, Reply, SetLight};
+use darkqa_score::image_dependence::{ImageDependence, LitReply};
+use darkqa_score::record::answered;
 
 /// Number of finished groups that may wait until they are asked about.
 const GROUPS_AHEAD: usize = 2;

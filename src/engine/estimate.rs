@@ -16,9 +16,9 @@ use crate::images::plan::Plan;
 use crate::images::source::Source;
 use crate::images::trial::Item as _;
 use crate::report::forecast::{CostLine, FewSources, Forecast, ReadingCost, StoreForecast};
-use crate::score::cluster::MIN_SCENES;
 use crate::store::StoredTrial;
 use crate::types::{Degradation, ImageFacts, ReadingName, View};
+use darkqa_score::cluster::MIN_SCENES;
 
 /// Assumed time of a reply in seconds, if no reply is stored.
 const REPLY_SECONDS: f64 = 2.0;

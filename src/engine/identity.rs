@@ -7,13 +7,13 @@ use serde_json::{Value, json};
 use crate::ask::by_flag;
 use crate::engine::models::ModelUnderTest;
 use crate::engine::settings::JobSettings;
-use crate::enhance::{self, SizeArgs, Tiling};
 use crate::images::recipe::Recipe;
 use crate::picture::Scaling;
-use crate::synthesis::{KindSettings, Synthesis, version};
 use crate::types::degradation::Kind;
 use crate::types::manifest::Columns;
 use crate::types::{Degradation, Digest, PairDark, ReadingName};
+use darkqa_enhance::{self, SizeArgs, Tiling};
+use darkqa_light::{KindSettings, Synthesis, version};
 
 /// The kinds of the paper, whose versions stand in the identity. Those of the others stand in the column of variants, where they
 /// are asked, so that a run may get them later.
@@ -30,7 +30,7 @@ pub(crate) fn images(recipe: &Recipe) -> impl Iterator<Item = (String, Value)> {
         ("--image", json!(recipe.format.to_string())),
         ("--seed", json!(recipe.seed)),
         ("synthesis", json!(PAPER.map(version))),
-        ("enhancement", json!(enhance::VERSION)),
+        ("enhancement", json!(darkqa_enhance::VERSION)),
     ];
     let fields = fields.into_iter().chain(scaling);
     fields.map(|(field, value)| (field.to_owned(), value))

@@ -11,7 +11,6 @@ use crate::engine::folder;
 use crate::engine::manifest;
 use crate::engine::measured_tokens::MeasuredTokens;
 use crate::engine::open_run::{OpenRun, answered, lost_for_good, pipeline, truncated};
-use crate::enhance::ModelFile;
 use crate::error::Result;
 use crate::images::enhancers::OpenEnhancers;
 use crate::images::image_maker::Maker;
@@ -25,6 +24,7 @@ use crate::runs::outcome::{Outcome, StdoutFormat};
 use crate::store::{self, Store};
 use crate::types::manifest::Status;
 use crate::types::{StoredDetail as _, TrialKey};
+use darkqa_enhance::ModelFile;
 
 /// An experiment that is carried out in a run folder.
 pub(crate) struct Job<'a, E: Experiment> {

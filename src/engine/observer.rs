@@ -5,13 +5,13 @@ use std::sync::Arc;
 use crate::ask::{Call, Local, LocalAnswer, Random};
 use crate::dataset::{DataPlace, Dataset};
 use crate::error::{Error, Result};
-use crate::questions::colors::Palette;
-use crate::questions::observer::controls::spoiled;
-use crate::questions::observer::{Observation, ObservedFrame, VERSION, understood};
-use crate::questions::rules::Rules;
 use crate::types::control::OBSERVER;
 use crate::types::recent::Recent;
 use crate::types::{AnswerSource, Control, Digest, FrameId, Labels, Observed, Question};
+use darkqa_questions::colors::Palette;
+use darkqa_questions::observer::controls::spoiled;
+use darkqa_questions::observer::{Observation, ObservedFrame, VERSION, understood};
+use darkqa_questions::rules::Rules;
 
 /// Number of cached observations. A few are enough, because questions about one image follow each other; with all controls,
 /// each image has one observation for each of them.

@@ -16,7 +16,6 @@ use crate::engine::in_flight_cost::InFlightCost;
 use crate::engine::manifest;
 use crate::engine::models::{self, ModelUnderTest};
 use crate::engine::settings::JobSettings;
-use crate::enhance::{Enhancer, Usage};
 use crate::error::Result;
 use crate::image_store::ImageStore;
 use crate::images::enhancers::OpenEnhancers;
@@ -38,12 +37,13 @@ use crate::runs::over_budget::OverBudget;
 use crate::runs::part_cost::PartCost;
 use crate::runs::record_table;
 use crate::runs::stored::StoredRun;
-use crate::score::image_dependence::FEWEST;
 use crate::store::now;
 use crate::store::{self, Store, StoredTrial};
 use crate::text::words::{counted, plural};
 use crate::types::manifest::{Counts, RunManifest};
 use crate::types::{EnhancerName, TrialKey, View};
+use darkqa_enhance::{Enhancer, Usage};
+use darkqa_score::image_dependence::FEWEST;
 
 /// Share of `--max-cost` below which a cost that no server stated is not mentioned; chosen.
 const SMALL_SHARE: f64 = 0.01;

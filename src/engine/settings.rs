@@ -13,7 +13,6 @@ use crate::engine::models::{
     AskSettings, AskingArgs, KeyUse, ModelArgs, ResolveContext, TextBaseline,
 };
 use crate::engine::money::{MoneyArgs, MoneySettings};
-use crate::enhance::{EnhancerArgs, ModelFile};
 use crate::error::{Error, Result};
 use crate::files::folder_access::FolderAccess;
 use crate::image_store::StoreArgs;
@@ -25,10 +24,11 @@ use crate::runs::outcome::{RecordTable, ShowArgs, StdoutFormat};
 use crate::runs::run_plan::RunPlan;
 use crate::runs::shard::Shard;
 use crate::store;
-use crate::synthesis::{LightArgs, LightSettings};
 use crate::types::flag::seconds;
 use crate::types::manifest::Columns;
 use crate::types::{Decides, SetLight, View};
+use darkqa_enhance::{EnhancerArgs, ModelFile};
+use darkqa_light::{LightArgs, LightSettings};
 
 /// The flags that every experiment has.
 #[derive(Debug, Args)]

@@ -1,11 +1,11 @@
 //! The conditions in which frames are shown: [`conditions`].
 
-use crate::enhance::EnhancerArgs;
 use crate::error::{Error, Result};
-use crate::synthesis::LightSettings;
 use crate::types::{
     Condition, Degradation, Digest, EnhancerName, PairDark, PhotoName, Treatment, TreatmentSet,
 };
+use darkqa_enhance::EnhancerArgs;
+use darkqa_light::LightSettings;
 
 /// Every condition in which a frame is shown, level by level, then in the darkness of its photographs: first raw, then with each
 /// enhancer. In this order a frame is degraded once for all enhancers.
@@ -89,9 +89,9 @@ pub(crate) fn check_enhanced(conditions: &[Condition], args: &EnhancerArgs) -> R
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::synthesis::LightArgs;
     use crate::types::SetLight;
     use clap::Parser;
+    use darkqa_light::LightArgs;
 
     #[derive(Parser)]
     #[command(no_binary_name = true)]

@@ -1,13 +1,13 @@
 //! The dark frames that an enhancer is tried on before a run: [`dark_frames`], made of [`DarkFrames`].
 
-use crate::enhance::{DARK, FRAMES, brightness};
 use crate::error::Result;
 use crate::images::frame_work::FrameWork;
 use crate::images::image_steps::ImageSteps;
 use crate::images::plan::SourcePlan;
 use crate::images::source::Source;
-use crate::synthesis::expose;
 use crate::types::{Condition, EnhancerName, Rgb, Severity};
+use darkqa_enhance::{DARK, FRAMES, brightness};
+use darkqa_light::expose;
 
 /// Exposure drops, in EV, by which frames are darkened if the plan has too few dark ones: that of L3 first.
 const DROPS: [Severity; 3] = [Severity::L3, Severity::L2, Severity::L4];

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::enhance::{Enhancer, ModelFile, ProbeArgs, Runtime, RuntimeArgs, SizeArgs};
 use crate::error::{Error, Result};
 use crate::images::workers::ThreadArgs;
 use crate::types::{Digest, EnhancerName};
+use darkqa_enhance::{Enhancer, ModelFile, ProbeArgs, Runtime, RuntimeArgs, SizeArgs};
 
 /// Flags for running enhancement models.
 #[derive(Debug, Clone, Default, Args)]

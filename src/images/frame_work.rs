@@ -18,10 +18,10 @@ use crate::images::walk::DegradedAt;
 use crate::picture::Scaling;
 use crate::picture::bilinear;
 use crate::picture::{Payload, PayloadFormat};
-use crate::synthesis::{AppliedDegradation, Exposures, FrameView, NoiseKey};
 use crate::types::{
     Condition, Degradation, Digest, ExposureFacts, FrameId, InputNote, PhotoName, Pixels, Rgb,
 };
+use darkqa_light::{AppliedDegradation, Exposures, FrameView, NoiseKey};
 
 /// Cached steps of one frame. Each is computed once, when it is first needed.
 pub(crate) struct FrameWork<'a> {

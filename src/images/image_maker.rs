@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::enhance::SizeArgs;
+use darkqa_enhance::SizeArgs;
 
 /// What decides images besides their recipes: the program, the machine's kind, and how enhancers are run. The number of threads is not
 /// part of it: six models (Zero-DCE, RUAS, SCI, Retinexformer, DarkIR, `lift`) gave the same bytes with 1, 2 and 3.

@@ -6,11 +6,11 @@ use crate::error::Result;
 use crate::images::stored_images::Similarity;
 use crate::images::thumbnail::MissingThumbnails;
 use crate::picture::Payload;
-use crate::score::realism::{psnr, ssim::ssim};
-use crate::score::record::Detail;
 use crate::store::Store;
 use crate::types::outlines::PixelBox;
 use crate::types::{Condition, FrameId, ImageFidelity, Rgb, Shared, Thumbnail};
+use darkqa_score::realism::{psnr, ssim::ssim};
+use darkqa_score::record::Detail;
 
 /// The notes about one image; `None` for what is not wanted or exists already.
 #[derive(Debug, Default)]

@@ -16,7 +16,6 @@ use std::time::Instant;
 use rayon::prelude::*;
 use tokio::sync::mpsc::Sender;
 
-use crate::enhance::{Enhancer, ImageUse, Implausible};
 use crate::error::{Error, Result};
 use crate::images::frame_work::FrameWork;
 use crate::images::frame_work::pairs::Resolved;
@@ -33,6 +32,7 @@ use crate::images::trial::{Item, PreparedGroup, Stimulus};
 use crate::images::workers::Workers;
 use crate::picture::Payload;
 use crate::types::{Condition, EnhancerName, FrameId, Rgb};
+use darkqa_enhance::{Enhancer, ImageUse, Implausible};
 
 /// The steps from a frame to an image, with the enhancement models that they need.
 pub(crate) struct ImagePipeline<'a> {

@@ -9,12 +9,12 @@ use clap::{ArgAction, ArgMatches, CommandFactory as _, Parser};
 use serde_json::Value;
 
 use crate::dataset::{CodesArgs, DataArgs, PixelLimit, SceneArgs};
-use crate::enhance::SizeArgs;
 use crate::error::{Error, Result};
 use crate::images::walk::Walk;
 use crate::picture::ImageArgs;
-use crate::synthesis::{CameraArgs, SensorArgs};
 use crate::types::Decides;
+use darkqa_enhance::SizeArgs;
+use darkqa_light::{CameraArgs, SensorArgs};
 
 /// The flag that may be given several times, and that a later call replaces as a whole.
 const REPLACED: &str = "data";

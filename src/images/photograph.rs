@@ -1,10 +1,10 @@
 //! A photograph of a frame's scene in the dark, and how dark it is: [`SourcePhotograph`].
 
-use crate::synthesis::PairEv;
 use crate::types::degradation::Kind;
 use crate::types::{
     Degradation, Digest, InputNote, PairFacts, PhotoName, ReadingName, Rgb, Severity,
 };
+use darkqa_light::PairEv;
 
 /// A photograph of a frame's scene in the dark.
 #[derive(Debug, Clone)]

@@ -15,9 +15,9 @@ use crate::files::reading;
 use crate::images::progress::Progress;
 use crate::images::questions_by_rule::by_rule;
 use crate::picture::ReadingRule;
-use crate::questions::rules::Rules;
 use crate::text::words::counted;
 use crate::types::{Digest, Family, FrameId, Question};
+use darkqa_questions::rules::Rules;
 
 /// The rulebook in a file; without one, the one built in.
 ///

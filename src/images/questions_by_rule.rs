@@ -7,13 +7,13 @@ use rayon::prelude::*;
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
 use crate::images::progress::Progress;
-use crate::questions::balance::BalanceMode;
-use crate::questions::colors::Palette;
-use crate::questions::room::RoomSource;
-use crate::questions::rules::Rules;
-use crate::questions::statistics::{FrameStatistics, measure};
-use crate::questions::{QuestionRequest, generate};
 use crate::types::{Digest, Family, FrameId, Question};
+use darkqa_questions::balance::BalanceMode;
+use darkqa_questions::colors::Palette;
+use darkqa_questions::room::RoomSource;
+use darkqa_questions::rules::Rules;
+use darkqa_questions::statistics::{FrameStatistics, measure};
+use darkqa_questions::{QuestionRequest, generate};
 
 /// The questions that the command `questions` makes with these rules, and no other flag.
 ///

@@ -5,17 +5,17 @@ use std::num::NonZeroU32;
 
 use serde::Serialize;
 
-use crate::enhance::{self, ModelFile};
 use crate::error::{Error, Result};
 use crate::images::source::{Source, SourceFrame};
 use crate::images::walk::{CameraOf, DegradedAt, Walk};
 use crate::picture::PayloadFormat;
 use crate::picture::Scaling;
-use crate::synthesis::{self, AppliedDegradation, FrameView, KindSettings, NoiseKey, Synthesis};
 use crate::types::degradation::Kind;
 use crate::types::{
     Condition, Degradation, Digest, EnhancerName, ExposureFacts, FrameId, Severity,
 };
+use darkqa_enhance::{self, ModelFile};
+use darkqa_light::{self, AppliedDegradation, FrameView, KindSettings, NoiseKey, Synthesis};
 
 /// All settings that decide an image, except its frame and its condition.
 #[derive(Debug)]
@@ -116,7 +116,7 @@ impl Recipe {
             degradation: degradation.transpose()?,
             enhancer: enhancer.map(|(_, digest)| EnhancerFacts {
                 digest: *digest,
-                version: enhance::VERSION,
+                version: darkqa_enhance::VERSION,
             }),
             format: self.format.to_string(),
             scaling: self.scaling,
@@ -169,7 +169,7 @@ impl Recipe {
         Ok(DegradationFacts {
             kind,
             severity: how.severity(),
-            version: synthesis::version(kind),
+            version: darkqa_light::version(kind),
             reading: applied.synthesis().cloned(),
             seed: random.then_some(self.seed),
             frame: random.then_some(&frame.id),

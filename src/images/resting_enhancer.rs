@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
-use crate::enhance::{Enhancer, Findings, ImageUse, Implausible, ModelFile, Stopper, Usage};
 use crate::error::{Error, Result};
 use crate::images::enhancers::EnhancerRunArgs;
 use crate::types::{EnhancerName, Rgb};
+use darkqa_enhance::{Enhancer, Findings, ImageUse, Implausible, ModelFile, Stopper, Usage};
 
 /// An enhancer that was opened and tried in another run, and all of whose images were in the store when the run began. It is opened if one
 /// of them is missing or damaged after all, once for all threads.

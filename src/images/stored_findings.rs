@@ -4,7 +4,6 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use crate::enhance::{self, Findings};
 use crate::error::Result;
 use crate::image_store::{Content, Entry, EntryFacts, ImageStore, Key, Shown};
 use crate::images::enhancers::{Model, OpenEnhancers};
@@ -12,6 +11,7 @@ use crate::images::image_maker::Maker;
 use crate::images::recipe::{ImageKeyFacts, Recipe};
 use crate::images::source::Source;
 use crate::types::{Condition, Digest};
+use darkqa_enhance::{self, Findings};
 
 /// The store, with what decides how enhancers run.
 #[derive(Debug, Clone, Copy)]
@@ -39,7 +39,7 @@ impl<'a> StoredFindings<'a> {
     fn key(self, model: &Model, frames: Option<Vec<Vec<ImageKeyFacts<'_>>>>) -> Result<Key> {
         Key::of(&FindingsRecipe {
             stated: model.stated()?,
-            version: enhance::VERSION,
+            version: darkqa_enhance::VERSION,
             maker: self.maker,
             frames,
         })

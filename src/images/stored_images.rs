@@ -4,7 +4,6 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use crate::enhance::ImageUse;
 use crate::error::Result;
 use crate::image_store::{Content, Entry, EntryFacts, ImageStore, Key, Shown, StoredKinds};
 use crate::images::image_maker::Maker;
@@ -15,6 +14,7 @@ use crate::images::stored_thumbnails::ThumbnailPlace;
 use crate::images::thumbnail::ShownObjects;
 use crate::picture::Payload;
 use crate::types::{Condition, FrameId};
+use darkqa_enhance::ImageUse;
 
 /// A store, with what decides images besides their recipes.
 #[derive(Debug, Clone, Copy)]

@@ -6,8 +6,8 @@ use crate::ask::{ImagePlaces, Message, Query};
 use crate::error::Error;
 use crate::images::image_notes::ImageNotes;
 use crate::picture::Payload;
-use crate::score::record::Detail;
 use crate::types::{Condition, Record, TrialKey};
+use darkqa_score::record::Detail;
 
 /// The subject of a trial: a question with choices, an open question, or an answer to judge.
 pub(crate) trait Item: Clone + Send + Sync + 'static {

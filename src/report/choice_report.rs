@@ -1,10 +1,10 @@
 //! All that a report of questions with choices shows: [`ChoiceReport`].
 
-use crate::score::findings::Findings;
 use crate::sentences::{Sentence, sentences};
 use crate::tables::{EnhancerRow, enhancers, observer_notes, tables};
 use crate::text::alert::{Alert, AlertKind};
 use crate::text::table::Table;
+use darkqa_score::findings::Findings;
 
 /// The findings of one run or several, in words and as tables. The terminal, the page and all files are made from it.
 #[derive(Debug)]

@@ -197,9 +197,9 @@ fn block(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::score::estimate::Estimate;
     use crate::text::table::ColumnKind::{Accuracy, Text};
     use crate::text::table::TableBuilder;
+    use darkqa_score::estimate::Estimate;
 
     #[test]
     fn nothing_in_a_name_is_markup() {

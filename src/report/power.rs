@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
-use crate::score::cluster::{ClusterUnit, Clusters};
-use crate::score::paired::POWER;
-use crate::score::power::{CHANGED, CORRELATION, Detectable, PlannedSample, TARGET};
-use crate::score::tested_sentences::AskedSets;
 use crate::text::words::counted;
+use darkqa_score::cluster::{ClusterUnit, Clusters};
+use darkqa_score::paired::POWER;
+use darkqa_score::power::{CHANGED, CORRELATION, Detectable, PlannedSample, TARGET};
+use darkqa_score::tested_sentences::AskedSets;
 
 /// The difference between two conditions that a run detects, and the frames that 5 points need.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -87,8 +87,8 @@ impl PowerForecast {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::score::cluster::FrameTies;
     use crate::types::{FrameId, QuestionId};
+    use darkqa_score::cluster::FrameTies;
 
     fn forecast(frames: usize, models: usize) -> PowerForecast {
         let questions: Vec<(QuestionId, FrameId)> = (0..4 * frames)

@@ -11,9 +11,6 @@ use std::path::Path;
 use self::foot::BELOW;
 use self::name_column::{LEVEL, NameColumn};
 use crate::report::choice_report::ChoiceReport;
-use crate::score::accuracy::AccuracyCell;
-use crate::score::choice::ReadingMode;
-use crate::score::health::Health;
 use crate::sentences::{FIRST, HOW_TO_READ, Sentence};
 use crate::text::alert::lines;
 use crate::text::frame_count::frames;
@@ -24,6 +21,9 @@ use crate::text::words::{counted, percent, reach_of};
 use crate::text::wrapped::{WIDTH, wrapped};
 use crate::types::manifest::RunManifest;
 use crate::types::{Axis, AxisLevel};
+use darkqa_score::accuracy::AccuracyCell;
+use darkqa_score::choice::ReadingMode;
+use darkqa_score::health::Health;
 
 /// Width of the column of intervals, in characters.
 const REACH: usize = 15;

@@ -13,12 +13,12 @@ use crate::images::progress::Progress;
 use crate::images::questions::open_data;
 use crate::picture::ReadingRule;
 use crate::picture::png;
-use crate::questions::rules::Rules;
 use crate::runs::Outcome;
 use crate::text::words::counted;
 use crate::types::manifest::Status;
 use crate::types::question::letter;
 use crate::types::{Choices, Decides, FrameId, Question, shell_word};
+use darkqa_questions::rules::Rules;
 
 /// The flags of `init`.
 #[derive(Debug, Args)]

@@ -15,9 +15,9 @@ use crate::runs::placed_trials::append;
 use crate::runs::record_table;
 use crate::runs::run_parts::{MissingParts, RunParts, one_kind, runs_in};
 use crate::runs::stored::{ExperimentKind, StoredRun};
-use crate::score::record::Detail;
 use crate::store::{self, AddressChange, Store};
 use crate::types::{ChoiceDetail, Decides, OpenDetail};
+use darkqa_score::record::Detail;
 
 /// The flags of `merge`.
 #[derive(Debug, Args)]

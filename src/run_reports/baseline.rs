@@ -9,16 +9,16 @@ use super::join::join;
 use crate::error::{Error, Result};
 use crate::report::choice_report::ChoiceReport;
 use crate::runs::stored::StoredRun;
-use crate::score::baseline::{BaselineRow, baseline_rows};
-use crate::score::cluster::ClusterUnit;
-use crate::score::grid::Grid;
-use crate::score::health::healths;
-use crate::score::significance::Significance;
-use crate::score::subject::{Subject, is_control, is_observer};
 use crate::sentences::{against_baseline, no_verdict};
 use crate::tables::baseline;
 use crate::text::alert::Alert;
 use crate::types::{ChoiceDetail, TrialRef};
+use darkqa_score::baseline::{BaselineRow, baseline_rows};
+use darkqa_score::cluster::ClusterUnit;
+use darkqa_score::grid::Grid;
+use darkqa_score::health::healths;
+use darkqa_score::significance::Significance;
+use darkqa_score::subject::{Subject, is_control, is_observer};
 
 /// The flag that makes a worse model a failure.
 pub(super) const FAIL_IF_WORSE: &str = "--fail-if-worse";

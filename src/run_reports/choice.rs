@@ -17,11 +17,11 @@ use crate::report::short::{findings, full, short};
 use crate::runs::outcome::Outcome;
 use crate::runs::outcome::StdoutFormat;
 use crate::runs::stored::{ShownModels, StoredRun, name};
-use crate::score::findings::Findings;
 use crate::store::Store;
 use crate::tables::{FLIPS, write_flips};
 use crate::types::manifest::RunManifest;
 use crate::types::{ChoiceDetail, Truths};
+use darkqa_score::findings::Findings;
 
 /// Writes the report and the manifest of a run into its folder.
 pub(crate) fn write(

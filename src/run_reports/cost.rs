@@ -7,10 +7,10 @@ use serde_json::Value;
 use crate::ask::{Price, Prices};
 use crate::error::Result;
 use crate::report::forecast::money;
-use crate::score::record::Detail;
 use crate::text::words;
 use crate::types::manifest::RunManifest;
 use crate::types::{TrialRef, Via};
+use darkqa_score::record::Detail;
 
 /// The cost of a model's trials at list prices, in US dollars, attempts without a reply included; `None` if the model has no known price or no
 /// reply says its tokens.

@@ -9,9 +9,9 @@ use super::whole_report::no_records;
 use crate::error::{Error, Result};
 use crate::runs::run_parts::choice_run;
 use crate::runs::stored::{ShownModels, StoredRun};
-use crate::score::findings::Findings;
 use crate::text::alert::Alert;
 use crate::types::{ChoiceDetail, Thumbnail, Truths};
+use darkqa_score::findings::Findings;
 
 /// Runs of questions with choices, joined as the report joins them.
 pub(crate) struct FigureRuns {

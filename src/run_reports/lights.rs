@@ -4,11 +4,11 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::settings::{self, some};
 use crate::runs::stored::StoredRun;
-use crate::score::record::Detail;
-use crate::score::subject::is_control;
 use crate::types::degradation::Kind;
 use crate::types::manifest::RunManifest;
 use crate::types::{Condition, Digest, EnhancerName, KindReading, LightGroup, TrialRef};
+use darkqa_score::record::Detail;
+use darkqa_score::subject::is_control;
 
 /// The conditions of one curve: a kind of degradation in a light reading, raw or with an enhancer, at all levels.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]

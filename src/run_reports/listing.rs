@@ -7,8 +7,8 @@ use serde_json::Value;
 use super::join::{Joined, JoinedRun};
 use super::settings::is_of_people;
 use crate::runs::renamed::ADAPTED_FOR;
-use crate::score::record::Detail;
 use crate::types::{ModelColumn, ModelListing};
+use darkqa_score::record::Detail;
 
 /// The order and the groups of the files of models of all runs, one after the other by the runs' names; and what is known of each
 /// model.

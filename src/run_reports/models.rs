@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::settings::{Setting, Settings, differing, is_digest, parameters};
 use crate::runs::stored::StoredRun;
-use crate::score::record::Detail;
 use crate::types::{Condition, QuestionId, RunQuestion, TrialKey, TrialRef, View};
+use darkqa_score::record::Detail;
 
 /// The most settings in the name of a model; with more, the run's name stands there.
 const MOST_SETTINGS: usize = 2;

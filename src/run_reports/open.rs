@@ -24,11 +24,6 @@ use crate::runs::outcome::Outcome;
 use crate::runs::outcome::StdoutFormat;
 use crate::runs::predictions::{AnswerState, Prediction, predictions};
 use crate::runs::stored::{RunLayout, ShownModels, StoredRun, sort};
-use crate::score::choice::llm_match::{Protocol, mark};
-use crate::score::open::{
-    AnswerOutcome, OpenSummary, QuestionGroups, ScoredAnswer, open_summary_listed,
-};
-use crate::score::subject::Subject;
 use crate::store::Store;
 use crate::tables::EnhancerRow;
 use crate::text::alert::{Alert, AlertKind};
@@ -39,6 +34,11 @@ use crate::types::manifest::{RunManifest, Status};
 use crate::types::{
     ModelListing, OpenDetail, QuestionId, Record, RunQuestion, Step, Thumbnail, TrialRef,
 };
+use darkqa_score::choice::llm_match::{Protocol, mark};
+use darkqa_score::open::{
+    AnswerOutcome, OpenSummary, QuestionGroups, ScoredAnswer, open_summary_listed,
+};
+use darkqa_score::subject::Subject;
 
 /// The answers of a run, with their scores.
 pub(crate) struct Scores {

@@ -14,10 +14,10 @@ use crate::report::products::PAGE;
 use crate::report::self_agreement::{AgreementReport, TextLength, products, summary, text};
 use crate::runs::StdoutFormat;
 use crate::runs::stored::name;
-use crate::score::self_agreement::SelfAgreement;
 use crate::text::alert::Alert;
 use crate::types::ChoiceDetail;
 use crate::types::manifest::RunManifest;
+use darkqa_score::self_agreement::SelfAgreement;
 
 /// The files of a report by name, and its text for standard output.
 pub(super) struct ReportOutput {

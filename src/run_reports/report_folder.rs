@@ -5,9 +5,9 @@ use std::path::Path;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::runs::stored::RunLayout;
-use crate::score::record::Detail;
 use crate::store::{AddressChange, Store};
 use crate::types::manifest::RunManifest;
+use darkqa_score::record::Detail;
 
 /// The folder that the report of one run is written into.
 pub(super) enum ReportFolder<'a, D: Detail> {

@@ -26,13 +26,13 @@ use crate::runs::StdoutFormat;
 use crate::runs::record_table;
 use crate::runs::run_parts::{any_run, choice_run};
 use crate::runs::stored::{AnyRun, RunLayout, ShownModels, StoredRun, name};
-use crate::score::record::{self, Detail as _};
 use crate::store::now;
 use crate::store::{AddressChange, Store};
 use crate::text::alert::Alert;
 use crate::types::manifest::Counts;
 use crate::types::manifest::Status;
 use crate::types::{ChoiceDetail, Decides, ModelColumn, OpenDetail, TrialRef, Truths};
+use darkqa_score::record::{self, Detail as _};
 
 /// The flags of `report`.
 #[derive(Debug, Args)]

@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 use crate::runs::placed_trials::{append, trials_of};
-use crate::score::record::Detail;
 use crate::store::{self, Store};
 use crate::types::manifest::{RunManifest, differences};
 use crate::types::{FrameId, TextPlace, TrialKey};
+use darkqa_score::record::Detail;
 
 /// The parts of a run in another number than now, as when a job array was stopped and goes on with another size.
 pub(crate) struct OtherParts(Vec<(PathBuf, RunManifest)>);

@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
 
 use crate::ask::openeqa::blind_answer;
-use crate::score::choice::llm_match::{Protocol, shortened};
-use crate::score::subject::Subject;
 use crate::types::{OpenDetail, QuestionId, Record, Step, Via, View};
+use darkqa_score::choice::llm_match::{Protocol, shortened};
+use darkqa_score::subject::Subject;
 
 /// The state of one answer.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -6,7 +6,6 @@ use std::sync::Arc;
 use clap::Args;
 
 use crate::dataset::{DataArgs, DataPlace, Dataset, Photographs, place};
-use crate::enhance::{Enhancer, Implausible, ProbeArgs, RuntimeArgs};
 use crate::error::{Error, Result};
 use crate::images::enhancers::{self, EnhancerRunArgs, OpenEnhancers};
 use crate::images::image_pipeline::ImagePipeline;
@@ -20,9 +19,10 @@ use crate::images::timings::Timings;
 use crate::images::walk::{Walk, WalkFolder};
 use crate::images::workers::ThreadArgs;
 use crate::picture::Payload;
-use crate::synthesis::KindSettings;
 use crate::types::manifest::RunManifest;
 use crate::types::{Condition, Decides, FrameId};
+use darkqa_enhance::{Enhancer, Implausible, ProbeArgs, RuntimeArgs};
+use darkqa_light::KindSettings;
 
 /// Flags for the current paths of a run's data and enhancers, and for running them.
 ///

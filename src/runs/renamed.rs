@@ -8,12 +8,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::{Value, json};
 
 use crate::error::Result;
-use crate::score::record::Detail;
 use crate::types::control::OBSERVER;
 use crate::types::manifest::RunManifest;
 use crate::types::model_views::{Fit, StoredViews, Views};
 use crate::types::recorded_names::RecordedNames;
 use crate::types::{Control, Digest, Record, Trials};
+use darkqa_score::record::Detail;
 
 /// The beginning of the fields of a manifest that hold the changes to requests to a model; its name follows.
 pub(crate) const ADAPTED_FOR: &str = "adapted for ";

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::error::{Error, Result};
-use crate::score::record::Detail;
 use crate::store::{RecordLog, each_question};
 use crate::types::{QuestionId, Record, RunQuestion, TextPlace};
+use darkqa_score::record::Detail;
 
 /// Where the texts of a run's replies, and the evidence of its questions, are read.
 #[derive(Debug, Clone)]

@@ -9,13 +9,13 @@ use crate::runs::renamed;
 use crate::runs::run_files::RunFiles;
 use crate::runs::run_texts::HeldTexts;
 pub(crate) use crate::runs::run_texts::RunTexts;
-use crate::score::record::Detail;
 use crate::store;
 use crate::types::manifest::RunManifest;
 use crate::types::{
     ChoiceDetail, ImageFidelity, ListedModel, ModelListing, OpenDetail, QuestionId, Record,
     RunQuestion, StoredDetail as _, TextPlace, Thumbnail, TrialRef, Trials,
 };
+use darkqa_score::record::Detail;
 
 /// The models of a run that a report shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

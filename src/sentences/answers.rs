@@ -1,14 +1,14 @@
 //! Sentences about the replies: how many could not be read, and whether fidelity predicts right ones.
 
 use super::sentence::{Numbers, Sentence, Tone};
-use crate::score::claim::Claim;
-use crate::score::fidelity::{ConditionFidelity, FidelityFindings};
-use crate::score::findings::Findings;
-use crate::score::pooled::PooledFinding;
-use crate::score::pooled_kind::PooledKind;
-use crate::score::significance::ALPHA;
 use crate::text::alert::MAX_UNREAD;
 use crate::types::UnreadReason;
+use darkqa_score::claim::Claim;
+use darkqa_score::fidelity::{ConditionFidelity, FidelityFindings};
+use darkqa_score::findings::Findings;
+use darkqa_score::pooled::PooledFinding;
+use darkqa_score::pooled_kind::PooledKind;
+use darkqa_score::significance::ALPHA;
 
 /// Replies that could not be read, if they are few: an alert speaks of many, and of failed trials. Built-in models are not counted.
 pub(super) fn unread(findings: &Findings<'_>) -> Option<Sentence> {

@@ -4,14 +4,14 @@ use std::collections::BTreeSet;
 
 use super::lights::Topic;
 use super::sentence::{Numbers, Sentence, Tone, capitalised};
-use crate::score::choice::ReadingMode;
-use crate::score::estimate::Estimate;
-use crate::score::findings::Findings;
-use crate::score::grid::Grid;
-use crate::score::pooled::pool;
-use crate::score::subject::{Subject, is_reference};
 use crate::text::words::light;
 use crate::types::{AxisLevel, KindReading, UnreadReason, View};
+use darkqa_score::choice::ReadingMode;
+use darkqa_score::estimate::Estimate;
+use darkqa_score::findings::Findings;
+use darkqa_score::grid::Grid;
+use darkqa_score::pooled::pool;
+use darkqa_score::subject::{Subject, is_reference};
 
 /// What each of them answered at L0 and at its darkest level, and the other models on the same questions.
 pub(super) fn apart(findings: &Findings<'_>) -> Vec<Sentence> {

@@ -1,12 +1,12 @@
 //! Sentences about new runs against an old one.
 
 use super::sentence::{Numbers, Sentence, Tone};
-use crate::score::baseline::BaselineRow;
-use crate::score::cluster::ClusterUnit;
-use crate::score::comparison::MIN_PAIRS;
-use crate::score::paired::POWER;
-use crate::score::significance::Significance;
-use crate::score::subject::judged;
+use darkqa_score::baseline::BaselineRow;
+use darkqa_score::cluster::ClusterUnit;
+use darkqa_score::comparison::MIN_PAIRS;
+use darkqa_score::paired::POWER;
+use darkqa_score::significance::Significance;
+use darkqa_score::subject::judged;
 
 /// Largest number of conditions that a sentence names.
 const MAX_NAMED: usize = 3;

@@ -1,12 +1,12 @@
 //! The sentence about what models know of their own sight: whether their confidence falls with their accuracy.
 
 use super::sentence::{Numbers, Sentence, Tone};
-use crate::score::calibration::Calibration;
-use crate::score::calibration::LEAST_CONFIDENT_REPLIES;
-use crate::score::cluster::{ClusterUnit, MIN_SCENES};
-use crate::score::findings::Findings;
-use crate::score::subject::Subject;
 use crate::types::{AxisLevel, KindReading};
+use darkqa_score::calibration::Calibration;
+use darkqa_score::calibration::LEAST_CONFIDENT_REPLIES;
+use darkqa_score::cluster::{ClusterUnit, MIN_SCENES};
+use darkqa_score::findings::Findings;
+use darkqa_score::subject::Subject;
 
 /// The confidence of a model in the images of a light: at the darkest level, and at L0 if that was asked.
 #[derive(Debug, Clone, Copy)]

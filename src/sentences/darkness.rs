@@ -5,15 +5,15 @@ use super::lights::{Topic, means_of_set, of_set};
 use super::pooled::{detail, mean_levels, of_verdict, reserved, runs};
 use super::sample::WIDE;
 use super::sentence::{Numbers, Sentence, Tone, capitalised};
-use crate::score::claim::Claim;
-use crate::score::cluster::ClusterUnit;
-use crate::score::findings::Findings;
-use crate::score::pooled::PooledFinding;
-use crate::score::pooled_kind::PooledKind;
-use crate::score::significance::Significance;
 use crate::text::words::light;
 use crate::types::degradation::{Axis, Kind};
 use crate::types::{KindReading, LightGroup};
+use darkqa_score::claim::Claim;
+use darkqa_score::cluster::ClusterUnit;
+use darkqa_score::findings::Findings;
+use darkqa_score::pooled::PooledFinding;
+use darkqa_score::pooled_kind::PooledKind;
+use darkqa_score::significance::Significance;
 
 /// What darkness, or another cause, costs in each topic.
 pub(super) fn darkness(findings: &Findings<'_>) -> Vec<Sentence> {

@@ -1,12 +1,12 @@
 //! Sentences about replies that do not keep to the answer format, where only the strict parsing detects a difference.
 
 use super::sentence::{Numbers, Sentence, Tone, models};
-use crate::score::claim::Claim;
-use crate::score::cluster::ClusterUnit;
-use crate::score::pooled::PooledFinding;
-use crate::score::pooled_kind::PooledKind;
-use crate::score::significance::Significance;
 use crate::text::words::light;
+use darkqa_score::claim::Claim;
+use darkqa_score::cluster::ClusterUnit;
+use darkqa_score::pooled::PooledFinding;
+use darkqa_score::pooled_kind::PooledKind;
+use darkqa_score::significance::Significance;
 
 /// The finding that the strict parsing alone detects, if at least half of its difference is a difference in readable replies: of
 /// several, the largest.

@@ -4,14 +4,14 @@ use std::collections::BTreeSet;
 
 use super::pooled::{detail, of_verdict, runs};
 use super::sentence::{Numbers, Sentence, Tone};
-use crate::score::cluster::ClusterUnit;
-use crate::score::confusion::{Collapse, FalseAnswer, MIN_EXCESS};
-use crate::score::findings::Findings;
-use crate::score::pooled::PooledFinding;
-use crate::score::significance::Significance;
-use crate::score::subject::Subject;
 use crate::text::words::family as family_name;
 use crate::types::{AxisLevel, Family, KindReading};
+use darkqa_score::cluster::ClusterUnit;
+use darkqa_score::confusion::{Collapse, FalseAnswer, MIN_EXCESS};
+use darkqa_score::findings::Findings;
+use darkqa_score::pooled::PooledFinding;
+use darkqa_score::significance::Significance;
+use darkqa_score::subject::Subject;
 
 /// How often a false answer is given at the darkest level at which its rate is shown to grow.
 pub(super) fn false_answers(

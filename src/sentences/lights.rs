@@ -2,12 +2,12 @@
 
 use super::sample::is_impossible;
 use super::sentence::Sentence;
-use crate::score::findings::Findings;
-use crate::score::pooled::PooledFinding;
-use crate::score::pooled_kind::PooledKind;
 use crate::text::words::light;
 use crate::types::KindReading;
 use crate::types::degradation::Kind;
+use darkqa_score::findings::Findings;
+use darkqa_score::pooled::PooledFinding;
+use darkqa_score::pooled_kind::PooledKind;
 
 /// The variants that sentences speak of together: a kind and those that extend it.
 #[derive(Debug)]

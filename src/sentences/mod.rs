@@ -37,10 +37,10 @@ use std::collections::BTreeSet;
 use self::confidence::Confidence;
 use self::hallucination::TopAnswer;
 use self::lights::{in_each_light, means_of_set, of_set};
-use crate::score::confusion::FalseAnswer;
-use crate::score::findings::Findings;
-use crate::score::pooled_kind::PooledKind;
 use crate::types::{Family, KindReading};
+use darkqa_score::confusion::FalseAnswer;
+use darkqa_score::findings::Findings;
+use darkqa_score::pooled_kind::PooledKind;
 
 /// Largest number of sentences that are shown first; the others follow on request.
 pub(crate) const FIRST: usize = 8;

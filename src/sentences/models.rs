@@ -2,15 +2,15 @@
 
 use super::lights::Topic;
 use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
-use crate::score::best::{BestInTheDark, Crossing};
-use crate::score::claim::Claim;
-use crate::score::findings::Findings;
-use crate::score::pooled::PooledFinding;
-use crate::score::pooled_kind::PooledKind;
-use crate::score::significance::Significance;
 use crate::text::words::family;
 use crate::types::KindReading;
 use crate::types::degradation::{Axis, Kind};
+use darkqa_score::best::{BestInTheDark, Crossing};
+use darkqa_score::claim::Claim;
+use darkqa_score::findings::Findings;
+use darkqa_score::pooled::PooledFinding;
+use darkqa_score::pooled_kind::PooledKind;
+use darkqa_score::significance::Significance;
 
 /// The model that sees best in the dark, and those that it is not shown to be better than; if the order of the leaders in the light
 /// and in the dark changes with the level, that in its place.

@@ -2,12 +2,12 @@
 
 use super::format::format_alone;
 use super::sentence::{Numbers, Sentence, Tone, level_runs, models};
-use crate::score::claim::Claim;
-use crate::score::cluster::ClusterUnit;
-use crate::score::pooled::PooledFinding;
-use crate::score::significance::Significance;
-use crate::score::subject;
 use crate::types::AxisLevel;
+use darkqa_score::claim::Claim;
+use darkqa_score::cluster::ClusterUnit;
+use darkqa_score::pooled::PooledFinding;
+use darkqa_score::significance::Significance;
+use darkqa_score::subject;
 
 /// Largest number of sentences about one enhancer.
 const MAX_PER_ENHANCER: usize = 3;

@@ -1,14 +1,14 @@
 //! Sentences about photographs in the dark: what they cost, whether synthetic images stand for them, and what an enhancer does to them.
 
 use super::sentence::{Numbers, Sentence, Tone};
-use crate::score::claim::Claim;
-use crate::score::cluster::ClusterUnit;
-use crate::score::comparison::{Comparison, ComparisonKind};
-use crate::score::findings::Findings;
-use crate::score::pair_darkness::PairDarkness;
-use crate::score::significance::Significance;
-use crate::score::subject::judged;
 use crate::text::words::light;
+use darkqa_score::claim::Claim;
+use darkqa_score::cluster::ClusterUnit;
+use darkqa_score::comparison::{Comparison, ComparisonKind};
+use darkqa_score::findings::Findings;
+use darkqa_score::pair_darkness::PairDarkness;
+use darkqa_score::significance::Significance;
+use darkqa_score::subject::judged;
 
 /// Sentences about each model and each photograph: against the light, against synthetic images that are as dark, and enhanced.
 pub(super) fn real(findings: &Findings<'_>) -> Vec<Sentence> {

@@ -1,12 +1,12 @@
 //! Sentences about the sample: what so few clusters cannot show, and which models are left out.
 
 use super::sentence::{Numbers, Sentence, Tone, level_runs};
-use crate::score::cluster::ClusterUnit;
-use crate::score::findings::Findings;
-use crate::score::pooled::{ModelsLeftOut, PooledFinding};
-use crate::score::pooled_kind::PooledKind;
 use crate::text::words::light;
 use crate::types::{EnhancerName, KindReading};
+use darkqa_score::cluster::ClusterUnit;
+use darkqa_score::findings::Findings;
+use darkqa_score::pooled::{ModelsLeftOut, PooledFinding};
+use darkqa_score::pooled_kind::PooledKind;
 
 /// Half-width of an interval in points above which the sample is called small.
 pub(super) const WIDE: f64 = 0.05;

@@ -3,15 +3,15 @@
 use std::collections::BTreeSet;
 
 use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
-use crate::score::claim::Claim;
-use crate::score::comparison::{Comparison, ComparisonKind};
-use crate::score::self_agreement::SelfAgreement;
-use crate::score::self_agreement::cell::{AgreementCell, CellRole};
-use crate::score::self_agreement::light::LightReplies;
-use crate::score::significance::Significance;
-use crate::score::subject::judged;
 use crate::text::words::light;
 use crate::types::{AxisLevel, EnhancerName, KindReading, SetLight};
+use darkqa_score::claim::Claim;
+use darkqa_score::comparison::{Comparison, ComparisonKind};
+use darkqa_score::self_agreement::SelfAgreement;
+use darkqa_score::self_agreement::cell::{AgreementCell, CellRole};
+use darkqa_score::self_agreement::light::LightReplies;
+use darkqa_score::significance::Significance;
+use darkqa_score::subject::judged;
 
 /// All sentences of a run without true answers: models against each other at L0 first, then each model.
 #[must_use]

@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::score::claim::Claim;
-use crate::score::cluster::ClusterUnit;
-use crate::score::estimate::Estimate;
-use crate::score::pooled::PooledFinding;
-use crate::score::significance::{Significance, SwapMethod};
 use crate::text::words::{counted, p, points};
+use darkqa_score::claim::Claim;
+use darkqa_score::cluster::ClusterUnit;
+use darkqa_score::estimate::Estimate;
+use darkqa_score::pooled::PooledFinding;
+use darkqa_score::significance::{Significance, SwapMethod};
 
 /// A finding in words.
 #[derive(Debug, Clone, PartialEq, Serialize)]

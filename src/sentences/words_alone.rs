@@ -5,15 +5,15 @@ use std::collections::BTreeSet;
 use super::format::format_alone;
 use super::pooled::{detail, of_verdict, runs};
 use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
-use crate::score::claim::Claim;
-use crate::score::cluster::ClusterUnit;
-use crate::score::comparison::{Comparison, ComparisonKind};
-use crate::score::findings::Findings;
-use crate::score::pooled::PooledFinding;
-use crate::score::pooled_kind::PooledKind;
-use crate::score::significance::Significance;
 use crate::text::words::family as family_name;
 use crate::types::{Axis, AxisLevel, KindReading};
+use darkqa_score::claim::Claim;
+use darkqa_score::cluster::ClusterUnit;
+use darkqa_score::comparison::{Comparison, ComparisonKind};
+use darkqa_score::findings::Findings;
+use darkqa_score::pooled::PooledFinding;
+use darkqa_score::pooled_kind::PooledKind;
+use darkqa_score::significance::Significance;
 
 /// Where the models fall below their replies to the words alone.
 pub(super) fn pooled(levels: &[&PooledFinding], unit: ClusterUnit) -> Option<Sentence> {

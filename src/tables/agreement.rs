@@ -1,8 +1,8 @@
 //! The table of the agreement of models in each condition.
 
-use crate::score::agreement::Agreement;
 use crate::text::table::ColumnKind::{Count, Ratio, Share, Text};
 use crate::text::table::{Table, TableBuilder};
+use darkqa_score::agreement::Agreement;
 
 pub(super) fn agreement(agreements: &[Agreement]) -> Table {
     TableBuilder::new("agreement", agreements)

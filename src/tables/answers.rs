@@ -1,9 +1,9 @@
 //! Tables of the answers: false positives and negatives, collapse, and answers given against true answers.
 
-use crate::score::confusion::{Collapse, Confusion, Hallucination};
-use crate::score::findings::Findings;
 use crate::text::table::ColumnKind::{Count, Number, Percent, Share, Text};
 use crate::text::table::{Table, TableBuilder};
+use darkqa_score::confusion::{Collapse, Confusion, Hallucination};
+use darkqa_score::findings::Findings;
 
 pub(super) fn answers(findings: &Findings<'_>) -> Vec<Table> {
     vec![

@@ -1,11 +1,11 @@
 //! The table of new runs against an old one, with a row for each model and condition.
 
-use crate::score::baseline::{BaselineRow, BaselineSide};
-use crate::score::comparison::MIN_PAIRS;
-use crate::score::significance::Significance;
 use crate::text::latex::escaped;
 use crate::text::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
 use crate::text::table::{Table, TableBuilder, TableCell};
+use darkqa_score::baseline::{BaselineRow, BaselineSide};
+use darkqa_score::comparison::MIN_PAIRS;
+use darkqa_score::significance::Significance;
 
 /// Name of the table, and id of its section of the page.
 pub(crate) const BASELINE: &str = "baseline";

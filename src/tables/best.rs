@@ -1,11 +1,11 @@
 //! The table of the models by mean accuracy in the dark: each less each other, with its test.
 
-use crate::score::best::{BestInTheDark, DarkAccuracy, DarkPair};
-use crate::score::findings::Findings;
 use crate::sentences::dark_levels;
 use crate::text::table::ColumnKind::{Number, P, Percent, Points, Significance, Text};
 use crate::text::table::{Table, TableBuilder};
 use crate::text::words::{light, points};
+use darkqa_score::best::{BestInTheDark, DarkAccuracy, DarkPair};
+use darkqa_score::findings::Findings;
 
 /// Empty if there are fewer than two models.
 pub(super) fn best(findings: &Findings<'_>) -> Table {

@@ -2,16 +2,16 @@
 
 use std::collections::BTreeSet;
 
-use crate::score::by_reading::{
-    EffectInReading, FindingByReading, LightClaim, Robustness, Standing, TestedEffect,
-};
-use crate::score::curve::Curve;
-use crate::score::findings::Findings;
 use crate::text::table::ColumnKind::{Count, Number, P, Text};
 use crate::text::table::{ColumnHeads, Table, TableBuilder, TableCell};
 use crate::text::words::{self, ends_in_points, points, reach, stops};
 use crate::types::degradation::Kind;
 use crate::types::{AxisLevel, ReadingName};
+use darkqa_score::by_reading::{
+    EffectInReading, FindingByReading, LightClaim, Robustness, Standing, TestedEffect,
+};
+use darkqa_score::curve::Curve;
+use darkqa_score::findings::Findings;
 
 /// One row a claim and reading in the file; one row a claim, with a column a reading, for people. Empty with one reading.
 pub(super) fn by_reading(findings: &Findings<'_>) -> Vec<Table> {
@@ -306,8 +306,8 @@ fn notes(found: &[FindingByReading]) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::score::estimate::Estimate;
     use crate::types::Severity;
+    use darkqa_score::estimate::Estimate;
 
     fn effect_of(reading: &str, low: f64, high: f64, standing: Standing) -> EffectInReading {
         let value = f64::midpoint(low, high);

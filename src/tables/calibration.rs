@@ -1,14 +1,14 @@
 //! The tables of confidence against accuracy, and of probabilities by the place of a choice.
 
-use crate::score::auc::Auc;
-use crate::score::calibration::{Calibration, PositionShare, ReliabilityBin};
-use crate::score::estimate::Estimate;
-use crate::score::findings::Findings;
-use crate::score::subject::Subject;
 use crate::text::table::ColumnKind::{Count, Number, Percent, Points, Ratio, Share, Text};
 use crate::text::table::{Table, TableBuilder, TableCell};
 use crate::text::words::light;
 use crate::types::question::letter;
+use darkqa_score::auc::Auc;
+use darkqa_score::calibration::{Calibration, PositionShare, ReliabilityBin};
+use darkqa_score::estimate::Estimate;
+use darkqa_score::findings::Findings;
+use darkqa_score::subject::Subject;
 
 /// Id of the section of the page.
 pub(super) const CONFIDENCE: &str = "confidence";

@@ -2,14 +2,14 @@
 
 use super::pooled::too_few_clusters;
 use super::sections::{ENHANCERS, REAL};
-use crate::score::choice::ReadingMode;
-use crate::score::cluster::ClusterUnit;
-use crate::score::comparison::{Comparison, ComparisonKind, MIN_PAIRS};
-use crate::score::findings::Findings;
-use crate::score::significance::Significance;
 use crate::text::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
 use crate::text::table::{Column, Table, TableBuilder, TableCell, TableFormat};
 use crate::text::words::{counted, name};
+use darkqa_score::choice::ReadingMode;
+use darkqa_score::cluster::ClusterUnit;
+use darkqa_score::comparison::{Comparison, ComparisonKind, MIN_PAIRS};
+use darkqa_score::findings::Findings;
+use darkqa_score::significance::Significance;
 
 /// Maximum number of rows of a kind in the terminal. The CSV file has all rows.
 const MAX_ROWS: usize = 40;

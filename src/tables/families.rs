@@ -1,14 +1,14 @@
 //! The table of accuracy by family, with a row for each subject. Numbers that are shown to be below those of a model without images
 //! are marked.
 
-use crate::score::choice::ReadingMode;
-use crate::score::findings::Findings;
-use crate::score::subject::Subject;
 use crate::text::latex::escaped;
 use crate::text::table::ColumnKind::{Percent, Text};
 use crate::text::table::{ColumnHeads, Table, TableBuilder, TableCell};
 use crate::text::words::family as family_name;
 use crate::types::Family;
+use darkqa_score::choice::ReadingMode;
+use darkqa_score::findings::Findings;
+use darkqa_score::subject::Subject;
 
 pub(super) fn families(findings: &Findings<'_>) -> Table {
     let subjects = findings.grid.subjects.iter().map(Some);

@@ -1,12 +1,12 @@
 //! The table of the similarity of images to their clean frames, and of how well it predicts right answers.
 
-use crate::score::auc::Auc;
-use crate::score::fidelity::{ConditionFidelity, FidelityFindings, Prediction};
-use crate::score::subject::Subject;
 use crate::text::table::ColumnKind::{Count, Number, P, Percent, Ratio, Significance, Text};
 use crate::text::table::{Table, TableBuilder, TableCell};
 use crate::text::words::light;
 use crate::types::View;
+use darkqa_score::auc::Auc;
+use darkqa_score::fidelity::{ConditionFidelity, FidelityFindings, Prediction};
+use darkqa_score::subject::Subject;
 
 /// The measures in the order of [`ConditionFidelity::means`]: name in CSV files, and in text.
 const MEASURES: [(&str, &str); 2] = [("psnr", "PSNR"), ("ssim", "SSIM")];

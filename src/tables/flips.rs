@@ -5,11 +5,11 @@ use std::io::Write;
 use std::ops::Range;
 
 use crate::error::Result;
-use crate::score::findings::Findings;
-use crate::score::flips::FirstFailure;
 use crate::text::csv;
 use crate::text::table::ColumnKind::{Count, Text};
 use crate::text::table::{Table, TableBuilder};
+use darkqa_score::findings::Findings;
+use darkqa_score::flips::FirstFailure;
 
 /// The name of the file.
 pub(crate) const FLIPS: &str = "flips.csv";

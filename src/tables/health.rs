@@ -1,10 +1,10 @@
 //! The table of replies, unreadable replies and failures of each subject.
 
-use crate::score::health::Health;
 use crate::text::table::ColumnKind::{Count, Failures};
 use crate::text::table::{Table, TableBuilder};
 use crate::text::words::percent;
 use crate::types::{FailureKind, UnreadReason};
+use darkqa_score::health::Health;
 
 /// CSV columns of the reasons for unreadable replies, in the order of [`UnreadReason::ALL`].
 const UNREAD: [&str; UnreadReason::ALL.len()] = [

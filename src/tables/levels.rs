@@ -1,8 +1,5 @@
 //! The table of accuracy by level, with a row for each model, variant and enhancer.
 
-use crate::score::accuracy::{AccuracyCell, AccuracySummary};
-use crate::score::choice::ReadingMode;
-use crate::score::findings::Findings;
 use crate::text::ladder::{Ladder, LadderRow};
 use crate::text::table::ColumnKind::Count;
 use crate::text::table::{ColumnKind, Table, TableCell, TableFormat, TableRow};
@@ -10,6 +7,9 @@ use crate::text::terminal::{differing, texts};
 use crate::text::words::{ends, percent};
 use crate::types::UnreadReason;
 use crate::types::degradation::Axis;
+use darkqa_score::accuracy::{AccuracyCell, AccuracySummary};
+use darkqa_score::choice::ReadingMode;
+use darkqa_score::findings::Findings;
 
 /// The tables of all items and, if the models were not asked the same ones, those of the items that they share.
 pub(super) fn levels(findings: &Findings<'_>) -> Vec<Table> {

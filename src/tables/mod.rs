@@ -22,12 +22,12 @@ mod subjects;
 mod summary;
 mod thresholds;
 
-use crate::score::findings::Findings;
-use crate::score::subject::Subject;
 use crate::text::table::ColumnKind::Text;
 use crate::text::table::{Table, TableBuilder, TableCell};
 use crate::text::words::{family, name};
 use crate::types::{EnhancerName, Family, KindReading, ModelListing};
+use darkqa_score::findings::Findings;
+use darkqa_score::subject::Subject;
 
 pub(crate) use answers::{commonest_answers, counted_answers};
 pub(crate) use baseline::BASELINE;

@@ -1,12 +1,12 @@
 //! The tables of the observer: what could still be read in each condition, and its controls.
 
-use crate::score::findings::Findings;
-use crate::score::observed::{ObserverCell, ObserverSummary};
 use crate::text::table::ColumnKind::{Count, Percent, Share, Text};
 use crate::text::table::{Table, TableBuilder, TableFormat};
 use crate::text::words::percent;
 use crate::types::Control;
 use crate::types::control::OBSERVER;
+use darkqa_score::findings::Findings;
+use darkqa_score::observed::{ObserverCell, ObserverSummary};
 
 /// What the observer is, above its table.
 const HEADING: &str = "Known-signal observer (given the untouched frame; not a model)";

@@ -1,10 +1,10 @@
 //! The tables on photographs in the dark: how dark they are, and how far answers agree between lights.
 
 use super::sections::REAL;
-use crate::score::agreement::Agreement;
-use crate::score::pair_darkness::PairDarkness;
 use crate::text::table::ColumnKind::{Count, Number, Ratio, Share, Text};
 use crate::text::table::{Table, TableBuilder};
+use darkqa_score::agreement::Agreement;
+use darkqa_score::pair_darkness::PairDarkness;
 
 /// How dark the photographs are beside their frames, by name.
 pub(super) fn darkness(pairs: &[PairDarkness]) -> Table {

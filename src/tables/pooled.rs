@@ -2,16 +2,16 @@
 
 use std::collections::BTreeSet;
 
-use crate::score::choice::ReadingMode;
-use crate::score::confusion::FalseAnswer;
-use crate::score::findings::Findings;
-use crate::score::pooled::PooledFinding;
-use crate::score::pooled_kind::PooledKind;
-use crate::score::significance::SwapMethod;
 use crate::sentences::left_out;
 use crate::text::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
 use crate::text::table::{Table, TableBuilder};
 use crate::text::words::{counted, light, p};
+use darkqa_score::choice::ReadingMode;
+use darkqa_score::confusion::FalseAnswer;
+use darkqa_score::findings::Findings;
+use darkqa_score::pooled::PooledFinding;
+use darkqa_score::pooled_kind::PooledKind;
+use darkqa_score::significance::SwapMethod;
 
 /// All families together, then by family.
 pub(super) fn pooled(findings: &Findings<'_>) -> Vec<Table> {

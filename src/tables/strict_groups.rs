@@ -1,14 +1,14 @@
 //! The table of the strict score: the share of groups of which all questions are right.
 
-use crate::score::choice::ReadingMode;
-use crate::score::estimate::Estimate;
-use crate::score::findings::Findings;
-use crate::score::strict_score::{GroupCell, GroupChance, StrictScore};
-use crate::score::subject::{CHANCE, Subject};
 use crate::text::table::ColumnKind::{Count, Percent, Share, Text};
 use crate::text::table::{Table, TableBuilder, TableCell, TableFormat};
 use crate::text::words::counted;
 use crate::types::{Family, KindReading, LightGroup};
+use darkqa_score::choice::ReadingMode;
+use darkqa_score::estimate::Estimate;
+use darkqa_score::findings::Findings;
+use darkqa_score::strict_score::{GroupCell, GroupChance, StrictScore};
+use darkqa_score::subject::{CHANCE, Subject};
 
 use super::summary::reading;
 

@@ -1,9 +1,9 @@
 //! The table of the accuracy of every subject, with intervals and counts.
 
-use crate::score::accuracy::AccuracySummary;
-use crate::score::choice::ReadingMode;
 use crate::text::table::ColumnKind::{Count, Percent, Share, Text};
 use crate::text::table::{Table, TableBuilder, TableCell};
+use darkqa_score::accuracy::AccuracySummary;
+use darkqa_score::choice::ReadingMode;
 
 pub(super) fn subjects(summary: &AccuracySummary) -> Table {
     let mut table = TableBuilder::new("subjects", summary.of(None, ReadingMode::Strict))

@@ -1,11 +1,11 @@
 //! The table of all accuracies: `summary.csv` and the rows of `summary.json`.
 
-use crate::score::accuracy::{AccuracyCell, AccuracySummary};
-use crate::score::choice::ReadingMode;
-use crate::score::subject::Subject;
 use crate::text::table::ColumnKind::{Count, Share, Text};
 use crate::text::table::{SUMMARY, Table, TableBuilder, TableCell};
 use crate::types::{LightGroup, ModelListing, PairDark};
+use darkqa_score::accuracy::{AccuracyCell, AccuracySummary};
+use darkqa_score::choice::ReadingMode;
+use darkqa_score::subject::Subject;
 
 /// A row for each accuracy.
 pub(crate) fn summary(summary: &AccuracySummary, listing: &ModelListing) -> Table {

@@ -2,15 +2,15 @@
 
 use std::collections::BTreeSet;
 
-use crate::score::choice::ReadingMode;
-use crate::score::curve::Curve;
-use crate::score::findings::Findings;
-use crate::score::threshold::{CurveSummary, NoThreshold, ThinLevel};
 use crate::text::table::ColumnKind::{Number, Share, Text, Threshold};
 use crate::text::table::{Table, TableBuilder, TableCell};
 use crate::text::words::{counted, light};
 use crate::types::AxisLevel;
 use crate::types::degradation::Axis;
+use darkqa_score::choice::ReadingMode;
+use darkqa_score::curve::Curve;
+use darkqa_score::findings::Findings;
+use darkqa_score::threshold::{CurveSummary, NoThreshold, ThinLevel};
 
 pub(super) fn thresholds(findings: &Findings<'_>) -> Vec<Table> {
     let mut tables = Vec::new();

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::score::grid::Grid;
 use crate::text::words::counted;
 use crate::types::{FrameId, SentImages};
+use darkqa_score::grid::Grid;
 
 /// The number of frames that were asked about; where some stand for several images, as `3 frames (2 of 2 to 4 images)`.
 pub(crate) fn frames(grid: &Grid<'_>) -> String {

@@ -2,9 +2,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::score::findings::Findings;
-use crate::score::pair_darkness::PairDarkness;
-use crate::score::subject::Subject;
 use crate::text::table::ColumnKind::Text;
 use crate::text::table::{ColumnKind, TableBuilder, TableCell, TableFormat};
 use crate::text::words::light;
@@ -12,6 +9,9 @@ use crate::types::degradation::{Axis, Kind};
 use crate::types::{
     AxisLevel, EnhancerName, KindReading, LightGroup, ModelListing, SetLight, View,
 };
+use darkqa_score::findings::Findings;
+use darkqa_score::pair_darkness::PairDarkness;
+use darkqa_score::subject::Subject;
 
 /// A model in one variant, raw or with one enhancer.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]

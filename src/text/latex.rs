@@ -2,11 +2,11 @@
 
 use std::fmt::Write;
 
-use crate::score::estimate::Estimate;
-use crate::score::significance::Significance;
 use crate::text::table::{Column, ColumnKind, Table, TableCell, TableFormat};
 use crate::text::words::{interval, percent, points, words};
 use crate::types::shown_text::shown;
+use darkqa_score::estimate::Estimate;
+use darkqa_score::significance::Significance;
 
 /// The findings as a list, then all tables that have a LaTeX caption; `head` names them in the first comment line.
 #[must_use]

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use serde::Serialize;
 
-use crate::score::subject::Subject;
 use crate::types::ReadingName;
+use darkqa_score::subject::Subject;
 
 /// The light readings of the subjects with noise, `paper` first.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]

@@ -1,9 +1,9 @@
 //! One table of a report: [`Table`], its [`Column`]s and [`TableCell`]s. It holds numbers. The modules that write it format
 //! them: `csv`, `latex` and `terminal` here, the JSON and the page of a report.
 
-use crate::score::estimate::Estimate;
-use crate::score::significance::Significance;
-use crate::score::threshold::Threshold;
+use darkqa_score::estimate::Estimate;
+use darkqa_score::significance::Significance;
+use darkqa_score::threshold::Threshold;
 
 /// Name of the table of all accuracies, whose numbers are written with all their digits.
 pub(crate) const SUMMARY: &str = "summary";

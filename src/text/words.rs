@@ -1,9 +1,9 @@
 //! Names and numbers as text: [`light`], [`family`], [`percent`] and others, and [`words`] for any cell.
 
-use crate::score::estimate::Estimate;
-use crate::score::subject::Subject;
 use crate::text::table::{ColumnKind, TableCell};
 use crate::types::{EnhancerName, Family, KindReading};
+use darkqa_score::estimate::Estimate;
+use darkqa_score::subject::Subject;
 
 /// A variant in words, with its enhancer.
 pub(crate) fn light(variant: &KindReading, enhancer: Option<&EnhancerName>) -> String {

@@ -6,17 +6,25 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use darkqa_eval::internals::picture::{Payload, PayloadFormat, bilinear};
-use darkqa_eval::internals::score::{psnr, ssim};
-use darkqa_eval::internals::synthesis::{
-    Negative, Term, add_noise, blur, blurred_codes, expose, expose_into, ladder as develop_ladder,
-    unprocess,
-};
-use darkqa_eval::synthesis::{
+use darkqa_ground::types::{FrameId, Rgb, Severity};
+use darkqa_light::blur::blur;
+use darkqa_light::blur::blurred_codes;
+use darkqa_light::exposure::expose;
+use darkqa_light::exposure::expose_into;
+use darkqa_light::negative::Negative;
+use darkqa_light::negative::ladder as develop_ladder;
+use darkqa_light::noise::Term;
+use darkqa_light::noise::add as add_noise;
+use darkqa_light::unprocess::unprocess;
+use darkqa_light::{
     Amplify, AppliedDegradation, AutoExposure, CameraModel, Draws, Exposures, FrameView,
     LightReading, Motion, NoiseKey, Streak, Synthesis,
 };
-use darkqa_eval::types::{FrameId, Rgb, Severity};
+use darkqa_picture::Payload;
+use darkqa_picture::PayloadFormat;
+use darkqa_picture::bilinear;
+use darkqa_score::realism::psnr;
+use darkqa_score::realism::ssim::ssim;
 
 /// A frame with edges, ramps and some texture, made by integer arithmetic.
 #[expect(clippy::unwrap_used, reason = "the size fits the samples")]

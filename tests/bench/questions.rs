@@ -8,10 +8,12 @@ use std::sync::Arc;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use darkqa_eval::internals::dataset::Dataset;
-use darkqa_eval::internals::questions::{Palette, Rules, measure};
-use darkqa_eval::types::{
+use darkqa_ground::types::{
     DepthKind, Digest, Frame, FrameId, Intrinsics, Label, Labels, Rgb, Segmentation,
 };
+use darkqa_questions::colors::Palette;
+use darkqa_questions::rules::Rules;
+use darkqa_questions::statistics::measure;
 use image::{ImageBuffer, Luma, RgbImage};
 use ndarray::Array2;
 

@@ -17,10 +17,11 @@ use std::hint::black_box;
 use criterion::{Criterion, criterion_group, criterion_main};
 use darkqa_eval::Kind;
 use darkqa_eval::internals::report::{ChoiceReport, PageInputs, products};
-use darkqa_eval::internals::score::{Findings, FrameTies};
-use darkqa_eval::types::{
+use darkqa_ground::types::{
     ChoiceDetail, Condition, Degradation, Digest, Family, Record, Severity, Trials,
 };
+use darkqa_score::cluster::FrameTies;
+use darkqa_score::findings::Findings;
 use made::record;
 
 /// Eleven conditions of five models on four questions about each of 456 frames: 100,320 records.

@@ -8,8 +8,12 @@
 use std::hint::black_box;
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
-use darkqa_eval::internals::questions::{ObservedFrame, Palette, Rules};
-use darkqa_eval::internals::rooms::{Room, Rooms, labels};
+use darkqa_questions::colors::Palette;
+use darkqa_questions::observer::ObservedFrame;
+use darkqa_questions::rules::Rules;
+use darkqa_scenes::Room;
+use darkqa_scenes::Rooms;
+use darkqa_scenes::labels;
 
 const SIZES: [[usize; 2]; 2] = [[640, 480], [1280, 720]];
 

@@ -12,10 +12,11 @@ use darkqa_eval::internals::ask::{
     Parameters, Prompts, Query, Random, Remote, Script, Secret, Sending, Temperature, TokenField,
     WireSetting,
 };
-use darkqa_eval::internals::picture::{Payload, PayloadFormat};
-use darkqa_eval::types::{
+use darkqa_ground::types::{
     Choices, Digest, FailureKind, Family, Finish, FrameId, Question, QuestionId, Reply, Rgb, View,
 };
+use darkqa_picture::Payload;
+use darkqa_picture::PayloadFormat;
 use serde_json::{Value, json};
 
 const KEY: &str = "sk-very-secret-0123";

@@ -8,10 +8,14 @@
 )]
 
 use crate::support::made::record;
-use darkqa_eval::internals::score::{
-    Calibration, Clusters, Estimate, FrameTies, Grid, Resamples, calibrations,
-};
-use darkqa_eval::types::{Condition, OptionProbabilities, Record};
+use darkqa_ground::types::{Condition, OptionProbabilities, Record};
+use darkqa_score::bootstrap::Resamples;
+use darkqa_score::calibration::Calibration;
+use darkqa_score::calibration::calibrations;
+use darkqa_score::cluster::Clusters;
+use darkqa_score::cluster::FrameTies;
+use darkqa_score::estimate::Estimate;
+use darkqa_score::grid::Grid;
 use rand::rngs::StdRng;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::{Beta, Distribution as _};

@@ -7,8 +7,8 @@ use std::process::Command;
 use crate::support::run::{Called, PROGRAM, called};
 use crate::support::table::check_rows;
 use darkqa_eval::internals::dataset::{DataPlace, Dataset, SetArgs};
-use darkqa_eval::internals::synthesis::expose;
-use darkqa_eval::types::{Question, Rgb, Severity};
+use darkqa_ground::types::{Question, Rgb, Severity};
+use darkqa_light::exposure::expose;
 use image::{Rgb as Pixel, RgbImage};
 use tempfile::TempDir;
 

@@ -4,8 +4,10 @@ use std::fs;
 
 use crate::support::made::record;
 use crate::support::run::{Bench, records, words};
-use darkqa_eval::internals::score::{FidelityFindings, Findings, FrameTies};
-use darkqa_eval::types::{Condition, Digest, ImageFacts, ImageFidelity, Record};
+use darkqa_ground::types::{Condition, Digest, ImageFacts, ImageFidelity, Record};
+use darkqa_score::cluster::FrameTies;
+use darkqa_score::fidelity::FidelityFindings;
+use darkqa_score::findings::Findings;
 use rand::rngs::StdRng;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::{Beta, Distribution as _, Normal};

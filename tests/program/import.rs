@@ -7,7 +7,7 @@ use std::process::Command;
 use crate::support::run::{Called, PROGRAM, called};
 use crate::support::table::check_rows;
 use darkqa_eval::internals::dataset::Dataset;
-use darkqa_eval::types::{DepthKind, Frame, FrameId};
+use darkqa_ground::types::{DepthKind, Frame, FrameId};
 use image::{GrayImage, ImageBuffer, Luma, Rgb, RgbImage, Rgba, RgbaImage};
 use serde_json::Value;
 use tempfile::TempDir;

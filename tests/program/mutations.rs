@@ -9,7 +9,9 @@ use std::io::Cursor;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use darkqa_eval::internals::picture::{ImageFile, MOST_PIXELS, ReadingRule};
+use darkqa_picture::ImageFile;
+use darkqa_picture::ReadingRule;
+use darkqa_picture::reading_rule::MOST_PIXELS;
 use image::{DynamicImage, ImageFormat, Rgb};
 
 use exr::prelude::Compression;

@@ -14,7 +14,7 @@ use crate::support::run::{Bench, called, records, words};
 use crate::support::table::check_rows;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use darkqa_eval::types::Digest;
+use darkqa_ground::types::Digest;
 use serde_json::{Value, json};
 
 /// The lines of a file of JSON objects.

@@ -8,7 +8,7 @@ use std::process::Command;
 
 use crate::support::run::{PROGRAM, called};
 use crate::support::table::check_rows;
-use darkqa_eval::internals::labels::space;
+use darkqa_ground::labels::space;
 use image::{GrayImage, ImageBuffer, Luma, Rgb, RgbImage};
 use serde_json::{Value, json};
 use tempfile::TempDir;

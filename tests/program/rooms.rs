@@ -6,12 +6,21 @@ use std::sync::LazyLock;
 use crate::support::run::{Bench, records, words};
 use crate::support::table::check_rows;
 use darkqa_eval::internals::dataset::{DataPlace, Dataset};
-use darkqa_eval::internals::questions::{
-    BalanceMode, ClassFlag, Palette, RoomSource, RuleResult, Rules, measure,
-};
-use darkqa_eval::internals::rooms::{Room, RoomTruth, Rooms, ThingTruth, VERSION, labels};
-use darkqa_eval::questions::{Generated, GeneratedQuestion, QuestionRequest, generate};
-use darkqa_eval::types::{Digest, Family, Frame, FrameId};
+use darkqa_ground::types::{Digest, Family, Frame, FrameId};
+use darkqa_questions::balance::BalanceMode;
+use darkqa_questions::colors::Palette;
+use darkqa_questions::room::RoomSource;
+use darkqa_questions::rule_context::RuleResult;
+use darkqa_questions::rules::ClassFlag;
+use darkqa_questions::rules::Rules;
+use darkqa_questions::statistics::measure;
+use darkqa_questions::{Generated, GeneratedQuestion, QuestionRequest, generate};
+use darkqa_scenes::Room;
+use darkqa_scenes::RoomTruth;
+use darkqa_scenes::Rooms;
+use darkqa_scenes::ThingTruth;
+use darkqa_scenes::VERSION;
+use darkqa_scenes::labels;
 use rayon::prelude::*;
 
 /// What is seen of a frame by number, and what its generator knows of it.

@@ -15,16 +15,28 @@ use std::fmt::Write as _;
 use crate::support::made::record;
 use crate::support::table::check_rows;
 use darkqa_eval::Kind;
-use darkqa_eval::internals::score::{
-    AnswerOutcome, Baseline, ClusterCount, Clusters, Estimate, Findings, FrameTies, Grid, Group,
-    OpenSummary, PairedComparison, QuestionGroups, Resamples, ScoredAnswer, Subject, curves,
-    open_summary,
-};
-use darkqa_eval::score::choice::ReadingMode;
-use darkqa_eval::types::{
+use darkqa_ground::types::{
     AnswerReading, AxisLevel, Condition, Degradation, EnhancerName, Family, KindReading, Record,
     Severity,
 };
+use darkqa_score::bootstrap::Resamples;
+use darkqa_score::choice::ReadingMode;
+use darkqa_score::cluster::Clusters;
+use darkqa_score::cluster::FrameTies;
+use darkqa_score::curve::curves;
+use darkqa_score::estimate::ClusterCount;
+use darkqa_score::estimate::Estimate;
+use darkqa_score::findings::Findings;
+use darkqa_score::grid::Grid;
+use darkqa_score::open::AnswerOutcome;
+use darkqa_score::open::Baseline;
+use darkqa_score::open::Group;
+use darkqa_score::open::OpenSummary;
+use darkqa_score::open::QuestionGroups;
+use darkqa_score::open::ScoredAnswer;
+use darkqa_score::open::open_summary;
+use darkqa_score::paired::PairedComparison;
+use darkqa_score::subject::Subject;
 use rand::rngs::StdRng;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::{Beta, Distribution as _};
@@ -410,7 +422,7 @@ fn a_made_set_gives_the_papers_arithmetic() {
     }
     let offers = records
         .iter()
-        .map(|record| darkqa_eval::internals::score::OfferedChoices {
+        .map(|record| darkqa_score::chance::OfferedChoices {
             family: record.detail.family.clone(),
             choices: record.detail.choices.len(),
             orders: 1,

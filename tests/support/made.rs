@@ -1,6 +1,6 @@
 //! Records whose truth is known, as a run would have kept them.
 
-use darkqa_eval::types::{
+use darkqa_ground::types::{
     AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, QuestionId, Record,
     TrialOutcome,
 };

@@ -33,5 +33,5 @@ pub fn forbid_telemetry() {
     static ONCE: std::sync::Once = std::sync::Once::new();
     // SAFETY: the tests read the environment through the standard library, which locks it; ONNX Runtime, which does not,
     // is opened after this call alone, by every thread that opens it.
-    ONCE.call_once(|| unsafe { darkqa_eval::enhance::forbid_telemetry() });
+    ONCE.call_once(|| unsafe { darkqa_enhance::forbid_telemetry() });
 }

@@ -87,7 +87,7 @@ impl ReadingMode {
 /// nothing to read: the reason is then [`UnreadReason::Truncated`].
 ///
 /// ```
-/// use darkqa_score::choice::{ReadingMode, read};
+/// use darkqa_choice::{ReadingMode, read};
 /// use darkqa_ground::types::{Answer, Choices, UnreadReason};
 ///
 /// let choices = Choices::new(vec!["kitchen".into(), "bedroom".into()], 0)?;

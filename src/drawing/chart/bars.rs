@@ -1,7 +1,7 @@
 //! A figure of bars: shares that lie on no axis, as those of photographs in the dark, raw and enhanced ([`BarChart`]).
 
 use super::LineStyle;
-use crate::score::estimate::Estimate;
+use darkqa_score::estimate::Estimate;
 
 /// One bar.
 #[derive(Debug, Clone)]

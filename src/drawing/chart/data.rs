@@ -4,10 +4,10 @@ use serde::Serialize;
 
 use super::{Chart, PanelContent, PlotLine};
 use crate::error::Result;
-use crate::score::estimate::Estimate;
 use crate::text::script::embedded;
 use crate::text::words::{percent, with_interval};
 use crate::types::degradation::Axis;
+use darkqa_score::estimate::Estimate;
 
 /// A chart as data. Shares are between 0 and 1; texts are those of tables, so that the script rounds nothing.
 #[derive(Debug, Clone, Serialize)]

@@ -1,7 +1,7 @@
 //! A figure of accuracy over confidence: [`ReliabilityChart`].
 
 use super::LineStyle;
-use crate::score::estimate::Estimate;
+use darkqa_score::estimate::Estimate;
 
 /// The bins of one condition.
 #[derive(Debug, Clone)]

@@ -1,7 +1,7 @@
 //! A figure of thresholds, a row for each curve: [`ThresholdChart`].
 
-use crate::score::threshold::Threshold;
 use crate::types::degradation::Axis;
+use darkqa_score::threshold::Threshold;
 
 /// The scale of an axis: the exposure drops to L5, the darkest named level, or the exposure times of the ladder.
 #[derive(Debug, Clone)]

@@ -2,10 +2,10 @@
 
 use super::Overview;
 use crate::drawing::chart::{Chart, LineStyle, Panel, PanelContent, PlotLine};
-use crate::score::confusion::{Confusion, Hallucination};
-use crate::score::estimate::Estimate;
 use crate::text::words::family as family_name;
 use crate::types::Family;
+use darkqa_score::confusion::{Confusion, Hallucination};
+use darkqa_score::estimate::Estimate;
 
 impl Overview<'_> {
     pub(super) fn hallucination(&self) -> Option<(String, Chart)> {

@@ -2,8 +2,8 @@
 
 use super::Overview;
 use crate::drawing::chart::{Chart, LineStyle, Panel, PanelContent, PlotLine};
-use crate::score::calibration::Calibration;
-use crate::score::estimate::Estimate;
+use darkqa_score::calibration::Calibration;
+use darkqa_score::estimate::Estimate;
 
 /// A quantity of the figure.
 type Quantity = fn(&Calibration) -> Estimate;

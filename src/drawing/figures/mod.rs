@@ -13,13 +13,13 @@ use std::collections::BTreeSet;
 
 use crate::drawing::chart::drawn::Drawn;
 use crate::drawing::chart::{Chart, DarkMark, LineStyle, Panel, PanelContent, PlotLine};
-use crate::score::choice::ReadingMode;
-use crate::score::estimate::Estimate;
-use crate::score::findings::Findings;
-use crate::score::subject::{CHANCE, Subject, judged};
 use crate::text::words::{counted, family as family_name, light_with};
 use crate::types::degradation::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
+use darkqa_score::choice::ReadingMode;
+use darkqa_score::estimate::Estimate;
+use darkqa_score::findings::Findings;
+use darkqa_score::subject::{CHANCE, Subject, judged};
 
 pub(crate) use names::{KnownNames, Names};
 pub(crate) use overview::{OverviewPanels, overview};

@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::error::{Error, Result};
-use crate::score::findings::Findings;
 use crate::text::words::family as family_name;
+use darkqa_score::findings::Findings;
 
 /// Names as a reader wants them in figures; by default as they are.
 #[derive(Debug, Clone, Default)]

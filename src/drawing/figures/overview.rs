@@ -4,10 +4,10 @@ use std::fmt::Write;
 
 use super::{ACCURACY, Names, Overview};
 use crate::drawing::chart::{Chart, LineStyle, Panel, PanelContent, PlotLine};
-use crate::score::findings::Findings;
-use crate::score::subject::{CHANCE, pooled_models};
 use crate::types::degradation::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, KindReading};
+use darkqa_score::findings::Findings;
+use darkqa_score::subject::{CHANCE, pooled_models};
 
 /// A chart with its caption, or the reason why there is none.
 pub(crate) type PanelChart = Result<(String, Chart), &'static str>;

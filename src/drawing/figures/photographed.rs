@@ -4,8 +4,8 @@ use super::{Drawing, Overview};
 use crate::drawing::chart::LineStyle;
 use crate::drawing::chart::bars::{Bar, BarChart, BarPanel};
 use crate::drawing::chart::drawn::Drawn;
-use crate::score::choice::ReadingMode;
 use crate::types::{SetLight, View};
+use darkqa_score::choice::ReadingMode;
 
 impl Overview<'_> {
     /// The accuracy of each model as photographed, raw and with each enhancer; `None` for sets in the light, which have curves.

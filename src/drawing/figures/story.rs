@@ -2,10 +2,10 @@
 
 use super::{Names, Overview};
 use crate::drawing::chart::{LineStyle, PanelContent, PlotLine};
-use crate::score::findings::Findings;
-use crate::score::subject::CHANCE;
 use crate::text::words::light;
 use crate::types::{EnhancerName, KindReading};
+use darkqa_score::findings::Findings;
+use darkqa_score::subject::CHANCE;
 
 /// Accuracy over the levels in one variant: each model raw, and each with each enhancer.
 #[derive(Debug, Clone)]

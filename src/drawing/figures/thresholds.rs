@@ -5,11 +5,11 @@ use std::collections::BTreeSet;
 use super::{Drawing, Overview};
 use crate::drawing::chart::drawn::Drawn;
 use crate::drawing::chart::thresholds::{Scale, ThresholdChart, ThresholdRow};
-use crate::score::curve::Curve;
-use crate::score::findings::Findings;
 use crate::tables::level_words;
 use crate::text::words::stops;
 use crate::types::degradation::Axis;
+use darkqa_score::curve::Curve;
+use darkqa_score::findings::Findings;
 
 /// The names of the figures.
 const NAMES: [(&str, Axis); 2] = [

@@ -6,8 +6,8 @@ use super::look::{Look, Pen};
 use super::sheet::{Mark, PAPER, Place, Sheet, Stroke};
 use super::title::Title;
 use crate::drawing::chart::{Chart, DarkMark, LineStyle, Panel, PanelContent, PlotLine};
-use crate::score::estimate::Estimate;
 use crate::types::AxisLevel;
+use darkqa_score::estimate::Estimate;
 
 /// Least width of a panel, in heights of letters.
 const LEAST: f64 = 14.0;

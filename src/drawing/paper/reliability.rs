@@ -125,7 +125,7 @@ mod tests {
     use crate::drawing::chart::reliability::ReliabilityLine;
     use crate::drawing::paper::Palette;
     use crate::drawing::paper::sheet::Mark;
-    use crate::score::estimate::Estimate;
+    use darkqa_score::estimate::Estimate;
 
     #[test]
     fn a_bin_lies_where_the_axes_say_and_its_interval_stands_beside() {

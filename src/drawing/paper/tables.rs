@@ -330,8 +330,8 @@ fn breaking(table: &Table, width: f64) -> String {
 mod tests {
     use super::*;
     use crate::drawing::paper::Palette;
-    use crate::score::estimate::Estimate;
     use crate::text::table::ColumnHeads;
+    use darkqa_score::estimate::Estimate;
 
     fn table(names: &[&str], columns: usize) -> Table {
         let cell = TableCell::Below(Estimate {

@@ -251,9 +251,9 @@ fn write_labels(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::score::estimate::Estimate;
     use crate::types::Severity;
     use crate::types::degradation::Kind;
+    use darkqa_score::estimate::Estimate;
 
     fn level(severity: Severity) -> AxisLevel {
         AxisLevel::new(Kind::ALL[0], severity)

@@ -5,7 +5,7 @@ mod real;
 mod reliability;
 
 use crate::drawing::figures::Drawing;
-use crate::score::findings::Findings;
+use darkqa_score::findings::Findings;
 
 /// The figures for which there are data.
 pub(crate) fn drawings(findings: &Findings<'_>) -> impl Iterator<Item = Drawing> {

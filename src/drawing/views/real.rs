@@ -4,10 +4,10 @@ use crate::drawing::chart::LineStyle;
 use crate::drawing::chart::bars::{Bar, BarChart, BarPanel};
 use crate::drawing::chart::drawn::Drawn;
 use crate::drawing::figures::Drawing;
-use crate::score::choice::ReadingMode;
-use crate::score::comparison::ComparisonKind;
-use crate::score::findings::Findings;
-use crate::score::subject::Subject;
+use darkqa_score::choice::ReadingMode;
+use darkqa_score::comparison::ComparisonKind;
+use darkqa_score::findings::Findings;
+use darkqa_score::subject::Subject;
 
 /// Accuracy of each model in the light, on photographs in the dark, on synthetic images that are as dark, and on enhanced
 /// photographs; `None` where no scene was photographed in the dark.

@@ -6,10 +6,10 @@ use crate::drawing::chart::LineStyle;
 use crate::drawing::chart::drawn::Drawn;
 use crate::drawing::chart::reliability::{ReliabilityChart, ReliabilityLine, ReliabilityPanel};
 use crate::drawing::figures::Drawing;
-use crate::score::calibration::Calibration;
-use crate::score::findings::Findings;
 use crate::text::words::light;
 use crate::types::AxisLevel;
+use darkqa_score::calibration::Calibration;
+use darkqa_score::findings::Findings;
 
 /// Most levels of a panel: L0, the darkest, and what lies between, spread.
 const MOST_LEVELS: usize = 4;

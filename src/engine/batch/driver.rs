@@ -20,10 +20,10 @@ use crate::engine::models::ModelUnderTest;
 use crate::engine::money::MoneySettings;
 use crate::error::{Error, Result};
 use crate::images::progress::Progress;
-use crate::score::record::Detail;
 use crate::store::Store;
 use crate::types::TrialKey;
 use crate::types::manifest::RunManifest;
+use darkqa_score::record::Detail;
 
 /// How many times as long as at first the wait between two looks may become; chosen: 5 minutes with the default of 10 s.
 const LONGEST_WAIT: u32 = 30;

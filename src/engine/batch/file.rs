@@ -10,9 +10,9 @@ use super::event::PartFacts;
 use super::journal::Journal;
 use crate::ask::TokenBound;
 use crate::error::{Error, Result};
-use crate::score::record::Detail;
 use crate::store::Store;
 use crate::types::Record;
+use darkqa_score::record::Detail;
 
 /// Extension of a file until it is complete.
 pub(super) const PART: &str = "part";

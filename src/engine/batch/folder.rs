@@ -18,9 +18,9 @@ use crate::ask::{AccessArgs, Endpoint, Sending};
 use crate::error::{Error, Result};
 use crate::images::progress::Progress;
 use crate::images::workers::unstarted;
-use crate::score::record::Detail;
 use crate::store::Store;
 use crate::types::manifest::RunManifest;
+use darkqa_score::record::Detail;
 
 /// What is done with the batches of a folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -14,9 +14,9 @@ use super::part::Stage;
 use super::split::PIECE;
 use super::take_over::{for_each_line, key_of};
 use crate::error::{Error, Result};
-use crate::score::record::Detail;
 use crate::store::Store;
 use crate::types::TrialKey;
+use darkqa_score::record::Detail;
 
 /// Completes the files of parts whose requests the run has recorded, as far as it has; deletes the others.
 pub(super) fn recover<D: Detail>(journal: &mut Journal, store: &Store<D>) -> Result<()> {

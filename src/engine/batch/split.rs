@@ -10,7 +10,7 @@ use super::event::{Event, PartFacts, Piece};
 use super::file::hexadecimal;
 use super::take_over::for_each_line;
 use crate::error::{Error, Result};
-use crate::score::record::Detail;
+use darkqa_score::record::Detail;
 
 /// Extension of a piece until the journal has it.
 pub(super) const PIECE: &str = "split";

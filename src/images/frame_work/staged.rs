@@ -5,7 +5,6 @@ use std::time::{Duration, Instant};
 
 use super::FrameWork;
 use super::pairs::{Resolved, paired};
-use crate::enhance::ImageUse;
 use crate::error::Result;
 use crate::images::image_notes::similarity;
 use crate::images::image_steps::ImageSteps;
@@ -13,6 +12,7 @@ use crate::images::stored_images::{MadeNotes, Needed, Similarity, StoredPlace};
 use crate::images::timings::TimedStep;
 use crate::picture::Payload;
 use crate::types::{Condition, EnhancerName, ExposureFacts, InputNote, PairFacts, Rgb};
+use darkqa_enhance::ImageUse;
 
 /// An image as it is sent, with what is known about it.
 pub(crate) struct MadeImage<'a> {

@@ -4,7 +4,6 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::ImagePipeline;
-use crate::enhance::{Enhancer, Findings, Stopper, Usage};
 use crate::error::Result;
 use crate::images::dark_frames::{DarkFrames, dark_frames};
 use crate::images::enhancers::{EnhancerRunArgs, Model};
@@ -14,6 +13,7 @@ use crate::images::source::Source;
 use crate::images::stored_findings::FindingsPlace;
 use crate::images::timings::TimedStep;
 use crate::types::EnhancerName;
+use darkqa_enhance::{Enhancer, Findings, Stopper, Usage};
 
 /// What ends the runs of an enhancer from another thread.
 pub(crate) enum EnhancerStopper {

@@ -5,7 +5,6 @@ use std::num::NonZeroUsize;
 
 use super::{ImagePipeline, one_frame_each};
 use crate::ask::ImageLimit;
-use crate::enhance::{Enhancer, FRAMES, sets_in_memory};
 use crate::error::Result;
 use crate::images::dark_frames::{darkened, evenly};
 use crate::images::frame_work::FrameWork;
@@ -14,6 +13,7 @@ use crate::images::source::{Source, SourceFrame};
 use crate::images::stored_images::Needed;
 use crate::images::workers::Workers;
 use crate::types::{ImageFacts, Rgb};
+use darkqa_enhance::{Enhancer, FRAMES, sets_in_memory};
 
 /// Size in bytes above which some servers and proxies refuse an image.
 const LARGE_IMAGE: usize = 5_000_000;

@@ -10,7 +10,7 @@ use crate::images::timings::Timings;
 use crate::images::walk::{CameraOf, DegradedAt};
 use crate::picture::PayloadFormat;
 use crate::picture::Scaling;
-use crate::synthesis::KindSettings;
+use darkqa_light::KindSettings;
 
 /// A folder with one frame as a plain PNG file, and the frame as a source.
 fn frame() -> (tempfile::TempDir, Dataset, Source) {

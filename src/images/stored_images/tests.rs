@@ -1,13 +1,13 @@
 use std::num::NonZeroUsize;
 
 use super::*;
-use crate::enhance::SizeArgs;
 use crate::files::folder_access::FolderAccess;
 use crate::images::source::SourceFrame;
 use crate::images::walk::{CameraOf, DegradedAt};
 use crate::picture::Scaling;
-use crate::synthesis::KindSettings;
 use crate::types::{Digest, EnhancerName, InputNote};
+use darkqa_enhance::SizeArgs;
+use darkqa_light::KindSettings;
 
 fn recipe() -> Recipe {
     Recipe {
@@ -29,7 +29,7 @@ fn frame() -> SourceFrame {
 
 fn sizes() -> SizeArgs {
     SizeArgs {
-        tile: crate::enhance::Tiling::Auto,
+        tile: darkqa_enhance::Tiling::Auto,
         llie_max_side: None,
         llie_resize: false,
     }
@@ -99,7 +99,7 @@ fn every_part_of_what_decides_an_image_gives_another_key() {
         changed(|recipe| recipe.camera_of = CameraOf::Episode),
         changed(|recipe| recipe.enhancers[0].1 = Digest::of(b"another file")),
         made_by("2", |_| {}),
-        made_by("1", |sizes| sizes.tile = crate::enhance::Tiling::Whole),
+        made_by("1", |sizes| sizes.tile = darkqa_enhance::Tiling::Whole),
         made_by("1", |sizes| sizes.llie_max_side = NonZeroUsize::new(64)),
         made_by("1", |sizes| sizes.llie_resize = true),
         of(&frame(), "L4-noise+one"),
@@ -119,7 +119,7 @@ fn every_part_of_what_decides_an_image_gives_another_key() {
 fn what_decides_no_degraded_image_leaves_its_key() {
     let of = |maker: &Maker| key(&recipe(), &frame(), "L3-noise", maker);
     let whole = SizeArgs {
-        tile: crate::enhance::Tiling::Whole,
+        tile: darkqa_enhance::Tiling::Whole,
         ..sizes()
     };
     let without = of(&Maker::new(None, &sizes()));

@@ -1,7 +1,7 @@
 //! Counts of scored and unscored answers, in lines: [`coverage`].
 
 use super::open_report::OpenReport;
-use crate::score::open::{Group, OpenCell};
+use darkqa_score::open::{Group, OpenCell};
 
 /// Lines with the number of scored answers, and of answers by every other outcome that occurs.
 #[must_use]

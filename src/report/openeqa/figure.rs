@@ -6,9 +6,9 @@ use crate::drawing::chart::drawn::Drawn;
 use crate::drawing::chart::{Chart, Figure, LineStyle, Panel, PanelContent, PlotLine};
 use crate::drawing::paper::figure;
 use crate::error::Result;
-use crate::score::open::{Group, OpenCell};
 use crate::text::ladder::Ladder;
 use crate::types::AxisLevel;
+use darkqa_score::open::{Group, OpenCell};
 
 /// Scores by level: all questions together, and by category if there are several.
 pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {

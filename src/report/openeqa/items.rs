@@ -8,10 +8,10 @@ use crate::report::page::data::{
     ABSENT, Distinct, FAILED, Item, PageData, PageKind, Question, SizeLimit, Subject, UNREAD,
     levels, packed_by, shortened, sizes, thumbnails,
 };
-use crate::score::open::{AnswerOutcome, Group};
-use crate::score::subject;
 use crate::text::words;
 use crate::types::{AxisLevel, View};
+use darkqa_score::open::{AnswerOutcome, Group};
+use darkqa_score::subject;
 
 /// Why an answer has no mark, by the index that `why` has of it.
 const REASONS: [&str; 3] = ["", "the judge’s reply has no mark", "no judge was asked"];

@@ -1,13 +1,13 @@
 //! The data of a report on open questions: [`OpenReport`].
 
-use crate::score::choice::llm_match::Protocol;
-use crate::score::open::{AnswerOutcome, OpenSummary};
-use crate::score::subject::Subject;
 use crate::tables::EnhancerRow;
 use crate::text::alert::Alert;
 use crate::text::light_readings::LightReadings;
 use crate::types::manifest::RunManifest;
 use crate::types::{RunQuestion, Thumbnail};
+use darkqa_score::choice::llm_match::Protocol;
+use darkqa_score::open::{AnswerOutcome, OpenSummary};
+use darkqa_score::subject::Subject;
 
 /// Everything that a report on open questions shows.
 #[derive(Debug, Clone)]

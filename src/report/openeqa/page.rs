@@ -9,9 +9,9 @@ use super::tables::SECTION;
 use crate::drawing::chart::Figure;
 use crate::error::Result;
 use crate::report::page::{OpenContent, page_of_open_questions};
-use crate::score::open::AnswerOutcome;
 use crate::tables::Section;
 use crate::text::table::Table;
+use darkqa_score::open::AnswerOutcome;
 
 /// The sections of the page before the items.
 const SECTIONS: [Section; 1] = [(SECTION, "Scores", "", &["scores", "categories"])];

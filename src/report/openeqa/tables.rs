@@ -1,9 +1,6 @@
 //! Tables of a run of open questions: [`tables`].
 
 use super::open_report::OpenReport;
-use crate::score::estimate::Estimate;
-use crate::score::open::{Baseline, Group, OpenCell, OpenSummary};
-use crate::score::subject::Subject;
 use crate::tables::{enhancers, reading};
 use crate::text::ladder::{Ladder, Series, SeriesByLevel};
 use crate::text::latex::escaped;
@@ -13,6 +10,9 @@ use crate::text::table::{ColumnKind, Table, TableBuilder, TableCell};
 use crate::text::terminal::texts;
 use crate::text::words::ends;
 use crate::types::degradation::Axis;
+use darkqa_score::estimate::Estimate;
+use darkqa_score::open::{Baseline, Group, OpenCell, OpenSummary};
+use darkqa_score::subject::Subject;
 
 /// Name of the page section that has all tables.
 pub(super) const SECTION: &str = "scores";

@@ -6,8 +6,8 @@ use serde::Serialize;
 
 use super::open_report::{OpenReport, ReportedAnswer};
 use crate::error::{Error, Result};
-use crate::score::open::AnswerOutcome;
-use crate::score::subject::Subject;
+use darkqa_score::open::AnswerOutcome;
+use darkqa_score::subject::Subject;
 
 /// Folder of these files in a run.
 const FOLDER: &str = "upstream";

@@ -9,12 +9,12 @@ use super::data::{
 use super::inputs::PageInputs;
 use super::sample::sample;
 use crate::error::Result;
-use crate::score::choice::ReadingMode;
-use crate::score::confusion;
-use crate::score::grid::{Grid, TrialResult};
 use crate::text::outcome_words;
 use crate::text::words::family;
 use crate::types::{AxisLevel, FailureKind, QuestionId, RunQuestion, TrialRef, UnreadReason, View};
+use darkqa_score::choice::ReadingMode;
+use darkqa_score::confusion;
+use darkqa_score::grid::{Grid, TrialResult};
 
 /// Everything that the script shows, as compressed JSON in base64.
 ///
@@ -124,7 +124,7 @@ fn code(result: TrialResult, mode: ReadingMode) -> u8 {
 }
 
 fn subjects<'a>(grid: &'a Grid<'_>) -> Vec<Subject<'a>> {
-    let subject = |subject: &'a crate::score::subject::Subject| Subject {
+    let subject = |subject: &'a darkqa_score::subject::Subject| Subject {
         name: crate::text::words::name(subject),
         model: &subject.model,
         condition: subject.condition(),
@@ -144,9 +144,9 @@ fn subjects<'a>(grid: &'a Grid<'_>) -> Vec<Subject<'a>> {
 }
 
 /// Index of the subject of the clean frames of a subject with images.
-fn clean(grid: &Grid<'_>, of: &crate::score::subject::Subject) -> Option<usize> {
+fn clean(grid: &Grid<'_>, of: &darkqa_score::subject::Subject) -> Option<usize> {
     of.level?;
-    let clean = crate::score::subject::Subject::seeing(&of.model, AxisLevel::L0, &of.variant, None);
+    let clean = darkqa_score::subject::Subject::seeing(&of.model, AxisLevel::L0, &of.variant, None);
     grid.stand_in(&clean)
 }
 

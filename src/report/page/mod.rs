@@ -23,9 +23,6 @@ use crate::drawing::chart::Figure;
 use crate::error::Result;
 use crate::report::choice_report::ChoiceReport;
 use crate::report::template::filled;
-use crate::score::confusion::Confusion;
-use crate::score::findings::Findings;
-use crate::score::grid::Grid;
 use crate::sentences::{HOW_TO_READ, Sentence};
 use crate::tables::{SECTIONS, Section};
 use crate::text::alert::Alert;
@@ -34,6 +31,9 @@ use crate::text::light_readings::LightReadings;
 use crate::text::table::Table;
 use crate::types::Truths;
 use crate::types::manifest::RunManifest;
+use darkqa_score::confusion::Confusion;
+use darkqa_score::findings::Findings;
+use darkqa_score::grid::Grid;
 
 /// The template of the page, its style and its script.
 const PAGE: &str = include_str!("page.html");

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::score::choice::ReadingMode;
-use crate::score::grid::Grid;
 use crate::types::{AxisLevel, Digest, Family};
+use darkqa_score::choice::ReadingMode;
+use darkqa_score::grid::Grid;
 
 /// The most replies that a page shows. Chosen: as many have room on a page of 12 MB, and are read in two seconds.
 const MOST_REPLIES: usize = 200_000;
@@ -84,7 +84,7 @@ fn fates(grid: &Grid<'_>) -> Vec<Fate> {
             [Fate::Harmed, Fate::Rescued]
         } else {
             base =
-                crate::score::subject::Subject::seeing(&of.model, AxisLevel::L0, &of.variant, None);
+                darkqa_score::subject::Subject::seeing(&of.model, AxisLevel::L0, &of.variant, None);
             [Fate::Lost, Fate::Stable]
         };
         let Some(base) = grid.stand_in(&base) else {

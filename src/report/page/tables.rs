@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use crate::score::significance::Significance;
 use crate::text::table::{ColumnKind, Table, TableCell, TableFormat, TableRow};
 use crate::text::words::{ends, interval, words};
+use darkqa_score::significance::Significance;
 
 /// Maximum number of rows of a table that is not folded.
 const MAX_OPEN_ROWS: usize = 60;

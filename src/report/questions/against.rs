@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
-use crate::questions::colors::{Color, NONE};
-use crate::questions::look::{FrameLook, STEEP};
 use crate::text::table::ColumnKind::Text;
 use crate::text::table::TableBuilder;
 use crate::text::terminal;
+use darkqa_questions::colors::{Color, NONE};
+use darkqa_questions::look::{FrameLook, STEEP};
 
 /// Two sets of frames, compared by how they look.
 #[derive(Debug, Serialize)]

@@ -4,13 +4,13 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 
-use crate::score::checks::{Checks, agreements, shares};
-use crate::score::estimate::Estimate;
 use crate::text::table::ColumnKind::{Count, Text};
 use crate::text::table::TableBuilder;
 use crate::text::terminal;
 use crate::text::words::with_interval;
 use crate::types::Family;
+use darkqa_score::checks::{Checks, agreements, shares};
+use darkqa_score::estimate::Estimate;
 
 /// The table of each person's findings by family, with a line about each two people; empty without checks.
 #[must_use]

@@ -3,8 +3,8 @@
 use crate::drawing::chart::counts::CountPanel;
 use crate::drawing::paper::count_figure;
 use crate::error::Result;
-use crate::questions::summary::{ClassCoverage, QuestionSummary};
 use crate::types::Family;
+use darkqa_questions::summary::{ClassCoverage, QuestionSummary};
 
 /// Bars with counts and shares: questions by family, frames by room, answers by family, and classes by questions, segments
 /// and pixels.

@@ -11,14 +11,14 @@ use against::LookComparison;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
-use crate::questions::summary::{Baselines, CandidateCounts, QuestionSummary};
-use crate::score::checks::Checks;
 use crate::text::csv as files;
 use crate::text::table::ColumnKind::{Count, Text};
 use crate::text::table::TableBuilder;
 use crate::text::terminal;
 use crate::text::words::counted;
 use crate::types::Family;
+use darkqa_questions::summary::{Baselines, CandidateCounts, QuestionSummary};
+use darkqa_score::checks::Checks;
 
 /// Maximum number of reasons in a line of the table.
 const REASONS: usize = 3;

@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use crate::error::Result;
-use crate::questions::GeneratedQuestion;
 use crate::text::script::embedded;
 use crate::types::Digest;
+use darkqa_questions::GeneratedQuestion;
 
 /// The template of the page.
 const PAGE: &str = include_str!("review.html");

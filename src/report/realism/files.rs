@@ -5,14 +5,14 @@ use crate::drawing::chart::points::{PointPanel, PointSeries};
 use crate::drawing::paper::point_figure;
 use crate::drawing::sheet::{self, CropRow};
 use crate::error::Result;
-use crate::score::realism::residual::Residuals;
-use crate::score::realism::{
-    CameraOrigin, ImageComparison, NoiseComparison, NoiseMethod, PairComparison,
-};
 use crate::text::csv::csv;
 use crate::text::table::ColumnKind::{Count, Number, Text};
 use crate::text::table::TableBuilder;
 use crate::types::Rgb;
+use darkqa_score::realism::residual::Residuals;
+use darkqa_score::realism::{
+    CameraOrigin, ImageComparison, NoiseComparison, NoiseMethod, PairComparison,
+};
 
 /// One way to make the image of one pair; no noise for exposure drop alone.
 struct PairRow<'a> {

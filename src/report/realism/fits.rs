@@ -1,12 +1,12 @@
 //! The table and the file of fitted gains: [`table`], [`by_pair`] and [`csv()`].
 
 use crate::error::Result;
-use crate::score::realism::gain::{FitOutcome, PairFit, PooledGain, ReadingFit};
-use crate::score::realism::mean::Mean;
 use crate::text::csv;
 use crate::text::table::ColumnKind::{Number, Text};
 use crate::text::table::TableBuilder;
 use crate::text::terminal;
+use darkqa_score::realism::gain::{FitOutcome, PairFit, PooledGain, ReadingFit};
+use darkqa_score::realism::mean::Mean;
 
 /// What a gain of a picture is, in words that stand beside every gain.
 pub(crate) const AS_SAVED: &str =

@@ -11,14 +11,14 @@ pub(crate) use fits::{AS_SAVED, csv as fits_csv};
 use rows::{MethodRow, NoiseRow, difference_text, mean_text};
 
 use crate::error::{Error, Result};
-use crate::score::realism::gain::ReadingFit;
-use crate::score::realism::mean::{LEAST_VALUES, Mean};
-use crate::score::realism::residual::{Bins, EmptyBins};
-use crate::score::realism::{ImageComparison, PairComparison};
 use crate::text::table::ColumnKind::{Count, Text};
 use crate::text::table::TableBuilder;
 use crate::text::terminal;
 use crate::text::words::counted;
+use darkqa_score::realism::gain::ReadingFit;
+use darkqa_score::realism::mean::{LEAST_VALUES, Mean};
+use darkqa_score::realism::residual::{Bins, EmptyBins};
+use darkqa_score::realism::{ImageComparison, PairComparison};
 
 /// Summary over all pairs.
 #[derive(Debug, Serialize)]

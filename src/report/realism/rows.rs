@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use crate::score::realism::mean::Mean;
-use crate::score::realism::{ImageComparison, NoiseComparison, NoiseMethod, PairComparison};
+use darkqa_score::realism::mean::Mean;
+use darkqa_score::realism::{ImageComparison, NoiseComparison, NoiseMethod, PairComparison};
 
 /// Means over pairs for one way of making the low-light images.
 #[derive(Debug, Serialize)]

@@ -1,11 +1,11 @@
 //! All that a report without true answers shows: [`AgreementReport`].
 
 use super::tables;
-use crate::score::self_agreement::SelfAgreement;
 use crate::sentences::{Sentence, self_agreement};
 use crate::tables::{EnhancerRow, enhancers};
 use crate::text::alert::Alert;
 use crate::text::table::Table;
+use darkqa_score::self_agreement::SelfAgreement;
 
 /// All that a report without true answers shows.
 pub(crate) struct AgreementReport<'a> {

@@ -4,11 +4,11 @@ use crate::drawing::chart::drawn::Drawn;
 use crate::drawing::chart::{Chart, Figure, LineStyle, Panel, PanelContent, PlotLine};
 use crate::drawing::paper::figure;
 use crate::error::Result;
-use crate::score::estimate::Estimate;
-use crate::score::self_agreement::SelfAgreement;
-use crate::score::self_agreement::cell::{AgreementCell, CellRole};
 use crate::text::ladder::{Ladder, Series, SeriesByLevel};
 use crate::types::AxisLevel;
+use darkqa_score::estimate::Estimate;
+use darkqa_score::self_agreement::SelfAgreement;
+use darkqa_score::self_agreement::cell::{AgreementCell, CellRole};
 
 /// Agreement by level with its floor, and the evidence kept, for each light. Empty if only one level was asked.
 ///

@@ -3,15 +3,15 @@
 use std::collections::BTreeSet;
 
 use super::measure::AGREEMENT;
-use crate::score::estimate::Estimate;
-use crate::score::self_agreement::SelfAgreement;
-use crate::score::self_agreement::cell::{AgreementCell, CellRole};
-use crate::score::self_agreement::evidence::{MIN_DISTANCE, NoEvidence};
 use crate::text::ladder::{Ladder, Series, SeriesByLevel};
 use crate::text::table::ColumnKind::{Accuracy, Text};
 use crate::text::table::{Table, TableBuilder, TableCell};
 use crate::text::words::{percent, with_interval};
 use crate::types::{Axis, AxisLevel};
+use darkqa_score::estimate::Estimate;
+use darkqa_score::self_agreement::SelfAgreement;
+use darkqa_score::self_agreement::cell::{AgreementCell, CellRole};
+use darkqa_score::self_agreement::evidence::{MIN_DISTANCE, NoEvidence};
 
 /// A measure of a series: a row of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

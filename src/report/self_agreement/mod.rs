@@ -17,12 +17,12 @@ use crate::error::Result;
 use crate::report::json::{Rows, RunList, RunsHead, document};
 use crate::report::page::{PageContent, PageInputs, page_of};
 use crate::report::products::files;
-use crate::score::self_agreement::SelfAgreement;
 use crate::sentences::Sentence;
 use crate::text::alert::Alert;
 use crate::text::light_readings::LightReadings;
 use crate::text::table::Table;
 use crate::text::words::counted;
+use darkqa_score::self_agreement::SelfAgreement;
 
 pub(crate) use agreement_report::AgreementReport;
 pub(crate) use text::{TextLength, text};

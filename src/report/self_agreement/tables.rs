@@ -2,13 +2,6 @@
 
 use super::levels::{levels, why};
 use super::measure::AGREEMENT;
-use crate::score::choice::ReadingMode;
-use crate::score::confusion::{Confusion, Hallucination};
-use crate::score::self_agreement::SelfAgreement;
-use crate::score::self_agreement::cell::{AgreementCell, CellRole};
-use crate::score::self_agreement::evidence::{EvidenceCurve, NoHalf};
-use crate::score::self_agreement::models_in_light::ModelsInLight;
-use crate::score::self_agreement::question_in_light::QuestionInLight;
 use crate::tables::{
     commonest_answers, comparisons_of, counted_answers, health, level_words, reading,
 };
@@ -17,6 +10,13 @@ use crate::text::table::SUMMARY;
 use crate::text::table::{Table, TableBuilder, TableCell};
 use crate::text::words::{counted, light};
 use crate::types::LightGroup;
+use darkqa_score::choice::ReadingMode;
+use darkqa_score::confusion::{Confusion, Hallucination};
+use darkqa_score::self_agreement::SelfAgreement;
+use darkqa_score::self_agreement::cell::{AgreementCell, CellRole};
+use darkqa_score::self_agreement::evidence::{EvidenceCurve, NoHalf};
+use darkqa_score::self_agreement::models_in_light::ModelsInLight;
+use darkqa_score::self_agreement::question_in_light::QuestionInLight;
 
 /// Name of the table of all agreements.
 pub(super) const OWN_ANSWERS: &str = "own_answers";

@@ -7,13 +7,13 @@ use super::agreement_report::AgreementReport;
 use super::levels::{levels, notes};
 use super::measure::HOW_TO_READ;
 use crate::report::short::marked;
-use crate::score::health::Health;
 use crate::text::alert::lines;
 use crate::text::light_readings::LightReadings;
 use crate::text::terminal::{line, render, table};
 use crate::text::words::counted;
 use crate::text::wrapped::wrapped;
 use crate::types::manifest::RunManifest;
+use darkqa_score::health::Health;
 
 /// How much of a report is printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

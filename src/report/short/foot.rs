@@ -2,14 +2,14 @@
 //! ([`about_models`]).
 
 use crate::report::choice_report::ChoiceReport;
-use crate::score::accuracy::AccuracyCell;
-use crate::score::choice::ReadingMode;
-use crate::score::subject::{CHANCE, is_observer, without_run};
 use crate::tables::{unread, what_it_is};
 use crate::text::ladder::Ladder;
 use crate::text::words::{percent, with_interval};
 use crate::text::wrapped::wrapped;
 use crate::types::control::OBSERVER;
+use darkqa_score::accuracy::AccuracyCell;
+use darkqa_score::choice::ReadingMode;
+use darkqa_score::subject::{CHANCE, is_observer, without_run};
 
 /// Mark of an accuracy that is shown to be below that without images.
 pub(super) const BELOW: char = '▼';

@@ -2,20 +2,20 @@
 
 use super::board::{BoardCell, BoardRow, BoardTable};
 use super::run_link::{GroupDigests, RunLink};
-use crate::score::choice::ReadingMode;
-use crate::score::comparison::{Comparison, ComparisonKind};
-use crate::score::curve::Curve;
-use crate::score::estimate::Estimate;
-use crate::score::findings::Findings;
-use crate::score::ranks::RankRange;
-use crate::score::significance::Significance;
-use crate::score::subject::{Subject, is_reference};
-use crate::score::threshold::{NoThreshold, Threshold as EvThreshold};
 use crate::tables::level_words as why;
 use crate::text::table::ColumnKind::{Count, Points, Share, Text, Threshold};
 use crate::text::table::{ColumnKind, Table, TableBuilder, TableCell};
 use crate::text::words::points;
 use crate::types::{AxisLevel, KindReading, View};
+use darkqa_score::choice::ReadingMode;
+use darkqa_score::comparison::{Comparison, ComparisonKind};
+use darkqa_score::curve::Curve;
+use darkqa_score::estimate::Estimate;
+use darkqa_score::findings::Findings;
+use darkqa_score::ranks::RankRange;
+use darkqa_score::significance::Significance;
+use darkqa_score::subject::{Subject, is_reference};
+use darkqa_score::threshold::{NoThreshold, Threshold as EvThreshold};
 
 /// A model of a run.
 #[derive(Debug, Clone)]

@@ -4,12 +4,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::board::{BoardCell, BoardRow, BoardTable};
 use super::run_link::{GroupDigests, RunLink};
-use crate::score::estimate::Estimate;
-use crate::score::open::{Group, OpenSummary};
 use crate::text::table::ColumnKind::{Count, Share, Text};
 use crate::text::table::{Table, TableBuilder, TableCell};
 use crate::text::words::light;
 use crate::types::{AxisLevel, View};
+use darkqa_score::estimate::Estimate;
+use darkqa_score::open::{Group, OpenSummary};
 
 /// A model of a run in one light, raw or with an enhancer, with its score (LLM-Match) at each level.
 #[derive(Debug, Clone)]

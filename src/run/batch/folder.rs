@@ -14,10 +14,10 @@ use crate::runs::Outcome;
 use crate::runs::ShowArgs;
 use crate::runs::StdoutFormat;
 use crate::runs::stored::{ExperimentKind, StoredRun, manifest};
-use crate::score::record::Detail;
 use crate::store::{AddressChange, Store};
 use crate::types::manifest::Status;
 use crate::types::{ChoiceDetail, Decides, OpenDetail};
+use darkqa_score::record::Detail;
 
 /// The flags of `batch status`.
 #[derive(Debug, Args)]

@@ -14,11 +14,11 @@ use crate::runs::ShowArgs;
 use crate::runs::StdoutFormat;
 use crate::runs::record_table;
 use crate::runs::stored::{ExperimentKind, StoredRun, manifest};
-use crate::score::record::Detail;
 use crate::store::{AddressChange, Store};
 use crate::types::manifest::Counts;
 use crate::types::manifest::RunManifest;
 use crate::types::{ChoiceDetail, Decides, OpenDetail, TrialRef};
+use darkqa_score::record::Detail;
 
 pub(crate) use folder::{BatchFolderArgs, BatchStatusArgs, cancel, fetch, status};
 

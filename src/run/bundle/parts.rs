@@ -12,10 +12,10 @@ use crate::error::{Error, Result};
 use crate::report::page::shown_thumbnails;
 use crate::runs::run_files::RunFiles;
 use crate::runs::stored::{AnyRun, ExperimentKind, StoredRun, manifest};
-use crate::score::record::Detail;
 use crate::store;
 use crate::types::manifest::RunManifest;
 use crate::types::{Record, Thumbnail};
+use darkqa_score::record::Detail;
 
 /// The small images that a bundle has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -6,9 +6,9 @@ use std::fmt::Write;
 use serde_json::{Value, json};
 
 use crate::runs::stored::AnyRun;
-use crate::score::record::Detail;
 use crate::types::manifest::{RunManifest, judge_flag};
 use crate::types::{AxisLevel, Trials, shell_word};
+use darkqa_score::record::Detail;
 
 /// What a README is written from.
 pub(super) struct ReadmeInputs<'a> {

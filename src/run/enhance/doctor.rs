@@ -6,7 +6,6 @@ use std::path::Path;
 use clap::Args;
 
 use crate::drawing::sheet::{ContactColumn, contact};
-use crate::enhance::{Enhancer, Examination, ImageOutput, Settled};
 use crate::error::{Error, Result};
 use crate::files::write;
 use crate::picture::{Payload, PayloadFormat, png};
@@ -14,6 +13,7 @@ use crate::report::doctor::{DoctorCell, DoctorColumn, DoctorPage, page};
 use crate::runs::Outcome;
 use crate::types::manifest::Status;
 use crate::types::{Decides, Rgb};
+use darkqa_enhance::{Enhancer, Examination, ImageOutput, Settled};
 
 /// Names of the page and of the picture.
 const PAGE: &str = "doctor.html";

@@ -9,7 +9,6 @@ use clap::Args;
 
 use crate::dataset::inputs::Inputs;
 use crate::dataset::{CodesArgs, PixelLimit, RootArgs};
-use crate::enhance::{Enhancer, FRAMES, ImageOutput, ModelFile};
 use crate::error::{Error, Result};
 use crate::images::dark_frames::{darkened, evenly};
 use crate::images::enhancers::{EnhancerRunArgs, OpenEnhancers};
@@ -20,6 +19,7 @@ use crate::runs::Outcome;
 use crate::runs::part_args::{PartArgs, keep_part};
 use crate::types::manifest::Status;
 use crate::types::{Decides, Rgb};
+use darkqa_enhance::{Enhancer, FRAMES, ImageOutput, ModelFile};
 use doctor::DoctorArgs;
 use origin::EnhancedOrigin;
 

@@ -5,9 +5,9 @@ use serde_json::Value;
 
 use crate::dataset::Picture;
 use crate::engine::identity;
-use crate::enhance::SizeArgs;
 use crate::images::placed_image::ImageOrigin;
 use crate::types::{Digest, FrameId, InputNote};
+use darkqa_enhance::SizeArgs;
 
 /// Everything that decides the pixels of an enhanced image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -17,17 +17,17 @@ use crate::images::plan::SourcePlan;
 use crate::images::questions::ASK;
 use crate::images::recipe::Recipe;
 use crate::images::source::{Frames, Source};
-use crate::questions::rules::Rules;
 use crate::report::power::PowerForecast;
 use crate::run_reports;
 use crate::runs::Outcome;
 use crate::runs::StdoutFormat;
 use crate::runs::stored::StoredRun;
-use crate::score::subject::is_reference;
 use crate::store::Store;
 use crate::types::manifest::PartPlace;
 use crate::types::manifest::{Columns, Identity};
 use crate::types::{ChoiceDetail, QuestionId, Record, RunQuestion, SetLight, View};
+use darkqa_questions::rules::Rules;
+use darkqa_score::subject::is_reference;
 
 impl Experiment for ChoiceSetup<'_> {
     type Item = ChoiceItem;

@@ -9,9 +9,9 @@ use crate::error::Result;
 use crate::images::questions::ASK;
 use crate::images::recipe::Recipe;
 use crate::picture::ReadingRule;
-use crate::questions::rules::Rules;
 use crate::types::manifest::Identity;
 use crate::types::{AxisLevel, Family, SetLight};
+use darkqa_questions::rules::Rules;
 
 /// The settings of data, questions and light. Models, enhancers and what is sent besides are not among them: they may be added to a
 /// plan later.

@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 
 use crate::dataset::Dataset;
 use crate::report::power::PowerForecast;
-use crate::score::cluster::{Clusters, FrameTies};
-use crate::score::tested_sentences::AskedSets;
 use crate::types::degradation::Kind;
 use crate::types::{Condition, KindReading, Question};
+use darkqa_score::cluster::{Clusters, FrameTies};
+use darkqa_score::tested_sentences::AskedSets;
 
 /// What questions about these data can detect; `None` without questions, or if nobody knows their answers.
 pub(super) fn power(

@@ -15,9 +15,9 @@ use crate::engine::settings::{ExperimentSettings, JobArgs, JobSettings};
 use crate::error::{Error, Result};
 use crate::images::questions::{QuestionBank, rules};
 use crate::picture::ReadingRule;
-use crate::questions::rules::Rules;
 use crate::runs::run_plan::RunPlan;
 use crate::types::{Decides, SetLight, Truths, View};
+use darkqa_questions::rules::Rules;
 
 /// The flags of an evaluation, by help heading.
 #[derive(Debug, Args)]

@@ -13,7 +13,6 @@ use crate::dataset::Dataset;
 use crate::engine::dark_already;
 use crate::engine::models::{self, ModelName, ModelUnderTest};
 use crate::engine::observer::Observer;
-use crate::enhance::ModelFile;
 use crate::error::Result;
 use crate::images::conditions::{check_enhanced, conditions};
 use crate::images::photographs;
@@ -24,6 +23,7 @@ use crate::images::source::{Source, first_asked, inspect_all};
 use crate::runs::part::part;
 use crate::types::manifest::PartPlace;
 use crate::types::{Condition, Digest, FrameId, Question, QuestionId, SetLight, TreatmentSet};
+use darkqa_enhance::ModelFile;
 
 /// All data and models of an evaluation, opened and checked. Nothing is asked or written yet.
 pub(super) struct ChoiceSetup<'a> {

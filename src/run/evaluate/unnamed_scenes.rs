@@ -1,8 +1,8 @@
 //! The warning about frames without the scenes that their names suggest: [`unnamed_scenes`].
 
 use crate::dataset::Dataset;
-use crate::score::suggested_scenes::SuggestedScenes;
 use crate::types::Question;
+use darkqa_score::suggested_scenes::SuggestedScenes;
 
 /// The warning; `None` if the data name scenes, or the names of the frames suggest none.
 pub(super) fn unnamed_scenes(dataset: &Dataset, questions: &[Question]) -> Option<String> {

@@ -11,7 +11,6 @@ use clap::Args;
 use crate::dataset::{
     self, CodesArgs, DataPlace, Dataset, PixelLimit, SceneArgs, SelectionArgs, SetArgs,
 };
-use crate::enhance::EnhancerArgs;
 use crate::error::{Error, Result};
 use crate::images::conditions::{check_enhanced, check_used, conditions};
 use crate::images::enhancers::{self, EnhancerRunArgs, OpenEnhancers};
@@ -29,10 +28,11 @@ use crate::picture::png;
 use crate::runs::Outcome;
 use crate::runs::part_args::{PartArgs, keep_part};
 use crate::runs::shard::Shard;
-use crate::synthesis::{LightArgs, LightSettings};
 use crate::text::words::counted;
 use crate::types::manifest::Status;
 use crate::types::{Condition, Decides, FrameId, Question};
+use darkqa_enhance::EnhancerArgs;
+use darkqa_light::{LightArgs, LightSettings};
 
 use set::{ReadySet, SetForm, SetPlace};
 

@@ -10,8 +10,8 @@ use crate::ask::{AccessArgs, KeyHeader, Parameters, Server, Temperature};
 use crate::engine::models::ModelName;
 use crate::engine::settings::JobArgs;
 use crate::error::Result;
-use crate::score::choice::llm_match::Protocol;
 use crate::types::Decides;
+use darkqa_score::choice::llm_match::Protocol;
 
 /// The flags of the judge, the model that marks the answers.
 #[derive(Debug, Clone, Args)]

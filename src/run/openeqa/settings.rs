@@ -14,8 +14,8 @@ use crate::engine::settings::{ExperimentSettings, JobArgs, JobSettings};
 use crate::error::{Error, Result};
 use crate::images::walk::Walk;
 use crate::picture::ReadingRule;
-use crate::score::choice::llm_match::Protocol;
 use crate::types::Decides;
+use darkqa_score::choice::llm_match::Protocol;
 
 /// The flags of `openeqa`.
 #[derive(Debug, Args)]

@@ -10,7 +10,6 @@ use super::settings::{OpenEqa, OpenTask};
 use crate::ask::Parameters;
 use crate::dataset::openeqa::{self, OpenQuestion};
 use crate::engine::models::{self, ModelUnderTest};
-use crate::enhance::ModelFile;
 use crate::error::{Error, Result};
 use crate::images::conditions::{check_enhanced, conditions};
 use crate::images::progress::Progress;
@@ -21,6 +20,7 @@ use crate::runs::part::part;
 use crate::text::words::counted;
 use crate::types::manifest::PartPlace;
 use crate::types::{Condition, FrameId, OpenDetail, QuestionId, Record, View};
+use darkqa_enhance::ModelFile;
 
 /// All data and models of an evaluation by open questions, opened and checked. Nothing is asked or written yet.
 pub(super) struct OpenSetup<'a> {

@@ -7,7 +7,6 @@ use super::setup::OpenSetup;
 use crate::engine::experiment::Experiment as _;
 use crate::engine::limit;
 use crate::engine::pipeline;
-use crate::enhance::ModelFile;
 use crate::error::Result;
 use crate::files::write;
 use crate::images::enhancers::OpenEnhancers;
@@ -22,6 +21,7 @@ use crate::runs::Outcome;
 use crate::text::words::counted;
 use crate::types::manifest::Status;
 use crate::types::{Condition, Digest};
+use darkqa_enhance::ModelFile;
 
 /// Writes the page and its images. Each image is the file that a model would be sent. The page has no true answers.
 ///

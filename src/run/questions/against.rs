@@ -7,10 +7,10 @@ use crate::error::{Error, Result};
 use crate::images::input_tally::InputTally;
 use crate::images::progress::Progress;
 use crate::images::workers::{ThreadArgs, pool};
-use crate::questions::colors::Palette;
-use crate::questions::look::FrameLook;
 use crate::report::questions::against::LookComparison;
 use crate::types::FrameId;
+use darkqa_questions::colors::Palette;
+use darkqa_questions::look::FrameLook;
 
 /// The frames of two sets beside each other.
 ///

@@ -9,11 +9,11 @@ use serde::Deserialize;
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
 use crate::files::{reading, write};
-use crate::questions::GeneratedQuestion;
-use crate::questions::statistics::FrameStatistics;
 use crate::report::questions::review::{ReviewItem, page};
-use crate::score::checks::{Check, CheckFinding, Checks};
 use crate::types::{Family, FrameId, QuestionId};
+use darkqa_questions::GeneratedQuestion;
+use darkqa_questions::statistics::FrameStatistics;
+use darkqa_score::checks::{Check, CheckFinding, Checks};
 
 /// A line of a file of verdicts.
 #[derive(Deserialize)]

@@ -12,8 +12,8 @@ use std::sync::{Mutex, PoisonError};
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::files::write;
-use crate::questions::statistics::FrameStatistics;
 use crate::types::Digest;
+use darkqa_questions::statistics::FrameStatistics;
 
 /// The statistics of frames, by the digest of everything that decides them.
 pub(super) struct StatisticsCache {

@@ -9,10 +9,10 @@ use crate::error::{Error, Result};
 use crate::images::input_tally::InputTally;
 use crate::picture::ImageFile;
 use crate::report::realism::LeftOut;
-use crate::score::realism::scene::{LEAST_CORRELATION, SceneMatch};
-use crate::score::realism::{exposure_drop, same_size};
 use crate::types::Rgb;
 use crate::types::{FrameId, Pixels};
+use darkqa_score::realism::scene::{LEAST_CORRELATION, SceneMatch};
+use darkqa_score::realism::{exposure_drop, same_size};
 
 /// Exposure drop in EV, up or down, below which a pair is hardly one in normal and low light (chosen).
 const SMALL_DROP: f32 = 0.5;

@@ -5,15 +5,15 @@ use super::fit::fitted_camera;
 use super::settings::RealismArgs;
 use super::workers::PairWorkers;
 use crate::error::Result;
-use crate::score::realism::gain::ReadingFit;
-use crate::score::realism::residual::{Residuals, divergence};
-use crate::score::realism::ssim::ssim;
-use crate::score::realism::{
+use crate::types::{FrameId, Rgb};
+use darkqa_light::noise::Term;
+use darkqa_light::{Negative, NoiseKey, SensorSettings, Synthesis, expose_by};
+use darkqa_score::realism::gain::ReadingFit;
+use darkqa_score::realism::residual::{Residuals, divergence};
+use darkqa_score::realism::ssim::ssim;
+use darkqa_score::realism::{
     CameraOrigin, ImageComparison, NoiseComparison, NoiseMethod, PairComparison, psnr,
 };
-use crate::synthesis::noise::Term;
-use crate::synthesis::{Negative, NoiseKey, SensorSettings, Synthesis, expose_by};
-use crate::types::{FrameId, Rgb};
 
 /// The maximum number of pairs whose crops are shown (chosen).
 const MOST_CROPS: usize = 8;

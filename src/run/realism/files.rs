@@ -11,10 +11,10 @@ use crate::files::write;
 use crate::picture::png;
 use crate::report::realism as report;
 use crate::report::realism::{PooledResiduals, RealismSummary};
-use crate::score::realism::PairComparison;
-use crate::score::realism::gain::{PooledGain, ReadingFit};
-use crate::score::realism::residual::Residuals;
-use crate::synthesis::{SensorSettings, Synthesis};
+use darkqa_light::{SensorSettings, Synthesis};
+use darkqa_score::realism::PairComparison;
+use darkqa_score::realism::gain::{PooledGain, ReadingFit};
+use darkqa_score::realism::residual::Residuals;
 
 /// Writes the numbers of each pair, the summary and the figures into a folder.
 pub(super) fn write_files(out: &Path, works: &[PairWork], summary: &RealismSummary) -> Result<()> {

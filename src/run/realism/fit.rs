@@ -4,12 +4,12 @@ use super::check::{CheckedPair, load};
 use super::settings::RealismArgs;
 use super::workers::PairWorkers;
 use crate::error::Result;
-use crate::score::realism::gain::{GAINS, GainFit, LADDER_STEPS, PairFit, ReadingFit, ladder};
-use crate::score::realism::smooth::SmoothBlocks;
-use crate::synthesis::{
+use crate::types::{FrameId, Pixels, ReadingName, Rgb};
+use darkqa_light::{
     CameraModel, CameraState, CleanRaw, Coupling, NoiseKey, Sampling, SensorSettings, Synthesis,
 };
-use crate::types::{FrameId, Pixels, ReadingName, Rgb};
+use darkqa_score::realism::gain::{GAINS, GainFit, LADDER_STEPS, PairFit, ReadingFit, ladder};
+use darkqa_score::realism::smooth::SmoothBlocks;
 
 /// The fits of all pairs, light reading by light reading. A pair that cannot be read is logged and left out.
 ///

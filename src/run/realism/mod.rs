@@ -24,10 +24,10 @@ use crate::images::progress::Progress;
 use crate::images::workers::pool;
 use crate::report::realism::{ComparedData, RealismSummary, ResidualRules};
 use crate::runs::Outcome;
-use crate::score::realism::PairComparison;
-use crate::score::realism::gain::ReadingFit;
-use crate::synthesis::SensorSettings;
 use crate::types::manifest::Status;
+use darkqa_light::SensorSettings;
+use darkqa_score::realism::PairComparison;
+use darkqa_score::realism::gain::ReadingFit;
 
 /// Compares all pairs.
 ///

@@ -6,9 +6,9 @@ use clap::Args;
 
 use crate::dataset::{CodesArgs, PixelLimit};
 use crate::images::workers::ThreadArgs;
-use crate::score::realism::residual::{Bins, EmptyBins};
-use crate::synthesis::SensorArgs;
 use crate::types::Decides;
+use darkqa_light::SensorArgs;
+use darkqa_score::realism::residual::{Bins, EmptyBins};
 
 /// The minimum and maximum of `--ev`, in EV.
 const DROPS: [f32; 2] = [-20.0, 20.0];

@@ -32,10 +32,10 @@ use crate::engine::interrupt::Interrupt;
 use crate::engine::observer::Observer;
 use crate::error::{Error, Result};
 use crate::images::progress::Progress;
-use crate::questions::rules::Rules;
 use crate::runs::Outcome;
 use crate::types::manifest::Status;
 use crate::types::{Choices, Decides, Digest, Family, FrameId, Question, QuestionId};
+use darkqa_questions::rules::Rules;
 
 use admission::{admit, body};
 use completion::{Completion, RequestFault};

@@ -16,10 +16,10 @@ use crate::run_reports::story_curves;
 use crate::runs::Outcome;
 use crate::runs::rebuild::ImageRebuilder;
 use crate::runs::run_parts::choice_run;
-use crate::score::subject::is_control;
 use crate::types::degradation::Kind;
 use crate::types::manifest::{RunManifest, Status};
 use crate::types::{AxisLevel, Condition, KindReading, Record, Rgb, TrialOutcome};
+use darkqa_score::subject::is_control;
 
 /// Draws the picture and writes it. The outcome says which conditions are left out, and which images are not those that were sent.
 ///

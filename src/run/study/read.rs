@@ -18,7 +18,6 @@ use crate::runs::stored::StoredRun;
 use crate::runs::Outcome;
 use crate::runs::ShowArgs;
 use crate::runs::StdoutFormat;
-use crate::score::record::{Detail, answered};
 use crate::store::now;
 use crate::store::{AddressChange, Store, read_questions};
 use crate::types::manifest::{Counts, RunManifest, Status};
@@ -26,6 +25,7 @@ use crate::types::{
     AnswerReading, ChoiceDetail, Condition, Decides, Digest, QuestionId, Record, Reply,
     StoredDetail as _, TrialKey, TrialRef, Trials, UnreadReason,
 };
+use darkqa_score::record::{Detail, answered};
 
 /// The flags of `study read`.
 #[derive(Debug, Args)]

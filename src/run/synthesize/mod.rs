@@ -25,10 +25,10 @@ use crate::images::timings::Timings;
 use crate::images::workers::{ThreadArgs, pool};
 use crate::runs::Outcome;
 use crate::runs::part_args::{PartArgs, keep_part};
-use crate::synthesis::{LightArgs, LightSettings, NoiseKey};
 use crate::text::words::counted;
 use crate::types::manifest::Status;
 use crate::types::{Condition, Decides, Degradation, FrameId, Rgb, SetLight};
+use darkqa_light::{LightArgs, LightSettings, NoiseKey};
 
 pub(crate) use sheet::Sheet;
 use sheet::SheetRecipe;

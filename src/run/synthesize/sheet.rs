@@ -13,12 +13,12 @@ use crate::drawing::sheet::{self, LevelBlock, LevelImage, LevelRow, Signal};
 use crate::error::Result;
 use crate::images::frame_work::FrameWork;
 use crate::images::placed_image::ImageOrigin;
-use crate::synthesis::bayer::Bayer;
-use crate::synthesis::noise::{self, Term};
-use crate::synthesis::unprocess::unprocess_up_to;
-use crate::synthesis::{Coupling, Draws, LightSettings, NoiseKey, Synthesis, version};
 use crate::types::degradation::{Axis, Kind};
 use crate::types::{AxisLevel, Degradation, FrameId, KindReading, Rgb, Severity};
+use darkqa_light::bayer::Bayer;
+use darkqa_light::noise::{self, Term};
+use darkqa_light::unprocess::unprocess_up_to;
+use darkqa_light::{Coupling, Draws, LightSettings, NoiseKey, Synthesis, version};
 
 /// The kind of a figure of one frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]

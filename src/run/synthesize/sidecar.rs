@@ -8,13 +8,13 @@ use serde_json::Value;
 use crate::dataset::Picture;
 use crate::error::{Error, Result};
 use crate::images::placed_image::{ImageOrigin, Sidecar};
-use crate::synthesis::blur::{blur, blurred_codes};
-use crate::synthesis::{
+use crate::types::degradation::{Axis, Kind};
+use crate::types::{Condition, Degradation, ExposureFacts, FrameId, InputNote, ReadingName, Rgb};
+use darkqa_light::blur::{blur, blurred_codes};
+use darkqa_light::{
     self, Amplify, AppliedDegradation, CameraState, Clean, Coupling, Draws, NoiseKey, Streak, Tone,
     develop_with_state, expose, exposure,
 };
-use crate::types::degradation::{Axis, Kind};
-use crate::types::{Condition, Degradation, ExposureFacts, FrameId, InputNote, ReadingName, Rgb};
 
 /// Everything that decides the pixels of an image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -176,5 +176,5 @@ fn paper() -> ReadingName {
 
 /// The version of the branch that makes a degradation. A clean frame has the version of the exposure branch.
 fn version(how: Option<&Degradation>) -> u32 {
-    how.map_or(exposure::VERSION, |how| synthesis::version(how.kind()))
+    how.map_or(exposure::VERSION, |how| darkqa_light::version(how.kind()))
 }

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use crate::run_reports::join::{Joined, JoinedRun};
-use crate::score::record::Detail;
-use crate::score::subject::without_run;
 use crate::text::alert::{Alert, AlertKind};
 use crate::text::words::plural;
+use darkqa_score::record::Detail;
+use darkqa_score::subject::without_run;
 
 /// One line for each model some of whose replies have a larger limit than the first ones, with the number of replies by limit.
 pub(super) fn of_limits<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {

@@ -21,17 +21,17 @@ use super::combine::Combined;
 use super::enhancers::of_enhancers;
 use super::join::{Joined, JoinedRun};
 use crate::runs::over_budget::OverBudget;
-use crate::score::cluster::{ClusterUnit, MIN_SCENES};
-use crate::score::findings::Findings;
-use crate::score::pair_darkness::PairDarkness;
-use crate::score::photographed_set::PhotographedSet;
-use crate::score::record::Detail;
-use crate::score::self_agreement::SelfAgreement;
-use crate::score::suggested_scenes::SuggestedScenes;
 use crate::text::alert::{Alert, AlertKind};
 use crate::text::words::{counted, plural};
 use crate::types::manifest::Status;
 use crate::types::{FrameId, InputSummary};
+use darkqa_score::cluster::{ClusterUnit, MIN_SCENES};
+use darkqa_score::findings::Findings;
+use darkqa_score::pair_darkness::PairDarkness;
+use darkqa_score::photographed_set::PhotographedSet;
+use darkqa_score::record::Detail;
+use darkqa_score::self_agreement::SelfAgreement;
+use darkqa_score::suggested_scenes::SuggestedScenes;
 
 /// All alerts of a report on questions with choices, in the order of their kinds.
 pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert> {

@@ -6,10 +6,10 @@ use std::collections::{BTreeMap, BTreeSet, HashSet};
 use serde_json::Value;
 
 use crate::run_reports::join::Joined;
-use crate::score::record::Detail;
 use crate::text::alert::{Alert, AlertKind};
 use crate::types::degradation::Kind;
 use crate::types::{Condition, Degradation, Severity, TrialRef};
+use darkqa_score::record::Detail;
 
 /// The exposure drop in hundredths of EV above which at most nine codes are left: white has code
 /// 255 · 2^(−EV/2.2) = 8 there.

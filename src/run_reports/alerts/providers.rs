@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::score::record::Detail;
 use crate::text::alert::{Alert, AlertKind};
 use crate::text::words::plural;
 use crate::types::Trials;
+use darkqa_score::record::Detail;
 
 /// One alert for each model whose replies name several providers, with the number of replies of each.
 pub(super) fn of_providers<D: Detail>(trials: &Trials<D>) -> Vec<Alert> {

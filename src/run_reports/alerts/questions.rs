@@ -5,12 +5,12 @@ use std::collections::{BTreeMap, BTreeSet, HashSet};
 use crate::run_reports::combine::Combined;
 use crate::run_reports::join::{Joined, JoinedRun};
 use crate::run_reports::settings::{is_of_people, listed};
-use crate::score::findings::Findings;
-use crate::score::record::Detail;
-use crate::score::subject::is_control;
 use crate::text::alert::{Alert, AlertKind};
 use crate::text::words::counted;
 use crate::types::{QuestionId, RunQuestion, TrialRef};
+use darkqa_score::findings::Findings;
+use darkqa_score::record::Detail;
+use darkqa_score::subject::is_control;
 
 /// What differs between the questions of the runs, and between the files that they are about.
 pub(super) fn of_questions<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use crate::run_reports::combine::Combined;
 use crate::run_reports::settings::is_of_people;
-use crate::score::health::Health;
 use crate::text::alert::{Alert, AlertKind, MAX_UNREAD};
 use crate::text::words::counted;
 use crate::types::{TrialRef, UnreadReason};
+use darkqa_score::health::Health;
 
 /// Replies that could not be read, with what they count as, and trials without a reply.
 pub(super) fn of_replies(health: &[Health], unread_as: &str) -> Vec<Alert> {
@@ -111,7 +111,7 @@ pub(super) fn of_people(combined: &Combined) -> Vec<Alert> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::score::subject::Subject;
+    use darkqa_score::subject::Subject;
 
     #[test]
     fn one_condition_that_cannot_be_read_is_named() {

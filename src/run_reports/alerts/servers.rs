@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::words::{names, sentence};
 use crate::run_reports::join::Joined;
 use crate::run_reports::settings::{Settings, address, differing, is_of_people, listed};
-use crate::score::record::Detail;
 use crate::text::alert::{Alert, AlertKind};
+use darkqa_score::record::Detail;
 
 /// The names that servers gave for a model, and the addresses, if there are several.
 pub(super) fn of_servers<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {

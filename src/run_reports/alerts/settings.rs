@@ -7,9 +7,9 @@ use crate::run_reports::join::Joined;
 use crate::run_reports::settings::{
     ENCODING, Setting, Settings, differing, light, listed, parameter_flags, some, without_repeated,
 };
-use crate::score::record::Detail;
 use crate::text::alert::{Alert, AlertKind};
 use crate::types::manifest::RunManifest;
+use darkqa_score::record::Detail;
 
 /// The flags that decide the orders in which choices are shown.
 const ORDERS: [&str; 2] = ["--shuffle-options", "--circular"];

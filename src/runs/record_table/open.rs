@@ -10,8 +10,6 @@ use super::row::{Row, SentImage, Tabled};
 use crate::error::Result;
 use crate::runs::mark_index::{JUDGE, MarkIndex, PROTOCOL};
 use crate::runs::predictions::{AnswerState, answer_state};
-use crate::score::choice::llm_match::{Protocol, mark};
-use crate::score::open::AnswerOutcome;
 use crate::store::CellKind::{Double, Int32, LongText, Text};
 use crate::store::Presence::{Always, MayBeNull};
 use crate::store::{Cell, Column, each_record};
@@ -19,6 +17,8 @@ use crate::types::flag::read_word;
 use crate::types::manifest::RunManifest;
 use crate::types::recorded_names::RecordedNames;
 use crate::types::{OpenDetail, Record, RunQuestion, Step};
+use darkqa_score::choice::llm_match::{Protocol, mark};
+use darkqa_score::open::AnswerOutcome;
 
 /// The marks of a run.
 pub(super) struct Marks {

@@ -5,13 +5,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::error::Result;
-use crate::score::record::Detail;
 use crate::store::Column;
 use crate::types::manifest::RunManifest;
 use crate::types::recorded_names::RecordedNames;
 use crate::types::{
     Condition, ConditionColumns, Digest, QuestionId, Record, RunQuestion, Severity,
 };
+use darkqa_score::record::Detail;
 
 /// The detail of a record that has a table of its own.
 pub(super) trait Tabled: Detail + Sync + 'static {

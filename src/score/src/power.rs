@@ -4,7 +4,7 @@
 //! is detected with power 1 − β at level α if n δ² = D (t₁₋α⁄₂ √ψ + t₁₋β √(ψ − δ²))² (Connett, Smith and McHugh 1987, Stat. Med. 6:53). D is
 //! the design effect of clusters of unequal sizes m, 1 + (Σm² / Σm − 1) ρ (Eldridge, Ashby and Kerry 2006, Int. J. Epidemiol. 35:1292,
 //! with its cv of the sizes written out). The quantiles are those of Student's t, with the degrees of freedom that the test finds on average
-//! ([`degrees_of_freedom`](super::quantiles)): half the number C of clusters, whose sums have a kurtosis of about 3; C − 1 if pairs are
+//! ([`degrees_of_freedom`](darkqa_statistics::quantiles)): half the number C of clusters, whose sums have a kurtosis of about 3; C − 1 if pairs are
 //! independent.
 //!
 //! ψ and ρ are not known before a run, so both are assumed: [`CHANGED`] and [`CORRELATION`].

@@ -1,13 +1,13 @@
 //! Golden sentences about what models know of their own sight.
 
 use super::checked;
-use crate::score::calibration::{Calibration, RiskCoverage, TestedConfidence};
-use crate::score::cluster::ClusterUnit;
-use crate::score::estimate::Estimate;
-use crate::score::subject::Subject;
 use crate::sentences::confidence::{Confidence, confidence};
 use crate::types::degradation::Kind;
 use crate::types::{AxisLevel, KindReading, Severity};
+use darkqa_score::calibration::{Calibration, RiskCoverage, TestedConfidence};
+use darkqa_score::cluster::ClusterUnit;
+use darkqa_score::estimate::Estimate;
+use darkqa_score::subject::Subject;
 
 fn around(value: f64) -> Estimate {
     Estimate {

@@ -1,16 +1,16 @@
 //! Golden sentences about false answers and one answer to everything.
 
 use super::{checked, findings};
-use crate::score::cluster::ClusterUnit;
-use crate::score::confusion::{AgainstClean, Collapse, FalseAnswer};
-use crate::score::estimate::Estimate;
-use crate::score::paired::{PairedComparison, Spread};
-use crate::score::pooled::PooledFinding;
-use crate::score::pooled_kind::PooledKind;
-use crate::score::significance::Significance::{self, Better, NotShown, Worse};
 use crate::sentences::hallucination::{self, TopAnswer};
 use crate::types::degradation::Kind;
 use crate::types::{AxisLevel, Family, Severity};
+use darkqa_score::cluster::ClusterUnit;
+use darkqa_score::confusion::{AgainstClean, Collapse, FalseAnswer};
+use darkqa_score::estimate::Estimate;
+use darkqa_score::paired::{PairedComparison, Spread};
+use darkqa_score::pooled::PooledFinding;
+use darkqa_score::pooled_kind::PooledKind;
+use darkqa_score::significance::Significance::{self, Better, NotShown, Worse};
 
 #[test]
 fn false_answers_are_said_where_they_are_shown_to_grow() {

@@ -1,13 +1,13 @@
 //! Sentences from made records, through all tests: what is named, counted, and left out.
 
 use super::checked;
-use crate::score::cluster::FrameTies;
-use crate::score::findings::Findings;
 use crate::sentences::{Sentence, Tone, sentences};
 use crate::types::{
     AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, LightGroup, ModelListing,
     QuestionId, Record, TrialOutcome, UnreadReason,
 };
+use darkqa_score::cluster::FrameTies;
+use darkqa_score::findings::Findings;
 
 /// Number of frames, each with two questions: one about colour and one about the room.
 const FRAMES: usize = 12;

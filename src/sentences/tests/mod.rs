@@ -8,14 +8,14 @@ mod words_alone;
 
 use super::sentence::{Sentence, level_runs};
 use super::{darkness, pooled, sample, words_alone as below};
-use crate::score::cluster::ClusterUnit;
-use crate::score::estimate::Estimate;
-use crate::score::pooled::{PooledDifference, PooledFinding};
-use crate::score::pooled_kind::PooledKind;
-use crate::score::significance::Significance::{self, Better, NotShown, TooFewClusters, Worse};
-use crate::score::significance::SwapMethod;
 use crate::types::degradation::Kind;
 use crate::types::{AxisLevel, EnhancerName, KindReading, Severity};
+use darkqa_score::cluster::ClusterUnit;
+use darkqa_score::estimate::Estimate;
+use darkqa_score::pooled::{PooledDifference, PooledFinding};
+use darkqa_score::pooled_kind::PooledKind;
+use darkqa_score::significance::Significance::{self, Better, NotShown, TooFewClusters, Worse};
+use darkqa_score::significance::SwapMethod;
 
 /// A finding at one of the named levels, with an interval of ± 4 points.
 fn finding(

@@ -7,19 +7,19 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::{Distribution, StandardNormal};
 
 use super::made::unanswered;
-use crate::score::baseline::baseline_rows;
-use crate::score::cluster::{Clusters, FrameTies};
-use crate::score::findings::Findings;
-use crate::score::grid::Grid;
-use crate::score::health::healths;
-use crate::score::pooled_kind::PooledKind;
-use crate::score::significance::Significance;
-use crate::score::subject::Subject;
 use crate::sentences::{Sentence, Tone, sentences};
 use crate::types::{
     AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, OptionProbabilities,
     QuestionId, Record, TrialOutcome,
 };
+use darkqa_score::baseline::baseline_rows;
+use darkqa_score::cluster::{Clusters, FrameTies};
+use darkqa_score::findings::Findings;
+use darkqa_score::grid::Grid;
+use darkqa_score::health::healths;
+use darkqa_score::pooled_kind::PooledKind;
+use darkqa_score::significance::Significance;
+use darkqa_score::subject::Subject;
 
 /// What a simulated run asks, and what is true.
 #[derive(Debug, Clone, Copy)]
@@ -260,7 +260,7 @@ fn simulate(design: &Design, runs: usize, seed: u64) -> Counts {
 
 /// A share in percent with Wilson's interval.
 fn percent(count: usize, runs: usize) -> String {
-    let share = crate::score::estimate::Estimate::share(count, runs).unwrap();
+    let share = darkqa_score::estimate::Estimate::share(count, runs).unwrap();
     let [value, low, high] = [share.value, share.low, share.high].map(|x| 100.0 * x);
     format!("{value:.1} [{low:.1}, {high:.1}]")
 }

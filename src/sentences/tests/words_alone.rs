@@ -1,17 +1,17 @@
 //! Golden sentences about models that fall below the words alone.
 
 use super::{checked, finding};
-use crate::score::cluster::ClusterUnit;
-use crate::score::comparison::{Comparison, ComparisonKind, TestedComparison};
-use crate::score::estimate::Estimate;
-use crate::score::paired::{PairedComparison, Spread};
-use crate::score::pooled::PooledFinding;
-use crate::score::pooled_kind::PooledKind;
-use crate::score::significance::Significance::{self, Better, NotShown, Worse};
-use crate::score::subject::Subject;
 use crate::sentences::words_alone;
 use crate::types::degradation::Kind;
 use crate::types::{AxisLevel, Family, KindReading, Severity};
+use darkqa_score::cluster::ClusterUnit;
+use darkqa_score::comparison::{Comparison, ComparisonKind, TestedComparison};
+use darkqa_score::estimate::Estimate;
+use darkqa_score::paired::{PairedComparison, Spread};
+use darkqa_score::pooled::PooledFinding;
+use darkqa_score::pooled_kind::PooledKind;
+use darkqa_score::significance::Significance::{self, Better, NotShown, Worse};
+use darkqa_score::subject::Subject;
 
 /// A model against words alone in a family.
 fn against_words(

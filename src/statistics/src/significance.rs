@@ -20,7 +20,7 @@ pub enum Significance {
     /// No verdict is possible: with so few clusters and so many tests the corrected p cannot be below 0.05, however large the
     /// difference is.
     TooFewClusters,
-    /// Fewer items are shared than a verdict needs ([`MIN_PAIRS`](super::comparison::MIN_PAIRS)).
+    /// Fewer items are shared than a verdict needs (`MIN_PAIRS` of the comparison).
     TooFew,
 }
 

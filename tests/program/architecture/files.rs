@@ -81,11 +81,14 @@ impl Files {
 
     /// The path of a part from the crate's root. It is `None` if the path begins with a library, or with a name that a `use`
     /// brings in: that `use` is a part of its own.
+    /// A crate of the workspace counts as a room.
     pub(crate) fn path_from_root(&self, part: &Part) -> Option<Vec<String>> {
-        if part.is_path() {
-            self.absolute(&part.scope, &part.names)
-        } else {
-            None
+        if !part.is_path() {
+            return None;
+        }
+        match part.names.first()?.strip_prefix("darkqa_") {
+            Some(name) if name != "eval" => Some([&[name.to_owned()], &part.names[1..]].concat()),
+            _ => self.absolute(&part.scope, &part.names),
         }
     }
 

@@ -16,18 +16,18 @@ use std::sync::LazyLock;
 use files::Files;
 use map::Map;
 
-/// The crates that the program uses under these names of its root.
+/// The crates that the program uses, by the names of their modules at its root, or by their own names without `darkqa_`.
 const CRATES: [&str; 11] = [
     "enhance",
     "error",
     "files",
     "labels",
+    "light",
     "picture",
     "questions",
     "rooms",
     "score",
     "store",
-    "synthesis",
     "types",
 ];
 

@@ -4,9 +4,11 @@ use std::fs;
 use std::io::Cursor;
 use std::path::Path;
 
-use darkqa_eval::internals::synthesis::{Bayer, Term, add_noise};
-use darkqa_eval::synthesis::{Amplify, CameraModel, CameraState, NoiseKey, Sampling};
-use darkqa_eval::types::FrameId;
+use darkqa_ground::types::FrameId;
+use darkqa_light::bayer::Bayer;
+use darkqa_light::noise::Term;
+use darkqa_light::noise::add as add_noise;
+use darkqa_light::{Amplify, CameraModel, CameraState, NoiseKey, Sampling};
 use rayon::prelude::*;
 use tiff::encoder::colortype::Gray16;
 use tiff::encoder::{Compression, TiffEncoder};

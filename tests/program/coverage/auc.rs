@@ -2,10 +2,13 @@
 
 use super::*;
 use crate::support::made::record;
-use darkqa_eval::internals::score::{Clusters, FidelityFindings, FrameTies, Grid};
-use darkqa_eval::types::{
+use darkqa_ground::types::{
     AnswerReading, Condition, Digest, Family, ImageFacts, ImageFidelity, Record,
 };
+use darkqa_score::cluster::Clusters;
+use darkqa_score::cluster::FrameTies;
+use darkqa_score::fidelity::FidelityFindings;
+use darkqa_score::grid::Grid;
 
 /// Frames of a scene, and questions about a frame.
 const FRAMES: usize = 2;

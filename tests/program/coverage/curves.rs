@@ -2,8 +2,8 @@
 
 use super::*;
 use darkqa_eval::Kind;
-use darkqa_eval::internals::score::LevelCounts;
-use darkqa_eval::types::{AxisLevel, Severity};
+use darkqa_ground::types::{AxisLevel, Severity};
+use darkqa_score::threshold::LevelCounts;
 
 /// Guessing among three choices.
 const CHANCE: f64 = 1.0 / 3.0;

@@ -9,7 +9,9 @@
     reason = "the long tests print the tables of the documentation"
 )]
 
-use darkqa_eval::internals::score::{ClusterCount, Estimate, Resamples};
+use darkqa_score::bootstrap::Resamples;
+use darkqa_score::estimate::ClusterCount;
+use darkqa_score::estimate::Estimate;
 use rand::rngs::StdRng;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::{Beta, Binomial, Distribution as _, StandardNormal};

@@ -13,8 +13,8 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use crate::support::onnx::{self, Graph};
-use darkqa_eval::enhance::{Enhancer, Install, ModelFile, Runtime, RuntimeSearch};
-use darkqa_eval::types::Rgb;
+use darkqa_enhance::{Enhancer, Install, ModelFile, Runtime, RuntimeSearch};
+use darkqa_ground::types::Rgb;
 use tempfile::TempDir;
 
 fn runtime() -> Runtime {

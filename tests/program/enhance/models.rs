@@ -1,7 +1,7 @@
 //! Graphs: what each computes, and those that are refused.
 
-use darkqa_eval::enhance::ModelFile;
-use darkqa_eval::types::Rgb;
+use darkqa_enhance::ModelFile;
+use darkqa_ground::types::Rgb;
 
 use super::{fault, image, loaded, map, open, stated};
 use crate::support::onnx::Size::{Known, Named};

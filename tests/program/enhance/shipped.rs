@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use darkqa_eval::enhance::Enhancer;
-use darkqa_eval::internals::rooms::Rooms;
-use darkqa_eval::internals::synthesis::{Negative, expose};
-use darkqa_eval::synthesis::{NoiseKey, Synthesis};
-use darkqa_eval::types::{Rgb, Severity};
+use darkqa_enhance::Enhancer;
+use darkqa_ground::types::{Rgb, Severity};
+use darkqa_light::exposure::expose;
+use darkqa_light::negative::Negative;
+use darkqa_light::{NoiseKey, Synthesis};
+use darkqa_scenes::Rooms;
 
 use super::open;
 use crate::support::onnx;

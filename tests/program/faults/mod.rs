@@ -15,8 +15,9 @@ use crate::support::endpoint::{Answer, MockEndpoint, Request};
 use darkqa_eval::internals::ask::{
     Access, AskError, Endpoint, Message, Parameters, Remote, Secret, Sending,
 };
-use darkqa_eval::internals::picture::{Payload, PayloadFormat};
-use darkqa_eval::types::{Reply, Rgb};
+use darkqa_ground::types::{Reply, Rgb};
+use darkqa_picture::Payload;
+use darkqa_picture::PayloadFormat;
 use serde_json::Value;
 
 fn sending() -> Sending {

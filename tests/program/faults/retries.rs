@@ -3,7 +3,7 @@
 use std::time::{Duration, SystemTime};
 
 use darkqa_eval::internals::ask::{Parameters, Reach, Sending};
-use darkqa_eval::types::FailureKind;
+use darkqa_ground::types::FailureKind;
 use serde_json::json;
 
 use super::{PIECE, ask, ask_with, completion, gzip, sending, stream};

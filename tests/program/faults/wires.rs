@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use darkqa_eval::internals::ask::{Parameters, Reach, Sending, WireSetting};
-use darkqa_eval::types::{FailureKind, Reply};
+use darkqa_ground::types::{FailureKind, Reply};
 use serde_json::{Value, json};
 
 use super::{ask, ask_with, sending, stream};

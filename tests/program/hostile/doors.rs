@@ -6,7 +6,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use darkqa_eval::internals::dataset::{DataPlace, Dataset, SetArgs};
-use darkqa_eval::internals::questions::Rules;
+use darkqa_questions::rules::Rules;
 
 use crate::hostile::mutators::{Form, step};
 use crate::hostile::random::Random;

@@ -9,7 +9,9 @@ use crate::support::image_files::{
 };
 use crate::support::run::{Bench, words};
 use crate::support::tiff_files::{Order, Page, tiff};
-use darkqa_eval::internals::picture::{ColourRule, ImageFile, ReadingRule};
+use darkqa_picture::ImageFile;
+use darkqa_picture::ReadingRule;
+use darkqa_picture::reading_rule::ColourRule;
 use image::{Rgb, RgbImage};
 use serde_json::{Value, json};
 

@@ -2,7 +2,8 @@
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use darkqa_eval::internals::picture::{ImageFile, ReadingRule};
+use darkqa_picture::ImageFile;
+use darkqa_picture::ReadingRule;
 use image::{ImageFormat, Rgb, RgbImage};
 use serde_json::json;
 

@@ -6,10 +6,13 @@ use crate::support::exr_files::{
     compressed, cropped, exr, with_channels, with_primaries, with_two_layers,
 };
 use crate::support::run::{Bench, records, words};
-use darkqa_eval::internals::picture::{ColourRule, ImageFile, ReadingRule};
-use darkqa_eval::internals::synthesis::{Negative, expose};
-use darkqa_eval::synthesis::{CameraModel, LightReading, NoiseKey, Synthesis};
-use darkqa_eval::types::{FrameId, Light, Pixels, Severity};
+use darkqa_ground::types::{FrameId, Light, Pixels, Severity};
+use darkqa_light::exposure::expose;
+use darkqa_light::negative::Negative;
+use darkqa_light::{CameraModel, LightReading, NoiseKey, Synthesis};
+use darkqa_picture::ImageFile;
+use darkqa_picture::ReadingRule;
+use darkqa_picture::reading_rule::ColourRule;
 use exr::prelude::{Compression, FlatSamples, f16};
 use image::RgbImage;
 use serde_json::Value;

@@ -4,7 +4,8 @@ use std::fs;
 
 use crate::support::image_files::{exif, jpeg, png, seen, turned_jpeg, turned_png};
 use crate::support::run::{Bench, records, words};
-use darkqa_eval::internals::picture::{ImageFile, ReadingRule};
+use darkqa_picture::ImageFile;
+use darkqa_picture::ReadingRule;
 use image::{Rgb, RgbImage};
 use serde_json::{Value, json};
 

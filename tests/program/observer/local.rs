@@ -2,9 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use darkqa_eval::internals::questions::Observation;
-use darkqa_eval::internals::score::Estimate;
 use darkqa_eval::{Question, Rgb};
+use darkqa_questions::observer::Observation;
+use darkqa_score::estimate::Estimate;
 use rayon::prelude::*;
 
 use super::made::{Asked, Draws, Set, interval, mapped};

@@ -3,16 +3,20 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use darkqa_eval::internals::questions::Observation;
-use darkqa_eval::internals::questions::{
-    BalanceMode, ObservedFrame, Palette, RoomSource, Rules, measure,
-};
-use darkqa_eval::internals::rooms::{Rooms, labels};
-use darkqa_eval::internals::score::Estimate;
-use darkqa_eval::questions::{QuestionRequest, generate};
-use darkqa_eval::synthesis::{NoiseKey, Synthesis, degrade};
-use darkqa_eval::types::{Digest, Family, Frame, FrameId, Labels};
 use darkqa_eval::{Degradation, Question, Rgb};
+use darkqa_ground::types::{Digest, Family, Frame, FrameId, Labels};
+use darkqa_light::{NoiseKey, Synthesis, degrade};
+use darkqa_questions::balance::BalanceMode;
+use darkqa_questions::colors::Palette;
+use darkqa_questions::observer::Observation;
+use darkqa_questions::observer::ObservedFrame;
+use darkqa_questions::room::RoomSource;
+use darkqa_questions::rules::Rules;
+use darkqa_questions::statistics::measure;
+use darkqa_questions::{QuestionRequest, generate};
+use darkqa_scenes::Rooms;
+use darkqa_scenes::labels;
+use darkqa_score::estimate::Estimate;
 use rayon::prelude::*;
 
 /// A frame with its questions.

@@ -9,10 +9,10 @@ use std::sync::LazyLock;
 
 use crate::support::table::check_rows;
 use darkqa_eval::Rgb;
-use darkqa_eval::internals::questions::{self, Control};
-use darkqa_eval::internals::rooms::Rooms;
-use darkqa_eval::synthesis::{CameraModel, LightReading, Synthesis};
-use darkqa_eval::types::{Digest, Family};
+use darkqa_ground::types::Control;
+use darkqa_ground::types::{Digest, Family};
+use darkqa_light::{CameraModel, LightReading, Synthesis};
+use darkqa_scenes::Rooms;
 
 use local::{CHANGES, Change, Elsewhere};
 use made::{Asked, Outcome, Set, degraded, invented, mapped};
@@ -37,7 +37,9 @@ fn spoiled(set: &Set, place: usize, asked: &Asked, control: Control) -> Rgb {
     let key = Digest::of(asked.id.0.as_bytes());
     match control {
         Control::OtherRoom => set.other(place).image.clone(),
-        control => questions::spoiled(control, &asked.image, &asked.known, &key),
+        control => {
+            darkqa_questions::observer::controls::spoiled(control, &asked.image, &asked.known, &key)
+        }
     }
 }
 

@@ -7,12 +7,12 @@ use rayon::prelude::*;
 use super::findings::{Findings, Mark};
 use crate::dataset::{Dataset, Picture, SkipBad};
 use crate::engine::dark_already::{DarkImages, advice};
-use crate::enhance::brightness;
 use crate::error::Result;
 use crate::images::progress::Progress;
 use crate::images::source::first_asked;
 use crate::text::words::counted;
 use crate::types::{Digest, FrameId, InputNote, InputSummary, Question};
+use darkqa_enhance::brightness;
 
 /// Whether the pixels of images are looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -25,11 +25,11 @@ use crate::files::write;
 use crate::images::progress::Progress;
 use crate::images::questions::{QuestionBank, open_data, rules, select};
 use crate::runs::Outcome;
-use crate::score::tested_sentences::AskedSets;
-use crate::synthesis::LightSettings;
 use crate::types::Decides;
 use crate::types::Question;
 use crate::types::manifest::Status;
+use darkqa_light::LightSettings;
+use darkqa_score::tested_sentences::AskedSets;
 
 use findings::{Finding, Findings, Mark, lines};
 use images::Depth;

@@ -5,13 +5,13 @@ use std::path::Path;
 use super::super::settings::EvaluateArgs;
 use super::findings::Findings;
 use crate::ask::Prompts;
-use crate::enhance::{Install, RuntimeSearch};
 use crate::error::Result;
 use crate::images::conditions::check_used;
 use crate::images::enhancers::{self, EnhancerRunArgs, OpenEnhancers};
 use crate::images::questions::rules;
-use crate::synthesis::LightSettings;
 use crate::types::Rgb;
+use darkqa_enhance::{Install, RuntimeSearch};
+use darkqa_light::LightSettings;
 
 /// Looks at the flags and the files that they name; no data is read.
 pub(super) fn settings(args: &EvaluateArgs, findings: &mut Findings) {
