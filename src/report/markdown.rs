@@ -6,7 +6,7 @@ use crate::report::choice_report::ChoiceReport;
 use crate::report::openeqa::{OpenReport, coverage};
 use crate::report::self_agreement::{self, AgreementReport};
 use crate::report::short::head;
-use crate::sentences::{HOW_TO_READ, Sentence};
+use crate::sentences::{Sentence, how_to_read};
 use crate::text::alert::Alert;
 use crate::text::readable::readable;
 use crate::text::table::{Column, ColumnKind, Table, TableFormat};
@@ -43,7 +43,7 @@ impl<'a> MarkdownReport<'a> {
             head: vec![head(report)],
             alerts: &report.alerts,
             sentences: &report.sentences,
-            how_to_read: has_tests.then_some(HOW_TO_READ),
+            how_to_read: has_tests.then(|| how_to_read(&report.sentences)),
             tables,
         }
     }

@@ -11,7 +11,7 @@ use std::path::Path;
 use self::foot::BELOW;
 use self::name_column::{LEVEL, NameColumn};
 use crate::report::choice_report::ChoiceReport;
-use crate::sentences::{FIRST, HOW_TO_READ, Sentence};
+use crate::sentences::{FIRST, Sentence, how_to_read};
 use crate::text::alert::lines;
 use crate::text::frame_count::frames;
 use crate::text::ladder::{Ladder, SeriesByLevel};
@@ -23,7 +23,9 @@ use crate::types::manifest::RunManifest;
 use crate::types::{Axis, AxisLevel};
 use darkqa_score::accuracy::AccuracyCell;
 use darkqa_score::choice::ReadingMode;
+use darkqa_score::grid::Grid;
 use darkqa_score::health::Health;
+use darkqa_score::subject::judged;
 
 /// Width of the column of intervals, in characters.
 const REACH: usize = 15;
@@ -58,7 +60,7 @@ pub(crate) fn full(report: &ChoiceReport<'_>, runs: &[(&RunManifest, &Path)]) ->
         text += &marked::sentence(sentence);
     }
     if !report.sentences.is_empty() {
-        text += &line_of([" ", HOW_TO_READ, " "]);
+        text += &line_of([" ", how_to_read(&report.sentences), " "]);
         text.push('\n');
     }
     text += &render(&report.tables);
@@ -85,7 +87,7 @@ pub(crate) fn findings(report: &ChoiceReport<'_>) -> String {
     }
     let is_tested = |sentence: &Sentence| sentence.values.contains_key("p");
     if report.sentences.iter().any(is_tested) {
-        text += &wrapped(" ", HOW_TO_READ, " ");
+        text += &wrapped(" ", how_to_read(&report.sentences), " ");
     }
     text
 }
@@ -97,16 +99,27 @@ fn open_question(report: &ChoiceReport<'_>) -> String {
     open.map_or_else(String::new, |open| wrapped(" ", &open, " "))
 }
 
-/// Numbers of models, questions, frames, clusters and replies.
-pub(super) fn head(report: &ChoiceReport<'_>) -> String {
-    let findings = report.findings;
-    let grid = &findings.grid;
+/// The models of a grid, in its order.
+fn models<'g>(grid: &'g Grid<'_>) -> Vec<&'g str> {
     let mut models: Vec<&str> = grid
         .subjects
         .iter()
         .map(|subject| &*subject.model)
         .collect();
     models.dedup();
+    models
+}
+
+/// The model under test, or the number of them, and the people. References such as `random` count only if there is no other model.
+pub(super) fn who_is_judged(grid: &Grid<'_>) -> String {
+    let mut models = models(grid);
+    let judged = judged(models.iter().copied());
+    models.retain(|model| judged.contains(model));
+    who(grid, models)
+}
+
+/// The model, or the number of models, and the people.
+fn who(grid: &Grid<'_>, models: Vec<&str>) -> String {
     let is_people = |model: &&str| grid.listing.is_people(model);
     let (people, models): (Vec<&str>, Vec<&str>) = models.into_iter().partition(is_people);
     let who = match &models[..] {
@@ -120,7 +133,13 @@ pub(super) fn head(report: &ChoiceReport<'_>) -> String {
         .into_iter()
         .chain(people)
         .collect();
-    let who = who.join(", ");
+    who.join(", ")
+}
+
+/// Numbers of models, questions, frames, clusters and replies.
+pub(super) fn head(report: &ChoiceReport<'_>) -> String {
+    let findings = report.findings;
+    let grid = &findings.grid;
     let questions: BTreeSet<_> = grid
         .items
         .iter()
@@ -133,7 +152,8 @@ pub(super) fn head(report: &ChoiceReport<'_>) -> String {
         n => format!("{n} replies"),
     };
     format!(
-        "{who} · {} · {} · {replies}, {failed} failed · intervals by {}",
+        "{} · {} · {} · {replies}, {failed} failed · intervals by {}",
+        who(grid, models(grid)),
         counted(questions.len(), "question"),
         frames(grid),
         findings.unit

@@ -4,14 +4,17 @@
 //! thumbnails, are packed data that its script reads. The page needs no network, and its content security policy allows none.
 
 pub(super) mod data;
+mod head;
 mod inputs;
 mod items;
 mod run_usage;
 mod sample;
 mod sections;
+mod strip;
 mod tables;
 
 pub(crate) use data::shown_thumbnails;
+pub(in crate::report) use head::PageHead;
 pub use inputs::PageInputs;
 pub(crate) use inputs::PageRun;
 pub(crate) use run_usage::RunUsage;
@@ -22,17 +25,16 @@ use serde_json::{Value, json};
 use crate::drawing::chart::Figure;
 use crate::error::Result;
 use crate::report::choice_report::ChoiceReport;
+use crate::report::short::{head, who_is_judged};
 use crate::report::template::filled;
-use crate::sentences::{HOW_TO_READ, Sentence};
+use crate::sentences::{Sentence, how_to_read};
 use crate::tables::{SECTIONS, Section};
 use crate::text::alert::Alert;
-use crate::text::frame_count::frames;
 use crate::text::light_readings::LightReadings;
 use crate::text::table::Table;
 use crate::types::Truths;
 use crate::types::manifest::RunManifest;
 use darkqa_score::confusion::Confusion;
-use darkqa_score::findings::Findings;
 use darkqa_score::grid::Grid;
 
 /// The template of the page, its style and its script.
@@ -56,6 +58,10 @@ struct Page<'a> {
     /// Class of the body: that of pages on which nothing is known to be right or wrong.
     class: &'static str,
     title: String,
+    /// Heading: the title without the names of runs.
+    heading: String,
+    /// The first screen; `None` of a page without one.
+    head: Option<PageHead<'a>>,
     /// What families of questions are called.
     family: &'static str,
     /// Warnings at the top of the page.
@@ -96,6 +102,10 @@ impl<'a> PageSentence<'a> {
 
 /// What a page shows, besides its figures and the facts of its runs.
 pub(crate) struct PageContent<'a> {
+    /// The models in words, for the heading.
+    pub(crate) who: String,
+    /// The first screen; `None` of a page without one.
+    pub(in crate::report) head: Option<PageHead<'a>>,
     /// Lines about the numbers as a whole.
     pub(crate) intro: Vec<String>,
     pub(crate) alerts: &'a [Alert],
@@ -124,10 +134,12 @@ pub(crate) fn page<'a>(
 ) -> Result<String> {
     let findings = report.findings;
     let content = PageContent {
-        intro: intro(findings),
+        who: who_is_judged(&findings.grid),
+        head: PageHead::new(report, inputs)?,
+        intro: intro(report),
         alerts: &report.alerts,
         sentences: &report.sentences,
-        how_to_read: HOW_TO_READ,
+        how_to_read: how_to_read(&report.sentences),
         tables: &report.tables,
         sections: &SECTIONS,
         grid: &findings.grid,
@@ -155,7 +167,9 @@ pub(crate) fn page_of<'a>(
                 Truths::Known => "",
                 Truths::Unknown => "no-truth",
             },
-            title: title(inputs),
+            title: title(&content.who, inputs),
+            heading: heading(&content.who, inputs),
+            head: content.head,
             family: "family",
             alerts: content.alerts.iter().map(|alert| &*alert.text).collect(),
             sentences: Some(content.sentences.iter().map(PageSentence::new).collect()),
@@ -196,7 +210,9 @@ pub(in crate::report) fn page_of_open_questions(
         PAGE,
         Page {
             class: "",
+            heading: content.title.clone(),
             title: content.title,
+            head: None,
             family: "category",
             alerts: content.alerts.iter().map(String::as_str).collect(),
             sentences: None,
@@ -216,26 +232,28 @@ pub(in crate::report) fn page_of_open_questions(
     )
 }
 
-fn title(inputs: &PageInputs<'_>) -> String {
+/// `MODEL in the dark`, or how many runs are compared.
+fn heading(who: &str, inputs: &PageInputs<'_>) -> String {
     match &*inputs.runs {
-        [one] => format!("Seeing in the dark: {}", one.name),
+        [_] => format!("{who} in the dark"),
         several => format!("Seeing in the dark: {} runs compared", several.len()),
     }
 }
 
-fn intro(findings: &Findings<'_>) -> Vec<String> {
-    let (grid, unit) = (&findings.grid, findings.unit);
-    let facts = format!(
-        "{} items about {}, {} subjects (model × condition). Strict reading. Intervals are 95 %, by {unit} \
-         ({} clusters); differences are paired by item, tested by swapping whole {unit}s, and corrected by Holm over the comparisons of one kind and model; \
-         “not shown” does not say that there is no difference.",
-        grid.items.len(),
-        frames(grid),
-        grid.subjects.len(),
-        grid.clusters
-    );
+/// The heading, with the name of a single run.
+fn title(who: &str, inputs: &PageInputs<'_>) -> String {
+    let heading = heading(who, inputs);
+    match &*inputs.runs {
+        [one] => format!("{heading} · {}", one.name),
+        _ => heading,
+    }
+}
+
+fn intro(report: &ChoiceReport<'_>) -> Vec<String> {
+    let grid = &report.findings.grid;
+    let size = format!("{} (95 %) · strict parsing", head(report));
     let readings = LightReadings::of(&grid.subjects);
-    std::iter::once(facts)
+    std::iter::once(size)
         .chain(readings.open_question())
         .collect()
 }

@@ -17,6 +17,7 @@ use crate::error::Result;
 use crate::report::json::{Rows, RunList, RunsHead, document};
 use crate::report::page::{PageContent, PageInputs, page_of};
 use crate::report::products::files;
+use crate::report::short::who_is_judged;
 use crate::sentences::Sentence;
 use crate::text::alert::Alert;
 use crate::text::light_readings::LightReadings;
@@ -40,6 +41,8 @@ pub(crate) fn products<'a>(
 ) -> Result<Vec<(String, Vec<u8>)>> {
     let figures = figures::figures(report.found)?;
     let content = PageContent {
+        who: who_is_judged(&report.found.grid),
+        head: None,
         intro: intro(report.found),
         alerts: &report.alerts,
         sentences: &report.sentences,

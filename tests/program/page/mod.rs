@@ -60,6 +60,7 @@ fn the_page_works_in_a_browser() {
     assert_eq!(browser.evaluate("window.scrollY"), 0);
     // Nothing is written to the address before a person acts.
     assert_eq!(browser.evaluate("location.hash"), "");
+    first_screen(&mut browser);
     charts(&mut browser, &bench);
     browser.shot("light.png", true);
     filters(&mut browser);
@@ -72,6 +73,31 @@ fn the_page_works_in_a_browser() {
     paper(&mut browser);
     assert!(browser.print("page.pdf") > 10_000);
     assert_eq!(browser.complaints(&url), Vec::<String>::new());
+}
+
+/// The first screen has the finding about darkness, a chart, and a frame with the answers of the model on it; the one wrong answer is
+/// marked where it was given.
+fn first_screen(browser: &mut Browser) {
+    assert_eq!(
+        browser.evaluate("document.querySelector('h1').textContent"),
+        format!("{SAID} in the dark")
+    );
+    let texts = |selector: &str| {
+        format!("[...document.querySelectorAll('{selector}')].map(e => e.textContent)")
+    };
+    let groups = browser.evaluate(&texts(".first-findings th"));
+    assert_eq!(groups, json!(["Darkness", "Noise", "Without images"]));
+    assert_eq!(
+        browser.evaluate("document.querySelectorAll('#figure-head .panel svg').length"),
+        1
+    );
+    let levels = browser.evaluate(&texts(".strip thead th"));
+    assert_eq!(
+        levels,
+        json!(["treatment", "L0", "L1", "L2", "L3", "L4", "L5"])
+    );
+    let wrong = browser.evaluate(&texts(".strip .answer.wrong"));
+    assert_eq!(wrong, json!(["✗ red"]));
 }
 
 fn count(browser: &mut Browser) -> Value {
@@ -122,7 +148,7 @@ fn filters(browser: &mut Browser) {
 
 /// Charts are drawn at the width there is, and the values at their cursor are those of the tables.
 fn charts(browser: &mut Browser, bench: &Bench) {
-    let first = "document.querySelector('figure.chart.drawn')";
+    let first = "document.querySelector('#figure-accuracy')";
     let drawn = "document.querySelectorAll('figure.chart.drawn .panel svg').length";
     assert!(browser.evaluate(drawn).as_u64().unwrap() >= 2);
     // The built-in model is off at first, as there is another.
@@ -314,7 +340,7 @@ fn narrow(browser: &mut Browser, url: &str) {
 
 /// On paper charts have its width, and what is not drawn is said; afterwards they have that of the window again.
 fn paper(browser: &mut Browser) {
-    let noted = "document.querySelector('figure.chart .paper-only').textContent";
+    let noted = "document.querySelector('#figure-accuracy .paper-only').textContent";
     let before = browser.evaluate(WIDEST_CHART);
     browser.evaluate("dispatchEvent(new Event('beforeprint'))");
     let printed = browser.evaluate(WIDEST_CHART).as_f64().unwrap();
