@@ -206,9 +206,10 @@ fn finish(outcome: &Outcome, verbosity: Verbosity, colours: ColorChoice) -> Exit
     let said = if verbosity == Verbosity::Normal || outcome.written.is_empty() {
         stdout.write_all(shown_in_colours(&outcome.output).as_bytes())
     } else {
-        // What ended with a fault says so, where it takes no place from the paths.
+        // An incomplete run is reported on standard error, so that standard output has the paths alone. Nothing there has colours.
         if outcome.status != Status::Complete {
-            let _ = std::io::stderr().write_all(shown_in_colours(&outcome.output).as_bytes());
+            let mut stderr = AutoStream::never(std::io::stderr());
+            let _ = stderr.write_all(shown_in_colours(&outcome.output).as_bytes());
         }
         let mut paths = outcome.written.iter();
         paths.try_for_each(|path| writeln!(stdout, "{}", path.display()))

@@ -9,6 +9,7 @@ use super::sheet::{Colour, Stroke};
 use crate::drawing::chart::{Chart, Panel, PanelContent, PlotLine};
 use crate::text::latex::escaped;
 use crate::types::AxisLevel;
+use crate::types::shown_text::shown;
 
 /// Room left of the first axes, between axes, and right of the last ones, in heights of letters.
 const FIRST: f64 = 4.6;
@@ -209,6 +210,7 @@ fn dat(panel: &Panel) -> String {
     let curves: Vec<_> = curves.collect();
     for (place, line, _) in &curves {
         let name = line.name.replace(['\n', '\r'], " ");
+        let name = shown(&name);
         let _ = writeln!(
             text,
             "# y{place}, low{place}, high{place}: {name}, in percent"

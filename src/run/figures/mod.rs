@@ -22,6 +22,7 @@ use crate::runs::Outcome;
 use crate::text::table::Table;
 use crate::types::Decides;
 use crate::types::manifest::Status;
+use crate::types::shown_text::shown;
 
 use width::{TEX, Width};
 
@@ -298,10 +299,8 @@ impl Files {
             let _ = writeln!(lines, "{}", out.join(name).display());
         }
         let captions = out.join(CAPTIONS);
-        files::write(
-            &captions,
-            format!("{}{}", self.captions, self.left_out).as_bytes(),
-        )?;
+        let text = self.captions + &self.left_out;
+        files::write(&captions, shown(&text).as_bytes())?;
         let _ = writeln!(lines, "{}", captions.display());
         Ok(lines + &self.left_out)
     }

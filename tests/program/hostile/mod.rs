@@ -23,6 +23,7 @@ mod random;
 mod replies;
 mod requests;
 mod seeds;
+mod texts;
 mod trial;
 
 /// The number of runs of the short form: about ten seconds on two cores.

@@ -15,14 +15,16 @@ const STYLES: [&str; 5] = [
     "\u{1b}[0m",
 ];
 
-/// Whether a character is not seen as itself: a control but line feed and tab, a direction mark, an invisible letter, or a tag.
+/// Whether a character is not seen as itself: a control but line feed and tab, a line separator, an annotation mark, or one that
+/// Unicode calls ignorable by default (direction marks, invisible letters, tags), but the two selectors of the form of an emoji.
 #[must_use]
 pub fn is_hidden(c: char) -> bool {
     matches!(
         c,
-        '\u{0}'..='\u{8}' | '\u{b}'..='\u{1f}' | '\u{7f}'..='\u{9f}' | '\u{ad}' | '\u{61c}' | '\u{115f}' | '\u{180e}'
-            | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}'
-            | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}'
+        '\u{0}'..='\u{8}' | '\u{b}'..='\u{1f}' | '\u{7f}'..='\u{9f}' | '\u{ad}' | '\u{34f}' | '\u{61c}' | '\u{115f}'..='\u{1160}'
+            | '\u{17b4}'..='\u{17b5}' | '\u{180b}'..='\u{180f}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}'
+            | '\u{2060}'..='\u{206f}' | '\u{3164}' | '\u{fe00}'..='\u{fe0d}' | '\u{feff}' | '\u{ffa0}' | '\u{fff0}'..='\u{fffb}'
+            | '\u{1bca0}'..='\u{1bca3}' | '\u{1d173}'..='\u{1d17a}' | '\u{e0000}'..='\u{e0fff}'
     )
 }
 
@@ -102,6 +104,8 @@ mod tests {
             ("a\u{202e}b", "a⟨U+202E⟩b"),
             ("\u{1b}[31mred", "⟨U+001B⟩[31mred"),
             ("a\r\u{e0041}ü\u{ad}", "a⟨U+000D⟩⟨U+E0041⟩ü⟨U+00AD⟩"),
+            ("a\u{3164}\u{34f}\u{e0101}", "a⟨U+3164⟩⟨U+034F⟩⟨U+E0101⟩"),
+            ("⚠\u{fe0f} עברית", "⚠\u{fe0f} עברית"),
         ] {
             assert_eq!(shown(text), expected);
         }

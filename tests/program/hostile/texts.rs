@@ -1,0 +1,85 @@
+//! Texts of strangers: nothing hidden is written to files, and nothing moves a terminal.
+
+use std::fs;
+
+use crate::support::endpoint::{Answer, MockEndpoint};
+use crate::support::run::{Bench, called, files, model_args, words};
+
+/// A key as a gateway gives it.
+const KEY: &str = "gateway-0123456789-abcdefghij";
+
+#[test]
+fn a_quiet_run_writes_no_colours_to_standard_error() {
+    let bench = Bench::with_questions(4);
+    let mock = MockEndpoint::answering(|_| Answer::error(400, "x", "no"));
+    let line = "--data set.jsonl --levels L0 --retries 0 --out";
+    let run = |out: &str, more: &[&str], variables: &[(&str, &str)]| {
+        let url = mock.base_url();
+        let args = [&model_args(&url, line)[..], &[out], more].concat();
+        called(
+            bench
+                .command(&args)
+                .envs(variables.iter().copied())
+                .env("OPENAI_API_KEY", KEY),
+        )
+    };
+    let rows: [(&[&str], &[(&str, &str)]); 4] = [
+        (&["--quiet"], &[]),
+        (&["--quiet", "--color", "never"], &[]),
+        (&["--quiet", "--color", "always"], &[]),
+        (&["--color", "always"], &[("NO_COLOR", "1")]),
+    ];
+    for (at, (more, variables)) in rows.into_iter().enumerate() {
+        let called = run(&format!("run{at}"), more, variables);
+        assert!(called.code == Some(1) && !called.stderr.is_empty() || at == 3);
+        assert!(!called.stderr.contains('\u{1b}'), "{more:?}: {called:?}");
+        // The same text has colours where they are wanted.
+        assert_eq!(called.stdout.contains('\u{1b}'), at == 3, "{called:?}");
+    }
+}
+
+/// The hidden characters of a text.
+fn hidden(text: &str) -> Vec<char> {
+    let is_hidden = |c: &char| {
+        (c.is_control() && *c != '\n' && *c != '\t')
+            || "\u{202e}\u{2066}\u{200b}\u{2028}\u{3164}".contains(*c)
+    };
+    text.chars().filter(is_hidden).collect()
+}
+
+#[test]
+fn captions_and_the_readme_of_a_bundle_hide_nothing() {
+    let strange = r"a\u001b[31m\u009b2J\r\u202e\u2066\u200b\u2028\u3164\\input{/etc/passwd}%&.png";
+    let bench = Bench::with_questions(9);
+    bench.complete(&words(
+        "--model random --data set.jsonl --levels L0,L3,L5 --out run",
+    ));
+    for path in files(&bench.path("run")) {
+        let text = fs::read_to_string(&path).unwrap_or_default();
+        if path.extension().is_some_and(|end| end == "jsonl") || path.ends_with("run/manifest.json")
+        {
+            let text = text.replace("a.png", strange);
+            fs::write(&path, text.replace("\"paper\"", "\"paper\\u202e\"")).unwrap();
+        }
+    }
+    bench.complete(&words("figures run --out figures --format pdf,svg,tex"));
+    let mut kinds = 0;
+    for path in files(&bench.path("figures")) {
+        let text = fs::read(&path).unwrap();
+        if path.extension().is_none_or(|end| end != "pdf") {
+            let text = String::from_utf8(text).unwrap();
+            assert_eq!(hidden(&text), [], "{}", path.display());
+            kinds += 1;
+        }
+    }
+    assert!(kinds > 3);
+    let captions = fs::read_to_string(bench.path("figures/captions.txt")).unwrap();
+    assert!(captions.contains("⟨U+202E⟩"), "{captions}");
+    bench.complete(&words("bundle run --out run.zip"));
+    let archive = fs::File::open(bench.path("run.zip")).unwrap();
+    let mut archive = zip::ZipArchive::new(archive).unwrap();
+    let readme = archive.by_name("run/README.md").unwrap();
+    let readme = std::io::read_to_string(readme).unwrap();
+    assert_eq!(hidden(&readme), [], "{readme}");
+    assert!(readme.contains("paper⟨U+202E⟩"), "{readme}");
+}
