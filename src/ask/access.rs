@@ -14,6 +14,7 @@ use rustls::pki_types::pem::PemObject as _;
 use super::key_header::KeyHeader;
 use super::own_certificate::client_config;
 use super::own_headers::OwnHeaders;
+use super::proxy::check_proxy;
 use super::secret::{Scrub, Secret};
 use super::url::BaseUrl;
 use super::vendor::Vendor;
@@ -131,6 +132,7 @@ impl Access {
             let config = config.map_err(|e| Error::usage("--ca-file", e.to_string()))?;
             client = client.tls_backend_preconfigured(config);
         }
+        check_proxy(&self.base, |name| std::env::var_os(name))?;
         if self.base.is_loopback() {
             client = client.no_proxy();
         }

@@ -38,6 +38,7 @@ mod pace;
 mod parameters;
 mod prices;
 mod prompt;
+mod proxy;
 mod random;
 mod remote;
 mod replica;

@@ -1,4 +1,4 @@
-//! Texts of strangers: nothing hidden is written to files, and nothing moves a terminal.
+//! Texts of strangers and settings of proxies: nothing hidden is written to files, nothing moves a terminal, and no proxy is passed by.
 
 use std::fs;
 
@@ -82,4 +82,40 @@ fn captions_and_the_readme_of_a_bundle_hide_nothing() {
     let readme = std::io::read_to_string(readme).unwrap();
     assert_eq!(hidden(&readme), [], "{readme}");
     assert!(readme.contains("paper⟨U+202E⟩"), "{readme}");
+}
+
+#[test]
+fn a_proxy_that_cannot_be_used_is_an_error() {
+    let bench = Bench::with_questions(1);
+    let proxy = MockEndpoint::answering(|_| Answer::text("brown"));
+    let address = proxy.base_url().replace("/v1", "");
+    let run = |proxy: &str, more: &str| {
+        let line = format!("--data set.jsonl --levels L0 --retries 0 --allow-http --out {more}");
+        // Reserved by RFC 5737: nobody answers there.
+        let args = model_args("http://192.0.2.1:9/v1", &line);
+        called(
+            bench
+                .command(&args)
+                .env("HTTP_PROXY", proxy)
+                .env("OPENAI_API_KEY", KEY),
+        )
+    };
+    for wrong in [
+        "socks5://user:word@127.0.0.1:1080",
+        "127.0.0.1:port",
+        "http//proxy",
+    ] {
+        let called = run(wrong, "refused").ended(2);
+        assert!(called.stderr.contains("HTTP_PROXY"), "{called:?}");
+        assert!(!called.stderr.contains("word"), "{called:?}");
+        assert!(!bench.path("refused").exists());
+    }
+    run(&address, "run").ended(0);
+    let requests = proxy.requests();
+    assert!(!requests.is_empty());
+    assert!(
+        requests[0].line.contains("192.0.2.1:9"),
+        "{}",
+        requests[0].line
+    );
 }

@@ -1,0 +1,154 @@
+//! The proxy of an endpoint, as the environment names it: [`check_proxy`].
+
+use std::ffi::OsString;
+
+use hyper::Uri;
+use hyper::http::uri::Authority;
+use hyper_util::client::proxy::matcher::Matcher;
+
+use super::url::BaseUrl;
+use crate::error::{Error, Result};
+
+/// A proxy that can be used, to find out whether `NO_PROXY` exempts an address.
+const PROBE: &str = "http://127.0.0.1:1";
+
+/// Refuses a proxy that cannot be used. reqwest ignores such a setting, and would connect to the endpoint directly.
+///
+/// The variables and their order are those of reqwest: `HTTP_PROXY` or `HTTPS_PROXY` by the scheme of the address, then `ALL_PROXY`,
+/// each before its name in small letters. An empty variable is not set.
+///
+/// # Errors
+/// Names the variable, and not its value, which may have a password.
+pub(super) fn check_proxy(
+    base: &BaseUrl,
+    variable: impl Fn(&str) -> Option<OsString>,
+) -> Result<()> {
+    // For this machine no proxy is used.
+    if base.is_loopback() {
+        return Ok(());
+    }
+    let Ok(address) = base.to_string().parse::<Uri>() else {
+        return Ok(());
+    };
+    let first = |names: [&'static str; 2]| {
+        let mut set = names
+            .into_iter()
+            .filter_map(|name| Some((name, variable(name)?)));
+        set.next().filter(|(_, value)| !value.is_empty())
+    };
+    let own = match base.is_plain() {
+        true => ["HTTP_PROXY", "http_proxy"],
+        false => ["HTTPS_PROXY", "https_proxy"],
+    };
+    let Some((name, value)) = first(own).or_else(|| first(["ALL_PROXY", "all_proxy"])) else {
+        return Ok(());
+    };
+    let except = first(["NO_PROXY", "no_proxy"]).and_then(|(_, value)| value.into_string().ok());
+    let except = except.unwrap_or_default();
+    let exempt = Matcher::builder().all(PROBE).no(except).build();
+    if exempt.intercept(&address).is_none() || value.to_str().is_some_and(is_usable) {
+        return Ok(());
+    }
+    let problem = "not a proxy that can be used, and nothing was sent without it; expected for example http://proxy.example:3128 (no \
+                   SOCKS). To connect directly, unset it or name the host in NO_PROXY";
+    Err(Error::usage(name, problem))
+}
+
+/// Whether requests can be sent through a proxy of this address.
+fn is_usable(proxy: &str) -> bool {
+    let matcher = Matcher::builder().all(proxy.to_owned()).build();
+    let found = matcher.intercept(&Uri::from_static("http://host.example/"));
+    found.is_some_and(|proxy| {
+        let is_http = matches!(proxy.uri().scheme_str(), Some("http" | "https"));
+        is_http && proxy.uri().authority().is_some_and(is_address)
+    })
+}
+
+/// Whether an authority has a host, and a port that exists if it has one.
+fn is_address(authority: &Authority) -> bool {
+    let after_host = authority.as_str().strip_prefix(authority.host());
+    let port = after_host.and_then(|rest| rest.strip_prefix(':'));
+    let is_port = |port: &str| port.parse::<u16>().is_ok_and(|port| port > 0);
+    !authority.host().is_empty() && port.is_none_or(is_port)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The variable that is refused for this address and environment.
+    fn refused(base: &str, set: &[(&str, &str)]) -> Option<String> {
+        let variable = |name: &str| {
+            let found = set.iter().find(|(known, _)| *known == name);
+            found.map(|(_, value)| value.into())
+        };
+        let error = check_proxy(&base.parse().unwrap(), variable).err()?;
+        let error = error.to_string();
+        assert!(!error.contains("pass"), "{error}");
+        Some(error.split(':').next().unwrap_or_default().to_owned())
+    }
+
+    const PLAIN: &str = "http://llm.example/v1";
+    const ENCRYPTED: &str = "https://llm.example/v1";
+
+    #[test]
+    fn unusable_proxies_are_refused() {
+        for proxy in [
+            "socks5://user:pass@127.0.0.1:1080",
+            "ftp://proxy",
+            "http://",
+            "http:/proxy:3128",
+            "http://:3128",
+            "http://proxy:99999",
+            "http://proxy:port",
+            "http://proxy:0",
+            "my proxy",
+            " http://proxy:3128",
+            "none",
+        ]
+        .map(|proxy| (proxy, proxy != "none"))
+        {
+            let (proxy, is_refused) = proxy;
+            let name = |name: &str| is_refused.then(|| name.to_owned());
+            assert_eq!(refused(PLAIN, &[("HTTP_PROXY", proxy)]), name("HTTP_PROXY"));
+            assert_eq!(
+                refused(ENCRYPTED, &[("https_proxy", proxy)]),
+                name("https_proxy"),
+                "{proxy}"
+            );
+            assert_eq!(
+                refused(ENCRYPTED, &[("ALL_PROXY", proxy)]),
+                name("ALL_PROXY")
+            );
+        }
+    }
+
+    #[test]
+    fn proxies_that_can_be_used_are_taken() {
+        for proxy in [
+            "",
+            "http://proxy:3128",
+            "https://user:pass@proxy",
+            "proxy:3128",
+            "http://[::1]:3128/",
+        ] {
+            assert_eq!(refused(PLAIN, &[("HTTP_PROXY", proxy)]), None, "{proxy}");
+        }
+    }
+
+    #[test]
+    fn a_proxy_that_is_not_asked_may_be_anything() {
+        let wrong = ("ALL_PROXY", "socks5://proxy");
+        assert_eq!(refused("http://127.0.0.1:8000/v1", &[wrong]), None);
+        assert_eq!(
+            refused(PLAIN, &[wrong, ("HTTP_PROXY", "http://proxy")]),
+            None
+        );
+        assert_eq!(refused(PLAIN, &[("HTTPS_PROXY", "socks5://proxy")]), None);
+        for except in ["*", "llm.example", ".example, other"] {
+            assert_eq!(refused(PLAIN, &[wrong, ("NO_PROXY", except)]), None);
+        }
+        let other = refused(PLAIN, &[wrong, ("NO_PROXY", "other")]);
+        assert_eq!(other.as_deref(), Some("ALL_PROXY"));
+    }
+}
