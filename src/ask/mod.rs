@@ -46,6 +46,7 @@ mod reply_secrets;
 mod request;
 mod script;
 mod secret;
+mod secret_parts;
 mod sending;
 mod server;
 mod service;

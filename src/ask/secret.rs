@@ -3,6 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
+use super::secret_parts::{MASK, SecretParts};
 use crate::error::{Error, Result};
 use crate::files::reading;
 
@@ -68,6 +69,9 @@ impl fmt::Debug for Secret {
 /// The maximum number of characters of a server's text; chosen.
 const MAX_LINE: usize = 300;
 
+/// The number of bytes of a server's text that are read for its line; chosen.
+const MAX_READ: usize = 64 << 10;
+
 /// The minimum length of a secret that is removed. Shorter ones are placeholders like `x` for servers that accept any key;
 /// their removal would destroy ordinary words.
 const MIN_SECRET: usize = 4;
@@ -79,7 +83,12 @@ const MIN_SECRET_IN_REPLY: usize = 16;
 /// A filter that makes the text of a server safe for a terminal, a log and a table: one short line without control characters
 /// and secrets.
 #[derive(Clone, Default)]
-pub(super) struct Scrub(Vec<String>);
+pub(super) struct Scrub {
+    /// The longest first: if one secret contains another, no part of the longer one must remain.
+    secrets: Vec<String>,
+    /// The parts of those that are removed from replies.
+    parts: SecretParts,
+}
 
 impl Scrub {
     /// The filter for these secrets.
@@ -88,23 +97,41 @@ impl Scrub {
             .into_iter()
             .filter(|secret| secret.len() >= MIN_SECRET)
             .collect();
-        // The longest first: if one secret contains another, no part of the longer one must remain.
         secrets.sort_by_key(|secret| std::cmp::Reverse(secret.len()));
         secrets.dedup();
-        Self(secrets)
+        let parts = SecretParts::new(keys(&secrets));
+        Self { secrets, parts }
     }
 
     /// Whether there are no secrets to remove.
     pub(super) fn is_empty(&self) -> bool {
-        self.0.is_empty()
+        self.secrets.is_empty()
     }
 
-    /// A model's reply without keys that it repeats, otherwise unchanged.
+    /// A model's reply without keys that it repeats, whole, in parts or in base64; otherwise unchanged.
     pub(super) fn reply(&self, text: String) -> String {
-        let keys = self.0.iter().filter(|key| key.len() >= MIN_SECRET_IN_REPLY);
-        keys.fold(text, |text, key| {
+        self.parts.masked(self.without_whole_keys(text))
+    }
+
+    /// A line of JSON without keys; its strings stay apart, and the id of a request in a batch loses whole keys alone.
+    pub(super) fn json_line(&self, line: String) -> String {
+        let line = self.without_whole_keys(line);
+        let pieces: Vec<&str> = line.split('"').collect();
+        let masked = pieces.iter().enumerate().map(|(at, piece)| {
+            let is_id = at >= 2 && pieces[at - 2] == "custom_id";
+            if is_id {
+                (*piece).to_owned()
+            } else {
+                self.parts.masked((*piece).to_owned())
+            }
+        });
+        masked.collect::<Vec<_>>().join("\"")
+    }
+
+    fn without_whole_keys(&self, text: String) -> String {
+        keys(&self.secrets).fold(text, |text, key| {
             if text.contains(key) {
-                text.replace(key, "[secret]")
+                text.replace(key, MASK)
             } else {
                 text
             }
@@ -113,18 +140,26 @@ impl Scrub {
 
     /// The text on one line of at most 300 characters, without secrets.
     pub(super) fn line(&self, text: &str) -> String {
+        let text = &text[..text.floor_char_boundary(MAX_READ)];
         let shown: String = text.chars().filter(|c| !is_hidden(*c)).collect();
         let words: Vec<&str> = shown.split_whitespace().collect();
         let mut line = words.join(" ");
         // Shorten last: otherwise the first half of a secret could remain.
-        for secret in &self.0 {
-            line = line.replace(secret, "[secret]");
+        for secret in &self.secrets {
+            line = line.replace(secret, MASK);
         }
+        let line = self.parts.masked(line);
         match line.char_indices().nth(MAX_LINE) {
             None => line,
             Some((end, _)) => format!("{}…", &line[..end]),
         }
     }
+}
+
+/// The secrets that are removed from replies.
+fn keys(secrets: &[String]) -> impl Iterator<Item = &str> {
+    let secrets = secrets.iter().map(String::as_str);
+    secrets.filter(|secret| secret.len() >= MIN_SECRET_IN_REPLY)
 }
 
 /// Whether a character is a control other than white space, or a mark that reverses or hides text.
@@ -135,7 +170,7 @@ fn is_hidden(c: char) -> bool {
 
 impl fmt::Debug for Scrub {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Scrub({} secrets)", self.0.len())
+        write!(f, "Scrub({} secrets)", self.secrets.len())
     }
 }
 

@@ -1,12 +1,16 @@
-//! Texts of strangers and settings of proxies: nothing hidden is written to files, nothing moves a terminal, and no proxy is passed by.
+//! Texts of strangers, and keys in them: nothing hidden is written to files, nothing moves a terminal, and no key is stored.
 
 use std::fs;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::run::{Bench, called, files, model_args, words};
 
-/// A key as a gateway gives it.
+/// A key as a gateway gives it, and two parts of it.
 const KEY: &str = "gateway-0123456789-abcdefghij";
+const PARTS: [&str; 2] = ["gateway-01234567", "89-abcdefghij"];
 
 #[test]
 fn a_quiet_run_writes_no_colours_to_standard_error() {
@@ -117,5 +121,39 @@ fn a_proxy_that_cannot_be_used_is_an_error() {
         requests[0].line.contains("192.0.2.1:9"),
         "{}",
         requests[0].line
+    );
+}
+
+#[test]
+fn a_key_in_base64_or_in_parts_is_in_no_file() {
+    let encoded = STANDARD.encode(format!("Bearer {KEY}"));
+    let reply = format!(
+        "brown {KEY} {encoded} {} and {}",
+        PARTS[0],
+        PARTS[1].replace('-', " ")
+    );
+    let bench = Bench::with_questions(2);
+    let run = |line: &str, answer: Answer| {
+        let mock = MockEndpoint::answering(move |_| answer.clone());
+        let url = mock.base_url();
+        let args = model_args(&url, line);
+        called(bench.command(&args).env("OPENAI_API_KEY", KEY))
+    };
+    let line = "--data set.jsonl --levels L0 --retries 0 --out";
+    run(&format!("{line} run"), Answer::text(&reply)).ended(0);
+    let refused = run(&format!("{line} refused"), Answer::error(400, "x", &reply));
+    let core = &encoded[12..encoded.len() - 4];
+    let pieces = [KEY, core, "0123456", "abcdefghij"];
+    let read = |path: &std::path::PathBuf| fs::read_to_string(path).unwrap_or_default();
+    let all: Vec<String> = files(&bench.path("")).iter().map(read).collect();
+    let texts = all.iter().chain([&refused.stdout, &refused.stderr]);
+    for text in texts {
+        let found = pieces.iter().find(|piece| text.contains(**piece));
+        assert_eq!(found, None, "{text}");
+    }
+    let records = fs::read_to_string(bench.path("run/records.jsonl")).unwrap();
+    assert!(
+        records.contains("brown [secret]") && records.contains("[secret] and [secret]"),
+        "{records}"
     );
 }

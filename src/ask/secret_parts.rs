@@ -1,0 +1,197 @@
+//! Parts of keys, and keys in base64, in the text of a server: [`SecretParts`].
+
+use std::collections::HashSet;
+use std::ops::Range;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD_NO_PAD;
+
+/// Letters and digits in a row by which a part of a key is recognized; chosen. A random text of 64 kB has such a part with a probability
+/// of 1e-6.
+const PART: usize = 8;
+
+/// Length from which a part without digits is recognized; chosen. Names of gateways have words in their keys, and so have replies.
+const WORDS: usize = 10;
+
+/// The text in the place of a key.
+pub(super) const MASK: &str = "[secret]";
+
+/// The letters and digits of keys, [`PART`] in a row, as they are and in base64; without regard to case.
+#[derive(Clone, Default)]
+pub(super) struct SecretParts(HashSet<[u8; PART]>);
+
+impl SecretParts {
+    /// The parts of these keys.
+    pub(super) fn new<'s>(keys: impl Iterator<Item = &'s str>) -> Self {
+        let forms = keys.flat_map(|key| {
+            let plain = std::iter::once(key.to_owned());
+            plain.chain((0..3).map(|shift| in_base64(key, shift)))
+        });
+        let mut parts = HashSet::new();
+        for form in forms {
+            let letters: Vec<u8> = letters(&form).map(|letter| letter.value).collect();
+            parts.extend(letters.windows(PART).filter_map(|part| {
+                let part: Result<[u8; PART], _> = part.try_into();
+                part.ok()
+            }));
+        }
+        Self(parts)
+    }
+
+    /// The text with `[secret]` in the place of each part, whatever stands between its letters.
+    pub(super) fn masked(&self, text: String) -> String {
+        let places = self.places(&text);
+        if places.is_empty() {
+            return text;
+        }
+        let mut masked = String::with_capacity(text.len());
+        let mut copied = 0;
+        for place in places {
+            masked += &text[copied..place.start];
+            masked += MASK;
+            copied = place.end;
+        }
+        masked + &text[copied..]
+    }
+
+    /// The parts in a text, in bytes.
+    fn places(&self, text: &str) -> Vec<Range<usize>> {
+        if self.0.is_empty() {
+            return Vec::new();
+        }
+        let letters: Vec<Letter> = letters(text).collect();
+        let mut runs: Vec<Range<usize>> = Vec::new();
+        for (at, window) in letters.windows(PART).enumerate() {
+            let part: [u8; PART] = std::array::from_fn(|i| window[i].value);
+            if !self.0.contains(&part) {
+                continue;
+            }
+            match runs.last_mut() {
+                Some(run) if run.end >= at => run.end = at + PART,
+                _ => runs.push(at..at + PART),
+            }
+        }
+        let is_part = |run: &&[Letter]| {
+            let has_digit = run.iter().any(|letter| letter.value.is_ascii_digit());
+            let has_letter = run.iter().any(|letter| letter.value.is_ascii_alphabetic());
+            (has_digit && has_letter) || run.len() >= WORDS
+        };
+        let runs = runs.into_iter().map(|run| &letters[run]).filter(is_part);
+        runs.map(|run| run[0].start..run[run.len() - 1].end)
+            .collect()
+    }
+}
+
+/// The letters of base64 that a key has behind `shift` unknown bytes, as far as the key alone decides them.
+fn in_base64(key: &str, shift: usize) -> String {
+    let bytes = [&[0; 2][..shift], key.as_bytes()].concat();
+    let encoded = STANDARD_NO_PAD.encode(&bytes);
+    let unknown = usize::from(bytes.len() % 3 != 0);
+    let known = (shift * 8).div_ceil(6)..encoded.len() - unknown;
+    encoded[known].to_owned()
+}
+
+/// A letter or digit of a text.
+struct Letter {
+    /// In lower case.
+    value: u8,
+    /// Where it stands, in bytes.
+    start: usize,
+    end: usize,
+}
+
+/// The ASCII letters and digits of a text. Those that JSON or an address escapes, as `\u0073` or `%73`, are read; other escapes of one
+/// letter, as `\n`, are none.
+fn letters(text: &str) -> impl Iterator<Item = Letter> {
+    let bytes = text.as_bytes();
+    let mut start = 0;
+    std::iter::from_fn(move || {
+        while start < bytes.len() {
+            let (value, length) = letter(&bytes[start..]);
+            let end = start + length;
+            let found = value.is_ascii_alphanumeric().then(|| Letter {
+                value: value.to_ascii_lowercase(),
+                start,
+                end,
+            });
+            start = end;
+            if found.is_some() {
+                return found;
+            }
+        }
+        None
+    })
+}
+
+/// The first letter of these bytes, and how many bytes it takes.
+fn letter(bytes: &[u8]) -> (u8, usize) {
+    let escaped = |digits: Range<usize>| {
+        let end = digits.end;
+        let digits = std::str::from_utf8(bytes.get(digits)?).ok()?;
+        let code = u8::from_str_radix(digits, 16).ok()?;
+        Some((code, end))
+    };
+    match bytes {
+        [b'\\', b'u', b'0', b'0', ..] => escaped(4..6).unwrap_or((0, 1)),
+        [b'\\', other, ..] if other.is_ascii() => (0, 2),
+        [b'%', ..] => escaped(1..3).unwrap_or((0, 1)),
+        _ => (bytes[0], 1),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const KEY: &str = "sk-proj-Ab12Cd34Ef56Gh78Ij90";
+
+    fn masked(text: &str) -> String {
+        SecretParts::new([KEY].into_iter()).masked(text.to_owned())
+    }
+
+    #[test]
+    fn a_key_in_base64_is_masked_at_any_place() {
+        for before in ["", "a", "ab", "Bearer ", "user:"] {
+            for after in ["", "x", "xy"] {
+                let encoded = STANDARD_NO_PAD.encode(format!("{before}{KEY}{after}"));
+                let text = masked(&format!("It is {encoded}, ok"));
+                let [head, tail] = text.split(MASK).collect::<Vec<_>>()[..] else {
+                    panic!("{text}");
+                };
+                let left = head.len() + tail.len() - "It is , ok".len();
+                // What is left encodes the text around it, and at most two bytes of the key.
+                let around = (before.len() + after.len()) * 4 / 3;
+                assert!(left <= around + 5, "{encoded}: {text}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_key_in_parts_is_masked() {
+        for (text, expected) in [
+            ("sk-proj-Ab12Cd34 and Ef56Gh78Ij90", "[secret] and [secret]"),
+            ("s k - p r o j - A b 1 2 C d 3 4", "[secret]"),
+            ("sk-proj-Ab12\nCd34Ef56\nGh78Ij90.", "[secret]."),
+            ("AB12CD34EF56", "[secret]"),
+            ("é Ab12\u{200b}Cd34Ef\\u0035\\u0036Gh7%38 é", "é [secret] é"),
+        ] {
+            assert_eq!(masked(text), expected);
+        }
+    }
+
+    #[test]
+    fn other_words_stay() {
+        for text in [
+            "sk-proj",
+            "the project Ab12",
+            "Zm9v12345678",
+            "%zz \\ud83d %",
+            "é\\",
+        ] {
+            assert_eq!(masked(text), text);
+        }
+        let words = SecretParts::new(["bathroom-gateway-key-4711"].into_iter());
+        assert_eq!(words.masked("bathroom".to_owned()), "bathroom");
+        assert_eq!(words.masked("gateway-key-4711".to_owned()), MASK);
+    }
+}
