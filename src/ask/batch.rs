@@ -2,6 +2,7 @@
 
 use serde_json::Value;
 
+use super::bounded_json::parse;
 use super::complaint::{Complaint, UnreadableReply};
 use super::constraint::letter_of;
 use super::parameters::Constrain;
@@ -42,7 +43,7 @@ impl BatchLine {
 
     /// Reads a line, and removes secrets from the reply or the failure; `None` if the line is not one of such a file.
     pub(super) fn without_secrets(line: &str, scrub: &Scrub) -> Option<Self> {
-        let line: Value = serde_json::from_str(line).ok()?;
+        let line = parse(line).ok()?;
         let id = line.get("custom_id")?.as_str()?.to_owned();
         let result = result(&line, scrub).map(|reply| without_secrets(reply, scrub));
         let body = line

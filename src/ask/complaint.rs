@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
+use super::bounded_json::{parse, parse_start};
 use super::pace::{protobuf_duration, wait_in_words};
 use crate::types::Usage;
 
@@ -30,6 +31,9 @@ pub(super) struct Complaint {
 
 /// The number of errors within errors that are opened: routers pass on a server's error as text.
 const MOST_NESTED: usize = 3;
+
+/// The longest message that is read, in bytes; chosen: it is searched for many phrases, and its first line is shown.
+const LONGEST_MESSAGE: usize = 64 << 10;
 
 /// Words and ids of a limit that resets once a day.
 const DAILY: [&str; 6] = ["(rpd)", "(tpd)", "perday", "per day", "per-day", "daily"];
@@ -109,6 +113,7 @@ impl Complaint {
         if let Some(raw) = metadata.and_then(|metadata| text(metadata.get("raw")?)) {
             message = format!("{message}: {raw}");
         }
+        let message = shortened(message);
         let field = |name| error.get(name).and_then(text_or_number);
         Self {
             kind: field("type"),
@@ -136,9 +141,9 @@ impl Complaint {
 
     /// The error in the body of a refused request: JSON, an HTML page or plain text.
     pub(super) fn of_body(body: &str) -> Self {
-        let parsed: Option<Value> = serde_json::from_str(body).ok();
+        let parsed = parse(body).ok();
         parsed.as_ref().and_then(Self::of).unwrap_or_else(|| Self {
-            message: page_title(body).unwrap_or_else(|| body.trim().to_owned()),
+            message: page_title(body).unwrap_or_else(|| shortened(body.trim().to_owned())),
             ..Self::default()
         })
     }
@@ -214,6 +219,12 @@ impl From<Unreadable> for UnreadableReply {
     }
 }
 
+/// The beginning of a long message.
+fn shortened(mut message: String) -> String {
+    message.truncate(message.floor_char_boundary(LONGEST_MESSAGE));
+    message
+}
+
 /// The title of an HTML page; `None` if the body is not one.
 pub(super) fn page_title(body: &str) -> Option<String> {
     // ASCII lower case keeps byte positions.
@@ -236,8 +247,7 @@ pub(super) fn page_title(body: &str) -> Option<String> {
 /// The JSON object in a text that may have words before it; `None` if there is none.
 fn object_in(text: &str) -> Option<Value> {
     let object = &text[text.find('{')?..];
-    let mut values = serde_json::Deserializer::from_str(object).into_iter::<Value>();
-    let value = values.next()?.ok()?;
+    let value = parse_start(object).ok()?;
     let is_error = ["error", "message", "detail"]
         .iter()
         .any(|field| value.get(field).is_some());

@@ -7,11 +7,11 @@ use std::time::Duration;
 
 use reqwest::header::{CONTENT_TYPE, HeaderMap};
 use reqwest::{Client, Method, RequestBuilder, Response, StatusCode};
-use serde_json::Value;
 use tokio::time::Instant;
 
 use super::access::{Access, with_causes};
 use super::body::Parts;
+use super::bounded_json::parse;
 use super::connection_fault::permanent_cause;
 use super::failure::{Again, FailedTry, Reach};
 use super::parameters::Parameters;
@@ -146,7 +146,7 @@ impl Connection {
             return None;
         }
         let body = self.receive(response, Deadline::Whole).await.ok()?;
-        let list: Value = serde_json::from_slice(&body).ok()?;
+        let list = parse(std::str::from_utf8(&body).ok()?).ok()?;
         let models = list.get("data")?.as_array()?;
         let own = models
             .iter()

@@ -13,6 +13,7 @@ pub(crate) mod batch_api;
 mod batch_interface;
 mod body;
 mod body_secrets;
+mod bounded_json;
 mod call;
 mod complaint;
 mod connection;

@@ -15,6 +15,7 @@ use reqwest::{Method, RequestBuilder};
 use serde_json::{Value, json};
 
 use super::batch::BatchLine;
+use super::bounded_json::parse;
 use super::complaint::Complaint;
 use super::connection::{Connection, Deadline, HttpReply};
 use super::failure::FailedTry;
@@ -211,7 +212,8 @@ impl BatchServer {
     /// The JSON object in the response to a request.
     async fn object(&self, request: RequestBuilder) -> ApiResult<Value> {
         let answer = self.send(request).await?;
-        serde_json::from_slice(&answer.body).map_err(|_| self.unreadable("no JSON"))
+        let text = String::from_utf8_lossy(&answer.body);
+        parse(&text).map_err(|_| self.unreadable("no JSON"))
     }
 
     /// The response to a request that succeeded.

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 
 use serde_json::Value;
 
+use crate::ask::bounded_json::parse;
 use crate::ask::complaint::{Unreadable, UnreadableReply, page_title};
 use crate::ask::escapes;
 
@@ -22,8 +23,8 @@ pub(super) fn text(body: &[u8]) -> Cow<'_, str> {
 
 /// The JSON of a text; escapes of no character become replacement characters.
 pub(super) fn parsed(text: &str, content_type: &str) -> Result<Value, UnreadableReply> {
-    serde_json::from_str(text).or_else(|error| {
-        let repaired = escapes::repaired(text).and_then(|text| serde_json::from_str(&text).ok());
+    parse(text).or_else(|error| {
+        let repaired = escapes::repaired(text).and_then(|text| parse(&text).ok());
         repaired.ok_or_else(|| unreadable(text, content_type, &error))
     })
 }

@@ -17,9 +17,9 @@ mod stream;
 mod usage;
 
 use reqwest::header::{AUTHORIZATION, HeaderMap, HeaderName, HeaderValue};
-use serde_json::Value;
 
 use super::body::Parts;
+use super::bounded_json::parse;
 use super::call::Message;
 use super::complaint::{Complaint, UnreadableReply};
 use super::field::{RequestField, RequestFields, SentFields};
@@ -96,7 +96,7 @@ impl Wire {
 
 /// Reads the body of a reply in a batch's file, whichever wire asked for it: a response has an `output`, a chat completion has none.
 pub(super) fn batch_reply(body: &str) -> Result<Reply, UnreadableReply> {
-    let parsed: Option<Value> = serde_json::from_str(body).ok();
+    let parsed = parse(body).ok();
     let is_response = parsed.is_some_and(|body| body.get("output").is_some());
     let wire = if is_response {
         Wire::Responses
@@ -108,7 +108,7 @@ pub(super) fn batch_reply(body: &str) -> Result<Reply, UnreadableReply> {
 
 /// The tokens that a body states, of a reply or of a failure; `None` if it states none.
 pub(super) fn body_usage(body: &str) -> Option<Usage> {
-    let body: Value = serde_json::from_str(body).ok()?;
+    let body = parse(body).ok()?;
     usage::read(body.get("usage"))
 }
 

@@ -2,6 +2,8 @@
 
 use serde_json::{Map, Value, json};
 
+use crate::ask::bounded_json::{MOST_ITEMS, parse};
+
 /// Whether a body is an event stream, by its content type or its beginning.
 pub(super) fn is_stream(text: &str, content_type: &str) -> bool {
     let text = text.trim_start();
@@ -17,7 +19,7 @@ pub(super) fn events(stream: &str) -> impl Iterator<Item = Value> {
     let lines = stream.split(['\n', '\r']);
     let data = lines.filter_map(|line| line.strip_prefix("data:").map(str::trim));
     data.take_while(|data| *data != "[DONE]")
-        .map(|data| serde_json::from_str(data).unwrap_or_default())
+        .map(|data| parse(data).unwrap_or_default())
 }
 
 /// The completion that the pieces of the choice with index 0 make, in the form of `chat_reply`. An event with an error is
@@ -77,6 +79,12 @@ struct Pieces {
     logprobs: Map<String, Value>,
 }
 
+/// Adds the items of a piece to those before, up to the bound of one list.
+fn extend(joined: &mut Vec<Value>, more: &[Value]) {
+    let room = MOST_ITEMS.saturating_sub(joined.len());
+    joined.extend(more.iter().take(room).cloned());
+}
+
 /// The fields of a piece that are texts, besides its content.
 const TEXTS: [&str; 3] = ["refusal", "reasoning_content", "reasoning"];
 
@@ -89,7 +97,7 @@ impl Pieces {
         let delta = choice.get("delta").or_else(|| choice.get("message"));
         match delta.and_then(|delta| delta.get("content")) {
             Some(Value::String(text)) => self.add_content(text),
-            Some(Value::Array(parts)) => self.content.extend(parts.iter().cloned()),
+            Some(Value::Array(parts)) => extend(&mut self.content, parts),
             _ => {}
         }
         for field in TEXTS {
@@ -104,7 +112,7 @@ impl Pieces {
             if let Value::Array(more) = value {
                 let joined = self.logprobs.entry(field).or_insert_with(|| json!([]));
                 if let Value::Array(joined) = joined {
-                    joined.extend(more.iter().cloned());
+                    extend(joined, more);
                 }
             }
         }
