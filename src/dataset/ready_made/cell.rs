@@ -74,6 +74,25 @@ impl FileFacts {
 }
 
 impl Cell {
+    /// The memory that the cell takes, in bytes.
+    pub(super) fn length(&self) -> usize {
+        let inner = match self {
+            Self::Absent | Self::Bool(_) => 0,
+            Self::Number(text) => text.len(),
+            Self::Text(text) => text.len(),
+            Self::Bytes(bytes) => bytes.len(),
+            Self::File(_) => size_of::<FileFacts>(),
+            Self::List(cells) => cells.iter().map(Self::length).sum(),
+            Self::Fields(fields) => {
+                let fields = fields.iter();
+                fields
+                    .map(|(_, cell)| size_of::<Arc<str>>() + cell.length())
+                    .sum()
+            }
+        };
+        size_of::<Self>() + inner
+    }
+
     /// The cell without the bytes of files.
     pub(super) fn without_files(self, names: &mut FieldNames) -> Self {
         match self {

@@ -14,6 +14,12 @@ use super::names::{Role, known, plain};
 /// The maximum number of columns of a set.
 const MOST_COLUMNS: usize = 4096;
 
+/// The maximum number of rows of a set; chosen: a row takes half a kilobyte, and a packed file of a few kilobytes can hold millions.
+pub(super) const MOST_ROWS: usize = 1_000_000;
+
+/// The maximum length of all rows of a set without its images, in bytes; chosen.
+const MOST_BYTES: usize = 1 << 30;
+
 /// All rows of a set, in the order of its files.
 #[derive(Debug, Default)]
 pub(super) struct Table {
@@ -24,6 +30,8 @@ pub(super) struct Table {
     /// Whether the last file has a column.
     in_last_file: Vec<bool>,
     pub(super) rows: Vec<Row>,
+    /// The length of all rows, in bytes.
+    bytes: usize,
     /// What was done with the rows, in words.
     pub(super) notes: Vec<String>,
 }
@@ -151,17 +159,35 @@ impl Table {
     }
 
     /// Adds a row of the last file. Files in the cells are not kept.
-    pub(super) fn push(&mut self, place: RowPlace, cells: Vec<(usize, Cell)>) {
+    ///
+    /// # Errors
+    /// If there are more rows than [`MOST_ROWS`], or more bytes than [`MOST_BYTES`].
+    pub(super) fn push(
+        &mut self,
+        place: RowPlace,
+        cells: Vec<(usize, Cell)>,
+    ) -> Result<(), String> {
+        if self.rows.len() == MOST_ROWS {
+            return Err(too_many_rows());
+        }
         let width = cells.iter().map(|(at, _)| at + 1).max().unwrap_or(0);
         let mut row = vec![Cell::Absent; width];
         for (at, cell) in cells {
             row[at] = cell.without_files(&mut self.names);
+        }
+        self.bytes += row.iter().map(Cell::length).sum::<usize>();
+        if self.bytes > MOST_BYTES {
+            return Err(format!(
+                "the rows have more than {} MB without their images; write a part of them to a file of its own",
+                MOST_BYTES >> 20
+            ));
         }
         self.rows.push(Row {
             file: self.files.len().saturating_sub(1),
             place,
             cells: row.into(),
         });
+        Ok(())
     }
 
     /// Parses the cells of columns of text that a map takes as lists or structs, as tables hold them in JSON: `turns.0.value`.
@@ -224,6 +250,13 @@ impl Table {
         let row = &self.rows[row];
         format!("{}, {}", self.files[row.file].path.display(), row.place)
     }
+}
+
+/// The error of a set with too many rows.
+pub(super) fn too_many_rows() -> String {
+    format!(
+        "more than {MOST_ROWS} rows, which are not read; write a part of them to a file of its own"
+    )
 }
 
 impl Row {

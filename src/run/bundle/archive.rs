@@ -1,12 +1,12 @@
 //! The ZIP file of a bundle: [`zipped`], and [`is_bundle`].
 
 use std::fmt::Write as _;
-use std::io::{Cursor, Write as _};
+use std::io::{self, Cursor, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::Path;
 
 use sha2::{Digest as _, Sha256};
 use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
+use zip::{CompressionMethod, DateTime, ZipWriter};
 
 use crate::error::{Error, Result};
 use crate::files::reading;
@@ -14,16 +14,27 @@ use crate::files::reading;
 /// The comment of the archive, by which a bundle is known again.
 const MARK: &[u8] = b"darkqa.bundle/1";
 
+/// Length of the record that ends a ZIP file, without its comment.
+const END_RECORD: usize = 22;
+
 /// Name of the file with the digests of the others.
 const SUMS: &str = "SHA256SUMS";
 
 /// Level of compression (the usual one of deflate).
 const LEVEL: i64 = 6;
 
-/// Whether a file is a bundle.
+/// Whether a file is a bundle, by its end alone: its directory may have millions of entries.
 pub(super) fn is_bundle(path: &Path) -> bool {
-    let archive = reading::open(path).ok().map(ZipArchive::new);
-    archive.is_some_and(|archive| archive.is_ok_and(|archive| archive.comment() == MARK))
+    // The record that ends a ZIP file has the length of the comment in its last two bytes, and the comment behind them.
+    let length = END_RECORD + MARK.len();
+    let read = || -> io::Result<Vec<u8>> {
+        let mut file = reading::open(path)?;
+        file.seek(SeekFrom::End(-(length as i64)))?;
+        let mut end = Vec::new();
+        file.take(length as u64).read_to_end(&mut end)?;
+        Ok(end)
+    };
+    read().is_ok_and(|end| end.starts_with(b"PK\x05\x06") && end.ends_with(MARK))
 }
 
 /// The files by name as one archive, in a folder of this name, with their digests as `sha256sum` reads them. The same files are the same
@@ -68,6 +79,8 @@ fn sums(files: &[(String, Vec<u8>)]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use zip::ZipArchive;
+
     use super::*;
 
     #[test]

@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufReader, Read as _};
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::{Component, Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use tempfile::NamedTempFile;
 use zip::ZipArchive;
@@ -14,8 +15,11 @@ use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::types::FrameId;
 
-/// The maximum number of entries.
-const MOST_ENTRIES: usize = 1_000_000;
+/// The maximum number of entries; chosen.
+const MOST_ENTRIES: usize = 500_000;
+
+/// The maximum length of the directory, in bytes; chosen. The shortest entry has 47 bytes there and takes half a kilobyte in memory.
+const MOST_DIRECTORY: u64 = 48 << 20;
 
 /// The maximum length of an image, in bytes.
 const LONGEST_IMAGE: u64 = 1 << 30;
@@ -25,7 +29,33 @@ pub(crate) struct Archive {
     pub(in crate::dataset::ready_made) path: PathBuf,
     /// The place of each file, by its name.
     names: BTreeMap<String, usize>,
-    zip: Mutex<ZipArchive<BufReader<File>>>,
+    zip: Mutex<ZipArchive<BufReader<BoundedFile>>>,
+}
+
+/// A file of which a bounded number of bytes is read while its directory is.
+struct BoundedFile {
+    file: File,
+    /// The bytes that may still be read.
+    left: Arc<AtomicU64>,
+}
+
+impl Read for BoundedFile {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.file.read(buffer)?;
+        let left = self.left.load(Ordering::Relaxed);
+        let left = left.saturating_sub(count as u64);
+        self.left.store(left, Ordering::Relaxed);
+        if left == 0 {
+            return Err(io::Error::other("the directory is too long"));
+        }
+        Ok(count)
+    }
+}
+
+impl Seek for BoundedFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.file.seek(to)
+    }
 }
 
 impl std::fmt::Debug for Archive {
@@ -42,14 +72,20 @@ impl Archive {
     pub(super) fn open(path: &Path) -> Result<Self> {
         let wrong = |problem: String| Error::data(path.display(), problem);
         let file = reading::open(path).map_err(|e| Error::file(path, "read", e))?;
-        let mut zip = ZipArchive::new(BufReader::new(file))
-            .map_err(|e| wrong(format!("not a whole ZIP file: {e}")))?;
-        if zip.len() > MOST_ENTRIES {
+        let left = Arc::new(AtomicU64::new(MOST_DIRECTORY));
+        let bounded = BoundedFile {
+            file,
+            left: Arc::clone(&left),
+        };
+        let opened = ZipArchive::new(BufReader::new(bounded));
+        let count = opened.as_ref().map_or(0, ZipArchive::len);
+        if count > MOST_ENTRIES || left.load(Ordering::Relaxed) == 0 {
             return Err(wrong(format!(
-                "{} entries; at most {MOST_ENTRIES} are read",
-                zip.len()
+                "more than {MOST_ENTRIES} entries, which are not read; unpack it, and name its folder"
             )));
         }
+        let mut zip = opened.map_err(|e| wrong(format!("not a whole ZIP file: {e}")))?;
+        left.store(u64::MAX, Ordering::Relaxed);
         let mut names = BTreeMap::new();
         for at in 0..zip.len() {
             let entry = zip.by_index_raw(at).map_err(|e| wrong(e.to_string()))?;

@@ -249,8 +249,7 @@ fn push(
     for (name, value) in fields {
         cells.push((table.column(&name)?, Cell::from(value)));
     }
-    table.push(place, cells);
-    Ok(())
+    table.push(place, cells)
 }
 
 /// The cell of a row in a column, whole.

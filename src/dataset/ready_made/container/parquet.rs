@@ -18,7 +18,7 @@ use parquet::file::serialized_reader::SerializedPageReader;
 use parquet::record::{Field, Row as Record};
 
 use super::super::cell::Cell;
-use super::super::row::{RowPlace, Table};
+use super::super::row::{MOST_ROWS, RowPlace, Table, too_many_rows};
 use super::super::step::Step;
 use super::super::text_list::list;
 use super::json_scan::LONGEST_ROW;
@@ -72,6 +72,11 @@ pub(super) fn count(path: &Path) -> Result<u64> {
 /// Adds the rows of a file.
 pub(super) fn read(path: &Path, footer: &Footer, table: &mut Table) -> Result<()> {
     check_codecs(path, &*footer.of(path)?)?;
+    // The footer alone tells it, before a row is read.
+    let stated = footer.of(path)?.file_metadata().num_rows();
+    if usize::try_from(stated).is_ok_and(|rows| rows > MOST_ROWS) {
+        return Err(Error::data(path.display(), too_many_rows()));
+    }
     let file = open(path)?;
     let mut columns: Vec<(String, usize)> = Vec::new();
     let mut too_long = None;
@@ -91,8 +96,7 @@ pub(super) fn read(path: &Path, footer: &Footer, table: &mut Table) -> Result<()
             }
             cells.push((columns[at].1, cell_of(field)));
         }
-        table.push(place, cells);
-        Ok(())
+        table.push(place, cells)
     };
     let walk = || {
         let reader = SerializedFileReader::new(file).map_err(|e| e.to_string())?;

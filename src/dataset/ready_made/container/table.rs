@@ -127,7 +127,8 @@ pub(super) fn read(path: &Path, delimiter: u8, table: &mut Table) -> Result<()> 
                 cells.push((*column, Cell::Text(text.to_owned())));
             }
         }
-        table.push(RowPlace::Record(position.clone()), cells);
+        let pushed = table.push(RowPlace::Record(position.clone()), cells);
+        pushed.map_err(at)?;
     }
     Ok(())
 }
