@@ -1,13 +1,13 @@
 //! Reading and writing images of a store: [`ImageStore`].
 
 use std::fs;
-use std::io;
+use std::io::{self, Read as _, Seek as _, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, SystemTime};
 
 use super::counts::StoreCounts;
-use super::entry::{Content, Entry};
+use super::entry::{Content, Damaged, Entry, FOOTER, fits};
 use super::folder::{StoreFolder, found};
 use super::key::Key;
 use super::kinds::StoredKinds;
@@ -20,6 +20,8 @@ use crate::files::reading;
 const SWEEP_AFTER: u64 = 1_000_000_000;
 /// The same as a share of the room, for small stores; chosen.
 const SWEEP_SHARE: u64 = 8;
+/// The most bytes of a file that is read; chosen: an image of 100 megapixels has a third.
+const MOST_BYTES: u64 = 1 << 30;
 /// Time from which on the use of an image is noted again: once a day, so that reading writes little.
 const NOTED: Duration = Duration::from_hours(24);
 
@@ -128,7 +130,7 @@ impl ImageStore {
         let entry = match found(read(&place)) {
             Ok(None) => None,
             Ok(Some(file)) => {
-                let entry = Entry::read(key, file);
+                let entry = file.and_then(|file| Entry::read(key, file));
                 if entry.is_err() {
                     self.remove_damaged(&place);
                 }
@@ -250,19 +252,27 @@ impl ImageStore {
     }
 }
 
-/// The content of a file, whose use is noted.
-fn read(path: &Path) -> io::Result<Vec<u8>> {
+/// The content of a file, whose use is noted. A file that is too large, or does not end as an entry does, is damaged and not read.
+fn read(path: &Path) -> io::Result<Result<Vec<u8>, Damaged>> {
     let mut file = reading::open(path)?;
     let data = file.metadata()?;
+    let mut footer = Vec::new();
+    let before = data.len().saturating_sub(FOOTER as u64);
+    file.seek(SeekFrom::Start(before))?;
+    (&mut file).take(FOOTER as u64).read_to_end(&mut footer)?;
+    if data.len() > MOST_BYTES || !fits(&footer, data.len()) {
+        return Ok(Err(Damaged));
+    }
+    file.rewind()?;
     let mut content = Vec::with_capacity(data.len() as usize);
-    io::Read::read_to_end(&mut file, &mut content)?;
+    (&mut file).take(data.len()).read_to_end(&mut content)?;
     let now = SystemTime::now();
     let used = data.modified().unwrap_or(now);
     if now.duration_since(used).unwrap_or_default() > NOTED {
         // A folder that can only be read keeps its times.
         let _ = file.set_modified(now);
     }
-    Ok(content)
+    Ok(Ok(content))
 }
 
 #[cfg(test)]

@@ -167,15 +167,22 @@ impl Entry {
 pub(super) fn facts_at_end(tail: &[u8], length: u64) -> Option<(EntryFacts, u64)> {
     let start = tail.len().checked_sub(FOOTER)?;
     let (body, footer) = tail.split_at(start);
-    let (numbers, facts_len) = (footer.get(32..52)?, footer.get(40..44)?);
-    let image = u64::from_le_bytes(numbers.get(..8)?.try_into().ok()?);
-    let facts = u32::from_le_bytes(facts_len.try_into().ok()?) as usize;
-    let whole = image.checked_add(facts as u64 + FOOTER as u64)?;
-    if &footer[52..] != MAGIC || whole != length {
-        return None;
-    }
-    let facts = body.get(body.len().checked_sub(facts)?..)?;
+    let (image, facts) = lengths(footer, length)?;
+    let facts = body.get(body.len().checked_sub(facts as usize)?..)?;
     Some((serde_json::from_slice(facts).ok()?, image))
+}
+
+/// Whether a file of such a length can end in this footer.
+pub(super) fn fits(footer: &[u8], length: u64) -> bool {
+    lengths(footer, length).is_some()
+}
+
+/// The lengths of the image and of the facts, as a footer states them; `None` if the file has another length.
+fn lengths(footer: &[u8], length: u64) -> Option<(u64, u32)> {
+    let image = u64::from_le_bytes(footer.get(32..40)?.try_into().ok()?);
+    let facts = u32::from_le_bytes(footer.get(40..44)?.try_into().ok()?);
+    let whole = image.checked_add(u64::from(facts) + FOOTER as u64)?;
+    (footer.get(52..)? == MAGIC && whole == length).then_some((image, facts))
 }
 
 /// The footer of a file whose length fits.

@@ -77,10 +77,17 @@ pub fn read_to_string(path: &Path) -> io::Result<String> {
 fn read_at_most(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let file = open(path)?;
     let length = file.metadata()?.len();
-    let mut bytes = Vec::with_capacity(length.min(most) as usize);
-    if file.take(most + 1).read_to_end(&mut bytes)? as u64 > most {
+    let too_large = || {
         let problem = format!("larger than {most} bytes, which no file of its kind needs");
-        return Err(io::Error::new(io::ErrorKind::InvalidData, problem));
+        io::Error::new(io::ErrorKind::InvalidData, problem)
+    };
+    // A sparse file takes no room on the disk, and would take it all in memory.
+    if length > most {
+        return Err(too_large());
+    }
+    let mut bytes = Vec::with_capacity(length as usize);
+    if file.take(most + 1).read_to_end(&mut bytes)? as u64 > most {
+        return Err(too_large());
     }
     Ok(bytes)
 }
