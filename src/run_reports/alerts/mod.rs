@@ -26,6 +26,7 @@ use crate::text::words::{counted, plural};
 use crate::types::manifest::Status;
 use crate::types::{FrameId, InputSummary};
 use darkqa_score::cluster::{ClusterUnit, MIN_SCENES};
+use darkqa_score::comparison::compares_models;
 use darkqa_score::findings::Findings;
 use darkqa_score::pair_darkness::PairDarkness;
 use darkqa_score::photographed_set::PhotographedSet;
@@ -52,6 +53,7 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
     let clusters = (findings.grid.clusters, findings.unit);
     alerts.extend(of_clusters(combined, clusters));
     alerts.extend(of_set(findings.set));
+    alerts.extend(of_many_models(findings));
     let oddities = findings.pairs.iter().flat_map(PairDarkness::oddities);
     alerts.extend(oddities.map(|text| Alert::new(AlertKind::Pairs, text)));
     alerts.sort_by_key(|alert| alert.kind);
@@ -74,6 +76,13 @@ pub(super) fn alerts_without_truths(combined: &Combined, found: &SelfAgreement<'
     alerts.extend(of_set(found.set));
     alerts.sort_by_key(|alert| alert.kind);
     alerts
+}
+
+/// Models that are too many to be compared with each other.
+fn of_many_models(findings: &Findings<'_>) -> Option<Alert> {
+    let text = "Too many models to compare them with each other: no pair of them is tested, and none is called best. Reports of fewer \
+                models do both.";
+    (!compares_models(&findings.grid)).then(|| Alert::new(AlertKind::Models, text))
 }
 
 /// That the photographs were taken in the dark.

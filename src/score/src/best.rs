@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 use super::choice::ReadingMode;
+use super::comparison::compares_models;
 use super::coverage::{Coverage, shared};
 use super::estimate::ClusterCount;
 use super::estimate::Estimate;
@@ -157,9 +158,12 @@ pub fn is_dark(level: AxisLevel, kind: Kind) -> bool {
 type Asked<'g> = (&'g str, BTreeSet<AxisLevel>);
 
 /// The comparison of the models in the dark, in one parsing; `None` if fewer than two of them were asked at L0 and at a degraded level,
-/// or if they share no item. If they share no dark level, the darkest one that they share counts as dark.
+/// if they share no item, or if there are so many that models are not compared. If they share no dark level, the darkest one that they share counts as dark.
 #[must_use]
 pub fn best_in_the_dark(grid: &Grid<'_>, mode: ReadingMode) -> Option<BestInTheDark> {
+    if !compares_models(grid) {
+        return None;
+    }
     let variant = grid.main_variant()?;
     let kind = variant.kind?;
     let models = pool(grid)

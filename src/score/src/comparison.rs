@@ -137,6 +137,17 @@ impl Comparison {
     }
 }
 
+/// The maximum number of comparisons between models; chosen: they take at most a gigabyte.
+const MOST_BETWEEN_MODELS: usize = 500_000;
+
+/// Whether models are compared with each other: their pairs grow with the square of their number.
+#[must_use]
+pub fn compares_models(grid: &Grid<'_>) -> bool {
+    let models: BTreeSet<&str> = grid.subjects.iter().map(|s| &*s.model).collect();
+    let pairs = grid.subjects.len() * models.len().saturating_sub(1) / 2;
+    pairs.saturating_mul(grid.groups().len()) <= MOST_BETWEEN_MODELS
+}
+
 /// All comparisons of a grid, ordered by kind, family and subjects.
 #[must_use]
 pub fn comparisons(grid: &Grid<'_>) -> Vec<Comparison> {
@@ -244,6 +255,7 @@ fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
 /// The indices of the subjects that a kind compares.
 pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)> {
     let mut pairs = Vec::new();
+    let compared = compares_models(grid);
     let judged = judged(grid.subjects.iter().map(|subject| &*subject.model));
     for (index, subject) in grid.subjects.iter().enumerate() {
         let against: Vec<usize> = match kind {
@@ -280,7 +292,7 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)
             ComparisonKind::RealSynthetic if subject.variant.photograph().is_some() => {
                 real_synthetic::as_dark(grid, index)
             }
-            ComparisonKind::Model => later_models(grid, index, &judged),
+            ComparisonKind::Model if compared => later_models(grid, index, &judged),
             ComparisonKind::Light => later_lights(grid, index),
             ComparisonKind::Blind if subject.view == Some(View::Image) => blind(grid, subject),
             _ => Vec::new(),
