@@ -7,7 +7,7 @@ use clap::Args;
 use crate::error::{Error, Result};
 use crate::images::workers::ThreadArgs;
 use crate::types::{Digest, EnhancerName};
-use darkqa_enhance::{Enhancer, ModelFile, ProbeArgs, Runtime, RuntimeArgs, SizeArgs};
+use darkqa_enhance::{Enhancer, LoadLimits, ModelFile, ProbeArgs, Runtime, RuntimeArgs, SizeArgs};
 
 /// Flags for running enhancement models.
 #[derive(Debug, Clone, Default, Args)]
@@ -33,12 +33,14 @@ impl EnhancerRunArgs {
     /// If ONNX Runtime is not found, or the file is not a model that it can run.
     pub(crate) fn open(&self, file: ModelFile) -> Result<Enhancer> {
         let runtime = self.runtime.search().open()?;
-        let enhancer = Enhancer::open(file, &runtime, self.threads.threads)?
+        let limits = LoadLimits {
+            time: self.runtime.llie_timeout,
+            memory: self.runtime.memory_limit(),
+        };
+        let enhancer = Enhancer::open_within(file, &runtime, self.threads.threads, limits)?
             .with_tiling(self.size.tile)
             .with_max_side(self.size.llie_max_side)
-            .with_fitting(self.size.fitting())
-            .with_time_limit(self.runtime.llie_timeout)
-            .with_memory_limit(self.runtime.memory_limit());
+            .with_fitting(self.size.fitting());
         Ok(enhancer)
     }
 }

@@ -341,6 +341,27 @@ pub fn of_much_memory() -> Graph {
         .giving_image()
 }
 
+/// The image, and a product of 400 constant matrices that is computed when the model is loaded: minutes.
+pub fn slow_to_load() -> Graph {
+    let names: Vec<String> = (0..=400).map(|at| format!("m{at}")).collect();
+    let graph =
+        Graph::new()
+            .shape("square", &[2048, 2048])
+            .node("ConstantOfShape", &["square"], "m0");
+    let products = names.windows(2).fold(graph, |graph, pair| {
+        graph.node("MatMul", &[&pair[0], &pair[0]], &pair[1])
+    });
+    products
+        .node_with(
+            "ReduceMax",
+            &["m400"],
+            "most",
+            &[("keepdims", Attribute::Int(0))],
+        )
+        .node("Add", &["input", "most"], "output")
+        .giving_image()
+}
+
 /// The image after 2⁴⁰ turns of a loop where it is brighter than a half, and after one where it is not.
 pub fn endless_if_bright() -> Graph {
     let body = Graph::empty()

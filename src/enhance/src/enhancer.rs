@@ -15,7 +15,7 @@ use super::failure::{RunFailure, by, unusable};
 use super::fed_image::DarkImage;
 use super::file::ModelFile;
 use super::frozen::traced_sizes;
-use super::graph::{Graph, RunResult};
+use super::graph::{Graph, LoadLimits, RunResult};
 use super::memory_check::{MemoryCheck, no_memory};
 use super::memory_limit::MemoryLimit;
 use super::planes::Planes;
@@ -90,10 +90,19 @@ impl Enhancer {
     ///
     /// # Errors
     /// If the file is not an ONNX model, ONNX Runtime refuses it, or its inputs and outputs are not one RGB image each.
-    pub fn open(
+    pub fn open(file: ModelFile, runtime: &Runtime, threads: Option<NonZeroUsize>) -> Result<Self> {
+        Self::open_within(file, runtime, threads, LoadLimits::NONE)
+    }
+
+    /// Loads a model as [`Self::open`] does, within limits that hold for each image, too.
+    ///
+    /// # Errors
+    /// As [`Self::open`], or if loading takes more than the limits. ONNX Runtime cannot be used any more then.
+    pub fn open_within(
         mut file: ModelFile,
         runtime: &Runtime,
         threads: Option<NonZeroUsize>,
+        limits: LoadLimits,
     ) -> Result<Self> {
         let flushed = file.weights.flush_subnormals(&mut file.bytes);
         let traced = traced_sizes(&file.bytes);
@@ -110,6 +119,7 @@ impl Enhancer {
             file.preset.as_ref(),
             runtime,
             threads,
+            limits,
         )?
         .map_err(|problem| {
             let path = file.path.clone();

@@ -49,6 +49,23 @@ pub(super) struct Graph {
     memory: MemoryLimit,
 }
 
+/// What loading a model, and then each image, may take: its operators on constants are computed when it is loaded.
+#[derive(Debug, Clone, Copy)]
+pub struct LoadLimits {
+    /// The longest time.
+    pub time: TimeLimit,
+    /// The memory of the process.
+    pub memory: MemoryLimit,
+}
+
+impl LoadLimits {
+    /// No limits.
+    pub const NONE: Self = Self {
+        time: TimeLimit::NONE,
+        memory: MemoryLimit::NONE,
+    };
+}
+
 /// All inputs and outputs of a graph, by name, type and dimensions; those of its first image if it takes several.
 struct Ports {
     inputs: Vec<Port>,
@@ -85,14 +102,33 @@ impl Graph {
         preset: Option<&Preset>,
         runtime: &Runtime,
         threads: Option<NonZeroUsize>,
+        limits: LoadLimits,
     ) -> Result<std::result::Result<Self, String>> {
         let environment = runtime.environment().clone();
-        let session = runtime.run(move || {
-            builder(&environment, threads).and_then(|builder| source.commit(builder))
-        })?;
-        Ok(session
+        let job = move || builder(&environment, threads).and_then(|found| source.commit(found));
+        let within = JobLimits {
+            time: limits.time.get(),
+            memory: limits.memory,
+        };
+        let session = match runtime.thread().run_or_leave(within, job)? {
+            Ended::InTime(session) => session,
+            Ended::Late => {
+                let problem = format!(
+                    "takes longer than {} s to load; --llie-timeout allows more, and 0 any time",
+                    limits.time
+                );
+                return Ok(Err(problem));
+            }
+            Ended::TooLarge => return Ok(Err(RunFailure::TooLarge(limits.memory).words())),
+        };
+        let loaded = session
             .map_err(|e| load_problem(&one_line(&e), runtime.version()))
-            .and_then(|session| Self::new(session, sidecar, preset, runtime)))
+            .and_then(|session| Self::new(session, sidecar, preset, runtime));
+        Ok(loaded.map(|mut graph| {
+            graph.limit_time(limits.time);
+            graph.limit_memory(limits.memory);
+            graph
+        }))
     }
 
     fn new(

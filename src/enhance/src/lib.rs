@@ -93,6 +93,7 @@ pub use enhancer::twin::sets_in_memory;
 pub use enhancer::{Enhancer, Fitting};
 pub use file::ModelFile;
 pub use findings::Findings;
+pub use graph::LoadLimits;
 pub use memory_limit::MemoryLimit;
 pub use plausible::{DARK, brightness};
 pub use probe::FRAMES;

@@ -310,14 +310,6 @@ impl Runtime {
         &self.0.environment
     }
 
-    /// Runs a job on the runtime's thread, waits for it and returns its result.
-    pub(super) fn run<T: Send + 'static>(
-        &self,
-        job: impl FnOnce() -> T + Send + 'static,
-    ) -> Result<T> {
-        self.0.thread.run(job)
-    }
-
     /// The thread that sessions are created and run on.
     pub(super) fn thread(&self) -> &RuntimeThread {
         &self.0.thread

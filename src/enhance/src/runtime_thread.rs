@@ -87,17 +87,7 @@ impl RuntimeThread {
         stop: impl FnOnce(),
         job: impl FnOnce() -> T + Send + 'static,
     ) -> Result<Ended<T>> {
-        let (sender, events) = channel();
-        let job = Box::new(move || {
-            // Sending fails only if the waiting thread has ended.
-            drop(sender.send(Event::Started));
-            drop(sender.send(Event::Ended(job())));
-        });
-        if self.stuck.load(Ordering::SeqCst) {
-            return Err(stuck());
-        }
-        self.jobs.send(job).map_err(|_| thread_ended())?;
-        self.wait_for_start(&events)?;
+        let events = self.start_job(job)?;
         let (ended, patience) = match wait_for_end(&events, limits)? {
             Ended::Late => {
                 let time = limits.time.unwrap_or_default();
@@ -115,6 +105,40 @@ impl RuntimeThread {
                 Err(stuck())
             }
         }
+    }
+
+    /// Runs a job that nothing can end. If it takes more than its `limits`, it is left alone with the thread, and every later job is
+    /// refused.
+    pub(super) fn run_or_leave<T: Send + 'static>(
+        &self,
+        limits: JobLimits,
+        job: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<Ended<T>> {
+        let events = self.start_job(job)?;
+        let ended = wait_for_end(&events, limits)?;
+        if !matches!(ended, Ended::InTime(_)) {
+            self.stuck.store(true, Ordering::SeqCst);
+        }
+        Ok(ended)
+    }
+
+    /// Hands a job to the thread, and waits for its start.
+    fn start_job<T: Send + 'static>(
+        &self,
+        job: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<Receiver<Event<T>>> {
+        let (sender, events) = channel();
+        let job = Box::new(move || {
+            // Sending fails only if the waiting thread has ended.
+            drop(sender.send(Event::Started));
+            drop(sender.send(Event::Ended(job())));
+        });
+        if self.stuck.load(Ordering::SeqCst) {
+            return Err(stuck());
+        }
+        self.jobs.send(job).map_err(|_| thread_ended())?;
+        self.wait_for_start(&events)?;
+        Ok(events)
     }
 
     /// Waits until a job starts, which earlier jobs may delay.
@@ -199,6 +223,20 @@ mod tests {
         let slow = || std::thread::sleep(Duration::from_millis(250));
         let small = thread.run_within(limits("1000000"), || {}, slow);
         assert_eq!(small.unwrap(), Ended::InTime(()));
+    }
+
+    #[test]
+    fn a_job_that_nothing_can_end_is_left_alone() {
+        let thread = RuntimeThread::start().unwrap();
+        let quick = thread.run_or_leave(within(Duration::from_mins(1)), || 7);
+        assert_eq!(quick.unwrap(), Ended::InTime(7));
+        let slow = || std::thread::sleep(Duration::from_secs(2));
+        let start = Instant::now();
+        let left = thread.run_or_leave(within(Duration::from_millis(20)), slow);
+        assert_eq!(left.unwrap(), Ended::Late);
+        assert!(start.elapsed() < Duration::from_secs(2));
+        let message = thread.run(|| 8).unwrap_err().to_string();
+        assert!(message.contains("--llie-timeout"), "{message}");
     }
 
     #[test]

@@ -113,8 +113,8 @@ pub struct RuntimeArgs {
     /// Never install ONNX Runtime
     #[arg(long, add = Decides::Nothing)]
     pub offline: bool,
-    /// Seconds that an enhancer may take for one image; a slower one is an error of that image, and after three in a row the
-    /// enhancer is not run any more; 0 is no limit
+    /// Seconds that an enhancer may take to load, and for one image; a slower one is an error of that image, and after three in a row
+    /// the enhancer is not run any more; 0 is no limit
     #[arg(long, value_name = "SECONDS", default_value_t, add = Decides::Nothing)]
     pub llie_timeout: TimeLimit,
     /// GB (10⁹ bytes) of memory that the program may take while an enhancer runs, on Linux; what takes more is an error of its image,

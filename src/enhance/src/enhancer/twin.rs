@@ -4,6 +4,7 @@ use std::num::NonZeroUsize;
 
 use super::{Enhancer, SizeLog};
 use crate::file::ModelFile;
+use crate::graph::LoadLimits;
 use crate::memory;
 use darkqa_ground::error::{Error, Result};
 
@@ -22,13 +23,15 @@ impl Enhancer {
             });
         }
         let runtime = self.graph.runtime().beside()?;
-        let mut twin = Self::open(file, &runtime, Some(threads))?;
+        let limits = LoadLimits {
+            time: self.graph.time_limit(),
+            memory: self.graph.memory_limit(),
+        };
+        let mut twin = Self::open_within(file, &runtime, Some(threads), limits)?;
         twin.graph = twin
             .graph
             .with_convention(self.convention().clone())
             .map_err(|problem| self.fault(problem))?;
-        twin.graph.limit_time(self.graph.time_limit());
-        twin.graph.limit_memory(self.graph.memory_limit());
         Ok(Self {
             tiling: self.tiling,
             fitting: self.fitting,
