@@ -1,6 +1,5 @@
 //! The connections to one server: [`Connection::post`] sends one request.
 
-use std::fs::File;
 use std::io::Write as _;
 use std::path::Path;
 use std::time::Duration;
@@ -18,6 +17,7 @@ use super::parameters::Parameters;
 use super::secret::Scrub;
 use super::url::BaseUrl;
 use crate::error::Result;
+use crate::files;
 use crate::types::FailureKind;
 
 /// The maximum size of a decompressed reply, in bytes; chosen. A reply of a few tokens is far smaller, and a server must not
@@ -172,7 +172,7 @@ impl Connection {
         let body = if status.is_success() {
             let failed = |what: String| FailedTry::new(FailureKind::Response, what);
             let unwritten = |e| failed(format!("{}: cannot write: {e}", to.display()));
-            let mut file = File::create(to).map_err(unwritten)?;
+            let mut file = files::create_new(to).map_err(unwritten)?;
             let mut written = 0;
             loop {
                 let chunk = tokio::time::timeout(self.timeout, response.chunk());

@@ -67,6 +67,7 @@ impl StoreFolder {
 
     /// Makes the folder.
     pub(super) fn make(&self) -> io::Result<()> {
+        refuse_link(&self.root)?;
         self.access.make(&self.root)
     }
 
@@ -82,6 +83,7 @@ impl StoreFolder {
         let place = self.place(key);
         let folder = place.parent().unwrap_or(&self.root);
         self.make()?;
+        refuse_link(folder)?;
         self.access.make(folder)?;
         let number = self.count.fetch_add(1, Ordering::Relaxed);
         let unfinished = folder.join(format!("{}{number}", self.unfinished));
@@ -106,7 +108,8 @@ impl StoreFolder {
         };
         for folder in folders {
             let folder = folder?;
-            if !is_hexadecimal(&folder.file_name().to_string_lossy(), 2) {
+            let is_folder = folder.file_type()?.is_dir();
+            if !is_folder || !is_hexadecimal(&folder.file_name().to_string_lossy(), 2) {
                 continue;
             }
             let Some(entries) = found(fs::read_dir(folder.path()))? else {
@@ -127,6 +130,7 @@ impl StoreFolder {
         let mut options = OpenOptions::new();
         options.write(true).create(true).truncate(false);
         let path = self.root.join(".lock");
+        refuse_link(&path)?;
         match reading::refuse_pipes(&path) {
             Err(e) if e.kind() != io::ErrorKind::NotFound => {
                 Err(io::Error::new(e.kind(), format!(".lock: {e}")))
@@ -134,6 +138,15 @@ impl StoreFolder {
             _ => options.open(path),
         }
     }
+}
+
+/// Refuses a link in a store, which may come from a stranger: what is written there would go elsewhere.
+fn refuse_link(path: &Path) -> io::Result<()> {
+    if path.is_symlink() {
+        let problem = format!("{} is a link; delete it", path.display());
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
+    }
+    Ok(())
 }
 
 /// A file of a store; `None` for what is not one.

@@ -28,12 +28,14 @@ fn nothing_is_written_through_a_link() {
         ("thumbnails.jsonl", "../private"),
         ("figures", "../elsewhere"),
         ("batch", "../elsewhere"),
+        ("batch/state.jsonl", "../../private"),
     ];
     check_rows(rows, |(name, target)| {
         let bench = bench();
         let place = bench.path("run").join(name);
         let _ = fs::remove_file(&place);
         let _ = fs::remove_dir_all(&place);
+        fs::create_dir_all(place.parent().unwrap()).unwrap();
         symlink(target, &place).unwrap();
         for line in [COMMAND, "report run", "report run --rescore"] {
             let called = bench.call(&words(line));
@@ -75,6 +77,52 @@ fn links_in_the_place_of_products_are_replaced() {
     assert_eq!(fs::read_to_string(bench.path("private")).unwrap(), PRIVATE);
     assert_eq!(fs::read(bench.path("run/report.html")).unwrap(), page);
     assert!(bench.path("run/summary.csv").is_file());
+}
+
+#[test]
+fn unfinished_files_are_not_written_through_links() {
+    let bench = bench();
+    for name in ["records.parquet", "report.html", "summary.csv"] {
+        fs::remove_file(bench.path("run").join(name)).unwrap();
+        let unfinished = bench.path("run").join(format!(".{name}.part"));
+        symlink("../private", unfinished).unwrap();
+    }
+    bench.complete(&words(COMMAND));
+    assert_eq!(fs::read_to_string(bench.path("private")).unwrap(), PRIVATE);
+    assert!(bench.path("run/records.parquet").is_file());
+}
+
+#[test]
+fn images_are_not_shown_through_a_link() {
+    let bench = bench();
+    symlink("../elsewhere", bench.path("run/shown")).unwrap();
+    let called = bench.call(&words("show run q0"));
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert!(called.stderr.contains("run/shown"), "{called:?}");
+    assert_eq!(fs::read_dir(bench.path("elsewhere")).unwrap().count(), 0);
+    bench.complete(&words("show run q0 --out images"));
+    fs::remove_file(bench.path("run/shown")).unwrap();
+    bench.complete(&words("show run q0"));
+    assert!(fs::read_dir(bench.path("run/shown")).unwrap().count() > 0);
+}
+
+#[test]
+fn a_store_is_not_written_through_links() {
+    let bench = bench();
+    let line = |run: &str| format!("{COMMAND}{run} --images-cache store");
+    bench.complete(&words(&line("1")));
+    let before = fs::read_dir(bench.path("store/v1")).unwrap();
+    let folders = before.map(|entry| entry.unwrap().path());
+    let folders: Vec<_> = folders.filter(|path| path.is_dir()).collect();
+    assert!(!folders.is_empty());
+    for folder in folders {
+        fs::remove_dir_all(&folder).unwrap();
+        symlink("../../elsewhere", &folder).unwrap();
+    }
+    let called = bench.call(&words(&line("2")));
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert!(called.stderr.contains("is a link"), "{called:?}");
+    assert_eq!(fs::read_dir(bench.path("elsewhere")).unwrap().count(), 0);
 }
 
 #[test]

@@ -1,11 +1,11 @@
 //! Removal of keys from a file that a server sent: [`remove_secrets`].
 
-use std::fs::{self, File};
+use std::fs;
 use std::io::{self, BufRead as _, BufReader, BufWriter, Write as _};
 use std::path::Path;
 
 use crate::ask::secret::Scrub;
-use crate::files::reading;
+use crate::files::{create_new, reading};
 
 /// Removes keys from the lines of a file. A file without any of them is not written again.
 pub(super) fn remove_secrets(path: &Path, scrub: &Scrub) -> io::Result<()> {
@@ -13,7 +13,7 @@ pub(super) fn remove_secrets(path: &Path, scrub: &Scrub) -> io::Result<()> {
         return Ok(());
     }
     let cleaned = path.with_extension("cleaned");
-    let mut out = BufWriter::new(File::create(&cleaned)?);
+    let mut out = BufWriter::new(create_new(&cleaned)?);
     for_each_line(path, |line| {
         let text = String::from_utf8_lossy(line).into_owned();
         out.write_all(scrub.json_line(text).as_bytes())

@@ -10,6 +10,7 @@ use super::event::PartFacts;
 use super::journal::Journal;
 use crate::ask::TokenBound;
 use crate::error::{Error, Result};
+use crate::files::create_new;
 use crate::store::Store;
 use crate::types::Record;
 use darkqa_score::record::Detail;
@@ -168,7 +169,7 @@ impl<D: Detail> ModelInputFiles<D> {
             .find(|path| !path.exists())
             .unwrap_or_default();
         let part = path.with_extension(PART);
-        let file = File::create(&part).map_err(|e| Error::file(&part, "create", e))?;
+        let file = create_new(&part).map_err(|e| Error::file(&part, "create", e))?;
         Ok(OpenFile {
             path,
             file: BufWriter::new(file),

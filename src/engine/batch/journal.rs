@@ -15,13 +15,9 @@ use super::part::{Part, Stage};
 use super::part_name::file_name;
 use crate::error::{Error, Result};
 use crate::files::reading;
-use crate::store::BATCH;
-use crate::store::now;
+use crate::store::{BATCH, BATCH_STATE, now};
 use crate::types::Digest;
 use crate::types::manifest::RunManifest;
-
-/// Name of the state file in the batch folder.
-const STATE: &str = "state.jsonl";
 
 /// Number of digits of a run's hash.
 const HASH_DIGITS: usize = 16;
@@ -115,7 +111,7 @@ impl Journal {
     }
 
     fn path(&self) -> PathBuf {
-        self.folder.join(STATE)
+        self.folder.join(BATCH_STATE)
     }
 
     /// The path of a part's file.

@@ -1,7 +1,7 @@
 //! Files that a killed process did not complete: [`recover`].
 
 use std::collections::BTreeSet;
-use std::fs::{self, File};
+use std::fs;
 use std::io::{BufWriter, Write as _};
 use std::path::Path;
 
@@ -14,6 +14,7 @@ use super::part::Stage;
 use super::split::PIECE;
 use super::take_over::{for_each_line, key_of};
 use crate::error::{Error, Result};
+use crate::files::create_new;
 use crate::store::Store;
 use crate::types::TrialKey;
 use darkqa_score::record::Detail;
@@ -50,7 +51,7 @@ fn complete(
     let path = journal.file(part);
     let kept = path.with_extension("kept.part");
     let unwritten = |e| Error::file(&kept, "write", e);
-    let mut file = BufWriter::new(File::create(&kept).map_err(unwritten)?);
+    let mut file = BufWriter::new(create_new(&kept).map_err(unwritten)?);
     let (mut hash, mut facts) = (Sha256::new(), journal.parts[part].facts.clone());
     let before = facts.requests;
     (facts.bytes, facts.requests) = (0, 0);

@@ -10,6 +10,7 @@ use super::event::{Event, PartFacts, Piece};
 use super::file::hexadecimal;
 use super::take_over::for_each_line;
 use crate::error::{Error, Result};
+use crate::files::create_new;
 use darkqa_score::record::Detail;
 
 /// Extension of a piece until the journal has it.
@@ -104,7 +105,7 @@ impl<D: Detail> Driver<'_, D> {
                 .join(name(into.len()))
                 .with_extension(PIECE);
             writer
-                .add(line, || File::create(&path))
+                .add(line, || create_new(&path))
                 .map_err(|e| Error::file(&path, "write", e))
         })?;
         finish(writer, &mut into)?;

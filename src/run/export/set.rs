@@ -9,7 +9,7 @@ use clap::ValueEnum;
 use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
-use crate::files::write;
+use crate::files::{create_new, write};
 use crate::runs::shard::Shard;
 use crate::types::question::letter;
 use crate::types::{Choices, Condition, Question};
@@ -136,7 +136,7 @@ impl ReadySet {
             none => {
                 let folder = path.parent().unwrap_or(Path::new("."));
                 fs::create_dir_all(folder).map_err(|e| Error::file(folder, "make", e))?;
-                let file = File::create(&path).map_err(|e| Error::file(&path, "write", e))?;
+                let file = create_new(&path).map_err(|e| Error::file(&path, "write", e))?;
                 let quotes = match self.form {
                     SetForm::VlmEvalKit => csv::QuoteStyle::Necessary,
                     SetForm::ImageFolder | SetForm::Llava => csv::QuoteStyle::Never,

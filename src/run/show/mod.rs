@@ -6,7 +6,7 @@ mod sheet;
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::dataset::inputs::stem;
@@ -43,7 +43,10 @@ pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
         });
     };
     let conditions = conditions(&item.answers, &args)?;
-    let out = args.out.clone().unwrap_or_else(|| folder.join("shown"));
+    let out = match &args.out {
+        Some(out) => out.clone(),
+        None => own_folder(&folder)?,
+    };
     let mut rebuilder = ImageRebuilder::open(args.rebuild, &manifest, &folder, &conditions)?;
     let mut text = item.text.clone();
     let mut all_same = true;
@@ -93,6 +96,20 @@ pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
         },
         text,
     ))
+}
+
+/// The folder of a run that its images are written into.
+///
+/// # Errors
+/// If it is a link: the run may come from a stranger, and the link may lead anywhere.
+fn own_folder(run: &Path) -> Result<PathBuf> {
+    let folder = run.join("shown");
+    if folder.is_symlink() {
+        let problem =
+            "a link; the images would be written to where it leads. Delete the link, or name --out";
+        return Err(Error::data(folder.display(), problem));
+    }
+    Ok(folder)
 }
 
 /// The frames that were shown with the item: its own first, then those that a control of the observer was shown.

@@ -38,6 +38,8 @@ pub(super) const FIDELITY: &str = "fidelity.jsonl";
 
 /// The subfolder of a run for Batch API files.
 pub const BATCH: &str = "batch";
+/// The file in it that says what happened to each batch.
+pub const BATCH_STATE: &str = "state.jsonl";
 /// The subfolder of a run for its plan, which is written before the run.
 pub const PLAN: &str = "plan";
 

@@ -54,9 +54,9 @@ pub use record_log::{QuestionFile, RecordLog, each_record, each_reread_record, e
 pub use stored_trial::StoredTrial;
 
 pub use folder::{
-    AddressChange, BATCH, PLAN, each_placed_question, each_question, find, holds_run, is_locked,
-    now, read_columns, read_fidelity, read_manifest, read_questions, read_records, read_thumbnails,
-    read_trials, schema,
+    AddressChange, BATCH, BATCH_STATE, PLAN, each_placed_question, each_question, find, holds_run,
+    is_locked, now, read_columns, read_fidelity, read_manifest, read_questions, read_records,
+    read_thumbnails, read_trials, schema,
 };
 
 /// The trials that were sent in batches.

@@ -6,13 +6,13 @@ use std::ffi::OsStr;
 use std::fs::{self, DirEntry, Metadata};
 use std::path::Path;
 
-use super::folder::{BATCH, FIDELITY, RECORDS, THUMBNAILS};
+use super::folder::{BATCH, BATCH_STATE, FIDELITY, RECORDS, THUMBNAILS};
 use darkqa_ground::error::{Error, Result};
 
 /// The subfolders of a run that lines are appended in.
 const INNER: [&str; 1] = [BATCH];
 /// The files that are appended to. All others are replaced by new files, which leaves what they link to as it is.
-const APPENDED: [&str; 3] = [RECORDS, THUMBNAILS, FIDELITY];
+const APPENDED: [&str; 4] = [RECORDS, THUMBNAILS, FIDELITY, BATCH_STATE];
 
 /// Refuses a run folder in which a folder or a file that is appended to is a link, or an entry is a pipe or a device. The folder itself
 /// may be reached by a link.

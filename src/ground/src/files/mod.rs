@@ -83,8 +83,11 @@ pub fn unfinished(path: &Path) -> PathBuf {
     path.with_file_name(format!(".{name}{UNFINISHED}"))
 }
 
-/// A new file in the place of what a killed process may have left there, or of a link that stands there.
-fn create_new(path: &Path) -> io::Result<File> {
+/// Creates an empty file in the place of what a killed process may have left there. A link there is replaced, not followed.
+///
+/// # Errors
+/// If a folder is there, or the file cannot be created.
+pub fn create_new(path: &Path) -> io::Result<File> {
     match fs::remove_file(path) {
         Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),
         _ => {}
@@ -110,4 +113,22 @@ fn replace(path: &Path, content: &[u8], sync: impl FnOnce(&File) -> io::Result<(
     });
     written.map_err(|e| Error::file(&unfinished, "write", e))?;
     fs::rename(&unfinished, path).map_err(|e| Error::file(path, "write", e))
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_link_in_the_place_of_a_new_file_is_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let [private, link] = ["private", "new.part"].map(|name| folder.path().join(name));
+        fs::write(&private, "private").unwrap();
+        std::os::unix::fs::symlink(&private, &link).unwrap();
+        let mut file = create_new(&link).unwrap();
+        file.write_all(b"new").unwrap();
+        assert_eq!(fs::read(&private).unwrap(), b"private");
+        assert_eq!(fs::read(&link).unwrap(), b"new");
+        assert!(!link.is_symlink());
+    }
 }

@@ -20,7 +20,7 @@ use rayon::prelude::*;
 
 use self::chunk::Chunk;
 use darkqa_ground::error::{Error, Result};
-use darkqa_ground::files::unfinished;
+use darkqa_ground::files::{create_new, unfinished};
 
 pub use self::column::{Cell, CellKind, Column, Presence};
 pub use self::metadata::{CREATED_BY, FileMetadata};
@@ -59,7 +59,7 @@ impl<'c, R: Sync> ColumnFile<'c, R> {
     /// If it cannot be written.
     pub fn create(path: &Path, columns: &'c [Column<R>], metadata: &FileMetadata) -> Result<Self> {
         let part = unfinished(path);
-        let file = File::create(&part).map_err(|e| Error::file(&part, "write", e))?;
+        let file = create_new(&part).map_err(|e| Error::file(&part, "write", e))?;
         let wrong = |e: ParquetError| unwritable(&part, e);
         let properties = Arc::new(properties(columns, metadata));
         let fields: std::result::Result<Vec<_>, _> = columns.iter().map(Column::field).collect();
