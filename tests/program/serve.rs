@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::process::{Child, Stdio};
+use std::time::{Duration, Instant};
 
 use crate::support::run::{Bench, records, words};
 use crate::support::table::check_rows;
@@ -267,6 +268,27 @@ fn connections_that_send_nothing_keep_no_one_else_out() {
     let mut rest = Vec::new();
     // The server ends a connection that does not finish its headers; reading then ends, too.
     let _ = idle[0].read_to_end(&mut rest);
+}
+
+#[test]
+fn clients_whose_bodies_are_slow_keep_no_one_else_out() {
+    let bench = Bench::new();
+    let server = Server::start(&bench);
+    let host = server.url.strip_prefix("http://").unwrap();
+    let host = host.strip_suffix("/v1").unwrap();
+    let mut slow: Vec<TcpStream> = (0..16).map(|_| server.connection()).collect();
+    for stream in &mut slow {
+        let head = format!(
+            "POST /v1/chat/completions HTTP/1.1\r\nHost: {host}\r\nContent-Type: application/json\r\nContent-Length: 9000\r\n\r\n{{"
+        );
+        stream.write_all(head.as_bytes()).unwrap();
+    }
+    // The server ends a body that does not arrive after a minute.
+    let start = Instant::now();
+    let words = json!([{"role": "user", "content": WORDS}]);
+    let (status, _) = server.ask(&json!({"model": "darkqa-random", "messages": words}));
+    assert_eq!(status, 200);
+    assert!(start.elapsed() < Duration::from_secs(30));
 }
 
 #[test]

@@ -72,7 +72,7 @@ struct ServerState {
     likenesses: Likenesses,
     /// The models by their names at this endpoint. They differ from `--model observer`, which runs without an endpoint.
     models: [(&'static str, Model); 2],
-    /// Places for requests that are read and answered.
+    /// Places for requests that are answered.
     places: Semaphore,
     /// Whether an image has come that shows no frame.
     met_unknown: AtomicBool,
@@ -159,8 +159,9 @@ async fn respond(
     match (request.method(), request.uri().path()) {
         (&Method::GET | &Method::HEAD, MODELS) => Ok(completion::models(state.names())),
         (&Method::POST, COMPLETIONS) => {
-            let _place = state.places.acquire().await;
+            // Before a place is taken: a slow client holds none.
             let body = body(request.into_body()).await?;
+            let _place = state.places.acquire().await;
             Ok(state.answer(&body).await?.into())
         }
         (_, path) => {
