@@ -16,6 +16,7 @@ mod coverage;
 mod doors;
 mod found;
 mod judge;
+mod memory;
 mod mutators;
 mod place;
 mod process;
