@@ -86,7 +86,7 @@ impl SecretParts {
 fn in_base64(key: &str, shift: usize) -> String {
     let bytes = [&[0; 2][..shift], key.as_bytes()].concat();
     let encoded = STANDARD_NO_PAD.encode(&bytes);
-    let unknown = usize::from(bytes.len() % 3 != 0);
+    let unknown = usize::from(!bytes.len().is_multiple_of(3));
     let known = (shift * 8).div_ceil(6)..encoded.len() - unknown;
     encoded[known].to_owned()
 }

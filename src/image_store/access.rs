@@ -159,9 +159,11 @@ impl ImageStore {
 
     /// Removes a damaged file; the first one is named in a warning.
     fn remove_damaged(&self, place: &Path) {
+        let bytes = place.symlink_metadata().map_or(0, |file| file.len());
         // If it cannot be removed, the image that is made now replaces it.
         let _ = fs::remove_file(place);
         let count = self.with(|state| {
+            state.bytes = state.bytes.saturating_sub(bytes);
             state.counts.damaged += 1;
             state.counts.damaged
         });

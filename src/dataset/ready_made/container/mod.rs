@@ -128,12 +128,23 @@ impl SetFile {
         }
         table.begin_file(self.label.clone());
         let path = self.read_path();
-        match self.kind {
+        let read = match self.kind {
             FileKind::Table { delimiter } => table::read(path, delimiter, table),
             FileKind::JsonLines => json::read_lines(path, table),
             FileKind::Json => json::read(path, rows, table),
             FileKind::Parquet => parquet::read(path, &self.footer, table),
-        }
+        };
+        // The unpacked copy has a name that nobody knows.
+        let named = |place: &str| {
+            place.replace(
+                &path.display().to_string(),
+                &self.label.path.display().to_string(),
+            )
+        };
+        read.map_err(|error| match error {
+            Error::Data { place, problem } => Error::data(named(&place), problem),
+            error => error,
+        })
     }
 
     /// The bytes or the text of a value: in a row, in a column, at the steps inside its cell.
