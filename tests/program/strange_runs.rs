@@ -104,6 +104,21 @@ fn images_are_not_shown_through_a_link() {
     fs::remove_file(bench.path("run/shown")).unwrap();
     bench.complete(&words("show run q0"));
     assert!(fs::read_dir(bench.path("run/shown")).unwrap().count() > 0);
+    // A folder inside, which the name of a frame leads to.
+    let picture = fs::read(bench.path("a.png")).unwrap();
+    bench.file("inner/a.png", picture);
+    let set = fs::read_to_string(bench.path("set.jsonl")).unwrap();
+    bench.file("nested.jsonl", set.replace("a.png", "inner/a.png"));
+    bench.complete(&words(
+        &COMMAND
+            .replace("set.jsonl", "nested.jsonl")
+            .replace("run", "nested"),
+    ));
+    fs::create_dir(bench.path("nested/shown")).unwrap();
+    symlink("../../elsewhere", bench.path("nested/shown/inner")).unwrap();
+    let called = bench.call(&words("show nested q0"));
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert_eq!(fs::read_dir(bench.path("elsewhere")).unwrap().count(), 0);
 }
 
 #[test]

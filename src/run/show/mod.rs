@@ -6,7 +6,7 @@ mod sheet;
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::dataset::inputs::stem;
@@ -43,9 +43,15 @@ pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
         });
     };
     let conditions = conditions(&item.answers, &args)?;
-    let out = match &args.out {
-        Some(out) => out.clone(),
-        None => own_folder(&folder)?,
+    let target = match &args.out {
+        Some(out) => Target {
+            trusted: out.clone(),
+            out: out.clone(),
+        },
+        None => Target {
+            trusted: folder.clone(),
+            out: folder.join("shown"),
+        },
     };
     let mut rebuilder = ImageRebuilder::open(args.rebuild, &manifest, &folder, &conditions)?;
     let mut text = item.text.clone();
@@ -66,7 +72,7 @@ pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
         }
         let images = rebuilder.images(&source, &conditions)?;
         for (condition, images) in conditions.iter().zip(images) {
-            text += &written(&out, &source, condition, &images)?;
+            text += &written(&target, &source, condition, &images)?;
             let Some(digest) = Payload::joint_digest(&images) else {
                 continue;
             };
@@ -98,18 +104,29 @@ pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
     ))
 }
 
-/// The folder of a run that its images are written into.
-///
-/// # Errors
-/// If it is a link: the run may come from a stranger, and the link may lead anywhere.
-fn own_folder(run: &Path) -> Result<PathBuf> {
-    let folder = run.join("shown");
-    if folder.is_symlink() {
-        let problem =
-            "a link; the images would be written to where it leads. Delete the link, or name --out";
-        return Err(Error::data(folder.display(), problem));
+/// Where the images go.
+struct Target {
+    /// The folder that the user names: that of the run, or `--out`. It may be a link.
+    trusted: PathBuf,
+    /// The folder of the images.
+    out: PathBuf,
+}
+
+impl Target {
+    /// The path of an image. Names of frames have folders, and a run may come from a stranger.
+    ///
+    /// # Errors
+    /// If a folder on the way is a link, which may lead anywhere.
+    fn path(&self, name: &str) -> Result<PathBuf> {
+        let path = self.out.join(name);
+        let folders = path.ancestors().skip(1);
+        let mut inner = folders.take_while(|folder| *folder != self.trusted);
+        if let Some(link) = inner.find(|folder| folder.is_symlink()) {
+            let problem = "a link; the images would be written to where it leads. Delete the link, or name another --out";
+            return Err(Error::data(link.display(), problem));
+        }
+        Ok(path)
     }
-    Ok(folder)
 }
 
 /// The frames that were shown with the item: its own first, then those that a control of the observer was shown.
@@ -128,7 +145,7 @@ fn sources(item: &ShownItem) -> Vec<FrameId> {
 
 /// Writes the images of a source in a condition; the lines with their paths.
 fn written(
-    out: &Path,
+    target: &Target,
     source: &FrameId,
     condition: &Condition,
     images: &[Arc<Payload>],
@@ -141,7 +158,7 @@ fn written(
             String::new()
         };
         let name = format!("{}_{condition}{place}.{}", stem(source)?, image.extension());
-        let path = out.join(name);
+        let path = target.path(&name)?;
         write(&path, image.file())?;
         let _ = writeln!(text, "{condition}: {}", path.display());
     }
