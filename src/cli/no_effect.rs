@@ -337,8 +337,12 @@ impl NoEffect {
 
     /// Checks the flags of enhancement. Enhancers that no condition uses are an error.
     fn enhancement(&mut self, args: &EnhancerArgs) {
-        if args.llie.is_empty() {
+        if args.is_empty() {
             self.because("no --llie is named", &enhancement());
+        } else if args.llie.is_empty() {
+            let mut idle = [ids::<SizeArgs>(), ids::<RuntimeArgs>()].concat();
+            idle.retain(|id| id != "enhanced");
+            self.because("no --llie is named, and --enhanced runs no model", &idle);
         }
     }
 }

@@ -66,7 +66,7 @@ impl DarkImages {
     /// For a set in this light, asked with these levels and enhancers.
     pub(crate) fn of(set: SetLight, light: &LightSettings, enhancers: &EnhancerArgs) -> Self {
         let as_they_are = light.levels == [AxisLevel::L0]
-            && !enhancers.llie.is_empty()
+            && !enhancers.is_empty()
             && enhancers.on().includes(None);
         if set == SetLight::Dark || as_they_are {
             Self::Expected

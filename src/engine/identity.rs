@@ -49,6 +49,12 @@ pub(crate) fn columns<'a>(
         let content = enhancer(digest, &settings.loading.size);
         (name.as_str().to_owned(), content)
     });
+    let elsewhere = recipe.elsewhere.iter();
+    let elsewhere = elsewhere.map(|images| {
+        let content = json!({"--enhanced": images.digest()});
+        (images.name().as_str().to_owned(), content)
+    });
+    let enhancers = enhancers.chain(elsewhere);
     let degradations = settings.light.degradations();
     let readings = degradations
         .iter()

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::types::{
-    Condition, Degradation, Digest, EnhancerName, PairDark, PhotoName, Treatment, TreatmentSet,
+    Condition, Degradation, EnhancerName, PairDark, PhotoName, Treatment, TreatmentSet,
 };
 use darkqa_enhance::EnhancerArgs;
 use darkqa_light::LightSettings;
@@ -13,7 +13,7 @@ pub(crate) fn conditions(
     light: &LightSettings,
     photographs: &[PhotoName],
     on: TreatmentSet,
-    enhancers: &[(EnhancerName, Digest)],
+    enhancers: &[EnhancerName],
 ) -> Vec<Condition> {
     let mut all = Vec::new();
     let degradations = light.degradations().into_iter().map(Treatment::from);
@@ -22,7 +22,7 @@ pub(crate) fn conditions(
     for treatment in degradations.chain(pairs.map(Treatment::Paired)) {
         let is_enhanced = on.has(&treatment);
         let raw = Condition::raw(treatment);
-        let enhanced = |(name, _): &(EnhancerName, Digest)| Condition {
+        let enhanced = |name: &EnhancerName| Condition {
             enhancer: Some(name.clone()),
             ..raw.clone()
         };
@@ -53,7 +53,7 @@ pub(crate) fn check_used(light: &LightSettings, args: &EnhancerArgs) -> Result<(
     let on = args.on();
     // Whether there are photographs in the dark is known when the data are open.
     let may_be = on.and(TreatmentSet::DARK).is_some() || !light.matches.is_empty();
-    if args.llie.is_empty() || may_be || asked.and(on).is_some() {
+    if args.is_empty() || may_be || asked.and(on).is_some() {
         return Ok(());
     }
     let problem = match asked.and(light.variants.into()) {
@@ -76,7 +76,7 @@ pub(crate) fn check_enhanced(conditions: &[Condition], args: &EnhancerArgs) -> R
     let is_used = conditions
         .iter()
         .any(|condition| condition.enhancer.is_some());
-    if args.llie.is_empty() || is_used || conditions.is_empty() {
+    if args.is_empty() || is_used || conditions.is_empty() {
         return Ok(());
     }
     let problem = format_args!(

@@ -290,7 +290,7 @@ impl<'a> ImagePipeline<'a> {
         match &condition.enhancer {
             None => Ok(degraded),
             Some(name) => {
-                let enhanced = self.enhanced(&degraded, name, [work.frame(), &condition])?;
+                let enhanced = self.enhanced(&degraded, name, (work.frame(), &condition))?;
                 Ok(Arc::new(enhanced.0))
             }
         }
@@ -319,7 +319,7 @@ impl<'a> ImagePipeline<'a> {
                 mut finish,
             } => {
                 let started = Instant::now();
-                let (image, used) = self.enhanced(&degraded, &enhancer, [frame, condition])?;
+                let (image, used) = self.enhanced(&degraded, &enhancer, (frame, condition))?;
                 finish.took += started.elapsed();
                 finish.image(&Arc::new(image), Some(used))
             }
@@ -337,6 +337,9 @@ impl<'a> ImagePipeline<'a> {
         let Some(used) = &notes.enhanced else {
             return Ok(());
         };
+        if let Some(images) = self.steps.recipe.elsewhere(name) {
+            return used.note_made_elsewhere(images.usage(), images.folder(), place, implausible);
+        }
         match self.resting(name) {
             Some(resting) => used.note_in(resting.usage(), resting.path(), place, implausible),
             None => self.enhancer(name)?.note_stored(used, place, implausible),
@@ -348,9 +351,14 @@ impl<'a> ImagePipeline<'a> {
         &mut self,
         image: &Rgb,
         name: &EnhancerName,
-        place: [&dyn ToString; 2],
+        (frame, condition): (&FrameId, &Condition),
     ) -> Result<(Rgb, ImageUse)> {
         let (timings, implausible) = (self.steps.timings, self.implausible);
+        if let Some(images) = self.steps.recipe.elsewhere(name) {
+            let read = || images.image(image, (frame, condition), implausible);
+            return timings.time(TimedStep::Decode, read);
+        }
+        let place: [&dyn ToString; 2] = [frame, condition];
         if let Some(resting) = self.resting(name) {
             let enhance = || resting.enhance_noted(image, place, implausible);
             return timings.time(TimedStep::Enhance, enhance);

@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::images::walk::Walk;
 use crate::picture::ImageArgs;
 use crate::types::Decides;
-use darkqa_enhance::SizeArgs;
+use darkqa_enhance::{EnhancedFolder, SizeArgs};
 use darkqa_light::{CameraArgs, SensorArgs};
 
 /// The flag that may be given several times, and that a later call replaces as a whole.
@@ -40,6 +40,8 @@ pub(crate) struct ImageFlags {
     pub(crate) camera: CameraArgs,
     #[arg(long, add = Decides::Trials)]
     pub(crate) llie: Vec<PathBuf>,
+    #[arg(long, add = Decides::Trials)]
+    pub(crate) enhanced: Vec<EnhancedFolder>,
     #[command(flatten)]
     pub(crate) size: SizeArgs,
     #[command(flatten)]

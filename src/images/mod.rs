@@ -5,11 +5,13 @@
 
 pub(crate) mod conditions;
 pub(crate) mod dark_frames;
+pub(crate) mod enhanced_images;
 pub(crate) mod enhancers;
 pub(crate) mod frame_work;
 pub(crate) mod image_maker;
 pub(crate) mod image_notes;
 pub(crate) mod image_pipeline;
+pub(crate) mod image_recipe;
 pub(crate) mod image_steps;
 pub(crate) mod image_words;
 pub(crate) mod input_tally;

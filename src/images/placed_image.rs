@@ -101,6 +101,12 @@ impl<R: ImageOrigin> Sidecar<R> {
         &self.darkqa_eval
     }
 
+    /// Whether the image of the file was written with these bytes; false for files of the first schema.
+    pub(crate) fn vouches_for(&self, image: Digest) -> bool {
+        let output = self.output.as_ref();
+        output.is_some_and(|output| output.digest == image.to_string())
+    }
+
     fn new(recipe: R, place: &Placed, bytes: &[u8]) -> Self {
         Self {
             schema: R::SCHEMAS[0].to_owned(),
@@ -240,7 +246,7 @@ impl Placed {
 const OTHER: &str = "made from another image or with other settings";
 
 /// The names of the fields that differ, with those of objects in them.
-fn differing(one: &Value, other: &Value) -> Vec<String> {
+pub(crate) fn differing(one: &Value, other: &Value) -> Vec<String> {
     let (Some(one), Some(other)) = (one.as_object(), other.as_object()) else {
         return Vec::new();
     };

@@ -6,6 +6,8 @@ use std::num::NonZeroU32;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
+use crate::images::enhanced_images::{DarkImage, EnhancedImages};
+use crate::images::image_recipe::ImageRecipe;
 use crate::images::source::{Source, SourceFrame};
 use crate::images::walk::{CameraOf, DegradedAt, Walk};
 use crate::picture::PayloadFormat;
@@ -14,7 +16,7 @@ use crate::types::degradation::Kind;
 use crate::types::{
     Condition, Degradation, Digest, EnhancerName, ExposureFacts, FrameId, Severity,
 };
-use darkqa_enhance::{self, ModelFile};
+use darkqa_enhance::{EnhancedFolder, ModelFile};
 use darkqa_light::{self, AppliedDegradation, FrameView, KindSettings, NoiseKey, Synthesis};
 
 /// All settings that decide an image, except its frame and its condition.
@@ -28,7 +30,10 @@ pub(crate) struct Recipe {
     pub(crate) degraded_at: DegradedAt,
     /// The frames that share one state of the camera.
     pub(crate) camera_of: CameraOf,
+    /// Enhancers that are run, with the digests of their files.
     pub(crate) enhancers: Vec<(EnhancerName, Digest)>,
+    /// Images that were enhanced elsewhere.
+    pub(crate) elsewhere: Vec<EnhancedImages>,
 }
 
 impl Recipe {
@@ -58,7 +63,31 @@ impl Recipe {
             enhancers: enhancers
                 .map(|file| (file.name().clone(), file.digest()))
                 .collect(),
+            elsewhere: Vec::new(),
         }
+    }
+
+    /// The recipe with the images of folders, too.
+    ///
+    /// # Errors
+    /// If a folder cannot be read, or two enhancers have the same name.
+    pub(crate) fn with_elsewhere(self, folders: &[EnhancedFolder]) -> Result<Self> {
+        let models = self.enhancers.iter().map(|(name, _)| name);
+        let elsewhere = EnhancedImages::open_all(folders, models)?;
+        Ok(Self { elsewhere, ..self })
+    }
+
+    /// The names of all enhancers: those that are run, then those of folders.
+    pub(crate) fn enhancer_names(&self) -> Vec<EnhancerName> {
+        let run = self.enhancers.iter().map(|(name, _)| name);
+        let elsewhere = self.elsewhere.iter().map(EnhancedImages::name);
+        run.chain(elsewhere).cloned().collect()
+    }
+
+    /// The images of the enhancer of this name, if they were made elsewhere.
+    pub(crate) fn elsewhere(&self, name: &EnhancerName) -> Option<&EnhancedImages> {
+        let mut folders = self.elsewhere.iter();
+        folders.find(|images| images.name() == name)
     }
 
     /// The recipe for frames of walks.
@@ -109,27 +138,44 @@ impl Recipe {
         let how = frame.degradation(condition)?;
         let degradation = how.map(|how| self.degradation(source, frame, &how));
         let enhancer = condition.enhancer.as_ref();
-        let enhancer =
-            enhancer.and_then(|name| self.enhancers.iter().find(|(known, _)| known == name));
+        let enhancer = enhancer.map(|name| self.enhancer_facts(name, frame, condition));
         Ok(ImageKeyFacts {
             picture: frame.picture(condition)?,
             degradation: degradation.transpose()?,
-            enhancer: enhancer.map(|(_, digest)| EnhancerFacts {
-                digest: *digest,
-                version: darkqa_enhance::VERSION,
-            }),
+            enhancer: enhancer.transpose()?.flatten(),
             format: self.format.to_string(),
             scaling: self.scaling,
             scaled_before: (self.degraded_at == DegradedAt::Resized).then_some(true),
         })
     }
+
+    /// All that an enhancer decides of the image of a frame; `None` if the recipe lacks it.
+    fn enhancer_facts(
+        &self,
+        name: &EnhancerName,
+        frame: &SourceFrame,
+        condition: &Condition,
+    ) -> Result<Option<EnhancerFacts>> {
+        if let Some(images) = self.elsewhere(name) {
+            return Ok(Some(EnhancerFacts {
+                digest: images.digest_of(&frame.id, condition)?,
+                version: None,
+            }));
+        }
+        let model = self.enhancers.iter().find(|(known, _)| known == name);
+        Ok(model.map(|(_, digest)| EnhancerFacts {
+            digest: *digest,
+            version: Some(darkqa_enhance::VERSION),
+        }))
+    }
 }
 
 impl Recipe {
-    /// Checks that the camera can make each image, which depends on the sizes of the frames.
+    /// Checks that the camera can make each image, which depends on the sizes of the frames, and that all images that were enhanced
+    /// elsewhere are there.
     ///
     /// # Errors
-    /// If a picture would move too far during an exposure; names the frame.
+    /// If a picture would move too far during an exposure; names the frame. If images of a folder cannot be used; names them.
     pub(crate) fn check(&self, sources: &[Source], conditions: &[Condition]) -> Result<()> {
         for source in sources {
             for frame in &source.frames {
@@ -141,7 +187,48 @@ impl Recipe {
                 }
             }
         }
+        for images in &self.elsewhere {
+            images.check(&self.dark_images(images.name(), sources, conditions)?)?;
+        }
         Ok(())
+    }
+
+    /// The dark images that the enhancer of this name gets, as `synthesize` would write them.
+    fn dark_images<'a>(
+        &self,
+        name: &EnhancerName,
+        sources: &'a [Source],
+        conditions: &'a [Condition],
+    ) -> Result<Vec<DarkImage<'a>>> {
+        let mut images = Vec::new();
+        for source in sources {
+            for frame in &source.frames {
+                let enhanced = conditions.iter().filter(|condition| {
+                    condition.enhancer.as_ref() == Some(name) && frame.can_show(condition)
+                });
+                for condition in enhanced {
+                    let how = frame.degradation(condition)?;
+                    let applied = how.as_ref();
+                    let applied = applied.map(|how| self.applied(&source.name, frame, how));
+                    let applied = applied.transpose()?;
+                    let file = (frame.digest, frame.note.clone());
+                    let key = self.noise(&source.name, &frame.id);
+                    images.push(DarkImage {
+                        frame,
+                        condition,
+                        recipe: ImageRecipe::new(
+                            &frame.id,
+                            file,
+                            how.as_ref(),
+                            applied.as_ref(),
+                            &key,
+                            self.seed,
+                        ),
+                    });
+                }
+            }
+        }
+        Ok(images)
     }
 
     fn applied(
@@ -223,6 +310,9 @@ struct DegradationFacts<'a> {
 
 #[derive(Serialize)]
 struct EnhancerFacts {
+    /// Digest of the model with its sidecar; of the image itself if it was enhanced elsewhere.
     digest: Digest,
-    version: u32,
+    /// `None` for images that were enhanced elsewhere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    version: Option<u32>,
 }

@@ -6,7 +6,7 @@ use super::join::JoinedRun;
 use crate::tables::EnhancerRow;
 use crate::text::alert::{Alert, AlertKind};
 use crate::text::words::counted;
-use crate::types::enhancer_note::{EnhancerNote, JudgedImages, ProbeOutcome};
+use crate::types::enhancer_note::{ELSEWHERE, EnhancerNote, JudgedImages, ProbeOutcome};
 
 /// A row for each enhancer; several runs that used it in the same way have one.
 pub(super) fn rows(runs: &[JoinedRun]) -> Vec<EnhancerRow> {
@@ -98,6 +98,7 @@ fn how(note: &EnhancerNote) -> String {
         Some(format!("{before}{} ({})", line.value, line.source))
     };
     let parts = [
+        said(ELSEWHERE, "enhanced "),
         said("preset", "preset "),
         said("range_in", "fed "),
         said("color", "colours "),

@@ -21,12 +21,12 @@ use crate::images::workers::ThreadArgs;
 use crate::picture::Payload;
 use crate::types::manifest::RunManifest;
 use crate::types::{Condition, Decides, FrameId};
-use darkqa_enhance::{Enhancer, Implausible, ProbeArgs, RuntimeArgs};
+use darkqa_enhance::{EnhancedFolder, Enhancer, Implausible, ProbeArgs, RuntimeArgs};
 use darkqa_light::KindSettings;
 
 /// Flags for the current paths of a run's data and enhancers, and for running them.
 ///
-/// The variables are `DARKQA_MOVED_DATA` and `DARKQA_MOVED_LLIE`, because `DARKQA_DATA` is for new runs and not for this one.
+/// The variables are `DARKQA_MOVED_DATA`, `DARKQA_MOVED_LLIE` and `DARKQA_MOVED_ENHANCED`, because `DARKQA_DATA` is for new runs and not for this one.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct RebuildArgs {
     /// The data, if they were moved; default: where they were
@@ -35,6 +35,9 @@ pub(crate) struct RebuildArgs {
     /// The enhancement models, if they were moved; repeatable; default: where they were
     #[arg(id = "moved_llie", long = "llie", value_name = "FILE", add = Decides::Nothing)]
     pub llie: Vec<PathBuf>,
+    /// The folders of images that were enhanced elsewhere, if they were moved; repeatable; default: where they were
+    #[arg(id = "moved_enhanced", long = "enhanced", value_name = "NAME=DIR", add = Decides::Nothing)]
+    pub enhanced: Vec<EnhancedFolder>,
     /// The ONNX Runtime that runs enhancers.
     #[command(flatten)]
     pub runtime: RuntimeArgs,
@@ -80,9 +83,11 @@ impl ImageRebuilder {
         let mut conditions = conditions.iter();
         let enhanced = conditions.any(|condition| condition.enhancer.is_some());
         let models = if enhanced { &*flags.llie } else { &[] };
+        let elsewhere = if enhanced { &*flags.enhanced } else { &[] };
         let files = enhancers::read(models)?;
         let kinds = KindSettings::resolve(&flags.sensor, &flags.camera)?;
         let recipe = Recipe::new(&kinds, flags.images.image, flags.max_side, &files);
+        let recipe = recipe.with_elsewhere(elsewhere)?;
         let (frames, recipe) = if let Some(walk) = flags.walk {
             let recipe = recipe.of_walks(&walk);
             let folder = WalkFolder::new(&walk, flags.codes.rule(flags.limit));
@@ -166,6 +171,9 @@ fn with_new_paths(mut flags: ImageFlags, args: &RebuildArgs) -> Result<ImageFlag
     }
     if !args.llie.is_empty() {
         flags.llie.clone_from(&args.llie);
+    }
+    if !args.enhanced.is_empty() {
+        flags.enhanced.clone_from(&args.enhanced);
     }
     Ok(flags)
 }

@@ -439,7 +439,7 @@ fn what_decides_nothing_asks_nothing() {
 }
 
 /// Flags that the tables here leave out, and where they are held.
-const ELSEWHERE: [(&str, &str); 50] = [
+const ELSEWHERE: [(&str, &str); 51] = [
     ("--map", "tests/program/ready_made.rs"),
     ("--config-name", "src/dataset/ready_made/tests/shapes.rs"),
     ("--split", "src/dataset/ready_made/tests/shapes.rs"),
@@ -476,6 +476,7 @@ const ELSEWHERE: [(&str, &str); 50] = [
         "settings_of_the_camera_are_those_of_its_variants",
     ),
     ("--llie-anyway", "tests/program/enhance/probe.rs"),
+    ("--enhanced", "tests/program/enhance/elsewhere.rs"),
     ("--models", "tests/program/models_file.rs"),
     ("--only", "tests/program/models_file.rs"),
     ("--set", "tests/program/models_file.rs"),

@@ -65,6 +65,7 @@ fn sample(arg: &Arg) -> String {
         "answers" => "people=answers.json",
         "condition" => "L3-noise",
         "map" => "question=abc",
+        "enhanced" | "moved_enhanced" => "mine=abc",
         "bad" => "skip:9%",
         "url" => "/v1/responses",
         "families" => "color",

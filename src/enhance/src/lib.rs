@@ -38,6 +38,7 @@ mod control_group;
 mod convention;
 mod describe;
 mod doctor;
+mod enhanced_folder;
 mod enhancer;
 mod expression;
 mod extra;
@@ -89,6 +90,7 @@ mod usage;
 mod weights;
 
 pub use doctor::{Examination, ImageOutput, ProposedLine, Settled};
+pub use enhanced_folder::EnhancedFolder;
 pub use enhancer::twin::sets_in_memory;
 pub use enhancer::{Enhancer, Fitting};
 pub use file::ModelFile;

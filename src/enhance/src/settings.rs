@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::enhanced_folder::EnhancedFolder;
 use super::enhancer::Fitting;
 use super::memory_limit::MemoryLimit;
 use super::runtime::{Install, RuntimeSearch};
@@ -23,6 +24,10 @@ pub struct EnhancerArgs {
     /// restormer, mirnet, kind); repeatable: each is shown beside raw; default: none
     #[arg(long, value_name = "NAME|FILE", add = Decides::Trials)]
     pub llie: Vec<PathBuf>,
+    /// Images that were enhanced elsewhere, shown beside raw like those of an enhancer NAME: DIR has an image for each one that `synthesize`
+    /// writes, under its name and with its JSON file; repeatable; default: none
+    #[arg(long, value_name = "NAME=DIR", add = Decides::Trials)]
+    pub enhanced: Vec<EnhancedFolder>,
     /// Which images are enhanced, several with commas: those of a variant (ev, noise, auto, motion); l0, the untouched images, for
     /// photographs that are dark already; dark, the photographs in the dark beside their frames; both is ev,noise; all is all of these;
     /// default: noise, or l0 for photographs that are dark already
@@ -35,6 +40,12 @@ impl EnhancerArgs {
     #[must_use]
     pub fn on(&self) -> TreatmentSet {
         self.llie_on.unwrap_or(TreatmentSet::NOISE)
+    }
+
+    /// Whether no enhancer and no folder of enhanced images is named.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.llie.is_empty() && self.enhanced.is_empty()
     }
 
     /// The same flags for a set in this light, of which the untouched photographs are enhanced by default if it is dark.

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::plausible::{Codes, DARK, Gravity, Verdict, brightness, judge};
 use darkqa_ground::error::{Error, Result};
-use darkqa_ground::types::enhancer_note::{EnhancerNote, FlawedImage};
+use darkqa_ground::types::enhancer_note::{ConventionLine, ELSEWHERE, EnhancerNote, FlawedImage};
 use darkqa_ground::types::{Digest, Rgb, SizeLog};
 
 /// Number of dark images from which on a verdict on the enhancer is possible; chosen as the number of frames of the probe.
@@ -74,6 +74,38 @@ impl ImageUse {
     }
 }
 
+impl ImageUse {
+    /// The use of an image that was enhanced elsewhere, made of a degraded one.
+    #[must_use]
+    pub fn made_elsewhere([degraded, made]: [&Rgb; 2]) -> Self {
+        Self {
+            seen: Seen::on([degraded, made]),
+            sizes: SizeLog::default(),
+        }
+    }
+
+    /// Notes an image of a frame in a condition that was enhanced elsewhere.
+    ///
+    /// # Errors
+    /// If most images of dark frames so far cannot be enhanced images; names the folder.
+    pub fn note_made_elsewhere(
+        &self,
+        usage: &Usage,
+        folder: &Path,
+        place: [&dyn ToString; 2],
+        implausible: Implausible,
+    ) -> Result<()> {
+        if implausible == Implausible::NotLookedFor {
+            return Ok(());
+        }
+        let judged = usage.judge(&self.seen, place, implausible);
+        judged.map_err(|problem| {
+            let remedy = "check that each has the name of its own dark image; --llie-anyway uses them as they are";
+            Error::data(folder.display(), format_args!("{problem}; {remedy}"))
+        })
+    }
+}
+
 impl Seen {
     /// Counts what was seen on the image of a frame in a condition, unless images are not looked at. The model is named by its file.
     ///
@@ -92,7 +124,9 @@ impl Seen {
         let judged = usage.judge(self, place, implausible);
         judged.map_err(|problem| Error::EnhancerEnded {
             path: model.to_owned(),
-            problem,
+            problem: format!(
+                "{problem}. `darkqa-eval enhance MODEL FRAMES… --doctor --out DIR` draws what it makes with each convention; --llie-anyway uses it as it is"
+            ),
         })
     }
 }
@@ -113,6 +147,20 @@ struct State {
 }
 
 impl Usage {
+    /// The handle of images that were enhanced elsewhere.
+    #[must_use]
+    pub fn made_elsewhere() -> Self {
+        let usage = Self::default();
+        usage.update(|note| {
+            note.convention.push(ConventionLine {
+                key: ELSEWHERE.to_owned(),
+                value: "not by this program".to_owned(),
+                source: "--enhanced".to_owned(),
+            });
+        });
+        usage
+    }
+
     /// The note as it is now.
     pub fn note(&self) -> EnhancerNote {
         self.with(|state| state.note.clone())
@@ -183,7 +231,7 @@ impl Usage {
                     if judged >= ENOUGH && 2 * state.impossible > judged =>
                 {
                     Err(format!(
-                        "{} of its {judged} images of dark frames cannot be enhanced images; they {example}. `darkqa-eval enhance MODEL FRAMES… --doctor --out DIR` draws what it makes with each convention; --llie-anyway uses it as it is",
+                        "{} of its {judged} images of dark frames cannot be enhanced images; they {example}",
                         state.impossible
                     ))
                 }

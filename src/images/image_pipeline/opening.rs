@@ -6,14 +6,16 @@ use std::time::Instant;
 use super::ImagePipeline;
 use crate::error::Result;
 use crate::images::dark_frames::{DarkFrames, dark_frames};
+use crate::images::enhanced_images::EnhancedImages;
 use crate::images::enhancers::{EnhancerRunArgs, Model};
+use crate::images::frame_work::FrameWork;
 use crate::images::plan::SourcePlan;
 use crate::images::resting_enhancer::RestingEnhancer;
 use crate::images::source::Source;
 use crate::images::stored_findings::FindingsPlace;
 use crate::images::timings::TimedStep;
 use crate::types::EnhancerName;
-use darkqa_enhance::{Enhancer, Findings, Stopper, Usage};
+use darkqa_enhance::{Enhancer, FRAMES, Findings, Stopper, Usage};
 
 /// What ends the runs of an enhancer from another thread.
 pub(crate) enum EnhancerStopper {
@@ -78,6 +80,38 @@ impl<'a> ImagePipeline<'a> {
                     }
                     self.enhancers.push(enhancer);
                 }
+            }
+        }
+        for images in &self.steps.recipe.elsewhere {
+            self.look_at(images, sources, plan)?;
+        }
+        Ok(())
+    }
+
+    /// Looks at images that were enhanced elsewhere, until enough of dark frames were seen for a verdict.
+    ///
+    /// # Errors
+    /// If most cannot be enhanced images of their dark images, or a file cannot be read.
+    fn look_at<I>(
+        &mut self,
+        images: &EnhancedImages,
+        sources: &[Source],
+        plan: &[SourcePlan<I>],
+    ) -> Result<()> {
+        let frames = DarkFrames::of(sources, plan, images.name());
+        let steps = self.steps.without_store();
+        for (place, (source, conditions)) in frames.frames().iter().enumerate() {
+            let Some(frame) = source.middle() else {
+                continue;
+            };
+            let mut work = FrameWork::planned(steps, source, frame);
+            // Another condition of each frame first, so that all levels and kinds are met.
+            let (before, after) = conditions.split_at(place % conditions.len());
+            for condition in after.iter().chain(before) {
+                if images.usage().note().judged.images >= FRAMES {
+                    return Ok(());
+                }
+                self.pixels(&mut work, condition)?;
             }
         }
         Ok(())
@@ -157,6 +191,8 @@ impl<'a> ImagePipeline<'a> {
         let open = open.map(|enhancer| (enhancer.name().clone(), enhancer.usage()));
         let resting = self.resting.iter();
         let resting = resting.map(|enhancer| (enhancer.name().clone(), enhancer.usage().clone()));
-        open.chain(resting).collect()
+        let elsewhere = self.steps.recipe.elsewhere.iter();
+        let elsewhere = elsewhere.map(|images| (images.name().clone(), images.usage().clone()));
+        open.chain(resting).chain(elsewhere).collect()
     }
 }

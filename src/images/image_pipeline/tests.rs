@@ -41,6 +41,7 @@ fn pipeline_output(
         degraded_at: DegradedAt::Native,
         camera_of: CameraOf::Frame,
         enhancers: Vec::new(),
+        elsewhere: Vec::new(),
     };
     let steps = ImageSteps {
         frames: &dataset,

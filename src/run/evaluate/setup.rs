@@ -97,7 +97,7 @@ impl<'a> ChoiceSetup<'a> {
         photographs::check_matches(&sources, &job.light.matches)?;
         photographs::tell(&*dataset, &sources, progress);
         dark_already::tell(job, progress);
-        if !job.enhancers.llie.is_empty()
+        if !job.enhancers.is_empty()
             && job.enhancers.on().and(TreatmentSet::DARK).is_none()
             && !photographs::names(&sources).is_empty()
         {
@@ -105,9 +105,14 @@ impl<'a> ChoiceSetup<'a> {
             progress.say(line);
         }
         let recipe = Recipe::new(&job.light.kinds, job.format, job.max_side, &files);
+        let recipe = if shows_images {
+            recipe.with_elsewhere(&job.enhancers.enhanced)?
+        } else {
+            recipe
+        };
         let photographed = photographs::names(&sources);
         let on = job.enhancers.on();
-        let conditions = conditions(&job.light, &photographed, on, &recipe.enhancers);
+        let conditions = conditions(&job.light, &photographed, on, &recipe.enhancer_names());
         let brightness = (job.set_light == SetLight::Dark)
             .then(|| dark_already::brightness(&*dataset, &sources))
             .flatten();

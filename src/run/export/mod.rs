@@ -113,6 +113,7 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
     let own_questions = part_of_frames(&questions, asked, shard)?;
     let files = enhancers::read(&args.enhancers.llie)?;
     let recipe = Recipe::lossless(&light.kinds, &files);
+    let recipe = recipe.with_elsewhere(&args.enhancers.enhanced)?;
     let workers = pool(args.loading.threads.threads)?;
     let mut sources = workers.install(|| inspect_all(&dataset, &own_questions, progress))?;
     if !light.matches.is_empty() {
@@ -124,7 +125,7 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
     }
     let photographed = photographs::names(&sources);
     let on = enhancement.on();
-    let conditions = conditions(&light, &photographed, on, &recipe.enhancers);
+    let conditions = conditions(&light, &photographed, on, &recipe.enhancer_names());
     check_enhanced(&conditions, &enhancement)?;
     warn_of_inputs(&input_summary(&sources));
     recipe.check(&sources, &conditions)?;

@@ -69,6 +69,11 @@ impl<'a> OpenSetup<'a> {
         };
         let recipe = Recipe::new(&job.light.kinds, job.format, None, &files);
         let recipe = recipe.of_walks(&config.walk);
+        let recipe = if shows_frames {
+            recipe.with_elsewhere(&job.enhancers.enhanced)?
+        } else {
+            recipe
+        };
         let walks = WalkFolder::new(&config.walk, config.rule);
         let names = names(&questions);
         let (sources, conditions) = if shows_frames {
@@ -77,7 +82,7 @@ impl<'a> OpenSetup<'a> {
             warn_of_repeated(&sources);
             let on = job.enhancers.on();
             job.light.refuse_matches("the frames of walks have none")?;
-            let conditions = conditions(&job.light, &[], on, &recipe.enhancers);
+            let conditions = conditions(&job.light, &[], on, &recipe.enhancer_names());
             check_enhanced(&conditions, &job.enhancers)?;
             (sources, conditions)
         } else {

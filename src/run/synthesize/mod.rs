@@ -2,7 +2,6 @@
 
 mod check;
 mod sheet;
-mod sidecar;
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -15,6 +14,7 @@ use crate::dataset::inputs::{InputFrame, Inputs, stem};
 use crate::dataset::{CodesArgs, Picture, PixelLimit, RootArgs};
 use crate::error::{Error, Result};
 use crate::images::frame_work::FrameWork;
+use crate::images::image_recipe::ImageRecipe;
 use crate::images::image_steps::ImageSteps;
 use crate::images::input_tally::InputTally;
 use crate::images::placed_image::{ImageOutcome, Placed, Sidecar};
@@ -32,7 +32,6 @@ use darkqa_light::{LightArgs, LightSettings, NoiseKey};
 
 pub(crate) use sheet::Sheet;
 use sheet::SheetRecipe;
-use sidecar::ImageRecipe;
 
 /// The flags of `synthesize`.
 #[derive(Debug, Args)]
@@ -273,7 +272,8 @@ impl SynthesisWork<'_> {
         let name = format!("{}_{condition}", self.entry.stem);
         let applied = how.map(|how| self.frame.applied(how)).transpose()?;
         let picture = self.frame.picture()?;
-        let recipe = ImageRecipe::new(&self.entry.id, picture, how, applied.as_ref(), &key, seed);
+        let file = (picture.digest(), picture.note());
+        let recipe = ImageRecipe::new(&self.entry.id, file, how, applied.as_ref(), &key, seed);
         let place = Placed::new(self.making.out, &name, self.making.args.force);
         place.put(&recipe, || Ok(Rgb::clone(self.frame.degraded(how)?)))
     }

@@ -1,5 +1,6 @@
 //! Stage 3 through its own door: models made by hand, on the ONNX Runtime that is found or installed.
 mod command;
+mod elsewhere;
 mod endings;
 mod fixed;
 mod inputs;

@@ -6,6 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use super::{Flaw, SizeLog};
 
+/// Key of the statement that images were enhanced elsewhere.
+pub const ELSEWHERE: &str = "enhanced";
+
 /// How a run used an enhancer, and whether its images can be enhanced images.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct EnhancerNote {

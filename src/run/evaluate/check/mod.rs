@@ -159,7 +159,7 @@ fn data(
         // With a model, this line is among what a run would take.
         let sets = AskedSets {
             models: 1,
-            enhancers: args.job.enhancers.llie.len(),
+            enhancers: args.job.enhancers.llie.len() + args.job.enhancers.enhanced.len(),
             lights: 1,
             has_noise: true,
         };

@@ -9,7 +9,9 @@ use crate::dataset::Picture;
 use crate::error::{Error, Result};
 use crate::images::placed_image::{ImageOrigin, Sidecar};
 use crate::types::degradation::{Axis, Kind};
-use crate::types::{Condition, Degradation, ExposureFacts, FrameId, InputNote, ReadingName, Rgb};
+use crate::types::{
+    Condition, Degradation, Digest, ExposureFacts, FrameId, InputNote, ReadingName, Rgb,
+};
 use darkqa_light::blur::{blur, blurred_codes};
 use darkqa_light::{
     self, Amplify, AppliedDegradation, CameraState, Clean, Coupling, Draws, NoiseKey, Streak, Tone,
@@ -18,7 +20,7 @@ use darkqa_light::{
 
 /// Everything that decides the pixels of an image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct ImageRecipe {
+pub(crate) struct ImageRecipe {
     frame: String,
     /// The digest of the image that this one was made from.
     source: String,
@@ -59,10 +61,11 @@ impl ImageOrigin for ImageRecipe {
 }
 
 impl ImageRecipe {
-    /// The recipe of an image of a frame; `how` and `applied` are both `None` for the clean frame.
-    pub(super) fn new(
+    /// The recipe of an image of a frame, whose file has this digest and was read so; `how` and `applied` are both `None` for the clean
+    /// frame.
+    pub(crate) fn new(
         frame: &FrameId,
-        picture: &Picture,
+        (source, read): (Digest, InputNote),
         how: Option<&Degradation>,
         applied: Option<&AppliedDegradation>,
         key: &NoiseKey,
@@ -87,8 +90,8 @@ impl ImageRecipe {
         });
         Self {
             frame: frame.0.clone(),
-            source: picture.digest().to_string(),
-            read: picture.note(),
+            source: source.to_string(),
+            read,
             condition: Condition::raw(how.cloned()),
             drop,
             synthesis: version(how),
@@ -97,12 +100,12 @@ impl ImageRecipe {
         }
     }
 
-    pub(super) fn frame(&self) -> FrameId {
+    pub(crate) fn frame(&self) -> FrameId {
         FrameId(self.frame.clone())
     }
 
     /// The name of the image file without its ending.
-    pub(super) fn name(&self, stem: &str) -> String {
+    pub(crate) fn name(&self, stem: &str) -> String {
         format!("{stem}_{}", self.condition)
     }
 
@@ -110,7 +113,7 @@ impl ImageRecipe {
     ///
     /// # Errors
     /// If the picture has other content, or the synthesis of this program has another version.
-    pub(super) fn replay(file: &Sidecar<Self>, picture: &Picture, path: &Path) -> Result<Rgb> {
+    pub(crate) fn replay(file: &Sidecar<Self>, picture: &Picture, path: &Path) -> Result<Rgb> {
         file.recipe.image(picture, file.program(), path)
     }
 

@@ -1,0 +1,55 @@
+//! A folder of images that were enhanced elsewhere, as a flag names it: [`EnhancedFolder`].
+
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use darkqa_ground::types::EnhancerName;
+
+/// A folder of images that were enhanced elsewhere, with the name of their enhancer.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct EnhancedFolder {
+    /// The name of the enhancer in tables and records.
+    pub name: EnhancerName,
+    /// The folder.
+    pub folder: PathBuf,
+}
+
+impl FromStr for EnhancedFolder {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts = text
+            .split_once('=')
+            .filter(|(_, folder)| !folder.is_empty());
+        let (name, folder) = parts.ok_or("NAME=DIR expected, such as mine=enhanced/")?;
+        let name = EnhancerName::new(name).map_err(|_| {
+            format!("{name:?} is no name: only letters, digits, '_', '-' and '.' are allowed")
+        })?;
+        Ok(Self {
+            name,
+            folder: folder.into(),
+        })
+    }
+}
+
+impl fmt::Display for EnhancedFolder {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}={}", self.name, self.folder.display())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_needs_a_name() {
+        let read: EnhancedFolder = "mine=a=b/c".parse().unwrap();
+        assert_eq!(read.to_string(), "mine=a=b/c");
+        assert_eq!(read.folder, PathBuf::from("a=b/c"));
+        for text in ["mine", "mine=", "=out", "my one=out"] {
+            assert!(text.parse::<EnhancedFolder>().is_err(), "{text}");
+        }
+    }
+}
