@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use super::token_bound::TokenBound;
 use crate::error::{Error, Result};
@@ -12,7 +13,7 @@ use crate::types::Usage;
 use crate::types::toml_fault::TomlFault;
 
 /// The price of a model, in dollars per million tokens.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Price {
     /// The price of prompts, images included, in dollars per million tokens.
@@ -20,8 +21,10 @@ pub(crate) struct Price {
     /// The price of replies, hidden reasoning included, in dollars per million tokens.
     pub output: f64,
     /// The price of what the server had in its cache, in dollars per million tokens; `None` if it is that of `input`.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub cached_input: Option<f64>,
     /// The number of tokens of an image; `None` to use the rule of the model's family.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub image_tokens: Option<u64>,
 }
 
@@ -51,7 +54,7 @@ impl Price {
 }
 
 /// A table of prices by model, with its date.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Prices {
     /// The date of the prices.
@@ -59,6 +62,9 @@ pub(crate) struct Prices {
     /// The share of the price that the Batch API charges.
     pub batch: f64,
     models: BTreeMap<String, Price>,
+    /// Whether it is a table of the user (`--prices`).
+    #[serde(skip)]
+    is_own: bool,
 }
 
 impl Prices {
@@ -99,7 +105,44 @@ impl Prices {
             )));
         }
         drop(numbers);
-        Ok(prices)
+        Ok(Self {
+            is_own: true,
+            ..prices
+        })
+    }
+
+    /// The key of the settings in a manifest under which a run keeps the user's table.
+    pub(crate) const SETTING: &str = "prices";
+
+    /// The table as a manifest keeps it; `None` for the built-in one.
+    pub(crate) fn setting(&self) -> Option<Value> {
+        self.is_own.then(|| serde_json::json!(self))
+    }
+
+    /// The table that a run had: its own, if its settings have one, else the built-in one.
+    ///
+    /// # Errors
+    /// If the table in the settings is broken.
+    pub(crate) fn of_settings(settings: &BTreeMap<String, Value>) -> Result<Self> {
+        let Some(own) = settings.get(Self::SETTING) else {
+            return Self::built_in();
+        };
+        let read: Self = serde_json::from_value(own.clone())
+            .map_err(|e| Error::data("the prices in the manifest", e))?;
+        Ok(Self {
+            is_own: true,
+            ..read
+        })
+    }
+
+    /// The source of the prices, in words that follow "at".
+    pub(crate) fn source(&self) -> String {
+        let date = &self.as_of;
+        if self.is_own {
+            format!("the prices of {date} of --prices")
+        } else {
+            format!("the list prices of {date}")
+        }
     }
 
     /// The price of a model: by its name, by the name after a provider's (`openai/gpt-4o`), or by the name without a version

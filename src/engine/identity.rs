@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
 
-use crate::ask::by_flag;
+use crate::ask::{Prices, by_flag};
 use crate::engine::models::ModelUnderTest;
 use crate::engine::settings::JobSettings;
 use crate::images::recipe::Recipe;
@@ -139,6 +139,7 @@ pub(crate) fn settings(job: &JobSettings) -> BTreeMap<String, Value> {
         ("--max-failures", json!(job.money.max_failures)),
         ("--threads", json!(job.loading.threads.threads)),
     ];
+    settings.extend(job.money.prices.setting().map(|own| (Prices::SETTING, own)));
     if let Some(models) = &job.ask.file {
         settings.push(("models", models.resolved.clone()));
     } else if let Some(server) = job.ask.servers().first() {

@@ -73,13 +73,13 @@ pub(crate) fn price(prices: &Prices, manifest: &RunManifest, model: &str) -> Opt
     stated.or_else(|| prices.of(id.unwrap_or(model)))
 }
 
-/// The cost of a run's replies at list prices, as text, attempts without a usable reply included; `None` if no model of the run has a known
+/// The cost of a run's replies at the prices that the run had, as text, attempts without a usable reply included; `None` if no model of the run has a known
 /// price.
 pub(super) fn cost<'t, D: Detail + 't>(
     trials: impl Iterator<Item = TrialRef<'t, D>>,
     manifest: &RunManifest,
 ) -> Result<Option<String>> {
-    let prices = Prices::built_in()?;
+    let prices = Prices::of_settings(&manifest.settings)?;
     let (mut dollars, mut counted, mut unknown) = (0.0, 0_usize, 0_usize);
     let (mut lost_dollars, mut attempts) = (0.0, 0_u32);
     let mut by_model = HashMap::new();
@@ -113,7 +113,6 @@ pub(super) fn cost<'t, D: Detail + 't>(
         0 => String::new(),
         n => format!("; {n} replies without a known price or usage"),
     };
-    let (date, all) = (&prices.as_of, money(dollars + lost_dollars));
-    Ok((counted > 0 || attempts > 0)
-        .then(|| format!("{all} at the list prices of {date}{lost}{note}")))
+    let (source, all) = (prices.source(), money(dollars + lost_dollars));
+    Ok((counted > 0 || attempts > 0).then(|| format!("{all} at {source}{lost}{note}")))
 }

@@ -516,3 +516,27 @@ fn the_cost_of_attempts_without_a_reply_is_in_the_report() {
     assert!(cost.ends_with("$2.60 "), "{}", &cost[cost.len() - 60..]);
     assert!(page.contains(", $2.00 of it for 1 attempt without a usable reply"));
 }
+
+#[test]
+fn the_report_has_the_prices_that_the_run_had() {
+    let bench = Bench::with_questions(1);
+    let usage = json!({"prompt_tokens": 1000, "completion_tokens": 100});
+    let mock = MockEndpoint::start([billed(&usage)]);
+    bench.file("prices.toml", PRICES);
+    let base = mock.base_url();
+    let cost = || {
+        let page = std::fs::read_to_string(bench.path("run/report.html")).unwrap();
+        let (before, _) = page.split_once(" of --prices").unwrap();
+        before[before.len() - 40..].to_owned()
+    };
+    bench.complete(&args(&base, "--out run --prices prices.toml"));
+    let stated = cost();
+    assert!(
+        stated.ends_with("$1.00 at the prices of 2026-01-01"),
+        "{stated}"
+    );
+    // Made again from the folder alone, without the file of prices.
+    std::fs::remove_file(bench.path("prices.toml")).unwrap();
+    bench.complete(&words("report run"));
+    assert_eq!(cost(), stated);
+}
