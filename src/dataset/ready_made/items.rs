@@ -190,7 +190,12 @@ fn parts(
 fn words(row: &Row, roles: &Roles, marks: &mut ImageMarks) -> Result<[String; 2], String> {
     let text = match &roles.question {
         Asked::InImage => Asked::IN_IMAGE.to_owned(),
-        Asked::Column(column) => column.text(row).ok_or_else(|| no_text(column, row))?,
+        Asked::Column(column) => {
+            // A list or struct in a text of JSON, as tables hold conversations, is no question either.
+            let text = column.text(row);
+            let text = text.filter(|_| column.of(row).parsed().is_none());
+            text.ok_or_else(|| no_text(column, row))?
+        }
     };
     if text.len() > LONGEST_TEXT {
         let longest = LONGEST_TEXT >> 10;
@@ -213,9 +218,9 @@ fn no_text(column: &Column, row: &Row) -> String {
             flag(Role::Question, &turns.question, None)
         )
     });
+    let kind = cell.parsed().map_or(cell.kind(), |parsed| parsed.kind());
     format!(
-        "the column {name:?} of the question holds a {}, not a text: {}{inner}",
-        cell.kind(),
+        "the column {name:?} of the question holds a {kind}, not a text: {}{inner}",
         cell.shown(60)
     )
 }
