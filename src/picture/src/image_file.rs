@@ -1,6 +1,7 @@
 //! An image file in memory: [`ImageFile`].
 
 mod cmyk_jpeg;
+mod cmyk_tiff;
 mod exr_layers;
 mod facts;
 pub mod format;
@@ -311,13 +312,18 @@ impl ImageFile {
         pixels.map_err(|e| e.at(self.place.clone()))
     }
 
-    /// The pixels of a JPEG file of four components.
+    /// The pixels of a JPEG or TIFF file of four inks.
     fn pixels_of_inks(&self, form: InkForm) -> Result<Pixels> {
         let (width, height) = self.decoder()?.dimensions();
         self.check_complete()?;
         let read = || {
             let colours = self.ink_colours()?;
-            let inks = guarded(|| cmyk_jpeg::inks(&self.bytes, form == InkForm::Adobe))?;
+            let inks = guarded(|| match form {
+                InkForm::Tiff => cmyk_tiff::inks(&self.bytes, width as usize * height as usize),
+                InkForm::Plain | InkForm::Adobe => {
+                    cmyk_jpeg::inks(&self.bytes, form == InkForm::Adobe)
+                }
+            })?;
             let image = RgbImage::from_raw(width, height, colours.srgb(&inks));
             let mut image =
                 DynamicImage::from(image.ok_or("not a whole image: samples are missing")?);

@@ -164,6 +164,20 @@ fn a_cut_file_is_named() {
 }
 
 #[test]
+fn inks_in_a_tiff_become_rgb() {
+    let inks = [[0, 0, 0, 0], [255, 0, 0, 0], [40, 90, 200, 60]];
+    let page = Page {
+        size: [3, 1],
+        channels: 4,
+        samples: inks.as_flattened().to_vec(),
+        ..Page::rgb(&image())
+    };
+    let read = decoded(tiff(Order::Big, &[page.with(262, 5)]));
+    let codes = [[255, 255, 255], [0, 255, 255], [164, 126, 42]];
+    assert_eq!(read.as_raw().as_slice(), codes.as_flattened());
+}
+
+#[test]
 fn what_cannot_be_shown_as_it_is_is_refused_by_name() {
     let rgb = |tag, value| tiff(Order::Little, &[Page::rgb(&image()).with(tag, value)]);
     let four = Page {
@@ -177,8 +191,8 @@ fn what_cannot_be_shown_as_it_is_is_refused_by_name() {
     clear.write_to(&mut transparent, ImageFormat::WebP).unwrap();
     for (bytes, says) in [
         (
-            tiff(Order::Little, &[four.with(262, 5)]),
-            "a CMYK image; convert it to RGB first",
+            tiff(Order::Little, &[four.with(262, 5).with(332, 2)]),
+            "a CMYK image of another form than four inks of 8 bits, pixel by pixel; convert it to RGB first",
         ),
         (rgb(262, 3), "palette colours; convert it"),
         (rgb(262, 8), "a Lab image; convert it"),

@@ -21,7 +21,7 @@ pub(super) struct FileFacts {
     pub(super) first_of: Option<&'static str>,
     pub(super) colour: ColourTag,
     pub(super) depth: Depth,
-    /// The form of the inks of a JPEG of four components; `None` for other files.
+    /// The form of the inks of a JPEG of four components or a TIFF of four inks; `None` for other files.
     pub(super) inks: Option<InkForm>,
     /// Why the file cannot be shown as it is; `None` if nothing is known before it is decoded.
     pub(super) unshowable: Option<String>,
@@ -43,10 +43,12 @@ pub(super) enum Depth {
 /// How a file holds amounts of ink.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum InkForm {
-    /// 0 is no ink.
+    /// A JPEG in which 0 is no ink.
     Plain,
-    /// 255 is no ink, as Adobe's programs write it.
+    /// A JPEG in which 255 is no ink, as Adobe's programs write it.
     Adobe,
+    /// A TIFF, in which 0 is no ink.
+    Tiff,
 }
 
 impl FileFacts {
@@ -115,6 +117,7 @@ impl FileFacts {
                     first_of: several(outline.pages, "TIFF of several pages"),
                     colour: profile(outline.profile.map(<[u8]>::to_vec)),
                     depth: deep(outline.bits),
+                    inks: outline.is_cmyk.then_some(InkForm::Tiff),
                     unshowable: unshowable(&outline),
                     whole: Some(outline.end),
                     ..Self::NONE

@@ -16,12 +16,18 @@ const BITS_PER_SAMPLE: u16 = 258;
 const PHOTOMETRIC: u16 = 262;
 const STRIP_OFFSETS: u16 = 273;
 const ORIENTATION: u16 = 274;
+const SAMPLES_PER_PIXEL: u16 = 277;
 const STRIP_BYTE_COUNTS: u16 = 279;
+const PLANAR_CONFIGURATION: u16 = 284;
 const TILE_OFFSETS: u16 = 324;
 const TILE_BYTE_COUNTS: u16 = 325;
+const INK_SET: u16 = 332;
 const SAMPLE_FORMAT: u16 = 339;
 const ICC_PROFILE: u16 = 34675;
 const DNG_VERSION: u16 = 50706;
+
+/// Photometric interpretation of amounts of ink.
+const SEPARATED: u64 = 5;
 
 /// Sample format of IEEE floats.
 const FLOAT: u64 = 3;
@@ -33,7 +39,9 @@ pub(super) struct TiffOutline<'a> {
     pub(super) orientation: u64,
     /// The number of pictures. Smaller copies of others are not counted.
     pub(super) pages: usize,
-    /// The colours that cannot be shown as they are; `None` for grey and RGB.
+    /// Whether the samples are amounts of cyan, magenta, yellow and black in 8 bits, pixel by pixel.
+    pub(super) is_cmyk: bool,
+    /// The colours that cannot be shown as they are; `None` for grey, RGB and the inks of `is_cmyk`.
     pub(super) colours: Option<&'static str>,
     /// The ICC profile; `None` if there is none.
     pub(super) profile: Option<&'a [u8]>,
@@ -60,11 +68,18 @@ impl<'a> TiffOutline<'a> {
         let value = |tag| reader.values(&directory, tag).first().copied();
         outline.pages = 1;
         outline.orientation = value(ORIENTATION).unwrap_or(0);
-        outline.colours = colours(value(PHOTOMETRIC));
+        outline.bits = value(BITS_PER_SAMPLE).unwrap_or(1);
+        outline.is_cmyk = value(PHOTOMETRIC) == Some(SEPARATED)
+            && outline.bits == 8
+            && value(SAMPLES_PER_PIXEL) == Some(4)
+            && value(INK_SET).is_none_or(|set| set == 1)
+            && value(PLANAR_CONFIGURATION).is_none_or(|planes| planes == 1);
+        if !outline.is_cmyk {
+            outline.colours = colours(value(PHOTOMETRIC));
+        }
         outline.profile = reader.bytes(&directory, ICC_PROFILE);
         let is_preview = value(NEW_SUBFILE_TYPE).is_some_and(is_reduced);
         outline.is_raw = is_preview || directory.iter().any(|entry| entry.tag == DNG_VERSION);
-        outline.bits = value(BITS_PER_SAMPLE).unwrap_or(1);
         outline.is_float = value(SAMPLE_FORMAT) == Some(FLOAT);
         for (offsets, counts) in [
             (STRIP_OFFSETS, STRIP_BYTE_COUNTS),
@@ -100,7 +115,7 @@ fn colours(photometric: Option<u64>) -> Option<&'static str> {
         0..=2 | 6 => None,
         3 => Some("a TIFF of palette colours"),
         4 => Some("a mask"),
-        5 => Some("a CMYK image"),
+        SEPARATED => Some("a CMYK image of another form than four inks of 8 bits, pixel by pixel"),
         8..=10 => Some("a Lab image"),
         32803 | 34892 => Some("a camera's RAW file"),
         _ => Some("an image of unknown colours"),
