@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Exports published enhancement models from their repositories to ONNX, each with a sidecar, and compares it with the original.
 
-    pip install torch onnx onnxruntime einops     # einops is for RetinexFormer alone; a GPU is not needed
+    pip install torch==2.15.0 onnx==1.23.2 onnxruntime==1.32.0 einops==0.8.2     # a GPU is not needed
 
     git clone https://github.com/Li-Chongyi/Zero-DCE            # CC BY-NC 4.0, weights in it
     git clone https://github.com/Li-Chongyi/Zero-DCE_extension  # CC BY-NC 4.0, weights in it
@@ -19,6 +19,8 @@
     python export.py pairlie PairLIE PairLIE/weights/PairLIE.pth pairlie.onnx
     python export.py retinexformer Retinexformer LOL_v2_real.pth retinexformer.onnx
     python export.py darkir DarkIR DarkIR_1k.pt darkir_1280x720.onnx --size 1280x720
+
+`darkqa-eval enhance --presets` prints the command for each model, with its repository, commit and licence.
 
 An export takes images of any size, or with `--size` of one. DarkIR needs `--size`, for its Fourier transforms become products with
 fixed matrices: ONNX Runtime's own DFT is many times slower, and most exporters have none.
@@ -175,10 +177,105 @@ def darkir(repo, _, held):
     return filled(module(repo / "archs/DarkIR.py", "archs.DarkIR").DarkIR(width=width), held, unused=r"adapter|^side_out\.")
 
 
+def stand_in(name: str, **contents) -> None:
+    """A module in place of one that a repository imports, with the few things that its network uses of it."""
+    parts = name.split(".")
+    for length in range(1, len(parts) + 1):
+        sys.modules.setdefault(".".join(parts[:length]), types.ModuleType(".".join(parts[:length])))
+    vars(sys.modules[name]).update(contents)
+
+
+def iat(repo, _, held):
+    stand_in("imp")  # of Python before 3.12; imported, not used
+    unused = {"VisionTransformer": object, "_cfg": dict}
+    stand_in("timm.models.vision_transformer", **unused)
+    stand_in("timm.models.registry", register_model=lambda model: model)
+    layers = {"trunc_normal_": torch.nn.init.trunc_normal_, "to_2tuple": lambda side: (side, side)}
+    stand_in("timm.models.layers", DropPath=lambda _: torch.nn.Identity(), **layers)  # paths are dropped in training alone
+    sys.path.insert(0, str(repo / "IAT_enhance"))
+    net = module(repo / "IAT_enhance/model/IAT_main.py").IAT()
+    return OneOutput(filled(net, held), lambda outputs: outputs[2])  # of factor, summand and image
+
+
+def uretinex(repo, path, _):
+    stand_in("torchvision.transforms", Grayscale=object, ToTensor=object, Compose=lambda _: None)
+    stand_in("PIL", Image=None)
+    sys.modules["torchvision"].transforms = sys.modules["torchvision.transforms"]
+    files = {"Decom_model_low_path": "init_low.pth", "unfolding_model_path": path.name, "adjust_model_path": "L_adjust.pth"}
+    options = argparse.Namespace(ratio=5, **{option: str(path.with_name(file)) for option, file in files.items()})
+    with contextlib.redirect_stdout(io.StringIO()):
+        net = module(repo / "test.py").Inference(options)
+    return OneOutput(net, lambda outputs: outputs[0])  # of image and seconds
+
+
+def to_hvi(trans, rgb):
+    """CIDNet's RGB_HVI.HVIT with choices by `where`, which are exported for any size; there they are assignments by masks."""
+    red, green, blue = rgb[:, 0], rgb[:, 1], rgb[:, 2]
+    value, least = rgb.max(1)[0], rgb.min(1)[0]
+    span, none = value - least + 1e-8, torch.zeros_like(value)
+    hue = torch.where(blue == value, 4 + (red - green) / span, none)
+    hue = torch.where(green == value, 2 + (blue - red) / span, hue)
+    hue = torch.where(red == value, ((green - blue) / span) % 6, hue)
+    hue = torch.where(least == value, none, hue) / 6
+    saturation = torch.where(value == 0, none, (value - least) / (value + 1e-8))
+    trans.this_k = trans.density_k.item()
+    pi = 3.141592653589793
+    chroma = ((value * 0.5 * pi).sin() + 1e-8).pow(trans.density_k) * saturation
+    return torch.stack([chroma * (2 * pi * hue).cos(), chroma * (2 * pi * hue).sin(), value], 1)
+
+
+def from_hvi(trans, hvi):
+    """CIDNet's RGB_HVI.PHVIT with choices by `where`."""
+    value, pi = hvi[:, 2].clamp(0, 1), 3.141592653589793
+    chroma = ((value * 0.5 * pi).sin() + 1e-8).pow(trans.this_k) + 1e-8
+    across, up = ((hvi[:, place].clamp(-1, 1) / chroma).clamp(-1, 1) for place in (0, 1))
+    hue = torch.atan2(up + 1e-8, across + 1e-8) / (2 * pi) % 1
+    saturation = (torch.sqrt(across**2 + up**2 + 1e-8) * trans.alpha_s).clamp(0, 1)
+    sector = torch.floor(hue * 6)
+    part = hue * 6 - sector
+    p, q, t = value * (1 - saturation), value * (1 - part * saturation), value * (1 - (1 - part) * saturation)
+    sectors = [(value, t, p), (q, value, p), (p, value, t), (p, q, value), (t, p, value), (value, p, q)]
+    colours = []
+    for place in range(3):
+        colour = torch.zeros_like(hue)
+        for number, channels in enumerate(sectors):
+            colour = torch.where(sector == number, channels[place], colour)
+        colours.append(colour)
+    return torch.stack(colours, 1) * trans.alpha
+
+
+def cidnet(repo, _, held):
+    stand_in("huggingface_hub", PyTorchModelHubMixin=type("PyTorchModelHubMixin", (), {}))
+    net = filled(module(repo / "net/CIDNet.py").CIDNet(), held)
+    net.trans.gated = net.trans.gated2 = True
+    net.trans.alpha = net.trans.alpha_s = 1.0  # as by default in its eval_hf.py
+    return net
+
+
+def llformer(repo, _, held):
+    arch = module(repo / "model/LLFormer.py").LLFormer
+    return filled(arch(num_blocks=[2, 4, 8, 16], attention=True), held)  # as in its test.py
+
+
+def restormer(repo, _, held):
+    # Its demo.py takes norms without bias for the weights of denoising.
+    has_bias = not held or any(name.endswith("norm1.body.bias") for name in held)
+    arch = module(repo / RESTORMER).Restormer
+    return filled(arch(LayerNorm_type="WithBias" if has_bias else "BiasFree"), held)
+
+
+def mirnet(repo, _, held):
+    return filled(module(repo / MIRNET).MIRNet_v2(), held)  # its defaults are those of Options/Enhancement_MIRNet_v2_*.yml
+
+
 GITHUB = "https://github.com/"
 RUAS = (GITHUB + "dut-media-lab/RUAS", "22b1cd6", ("model.py", "operations.py", "genotypes.py", "model/denoise.pt"))
 PAIRLIE = (GITHUB + "zhenqifu/PairLIE", "3fd5c15", ("net/net.py",))
 RETINEXFORMER = "basicsr/models/archs/RetinexFormer_arch.py"
+RESTORMER = "basicsr/models/archs/restormer_arch.py"
+MIRNET = "basicsr/models/archs/mirnet_v2_arch.py"
+IAT = ("IAT_enhance/model/IAT_main.py", "IAT_enhance/model/blocks.py", "IAT_enhance/model/global_net.py")
+CIDNET = ("net/CIDNet.py", "net/HVI_transform.py", "net/transformer_utils.py", "net/LCA.py")
 DARKIR = ("archs/DarkIR.py", "archs/arch_model.py", "archs/arch_util.py")
 MODELS = {
     # A convolution of 3 × 3 reaches 1 pixel: Zero-DCE has seven, SCI three, PairLIE ten. Each of RUAS's three cells reaches 3,
@@ -189,6 +286,7 @@ MODELS = {
     ),
     "ruas-lol": Published(*RUAS, functools.partial(ruas, image=-1), "exact:17", "truncate"),
     "ruas-upe": Published(*RUAS, functools.partial(ruas, image=-2), "exact:9", "truncate"),
+    "ruas-dark": Published(*RUAS, functools.partial(ruas, image=-2), "exact:9", "truncate"),
     "sci": Published(GITHUB + "vis-opt-group/SCI", "9d28a3f", ("model.py", "loss.py"), sci, "exact:8", "truncate"),
     "pairlie": Published(*PAIRLIE, functools.partial(pairlie, exponent=0.2), "exact:10", "truncate"),
     "pairlie-lol": Published(*PAIRLIE, functools.partial(pairlie, exponent=0.14), "exact:10", "truncate"),  # eval.py says so for LOL
@@ -196,6 +294,14 @@ MODELS = {
         GITHUB + "caiyuanhao1998/Retinexformer", "ad5c091", (RETINEXFORMER,), retinexformer, "none", "round", 4, "reflect"
     ),
     "darkir": Published(GITHUB + "cidautai/DarkIR", "0910291", DARKIR, darkir, "none", "truncate", any_size=False),
+    "iat": Published(GITHUB + "cuiziteng/Illumination-Adaptive-Transformer", "c764722", IAT, iat, "none", "round"),
+    "uretinex": Published(
+        GITHUB + "AndersonYong/URetinex-Net", "7ee2196", ("test.py", "utils.py", "network/decom.py"), uretinex, "none", "truncate"
+    ),
+    "cidnet": Published(GITHUB + "Fediory/HVI-CIDNet", "eb43d7d", CIDNET, cidnet, "none", "truncate", 8),
+    "llformer": Published(GITHUB + "TaoWangzj/LLFormer", "ed5e7bf", ("model/LLFormer.py",), llformer, "none", "round", 16),
+    "restormer": Published(GITHUB + "swz30/Restormer", "df766d5", (RESTORMER,), restormer, "none", "round", 8),
+    "mirnet": Published(GITHUB + "swz30/MIRNetv2", "9014049", (MIRNET,), mirnet, "none", "round", 4),
 }
 
 
@@ -246,6 +352,8 @@ def exported(net: torch.nn.Module, example: torch.Tensor, any_size: bool) -> byt
     for part in net.modules():
         if type(part).__name__ == "FreMLP":
             type(part).forward = frequencies_by_products
+        if type(part).__name__ == "RGB_HVI":
+            type(part).HVIT, type(part).PHVIT = to_hvi, from_hvi
     file = io.BytesIO()
     with warnings.catch_warnings(), torch.no_grad():
         # They say that tracing may freeze a size, which the comparison at another size finds, and that this exporter is an old one.
@@ -325,6 +433,7 @@ def main() -> None:
     if not came["commit"].startswith(model.commit) or came["commit"].endswith("-dirty"):
         print(f"this script was tried with {model.url} at commit {model.commit}", file=sys.stderr)
     without_gpu()
+    torch.serialization.add_safe_globals([argparse.Namespace])  # options beside the weights of URetinex-Net
     try:
         with working_in(said.repo):
             net = model.build(said.repo, said.weights, weights(said.weights)).eval()

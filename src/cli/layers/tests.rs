@@ -99,7 +99,9 @@ fn required(command: &Command, without: &Arg) -> Vec<String> {
     for arg in command.get_arguments() {
         let conflicts = hides(command, without, arg);
         // Needed unless another flag is set.
-        let unless = ["inputs", "pairs", "out", "src"].contains(&arg.get_id().as_str());
+        let id = arg.get_id().as_str();
+        let unless =
+            ["inputs", "pairs", "out", "src"].contains(&id) || id == "model" && arg.is_positional();
         if conflicts || !arg.is_required_set() && !unless {
             continue;
         }

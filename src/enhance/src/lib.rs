@@ -98,6 +98,7 @@ pub use findings::Findings;
 pub use graph::LoadLimits;
 pub use memory_limit::MemoryLimit;
 pub use plausible::{DARK, brightness};
+pub use preset::list_of_presets;
 pub use probe::FRAMES;
 pub use runtime::{Install, Runtime, RuntimeSearch, forbid_telemetry};
 pub use session::Stopper;

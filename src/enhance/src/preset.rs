@@ -40,6 +40,14 @@ pub(super) struct PresetContent {
     file: String,
     /// Authors, place and year, and a remark.
     paper: String,
+    /// Licence of code and weights.
+    licence: String,
+    /// Path of the official weights in the repository; `None` if they are linked from its README.
+    weights: Option<String>,
+    /// Size of an example, if the export needs one.
+    one_size: Option<String>,
+    /// Source of the file, if the project's script does not export it.
+    ready_made: Option<String>,
     /// Names of the output that is the image, the first one first.
     names: Vec<String>,
     /// All outputs of the repository's own export, by name; the first is the image.
@@ -50,6 +58,8 @@ pub(super) struct PresetContent {
     signatures: Vec<OutputList>,
     /// The image as an expression of outputs.
     image: Option<Expression>,
+    /// The image in a single output of more channels than it has.
+    stacked: Option<StackedOutput>,
     /// All else.
     pub(super) sidecar: ModelSidecar,
 }
@@ -64,6 +74,26 @@ struct OutputList {
     nth: usize,
 }
 
+/// The image in a single output of several things, one behind the other.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StackedOutput {
+    /// Channels of the output.
+    channels: usize,
+    /// The image as an expression of `x`, the output.
+    image: String,
+}
+
+impl StackedOutput {
+    /// The image as an expression of the output of a graph; `None` if the graph has other outputs.
+    fn image_of(&self, outputs: &[Port]) -> Option<Expression> {
+        let [port] = outputs else { return None };
+        let named = || self.image.replace("x[", &format!("`{}`[", port.name));
+        port.layout(self.channels)?;
+        named().parse().ok()
+    }
+}
+
 /// What decides, beside the sidecar's keys, which output of a file a preset takes; for the digest of an enhancer.
 #[derive(Serialize)]
 pub(super) struct PresetOutputs<'a> {
@@ -72,6 +102,8 @@ pub(super) struct PresetOutputs<'a> {
     own_export: &'a [String],
     signatures: &'a [OutputList],
     image: Option<&'a Expression>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    stacked: Option<&'a StackedOutput>,
 }
 
 /// All presets by their names.
@@ -130,6 +162,77 @@ impl PresetContent {
             .as_ref()
             .filter(|image| image.names().iter().all(has))
     }
+}
+
+impl PresetContent {
+    /// The lines of a preset in the list of all.
+    fn entry(&self, name: &str) -> String {
+        let folder = self
+            .repository
+            .split('/')
+            .next_back()
+            .unwrap_or(&self.repository);
+        let file = format!("{name}.onnx");
+        let weights = match &self.weights {
+            Some(path) => format!("{folder}/{path}"),
+            None => "WEIGHTS".to_owned(),
+        };
+        let size = self.one_size.as_ref();
+        let size = size.map_or_else(String::new, |size| format!(" --size {size}"));
+        let export = match &self.ready_made {
+            Some(source) => format!("  file: {source}\n"),
+            None => format!(
+                "  export: python models/export.py {name} {folder} {weights} {file}{size}{}\n",
+                if self.weights.is_some() {
+                    ""
+                } else {
+                    "; WEIGHTS are linked from its README"
+                }
+            ),
+        };
+        format!(
+            "{name}: {self}\n  licence: {}\n  conventions: {}\n{export}  use: --llie {name}:{file}\n",
+            self.licence,
+            self.conventions()
+        )
+    }
+
+    /// How the authors' model is fed and read: the lines of a sidecar, with the usual ranges where the preset states none.
+    fn conventions(&self) -> String {
+        let image = self.image.as_ref().map(ToString::to_string);
+        let image = image.or_else(|| self.stacked.as_ref().map(|stacked| stacked.image.clone()));
+        let outputs = match image {
+            Some(image) => format!("image = {image:?}"),
+            None => format!("output {}", self.names.join(" or ")),
+        };
+        let usual = [
+            ("range_in", "0..1"),
+            ("range_out", "0..1"),
+            ("rounding", "round"),
+        ];
+        let usual = usual.map(|(key, value)| (key.to_owned(), toml::Value::from(value)));
+        let mut keys: BTreeMap<String, toml::Value> = usual.into();
+        if let Ok(toml::Value::Table(stated)) = toml::Value::try_from(&self.sidecar) {
+            keys.extend(stated);
+        }
+        let keys: Vec<String> = keys
+            .into_iter()
+            .map(|(key, value)| format!("{key} = {value}"))
+            .collect();
+        format!("RGB, {outputs}, {}", keys.join(", "))
+    }
+}
+
+/// The list of all presets, with source, licence, conventions and export of each.
+///
+/// # Errors
+/// If the file of presets is broken, which is a bug.
+pub fn list_of_presets() -> Result<String> {
+    let entries = all()?;
+    Ok(entries
+        .iter()
+        .map(|(name, content)| content.entry(name))
+        .collect())
 }
 
 impl fmt::Display for PresetContent {
@@ -208,6 +311,7 @@ impl Preset {
             own_export: &self.content.own_export,
             signatures: &self.content.signatures,
             image: self.content.image.as_ref(),
+            stacked: self.content.stacked.as_ref(),
         }
     }
 
@@ -235,7 +339,22 @@ impl Preset {
                 Some((port.name.clone(), value))
             })
             .collect();
-        if sidecar.output.is_some() || sidecar.image.is_some() || outputs.len() == 1 {
+        if sidecar.output.is_some() || sidecar.image.is_some() {
+            return Ok(stated);
+        }
+        if let Some(stacked) = &self.content.stacked {
+            let image = stacked.image_of(outputs).ok_or_else(|| {
+                format!(
+                    "is not as preset {} knows it: one output of {} channels; it has {}",
+                    self.name,
+                    stacked.channels,
+                    list(outputs)
+                )
+            })?;
+            stated.image = Some(image);
+            return Ok(stated);
+        }
+        if outputs.len() == 1 {
             return Ok(stated);
         }
         if let Some(image) = self.content.image_of(outputs) {
@@ -271,6 +390,8 @@ impl Preset {
         let known = outputs.len() == 1
             || content.image_of(outputs).is_some()
             || content.by_channels(outputs).is_some();
+        let is_stacked = |stacked: &StackedOutput| stacked.image_of(outputs).is_some();
+        let known = content.stacked.as_ref().map_or(known, is_stacked);
         // Some authors' models have one output, and an export that adds others says by name which it is.
         let named = content.signatures.is_empty() && content.by_name(outputs).is_some();
         if !known && !named {

@@ -21,7 +21,7 @@ use darkqa_ground::types::{Decides, SetLight, TreatmentSet};
 pub struct EnhancerArgs {
     /// An enhancer: lift or gray-gain, which are built in; FILE.onnx; or PRESET:FILE.onnx (zero-dce, zero-dce++, ruas-lol,
     /// ruas-upe, ruas-dark, sci, iat, pairlie, pairlie-lol, enlightengan, uretinex, retinexformer, darkir, cidnet, llformer,
-    /// restormer, mirnet, kind); repeatable: each is shown beside raw; default: none
+    /// restormer, mirnet, kind, agllnet, zero-dce-tf); repeatable: each is shown beside raw; default: none
     #[arg(long, value_name = "NAME|FILE", add = Decides::Trials)]
     pub llie: Vec<PathBuf>,
     /// Images that were enhanced elsewhere, shown beside raw like those of an enhancer NAME: DIR has an image for each one that `synthesize`

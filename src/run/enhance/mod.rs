@@ -3,7 +3,7 @@
 mod doctor;
 mod origin;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
@@ -19,7 +19,7 @@ use crate::runs::Outcome;
 use crate::runs::part_args::{PartArgs, keep_part};
 use crate::types::manifest::Status;
 use crate::types::{Decides, Rgb};
-use darkqa_enhance::{Enhancer, FRAMES, ImageOutput, ModelFile};
+use darkqa_enhance::{Enhancer, FRAMES, ImageOutput, ModelFile, list_of_presets};
 use doctor::DoctorArgs;
 use origin::EnhancedOrigin;
 
@@ -31,18 +31,21 @@ const MOST_OUTPUTS: usize = 16;
 pub(crate) struct EnhanceArgs {
     /// The enhancer: lift or gray-gain, which are built in; FILE.onnx; or PRESET:FILE.onnx (zero-dce, zero-dce++, ruas-lol,
     /// ruas-upe, ruas-dark, sci, iat, pairlie, pairlie-lol, enlightengan, uretinex, retinexformer, darkir, cidnet, llformer,
-    /// restormer, mirnet, kind)
-    #[arg(value_name = "MODEL", add = Decides::Trials)]
-    pub model: PathBuf,
+    /// restormer, mirnet, kind, agllnet, zero-dce-tf)
+    #[arg(value_name = "MODEL", required_unless_present = "presets", add = Decides::Trials)]
+    pub model: Option<PathBuf>,
     /// Images (PNG, JPEG, WebP, TIFF, BMP) and folders of frames
-    #[arg(value_name = "INPUT", required_unless_present = "describe", add = Decides::Pixels)]
+    #[arg(value_name = "INPUT", required_unless_present_any = ["describe", "presets"], add = Decides::Pixels)]
     pub inputs: Vec<PathBuf>,
     /// Where the enhanced images go, as PNG under their own names, each with a JSON file; default: nowhere, with --describe
-    #[arg(long, value_name = "DIR", required_unless_present = "describe", add = Decides::Nothing)]
+    #[arg(long, value_name = "DIR", required_unless_present_any = ["describe", "presets"], add = Decides::Nothing)]
     pub out: Option<PathBuf>,
     /// Print how the model's input and output are read, and why; enhances nothing
     #[arg(long, conflicts_with_all = ["inputs", "out", "shard"], add = Decides::Nothing)]
     pub describe: bool,
+    /// Print the presets of published enhancers, each with repository, licence, conventions and the command that exports it
+    #[arg(long, conflicts_with_all = ["model", "inputs", "out", "describe", "shard"], add = Decides::Nothing)]
+    pub presets: bool,
     /// The flags of the examination.
     #[command(flatten)]
     pub doctor: DoctorArgs,
@@ -73,9 +76,12 @@ pub(crate) struct EnhanceArgs {
 /// # Errors
 /// If the model or an input is missing, two images have the same name, or the folder cannot be written to.
 pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
-    let file = ModelFile::read(&args.model).map_err(|e| e.usage_at("MODEL"))?;
+    let Some(model) = &args.model else {
+        return Ok(Outcome::text(Status::Complete, list_of_presets()?));
+    };
+    let file = ModelFile::read(model).map_err(|e| e.usage_at("MODEL"))?;
     let digest = file.digest();
-    let (mut enhancer, image) = open(file, args)?;
+    let (mut enhancer, image) = open(file, model, args)?;
     let Some(out) = &args.out else {
         return Ok(Outcome::text(Status::Complete, enhancer.describe()));
     };
@@ -95,7 +101,7 @@ pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome
             return Err(Error::usage("INPUT", problem));
         }
         let dark = darkened(&sample);
-        let (model, n) = (args.model.display(), dark.len());
+        let (model, n) = (model.display(), dark.len());
         progress.say(&format!(
             "{model} enhances {n} dark images with each convention"
         ));
@@ -161,7 +167,7 @@ pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome
 }
 
 /// The enhancer, and whether it is known which of its outputs is the image. If it is not, `--doctor` examines all of them.
-fn open(file: ModelFile, args: &EnhanceArgs) -> Result<(Enhancer, ImageOutput)> {
+fn open(file: ModelFile, model: &Path, args: &EnhanceArgs) -> Result<(Enhancer, ImageOutput)> {
     let load = |file: ModelFile| -> Result<Enhancer> {
         let enhancers = OpenEnhancers::load(vec![file], &args.loading)?.take()?;
         let mut enhancers = enhancers.into_iter();
@@ -174,7 +180,7 @@ fn open(file: ModelFile, args: &EnhanceArgs) -> Result<(Enhancer, ImageOutput)> 
     };
     if args.doctor.doctor {
         for place in 0..MOST_OUTPUTS {
-            if let Ok(enhancer) = load(ModelFile::read(&args.model)?.with_output(place)) {
+            if let Ok(enhancer) = load(ModelFile::read(model)?.with_output(place)) {
                 return Ok((enhancer, ImageOutput::Unknown));
             }
         }

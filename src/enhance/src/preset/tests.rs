@@ -114,6 +114,40 @@ fn every_preset_has_its_source() {
 }
 
 #[test]
+fn the_image_is_found_among_the_channels_of_one_output() {
+    let image = |name, outputs| {
+        let stated = stated(name, outputs).unwrap();
+        stated.image.unwrap().to_string()
+    };
+    assert_eq!(image("agllnet", &[("a/b:0", 7)]), "`a/b:0`[4:7]");
+    let curves = image("zero-dce-tf", &[("y", 24)]);
+    assert!(curves.starts_with("curves(input, `y`[0:3]"), "{curves}");
+    for (name, outputs) in [
+        ("agllnet", &[("y", 3)][..]),
+        ("zero-dce-tf", &[("y", 3)]),
+        ("agllnet", &[("y", 7), ("z", 7)]),
+    ] {
+        let problem = stated(name, outputs).unwrap_err();
+        assert!(problem.contains("one output of "), "{problem}");
+    }
+}
+
+#[test]
+fn the_list_has_source_licence_and_export_of_each_preset() {
+    let list = list_of_presets().unwrap();
+    for (name, content) in all().unwrap() {
+        assert!(list.contains(&content.repository), "{name}");
+        assert!(!content.licence.is_empty(), "{name}");
+        let script = include_str!("../../../../models/export.py");
+        let is_exported = script.contains(&format!("    \"{name}\": Published("));
+        assert_eq!(is_exported, content.ready_made.is_none(), "{name}");
+    }
+    let command = "export: python models/export.py ruas-lol RUAS RUAS/ckpt/lol.pt ruas-lol.onnx\n";
+    assert!(list.contains(command), "{list}");
+    assert!(list.contains("pad = \"reflect\""), "{list}");
+}
+
+#[test]
 fn the_output_is_known_by_name_then_by_channels() {
     for (name, outputs, expected) in [
         ("zero-dce", &[("a", 3), ("b", 3), ("c", 24)][..], "b"),
