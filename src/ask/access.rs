@@ -116,7 +116,7 @@ impl Access {
         Ok(headers)
     }
 
-    /// The HTTP client of all requests. It follows no redirects, because a POST would become a GET and the key would be sent
+    /// The HTTP client of all requests, with a limit of the time to connect alone. It follows no redirects, because a POST would become a GET and the key would be sent
     /// elsewhere. Proxies come from the environment (`HTTPS_PROXY`, `NO_PROXY`, …); there is none for this machine.
     pub(super) fn client(&self, timeout: Duration, scrub: &Scrub) -> Result<Client> {
         // An error means that a provider is installed already.
@@ -124,8 +124,7 @@ impl Access {
         let mut client = Client::builder()
             .user_agent(concat!("darkqa-eval/", env!("CARGO_PKG_VERSION")))
             .redirect(redirect::Policy::none())
-            .connect_timeout(CONNECT.min(timeout))
-            .timeout(timeout);
+            .connect_timeout(connect_limit(timeout));
         let trusted = &self.authorities.0;
         if !trusted.is_empty() {
             let config = client_config(trusted, Arc::new(default_provider()));
@@ -168,6 +167,11 @@ impl Authorities {
         }
         Ok(Self(found))
     }
+}
+
+/// The maximum time to open a connection for tries of this time.
+pub(super) fn connect_limit(timeout: Duration) -> Duration {
+    CONNECT.min(timeout)
 }
 
 /// The text of an error with its causes: reqwest's own text says only that something failed.

@@ -8,13 +8,14 @@ use reqwest::header::{CONTENT_TYPE, HeaderMap};
 use reqwest::{Client, Method, RequestBuilder, Response, StatusCode};
 use tokio::time::Instant;
 
-use super::access::{Access, with_causes};
+use super::access::{Access, connect_limit, with_causes};
 use super::body::Parts;
 use super::bounded_json::parse;
 use super::connection_fault::permanent_cause;
 use super::failure::{Again, FailedTry, Reach};
 use super::parameters::Parameters;
 use super::secret::Scrub;
+use super::time_limit::TimeLimit;
 use super::url::BaseUrl;
 use crate::error::Result;
 use crate::files;
@@ -28,13 +29,81 @@ const MAX_REPLY: usize = 16 << 20;
 /// not hold a run for ever.
 const STREAM_TIMEOUTS: u32 = 30;
 
-/// What the timeout of a request limits.
+/// The longest time that a file of replies may take; chosen.
+const LONGEST_DOWNLOAD: Duration = Duration::from_hours(1);
+
+/// The time limits of one try, each of the time in which the process runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Deadline {
-    /// The whole try, from the first byte sent to the last byte received.
-    Whole,
-    /// The silence between two pieces of a stream, which may take longer as a whole.
-    Silence,
+pub(super) struct Deadline {
+    /// From the first byte sent to the last byte received.
+    whole: Duration,
+    /// Between two pieces of the response; `None` if only the whole try is limited.
+    silence: Option<Duration>,
+}
+
+impl Deadline {
+    /// The deadline of a try whose response is one piece.
+    pub(super) fn whole(timeout: Duration) -> Self {
+        Self {
+            whole: timeout,
+            silence: None,
+        }
+    }
+
+    /// The deadline of a try whose response is a stream.
+    pub(super) fn stream(timeout: Duration) -> Self {
+        Self {
+            whole: timeout.saturating_mul(STREAM_TIMEOUTS),
+            silence: Some(timeout),
+        }
+    }
+
+    /// The deadline of a download.
+    pub(super) fn download(timeout: Duration) -> Self {
+        Self {
+            whole: LONGEST_DOWNLOAD,
+            silence: Some(timeout),
+        }
+    }
+}
+
+/// The time that a try has left.
+#[derive(Debug)]
+struct TryTime {
+    deadline: Deadline,
+    whole: TimeLimit,
+}
+
+impl TryTime {
+    fn new(deadline: Deadline) -> Self {
+        Self {
+            deadline,
+            whole: TimeLimit::new(deadline.whole),
+        }
+    }
+
+    /// The output of one step of the try, or the limit that is reached first.
+    async fn step<T>(&mut self, step: impl Future<Output = T>) -> Result<T, TimeOut> {
+        let silence = self.deadline.silence;
+        let step = async {
+            match silence {
+                None => Some(step.await),
+                Some(silence) => TimeLimit::new(silence).run(step).await,
+            }
+        };
+        match self.whole.run(step).await {
+            None => Err(TimeOut::Whole(self.deadline.whole)),
+            Some(None) => Err(TimeOut::Silence(silence.unwrap_or_default())),
+            Some(Some(output)) => Ok(output),
+        }
+    }
+}
+
+/// The limit that a try reached.
+#[derive(Debug, Clone, Copy)]
+enum TimeOut {
+    Whole(Duration),
+    Silence(Duration),
 }
 
 /// Pooled connections to a server, and the filter for secrets in its texts.
@@ -79,20 +148,26 @@ impl Connection {
         &self,
         path: &str,
         headers: &HeaderMap,
-        body: Parts,
+        body: &Parts,
         deadline: Deadline,
     ) -> Result<HttpReply, FailedTry> {
-        let request = self
-            .client
-            .post(self.base.join(path))
-            .headers(headers.clone())
-            .header(CONTENT_TYPE, "application/json")
-            .body(reqwest::Body::wrap(body));
-        let request = match deadline {
-            Deadline::Whole => request,
-            Deadline::Silence => request.timeout(self.timeout * STREAM_TIMEOUTS),
-        };
-        self.exchange(request, deadline).await
+        loop {
+            let request = self
+                .client
+                .post(self.base.join(path))
+                .headers(headers.clone())
+                .header(CONTENT_TYPE, "application/json")
+                .body(reqwest::Body::wrap(body.clone()));
+            let mut time = TryTime::new(deadline);
+            match self.exchange_in(request, &mut time).await {
+                // The process was stopped while it connected: nothing was sent.
+                Err(failed)
+                    if failed.failure.kind == FailureKind::Timeout
+                        && !failed.may_be_charged
+                        && !time.whole.paused().is_zero() => {}
+                sent => return sent,
+            }
+        }
     }
 
     /// A request to a path below the base URL, with these fields in its query string.
@@ -115,11 +190,19 @@ impl Connection {
         request: RequestBuilder,
         deadline: Deadline,
     ) -> Result<HttpReply, FailedTry> {
+        self.exchange_in(request, &mut TryTime::new(deadline)).await
+    }
+
+    async fn exchange_in(
+        &self,
+        request: RequestBuilder,
+        time: &mut TryTime,
+    ) -> Result<HttpReply, FailedTry> {
         let started = Instant::now();
-        let response = self.in_time(deadline, request.send()).await?;
+        let response = self.in_time(time, request.send()).await?;
         let status = response.status();
         let headers = response.headers().clone();
-        let body = match self.receive(response, deadline).await {
+        let body = match self.receive(response, time).await {
             Err(failed) if status.is_success() => return Err(failed),
             // The status alone says that the request was refused.
             body => body.unwrap_or_default(),
@@ -128,7 +211,7 @@ impl Connection {
             status,
             headers,
             body,
-            took: started.elapsed(),
+            took: started.elapsed().saturating_sub(time.whole.paused()),
         })
     }
 
@@ -141,12 +224,12 @@ impl Connection {
     ) -> Option<String> {
         let request = self.client.get(self.base.join("models"));
         let request = request.headers(headers.clone());
-        let response = request.send().await.ok()?;
-        if !response.status().is_success() {
+        let exchange = self.exchange(request, Deadline::whole(self.timeout));
+        let answer = exchange.await.ok()?;
+        if !answer.status.is_success() {
             return None;
         }
-        let body = self.receive(response, Deadline::Whole).await.ok()?;
-        let list = parse(std::str::from_utf8(&body).ok()?).ok()?;
+        let list = parse(std::str::from_utf8(&answer.body).ok()?).ok()?;
         let models = list.get("data")?.as_array()?;
         let own = models
             .iter()
@@ -166,22 +249,15 @@ impl Connection {
         most: u64,
     ) -> Result<HttpReply, FailedTry> {
         let started = Instant::now();
-        let sent = request.send().await;
-        let mut response = sent.map_err(|error| self.failed_try(error))?;
+        let mut time = TryTime::new(Deadline::download(self.timeout));
+        let mut response = self.in_time(&mut time, request.send()).await?;
         let (status, headers) = (response.status(), response.headers().clone());
         let body = if status.is_success() {
             let failed = |what: String| FailedTry::new(FailureKind::Response, what);
             let unwritten = |e| failed(format!("{}: cannot write: {e}", to.display()));
             let mut file = files::create_new(to).map_err(unwritten)?;
             let mut written = 0;
-            loop {
-                let chunk = tokio::time::timeout(self.timeout, response.chunk());
-                let chunk = chunk
-                    .await
-                    .map_err(|_| failed(format!("{} sent no more bytes of a file", self.base)))?;
-                let Some(chunk) = chunk.map_err(|error| self.failed_try(error))? else {
-                    break;
-                };
+            while let Some(chunk) = self.in_time(&mut time, response.chunk()).await? {
                 written += chunk.len() as u64;
                 if written > most {
                     let what = format!("{} sent a file of more than {most} bytes", self.base);
@@ -192,9 +268,7 @@ impl Connection {
             file.sync_all().map_err(unwritten)?;
             Vec::new()
         } else {
-            self.receive(response, Deadline::Whole)
-                .await
-                .unwrap_or_default()
+            self.receive(response, &mut time).await.unwrap_or_default()
         };
         Ok(HttpReply {
             status,
@@ -208,10 +282,10 @@ impl Connection {
     async fn receive(
         &self,
         mut response: Response,
-        deadline: Deadline,
+        time: &mut TryTime,
     ) -> Result<Vec<u8>, FailedTry> {
         let mut body = Vec::new();
-        while let Some(chunk) = self.in_time(deadline, response.chunk()).await? {
+        while let Some(chunk) = self.in_time(time, response.chunk()).await? {
             if body.len() + chunk.len() > MAX_REPLY {
                 let message = format!("{} answered with more than 16 MiB", self.base);
                 return Err(FailedTry::new(FailureKind::Response, message));
@@ -224,25 +298,31 @@ impl Connection {
     /// The result of one step of a request, or its failure.
     async fn in_time<T>(
         &self,
-        deadline: Deadline,
+        time: &mut TryTime,
         step: impl Future<Output = reqwest::Result<T>>,
     ) -> Result<T, FailedTry> {
-        let done = match deadline {
-            Deadline::Whole => Ok(step.await),
-            Deadline::Silence => tokio::time::timeout(self.timeout, step).await,
+        let message = match time.step(step).await {
+            Ok(done) => return done.map_err(|error| self.failed_try(error)),
+            Err(TimeOut::Whole(limit)) => self.no_answer_within(limit),
+            Err(TimeOut::Silence(limit)) => format!(
+                "{} sent nothing for {} s; allow more with --timeout",
+                self.base,
+                limit.as_secs_f64()
+            ),
         };
-        if let Ok(done) = done {
-            return done.map_err(|error| self.failed_try(error));
-        }
-        let timeout = self.timeout.as_secs_f64();
-        let message = format!(
-            "{} sent nothing for {timeout} s; allow more with --timeout",
-            self.base
-        );
         Err(FailedTry {
             again: Again::Later,
             ..FailedTry::new(FailureKind::Timeout, message)
         })
+    }
+
+    /// The message about a request without an answer in time.
+    fn no_answer_within(&self, limit: Duration) -> String {
+        let limit = limit.as_secs_f64();
+        format!(
+            "{} did not answer within {limit} s; allow more with --timeout",
+            self.base
+        )
     }
 
     /// The failure of a request without a complete response.
@@ -250,11 +330,7 @@ impl Connection {
         // A request whose connection was not made was not sent.
         let may_be_charged = !error.is_connect();
         if error.is_timeout() {
-            let timeout = self.timeout.as_secs_f64();
-            let message = format!(
-                "{} did not answer within {timeout} s; allow more with --timeout",
-                self.base
-            );
+            let message = self.no_answer_within(connect_limit(self.timeout));
             return FailedTry {
                 again: Again::Later,
                 may_be_charged,

@@ -81,12 +81,14 @@ impl Replica {
         sent: Instant,
     ) -> Result<Reply, FailedTry> {
         let wire = request.wire;
-        let body = request.body.clone();
+        let timeout = self.sending.timeout;
         let deadline = match wire {
-            Wire::ChatStream => Deadline::Silence,
-            Wire::Chat | Wire::Responses => Deadline::Whole,
+            Wire::ChatStream => Deadline::stream(timeout),
+            Wire::Chat | Wire::Responses => Deadline::whole(timeout),
         };
-        let posted = self.connection.post(wire.path(), headers, body, deadline);
+        let posted = self
+            .connection
+            .post(wire.path(), headers, &request.body, deadline);
         let posted = posted.await;
         let answer = posted.inspect_err(|failed| {
             if failed.failure.kind == FailureKind::Timeout {

@@ -11,7 +11,7 @@ use tokio::sync::watch;
 use tokio::task::{JoinError, JoinSet};
 use tokio::time::timeout;
 
-use crate::ask::{AskError, Call, Reach, Reservation};
+use crate::ask::{AskError, Call, Reach, Reservation, sleep_running};
 use crate::engine::budget::{Budget, Permit, text_tokens};
 use crate::engine::budget_notes::BudgetNotes;
 use crate::engine::circuit_breaker::{CircuitBreaker, EndReason};
@@ -341,7 +341,7 @@ impl<I: Item> ReplySink<'_, I> {
         }
         let out_of_grace = async {
             match grace {
-                Some(grace) => tokio::time::sleep(grace).await,
+                Some(grace) => sleep_running(grace).await,
                 None => std::future::pending().await,
             }
         };

@@ -52,6 +52,7 @@ mod openeqa;
 mod own_requests;
 mod page;
 mod parts_of_commands;
+mod pauses;
 mod photographs;
 mod pins;
 mod plan;

@@ -30,9 +30,6 @@ use upload::FileForm;
 /// The slowest upload that is waited for, in bytes per second; chosen.
 const SLOWEST: u64 = 50_000;
 
-/// The longest time that a file of replies may take; chosen.
-const LONGEST_DOWNLOAD: Duration = Duration::from_hours(1);
-
 /// The most pages of a list that are read; chosen: 10,000 files or batches.
 const MOST_PAGES: usize = 100;
 
@@ -89,9 +86,10 @@ impl BatchServer {
         let request = self
             .request(Method::POST, "files", &[])
             .header(CONTENT_TYPE, kind)
-            .timeout(self.timeout + Duration::from_secs(bytes / SLOWEST))
             .body(reqwest::Body::wrap(form));
-        let object = self.object(request).await?;
+        let time = self.timeout + Duration::from_secs(bytes / SLOWEST);
+        let answer = self.send_within(request, time).await?;
+        let object = self.read_object(&answer)?;
         RemoteFile::read(&object).ok_or_else(|| self.unreadable("a file without an id"))
     }
 
@@ -111,9 +109,7 @@ impl BatchServer {
     /// Writes the content of a file to a path, at most this number of bytes, without keys that the server repeats in it.
     pub(crate) async fn download(&self, id: &str, to: &Path, most: u64) -> ApiResult<()> {
         let path = format!("files/{}/content", segment(id));
-        let request = self
-            .request(Method::GET, &path, &[])
-            .timeout(LONGEST_DOWNLOAD);
+        let request = self.request(Method::GET, &path, &[]);
         let sent = self.connection.save(request, to, most).await;
         let answer = sent.map_err(not_answered)?;
         self.succeeded(answer)?;
@@ -211,15 +207,23 @@ impl BatchServer {
 
     /// The JSON object in the response to a request.
     async fn object(&self, request: RequestBuilder) -> ApiResult<Value> {
-        let answer = self.send(request).await?;
+        self.read_object(&self.send(request).await?)
+    }
+
+    fn read_object(&self, answer: &HttpReply) -> ApiResult<Value> {
         let text = String::from_utf8_lossy(&answer.body);
         parse(&text).map_err(|_| self.unreadable("no JSON"))
     }
 
     /// The response to a request that succeeded.
     async fn send(&self, request: RequestBuilder) -> ApiResult<HttpReply> {
-        let sent = self.connection.exchange(request, Deadline::Whole).await;
-        self.succeeded(sent.map_err(not_answered)?)
+        self.send_within(request, self.timeout).await
+    }
+
+    /// The response to a request that succeeded within a time.
+    async fn send_within(&self, request: RequestBuilder, time: Duration) -> ApiResult<HttpReply> {
+        let sent = self.connection.exchange(request, Deadline::whole(time));
+        self.succeeded(sent.await.map_err(not_answered)?)
     }
 
     /// The response itself, if its status says that the call succeeded.
