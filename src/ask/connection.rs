@@ -11,7 +11,7 @@ use tokio::time::Instant;
 use super::access::{Access, connect_limit, with_causes};
 use super::body::Parts;
 use super::bounded_json::parse;
-use super::connection_fault::permanent_cause;
+use super::connection_fault::{lacks_open_files, permanent_cause};
 use super::failure::{Again, FailedTry, Reach};
 use super::parameters::Parameters;
 use super::secret::Scrub;
@@ -337,7 +337,19 @@ impl Connection {
                 ..FailedTry::new(FailureKind::Timeout, message)
             };
         }
+        let lacks_files = lacks_open_files(&error);
         let text = self.scrub.line(&with_causes(&error.without_url()));
+        if lacks_files {
+            let message = format!(
+                "{}: {text}; this process may open no more files: less --concurrency, or more with ulimit -n",
+                self.base
+            );
+            return FailedTry {
+                again: Again::WhenTaken,
+                may_be_charged,
+                ..FailedTry::new(FailureKind::Connection, message)
+            };
+        }
         let Some(remedy) = permanent_cause(&text, self.base.is_plain()) else {
             return FailedTry {
                 again: Again::Later,

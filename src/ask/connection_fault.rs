@@ -1,4 +1,8 @@
-//! The cause of a connection that cannot be made, from the words of the HTTP client: [`permanent_cause`].
+//! The cause of a connection that cannot be made: [`permanent_cause`] from the words of the HTTP client, [`lacks_open_files`] from its
+//! error.
+
+use std::error::Error;
+use std::io;
 
 /// Words of causes that another try does not remove, with what to do.
 const CAUSES: [(&[&str], &str); 7] = [
@@ -57,6 +61,17 @@ pub(super) fn permanent_cause(text: &str, is_plain: bool) -> Option<&'static str
     found.map(|(_, remedy)| *remedy)
 }
 
+/// Errors of systems that allow no further open file, to this process or to all: EMFILE and ENFILE; on Windows WSAEMFILE.
+const NO_MORE_FILES: &[i32] = if cfg!(windows) { &[10_024] } else { &[24, 23] };
+
+/// True if a request failed because no further file could be opened, such as a connection.
+pub(super) fn lacks_open_files(error: &(dyn Error + 'static)) -> bool {
+    let system = error.downcast_ref::<io::Error>();
+    let code = system.and_then(io::Error::raw_os_error);
+    code.is_some_and(|code| NO_MORE_FILES.contains(&code))
+        || error.source().is_some_and(lacks_open_files)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -105,5 +120,19 @@ mod tests {
             assert_eq!(permanent_cause(text, false), None);
             assert_eq!(permanent_cause(text, true), None);
         }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn open_files_are_found_among_causes() {
+        #[derive(Debug, thiserror::Error)]
+        #[error("outer")]
+        struct Outer(#[source] io::Error);
+        let of_code = |code| Outer(io::Error::from_raw_os_error(code));
+        assert!(lacks_open_files(&of_code(24)));
+        assert!(!lacks_open_files(&of_code(111)));
+        assert!(!lacks_open_files(&Outer(io::Error::other(
+            "Too many open files"
+        ))));
     }
 }

@@ -94,6 +94,11 @@ impl Replica {
             if failed.failure.kind == FailureKind::Timeout {
                 self.window.overloaded(sent);
             }
+            // This process may open no more files: fewer connections need fewer.
+            if failed.again == Again::WhenTaken {
+                self.window.overloaded(sent);
+                self.gate.pause(self.sending.first_delay);
+            }
         })?;
         let status = answer.status.as_u16();
         let (request_id, took) = (self.request_id(&answer), answer.took);

@@ -18,6 +18,7 @@ use clap::FromArgMatches as _;
 use clap_complete::Shell;
 use tracing_subscriber::EnvFilter;
 
+use crate::engine::open_files::raise_limit;
 use crate::error::{Error, Result};
 use crate::images::image_words;
 use crate::images::progress::{Progress, Verbosity};
@@ -57,6 +58,7 @@ const FIRST_STEPS: &str = "
 /// The exit code of the program, after it has carried out the command that these words name.
 #[must_use]
 pub fn main(words: impl Iterator<Item = OsString>) -> ExitCode {
+    raise_limit();
     let words: Vec<OsString> = words.collect();
     let first_steps = if words.len() == 1 { FIRST_STEPS } else { "" };
     let called: Vec<String> = words.iter().skip(1).map(text).collect();

@@ -143,8 +143,8 @@ impl CircuitBreaker {
         self.stop(EndReason::Interrupted);
     }
 
-    /// Stops the run because an enhancer cannot be used any further.
-    pub(crate) fn enhancer_ended(&mut self, error: Error) {
+    /// Stops the run because of this machine: an enhancer cannot be used any further, or a file cannot be written.
+    pub(crate) fn ended(&mut self, error: Error) {
         self.stop(EndReason::Stopped(error));
     }
 

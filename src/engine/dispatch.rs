@@ -24,6 +24,7 @@ use crate::engine::settings::JobSettings;
 use crate::engine::suspects::Suspects;
 use crate::engine::truncation::TruncationCheck;
 use crate::error::{Error, Result};
+use crate::images::image_notes::ImageNotes;
 use crate::images::image_pipeline::EnhancerStopper;
 use crate::images::progress::{Progress, StepBar};
 use crate::images::timings::{TimedStep, Timings};
@@ -92,6 +93,7 @@ impl Dispatcher<'_> {
             limits: BudgetNotes::new(self.models),
             given_up: watch::Sender::new(false),
             in_flight_cost: self.in_flight_cost,
+            are_notes_lost: false,
         };
         std::thread::scope(|scope| {
             scope.spawn(move || make(&sender));
@@ -142,6 +144,8 @@ struct ReplySink<'a, I: Item> {
     /// Whether the requests in flight are given up.
     given_up: watch::Sender<bool>,
     in_flight_cost: InFlightCost,
+    /// Whether a note about an image could not be written.
+    are_notes_lost: bool,
 }
 
 /// The first question to a model. With `--max-cost` others wait for its end, as the tokens of prompts are only estimated before.
@@ -163,6 +167,7 @@ impl<I: Item> ReplySink<'_, I> {
     async fn ask(mut self, mut groups: Receiver<PreparedGroup<I>>) -> Result<EndReason> {
         let concurrency = self.dispatcher.settings.concurrency.most();
         let mut lanes = Lanes::<I>::new(self.dispatcher.models, concurrency);
+        lanes.keep_within_open_files(self.dispatcher.settings.loading.threads);
         let mut in_flight = JoinSet::<Finished<I>>::new();
         let mut interrupt = Interrupt::listen()?;
         let mut grace = None;
@@ -174,7 +179,11 @@ impl<I: Item> ReplySink<'_, I> {
                 match self.permit(&ready) {
                     Permit::Refused => lanes.put_back(ready),
                     permit => {
-                        self.note_in_flight()?;
+                        // What is in flight is paid for: it is waited for.
+                        if let Err(e) = self.note_in_flight() {
+                            self.breaker.ended(e);
+                            break;
+                        }
                         let model = &self.dispatcher.models[ready.trial.model];
                         let given_up = self.given_up.subscribe();
                         in_flight.spawn(send(model.clone(), ready, permit, given_up));
@@ -376,7 +385,7 @@ impl<I: Item> ReplySink<'_, I> {
             problem,
             notes,
         } = group;
-        notes.store(self.store)?;
+        self.store_notes(&notes);
         let stimulus = Arc::new(stimulus);
         let ready = trials.into_iter().map(|trial| PreparedTrial {
             trial,
@@ -387,7 +396,7 @@ impl<I: Item> ReplySink<'_, I> {
         };
         // Its trials are asked when the command is given again.
         if let Error::EnhancerEnded { .. } = problem {
-            self.breaker.enhancer_ended(problem);
+            self.breaker.ended(problem);
             return Ok(Vec::new());
         }
         let message = problem.to_string();
@@ -407,6 +416,19 @@ impl<I: Item> ReplySink<'_, I> {
             self.store_result(Ok((ready, Err(error.clone()))))?;
         }
         Ok(Vec::new())
+    }
+
+    /// Stores the notes about an image, unless an earlier one could not be written: no trial depends on them.
+    fn store_notes(&mut self, notes: &ImageNotes) {
+        if self.are_notes_lost {
+            return;
+        }
+        if let Err(e) = notes.store(self.store) {
+            self.are_notes_lost = true;
+            tracing::warn!(
+                "{e}; the run goes on without further thumbnails and similarities of images, which the same command adds later"
+            );
+        }
     }
 
     /// Compares what the images of a prompt were charged with the estimate. Says once of each model if they differ.

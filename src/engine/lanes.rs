@@ -4,7 +4,10 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Weak};
 
 use crate::engine::models::ModelUnderTest;
+use crate::engine::open_files::ConnectionRoom;
 use crate::images::trial::{Stimulus, Trial};
+use crate::images::workers::ThreadArgs;
+use crate::text::words::counted;
 
 /// The most bytes of images that may wait ahead of the slowest endpoint; chosen: some fifty images of 1280×720 as PNG.
 const BYTES_AHEAD: usize = 64 << 20;
@@ -23,6 +26,10 @@ struct Lane<I> {
     /// Trials that are asked last.
     aside: VecDeque<PreparedTrial<I>>,
     in_flight: usize,
+    /// Number of addresses, each with its own connections.
+    addresses: usize,
+    /// The maximum number of requests in flight for which there is room.
+    room: usize,
     /// The budget does not allow its next trial now.
     is_held: bool,
 }
@@ -48,8 +55,11 @@ impl<'a, I> Lanes<'a, I> {
             let shares =
                 |lane: &Lane<I>| models[lane.models[0]].model.shares_endpoint(&model.model);
             let lane = lanes.iter().position(shares).unwrap_or_else(|| {
+                let server = model.server.as_ref();
                 lanes.push(Lane {
                     models: Vec::new(),
+                    addresses: server.map_or(0, |server| server.replicas.len()),
+                    room: usize::MAX,
                     waiting: VecDeque::new(),
                     aside: VecDeque::new(),
                     in_flight: 0,
@@ -69,13 +79,35 @@ impl<'a, I> Lanes<'a, I> {
         }
     }
 
+    /// Limits the requests in flight to the connections that this process may open beside the files of these threads. Says so if they are
+    /// fewer than the settings allow.
+    pub(crate) fn keep_within_open_files(&mut self, threads: ThreadArgs) {
+        let Some(ConnectionRoom { limit, requests }) = ConnectionRoom::now(threads.number()) else {
+            return;
+        };
+        let addresses: usize = self.all.iter().map(|lane| lane.addresses).sum();
+        let mut most = 0;
+        for lane in self.all.iter_mut().filter(|lane| lane.addresses > 0) {
+            lane.room = (requests / addresses * lane.addresses).max(1);
+            let server = self.models[lane.models[0]].server.as_ref();
+            most += server.map_or(0, |server| server.most_in_flight());
+        }
+        if most > requests {
+            tracing::warn!(
+                "at most {} in flight at once instead of {most} (--concurrency), as this process may open only {limit} files (ulimit -n)",
+                counted(requests, "request")
+            );
+        }
+    }
+
     /// The maximum number of requests in flight in a lane now.
     fn width(&self, lane: &Lane<I>) -> usize {
         let widths = lane
             .models
             .iter()
             .filter_map(|model| self.models[*model].model.width());
-        widths.max().unwrap_or(self.default_width)
+        let width = widths.max().unwrap_or(self.default_width);
+        width.min(lane.room)
     }
 
     /// Adds the trials of a group.

@@ -24,6 +24,7 @@ pub(crate) mod measured_tokens;
 pub(crate) mod models;
 pub(crate) mod money;
 pub(crate) mod observer;
+pub(crate) mod open_files;
 pub(crate) mod open_run;
 pub(crate) mod plan_costs;
 pub(crate) mod planned_images;

@@ -17,6 +17,14 @@ pub(crate) struct ThreadArgs {
     pub threads: Option<NonZeroUsize>,
 }
 
+impl ThreadArgs {
+    /// The number of threads.
+    pub(crate) fn number(self) -> usize {
+        let one_per_core = || std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+        self.threads.unwrap_or_else(one_per_core).get()
+    }
+}
+
 /// The threads, twice: one pool of all for a shared source, and one pool of a single thread for each source of its own.
 pub(crate) struct Workers {
     pub(crate) all: ThreadPool,

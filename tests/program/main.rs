@@ -48,6 +48,7 @@ mod money;
 mod money_simulation;
 mod mutations;
 mod observer;
+mod open_files;
 mod openeqa;
 mod own_requests;
 mod page;
