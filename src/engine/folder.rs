@@ -18,6 +18,8 @@ pub(crate) fn find<E: Experiment>(experiment: &E) -> Result<PathBuf> {
     let settings = experiment.settings();
     match settings.place.for_shard(settings.shard) {
         RunPlace::Named(path) => Ok(path),
+        // It is made again.
+        RunPlace::Resume(path) if store::manifest_damage(&path)?.is_some() => Ok(path),
         RunPlace::Resume(path) => match store::read_manifest(&path, DetailOf::<E>::SCHEMA)? {
             Some(_) => Ok(path),
             None => Err(Error::usage(

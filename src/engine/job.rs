@@ -8,6 +8,7 @@ use crate::engine::dark_already;
 use crate::engine::estimate;
 use crate::engine::experiment::{DetailOf, Experiment};
 use crate::engine::folder;
+use crate::engine::lost_manifest;
 use crate::engine::manifest;
 use crate::engine::measured_tokens::MeasuredTokens;
 use crate::engine::open_run::{OpenRun, answered, lost_for_good, pipeline, truncated};
@@ -143,7 +144,11 @@ impl<'a, E: Experiment> Job<'a, E> {
             progress,
         } = self;
         let settings = experiment.settings();
-        let stored = store::read_manifest(&folder, DetailOf::<E>::SCHEMA)?;
+        let damage = store::manifest_damage(&folder)?;
+        let stored = match damage {
+            Some(_) => None,
+            None => store::read_manifest(&folder, DetailOf::<E>::SCHEMA)?,
+        };
         let complete = stored
             .as_ref()
             .is_some_and(|stored| stored.status == Status::Complete);
@@ -161,8 +166,13 @@ impl<'a, E: Experiment> Job<'a, E> {
         }
         let manifest = manifest::of(experiment, stored)?;
         folder::make(&folder, settings)?;
+        if let Some(damage) = damage {
+            lost_manifest::restore(experiment, &folder, &manifest, &damage)?;
+        }
         let mut store = Store::open(&folder, &manifest, folder::address_change(&settings.place))?;
-        store.add_questions(experiment.questions(), manifest.inputs.as_ref())?;
+        store.add_questions(experiment.questions(), manifest.inputs.as_ref(), || {
+            lost_manifest::planned_keys(experiment, &folder)
+        })?;
         let present: HashSet<TrialKey> = if experiment.imported_records().is_empty() {
             HashSet::new()
         } else {

@@ -25,6 +25,7 @@ use crate::images::image_pipeline::ImagePipeline;
 use crate::images::image_steps::ImageSteps;
 use crate::images::plan::Plan;
 use crate::images::progress::Progress;
+use crate::images::source::Source;
 use crate::images::stored_images::StoredImages;
 use crate::images::thumbnail::MissingThumbnails;
 use crate::images::timings::Timings;
@@ -78,9 +79,10 @@ impl<E: Experiment> OpenRun<'_, E> {
     pub(crate) fn ask(mut self) -> Result<Outcome> {
         let (mut end, mut stopped) = (EndReason::AllAsked, Vec::new());
         for phase in 0..E::PHASES.len() {
-            let remaining = self.remaining(phase)?;
+            let mut remaining = self.remaining(phase)?;
             self.warn_of_batches(remaining.in_batch);
-            if remaining.plan.remaining() == 0 {
+            self.add_lost_notes(phase, &mut remaining.plan)?;
+            if remaining.plan.sources.is_empty() {
                 continue;
             }
             match self.ask_phase(phase, remaining)? {
@@ -212,6 +214,23 @@ impl<E: Experiment> OpenRun<'_, E> {
         })
     }
 
+    /// Adds the images about which notes were lost to a plan, without trials.
+    fn add_lost_notes(&self, phase: usize, plan: &mut Plan<E::Item>) -> Result<()> {
+        if !self.store.lacks_notes() {
+            return Ok(());
+        }
+        let missing = missing_notes(self.experiment, self.store.folder());
+        let sources = self.experiment.sources();
+        let all = self.experiment.plan(phase, || self.store.records())?;
+        plan.add_images(all, |source, condition| {
+            let Source { name, frames, .. } = &sources[source];
+            let wanted = missing.of(name, condition);
+            // Several images of one source are not measured.
+            wanted.thumbnail || (wanted.fidelity && frames.len() == 1)
+        });
+        Ok(())
+    }
+
     /// Copies the replies to these trials that parts of another division have; returns whether there are any.
     fn copy_from_other_parts(
         &mut self,
@@ -313,7 +332,7 @@ impl<E: Experiment> OpenRun<'_, E> {
             timings: &timings,
             in_flight_cost,
         };
-        let missing = missing_notes(experiment, self.store.folder())?;
+        let missing = missing_notes(experiment, self.store.folder());
         let started = Instant::now();
         let end = dispatcher.run(counts, budget, &mut self.store, stoppers, |groups| {
             pipeline.develop(sources, plan.sources, &missing, &workers, groups);
@@ -480,11 +499,11 @@ pub(crate) fn limit(settings: &JobSettings) -> Option<ImageLimit> {
 }
 
 /// The notes about images that a run folder does not have yet.
-pub(crate) fn missing_notes<E: Experiment>(experiment: &E, folder: &Path) -> Result<MissingNotes> {
+pub(crate) fn missing_notes<E: Experiment>(experiment: &E, folder: &Path) -> MissingNotes {
     let names = experiment.sources().iter().map(|source| &source.name);
-    let thumbnails = MissingThumbnails::new(names, store::read_thumbnails(folder)?);
+    let thumbnails = MissingThumbnails::new(names, store::read_thumbnails(folder));
     let thumbnails = thumbnails.with_objects(&experiment.questions());
-    Ok(MissingNotes::new(thumbnails, store::read_fidelity(folder)?))
+    MissingNotes::new(thumbnails, store::read_fidelity(folder))
 }
 
 /// Keys of the trials without a reply that were charged as often as `--paid-retries` allows.

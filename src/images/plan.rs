@@ -76,6 +76,33 @@ impl<I> Plan<I> {
         before - self.remaining()
     }
 
+    /// Adds the images of `all` groups that are wanted and not in the plan, without trials.
+    pub(crate) fn add_images(
+        &mut self,
+        all: Vec<SourcePlan<I>>,
+        is_wanted: impl Fn(usize, &Condition) -> bool,
+    ) {
+        for SourcePlan { source, groups } in all {
+            let own = self.sources.iter().position(|part| part.source == source);
+            let planned: BTreeSet<Condition> = own
+                .map(|own| self.sources[own].conditions().cloned().collect())
+                .unwrap_or_default();
+            let conditions = groups.into_iter().filter_map(|group| group.condition);
+            let wanted = conditions
+                .filter(|condition| !planned.contains(condition) && is_wanted(source, condition));
+            let groups = wanted.map(|condition| TrialGroup {
+                condition: Some(condition),
+                trials: Vec::new(),
+            });
+            let groups: Vec<TrialGroup<I>> = groups.collect();
+            match own {
+                Some(own) => self.sources[own].groups.extend(groups),
+                None if groups.is_empty() => {}
+                None => self.sources.push(SourcePlan { source, groups }),
+            }
+        }
+    }
+
     /// Moves untouched images to the front, source by source, until they have this many trials; nothing is moved if there are fewer than
     /// `fewest`. They show whether a server looks at the images at all. Only sources for which `is_cheap` holds are moved, because their
     /// frames are read twice.

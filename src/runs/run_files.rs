@@ -25,8 +25,8 @@ impl RunFiles {
         })?;
         Ok(Self {
             questions,
-            thumbnails: store::read_thumbnails(folder)?,
-            fidelity: store::read_fidelity(folder)?,
+            thumbnails: store::read_thumbnails(folder),
+            fidelity: store::read_fidelity(folder),
         })
     }
 
@@ -37,8 +37,8 @@ impl RunFiles {
     pub(crate) fn read(folder: &Path) -> Result<Self> {
         Ok(Self {
             questions: store::read_questions(folder)?,
-            thumbnails: store::read_thumbnails(folder)?,
-            fidelity: store::read_fidelity(folder)?,
+            thumbnails: store::read_thumbnails(folder),
+            fidelity: store::read_fidelity(folder),
         })
     }
 }

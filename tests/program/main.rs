@@ -20,6 +20,7 @@ mod compared;
 mod confidence;
 mod container;
 mod coverage;
+mod damaged_files;
 mod documentation;
 mod enhance;
 mod evaluate;

@@ -84,7 +84,7 @@ pub(super) fn write<E: Experiment>(
     let images = run.images.as_ref();
     let mut pipeline = pipeline(experiment, Vec::new(), limit, &timings);
     pipeline.steps.stored = images.map(|images| StoredImages::new(images, &maker));
-    let missing = missing_notes(experiment, run.store.folder())?;
+    let missing = missing_notes(experiment, run.store.folder());
     let sources = experiment.sources();
     workers.install(|| {
         pipeline.open_enhancers(enhancers, &settings.loading, sources, &plan.sources)?;

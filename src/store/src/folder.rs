@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::slice::ParallelSliceMut;
 
+use super::damaged_file::{each_readable_line, set_file_aside};
 use super::lines::{StoredLine, each_line, each_placed_line, lines};
 use super::pieces::{LinePlace, open_if_there};
 use super::stored_trial::StoredTrial;
@@ -149,22 +150,33 @@ pub fn each_placed_question(folder: &Path, take: impl FnMut(RunQuestion, LinePla
     each_placed_line(&folder.join(QUESTIONS), take)
 }
 
-/// The small copies of images of a run; none if the run has no such file.
-pub fn read_thumbnails(folder: &Path) -> Result<Vec<Thumbnail>> {
-    lines(&folder.join(THUMBNAILS))
+/// The small copies of images of a run; none if the run has no such file. Damaged ones are left out with a warning.
+#[must_use]
+pub fn read_thumbnails(folder: &Path) -> Vec<Thumbnail> {
+    let mut all = Vec::new();
+    each_readable_note(&folder.join(THUMBNAILS), |thumbnail| all.push(thumbnail));
+    all
 }
 
 /// The similarity of the images of a run to their clean frames, equal frames and conditions kept once; none if the run has no
-/// such file.
-pub fn read_fidelity(folder: &Path) -> Result<Vec<ImageFidelity>> {
+/// such file. Damaged ones are left out with a warning.
+#[must_use]
+pub fn read_fidelity(folder: &Path) -> Vec<ImageFidelity> {
     let (mut frames, mut conditions) = (Distinct::default(), Distinct::default());
     let mut all: Vec<ImageFidelity> = Vec::new();
-    each_line(&folder.join(FIDELITY), |mut image: ImageFidelity| {
+    each_readable_note(&folder.join(FIDELITY), |mut image: ImageFidelity| {
         frames.share(&mut image.frame);
         conditions.share(&mut image.condition);
         all.push(image);
-    })?;
-    Ok(all)
+    });
+    all
+}
+
+/// Hands over the notes about images that can be read. A report lacks the others.
+fn each_readable_note<T: StoredLine>(path: &Path, take: impl FnMut(T)) {
+    if let Some(damage) = each_readable_line(path, take) {
+        tracing::warn!("{damage}; left out: the command that made the run makes it again");
+    }
 }
 
 /// The newest run folder in `base` whose name ends in `-<hash>`.
@@ -178,7 +190,7 @@ pub fn find(base: &Path, hash: &str) -> Option<PathBuf> {
                 .and_then(OsStr::to_str)
                 .is_some_and(|name| name.ends_with(&ending))
         })
-        .filter(|path| holds_run(path))
+        .filter(|path| holds_run(path) || path.join(RECORDS).is_file())
         .max()
 }
 
@@ -272,8 +284,36 @@ fn any_manifest(folder: &Path) -> Result<Option<RunManifest>> {
         .map(Some)
         .map_err(|e| Error::Run {
             path: path.clone(),
-            problem: format!("not the manifest of a run: {e}"),
+            problem: format!(
+                "not the manifest of a run: {e}; the command that made the run, called again, makes it again"
+            ),
         })
+}
+
+/// The damage of a manifest in words, if a run has records and its manifest is missing or cannot be read.
+///
+/// # Errors
+/// If the records cannot be opened.
+pub fn manifest_damage(folder: &Path) -> Result<Option<String>> {
+    let has_records = open_if_there(&folder.join(RECORDS))?.is_some();
+    Ok(match any_manifest(folder) {
+        _ if !has_records => None,
+        Ok(Some(_)) => None,
+        Ok(None) => Some(format!("{}: missing", folder.join(MANIFEST).display())),
+        Err(_) => Some(format!("{}: damaged", folder.join(MANIFEST).display())),
+    })
+}
+
+/// Writes the manifest of a run that has lost its own; a damaged one is set aside.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn restore_manifest(folder: &Path, manifest: &RunManifest) -> Result<()> {
+    let path = folder.join(MANIFEST);
+    if fs::symlink_metadata(&path).is_ok() {
+        set_file_aside(&path)?;
+    }
+    write_manifest(folder, manifest)
 }
 
 /// Checks that a stored run is the requested one: the same identity, the same shard, and the same meaning of every column

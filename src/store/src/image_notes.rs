@@ -5,32 +5,25 @@ use std::hash::Hash;
 use std::path::Path;
 
 use super::folder::{read_fidelity, read_thumbnails};
-use darkqa_ground::error::Result;
 use darkqa_ground::types::{FrameId, ImageFidelity, Thumbnail};
 
 /// The small copies of images in these folders that are not `present`, each once, of the frames that are wanted.
-///
-/// # Errors
-/// If a file cannot be read.
 pub fn more_thumbnails(
     present: &[Thumbnail],
     folders: &[&Path],
     is_wanted: impl Fn(&FrameId) -> bool,
-) -> Result<Vec<Thumbnail>> {
+) -> Vec<Thumbnail> {
     let place = |thumbnail: &Thumbnail| (thumbnail.frame.clone(), thumbnail.condition.clone());
     let is_wanted = |thumbnail: &Thumbnail| is_wanted(&thumbnail.frame);
     more(present, folders, read_thumbnails, (place, is_wanted))
 }
 
 /// The similarities of images in these folders that are not `present`, each once, of the frames that are wanted.
-///
-/// # Errors
-/// If a file cannot be read.
 pub fn more_fidelity(
     present: &[ImageFidelity],
     folders: &[&Path],
     is_wanted: impl Fn(&FrameId) -> bool,
-) -> Result<Vec<ImageFidelity>> {
+) -> Vec<ImageFidelity> {
     let place = |image: &ImageFidelity| (image.frame.clone(), image.condition.clone());
     let is_wanted = |image: &ImageFidelity| is_wanted(&image.frame);
     more(present, folders, read_fidelity, (place, is_wanted))
@@ -40,14 +33,11 @@ pub fn more_fidelity(
 fn more<T, P: Eq + Hash>(
     present: &[T],
     folders: &[&Path],
-    read: impl Fn(&Path) -> Result<Vec<T>>,
+    read: impl Fn(&Path) -> Vec<T>,
     (place, is_wanted): (impl Fn(&T) -> P, impl Fn(&T) -> bool),
-) -> Result<Vec<T>> {
+) -> Vec<T> {
     let mut known: HashSet<_> = present.iter().map(&place).collect();
-    let mut more = Vec::new();
-    for folder in folders {
-        let read = read(folder)?.into_iter();
-        more.extend(read.filter(|one| is_wanted(one) && known.insert(place(one))));
-    }
-    Ok(more)
+    let read = folders.iter().flat_map(|folder| read(folder));
+    read.filter(|one| is_wanted(one) && known.insert(place(one)))
+        .collect()
 }

@@ -9,10 +9,12 @@
 
 mod changed_questions;
 mod column_file;
+mod damaged_file;
 mod folder;
 mod image_notes;
 mod lines;
 mod log_mark;
+mod lost_questions;
 mod own_files;
 mod pieces;
 mod record_log;
@@ -21,7 +23,7 @@ mod stored_trial;
 mod trial_line;
 
 use std::borrow::Cow;
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::Write;
 use std::marker::PhantomData;
@@ -39,6 +41,7 @@ use darkqa_ground::types::{
 use darkqa_score::record::Detail;
 
 use changed_questions::ChangedQuestions;
+use damaged_file::{each_readable_line, lacks_notes, set_file_aside};
 use folder::{
     FIDELITY, QUESTIONS, RECORDS, THUMBNAILS, check_same_run, create_run, write, write_manifest,
 };
@@ -49,14 +52,15 @@ use own_files::check_own;
 pub use column_file::{CREATED_BY, Cell, CellKind, Column, ColumnFile, FileMetadata, Presence};
 pub use image_notes::{more_fidelity, more_thumbnails};
 pub use log_mark::LogMark;
+use lost_questions::LostQuestions;
 pub use pieces::LinePlace;
 pub use record_log::{QuestionFile, RecordLog, each_record, each_reread_record, each_trial};
 pub use stored_trial::StoredTrial;
 
 pub use folder::{
     AddressChange, BATCH, BATCH_STATE, PLAN, each_placed_question, each_question, find, holds_run,
-    is_locked, now, read_columns, read_fidelity, read_manifest, read_questions, read_records,
-    read_thumbnails, read_trials, schema,
+    is_locked, manifest_damage, now, read_columns, read_fidelity, read_manifest, read_questions,
+    read_records, read_thumbnails, read_trials, restore_manifest, schema,
 };
 
 /// The trials that were sent in batches.
@@ -77,6 +81,8 @@ pub struct Store<D = ChoiceDetail> {
     synced: Instant,
     /// The names of models in the records.
     names: RecordedNames,
+    /// Whether thumbnails or similarities of images were damaged, or there are none.
+    lacks_notes: bool,
     kind: PhantomData<D>,
 }
 
@@ -120,20 +126,26 @@ impl<D: Detail> Store<D> {
         records.try_lock().map_err(|e| match e {
             TryLockError::WouldBlock => Error::Run {
                 path: folder.to_owned(),
-                problem:
-                    "another process is writing to this run; wait for it, or use another --out"
-                        .to_owned(),
+                problem: "another process is writing to this run; wait for its end".to_owned(),
             },
             TryLockError::Error(e) => Error::file(&path, "lock", e),
         })?;
         repair::<Record<D>>(&path, &records)?;
+        let lacks_thumbnails = lacks_notes::<Thumbnail>(&folder.join(THUMBNAILS));
+        let lacks_fidelity = lacks_notes::<ImageFidelity>(&folder.join(FIDELITY));
         Ok(Self {
+            lacks_notes: lacks_thumbnails || lacks_fidelity,
             folder: folder.to_owned(),
             records,
             synced: Instant::now(),
             names: RecordedNames::of(manifest),
             kind: PhantomData,
         })
+    }
+
+    /// Whether notes about images were lost, or there are none.
+    pub fn lacks_notes(&self) -> bool {
+        self.lacks_notes
     }
 
     /// The last record of each trial, in the order of each trial's first record.
@@ -209,8 +221,8 @@ impl<D: Detail> Store<D> {
         folders: &[&Path],
         is_wanted: impl Fn(&FrameId) -> bool,
     ) -> Result<()> {
-        let present = read_thumbnails(&self.folder)?;
-        for thumbnail in more_thumbnails(&present, folders, is_wanted)? {
+        let present = read_thumbnails(&self.folder);
+        for thumbnail in more_thumbnails(&present, folders, is_wanted) {
             self.append_thumbnail(&thumbnail)?;
         }
         Ok(())
@@ -225,8 +237,8 @@ impl<D: Detail> Store<D> {
         folders: &[&Path],
         is_wanted: impl Fn(&FrameId) -> bool,
     ) -> Result<()> {
-        let present = read_fidelity(&self.folder)?;
-        for image in more_fidelity(&present, folders, is_wanted)? {
+        let present = read_fidelity(&self.folder);
+        for image in more_fidelity(&present, folders, is_wanted) {
             self.append_fidelity(&image)?;
         }
         Ok(())
@@ -237,19 +249,29 @@ impl<D: Detail> Store<D> {
         append(&self.folder.join(FIDELITY), std::slice::from_ref(fidelity)).map(drop)
     }
 
-    /// Writes the questions of the run, new and stored ones, in the order of the data. `inputs` is how their images were read.
+    /// Writes the questions of the run, new and stored ones, in the order of the data. `inputs` is how their images were read. Questions
+    /// of records that are no longer stored are made again, if `planned`, the keys of the trials of this command, has one of their
+    /// records.
     ///
     /// # Errors
-    /// If a stored question differs in a part that decides its replies or its score. The error names the part.
+    /// If a stored question differs in a part that decides its replies or its score, or a lost one cannot be made again. The error names
+    /// the part.
     pub fn add_questions(
         &self,
         mut questions: Vec<RunQuestion>,
         inputs: Option<&InputSummary>,
+        planned: impl FnOnce() -> Result<HashSet<TrialKey>>,
     ) -> Result<()> {
+        let path = self.folder.join(QUESTIONS);
+        let mut stored_questions: Vec<RunQuestion> = Vec::new();
+        let damage = each_readable_line(&path, |question| stored_questions.push(question));
+        let stored_ids = stored_questions.iter().map(|question| question.id.clone());
+        let lost = LostQuestions::find(&self.folder, &questions, stored_ids.collect(), &damage)?;
+        lost.check(&path, planned)?;
         let mut changed = ChangedQuestions::default();
         let ids = questions.iter().map(|question| question.id.clone());
         let places: HashMap<QuestionId, usize> = ids.zip(0..).collect();
-        for mut stored in read_questions(&self.folder)? {
+        for mut stored in stored_questions {
             let Some(&place) = places.get(&stored.id) else {
                 questions.push(stored);
                 continue;
@@ -274,6 +296,19 @@ impl<D: Detail> Store<D> {
             return Err(Error::Run { path, problem });
         }
         questions.sort_by_key(|question| question.place);
+        if let Some(damage) = damage {
+            let aside = set_file_aside(&path)?;
+            tracing::warn!(
+                "{damage}; made again from the data; the damaged file is {}",
+                aside.display()
+            );
+        } else if !lost.is_empty() {
+            tracing::warn!(
+                "{}: {} questions of records were missing; made again from the data",
+                path.display(),
+                lost.len()
+            );
+        }
         self.write_questions(&questions)
     }
 

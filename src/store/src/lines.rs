@@ -191,7 +191,8 @@ pub(super) trait StoredLine: Sized + Send {
     /// The name in error messages, with its article.
     const WHAT: &str;
     /// What a user can do about a line that is none.
-    const REMEDY: &str = "restore the file, or use another --out";
+    const REMEDY: &str =
+        "the command that made the run, called again, makes the file again from its data";
 
     /// Parses a line, with or without its end.
     fn parse(line: &[u8]) -> serde_json::Result<Self>;

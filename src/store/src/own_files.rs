@@ -60,7 +60,8 @@ fn foreign(entry: &DirEntry) -> Option<&'static str> {
         return Some("a pipe or a device");
     }
     let is_appended = APPENDED.iter().any(|appended| name == *appended);
-    (is_appended && names(&own) > 1).then_some("a file with a second name (a hard link)")
+    (is_appended && own.is_file() && names(&own) > 1)
+        .then_some("a file with a second name (a hard link)")
 }
 
 /// The number of names of a file.
