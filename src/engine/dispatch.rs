@@ -524,6 +524,9 @@ impl<I: Item> ReplySink<'_, I> {
             },
         };
         self.store.append(&record)?;
+        if let Some(e) = self.store.other_writer() {
+            self.breaker.ended(e);
+        }
         self.check_dependence(&ready.trial, &record);
         Ok(())
     }

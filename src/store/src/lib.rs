@@ -21,6 +21,7 @@ mod record_log;
 mod reread_record;
 mod stored_trial;
 mod trial_line;
+mod unlocked_log;
 
 use std::borrow::Cow;
 use std::collections::{BTreeSet, HashMap, HashSet};
@@ -48,6 +49,7 @@ use folder::{
 use lines::{append, each_line, json_lines, lines, repair, set_aside};
 
 use own_files::check_own;
+use unlocked_log::UnlockedLog;
 
 pub use column_file::{CREATED_BY, Cell, CellKind, Column, ColumnFile, FileMetadata, Presence};
 pub use image_notes::{more_fidelity, more_thumbnails};
@@ -73,11 +75,13 @@ const SET_ASIDE: &str = "set-aside.jsonl";
 /// Chosen.
 const SYNC_EVERY: Duration = Duration::from_secs(2);
 
-/// An open run folder, locked by this process.
+/// An open run folder, locked by this process if its file system has locks.
 #[derive(Debug)]
 pub struct Store<D = ChoiceDetail> {
     folder: PathBuf,
     records: File,
+    /// The log on a file system without locks; `None` if it is locked.
+    unlocked: Option<UnlockedLog>,
     synced: Instant,
     /// The names of models in the records.
     names: RecordedNames,
@@ -123,24 +127,34 @@ impl<D: Detail> Store<D> {
             .create(true)
             .open(&path)
             .map_err(|e| Error::file(&path, "open", e))?;
-        records.try_lock().map_err(|e| match e {
-            TryLockError::WouldBlock => Error::Run {
+        let locked = records.try_lock();
+        if let Err(TryLockError::WouldBlock) = locked {
+            return Err(Error::Run {
                 path: folder.to_owned(),
                 problem: "another process is writing to this run; wait for its end".to_owned(),
-            },
-            TryLockError::Error(e) => Error::file(&path, "lock", e),
-        })?;
+            });
+        }
         repair::<Record<D>>(&path, &records)?;
+        let unlocked = match locked {
+            Err(TryLockError::Error(e)) => Some(UnlockedLog::begin(folder, &records, &e)?),
+            _ => None,
+        };
         let lacks_thumbnails = lacks_notes::<Thumbnail>(&folder.join(THUMBNAILS));
         let lacks_fidelity = lacks_notes::<ImageFidelity>(&folder.join(FIDELITY));
         Ok(Self {
             lacks_notes: lacks_thumbnails || lacks_fidelity,
             folder: folder.to_owned(),
             records,
+            unlocked,
             synced: Instant::now(),
             names: RecordedNames::of(manifest),
             kind: PhantomData,
         })
+    }
+
+    /// The error that stops this process, if another one, which started earlier, writes to the run.
+    pub fn other_writer(&self) -> Option<Error> {
+        self.unlocked.as_ref()?.problem(&self.folder)
     }
 
     /// Whether notes about images were lost, or there are none.
@@ -393,6 +407,9 @@ impl<D: Detail> Store<D> {
 
     /// Appends the lines of records, with their ends, as they are in the file of another run with the same names of models.
     pub fn append_lines(&mut self, lines: &[u8]) -> Result<()> {
+        if let Some(unlocked) = &mut self.unlocked {
+            unlocked.appends(&self.records, lines.len());
+        }
         self.records
             .write_all(lines)
             .map_err(|e| Error::file(self.folder.join(RECORDS), "write", e))?;
