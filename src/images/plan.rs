@@ -82,8 +82,10 @@ impl<I> Plan<I> {
         all: Vec<SourcePlan<I>>,
         is_wanted: impl Fn(usize, &Condition) -> bool,
     ) {
+        let own = self.sources.iter().map(|part| part.source);
+        let own: BTreeMap<usize, usize> = own.zip(0..).collect();
         for SourcePlan { source, groups } in all {
-            let own = self.sources.iter().position(|part| part.source == source);
+            let own = own.get(&source).copied();
             let planned: BTreeSet<Condition> = own
                 .map(|own| self.sources[own].conditions().cloned().collect())
                 .unwrap_or_default();

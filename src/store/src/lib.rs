@@ -85,7 +85,7 @@ pub struct Store<D = ChoiceDetail> {
     synced: Instant,
     /// The names of models in the records.
     names: RecordedNames,
-    /// Whether thumbnails or similarities of images were damaged, or there are none.
+    /// Whether thumbnails or similarities of images were damaged, or the run has records and none of them.
     lacks_notes: bool,
     kind: PhantomData<D>,
 }
@@ -141,8 +141,9 @@ impl<D: Detail> Store<D> {
         };
         let lacks_thumbnails = lacks_notes::<Thumbnail>(&folder.join(THUMBNAILS));
         let lacks_fidelity = lacks_notes::<ImageFidelity>(&folder.join(FIDELITY));
+        let has_records = records.metadata().is_ok_and(|log| log.len() > 0);
         Ok(Self {
-            lacks_notes: lacks_thumbnails || lacks_fidelity,
+            lacks_notes: has_records && (lacks_thumbnails || lacks_fidelity),
             folder: folder.to_owned(),
             records,
             unlocked,
@@ -157,7 +158,7 @@ impl<D: Detail> Store<D> {
         self.unlocked.as_ref()?.problem(&self.folder)
     }
 
-    /// Whether notes about images were lost, or there are none.
+    /// Whether notes about images were lost, or the run has records and no such notes.
     pub fn lacks_notes(&self) -> bool {
         self.lacks_notes
     }
