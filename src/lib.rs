@@ -7,7 +7,7 @@
 //! # The library
 //!
 //! The program `darkqa-eval` does all of this from the command line. The library has the pieces that other programs use:
-//! [`synthesis`], [`enhance`], [`questions`] and [`score::choice`]; their vocabulary is at the root.
+//! [`synthesis`], [`enhance`], [`questions`], [`score::choice`] and [`StoredRun`]; their vocabulary is at the root.
 //!
 //! Degrade a frame. The noise follows from the seed and the name of the frame, so that the same call gives the same image:
 //!
@@ -55,6 +55,25 @@
 //! assert_eq!(lenient, Answer::Chosen(1));
 //! # Ok::<(), darkqa_eval::Error>(())
 //! ```
+//!
+//! Read the records of a run, with the columns of `records.parquet`:
+//!
+//! ```
+//! use darkqa_eval::StoredRun;
+//!
+//! let (mut right, mut replies) = (0, 0);
+//! for record in StoredRun::open("results/reference")?.records()? {
+//!     let record = record?;
+//!     if record.text("level")? == Some("L3") {
+//!         replies += usize::from(record.flag("right")?.is_some());
+//!         right += usize::from(record.flag("right")? == Some(true));
+//!     }
+//! }
+//! assert!(right < replies);
+//! # Ok::<(), darkqa_eval::Error>(())
+//! ```
+//!
+//! `tests/examples/accuracy.rs` computes the accuracy of each level.
 //!
 //! # The map
 //!
@@ -173,6 +192,7 @@ pub(crate) use darkqa_scenes as rooms;
 pub(crate) use darkqa_store as store;
 
 pub use error::{Error, Result};
+pub use runs::record_table::{Records, RunRecord, StoredRun};
 pub use types::degradation::Kind;
 pub use types::{
     Answer, Choices, Condition, Degradation, DepthKind, Digest, Family, Frame, FrameId, Intrinsics,

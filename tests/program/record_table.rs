@@ -1,5 +1,8 @@
 //! `records.parquet`: the records of a run as a table for other programs.
 
+#[path = "../examples/accuracy.rs"]
+mod accuracy;
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
@@ -375,4 +378,44 @@ fn duckdb_counts_as_the_summary_does() {
     let mut summary = of_summary(&bench.path("run"));
     summary.retain(|place, _| place[6] == "strict");
     assert_eq!(counted, summary);
+}
+
+/// The example and the summary of a run agree on every model, level and variant.
+#[test]
+fn the_example_computes_the_accuracy_of_the_summary() {
+    let run = Path::new(env!("CARGO_MANIFEST_DIR")).join("results/reference");
+    let scores = accuracy::accuracy(&run).unwrap();
+    let mut expected = BTreeMap::<[String; 3], accuracy::Score>::new();
+    for (row, [replies, right, _]) in of_summary(&run) {
+        let [model, _, level, variant, enhancer, _, mode, _] = row;
+        if mode == "strict" && enhancer.is_empty() && !level.is_empty() {
+            let score = expected.entry([model, level, variant]).or_default();
+            score.replies += replies as usize;
+            score.right += right as usize;
+        }
+    }
+    assert!(expected.len() >= 3, "{expected:?}");
+    // Controls of the observer are no rows of the summary.
+    for (subject, score) in expected {
+        assert_eq!(scores.get(&subject), Some(&score), "{subject:?}");
+    }
+}
+
+#[test]
+fn records_have_the_columns_and_rows_of_the_table() {
+    let run = Path::new(env!("CARGO_MANIFEST_DIR")).join("results/reference");
+    let records = darkqa_eval::StoredRun::open(&run)
+        .unwrap()
+        .records()
+        .unwrap();
+    assert!(records.columns().any(|column| column == "right_lenient"));
+    let records: Vec<_> = records.map(Result::unwrap).collect();
+    let first = &records[0];
+    assert_eq!(first.text("key").unwrap().map(str::len), Some(32));
+    assert_eq!(first.number("attempts").unwrap(), Some(1.0));
+    let problem = first.text("levl").unwrap_err().to_string();
+    assert!(problem.contains("did you mean level?"), "{problem}");
+    let problem = first.number("level").unwrap_err().to_string();
+    assert!(problem.contains("no numbers"), "{problem}");
+    assert!(darkqa_eval::StoredRun::open("no-such-run").is_err());
 }

@@ -1,31 +1,26 @@
 //! `records.parquet`: the records of a run as a table for other programs, made from the log, which stays the truth: [`update`].
 
+mod batches;
 mod choice;
 mod common;
 mod open;
 mod places;
+mod reader;
 mod row;
 
 use std::path::Path;
 
-use rayon::prelude::*;
-
-use self::places::places;
-use self::row::{Row, Rows, Tabled};
+use self::batches::RowBatches;
+pub use self::reader::{Records, RunRecord, StoredRun};
+use self::row::Tabled;
 use crate::error::Result;
 use crate::runs::outcome::RecordTable;
-use crate::runs::stored::{ExperimentKind, manifest};
-use crate::store::{
-    CREATED_BY, ColumnFile, FileMetadata, LinePlace, LogMark, RecordLog, each_question,
-};
-use crate::types::{ChoiceDetail, OpenDetail, Record};
+use crate::runs::stored::ExperimentKind;
+use crate::store::{CREATED_BY, ColumnFile, FileMetadata, LogMark};
+use crate::types::{ChoiceDetail, OpenDetail};
 
 /// The name of the file.
 pub(crate) const RECORDS_PARQUET: &str = "records.parquet";
-/// The most records that are read at once. Chosen: enough for all cores.
-const RECORDS_AT_ONCE: usize = 1 << 14;
-/// The most bytes of records that are read at once; more only if one record has more. Chosen.
-const BYTES_AT_ONCE: usize = 16 << 20;
 
 /// Writes the table of the run in a folder, unless the one that is there is as new as the log. The records are not held in memory.
 ///
@@ -62,28 +57,11 @@ fn update_of<D: Tabled>(folder: &Path, table: RecordTable) -> Result<()> {
 }
 
 fn write<D: Tabled>(folder: &Path, path: &Path, metadata: &FileMetadata) -> Result<()> {
-    let manifest = manifest(folder)?;
-    let mut questions = Vec::new();
-    each_question(folder, |question| {
-        questions.push(question.without_evidence());
-    })?;
-    let places = places(folder, &manifest, &questions)?;
-    let mut rows = Rows::<D>::new(folder, &manifest, &questions)?;
-    let log = RecordLog::open(folder)?;
+    let mut batches = RowBatches::<D>::open(folder)?;
     let columns = D::columns();
     let mut file = ColumnFile::create(path, &columns, metadata)?;
-    let mut rest = &*places;
-    while !rest.is_empty() {
-        let (now, later) = rest.split_at(at_once(rest));
-        let lines = log.lines(now)?;
-        let records = lines.par_iter().map(|line| log.record::<D>(line));
-        let records: Result<Vec<Record<D>>> = records.collect();
-        let now: Vec<Row<D>> = records?
-            .into_iter()
-            .filter_map(|record| rows.row(record))
-            .collect();
-        file.append(&now)?;
-        rest = later;
+    while let Some(rows) = batches.next_batch()? {
+        file.append(&rows)?;
     }
     for (column, count) in file.finish()? {
         tracing::warn!(
@@ -92,14 +70,4 @@ fn write<D: Tabled>(folder: &Path, path: &Path, metadata: &FileMetadata) -> Resu
         );
     }
     Ok(())
-}
-
-/// How many of these records are read at once.
-fn at_once(places: &[LinePlace]) -> usize {
-    let mut bytes = 0;
-    let fits = places.iter().take(RECORDS_AT_ONCE).take_while(|place| {
-        bytes += place.length;
-        bytes <= BYTES_AT_ONCE
-    });
-    fits.count().max(1)
 }

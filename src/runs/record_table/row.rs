@@ -19,7 +19,7 @@ pub(super) trait Tabled: Detail + Sync + 'static {
     const TABLE: &'static str;
 
     /// What is read of the whole run before its rows are written.
-    type Context: Sync;
+    type Context: Send + Sync;
 
     /// What a row has besides its record.
     type Further: Send + Sync;
@@ -103,14 +103,14 @@ pub(super) struct QuestionTexts {
 }
 
 /// What makes rows of the records of a run.
-pub(super) struct Rows<'r, D: Tabled> {
+pub(super) struct Rows<D: Tabled> {
     names: RecordedNames,
     lights: HashMap<Option<Condition>, Arc<LightTexts>>,
-    questions: HashMap<&'r QuestionId, Arc<QuestionTexts>>,
+    questions: HashMap<QuestionId, Arc<QuestionTexts>>,
     context: D::Context,
 }
 
-impl<'r, D: Tabled> Rows<'r, D> {
+impl<D: Tabled> Rows<D> {
     /// Rows of the run in a folder.
     ///
     /// # Errors
@@ -118,14 +118,14 @@ impl<'r, D: Tabled> Rows<'r, D> {
     pub(super) fn new(
         folder: &Path,
         manifest: &RunManifest,
-        questions: &'r [RunQuestion],
+        questions: &[RunQuestion],
     ) -> Result<Self> {
         let texts = questions.iter().map(|question| {
             let texts = QuestionTexts {
                 scene: Some(question.scene.clone()).filter(|scene| !scene.is_empty()),
                 answer: question.answer.clone(),
             };
-            (&question.id, Arc::new(texts))
+            (question.id.clone(), Arc::new(texts))
         });
         Ok(Self {
             names: RecordedNames::of(manifest),
