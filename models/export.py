@@ -20,7 +20,7 @@
     python export.py retinexformer Retinexformer LOL_v2_real.pth retinexformer.onnx
     python export.py darkir DarkIR DarkIR_1k.pt darkir_1280x720.onnx --size 1280x720
 
-`darkqa-eval enhance --presets` prints the command for each model, with its repository, commit and licence.
+`darkqa-eval enhance presets` prints the command for each model, with its repository, commit and licence.
 
 An export takes images of any size, or with `--size` of one. DarkIR needs `--size`, for its Fourier transforms become products with
 fixed matrices: ONNX Runtime's own DFT is many times slower, and most exporters have none.

@@ -77,7 +77,7 @@ impl Access {
             return Err(Error::usage(
                 "--base-url",
                 format_args!(
-                    "the key would be sent unencrypted to {base}; use https://, or --allow-http on a network that you trust"
+                    "the key would be sent unencrypted to {base}; use https://, or --allow http on a network that you trust"
                 ),
             ));
         }

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::parameters::Constrain;
 use crate::types::question::letter;
 
-/// The name of the only field in a reply with `--constrain json`.
+/// The name of the only field in a reply with `--request constrain=json`.
 pub(super) const ANSWER: &str = "answer";
 
 /// The JSON schema of an object whose only field is one of the letters.

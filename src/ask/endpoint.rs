@@ -397,7 +397,7 @@ impl Endpoint {
     fn out_of_patience(&self, model: ModelNumber, mut failed: FailedTry) -> FailedTry {
         failed.reach = Reach::Endpoint;
         failed.failure.message = format!(
-            "{} (no request was accepted for {:.0} s, longer than --patience; continue later with --resume)",
+            "{} (no request was accepted for {:.0} s, longer than --retries patience; continue later with --resume)",
             failed.failure.message,
             self.refused_for(model).as_secs_f64()
         );
@@ -423,10 +423,10 @@ fn over_budget(last: Option<FailedTry>) -> FailedTry {
     failed
 }
 
-/// The failure of a request that was charged for as many attempts as `--paid-retries` allows.
+/// The failure of a request that was charged for as many attempts as `--retries paid` allows.
 fn out_of_paid_retries(mut failed: FailedTry, lost: LostAttempts) -> FailedTry {
     failed.failure.message = format!(
-        "{} ({} charged without a reply, {} tokens; remedies: a larger --max-tokens, --thinking off, or more --paid-retries)",
+        "{} ({} charged without a reply, {} tokens; remedies: a larger --max-tokens, --thinking off, or more --retries paid)",
         failed.failure.message,
         if lost.attempts == 1 {
             "1 attempt".to_owned()

@@ -38,10 +38,13 @@ const OWNED: [(&str, &str); 15] = [
     ("messages", "--system, or --prompts"),
     ("input", "--system, or --prompts"),
     ("instructions", "--system"),
-    ("stream", "--wire"),
+    ("stream", "--request wire"),
     ("n", "--repeats"),
     ("max_tokens", "--max-tokens"),
-    ("max_completion_tokens", "--max-tokens with --token-field"),
+    (
+        "max_completion_tokens",
+        "--max-tokens with --request token-field",
+    ),
     ("max_output_tokens", "--max-tokens"),
     ("temperature", "--temperature"),
     ("top_p", "--top-p"),
@@ -50,8 +53,8 @@ const OWNED: [(&str, &str); 15] = [
         "--sampling-seed of openeqa, or seed in a file of models",
     ),
     ("reasoning_effort", "--reasoning-effort"),
-    ("logprobs", "--probabilities"),
-    ("top_logprobs", "--probabilities"),
+    ("logprobs", "--request probabilities"),
+    ("top_logprobs", "--request probabilities"),
 ];
 
 /// Fields without which no request can be sent.
@@ -122,7 +125,7 @@ impl RequestArgs {
             *field = field.trim().to_owned();
             if field.is_empty() || NEEDED.contains(&&**field) {
                 let problem = format_args!("{field:?} cannot be left out of a request");
-                return Err(Error::usage("--omit-field", problem));
+                return Err(Error::usage("--request omit-field", problem));
             }
         }
         omit.sort();

@@ -60,7 +60,7 @@ pub(super) enum Again {
     Never,
     /// The same request may succeed later; this spends one of `--retries`.
     Later,
-    /// The endpoint takes no more at the moment. This is a wait and no try: only `--patience` ends it.
+    /// The endpoint takes no more at the moment. This is a wait and no try: only `--retries patience` ends it.
     WhenTaken,
 }
 

@@ -53,7 +53,7 @@ const MODERATED: [&str; 6] = [
 const TOO_LARGE: [&str; 2] = ["request too large", "request is too large"];
 
 /// The remedy for a request that is too large.
-const SMALLER: &str = "send smaller images: --max-side, or --image jpeg:95";
+const SMALLER: &str = "send smaller images: --image max-side=N, or --image jpeg:95";
 
 /// The remedy for a limit that resets once a day.
 const NEXT_DAY: &str =
@@ -175,8 +175,8 @@ impl FailureClass {
     /// The class of a request that the server takes through another wire alone.
     fn of_wire(wanted: Wire) -> Self {
         let hint = match wanted {
-            Wire::Responses => "ask the model through the Responses API: --wire responses",
-            _ => "ask for a stream: --wire chat-stream",
+            Wire::Responses => "ask the model through the Responses API: --request wire=responses",
+            _ => "ask for a stream: --request wire=chat-stream",
         };
         Self {
             refused_field: Some(AdaptableField::Wire(wanted)),

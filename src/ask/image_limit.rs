@@ -101,7 +101,7 @@ impl ImageLimit {
             Some(Known { most, origin }) => {
                 let problem = format!(
                     "a side of {long} pixels is more than the {most} of {origin} for requests with more than {MANY} images; make images \
-                     smaller with --max-side {most}"
+                     smaller with --image max-side={most}"
                 );
                 Err(Error::data("request", problem))
             }
@@ -116,7 +116,7 @@ impl ImageLimit {
         let Known { most, origin } = self.request.bytes.filter(|known| bytes > known.most)?;
         let megabytes = |bytes: usize| bytes as f64 / 1e6;
         Some(format!(
-            "a request may have up to {:.1} MB, with {images} images, and {origin} takes {} MB; make images smaller with --max-side, or \
+            "a request may have up to {:.1} MB, with {images} images, and {origin} takes {} MB; make images smaller with --image max-side=N, or \
              with --image jpeg:95",
             megabytes(bytes),
             megabytes(most)
@@ -129,12 +129,12 @@ impl ImageLimit {
     /// [`Error::Data`] about the image, with the flags that make it smaller.
     pub(crate) fn check(&self, image: &ImageFacts) -> Result<()> {
         let long = image.width.max(image.height);
-        let remedy = "make it smaller with --max-side, or with --image jpeg:95";
+        let remedy = "make it smaller with --image max-side=N, or with --image jpeg:95";
         let wrong = |problem: String| Err(Error::data("image", problem));
         let megabytes = |bytes: usize| bytes as f64 / 1e6;
         if image.bytes > self.bytes {
             return wrong(format!(
-                "{} × {} pixels are {:.1} MB as {}, more than the {} MB of {}; {remedy}, or set another limit with --max-image",
+                "{} × {} pixels are {:.1} MB as {}, more than the {} MB of {}; {remedy}, or set another limit with --image max-mb",
                 image.width,
                 image.height,
                 megabytes(image.bytes),
@@ -174,10 +174,10 @@ impl ImageLimit {
         }
     }
 
-    /// The limit that the user set by `--max-image`.
+    /// The limit that the user set by `--image max-mb`.
     #[must_use]
     pub(crate) fn stated(bytes: usize) -> Self {
-        limit(bytes, None, "--max-image")
+        limit(bytes, None, "--image max-mb")
     }
 }
 
@@ -226,14 +226,14 @@ mod tests {
         for beyond in [image(7_500_001, 10), image(10, 8001)] {
             let error = limit.check(&beyond).unwrap_err().to_string();
             assert!(
-                error.contains("Anthropic") && error.contains("--max-side"),
+                error.contains("Anthropic") && error.contains("--image max-side"),
                 "{error}"
             );
         }
         let both = limit.stricter(ImageLimit::stated(5));
         assert_eq!(
             (both.bytes, both.side, both.origin),
-            (5, Some(8000), "--max-image")
+            (5, Some(8000), "--image max-mb")
         );
         assert!(ImageLimit::stated(5).check(&image(6, 10)).is_err());
     }
@@ -254,7 +254,10 @@ mod tests {
         let wide = image(10, 2001);
         assert!(anthropic.check_request(20, Some(&wide)).is_ok());
         let error = anthropic.check_request(21, Some(&wide)).unwrap_err();
-        assert!(error.to_string().contains("--max-side 2000"), "{error}");
+        assert!(
+            error.to_string().contains("--image max-side=2000"),
+            "{error}"
+        );
         assert!(anthropic.check_request(21, Some(&image(10, 2000))).is_ok());
         // 50 images of 300 kB are 20 MB of base64.
         let gemini = at("https://generativelanguage.googleapis.com/v1beta/openai");

@@ -16,7 +16,7 @@ pub(super) fn check_owner(key: &Secret, base: &BaseUrl, vendors: VendorTable) ->
             "--base-url",
             format_args!(
                 "{base}: the key looks like one of {}, and this address is another's; name the key of this address with --api-key-env NAME, \
-                 or type --key-anyway to send it there",
+                 or type --allow key-mismatch to send it there",
                 owner.name
             ),
         )),
@@ -52,7 +52,8 @@ mod tests {
         for address in ["https://api.openai.com/v1", "https://api.example.org/v1"] {
             let error = check(own, "sk-ant-123", address).unwrap_err();
             assert!(
-                error.contains("looks like one of Anthropic") && error.contains("--key-anyway")
+                error.contains("looks like one of Anthropic")
+                    && error.contains("--allow key-mismatch")
             );
             assert!(!error.contains("sk-ant"), "{error}");
         }

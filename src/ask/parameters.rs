@@ -140,7 +140,7 @@ impl Parameters {
     pub(crate) fn require_greedy(&self) -> Result<()> {
         match self.temperature {
             Temperature::Of(value) if value > 0.0 => Err(Error::usage(
-                "--probabilities",
+                "--request probabilities",
                 "the probabilities of tokens depend on the temperature: --temperature 0, auto or default expected",
             )),
             _ => Ok(()),

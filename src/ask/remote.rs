@@ -60,7 +60,7 @@ impl Remote {
     ///
     /// # Errors
     /// If a header value has characters that HTTP does not allow, if `--thinking` cannot be said to the server, or if the user's own
-    /// fields contradict `--constrain` or `--thinking`.
+    /// fields contradict `--request constrain` or `--thinking`.
     pub fn open(endpoint: Arc<Endpoint>, parameters: Parameters) -> Result<Self> {
         let first = RequestFields::first(&parameters, endpoint.base(), endpoint.vendor())?;
         check_own_fields(&parameters, first)?;
@@ -336,7 +336,7 @@ impl Remote {
         letter_of(constrain, choices, &text).unwrap_or_else(|| {
             if !self.warned_unconstrained.swap(true, Ordering::Relaxed) {
                 warn!(
-                    "{}: a reply does not have the form that --constrain {constrain} requests; the server may not support it, or the \
+                    "{}: a reply does not have the form that --request constrain={constrain} requests; the server may not support it, or the \
                      reply was truncated (--max-tokens)",
                     self.name()
                 );
@@ -365,7 +365,7 @@ fn check_own_fields(parameters: &Parameters, first: RequestFields) -> Result<()>
     if parameters.constrain != Constrain::None
         && let Some(field) = formats.find(|field| own.adds(field))
     {
-        return refused(field, "--constrain");
+        return refused(field, "--request constrain");
     }
     let mut switch = first.switch().into_iter().flat_map(Map::keys);
     if let Some(field) = switch.find(|field| own.adds(field)) {
@@ -380,7 +380,7 @@ fn check_own_fields(parameters: &Parameters, first: RequestFields) -> Result<()>
         return refused("reasoning.effort", flag);
     }
     if parameters.probabilities && own.adds("include") {
-        return refused("include", "--probabilities");
+        return refused("include", "--request probabilities");
     }
     Ok(())
 }
@@ -392,7 +392,7 @@ fn check_vendor(vendor: &Vendor, parameters: &Parameters) -> Result<()> {
             "{} takes a constraint and ignores it, so it would be none; leave it out",
             vendor.name
         );
-        return Err(Error::usage("--constrain", problem));
+        return Err(Error::usage("--request constrain", problem));
     }
     if let Some(instead) = vendor
         .without_probabilities()
@@ -402,7 +402,7 @@ fn check_vendor(vendor: &Vendor, parameters: &Parameters) -> Result<()> {
             "{} {instead}, so the confidence of {} would not be known; leave it out",
             vendor.name, parameters.model
         );
-        return Err(Error::usage("--probabilities", problem));
+        return Err(Error::usage("--request probabilities", problem));
     }
     if let Some(field) = vendor
         .pin

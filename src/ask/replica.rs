@@ -229,7 +229,7 @@ impl Replica {
         message
     }
 
-    /// Makes all requests wait as long as the server asked; a request that would wait more than `--max-wait` is given up, and
+    /// Makes all requests wait as long as the server asked; a request that would wait more than `--retries max-wait` is given up, and
     /// the time at which it could go on is said.
     fn pause(&self, status: u16, sent: Instant, failed: &mut FailedTry) {
         let max_wait = self.sending.max_wait;
@@ -240,7 +240,7 @@ impl Replica {
                     failed.reach = Reach::Endpoint;
                 }
                 failed.failure.message = format!(
-                    "{} (it asks to wait {:.0} s, beyond --max-wait of {:.0} s)",
+                    "{} (it asks to wait {:.0} s, beyond --retries max-wait of {:.0} s)",
                     failed.failure.message,
                     wait.as_secs_f64(),
                     max_wait.as_secs_f64()

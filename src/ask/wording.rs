@@ -108,12 +108,12 @@ mod tests {
             (flat("At most 0 image(s) may be provided in one request."), "--blind"),
             (flat("At most 1 image(s) may be provided in one request."), "--limit-mm-per-prompt"),
             (flat("This model's maximum context length is 4096 tokens. However, you requested 5000 tokens"), "--max-tokens"),
-            (flat("The decoder prompt (length 5000) is longer than the maximum model length of 4096."), "--max-side"),
-            (flat("Multimodal prompt is too long after expanding multimodal tokens. After expanding len(req.origin_input_ids_unpadded)=5192 => 6153 >= 5489."), "--max-side"),
-            (flat("The input (61709 tokens) is longer than the model's context length (40960 tokens)."), "--max-side"),
-            (json!({"error": {"code": 400, "message": "too long", "type": "exceed_context_size_error", "n_ctx": 256}}).to_string(), "--max-side"),
-            (json!({"error": "Trying to keep the first 111490 tokens when context the overflows. However, the model is loaded with context length of only 32768 tokens"}).to_string(), "--max-side"),
-            (json!({"error": {"message": "Please reduce the length of the messages or completion.", "code": "context_length_exceeded"}}).to_string(), "--max-side"),
+            (flat("The decoder prompt (length 5000) is longer than the maximum model length of 4096."), "--image max-side"),
+            (flat("Multimodal prompt is too long after expanding multimodal tokens. After expanding len(req.origin_input_ids_unpadded)=5192 => 6153 >= 5489."), "--image max-side"),
+            (flat("The input (61709 tokens) is longer than the model's context length (40960 tokens)."), "--image max-side"),
+            (json!({"error": {"code": 400, "message": "too long", "type": "exceed_context_size_error", "n_ctx": 256}}).to_string(), "--image max-side"),
+            (json!({"error": "Trying to keep the first 111490 tokens when context the overflows. However, the model is loaded with context length of only 32768 tokens"}).to_string(), "--image max-side"),
+            (json!({"error": {"message": "Please reduce the length of the messages or completion.", "code": "context_length_exceeded"}}).to_string(), "--image max-side"),
             (json!([{"error": {"code": 400, "message": "Bad key", "details": [{"reason": "API_KEY_INVALID"}]}}]).to_string(), "--api-key-env"),
         ] {
             let wording = Wording::find(&Complaint::of_body(&body), true);

@@ -1,4 +1,4 @@
-//! The TOML file of a measured camera, as `--camera` reads it: [`camera_file`].
+//! The TOML file of a measured camera, as `--noise camera` reads it: [`camera_file`].
 
 use std::fmt::Write as _;
 
@@ -35,7 +35,7 @@ pub(crate) fn camera_file(camera: &CameraFit) -> Result<String> {
     for fit in &camera.settings {
         step(&mut text, camera, fit);
     }
-    // What --camera would refuse is not written.
+    // What --noise camera would refuse is not written.
     Calibration::parse(&text, "the measured camera").map_err(|e| {
         let problem = format!("{e}; leave out the setting, or see its frames");
         Error::data(&camera.name, problem)

@@ -1,5 +1,5 @@
 //! A camera from its own frames: [`calibrate`] measures gain, read noise, row noise and offsets of a sensor at each setting of its
-//! gain, from bias frames and pairs of flats, and [`camera_file()`] writes them for `--camera`.
+//! gain, from bias frames and pairs of flats, and [`camera_file()`] writes them for `--noise camera`.
 //!
 //! ```text
 //! bias frames ─ mean ──► offsets, light, hot pixels, fixed pattern

@@ -10,11 +10,11 @@ use crate::run::batch::{BatchFolderArgs, BatchImportArgs, BatchStatusArgs};
 use crate::run::bundle::BundleArgs;
 use crate::run::cache::CacheArgs;
 use crate::run::calibrate::CalibrateArgs;
-use crate::run::enhance::EnhanceArgs;
+use crate::run::enhance::EnhanceCommand;
 use crate::run::evaluate::{CheckArgs, EvaluateArgs};
 use crate::run::export::ExportArgs;
 use crate::run::figures::FiguresArgs;
-use crate::run::import::ImportArgs;
+use crate::run::import::ImportCommand;
 use crate::run::init::InitArgs;
 use crate::run::merge::MergeArgs;
 use crate::run::models::ModelsArgs;
@@ -26,9 +26,12 @@ use crate::run::serve::ServeArgs;
 use crate::run::show::ShowArgs;
 use crate::run::site::SiteArgs;
 use crate::run::study;
-use crate::run::synthesize::SynthesizeArgs;
+use crate::run::synthesize::SynthesizeCommand;
 use crate::run_reports::ReportArgs;
 use crate::types::Decides;
+use crate::types::keyed_flag::KeyedFlag;
+
+use super::keyed::{grouped, name_of};
 
 pub(super) const NAME: &str = "darkqa-eval";
 
@@ -94,12 +97,12 @@ pub(crate) struct CommonArgs {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Write the low-light versions of images, as an evaluation would send them
-    Synthesize(Box<SynthesizeArgs>),
+    Synthesize(Box<SynthesizeCommand>),
     /// Compare the synthesis with real pairs of images in normal and low light
     ///
     /// It takes no --shard: its means, its pooled residuals and the fitted gain are over all pairs.
     Realism(Box<RealismArgs>),
-    /// Measure your own camera, from bias frames and pairs of flats of its sensor, as a file for --camera
+    /// Measure your own camera, from bias frames and pairs of flats of its sensor, as a file for --noise camera
     Calibrate(Box<CalibrateArgs>),
     /// Make multiple-choice questions about frames, by rule, from their depth, class and segment maps
     Questions(Box<QuestionsArgs>),
@@ -111,13 +114,13 @@ pub(crate) enum Command {
     /// the evaluation
     Plan(Box<EvaluateArgs>),
     /// Import frames of another data set as a folder of frames
-    Import(Box<ImportArgs>),
+    Import(Box<ImportCommand>),
     /// Write ready-made sets for other tools, one for each condition, with its images
     Export(Box<ExportArgs>),
     /// Write the built-in rooms as frames with depth, class and segment maps
     Rooms(RoomsArgs),
-    /// Enhance images with an ONNX model, as an evaluation would; or describe its inputs and outputs
-    Enhance(Box<EnhanceArgs>),
+    /// Enhance images with an ONNX model, as an evaluation would; or describe or examine the model
+    Enhance(Box<EnhanceCommand>),
     /// Show the settings of each model of a file: endpoint, key, request and digest; sends nothing without --check
     Models(ModelsArgs),
     /// Ask through a Batch API, at half the price: submit batches and wait for them, or write and import their files
@@ -131,15 +134,16 @@ pub(crate) enum Command {
     OpenEqa(Box<OpenEqaArgs>),
     /// Serve the built-in models at an OpenAI-compatible endpoint on this machine, to try clients without keys
     Serve(ServeArgs),
-    /// Show the results of runs, from their records alone: tables, figures and one HTML file; several runs are compared
-    Report(ReportArgs),
+    /// Show the results of runs, from their records alone: tables, figures and one HTML file; several runs are compared, and shards merged
+    Report(ReportCommand),
     /// Draw the figures of runs for a paper, at the width of its columns: PDF, SVG, pgfplots, and their captions
     Figures(FiguresArgs),
     /// Pack a run as one ZIP file to pass on: records, tables, page and findings, without keys and paths of this machine
     Bundle(BundleArgs),
     /// Write a site of many runs: a leaderboard and the page of each run, to open from a folder or put on any web server
     Site(SiteArgs),
-    /// Merge the shards of an evaluation into one run
+    /// Merge the shards of an evaluation into one run; an earlier name of report merge
+    #[command(hide = true)]
     Merge(MergeArgs),
     /// Make the images of one question again, bit for bit, and check their digests
     Show(ShowArgs),
@@ -180,6 +184,25 @@ pub(crate) enum BatchCommand {
     Export(Box<BatchExportArgs>),
     /// Import the replies of a Batch API into a run
     Import(BatchImportArgs),
+}
+
+/// A report on runs, or another form of it.
+#[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub(crate) struct ReportCommand {
+    /// The form; `None` for a report on runs as they are.
+    #[command(subcommand)]
+    pub form: Option<ReportForm>,
+    /// Flags of the report on runs as they are.
+    #[command(flatten)]
+    pub report: Option<ReportArgs>,
+}
+
+/// The other forms of a report.
+#[derive(Debug, Subcommand)]
+pub(crate) enum ReportForm {
+    /// Merge the shards of an evaluation into one run, with its report
+    Merge(MergeArgs),
 }
 
 /// The flags of `check`.
@@ -227,9 +250,9 @@ pub(crate) enum StudyCommand {
     Read(study::ReadArgs),
 }
 
-/// The command line, with the class of each flag at the end of its help, such as `[pixels]`.
+/// The command line, with keyed flags, and the class of each flag at the end of its help, such as `[pixels]`.
 pub(super) fn command() -> clap::Command {
-    marked(Cli::command())
+    marked(grouped(Cli::command()))
 }
 
 fn marked(command: clap::Command) -> clap::Command {
@@ -239,7 +262,14 @@ fn marked(command: clap::Command) -> clap::Command {
             return arg;
         };
         let help = arg.get_help().map(|help| format!("{help} [{class}]"));
-        let long = arg.get_long_help().map(|help| format!("{help} [{class}]"));
+        let long = arg.get_long_help().map(ToString::to_string);
+        let long = long.map(|help| match help.split_once('\n') {
+            // The lines of its keys follow, each with its own class.
+            Some((first, keys)) if KeyedFlag::named(&name_of(&arg)).is_some() => {
+                format!("{first} [{class}]\n{keys}")
+            }
+            _ => format!("{help} [{class}]"),
+        });
         let arg = arg.help(help.unwrap_or_default());
         match long {
             Some(long) => arg.long_help(long),

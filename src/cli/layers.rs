@@ -4,6 +4,8 @@
 //! them are parsed together, once. So a value is read in the same way wherever it comes from. ripgrep does so with its configuration
 //! file (`crates/core/flags/parse.rs`).
 
+mod earlier_form;
+mod expansion;
 mod invalid_toml;
 mod layered_value;
 mod models_file;
@@ -19,9 +21,12 @@ use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command};
 use toml::{Table, Value};
 
+use self::earlier_form::in_current_form;
+use self::expansion::Expansion;
 use self::invalid_toml::invalid_toml;
 use self::layered_value::LayeredValue;
 use self::value_text::text_of;
+use super::keyed::{name_of, respelled};
 use crate::ask::OPENAI_KEY;
 use crate::error::{Error, Result};
 use crate::files::reading;
@@ -69,6 +74,7 @@ pub(super) fn parse(
     // Cloned before `build`: only then does this setting reach the nested commands.
     let lenient = all.clone().ignore_errors(true);
     all.build();
+    let typed = current_words(&all, typed)?;
     let Ok(matches) = lenient.try_get_matches_from(&typed) else {
         let matches = parse_words(all, typed, &BTreeMap::new())?;
         let typed = BTreeSet::new();
@@ -81,7 +87,8 @@ pub(super) fn parse(
         .collect();
     let in_call = set.iter().filter_map(|arg| arg.get_long());
     let in_call: BTreeSet<String> = in_call.map(str::to_owned).collect();
-    let environment = environment_values(&all, command, &variable)?;
+    let expansion = Expansion(command);
+    let environment = expansion.layer(environment_values(&all, command, &variable)?)?;
     let file = match own.get_one::<PathBuf>(CONFIG) {
         Some(path) => Some(path.clone()),
         None => variable("DARKQA_CONFIG")
@@ -89,7 +96,7 @@ pub(super) fn parse(
             .map(PathBuf::from),
     };
     let of_file = match &file {
-        Some(file) => file_values(file, &all, command, &path)?,
+        Some(file) => expansion.layer(file_values(file, &all, command, &path)?)?,
         None => BTreeMap::new(),
     };
     let models = models_values(own, command, [&environment, &of_file])?;
@@ -98,7 +105,7 @@ pub(super) fn parse(
         let mut newly_set = Vec::new();
         for arg in settable_flags(command) {
             let hidden = || set.iter().any(|other| hides(command, other, arg));
-            if let Some(value) = layer.get(&key(arg)).filter(|_| !hidden()) {
+            if let Some(value) = layer.get(&name_of(arg)).filter(|_| !hidden()) {
                 let flag = arg.get_long().unwrap_or_default();
                 words.extend(as_words(arg, flag, value)?);
                 origins.insert(flag.to_owned(), value.origin.clone());
@@ -112,7 +119,7 @@ pub(super) fn parse(
             let is_in_effect = origins.get(flag) == Some(&value.origin);
             is_in_effect.then(|| (flag.clone(), value))
         });
-        let is_set = |flag: &str| set.iter().any(|arg| key(arg) == flag);
+        let is_set = |flag: &str| set.iter().any(|arg| name_of(arg) == flag);
         let has_key = variable(OPENAI_KEY).is_some_and(|text| !text.is_empty());
         sent_secrets::check(file, &in_effect.collect(), is_set, has_key)?;
     }
@@ -124,6 +131,37 @@ pub(super) fn parse(
         matches: parse_words(all, typed, &origins)?,
         typed: in_call,
     })
+}
+
+/// The typed words in their current form: modes as subcommands, and the settings of keyed flags as the hidden flags for them.
+fn current_words(all: &Command, typed: Vec<OsString>) -> Result<Vec<OsString>> {
+    let (_, place) = typed_command(all, &typed);
+    let typed = in_current_form(typed, place);
+    let (command, _) = typed_command(all, &typed);
+    Expansion(command).words(typed)
+}
+
+/// The command that the words call, and the place of its name. Flags may stand before it.
+fn typed_command<'a>(all: &'a Command, words: &[OsString]) -> (&'a Command, usize) {
+    let (mut command, mut place, mut at) = (all, 0, 1);
+    while let Some(word) = words.get(at).and_then(|word| word.to_str()) {
+        if word == "--" {
+            break;
+        }
+        if let Some(flag) = word.strip_prefix("--") {
+            let mut args = command.get_arguments();
+            let arg = args.find(|arg| arg.get_long() == Some(flag));
+            let has_value = arg.is_some_and(|arg| arg.get_action().takes_values());
+            at += if has_value { 2 } else { 1 };
+            continue;
+        }
+        let Some(inner) = command.find_subcommand(word) else {
+            break;
+        };
+        (command, place) = (inner, at);
+        at += 1;
+    }
+    (command, place)
 }
 
 /// The matches of the command that is called.
@@ -154,12 +192,6 @@ fn settable_flags(command: &Command) -> impl Iterator<Item = &Arg> {
         long.is_some() && !matches!(long, Some("help" | "version" | CONFIG))
     };
     command.get_arguments().filter(settable)
-}
-
-/// The name of a flag in files, which [`variable_name`] turns into that of its variable. It is the name of the field. That differs
-/// from the flag's name only if an evaluation has a flag of the same name and another meaning.
-fn key(arg: &Arg) -> String {
-    arg.get_id().as_str().replace('_', "-")
 }
 
 /// Whether a flag that is set hides another in lower layers: the same flag, or one that conflicts with it.
@@ -193,7 +225,7 @@ fn environment_values(
         }
     }
     let values = settable_flags(command).filter_map(|arg| {
-        let flag = key(arg);
+        let flag = name_of(arg);
         let origin = variable_name(&flag);
         let text = variable(&origin).filter(|text| !text.is_empty())?;
         let list = matches!(arg.get_action(), ArgAction::Append) && !WITH_COMMAS.contains(&&*flag);
@@ -216,7 +248,7 @@ fn variable_name(flag: &str) -> String {
 
 /// The flags of all commands.
 fn every_flag(command: &Command) -> Vec<String> {
-    let mut all: Vec<String> = settable_flags(command).map(key).collect();
+    let mut all: Vec<String> = settable_flags(command).map(name_of).collect();
     all.extend(command.get_subcommands().flat_map(every_flag));
     all
 }
@@ -232,7 +264,7 @@ fn file_values(
     let text = reading::settings(path)?;
     let table: Table = text.parse().map_err(|e| invalid_toml(path, &text, &e))?;
     let mut values = BTreeMap::new();
-    let flags: Vec<String> = settable_flags(command).map(key).collect();
+    let flags: Vec<String> = settable_flags(command).map(name_of).collect();
     read_table(&mut values, path, &table, all, (&flags, called), &[])?;
     Ok(values)
 }
@@ -256,6 +288,10 @@ fn read_table(
             return Err(Error::usage(origin, problem));
         }
         if !flags.contains(&flag) {
+            // A flag of the command around the one that is called, as of `synthesize` for `synthesize check`.
+            if !within.is_empty() && settable_flags(at).any(|arg| name_of(arg) == flag) {
+                continue;
+            }
             let near = nearest(&flag, flags).map(|near| format!("--{near}"));
             let hint = question(near.as_deref());
             let problem = format_args!("there is no flag --{flag} here{hint}");
@@ -304,7 +340,7 @@ fn models_values(
     command: &Command,
     layers: [&BTreeMap<String, LayeredValue>; 2],
 ) -> Result<BTreeMap<String, LayeredValue>> {
-    let flags: Vec<String> = settable_flags(command).map(key).collect();
+    let flags: Vec<String> = settable_flags(command).map(name_of).collect();
     if !flags.iter().any(|flag| flag == MODELS) {
         return Ok(BTreeMap::new());
     }
@@ -409,7 +445,15 @@ pub(super) fn one_line(error: &clap::Error) -> String {
         .collect::<Vec<_>>()
         .join(" ")
         .replace(" tip: ", "; tip: ");
-    line.trim_start_matches("error: ").to_owned()
+    let line = line.trim_start_matches("error: ");
+    // An unknown flag is named as it was typed.
+    match line.split_once("; tip: ") {
+        Some((problem, tip)) if error.kind() == ErrorKind::UnknownArgument => {
+            format!("{problem}; tip: {}", respelled(tip))
+        }
+        None if error.kind() == ErrorKind::UnknownArgument => line.to_owned(),
+        _ => respelled(line),
+    }
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 //! values.
 
 mod command;
+mod keyed;
 mod layers;
 mod no_effect;
 
@@ -31,7 +32,7 @@ use crate::runs::Outcome;
 use crate::types::manifest::Status;
 use crate::types::shown_text::{shown, shown_in_colours};
 
-use command::{BatchCommand, Colours, Command, NAME, StudyCommand};
+use command::{BatchCommand, Colours, Command, NAME, ReportCommand, ReportForm, StudyCommand};
 use layers::one_line;
 
 use command::Cli;
@@ -163,12 +164,16 @@ fn carry_out(cli: Cli, progress: &Progress) -> Result<Outcome> {
         Command::Batch(BatchCommand::Cancel(args)) => run::batch::cancel(&args, progress),
         Command::Batch(BatchCommand::Import(args)) => run::batch::import(&args),
         Command::Serve(args) => run::serve::serve(&args, progress),
-        Command::Report(args) => report(&args),
+        Command::Merge(args)
+        | Command::Report(ReportCommand {
+            form: Some(ReportForm::Merge(args)),
+            ..
+        }) => merge(&args),
+        Command::Report(ReportCommand { report: args, .. }) => report(&args.ok_or_else(no_run)?),
         Command::Figures(args) => run::figures::figures(&args),
         Command::Bundle(args) => run::bundle::bundle(&args),
         Command::Cache(args) => run::cache::cache(&args),
         Command::Site(args) => run::site::site(&args),
-        Command::Merge(args) => merge(&args),
         Command::Show(args) => run::show::show(args),
         Command::Study(StudyCommand::Pack(args)) => study::pack(args, progress),
         Command::Study(StudyCommand::Read(args)) => study::read(&args),
@@ -177,15 +182,38 @@ fn carry_out(cli: Cli, progress: &Progress) -> Result<Outcome> {
     }
 }
 
+/// The error of a report without a run, which the parser finds first.
+fn no_run() -> Error {
+    Error::CommandLine("report: the folder of a run is missing".to_owned())
+}
+
 /// All commands and flags of the program, so that a test can hold the documentation to them.
 #[must_use]
 pub fn command() -> clap::Command {
     command::command()
 }
 
+/// Checks the words of a call as far as the parser does, so that a test can hold the documentation to it.
+///
+/// # Errors
+/// The text of the error.
+pub fn check_words(words: impl IntoIterator<Item = OsString>) -> Result<(), String> {
+    let words = words.into_iter().collect();
+    match layers::parse(command::command(), words, |_| None) {
+        Err(layers::Problem::Error(e)) => Err(e.to_string()),
+        Err(layers::Problem::Help(help)) if help.use_stderr() => Err(help.to_string()),
+        Ok(_) | Err(layers::Problem::Help(_)) => Ok(()),
+    }
+}
+
 fn completions(shell: Shell) -> Outcome {
     let mut script = Vec::new();
-    clap_complete::generate(shell, &mut command::command(), NAME, &mut script);
+    clap_complete::generate(
+        shell,
+        &mut keyed::visible(&command::command()),
+        NAME,
+        &mut script,
+    );
     Outcome::text(
         Status::Complete,
         String::from_utf8_lossy(&script).into_owned(),

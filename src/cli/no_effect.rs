@@ -15,10 +15,10 @@ use crate::engine::settings::JobArgs;
 use crate::image_store::StoreArgs;
 use crate::picture::ImageArgs;
 use crate::run::evaluate::{EvaluateArgs, ShrinkArgs};
-use crate::run::import::ImportArgs;
 use crate::run::openeqa::{JudgeArgs, OpenEqaArgs};
 use crate::run::synthesize::Sheet;
 use crate::types::degradation::Kind;
+use crate::types::keyed_flag::spelled;
 use crate::types::{AxisLevel, SetLight};
 use darkqa_enhance::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
 use darkqa_light::{CameraArgs, LightArgs, SensorArgs};
@@ -47,23 +47,21 @@ pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
         }
         Some(Command::Check(args)) => idle.check(args),
         Some(Command::OpenEqa(args)) => idle.open(args),
-        Some(Command::Synthesize(args)) if args.check.is_some() => {
-            let mut others = ids::<LightArgs>();
-            others.extend(["max_pixels".into(), "threads".into()]);
-            idle.because("--check makes no image", &others);
-        }
-        Some(Command::Synthesize(args)) => {
-            if args.from.is_some() {
-                let why = "--from makes an image with the settings in its file";
-                idle.because(why, &light());
+        Some(Command::Synthesize(command)) => {
+            if let Some(args) = &command.images {
+                if args.sheet == Some(Sheet::Noise) {
+                    let why = "this sheet shows the noise variant";
+                    idle.because(why, &[vec!["variant".into()], camera()].concat());
+                }
+                idle.light(&args.light);
             }
-            if args.sheet == Some(Sheet::Noise) {
-                let why = "this sheet shows the noise variant";
-                idle.because(why, &[vec!["variant".into()], camera()].concat());
-            }
-            idle.light(&args.light);
         }
-        Some(Command::Report(args)) if !args.writes_into_run() => {
+        Some(Command::Report(command))
+            if command
+                .report
+                .as_ref()
+                .is_some_and(|args| !args.writes_into_run()) =>
+        {
             let why = "the report is not written into the folder of a run";
             idle.because(why, &["no_parquet".into()]);
         }
@@ -88,20 +86,9 @@ pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
             let why = "a part measures its frames, and the same command without --shard makes the questions";
             idle.because(why, &of_all.map(str::to_owned));
         }
-        Some(Command::Import(args)) if args.script => {
-            let mut others = ids::<ImportArgs>();
-            others.retain(|id| id != "kind" && id != "script");
-            idle.because("--script imports nothing", &others);
-        }
         Some(Command::Realism(args)) if args.kl_bins == Bins::Kousha => {
             let why = "the bins of kousha have one count added to each";
             idle.because(why, &["kl_empty".into()]);
-        }
-        Some(Command::Enhance(args)) if args.describe => {
-            let others = ["force".into(), "max_pixels".into()];
-            let why = "--describe enhances nothing";
-            let flags = [ids::<SizeArgs>(), ids::<CodesArgs>(), others.to_vec()];
-            idle.because(why, &flags.concat());
         }
         _ => {}
     }
@@ -172,7 +159,7 @@ impl NoEffect {
         let idle: Vec<String> = flags
             .iter()
             .filter(|id| self.typed.remove(*id))
-            .map(|id| format!("--{}", id.replace('_', "-")))
+            .map(|id| spelled(&id.replace('_', "-")))
             .collect();
         if !idle.is_empty() {
             self.lines
@@ -351,14 +338,16 @@ impl NoEffect {
 mod tests {
     use std::ffi::OsString;
 
-    use clap::{CommandFactory as _, FromArgMatches as _};
+    use clap::FromArgMatches as _;
 
     use super::*;
+    use crate::cli::command;
 
     fn lines(words: &str) -> Vec<String> {
         let words = std::iter::once("darkqa-eval").chain(words.split(' '));
         let words: Vec<OsString> = words.map(OsString::from).collect();
-        let matches = Cli::command().try_get_matches_from(words).unwrap();
+        let parsed = layers::parse(command::command(), words, |_| None);
+        let matches = parsed.map_err(|_| "not parsed").unwrap().matches;
         without_effect(&Cli::from_arg_matches(&matches).unwrap(), &matches)
     }
 
@@ -370,15 +359,15 @@ mod tests {
         ),
         (
             "--blind-model m --max-side 9 --image jpeg:9 --detail low",
-            "--image, --max-side, --detail: no effect: no model is shown",
+            "--image, --image max-side, --image detail: no effect: no model is shown",
         ),
         (
             "--blind-model m --colour ignore --transfer linear --exposure 1",
-            "--colour, --transfer, --exposure: no effect: no model is shown",
+            "--decode colour, --decode transfer, --decode exposure: no effect: no model is shown",
         ),
         (
             "--model m --levels L0 --variant ev --ratio 9 --fixed",
-            "--ratio, --fixed, --variant: no effect: the only level is L0",
+            "--noise ratio, --noise fixed, --variant: no effect: the only level is L0",
         ),
         (
             "--model m --variant ev --profile eld",
@@ -386,19 +375,19 @@ mod tests {
         ),
         (
             "--model m --tile whole --offline",
-            "--tile, --offline: no effect: no --llie is named",
+            "--llie-options tile, --llie-options offline: no effect: no --llie is named",
         ),
         (
             "--model m --levels L0 --llie-on l0 --ort-lib x --llie-max-side 9",
-            "--llie-on, --llie-max-side, --ort-lib: no effect: no --llie is named",
+            "--llie-on, --llie-options max-side, --llie-options ort-lib: no effect: no --llie is named",
         ),
         (
             "--model random --temperature 0 --rpm 9 --max-cost 1 --grace 9",
-            "--temperature, --rpm, --max-cost, --grace: no effect: all models are built in",
+            "--temperature, --rpm, --max-cost, --stop grace: no effect: all models are built in",
         ),
         (
             "--model random --constrain json",
-            "--constrain: no effect: all models are built in",
+            "--request constrain: no effect: all models are built in",
         ),
         (
             "--model random --observer-controls",
@@ -406,19 +395,19 @@ mod tests {
         ),
         (
             "--model m --ask-per-image 3",
-            "--ask-per-image: no effect: no --ask is named",
+            "--ask per-image: no effect: no --ask is named",
         ),
         (
             "--model m --trust-models",
-            "--trust-models: no effect: no file of models is named",
+            "--allow models-file: no effect: no file of models is named",
         ),
         (
             "--model m --dry-run --timings --grace 9",
-            "--grace, --timings: no effect: --dry-run sends nothing",
+            "--stop grace, --timings: no effect: --dry-run sends nothing",
         ),
         (
             "batch run --model m --grace 9",
-            "--grace: no effect: a batch has no request in flight",
+            "--stop grace: no effect: a batch has no request in flight",
         ),
         (
             "--model m --dry-run --no-parquet",
@@ -438,7 +427,7 @@ mod tests {
         ),
         (
             "--model m --images-cache-size 9",
-            "--images-cache-size: no effect: no --images-cache is named",
+            "--images-cache size: no effect: no --images-cache is named",
         ),
         (
             "openeqa --questions q --frames f --model m --judge-temperature 1",
@@ -454,11 +443,7 @@ mod tests {
         ),
         (
             "openeqa --questions q --frames f --model m --levels L0 --gain 1",
-            "--gain: no effect: the only level is L0",
-        ),
-        (
-            "synthesize a --out b --from c --levels L3 --camera x",
-            "--levels, --camera: no effect: --from",
+            "--noise gain: no effect: the only level is L0",
         ),
         (
             "synthesize a --out b --sheet noise --variant ev",
@@ -474,11 +459,11 @@ mod tests {
         ),
         (
             "--model m --variant motion --profile eld --gain 1",
-            "--profile, --gain: no effect: no variant has noise",
+            "--profile, --noise gain: no effect: no variant has noise",
         ),
         (
             "--model m --variant auto --profile eld --gain 1 --camera nikon-d850",
-            "--profile, --gain: no effect: automatic exposure has",
+            "--profile, --noise gain: no effect: automatic exposure has",
         ),
         (
             "export llava a --out b --levels L0 --auto gain=3",
@@ -486,7 +471,7 @@ mod tests {
         ),
         (
             "synthesize a --out b --levels L0 --tone none",
-            "--tone: no effect: the only level is L0",
+            "--noise tone: no effect: the only level is L0",
         ),
         (
             "export llava a --out b --llie-on ev",
@@ -498,15 +483,11 @@ mod tests {
         ),
         (
             "plan --model m --out r --shard 1/2 --workers 2",
-            "--shard, --workers: no effect: a plan is of the whole run",
+            "--shard, --shard workers: no effect: a plan is of the whole run",
         ),
         (
             "plan --model m --out r --dry-run",
             "--dry-run: no effect: plan asks nothing",
-        ),
-        (
-            "enhance m --describe --force",
-            "--force: no effect: --describe",
         ),
     ];
 

@@ -5,16 +5,79 @@ use std::path::Path;
 use clap::{Arg, Command as Clap, CommandFactory as _};
 
 use super::*;
+use crate::cli::keyed::{grouped, name_of, with_value};
 use crate::types::Decides;
+use crate::types::keyed_flag::{KEYED_FLAGS, keyed_form};
 
 #[test]
 fn the_command_line_is_valid() {
-    Cli::command().help_expected(true).debug_assert();
+    command::command().help_expected(true).debug_assert();
+}
+
+/// The number of flags of an evaluation, without the hidden ones that keyed flags stand for.
+#[test]
+fn an_evaluation_has_at_most_eighty_flags() {
+    let mut command = command::command();
+    command.build();
+    let flags: Vec<&str> = command
+        .get_arguments()
+        .filter(|arg| !is_key(arg))
+        .filter_map(Arg::get_long)
+        .collect();
+    assert!(flags.len() <= 80, "{}: {flags:?}", flags.len());
+}
+
+#[test]
+fn only_keys_are_hidden_and_every_key_is_of_a_flag() {
+    let mut root = command::command();
+    root.build();
+    let is_wrong = |arg: &&Arg| arg.is_hide_set() != is_key(arg);
+    for command in commands(&root) {
+        let wrong: Vec<&Arg> = command.get_arguments().filter(is_wrong).collect();
+        assert!(wrong.is_empty(), "{}: {wrong:?}", command.get_name());
+    }
+    for command in commands(&root) {
+        for arg in command.get_arguments().filter(|arg| is_key(arg)) {
+            let (keyed, _) = keyed_form(&name_of(arg)).unwrap();
+            let mut visible = command.get_arguments().filter(|arg| !arg.is_hide_set());
+            assert!(
+                visible.any(|arg| arg.get_long() == Some(keyed.name)),
+                "{}: no --{} for {arg}",
+                command.get_name(),
+                keyed.name
+            );
+        }
+    }
+    for (_, flag) in KEYED_FLAGS.iter().flat_map(|keyed| keyed.keys) {
+        let has = root.get_arguments().any(|arg| name_of(arg) == *flag);
+        assert!(has, "an evaluation has no flag {flag}");
+    }
+}
+
+#[test]
+fn completions_offer_no_hidden_flag() {
+    for shell in [
+        Shell::Bash,
+        Shell::Zsh,
+        Shell::Fish,
+        Shell::Elvish,
+        Shell::PowerShell,
+    ] {
+        let script = completions(shell).output;
+        assert!(
+            script.contains("noise") && !script.contains("amplify "),
+            "{shell}"
+        );
+        assert!(
+            !script.contains("llie-max-side") && script.contains("openeqa"),
+            "{shell}"
+        );
+    }
 }
 
 /// All flags of all commands as Markdown.
 fn reference() -> String {
-    let mut command = Cli::command();
+    let mut command = grouped(Cli::command());
     command.build();
     let mut text = "# All flags\n\nAt the end of this page you know each flag, its default and what it decides. `UPDATE=1 cargo test --lib cli::` writes the page from \
                     what `--help` shows. A variable is `DARKQA_` and the name of the \
@@ -33,10 +96,9 @@ fn section(text: &mut String, command: &Clap, name: &str) {
         .unwrap_or_default();
     let _ = write!(text, "\n## {name}\n\n{about}\n");
     let shown = |arg: &&Arg| !matches!(arg.get_id().as_str(), "help" | "version");
-    let args: Vec<&Arg> = command.get_arguments().filter(shown).collect();
-    let is_only_a_group =
-        command.is_subcommand_required_set() || name.ends_with("batch") || name.ends_with("study");
-    if !is_only_a_group {
+    let mut args: Vec<&Arg> = command.get_arguments().filter(shown).collect();
+    args.sort_by_key(|arg| order(command, arg));
+    if !is_only_a_group(command) {
         text.push_str("\n| flag | default | decides | |\n|---|---|---|---|\n");
         for arg in args {
             row(text, arg);
@@ -44,10 +106,41 @@ fn section(text: &mut String, command: &Clap, name: &str) {
     }
     for inner in command
         .get_subcommands()
-        .filter(|inner| inner.get_name() != "help")
+        .filter(|inner| inner.get_name() != "help" && !inner.is_hide_set())
     {
         section(text, inner, &format!("{name} {}", inner.get_name()));
     }
+}
+
+/// Whether a flag is hidden because a keyed flag sets the same.
+fn is_key(arg: &Arg) -> bool {
+    keyed_form(&name_of(arg)).is_some()
+}
+
+/// Whether a command only holds other commands.
+fn is_only_a_group(command: &Clap) -> bool {
+    let has_own = |arg: &Arg| !arg.is_global_set() && !is_of_clap(arg);
+    command.has_subcommands() && !command.get_arguments().any(has_own)
+}
+
+/// The place of a flag in the list: keys stand below their keyed flag.
+fn order(command: &Clap, arg: &Arg) -> (usize, bool) {
+    let keyed = KEYED_FLAGS.iter().find(|keyed| {
+        let mut flags = keyed.keys.iter().map(|(_, flag)| *flag);
+        flags.any(|flag| flag == name_of(arg))
+    });
+    let keyed = keyed.and_then(|keyed| {
+        let mut args = command.get_arguments();
+        args.find(|arg| arg.get_long() == Some(keyed.name))
+    });
+    let place = keyed.unwrap_or(arg).get_display_order();
+    (place, is_key(arg))
+}
+
+/// A key as it is typed, such as `--noise gain=K`; `None` for other flags.
+fn typed_key(arg: &Arg) -> Option<String> {
+    let (keyed, key) = keyed_form(&name_of(arg))?;
+    Some(format!("--{} {}", keyed.name, with_value(key, arg)))
 }
 
 fn row(text: &mut String, arg: &Arg) {
@@ -58,12 +151,15 @@ fn row(text: &mut String, arg: &Arg) {
     } else {
         String::new()
     };
+    let key_flag = typed_key(arg);
     let flag = match arg.get_long() {
+        _ if key_flag.is_some() => key_flag.clone().unwrap_or_default(),
         Some(long) if values.is_empty() => format!("--{long}"),
         Some(long) => format!("--{long} {values}"),
         None => values,
     };
     let key = match arg.get_long() {
+        Some(long) if is_key(arg) => format!(" (`--{long}` until 0.2)"),
         Some(long) if long != id => format!(" (`{id}` in variables and files)"),
         _ => String::new(),
     };
@@ -83,7 +179,10 @@ fn row(text: &mut String, arg: &Arg) {
         [] => stated,
         values => format!("`{}`", values.join(",")),
     };
-    let possible = arg.get_possible_values();
+    let possible = match key_flag {
+        Some(_) => Vec::new(),
+        None => arg.get_possible_values(),
+    };
     let words: Vec<String> = possible
         .iter()
         .map(|value| format!("`{}`", value.get_name()))
@@ -184,7 +283,8 @@ fn the_manual_says_what_the_help_says() {
             .unwrap();
         let page = words_of(&String::from_utf8(page).unwrap());
         let shown = words_of(&command.clone().term_width(0).render_long_help().to_string());
-        for arg in command.get_arguments().filter(|arg| !is_of_clap(arg)) {
+        let is_shown = |arg: &&Arg| !is_of_clap(arg) && !arg.is_hide_set();
+        for arg in command.get_arguments().filter(is_shown) {
             let help = arg.get_long_help().or(arg.get_help());
             let help = words_of(&help.map(ToString::to_string).unwrap_or_default());
             for (text, place) in [(&page, "manual"), (&shown, "help")] {

@@ -92,7 +92,7 @@ enum SegmentSource {
 pub(super) enum MissingFiles {
     /// The list is refused.
     Refused,
-    /// They are named when they are read, so that `--bad skip` leaves out their frames.
+    /// They are named when they are read, so that `--skip bad` leaves out their frames.
     Named,
 }
 

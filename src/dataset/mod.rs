@@ -178,7 +178,7 @@ impl Dataset {
         std::mem::take(&mut self.questions)
     }
 
-    /// The same data set with the questions of a file. Each must be about one of its frames; others are left out with `--bad skip`.
+    /// The same data set with the questions of a file. Each must be about one of its frames; others are left out with `--skip bad`.
     fn with_questions_of(
         self,
         file: &Path,
@@ -217,7 +217,7 @@ impl Dataset {
             (None, _) => Ok(asked),
             (Some(problem), Some(skip)) => asked.without_strangers(&problem, skip),
             (Some(problem), None) => {
-                Err(Error::data(problem, "--bad skip leaves such questions out"))
+                Err(Error::data(problem, "--skip bad leaves such questions out"))
             }
         }
     }

@@ -1,4 +1,4 @@
-//! Questions about images that cannot be used, which `--bad skip` leaves out: [`Dataset::without`].
+//! Questions about images that cannot be used, which `--skip bad` leaves out: [`Dataset::without`].
 
 use std::collections::{BTreeMap, BTreeSet};
 

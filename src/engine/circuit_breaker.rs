@@ -232,7 +232,7 @@ impl CircuitBreaker {
         let too_many = self.max_failures.is_some_and(|max| self.failures >= max);
         let too_many = too_many.then(|| {
             format!(
-                "the limit of failed trials is reached (--max-failures {}); the last: {message}",
+                "the limit of failed trials is reached (--stop failures={}); the last: {message}",
                 self.failures
             )
         });

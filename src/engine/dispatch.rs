@@ -242,7 +242,7 @@ impl<I: Item> ReplySink<'_, I> {
         for (source, trials) in &self.not_asked {
             tracing::warn!(
                 "{source}: {trials} of its trials were not asked: the server fails for this image again and again, and answers others; \
-                 leave it out, or send it smaller (--max-side)"
+                 leave it out, or send it smaller (--image max-side=N)"
             );
         }
         self.store.sync()?;
@@ -338,7 +338,10 @@ impl<I: Item> ReplySink<'_, I> {
         if !in_flight.is_empty() {
             let (at_most, again) = match grace {
                 Some(grace) => (
-                    format!(", after {} s (--grace) at the latest", grace.as_secs_f64()),
+                    format!(
+                        ", after {} s (--stop grace) at the latest",
+                        grace.as_secs_f64()
+                    ),
                     " again",
                 ),
                 None => (String::new(), ""),

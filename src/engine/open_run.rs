@@ -202,7 +202,7 @@ impl<E: Experiment> OpenRun<'_, E> {
             };
             tracing::warn!(
                 "{not_again} {trials} not asked again: {were} charged for several attempts without a reply; asked again with more \
-                 --paid-retries, best with a larger --max-tokens in another folder"
+                 --retries paid, best with a larger --max-tokens in another folder"
             );
         }
         let sent = self.store.pending_in_batches()?;
@@ -506,7 +506,7 @@ pub(crate) fn missing_notes<E: Experiment>(experiment: &E, folder: &Path) -> Mis
     MissingNotes::new(thumbnails, store::read_fidelity(folder))
 }
 
-/// Keys of the trials without a reply that were charged as often as `--paid-retries` allows.
+/// Keys of the trials without a reply that were charged as often as `--retries paid` allows.
 pub(crate) fn lost_for_good(stored: &[StoredTrial], settings: &JobSettings) -> HashSet<TrialKey> {
     let servers = settings.ask.servers().into_iter();
     let Some(most) = servers.map(|server| server.sending.paid_retries).max() else {

@@ -191,7 +191,7 @@ impl ImageStore {
                 let (folder, most) = (self.named.display(), self.most as f64 / 1e9);
                 tracing::warn!(
                     "--images-cache: {folder} is full, and no image in it is unused for 14 days; further ones are not stored; a larger \
-                     --images-cache-size than {most} makes room"
+                     --images-cache size than {most} makes room"
                 );
             }
             return;

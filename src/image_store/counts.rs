@@ -44,7 +44,7 @@ impl fmt::Display for StoreCounts {
         for (count, what) in [
             (
                 self.left_out,
-                "not stored because the store is full (--images-cache-size)",
+                "not stored because the store is full (--images-cache size)",
             ),
             (self.damaged, "damaged and made again"),
             (self.evicted, "removed that nobody had used for 14 days"),

@@ -33,7 +33,7 @@ pub(crate) struct Sidecar<R> {
     darkqa_eval: String,
     #[serde(flatten)]
     pub(crate) recipe: R,
-    /// Why the image may be wrong although it was made (`--llie-anyway`). It follows from all images of a call, and decides no pixel.
+    /// Why the image may be wrong although it was made (`--allow bad-enhancer`). It follows from all images of a call, and decides no pixel.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     used_anyway: Option<String>,
     /// The image file; `None` in files of the first schema.

@@ -46,11 +46,11 @@ pub(crate) fn open_data(
     Ok(dataset.with_questions(questions))
 }
 
-/// The same data without images that cannot be read, and without the questions that show one, if `--bad` allows it. Each image is
+/// The same data without images that cannot be read, and without the questions that show one, if `--skip bad` allows it. Each image is
 /// decoded; with its maps if questions are to be made of them.
 ///
 /// # Errors
-/// If more is broken than `--bad` allows.
+/// If more is broken than `--skip bad` allows.
 fn usable(dataset: Dataset, skip: Option<SkipBad>, progress: &Progress) -> Result<Dataset> {
     let Some(skip) = skip else {
         return Ok(dataset);

@@ -251,7 +251,7 @@ pub(crate) fn inspect_all(
     let bar = progress.bar("reading images", first.len());
     let sources = first.into_par_iter().map(|question| {
         let source = Source::of_questions(dataset, &question.frame).map_err(|e| {
-            let problem = format_args!("{e}; --bad skip leaves such questions out");
+            let problem = format_args!("{e}; --skip bad leaves such questions out");
             Error::data(
                 format_args!("question {:?}", excerpt(&question.id.0, 60)),
                 problem,

@@ -119,10 +119,10 @@ impl fmt::Display for TimingsText<'_> {
             }
             _ if idle < took / 4.0 => "nothing limits the speed much",
             Some(TimedStep::Enhance) => {
-                "making images limits the speed, enhancement most: more cores, --shard over machines or --llie-max-side would help"
+                "making images limits the speed, enhancement most: more cores, --shard over machines or --llie-options max-side would help"
             }
             Some(TimedStep::Encode) => {
-                "making images limits the speed, encoding most: more cores, --shard over machines, or smaller images (--max-side, --image \
+                "making images limits the speed, encoding most: more cores, --shard over machines, or smaller images (--image max-side=N, --image \
                  jpeg:95) would help"
             }
             _ => "making images limits the speed: more cores or --shard over machines would help",

@@ -1,4 +1,4 @@
-//! `calibrate`: measuring a camera from frames of its sensor, as a file for `--camera`.
+//! `calibrate`: measuring a camera from frames of its sensor, as a file for `--noise camera`.
 
 use std::path::{Path, PathBuf};
 
@@ -28,7 +28,7 @@ pub(crate) struct CalibrateArgs {
     /// files of makers (DNG, CR2, NEF) are not read.
     #[arg(value_name = "DIR", add = Decides::Pixels)]
     pub recording: PathBuf,
-    /// The camera file to write, for --camera, with the ending .toml; its figure goes beside it, with the ending .svg
+    /// The camera file to write, for --noise camera, with the ending .toml; its figure goes beside it, with the ending .svg
     #[arg(long, value_name = "FILE", add = Decides::Nothing)]
     pub out: PathBuf,
     /// The colour filters of the upper left corner of the frames, row by row; mono for none
@@ -68,7 +68,7 @@ pub(crate) fn calibrate(args: &CalibrateArgs, progress: &Progress) -> Result<Out
         .is_none_or(|ending| !ending.eq_ignore_ascii_case("toml"))
     {
         let problem = format!(
-            "{} does not end in .toml, by which --camera recognises a camera file; its figure gets the ending .svg",
+            "{} does not end in .toml, by which --noise camera recognises a camera file; its figure gets the ending .svg",
             args.out.display()
         );
         return Err(Error::usage("--out", problem));
@@ -125,7 +125,7 @@ fn output(args: &CalibrateArgs, camera: &CameraFit, figure: &Path) -> Result<Str
         return calibration::json(camera);
     }
     Ok(format!(
-        "{}{}: the camera, for --camera; {}: its fits\n",
+        "{}{}: the camera, for --noise camera; {}: its fits\n",
         calibration::table(camera),
         args.out.display(),
         figure.display()

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Component, Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, Subcommand};
 use ndarray::Array2;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
@@ -35,76 +35,93 @@ const HM3D_SCRIPT: &str = include_str!("../import/hm3d_frames.py");
 /// The maximum number of words without a class that are printed.
 const NAMED: usize = 12;
 
-/// The flags of `import`.
+/// `import`, or another form of it.
 #[derive(Debug, Args)]
-pub(crate) struct ImportArgs {
-    /// The kind of data set in --src
-    #[arg(value_name = "KIND", value_enum, add = Decides::Pixels)]
-    pub kind: DataSetKind,
-    /// The data set, laid out as src/import/README.md shows; repeatable: several folders are joined, each scene with its folder's number
-    /// if two have one of its name; default: none; required without --script
-    #[arg(long, value_name = "DIR", required_unless_present = "script", add = Decides::Pixels)]
-    pub src: Vec<PathBuf>,
-    /// Where the frames go, in the common interface; default: none; required without --script
-    #[arg(long, value_name = "DIR", required_unless_present = "script", add = Decides::Nothing)]
-    pub out: Option<PathBuf>,
-    /// Print the Python script that renders HM3D with habitat-sim for --src, and import nothing (kind habitat)
-    #[arg(long, conflicts_with_all = ["src", "out"], add = Decides::Nothing)]
-    pub script: bool,
-    /// The name the data set gives itself; questions are named by it; default: the kind
-    #[arg(long, value_name = "NAME", add = Decides::Reply)]
-    pub name: Option<String>,
-    /// Facts about the maps that the data set does not state.
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub(crate) struct ImportCommand {
+    /// The form; `None` for an import.
+    #[command(subcommand)]
+    form: Option<ImportForm>,
+    /// Flags of the import.
     #[command(flatten)]
-    pub stated: StatedArgs,
-    /// The flags that select key frames.
-    #[command(flatten)]
-    pub key_frames: KeyFrameArgs,
-    /// Write into a folder that holds frames already
-    #[arg(long, help_heading = "Output", add = Decides::Nothing)]
-    pub force: bool,
-    /// The maximum size of an image.
-    #[command(flatten)]
-    pub limit: PixelLimit,
-    /// What the codes of images mean.
-    #[command(flatten)]
-    pub codes: CodesArgs,
-    /// Further folders of the frames.
-    #[command(flatten)]
-    pub root: RootArgs,
-    /// The number of threads.
-    #[command(flatten)]
-    pub threads: ThreadArgs,
+    import: Option<ImportArgs>,
 }
 
-/// Imports the frames; or only prints the script of --script.
+/// The other forms of `import`.
+#[derive(Debug, Subcommand)]
+enum ImportForm {
+    /// Print the Python script that renders HM3D with habitat-sim as `import habitat` reads it
+    Script {
+        /// The kind of data set; habitat has a script
+        #[arg(value_name = "KIND", value_enum, add = Decides::Nothing)]
+        kind: DataSetKind,
+    },
+}
+
+/// The flags of `import`.
+#[derive(Debug, Args)]
+#[group(arg = "kind")]
+struct ImportArgs {
+    /// The kind of data set in --src
+    #[arg(value_name = "KIND", value_enum, add = Decides::Pixels)]
+    kind: DataSetKind,
+    /// The data set, laid out as src/import/README.md shows; repeatable: several folders are joined, each scene with its folder's number
+    /// if two have one of its name
+    #[arg(long, value_name = "DIR", required = true, add = Decides::Pixels)]
+    src: Vec<PathBuf>,
+    /// Where the frames go, in the common interface
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
+    out: PathBuf,
+    /// The name the data set gives itself; questions are named by it; default: the kind
+    #[arg(long, value_name = "NAME", add = Decides::Reply)]
+    name: Option<String>,
+    /// Facts about the maps that the data set does not state.
+    #[command(flatten)]
+    stated: StatedArgs,
+    /// The flags that select key frames.
+    #[command(flatten)]
+    key_frames: KeyFrameArgs,
+    /// Write into a folder that holds frames already
+    #[arg(long, help_heading = "Output", add = Decides::Nothing)]
+    force: bool,
+    /// The maximum size of an image.
+    #[command(flatten)]
+    limit: PixelLimit,
+    /// What the codes of images mean.
+    #[command(flatten)]
+    codes: CodesArgs,
+    /// Further folders of the frames.
+    #[command(flatten)]
+    root: RootArgs,
+    /// The number of threads.
+    #[command(flatten)]
+    threads: ThreadArgs,
+}
+
+/// Imports frames, or prints the script that makes them.
 ///
 /// # Errors
 /// If there are no frames, the folder holds frames already, the typical depth is not that of a room, or no frame could be
 /// read; or if the kind has no script.
-pub(crate) fn import(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
-    match (&*args.src, &args.out) {
-        _ if args.script => script(args.kind),
-        (src @ [_, ..], Some(out)) => import_frames(args, src, out, progress),
-        _ => Err(Error::usage("--src", "--src and --out are required")),
+pub(crate) fn import(command: &ImportCommand, progress: &Progress) -> Result<Outcome> {
+    match (&command.form, &command.import) {
+        (Some(ImportForm::Script { kind }), _) => script(*kind),
+        (None, Some(args)) => import_frames(args, progress),
+        (None, None) => Err(Error::usage("KIND", "a kind of data set is missing")),
     }
 }
 
 fn script(kind: DataSetKind) -> Result<Outcome> {
     if kind != DataSetKind::Habitat {
         let problem = format_args!("only the kind habitat has a script, not {kind}");
-        return Err(Error::usage("--script", problem));
+        return Err(Error::usage("KIND", problem));
     }
     Ok(Outcome::text(Status::Complete, HM3D_SCRIPT.to_owned()))
 }
 
 /// If one frame fails, the error is logged and counted, and the others continue.
-fn import_frames(
-    args: &ImportArgs,
-    src: &[PathBuf],
-    out: &Path,
-    progress: &Progress,
-) -> Result<Outcome> {
+fn import_frames(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
+    let (src, out) = (&args.src, &args.out);
     let list = out.join("frames.jsonl");
     if !args.force && list.exists() {
         let problem =

@@ -1,4 +1,4 @@
-//! `merge`: joins the shards of a run into one run.
+//! `report merge`: joins the shards of a run into one run.
 
 use std::path::PathBuf;
 
@@ -19,7 +19,7 @@ use crate::store::{self, AddressChange, Store};
 use crate::types::{ChoiceDetail, Decides, OpenDetail};
 use darkqa_score::record::Detail;
 
-/// The flags of `merge`.
+/// The flags of `report merge`.
 #[derive(Debug, Args)]
 pub(crate) struct MergeArgs {
     /// The folders of the shards, or a folder that holds them

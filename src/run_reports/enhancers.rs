@@ -50,7 +50,7 @@ pub(super) fn of_enhancers(runs: &[JoinedRun]) -> Vec<Alert> {
         let probe = note.probe.as_ref();
         match probe.map(|probe| (probe.outcome, probe.problem.as_deref())) {
             Some((ProbeOutcome::Overruled, Some(problem))) => add(format!(
-                "{name} was used because of --llie-anyway although its images may be read in a wrong way: {problem}."
+                "{name} was used because of --allow bad-enhancer although its images may be read in a wrong way: {problem}."
             )),
             Some((ProbeOutcome::Doubtful, Some(problem))) => {
                 add(format!(

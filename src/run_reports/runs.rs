@@ -36,6 +36,7 @@ use darkqa_score::record::{self, Detail as _};
 
 /// The flags of `report`.
 #[derive(Debug, Args)]
+#[group(arg = "runs")]
 pub(crate) struct ReportArgs {
     /// The folders of the runs, or of all parts of a run; several runs are compared
     #[arg(value_name = "RUN", required = true, add = Decides::Nothing)]
@@ -368,7 +369,7 @@ fn of_open(
 fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<String> {
     if run.layout == RunLayout::Parts {
         let problem = format!(
-            "{} holds the parts of a run, and their readings are stored in each: name the parts, or merge them, which reads all replies again",
+            "{} holds the parts of a run, and their readings are stored in each: name the parts, or merge them with report merge, which reads all replies again",
             run.folder.display()
         );
         return Err(Error::usage("--rescore", problem));

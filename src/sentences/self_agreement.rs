@@ -46,7 +46,7 @@ fn unread(found: &SelfAgreement<'_>, model: &str) -> Sentence {
     let text = format!(
         "Nothing is known about {model}: no answer could be read in any of its replies at L0, so that there is nothing to compare it with."
     );
-    let detail = "--constrain choice makes a server allow letters alone; --max-tokens may be too low for a model that thinks first";
+    let detail = "--request constrain=choice makes a server allow letters alone; --max-tokens may be too low for a model that thinks first";
     let numbers = Numbers::of(found.unit);
     numbers.sentence(
         "no_answer_in_the_light",

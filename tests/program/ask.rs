@@ -319,7 +319,7 @@ fn keys_do_not_travel_in_the_open() {
         Endpoint::open(access, quick())
     };
     let refused = open("http://10.0.0.7:8000/v1", Some(&key), false).unwrap_err();
-    assert!(refused.to_string().contains("--allow-http"), "{refused}");
+    assert!(refused.to_string().contains("--allow http"), "{refused}");
     assert!(open("http://me:secret@10.0.0.7/v1", None, false).is_err());
     assert!(open("http://10.0.0.7:8000/v1", Some(&key), true).is_ok());
     assert!(open("http://10.0.0.7:8000/v1", None, false).is_ok());

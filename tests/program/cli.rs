@@ -117,7 +117,7 @@ fn wrong_words_name_their_flag() {
             "--model random --threads 1025",
             &["--threads", "1025", "1024"],
         ),
-        ("--model random --max-failures 0", &["--max-failures"]),
+        ("--model random --max-failures 0", &["--stop failures"]),
         ("--model random --model random", &["--model", "twice"]),
         ("--model random --image webp", &["--image", "webp"]),
         ("--model random --prompts nowhere", &["nowhere"]),
@@ -153,12 +153,12 @@ fn completions_and_manual_come_from_the_flags() {
     let bench = Bench::new();
     check_rows(["bash", "zsh", "fish", "powershell", "elvish"], |shell| {
         let script = bench.complete(&["completions", shell]);
-        assert!(script.contains("llie-max-side"), "{shell}");
+        assert!(script.contains("llie-options"), "{shell}");
     });
     bench.complete(&["man", "pages"]);
     let page =
         |name: &str| std::fs::read_to_string(bench.path(&format!("pages/{name}.1"))).unwrap();
-    assert!(page("darkqa-eval").contains("llie\\-max\\-side"));
+    assert!(page("darkqa-eval").contains("llie\\-options"));
     assert!(page("darkqa-eval-openeqa").contains("judge\\-base\\-url"));
     assert!(page("darkqa-eval-batch-export").contains("file\\-size"));
 }
@@ -245,7 +245,7 @@ fn a_remote_endpoint_needs_a_key() {
     refused(&bench, "--model m --api-key-file nowhere", &["nowhere"]);
     bench.file("key", "sk-secret-42\n");
     let line = "--model m --base-url http://example.org/v1 --api-key-file key";
-    refused(&bench, line, &["http://example.org", "--allow-http"]);
+    refused(&bench, line, &["http://example.org", "--allow http"]);
     assert!(!bench.call(&words(line)).stderr.contains("sk-secret-42"));
 }
 

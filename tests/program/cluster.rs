@@ -1,6 +1,7 @@
 //! The manifests for Kubernetes and the scripts in `src/run/cluster`: their flags exist, and they agree with each other.
 
 use std::collections::BTreeSet;
+use std::ffi::OsString;
 use std::fs;
 use std::path::PathBuf;
 
@@ -55,7 +56,7 @@ fn value(words: &[String], flag: &str) -> String {
 fn parse(words: &[String]) {
     let program = "darkqa-eval".to_owned();
     let words = std::iter::once(&program).chain(words);
-    if let Err(e) = cli::command().try_get_matches_from(words) {
+    if let Err(e) = cli::check_words(words.map(OsString::from)) {
         panic!("{e}");
     }
 }
@@ -84,15 +85,18 @@ fn the_manifests_are_of_one_run() {
         flag.unwrap_or_default()
     });
     let others: Vec<&str> = others.collect();
-    let expected = ["--grace", "--quiet", "--rpm", "--shard", "--workers"];
+    let expected = ["--quiet", "--rpm", "--shard", "--stop"];
     assert_eq!(others, expected);
-    assert_eq!(merge[..2], ["merge".to_owned(), value(&job, "--out")]);
+    assert_eq!(merge[..2], ["report", "merge"]);
+    assert_eq!(merge[2], value(&job, "--out"));
     // Kubernetes tells a pod neither how many there are nor how many run at once.
     let parts = value(&job, "--shard");
+    let (parts, workers) = parts.split_once(",workers=").unwrap();
     let parts = parts.strip_prefix("auto/").unwrap();
     assert_eq!(parts, field("job.yaml", "completions"));
-    assert_eq!(value(&job, "--workers"), field("job.yaml", "parallelism"));
-    let grace: u32 = value(&job, "--grace").parse().unwrap();
+    assert_eq!(workers, field("job.yaml", "parallelism"));
+    let grace = value(&job, "--stop");
+    let grace: u32 = grace.strip_prefix("grace=").unwrap().parse().unwrap();
     let given = field("job.yaml", "terminationGracePeriodSeconds");
     assert!(grace < given.parse().unwrap());
     let images = MANIFESTS.map(|manifest| field(manifest, "image"));
@@ -275,12 +279,12 @@ fn the_script_of_slurm_submits_three_jobs_in_order() {
             panic!("{told:?}");
         };
         assert_eq!(plan.1, format!("plan {line}"));
-        assert_eq!(array.1, format!("--workers 3 {line}"));
+        assert_eq!(array.1, format!("--shard workers=3 {line}"));
         assert!(
             array.0.contains("--array=0-11%3") && array.0.contains("--dependency=afterok:1"),
             "{array:?}"
         );
-        assert_eq!(merge.1, "merge runs/a --out runs/a-whole --quiet");
+        assert_eq!(merge.1, "report merge runs/a --out runs/a-whole --quiet");
         assert!(merge.0.contains("--dependency=afterok:2"), "{merge:?}");
         for (_, words) in calls {
             let words: Vec<String> = words.split(' ').map(str::to_owned).collect();

@@ -86,7 +86,7 @@ impl Scene {
         // The enhancer and the frames are made for tests, the scripted model answers one letter, and nearly all of these runs have the
         // noise of the default reading.
         let of_all = [
-            "--llie-anyway",
+            "--allow bad-enhancer",
             "whatever the image",
             "signal-to-noise ratio is the same",
         ];

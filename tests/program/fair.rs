@@ -145,7 +145,7 @@ fn a_constraint_is_sent_and_its_object_is_read() {
     assert!(!of("run").contains("Constraint not followed"));
     // It measures something else, so it is another run.
     let other = [args("--out run"), words(&model)].concat();
-    assert!(bench.call(&other).stderr.contains("--constrain"));
+    assert!(bench.call(&other).stderr.contains("--request constrain"));
 
     let mock = MockEndpoint::start([Answer::text("I think C")]);
     let base = mock.base_url();
@@ -156,10 +156,13 @@ fn a_constraint_is_sent_and_its_object_is_read() {
         json!(["A", "B", "C"])
     );
     assert!(
-        called.stderr.contains("--constrain choice"),
+        called.stderr.contains("--request constrain=choice"),
         "said once: {called:?}"
     );
-    assert_eq!(called.stderr.matches("--constrain choice").count(), 1);
+    assert_eq!(
+        called.stderr.matches("--request constrain=choice").count(),
+        1
+    );
     let report = of("free");
     let report = report.split_whitespace().collect::<Vec<_>>().join(" ");
     let counted = records(&bench.path("free")).len();

@@ -438,8 +438,20 @@ fn what_decides_nothing_asks_nothing() {
     }
 }
 
+/// Where keyed flags are held: each key has a row of its own, by its earlier flag.
+const KEYS: &str = "by key";
+
 /// Flags that the tables here leave out, and where they are held.
-const ELSEWHERE: [(&str, &str); 51] = [
+const ELSEWHERE: [(&str, &str); 60] = [
+    ("--noise", KEYS),
+    ("--read", KEYS),
+    ("--skip", KEYS),
+    ("--decode", KEYS),
+    ("--choice-order", KEYS),
+    ("--llie-options", KEYS),
+    ("--request", KEYS),
+    ("--allow", KEYS),
+    ("--stop", KEYS),
     ("--map", "tests/program/ready_made.rs"),
     ("--config-name", "src/dataset/ready_made/tests/shapes.rs"),
     ("--split", "src/dataset/ready_made/tests/shapes.rs"),
@@ -523,7 +535,10 @@ fn classes(command: &str) -> Vec<(&'static str, &'static str)> {
     let rows = section.lines().filter(|line| line.starts_with("| `--"));
     rows.map(|row| {
         let unescaped: Vec<&str> = row.split(" | ").collect();
-        let flag = unescaped[0].trim_start_matches("| `");
+        // A key is known by its earlier flag.
+        let earlier = unescaped[0].strip_suffix("` until 0.2)");
+        let earlier = earlier.and_then(|flag| flag.split(" (`").last());
+        let flag = earlier.unwrap_or(unescaped[0].trim_start_matches("| `"));
         let flag = flag.split([' ', '`']).next().unwrap();
         (flag, unescaped[2])
     })

@@ -554,7 +554,7 @@ fn what_is_known_of_a_vendor_is_said_before_anything_is_sent() {
     );
     let error = refusal(&anthropic, "--dry-run");
     assert!(
-        error.contains("--constrain: Anthropic takes a constraint and ignores it"),
+        error.contains("--request constrain: Anthropic takes a constraint and ignores it"),
         "{error}"
     );
     for (base, name) in [
@@ -571,7 +571,7 @@ fn what_is_known_of_a_vendor_is_said_before_anything_is_sent() {
     ] {
         let error = refusal(&table("m", base, "probabilities = true"), "--dry-run");
         assert!(
-            error.contains(&format!("--probabilities: {name}")),
+            error.contains(&format!("--request probabilities: {name}")),
             "{error}"
         );
     }

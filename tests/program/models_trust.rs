@@ -91,7 +91,7 @@ fn a_file_that_came_with_the_data_takes_nothing_that_is_not_its_own() {
         assert!(
             refused
                 .stderr
-                .contains("--trust-models states that you trust it"),
+                .contains("--allow models-file states that you trust it"),
             "{refused:?}"
         );
     }
@@ -101,8 +101,16 @@ fn a_file_that_came_with_the_data_takes_nothing_that_is_not_its_own() {
         (OPENAI, "key-env = \"OPENAI_API_KEY\"", ""),
         (OPENAI, "system-file = \"../data/inside.txt\"", ""),
         ("http://127.0.0.1:9/v1", "", ""),
-        (ELSEWHERE, "key-env = \"OPENAI_API_KEY\"", "--trust-models"),
-        (OPENAI, "system-file = \"../outside.txt\"", "--trust-models"),
+        (
+            ELSEWHERE,
+            "key-env = \"OPENAI_API_KEY\"",
+            "--allow models-file",
+        ),
+        (
+            OPENAI,
+            "system-file = \"../outside.txt\"",
+            "--allow models-file",
+        ),
     ];
     for (url, more, line) in taken {
         let called = strange(&table("m", url, more), line, &key);

@@ -185,7 +185,7 @@ fn a_model_is_above_the_flag_for_probabilities() {
     assert!(
         refused
             .stderr
-            .contains("models.toml, line 2: hot: --probabilities"),
+            .contains("models.toml, line 2: hot: --request probabilities"),
         "{}",
         refused.stderr
     );
@@ -203,12 +203,12 @@ fn fields_that_say_a_flag_again_are_refused() {
         ),
         (
             "constrain = \"json\"\nbody = { response_format = { type = \"text\" } }".to_owned(),
-            "response_format is set by --constrain",
+            "response_format is set by --request constrain",
         ),
         (
             "constrain = \"json\"\nwire = \"responses\"\nbody = { text = { verbosity = \"low\" } }"
                 .to_owned(),
-            "text is set by --constrain",
+            "text is set by --request constrain",
         ),
         (
             "reasoning-effort = \"low\"\nwire = \"responses\"\nbody = { reasoning = { effort = \"high\" } }"
@@ -217,7 +217,7 @@ fn fields_that_say_a_flag_again_are_refused() {
         ),
         (
             "probabilities = true\nwire = \"responses\"\nbody = { include = [] }".to_owned(),
-            "include is set by --probabilities",
+            "include is set by --request probabilities",
         ),
         (
             "body = { instructions = \"a\" }".to_owned(),

@@ -114,7 +114,7 @@ fn an_image_beyond_the_limit_is_found_before_anything_is_asked() {
     let refused = bench.call(&args(&base, "--max-image 0.00005"));
     assert_eq!(refused.code, Some(2), "{refused:?}");
     assert!(
-        refused.stderr.contains("frame") && refused.stderr.contains("--max-side"),
+        refused.stderr.contains("frame") && refused.stderr.contains("--image max-side"),
         "{refused:?}"
     );
     assert!(mock.requests().is_empty());

@@ -121,7 +121,7 @@ fn a_secret_header_is_not_sent_unencrypted_or_twice() {
     let variables = [("GATEWAY", SECRET), ("OPENAI_API_KEY", "sk-0123456789")];
     let url = "http://h.example/v1";
     let error = refusal(url, &["--header-env", "X-Auth=GATEWAY"], &variables[..1]);
-    assert!(error.contains("--allow-http"), "{error}");
+    assert!(error.contains("--allow http"), "{error}");
     let twice = ["--header-env", "Authorization=GATEWAY"];
     let error = refusal("http://127.0.0.1:9/v1", &twice, &variables);
     assert!(error.contains("authorization is sent already"), "{error}");
@@ -197,7 +197,7 @@ fn what_the_program_sets_is_refused_by_name() {
         ],
         &[],
     );
-    assert!(error.contains("--constrain"), "{error}");
+    assert!(error.contains("--request constrain"), "{error}");
 }
 
 /// Bodies are written to the manifest and to files of batches.

@@ -41,7 +41,7 @@ fn a_set_with_two_readings_is_asked_as_the_user_says() {
     assert!(
         called
             .stderr
-            .contains("no options in 1 of 3 rows, where the answer is e.g. \"7\"; --open skip"),
+            .contains("no options in 1 of 3 rows, where the answer is e.g. \"7\"; --skip open"),
         "{}",
         called.stderr
     );

@@ -74,7 +74,7 @@ fn any_drop_and_several_readings_are_made() {
     assert!(
         refused
             .stderr
-            .contains("--tone: cannot be combined with several profiles")
+            .contains("--noise tone: cannot be combined with several profiles")
     );
 }
 
@@ -282,7 +282,7 @@ fn what_makes_no_sense_is_one_line() {
         (&["frames/a.png", "--from", "my.toml"], "my.toml"),
         (
             &["frames/a.png", "--coupling", "photon", "--ratio", "4"],
-            "--ratio",
+            "--noise ratio",
         ),
     ];
     check_rows(cases, |(args, message)| {
@@ -298,7 +298,11 @@ fn what_makes_no_sense_is_one_line() {
     });
     let small = bench.call(&words("synthesize frames/a.png --out out --max-pixels 100"));
     assert_eq!(small.code, Some(1));
-    assert!(small.stderr.contains("--max-pixels"), "{}", small.stderr);
+    assert!(
+        small.stderr.contains("--decode max-pixels"),
+        "{}",
+        small.stderr
+    );
 }
 
 #[test]

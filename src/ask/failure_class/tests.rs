@@ -124,12 +124,12 @@ fn the_flag_that_helps_is_named() {
         (
             r#"{"error":{"param":"max_tokens","message":"Use 'max_completion_tokens' instead."}}"#,
             Reach::Endpoint,
-            "--token-field max_completion_tokens",
+            "--request token-field=max_completion_tokens",
         ),
         (
             r#"{"error":{"message":"Unsupported: 'max_tokens'. Use 'max_completion_tokens' instead."}}"#,
             Reach::Endpoint,
-            "--token-field max_completion_tokens",
+            "--request token-field=max_completion_tokens",
         ),
         (
             r#"{"error":{"message":"`temperature` is deprecated for this model."}}"#,

@@ -6,7 +6,7 @@ use crate::ask::token_field::TokenField;
 use crate::ask::wire_kind::Wire;
 
 /// The remedy for a server that states no probabilities.
-pub(super) const PROBABILITIES: &str = "leave --probabilities out: the server states none";
+pub(super) const PROBABILITIES: &str = "leave --request probabilities out: the server states none";
 
 /// The number of likeliest tokens, as Text Generation Inference calls it in its refusals.
 const TOP_TOKENS: &str = "top_n_tokens";
@@ -42,13 +42,13 @@ fn sampling(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
             name: "max_tokens",
             state: limit(TokenField::MaxTokens),
             adaptable: Some(AdaptableField::TokenField),
-            hint: "send the limit in another field: --token-field max_completion_tokens (or none), or another --max-tokens",
+            hint: "send the limit in another field: --request token-field=max_completion_tokens (or none), or another --max-tokens",
         },
         RequestField {
             name: "max_completion_tokens",
             state: limit(TokenField::MaxCompletionTokens),
             adaptable: Some(AdaptableField::TokenField),
-            hint: "send the limit in another field: --token-field max_tokens (or none), or another --max-tokens",
+            hint: "send the limit in another field: --request token-field=max_tokens (or none), or another --max-tokens",
         },
         RequestField {
             name: "reasoning_effort",
@@ -67,19 +67,19 @@ fn form(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
             name: "detail",
             state: FieldState::set(sent.has_image && parameters.detail.is_some()),
             adaptable: None,
-            hint: "leave --detail out, or give a value the server takes",
+            hint: "leave --image detail out, or give a value the server takes",
         },
         RequestField {
             name: "response_format",
             state: FieldState::set(parameters.constrain == Constrain::Json),
             adaptable: None,
-            hint: "leave --constrain out: the server does not take it",
+            hint: "leave --request constrain out: the server does not take it",
         },
         RequestField {
             name: "structured_outputs",
             state: FieldState::set(parameters.constrain == Constrain::Choice),
             adaptable: None,
-            hint: "leave --constrain out, or try --constrain json",
+            hint: "leave --request constrain out, or try --request constrain=json",
         },
         RequestField {
             name: "logprobs",
@@ -109,7 +109,7 @@ fn form(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
                 sent.fields.stream_usage,
             ),
             adaptable: Some(AdaptableField::StreamUsage),
-            hint: "ask without a stream: --wire chat",
+            hint: "ask without a stream: --request wire=chat",
         },
     ])
 }

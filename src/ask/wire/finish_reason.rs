@@ -41,7 +41,7 @@ pub(super) fn read(word: &str, usage: Option<Usage>) -> Result<Finish, Unreadabl
             is_final: true,
             finish: Some(word.to_owned()),
             ..Unreadable::new(format!(
-                "a reply that ended at the model's context length: its finish_reason is {word:?} (send smaller images: --max-side, or a \
+                "a reply that ended at the model's context length: its finish_reason is {word:?} (send smaller images: --image max-side=N, or a \
                  smaller --max-tokens)"
             ))
         }),

@@ -172,7 +172,7 @@ pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
                 parameters.token_field == TokenField::Omit,
             ),
             Some(AdaptableField::TokenField),
-            "send no limit: --token-field none, or another --max-tokens",
+            "send no limit: --request token-field=none, or another --max-tokens",
         ),
         field(
             "effort",
@@ -190,13 +190,13 @@ pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
             "detail",
             FieldState::set(sent.has_image && parameters.detail.is_some()),
             None,
-            "leave --detail out, or give a value the server takes",
+            "leave --image detail out, or give a value the server takes",
         ),
         field(
             "format",
             FieldState::set(parameters.constrain == Constrain::Json),
             None,
-            "leave --constrain out: the server does not take it",
+            "leave --request constrain out: the server does not take it",
         ),
         field(
             "top_logprobs",
@@ -220,7 +220,7 @@ pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
             "structured_outputs",
             FieldState::set(parameters.constrain == Constrain::Choice),
             None,
-            "leave --constrain out, or try --constrain json",
+            "leave --request constrain out, or try --request constrain=json",
         ),
     ])
 }

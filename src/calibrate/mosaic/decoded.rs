@@ -45,6 +45,6 @@ pub(super) fn developed(what: &str) -> String {
 pub(super) fn too_large(width: usize, height: usize, most_pixels: u64) -> Option<String> {
     let pixels = (width as u64).saturating_mul(height as u64);
     (pixels > most_pixels).then(|| {
-        format!("{width} × {height} pixels are more than the {most_pixels} that are read; raise --max-pixels")
+        format!("{width} × {height} pixels are more than the {most_pixels} that are read; raise --decode max-pixels")
     })
 }

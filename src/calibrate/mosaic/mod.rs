@@ -84,7 +84,7 @@ fn png(bytes: &[u8], most_pixels: u64) -> Result<Decoded, String> {
     let png =
         RawPng::open(bytes, &[SampleForm::Grey16], most_pixels).map_err(|error| match error {
             RawPngError::Broken(problem) => again(problem),
-            RawPngError::TooLarge(problem) => format!("{problem}; raise --max-pixels"),
+            RawPngError::TooLarge(problem) => format!("{problem}; raise --decode max-pixels"),
             RawPngError::OtherForm(problem) => developed(&problem),
         })?;
     let (height, width) = png.size;

@@ -244,7 +244,7 @@ fn a_damaged_or_large_png_is_named_as_such() {
         (
             &small[..],
             14,
-            "5 × 3 pixels are more than the 14 that are read; raise --max-pixels",
+            "5 × 3 pixels are more than the 14 that are read; raise --decode max-pixels",
         ),
         (
             &large,

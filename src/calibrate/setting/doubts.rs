@@ -43,7 +43,7 @@ pub(super) fn of(fit: &SettingFit, has_dark: bool, width: usize) -> Result<Vec<S
     doubts.extend(planes(fit));
     if fit.row_deviation.value <= 0.0 {
         doubts.push(format!(
-            "row noise cannot be seen below about {:.3} ADU: this setting does not count in the line of σ_row, which --camera takes for it, too",
+            "row noise cannot be seen below about {:.3} ADU: this setting does not count in the line of σ_row, which --noise camera takes for it, too",
             fit.read_deviation / (width as f64).sqrt()
         ));
     }

@@ -9,6 +9,7 @@ use std::path::Path;
 use super::layered_value::LayeredValue;
 use crate::ask::{BaseUrl, OPENAI_KEY, own_variables};
 use crate::error::{Error, Result};
+use crate::types::keyed_flag::spelled;
 
 /// The flags that say where requests go, or who may read them on their way.
 const ADDRESSES: [&str; 3] = ["base-url", "judge-base-url", "ca-file"];
@@ -56,7 +57,8 @@ pub(super) fn check(
     let refuse = |flag: &str, value: &LayeredValue, what: &str| {
         let problem = format!(
             "the file sets --{address}, too, so that {what} could be sent to an unknown server; name it on the command line with \
-             --{flag}, or remove --{address} from the file"
+             {}, or remove --{address} from the file",
+            spelled(flag)
         );
         Err(Error::usage(&value.origin, problem))
     };

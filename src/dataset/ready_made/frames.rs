@@ -357,11 +357,11 @@ fn no_path(text: &str, problem: String) -> String {
     let is_long = length > LONGEST_NAME && text.chars().all(is_base64);
     if text.starts_with("data:") || is_long {
         format!(
-            "its image is base64 that is cut or damaged ({length} characters, {start:?}); --bad skip leaves such rows out"
+            "its image is base64 that is cut or damaged ({length} characters, {start:?}); --skip bad leaves such rows out"
         )
     } else if length > LONG {
         format!(
-            "its image is a text of {length} characters, {start:?}, which is neither base64 nor a path of a file; --bad skip leaves such rows out"
+            "its image is a text of {length} characters, {start:?}, which is neither base64 nor a path of a file; --skip bad leaves such rows out"
         )
     } else {
         problem

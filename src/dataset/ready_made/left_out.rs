@@ -34,10 +34,10 @@ impl Why {
     fn flag(self) -> &'static str {
         match self {
             Self::SeveralImages => "--multi-image skip",
-            Self::NoImage => "--no-image skip",
-            Self::Open => "--open skip",
-            Self::SeveralTruths => "--several skip",
-            Self::Bad | Self::Rotation => "--bad skip",
+            Self::NoImage => "--skip no-image",
+            Self::Open => "--skip open",
+            Self::SeveralTruths => "--skip several",
+            Self::Bad | Self::Rotation => "--skip bad",
         }
     }
 
@@ -101,7 +101,7 @@ impl LeftOut {
                     _ => "leaves them out",
                 };
                 let flag = match why {
-                    Why::Bad => format!("--bad {}", SkipBad::enough(*count, rows)),
+                    Why::Bad => SkipBad::enough(*count, rows).flag(),
                     why => why.flag().to_owned(),
                 };
                 let other = match why {
@@ -131,7 +131,7 @@ mod tests {
         left.add(Why::SeveralImages, || "2 images".into());
         left.add(Why::SeveralImages, || "3 images".into());
         let problem = left.check(40, &SetArgs::default()).unwrap_err();
-        assert!(problem.contains("2 of 40 rows show 2 images; --multi-image skip leaves them out, --multi-image send shows all of them in one request\n no image in 1 of 40 rows; --no-image skip leaves it out"), "{problem}");
+        assert!(problem.contains("2 of 40 rows show 2 images; --multi-image skip leaves them out, --multi-image send shows all of them in one request\n no image in 1 of 40 rows; --skip no-image leaves it out"), "{problem}");
         let args = SetArgs {
             no_image: Some(LeaveOut::Skip),
             multi_image: Some(SeveralImages::Skip),
@@ -152,7 +152,7 @@ mod tests {
         assert!(left.check(20, &args).is_ok());
         let problem = left.check(19, &args).unwrap_err();
         assert!(
-            problem.contains("line 3: empty; --bad skip leaves out at most 5 %"),
+            problem.contains("line 3: empty; --skip bad leaves out at most 5 %"),
             "{problem}"
         );
     }

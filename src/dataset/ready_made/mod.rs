@@ -380,7 +380,7 @@ fn finish(
     })
 }
 
-/// Leaves out the rows with an image that is not there or is none, with `--bad skip`; without it such an image is named when it is read.
+/// Leaves out the rows with an image that is not there or is none, with `--skip bad`; without it such an image is named when it is read.
 /// Images that are there and cannot be decoded are left out later ([`Dataset::without`](crate::dataset::Dataset::without)).
 fn leave_out_unusable(opened: &Opened<'_>, set: &mut ReadSet, frames: &Frames<'_>) -> Result<()> {
     if opened.args.bad.is_none() {
@@ -472,7 +472,7 @@ fn image_hint(table: &Table, roles: &Roles, problem: String) -> String {
 
 /// The error of an image that is not there, with the flag that leaves its row out.
 fn with_skip(error: Error) -> Error {
-    const FLAG: &str = "--bad skip";
+    const FLAG: &str = "--skip bad";
     match error {
         Error::Data { place, problem } if !problem.contains(FLAG) => Error::data(
             place,

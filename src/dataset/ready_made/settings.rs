@@ -33,18 +33,17 @@ pub struct SetArgs {
     /// What is done about rows that show several images: leave them out, or send all images of a row in one request; default: stop
     #[arg(long, value_name = "skip|send", add = Decides::Trials)]
     pub multi_image: Option<SeveralImages>,
-    /// What is done about rows without an image; default: stop
+    /// Leave out rows without an image; default: stop
     #[arg(long, value_name = "skip", add = Decides::Trials)]
     pub no_image: Option<LeaveOut>,
-    /// What is done about open questions, which have no options; default: stop
+    /// Leave out open questions, which have no options; default: stop
     #[arg(long, value_name = "skip", add = Decides::Trials)]
     pub open: Option<LeaveOut>,
-    /// What is done about rows with several true options; default: stop
+    /// Leave out rows with several true options; default: stop
     #[arg(long, value_name = "skip", add = Decides::Trials)]
     pub several: Option<LeaveOut>,
-    /// What is done about broken rows, and about images that are missing or cannot be read: leave them out, up to 5 % of all, or up to
-    /// another share with skip:20%; default: stop
-    #[arg(long, value_name = "skip|skip:PERCENT", add = Decides::Trials)]
+    /// Leave out broken rows, and images that are missing or cannot be read, up to this share of all: 5 % for the key alone; default: stop
+    #[arg(long, value_name = "PERCENT", add = Decides::Trials)]
     pub bad: Option<SkipBad>,
     /// Further folders of the data.
     #[command(flatten)]

@@ -29,11 +29,19 @@ impl SkipBad {
             return Ok(());
         }
         Err(format!(
-            "{bad} of {all} {noun} are broken; the first: {first}; --bad {self} leaves out at most {} %: repair the data, or raise the \
-             limit with --bad {}",
+            "{bad} of {all} {noun} are broken; the first: {first}; {} leaves out at most {} %: repair the data, or raise the limit with {}",
+            self.flag(),
             self.most,
-            Self::enough(bad, all)
+            Self::enough(bad, all).flag()
         ))
+    }
+
+    /// The flag with the share, as it is typed.
+    pub(crate) fn flag(self) -> String {
+        if self == Self::default() {
+            return "--skip bad".to_owned();
+        }
+        format!("--skip bad={}%", self.most)
     }
 
     /// The usual share, or one in whole percent that allows a number of broken rows of a set.
@@ -70,11 +78,12 @@ impl FromStr for SkipBad {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let expected = || "skip expected, or a share of the rows as skip:20%".to_owned();
+        let expected = || "a share of the rows expected, as 20%".to_owned();
         if text == "skip" {
             return Ok(Self::default());
         }
-        let share = text.strip_prefix("skip:").ok_or_else(expected)?;
+        // `--bad skip:20%` is an earlier form of `--skip bad=20%`.
+        let share = text.strip_prefix("skip:").unwrap_or(text);
         let share: f64 = share
             .strip_suffix('%')
             .unwrap_or(share)
@@ -96,6 +105,7 @@ mod tests {
         for (text, most) in [
             ("skip", 5.0),
             ("skip:20%", 20.0),
+            ("20%", 20.0),
             ("skip:0.5%", 0.5),
             ("skip:100", 100.0),
         ] {
@@ -125,8 +135,8 @@ mod tests {
             problem.contains("3 of 40 rows are broken; the first: line 3"),
             "{problem}"
         );
-        let (_, raised) = problem.rsplit_once("--bad ").unwrap();
-        assert_eq!(raised, "skip:8%");
+        let (_, raised) = problem.rsplit_once("--skip bad=").unwrap();
+        assert_eq!(raised, "8%");
         assert_eq!(
             raised.parse::<SkipBad>().unwrap().check(3, 40, "rows", ""),
             Ok(())

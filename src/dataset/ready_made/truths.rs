@@ -162,7 +162,7 @@ fn with_answers(
     }
     if absent.len() == count && count > 0 {
         let remedy = other.map_or_else(
-            || "a test split without them? --split names another, and --ask FILE asks questions without answers about every image".to_owned(),
+            || "a test split without them? --read split names another, and --ask FILE asks questions without answers about every image".to_owned(),
             |flag| format!("{flag} reads those of another column"),
         );
         return Err(format!(

@@ -121,7 +121,7 @@ impl<D: Detail> ModelInputFiles<D> {
         if size > limits.bytes {
             let megabytes = size as f64 / 1e6;
             let problem = format!(
-                "one request has {megabytes:.1} MB, more than a file may have; make images smaller with --max-side or --image jpeg:95"
+                "one request has {megabytes:.1} MB, more than a file may have; make images smaller with --image max-side=N or --image jpeg:95"
             );
             return Err(Error::usage("--file-size", problem));
         }

@@ -26,7 +26,7 @@ impl<D: Detail> Driver<'_, D> {
         let pieces = pieces.clamp(2, of.facts.requests.max(2));
         if of.facts.requests < 2 {
             let problem = format!(
-                "{}: one request has about {:.0} tokens, more than may wait for batches of {}; send smaller images with --max-side",
+                "{}: one request has about {:.0} tokens, more than may wait for batches of {}; send smaller images with --image max-side=N",
                 of.name, of.facts.tokens, of.facts.model
             );
             return Err(Error::Endpoint {

@@ -229,7 +229,7 @@ impl Suspect<'_> {
 
     fn strange_at(&self, located: Option<&Located>, problem: std::fmt::Arguments<'_>) -> Error {
         let problem = format!(
-            "{problem}, and the file may have come with the data from someone else; --trust-models states that you trust it"
+            "{problem}, and the file may have come with the data from someone else; --allow models-file states that you trust it"
         );
         match (located, &self.entry.place) {
             (Some(located), _) => located.error(problem),

@@ -62,7 +62,7 @@ impl Description {
         self.output(&mut lines, graph);
         let source = match convention.tile {
             Some(_) => self.source(|s| s.tile.is_some(), ""),
-            None => "not stated; --tile N tries it and checks every seam".to_owned(),
+            None => "not stated; --llie-options tile=N tries it and checks every seam".to_owned(),
         };
         lines.add("tile", convention.tile.unwrap_or(Tile::None), source);
         lines.0

@@ -38,7 +38,7 @@ pub enum Fitting {
     /// It is filled or cut into tiles, if the model is local; otherwise it is refused.
     #[default]
     Tiles,
-    /// It is resized to the fixed size, and the result back (`--llie-resize`): its shape is not kept, and it is blurred.
+    /// It is resized to the fixed size, and the result back (`--llie-options resize`): its shape is not kept, and it is blurred.
     Resize,
 }
 
@@ -229,7 +229,7 @@ impl Enhancer {
     pub fn enhance(&mut self, image: &Rgb) -> Result<Rgb> {
         if self.ended >= MOST_ENDED {
             return Err(self.fault(format!(
-                "is not run any more, because {MOST_ENDED} images in a row took longer than --llie-timeout or more memory than --llie-max-memory allows"
+                "is not run any more, because {MOST_ENDED} images in a row took longer than --llie-options timeout or more memory than --llie-options max-memory allows"
             )));
         }
         self.graph.restart_clock();
@@ -427,7 +427,7 @@ impl Enhancer {
         match problem {
             NoPlan::Other(problem) => self.fault(problem),
             NoPlan::TileFlag(side) => Error::usage(
-                "--tile",
+                "--llie-options tile",
                 format_args!(
                     "{side} is not possible: {} needs the whole image (tile = \"none\" in its sidecar or preset)",
                     self.name

@@ -120,12 +120,12 @@ impl RunFailure {
                 format!("did not get the memory for an image of {}", by(*fed))
             }
             Self::TooLong(limit) => format!(
-                "took longer than {} s for an image; --llie-timeout allows more, and 0 any time",
+                "took longer than {} s for an image; --llie-options timeout allows more, and 0 any time",
                 limit.as_secs_f64()
             ),
             Self::TooLarge(limit) => format!(
-                "took more than {limit} GB of memory together with the program and was ended; --llie-max-memory allows more, and --tile or \
-                 --llie-max-side need less"
+                "took more than {limit} GB of memory together with the program and was ended; --llie-options max-memory allows more, and --llie-options tile or \
+                 --llie-options max-side need less"
             ),
             Self::NotCut(problem) => problem.clone(),
         }
@@ -145,7 +145,7 @@ pub(super) fn unusable(values: OutOfRange, range: ValueRange, size: [usize; 2]) 
             by(size)
         ),
         OutOfRange::Beyond { min, max, likely } => format!(
-            "gave values from {min} to {max}, but {range} is usual; its range seems to be {likely}: state both ranges in MODEL.onnx.toml beside it, `range_in = \"…\"` and `range_out = \"…\"`; `darkqa-eval enhance --doctor` finds them"
+            "gave values from {min} to {max}, but {range} is usual; its range seems to be {likely}: state both ranges in MODEL.onnx.toml beside it, `range_in = \"…\"` and `range_out = \"…\"`; `darkqa-eval enhance doctor` finds them"
         ),
     }
 }
@@ -175,11 +175,11 @@ pub(super) fn load_problem(message: &str, version: &str) -> String {
     let newer = |what: &str, needed: u32, most: u32, pinned: u32| {
         let way_out = if needed <= pinned && version != PINNED {
             format!(
-                "version {PINNED} reads it: name its library with --ort-lib FILE, or leave out --ort-lib and ORT_DYLIB_PATH"
+                "version {PINNED} reads it: name its library with --llie-options ort-lib=FILE, or leave out --llie-options ort-lib and ORT_DYLIB_PATH"
             )
         } else {
             format!(
-                "name the library of a newer one with --ort-lib FILE, or export the model with {what} {most} or older"
+                "name the library of a newer one with --llie-options ort-lib=FILE, or export the model with {what} {most} or older"
             )
         };
         format!(

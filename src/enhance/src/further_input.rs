@@ -155,7 +155,7 @@ impl FurtherInput {
     pub(super) fn check_cut(&self, fed: &FedImage<'_>) -> Result<(), String> {
         match &self.value {
             ExtraValue::Noise(noise) if noise.divide != 1 && !fed.is_whole() => Err(format!(
-                "takes noise of the image's size divided by {} ({:?}), which cannot be cut into tiles; enhance the whole image, without --tile, in a size that the model takes",
+                "takes noise of the image's size divided by {} ({:?}), which cannot be cut into tiles; enhance the whole image, without --llie-options tile, in a size that the model takes",
                 noise.divide, self.port.name
             )),
             _ => Ok(()),

@@ -83,7 +83,7 @@ pub(super) fn no_memory(failure: &RunFailure, rule: SizeRule, size: [usize; 2]) 
 
 /// What helps if memory is short for a run of `fed` on an image of `size`.
 fn remedy(rule: SizeRule, fed: [usize; 2], size: [usize; 2]) -> String {
-    const SMALLER: &str = "--llie-max-side 1280 enhances a smaller image";
+    const SMALLER: &str = "--llie-options max-side=1280 enhances a smaller image";
     let much_larger = fed[0] * fed[1] > 4 * size[0] * size[1];
     match rule.tile {
         _ if much_larger && !rule.takes_any_size() => format!(
@@ -99,9 +99,9 @@ fn remedy(rule: SizeRule, fed: [usize; 2], size: [usize; 2]) -> String {
             "export it for a smaller size, or with free sizes".to_owned()
         }
         Some(Tile::None) => SMALLER.to_owned(),
-        Some(Tile::Exact(_)) => "--tile 256 needs a fraction of it".to_owned(),
+        Some(Tile::Exact(_)) => "--llie-options tile=256 needs a fraction of it".to_owned(),
         None => format!(
-            "--tile 256 needs a fraction of it, if a pixel depends only on the pixels around it; otherwise {SMALLER}"
+            "--llie-options tile=256 needs a fraction of it, if a pixel depends only on the pixels around it; otherwise {SMALLER}"
         ),
     }
 }

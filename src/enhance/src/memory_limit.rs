@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::memory::{available, resident};
 
-/// The most memory of this process while an enhancer runs (`--llie-max-memory`), in bytes. On systems without Linux's `/proc` nothing
+/// The most memory of this process while an enhancer runs (`--llie-options max-memory`), in bytes. On systems without Linux's `/proc` nothing
 /// is limited.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MemoryLimit(Option<u64>);

@@ -277,7 +277,7 @@ fn ambiguous(outputs: &[Port]) -> String {
         }
     };
     format!(
-        "has several outputs that could be the image: {}; say which in MODEL.onnx.toml beside it: `output = \"NAME\"` or `output = INDEX`, counted from 0{presets}; `darkqa-eval enhance --doctor` draws what each gives, and which are plausible",
+        "has several outputs that could be the image: {}; say which in MODEL.onnx.toml beside it: `output = \"NAME\"` or `output = INDEX`, counted from 0{presets}; `darkqa-eval enhance doctor` draws what each gives, and which are plausible",
         list(outputs)
     )
 }

@@ -54,7 +54,7 @@ impl Enhancer {
         match (&problem, outcome, implausible) {
             (Some(problem), ProbeOutcome::Overruled, Implausible::Refused) => {
                 return Err(self.fault(format!(
-                    "{problem}. `darkqa-eval enhance {} FRAMES… --doctor --out DIR` draws what it makes with each convention; --llie-anyway uses it as it is",
+                    "{problem}. `darkqa-eval enhance doctor {} FRAMES… --out DIR` draws what it makes with each convention; --allow bad-enhancer uses it as it is",
                     self.path().display()
                 )));
             }
@@ -64,7 +64,7 @@ impl Enhancer {
         if problem.is_none() && self.may_be_residual(probe.usual)? {
             let name = in_expression(&self.graph().signature.outputs[0].port.name);
             self.remark(&format!(
-                "its output of a white image is nearly black, as if it had to be added to the input; if its authors add it, state in MODEL.onnx.toml beside it: `image = \"input + {name}\"`; `darkqa-eval enhance --doctor` draws both"
+                "its output of a white image is nearly black, as if it had to be added to the input; if its authors add it, state in MODEL.onnx.toml beside it: `image = \"input + {name}\"`; `darkqa-eval enhance doctor` draws both"
             ));
         }
         self.warn_of_remarks();

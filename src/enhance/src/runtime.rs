@@ -24,14 +24,14 @@ use super::search::{LibraryPlace, Surroundings};
 pub enum Install {
     /// Install it with pip into the user's cache folder, once.
     Allowed,
-    /// Do not install it (`--offline`).
+    /// Do not install it (`--llie-options offline`).
     Offline,
 }
 
 /// Search for the library of ONNX Runtime.
 #[derive(Debug, Clone)]
 pub struct RuntimeSearch {
-    /// Library to use (`--ort-lib`, `ORT_DYLIB_PATH`); if set, no other is tried.
+    /// Library to use (`--llie-options ort-lib`, `ORT_DYLIB_PATH`); if set, no other is tried.
     pub library: Option<PathBuf>,
     /// Whether the library may be installed if it is not found.
     pub install: Install,
@@ -87,7 +87,7 @@ impl RuntimeSearch {
                 // The system's loader would search a bare name in its own folders.
                 let path = std::path::absolute(named).unwrap_or_else(|_| named.clone());
                 let version = probe(&path).map_err(|e| unusable_library(&path, &e))?;
-                let place = "named by --ort-lib or ORT_DYLIB_PATH".to_owned();
+                let place = "named by --llie-options ort-lib or ORT_DYLIB_PATH".to_owned();
                 FoundLibrary {
                     path,
                     version,
@@ -162,7 +162,7 @@ fn find(surroundings: &Surroundings, allowed: Install) -> Result<FoundLibrary> {
             }),
     );
     let installed = match allowed {
-        Install::Offline => Err("--offline forbids its installation".to_owned()),
+        Install::Offline => Err("--llie-options offline forbids its installation".to_owned()),
         Install::Allowed => install_here(surroundings, &rejected),
     };
     installed.map_err(|problem| Error::Runtime(not_found_message(&problem, &rejected)))
@@ -224,13 +224,13 @@ fn not_found_message(problem: &str, rejected: &[String]) -> String {
     let rejected = skipped(rejected);
     let places = LibraryPlace::ALL.map(|place| place.to_string()).join(", ");
     format!(
-        "no library was found ({places}){rejected}, and {problem}. Three ways out: install the Python package into the environment of this program or one on PATH (`pip install onnxruntime=={PINNED}`); or name the library of any release from 1.{OLDEST} on with --ort-lib FILE or ORT_DYLIB_PATH; or let it be installed: without --offline, with pip on PATH and a reachable package index"
+        "no library was found ({places}){rejected}, and {problem}. Three ways out: install the Python package into the environment of this program or one on PATH (`pip install onnxruntime=={PINNED}`); or name the library of any release from 1.{OLDEST} on with --llie-options ort-lib=FILE or ORT_DYLIB_PATH; or let it be installed: without --llie-options offline, with pip on PATH and a reachable package index"
     )
 }
 
 fn unusable_library(path: &Path, problem: &str) -> Error {
     Error::Runtime(format!(
-        "{} {problem}; name the library of ONNX Runtime 1.{OLDEST} or later with --ort-lib FILE or ORT_DYLIB_PATH, or leave both out to have it found",
+        "{} {problem}; name the library of ONNX Runtime 1.{OLDEST} or later with --llie-options ort-lib=FILE or ORT_DYLIB_PATH, or leave both out to have it found",
         path.display()
     ))
 }
@@ -331,7 +331,11 @@ mod tests {
         let message = find(&surroundings, Install::Offline)
             .unwrap_err()
             .to_string();
-        for part in ["--offline", "--ort-lib", "pip install onnxruntime==1.31.1"] {
+        for part in [
+            "--llie-options offline",
+            "--llie-options ort-lib",
+            "pip install onnxruntime==1.31.1",
+        ] {
             assert!(message.contains(part), "{message}");
         }
         if cfg!(target_os = "linux") {
@@ -356,6 +360,6 @@ mod tests {
         };
         let message = search.open().err().unwrap().to_string();
         assert!(message.contains(&path.display().to_string()), "{message}");
-        assert!(message.contains("--ort-lib"), "{message}");
+        assert!(message.contains("--llie-options ort-lib"), "{message}");
     }
 }

@@ -185,8 +185,8 @@ fn thread_ended() -> Error {
 
 fn stuck() -> Error {
     Error::Runtime(format!(
-        "an enhancer did not end within {PATIENCE} times --llie-timeout, although it was stopped, because one of its operators takes that \
-         long; no further image is enhanced, and finished trials are saved. Allow more time with --llie-timeout, or enhance smaller images"
+        "an enhancer did not end within {PATIENCE} times --llie-options timeout, although it was stopped, because one of its operators takes that \
+         long; no further image is enhanced, and finished trials are saved. Allow more time with --llie-options timeout, or enhance smaller images"
     ))
 }
 
@@ -265,7 +265,7 @@ mod tests {
         };
         let stuck = thread.run_within(within(Duration::from_millis(1)), || {}, job);
         let message = stuck.unwrap_err().to_string();
-        assert!(message.contains("--llie-timeout"), "{message}");
+        assert!(message.contains("--llie-options timeout"), "{message}");
         assert!(thread.run(|| 1).is_err());
         drop(release);
     }

@@ -136,7 +136,7 @@ const KEYS: &str =
 /// Largest side, in pixels, that a sidecar may state; chosen: no image of this program is larger.
 const MOST_SIDE: usize = 1 << 16;
 
-/// Most pixels of the size that a sidecar may state: the default of `--max-pixels`.
+/// Most pixels of the size that a sidecar may state: the default of `--decode max-pixels`.
 const MOST_PIXELS: usize = 100_000_000;
 
 /// Largest multiple, in pixels; chosen: twice what any published model needs, and a small image filled up to it still fits anywhere.

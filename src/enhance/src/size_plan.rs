@@ -12,11 +12,11 @@ use super::failure::by;
 use super::sidecar::ModelSidecar;
 use super::tiles::{Cutting, Seam, TilePlan, Tiling};
 
-/// Side of a tile with `--tile auto`, in pixels: measured to be as fast as the whole image, with a twelfth of its memory.
+/// Side of a tile with `--llie-options tile=auto`, in pixels: measured to be as fast as the whole image, with a twelfth of its memory.
 const TILE: usize = 256;
-/// Largest image, in pixels, that `--tile auto` does not cut and whose memory is not checked; chosen.
+/// Largest image, in pixels, that `--llie-options tile=auto` does not cut and whose memory is not checked; chosen.
 pub(super) const MAX_WHOLE: usize = 1280 * 720;
-/// Context of tiles, in pixels, if `--tile N` is set and no sidecar or preset states the exact context; chosen.
+/// Context of tiles, in pixels, if `--llie-options tile=N` is set and no sidecar or preset states the exact context; chosen.
 const CONTEXT: usize = 32;
 
 /// Sizes that a model takes, as far as graph, sidecar, preset and trials show.
@@ -117,7 +117,7 @@ pub(super) enum SeamRule {
 /// Reason why there is no plan; the message follows the file's name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum NoPlan {
-    /// The flag `--tile` contradicts sidecar or preset.
+    /// The flag `--llie-options tile` contradicts sidecar or preset.
     TileFlag(String),
     /// Anything else.
     Other(String),
@@ -174,7 +174,7 @@ fn cropping(size: [usize; 2], rule: SizeRule) -> Result<Cutting, NoPlan> {
     })
 }
 
-/// Tiles for a model that takes any size, by `--tile` and what is stated.
+/// Tiles for a model that takes any size, by `--llie-options tile` and what is stated.
 fn cutting(size: [usize; 2], rule: SizeRule, tiling: Tiling) -> Result<Cutting, NoPlan> {
     let area = rule.filled(size);
     let exact = match rule.tile {
@@ -219,7 +219,7 @@ fn fitting(size: [usize; 2], rule: SizeRule, context: usize) -> Cutting {
 
 fn too_small(cut: Cutting) -> String {
     format!(
-        "cannot be cut into tiles of {} pixels: with {} pixels of context on each side nothing is left of them; set larger ones with --tile N, or export it for a larger size",
+        "cannot be cut into tiles of {} pixels: with {} pixels of context on each side nothing is left of them; set larger ones with --llie-options tile=N, or export it for a larger size",
         by(cut.tile),
         cut.context
     )
@@ -230,7 +230,7 @@ pub(super) fn global(rule: SizeRule, size: [usize; 2], why: &str) -> String {
     let side = |side: Option<usize>| side.map_or("any".to_owned(), |side| side.to_string());
     let [height, width] = rule.fixed.map(side);
     format!(
-        "takes images of {width} × {height} alone, and the image has {}; filling or cutting would change it, because {why}. Export the model with free sizes: torch.onnx.export(..., dynamic_axes={{\"input\": {{2: \"h\", 3: \"w\"}}, \"output\": {{2: \"h\", 3: \"w\"}}}}); or export it for images of {}; or let --llie-resize resize each image to {width} × {height} and back, which blurs it and changes its brightness by some codes of 255",
+        "takes images of {width} × {height} alone, and the image has {}; filling or cutting would change it, because {why}. Export the model with free sizes: torch.onnx.export(..., dynamic_axes={{\"input\": {{2: \"h\", 3: \"w\"}}, \"output\": {{2: \"h\", 3: \"w\"}}}}); or export it for images of {}; or let --llie-options resize resize each image to {width} × {height} and back, which blurs it and changes its brightness by some codes of 255",
         by(size),
         by(size)
     )
@@ -255,7 +255,7 @@ pub(super) fn seams_differ(
         return global(rule, size, &differ);
     }
     format!(
-        "cannot be cut: {differ}. Leave out --tile to enhance the whole image, or state more context (tile = \"exact:N\" in MODEL.onnx.toml)"
+        "cannot be cut: {differ}. Leave out --llie-options tile to enhance the whole image, or state more context (tile = \"exact:N\" in MODEL.onnx.toml)"
     )
 }
 

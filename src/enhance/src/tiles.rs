@@ -42,7 +42,7 @@ impl TileWindow {
     }
 }
 
-/// Division of images into tiles (`--tile`).
+/// Division of images into tiles (`--llie-options tile`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Tiling {
     /// Tiles if they are known to be exact and the image is large; else the whole image.

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use darkqa_ground::types::flag::seconds;
 
-/// Longest time that one image may take (`--llie-timeout`).
+/// Longest time that one image may take (`--llie-options timeout`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TimeLimit(Option<Duration>);
 

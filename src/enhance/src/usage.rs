@@ -22,7 +22,7 @@ pub enum Implausible {
     /// It is refused.
     #[default]
     Refused,
-    /// It is used (`--llie-anyway`).
+    /// It is used (`--allow bad-enhancer`).
     Used,
     /// Its images are not looked at, because they are those of a run that is there.
     NotLookedFor,
@@ -100,7 +100,7 @@ impl ImageUse {
         }
         let judged = usage.judge(&self.seen, place, implausible);
         judged.map_err(|problem| {
-            let remedy = "check that each has the name of its own dark image; --llie-anyway uses them as they are";
+            let remedy = "check that each has the name of its own dark image; --allow bad-enhancer uses them as they are";
             Error::data(folder.display(), format_args!("{problem}; {remedy}"))
         })
     }
@@ -125,7 +125,7 @@ impl Seen {
         judged.map_err(|problem| Error::EnhancerEnded {
             path: model.to_owned(),
             problem: format!(
-                "{problem}. `darkqa-eval enhance MODEL FRAMES… --doctor --out DIR` draws what it makes with each convention; --llie-anyway uses it as it is"
+                "{problem}. `darkqa-eval enhance doctor MODEL FRAMES… --out DIR` draws what it makes with each convention; --allow bad-enhancer uses it as it is"
             ),
         })
     }

@@ -163,7 +163,7 @@ fn warn_of_large(largest: Option<&ImageFacts>, limit: ImageLimit) {
         && limit == ImageLimit::UNKNOWN
     {
         tracing::warn!(
-            "images are up to {:.1} MB, {:.1} MB as sent; if the server answers 413, make them smaller with --max-side or --image jpeg:95",
+            "images are up to {:.1} MB, {:.1} MB as sent; if the server answers 413, make them smaller with --image max-side=N or --image jpeg:95",
             image.bytes as f64 / 1e6,
             image.bytes as f64 / 0.75e6
         );

@@ -62,7 +62,7 @@ pub struct CameraArgs {
     /// How the automatic exposure of the variant auto meets a drop: the maximum number of stops of longer exposure, then of stops of gain,
     /// starting at L0 from a system gain K in ADU per electron and an exposure time in seconds; the rest of the drop stays dark
     ///
-    /// Settings that are not named have their defaults. Those of gain and base-gain follow from the sensor of --camera: the gain ends at
+    /// Settings that are not named have their defaults. Those of gain and base-gain follow from the sensor of --noise camera: the gain ends at
     /// its greatest K, and starts 4 stops below, or at its least K (the paper's: gain=4,base-gain=0.375). The noise is that of the
     /// light reading physical at this gain, in this sensor.
     #[arg(long, value_name = "KEY=VALUE,…", default_value_t = AutoSettings::default(), add = Decides::Pixels)]
@@ -82,8 +82,8 @@ pub struct SensorArgs {
     /// The seed of all random draws
     #[arg(long, value_name = "N", default_value_t = 0, add = Decides::Pixels)]
     pub seed: u64,
-    /// Light readings, ways to understand the paper's noise, one or several as paper,eld; the four flags below replace choices
-    /// of a single reading, which is then custom, or has the name of the reading with the same choices
+    /// Light readings, ways to understand the paper's noise, one or several as paper,eld; amplify, tone, draws and
+    /// coupling of --noise replace choices of a single reading, which is then custom, or has the name of the reading with the same choices
     ///
     /// By default the noise variant has the same signal-to-noise ratio at every level: the levels are one noisy image at five
     /// brightnesses. `--profile physical` loses photons with the light; `--profile all` asks under every reading of the paper.
@@ -120,7 +120,7 @@ pub struct SensorArgs {
     /// for sony-a7s2) for each image
     #[arg(long, value_name = "K", add = Decides::Pixels)]
     pub gain: Option<f64>,
-    /// Pin the light ratio r of the sensor noise; not with --coupling photon, where it is 2^EV; default: uniform in the camera's
+    /// Pin the light ratio r of the sensor noise; not with --noise coupling=photon, where it is 2^EV; default: uniform in the camera's
     /// range for each image (100–300 for the built-in ones)
     #[arg(long, value_name = "R", add = Decides::Pixels)]
     pub ratio: Option<f64>,
@@ -134,11 +134,11 @@ pub struct SensorArgs {
 pub enum Profile {
     /// As the DarkQA paper states it
     Paper,
-    /// --amplify all
+    /// --noise amplify=all
     Eld,
-    /// --coupling photon
+    /// --noise coupling=photon
     Level,
-    /// --amplify all --tone before-ev --coupling photon
+    /// --noise amplify=all,tone=before-ev,coupling=photon
     Physical,
     /// All four, side by side
     All,
@@ -190,7 +190,7 @@ pub struct SensorSettings {
 }
 
 impl LightSettings {
-    /// Resolves the flags; reads the camera's file if `--camera` names one.
+    /// Resolves the flags; reads the camera's file if `--noise camera` names one.
     ///
     /// # Errors
     /// [`Error::Usage`] with the flag that cannot be used.
@@ -250,7 +250,7 @@ impl LightSettings {
 }
 
 impl KindSettings {
-    /// Resolves the flags; reads the camera's file if `--camera` names one.
+    /// Resolves the flags; reads the camera's file if `--noise camera` names one.
     ///
     /// # Errors
     /// [`Error::Usage`] with the flag that cannot be used.
@@ -293,7 +293,7 @@ impl KindSettings {
 }
 
 impl SensorSettings {
-    /// Resolves the flags; reads the camera's file if `--camera` names one.
+    /// Resolves the flags; reads the camera's file if `--noise camera` names one.
     ///
     /// # Errors
     /// [`Error::Usage`] with the flag that cannot be used.
@@ -319,10 +319,10 @@ fn readings(args: &SensorArgs) -> Result<Readings> {
         return synthesis(args, Synthesis::of(reading, camera)).map(Readings::from);
     }
     let choices = [
-        ("--amplify", args.amplify.is_some()),
-        ("--tone", args.tone.is_some()),
-        ("--draws", args.draws.is_some()),
-        ("--coupling", args.coupling.is_some()),
+        ("--noise amplify", args.amplify.is_some()),
+        ("--noise tone", args.tone.is_some()),
+        ("--noise draws", args.draws.is_some()),
+        ("--noise coupling", args.coupling.is_some()),
     ];
     if let Some((flag, _)) = choices.into_iter().find(|(_, is_set)| *is_set) {
         let problem = "cannot be combined with several profiles; name one in --profile";
@@ -335,8 +335,8 @@ fn readings(args: &SensorArgs) -> Result<Readings> {
         && let Some(reading) = chosen.iter().find(by_light)
     {
         let name = reading.name();
-        let problem = format!("the ratio of {name} is 2^EV; leave out --ratio or {name}");
-        return Err(Error::usage("--ratio", problem));
+        let problem = format!("the ratio of {name} is 2^EV; leave out --noise ratio or {name}");
+        return Err(Error::usage("--noise ratio", problem));
     }
     Ok(Readings::named(&chosen, &camera))
 }
@@ -351,8 +351,8 @@ fn synthesis(args: &SensorArgs, reading: Synthesis) -> Result<Synthesis> {
         camera: reading.camera,
     };
     if synthesis.coupling == Coupling::Photon && args.ratio.is_some() {
-        let problem = "with --coupling photon, or a profile that has it, the ratio is 2^EV; leave out --ratio";
-        return Err(Error::usage("--ratio", problem));
+        let problem = "with --noise coupling=photon, or a profile that has it, the ratio is 2^EV; leave out --noise ratio";
+        return Err(Error::usage("--noise ratio", problem));
     }
     Ok(synthesis)
 }
@@ -377,7 +377,7 @@ fn camera(args: &SensorArgs) -> Result<CameraModel> {
     Ok(camera)
 }
 
-/// Whether `--camera` is a file: it has an extension or a folder, which names of cameras do not have.
+/// Whether `--noise camera` is a file: it has an extension or a folder, which names of cameras do not have.
 fn is_file(path: &Path) -> bool {
     path.extension().is_some() || path.components().count() > 1
 }
@@ -417,20 +417,20 @@ mod tests {
         for (words, part) in [
             (
                 &["--profile=paper,eld", "--tone=none"][..],
-                "--tone: cannot be combined with several profiles",
+                "--noise tone: cannot be combined with several profiles",
             ),
             (
                 &["--profile=paper,physical", "--ratio=200"],
-                "--ratio: the ratio of physical is 2^EV",
+                "--noise ratio: the ratio of physical is 2^EV",
             ),
             (
                 &["--profile=physical", "--ratio=9"],
-                "--ratio: with --coupling photon",
+                "--noise ratio: with --noise coupling=photon",
             ),
             (&["--profile=papre"], "invalid value 'papre'"),
             (
                 &["--camera=leica"],
-                "--camera: \"leica\" is not one of sony-a7s2",
+                "--noise camera: \"leica\" is not one of sony-a7s2",
             ),
             (&["--camera=no/such.toml"], "no/such.toml"),
         ] {

@@ -29,7 +29,8 @@ const MOST_PROFILE: usize = 4 << 20;
 const CACHED: usize = 16;
 
 /// What to do with colours that are not converted.
-const REMEDY: &str = "convert it to sRGB first, or take its codes as sRGB with --colour ignore";
+const REMEDY: &str =
+    "convert it to sRGB first, or take its codes as sRGB with --decode colour=ignore";
 
 /// The colour information of a file that counts.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -71,7 +71,7 @@ pub fn grey_png((width, height): (usize, usize), samples: &[u16]) -> Result<Vec<
 pub(crate) fn jpeg(samples: &[u8], width: u32, height: u32, quality: Quality) -> Result<Vec<u8>> {
     let (Ok(width), Ok(height)) = (u16::try_from(width), u16::try_from(height)) else {
         return Err(image_error(format_args!(
-            "{width} × {height} pixels are too many for a JPEG; set --max-side, or --image png"
+            "{width} × {height} pixels are too many for a JPEG; set --image max-side=N, or --image png"
         )));
     };
     let mut file = Vec::new();

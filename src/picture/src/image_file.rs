@@ -357,7 +357,7 @@ impl ImageFile {
         read().map_err(|problem| self.wrong(problem))
     }
 
-    /// Light after `--exposure`.
+    /// Light after `--decode exposure`.
     fn scaled_light(&self, height: usize, width: usize, light: Vec<f32>) -> Result<Pixels> {
         let light = Arc::new(Light::new(height, width, light)?);
         Ok(Pixels::Light(self.rule.scaled(light)))
@@ -455,8 +455,8 @@ impl Depth {
 
 fn contradiction(colour: &ColourTag) -> String {
     format!(
-        "the file states what its codes mean ({}), and --transfer linear states something else; leave the flag out, or make the flag \
-         decide with --colour ignore",
+        "the file states what its codes mean ({}), and --decode transfer=linear states something else; leave the flag out, or make the flag \
+         decide with --decode colour=ignore",
         colour.kind()
     )
 }

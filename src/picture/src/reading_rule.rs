@@ -44,14 +44,14 @@ impl ReadingRule {
         let pixels = (width as u64).saturating_mul(height as u64);
         if pixels > self.most_pixels {
             return Err(format!(
-                "{width} × {height} pixels are more than the {} that are read; shrink it first, or raise --max-pixels",
+                "{width} × {height} pixels are more than the {} that are read; shrink it first, or raise --decode max-pixels",
                 self.most_pixels
             ));
         }
         let is_narrow = width.max(height) > MOST_ASPECT * width.min(height);
         if is_narrow && self.most_pixels == MOST_PIXELS {
             return Err(format!(
-                "{width} × {height} pixels: one side is more than {MOST_ASPECT} times the other; cut it, or set --max-pixels {}",
+                "{width} × {height} pixels: one side is more than {MOST_ASPECT} times the other; cut it, or set --decode max-pixels={}",
                 MOST_PIXELS - 1
             ));
         }
@@ -73,7 +73,7 @@ impl ReadingRule {
         }
     }
 
-    /// Light after `--exposure`.
+    /// Light after `--decode exposure`.
     #[must_use]
     pub fn scaled(&self, light: Arc<Light>) -> Arc<Light> {
         let Some(ev) = self.exposure_ev else {
@@ -90,8 +90,8 @@ impl ReadingRule {
 
     /// The flags for linear light that were given.
     fn of_light(&self) -> Vec<String> {
-        let linear = (self.transfer == Transfer::Linear).then_some("--transfer linear");
-        let exposure = self.exposure_ev.map(|_| "--exposure");
+        let linear = (self.transfer == Transfer::Linear).then_some("--decode transfer=linear");
+        let exposure = self.exposure_ev.map(|_| "--decode exposure");
         let flags = [linear, exposure].into_iter().flatten();
         flags.map(str::to_owned).collect()
     }

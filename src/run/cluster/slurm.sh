@@ -6,7 +6,7 @@
 # PARTS=64 AT_ONCE=8 in front divides otherwise; SBATCH_ACCOUNT, SBATCH_PARTITION and the like are sbatch's own. The key comes from
 # the environment, or --api-key-file. One array alone, where the plan is there or none is wanted:
 #
-#     sbatch --array=0-15%4 slurm.sh --workers 4 --out runs/a --model gpt-4o --data frames/ --rpm 500
+#     sbatch --array=0-15%4 slurm.sh --shard workers=4 --out runs/a --model gpt-4o --data frames/ --rpm 500
 #
 # A task that is preempted, or near its time limit, finishes the requests in flight, and Slurm starts it again. A task that was
 # killed (kill -9, no memory), cancelled or lost with its node is not started again, and the merge is cancelled with it: give the
@@ -32,8 +32,8 @@ if [ -z "${SLURM_JOB_ID:-}" ]; then
   submit() { sbatch --parsable --kill-on-invalid-dep=yes "$@"; }
   plan=$(submit --job-name=darkqa-plan "$0" plan "$@")
   array=$(submit --array="0-$((parts - 1))%$at_once" --output=darkqa-%A_%a.log --dependency="afterok:$plan" \
-    "$0" --workers "$at_once" "$@")
-  merge=$(submit --job-name=darkqa-merge --dependency="afterok:$array" "$0" merge "$out" --out "${out%/}-whole" --quiet)
+    "$0" --shard "workers=$at_once" "$@")
+  merge=$(submit --job-name=darkqa-merge --dependency="afterok:$array" "$0" report merge "$out" --out "${out%/}-whole" --quiet)
   echo "plan $plan, $parts parts $array, merge $merge: squeue --me shows them"
   exit
 fi

@@ -1,7 +1,7 @@
-//! `enhance --doctor`: what a model makes of dark frames with each convention, as a page, a picture and a proposed sidecar.
+//! `enhance doctor`: what a model makes of dark frames with each convention, as a page, a picture and a proposed sidecar.
 
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
@@ -19,16 +19,15 @@ use darkqa_enhance::{Enhancer, Examination, ImageOutput, Settled};
 const PAGE: &str = "doctor.html";
 const PICTURE: &str = "doctor.png";
 
-/// The flags of the examination.
+/// The flags of the files of an examination.
 #[derive(Debug, Args)]
-pub(crate) struct DoctorArgs {
-    /// Run the model on dark versions of the images with each convention that could be meant, and write doctor.html and doctor.png
-    /// into the folder of --out, with the sidecar that would repair it; ends with 0 if there is one plausible convention, else with 1
-    #[arg(long, conflicts_with_all = ["describe", "shard"], requires = "out", add = Decides::Nothing)]
-    pub doctor: bool,
-    /// Write the sidecar that --doctor proposes beside the model; an existing one is never replaced
-    #[arg(long, requires = "doctor", add = Decides::Nothing)]
-    pub write: bool,
+pub(super) struct DoctorFileArgs {
+    /// Where doctor.html and doctor.png go
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
+    out: PathBuf,
+    /// Write the sidecar that is proposed beside the model; an existing one is never replaced
+    #[arg(long, add = Decides::Nothing)]
+    write: bool,
 }
 
 /// Examines the model on dark frames, and writes page and picture; with `--write`, the proposed sidecar, too.
@@ -36,12 +35,12 @@ pub(crate) struct DoctorArgs {
 /// # Errors
 /// If the model takes none of the sizes of the probe, a file cannot be written, or `--write` finds a sidecar that is there already.
 pub(super) fn doctor(
-    args: &DoctorArgs,
+    args: &DoctorFileArgs,
     image: ImageOutput,
     enhancer: &mut Enhancer,
     dark: &[Rgb],
-    out: &Path,
 ) -> Result<Outcome> {
+    let out = &args.out;
     let examination = enhancer.examine(dark, image)?;
     let model = enhancer.path();
     let lines: Vec<&str> = examination

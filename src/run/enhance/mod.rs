@@ -3,9 +3,9 @@
 mod doctor;
 mod origin;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, Subcommand};
 
 use crate::dataset::inputs::Inputs;
 use crate::dataset::{CodesArgs, PixelLimit, RootArgs};
@@ -20,101 +20,193 @@ use crate::runs::part_args::{PartArgs, keep_part};
 use crate::types::manifest::Status;
 use crate::types::{Decides, Rgb};
 use darkqa_enhance::{Enhancer, FRAMES, ImageOutput, ModelFile, list_of_presets};
-use doctor::DoctorArgs;
+use doctor::DoctorFileArgs;
 use origin::EnhancedOrigin;
 
 /// Number of outputs that are tried as the image; chosen: models that give each of their steps have fewer.
 const MOST_OUTPUTS: usize = 16;
 
-/// The flags of `enhance`.
+/// `enhance`, or another form of it.
 #[derive(Debug, Args)]
-pub(crate) struct EnhanceArgs {
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub(crate) struct EnhanceCommand {
+    /// The form; `None` for enhanced images.
+    #[command(subcommand)]
+    form: Option<EnhanceForm>,
+    /// Flags for enhanced images.
+    #[command(flatten)]
+    images: Option<EnhanceArgs>,
+}
+
+/// The other forms of `enhance`.
+#[derive(Debug, Subcommand)]
+enum EnhanceForm {
+    /// Print how the model's input and output are read, and why; enhances nothing
+    Describe(DescribeArgs),
+    /// Run the model on dark versions of images with each convention that could be meant, and propose a sidecar
+    ///
+    /// Writes doctor.html and doctor.png into the folder of --out, with the sidecar that would repair it. Ends with 0 if there is one
+    /// plausible convention, else with 1.
+    Doctor(DoctorArgs),
+    /// Print the presets of published enhancers, each with repository, licence, conventions and the command that exports it
+    Presets,
+}
+
+/// The enhancer, and how it is run.
+#[derive(Debug, Args)]
+struct ModelArgs {
     /// The enhancer: lift or gray-gain, which are built in; FILE.onnx; or PRESET:FILE.onnx (zero-dce, zero-dce++, ruas-lol,
     /// ruas-upe, ruas-dark, sci, iat, pairlie, pairlie-lol, enlightengan, uretinex, retinexformer, darkir, cidnet, llformer,
     /// restormer, mirnet, kind, agllnet, zero-dce-tf)
-    #[arg(value_name = "MODEL", required_unless_present = "presets", add = Decides::Trials)]
-    pub model: Option<PathBuf>,
-    /// Images (PNG, JPEG, WebP, TIFF, BMP) and folders of frames
-    #[arg(value_name = "INPUT", required_unless_present_any = ["describe", "presets"], add = Decides::Pixels)]
-    pub inputs: Vec<PathBuf>,
-    /// Where the enhanced images go, as PNG under their own names, each with a JSON file; default: nowhere, with --describe
-    #[arg(long, value_name = "DIR", required_unless_present_any = ["describe", "presets"], add = Decides::Nothing)]
-    pub out: Option<PathBuf>,
-    /// Print how the model's input and output are read, and why; enhances nothing
-    #[arg(long, conflicts_with_all = ["inputs", "out", "shard"], add = Decides::Nothing)]
-    pub describe: bool,
-    /// Print the presets of published enhancers, each with repository, licence, conventions and the command that exports it
-    #[arg(long, conflicts_with_all = ["model", "inputs", "out", "describe", "shard"], add = Decides::Nothing)]
-    pub presets: bool,
-    /// The flags of the examination.
-    #[command(flatten)]
-    pub doctor: DoctorArgs,
+    #[arg(value_name = "MODEL", add = Decides::Trials)]
+    model: PathBuf,
     /// The flags for running enhancers.
     #[command(flatten)]
-    pub loading: EnhancerRunArgs,
-    /// The part of the images.
-    #[command(flatten)]
-    pub part: PartArgs,
-    /// Replace images that exist already, also those of other models and settings
-    #[arg(long, help_heading = "Output", add = Decides::Nothing)]
-    pub force: bool,
-    /// The maximum size of an image.
-    #[command(flatten)]
-    pub limit: PixelLimit,
-    /// What the codes of images mean.
-    #[command(flatten)]
-    pub codes: CodesArgs,
-    /// Further folders of the images.
-    #[command(flatten)]
-    pub root: RootArgs,
+    loading: EnhancerRunArgs,
 }
 
-/// Enhances the images, or describes the model.
+/// The images, and how they are read.
+#[derive(Debug, Args)]
+struct InputArgs {
+    /// Images (PNG, JPEG, WebP, TIFF, BMP) and folders of frames
+    #[arg(value_name = "INPUT", required = true, add = Decides::Pixels)]
+    inputs: Vec<PathBuf>,
+    /// The maximum size of an image.
+    #[command(flatten)]
+    limit: PixelLimit,
+    /// What the codes of images mean.
+    #[command(flatten)]
+    codes: CodesArgs,
+    /// Further folders of the images.
+    #[command(flatten)]
+    root: RootArgs,
+}
+
+/// The flags of `enhance describe`.
+#[derive(Debug, Args)]
+struct DescribeArgs {
+    /// The enhancer.
+    #[command(flatten)]
+    enhancer: ModelArgs,
+}
+
+/// The flags of `enhance doctor`.
+#[derive(Debug, Args)]
+struct DoctorArgs {
+    /// The enhancer.
+    #[command(flatten)]
+    enhancer: ModelArgs,
+    /// The images.
+    #[command(flatten)]
+    images: InputArgs,
+    /// The files of the examination.
+    #[command(flatten)]
+    files: DoctorFileArgs,
+}
+
+/// The flags of `enhance`.
+#[derive(Debug, Args)]
+#[group(arg = "out")]
+struct EnhanceArgs {
+    /// The enhancer.
+    #[command(flatten)]
+    enhancer: ModelArgs,
+    /// The images.
+    #[command(flatten)]
+    images: InputArgs,
+    /// Where the enhanced images go, as PNG under their own names, each with a JSON file
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
+    out: PathBuf,
+    /// The part of the images.
+    #[command(flatten)]
+    part: PartArgs,
+    /// Replace images that exist already, also those of other models and settings
+    #[arg(long, help_heading = "Output", add = Decides::Nothing)]
+    force: bool,
+}
+
+impl ModelArgs {
+    fn file(&self) -> Result<ModelFile> {
+        ModelFile::read(&self.model).map_err(|e| e.usage_at("MODEL"))
+    }
+
+    fn open(&self, file: ModelFile) -> Result<Enhancer> {
+        let enhancers = OpenEnhancers::load(vec![file], &self.loading)?.take()?;
+        let only = enhancers.into_iter().next();
+        only.ok_or_else(|| Error::usage("MODEL", "one model expected"))
+    }
+}
+
+impl InputArgs {
+    fn open(&self) -> Result<Inputs> {
+        let rule = self.codes.rule(self.limit);
+        Inputs::open(&self.inputs, &self.root.data_root, rule)
+    }
+}
+
+/// Enhances images, or describes or examines the model.
+///
+/// # Errors
+/// If the model or an input is missing, or the work of the command fails.
+pub(crate) fn enhance(command: &EnhanceCommand, progress: &Progress) -> Result<Outcome> {
+    match (&command.form, &command.images) {
+        (Some(EnhanceForm::Describe(DescribeArgs { enhancer })), _) => {
+            let enhancer = enhancer.open(enhancer.file()?)?;
+            Ok(Outcome::text(Status::Complete, enhancer.describe()))
+        }
+        (Some(EnhanceForm::Doctor(args)), _) => examine(args, progress),
+        (Some(EnhanceForm::Presets), _) => Ok(Outcome::text(Status::Complete, list_of_presets()?)),
+        (None, Some(args)) => enhance_images(args, progress),
+        (None, None) => Err(Error::usage("MODEL", "an enhancer is missing")),
+    }
+}
+
+/// Examines the model on dark versions of images.
+fn examine(args: &DoctorArgs, progress: &Progress) -> Result<Outcome> {
+    let (mut enhancer, image) = open_unsure(&args.enhancer)?;
+    let sample = sample(&args.images.open()?);
+    if sample.is_empty() {
+        let problem = "needs at least one image that can be read";
+        return Err(Error::usage("INPUT", problem));
+    }
+    let dark = darkened(&sample);
+    let (model, n) = (args.enhancer.model.display(), dark.len());
+    progress.say(&format!(
+        "{model} enhances {n} dark images with each convention"
+    ));
+    doctor::doctor(&args.files, image, &mut enhancer, &dark)
+}
+
+/// Images that stand for all. One that cannot be read is named when its turn comes.
+fn sample(images: &Inputs) -> Vec<Rgb> {
+    let sample = evenly(images.entries.len(), FRAMES).into_iter();
+    sample
+        .filter_map(|place| images.picture(&images.entries[place]).ok()?.decode().ok())
+        .collect()
+}
+
+/// Enhances the images.
 ///
 /// If one image fails, the error is logged and counted, and the others continue.
 ///
 /// # Errors
 /// If the model or an input is missing, two images have the same name, or the folder cannot be written to.
-pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
-    let Some(model) = &args.model else {
-        return Ok(Outcome::text(Status::Complete, list_of_presets()?));
-    };
-    let file = ModelFile::read(model).map_err(|e| e.usage_at("MODEL"))?;
+fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
+    let file = args.enhancer.file()?;
     let digest = file.digest();
-    let (mut enhancer, image) = open(file, model, args)?;
-    let Some(out) = &args.out else {
-        return Ok(Outcome::text(Status::Complete, enhancer.describe()));
-    };
-    let mut images = Inputs::open(
-        &args.inputs,
-        &args.root.data_root,
-        args.codes.rule(args.limit),
-    )?;
+    let mut enhancer = args.enhancer.open(file)?;
+    let (out, loading) = (&args.out, &args.enhancer.loading);
+    let mut images = args.images.open()?;
     keep_part(&mut images.entries, args.part.resolve()?)?;
-    let sample = evenly(images.entries.len(), FRAMES).into_iter();
-    let sample = sample.map(|place| images.picture(&images.entries[place])?.decode());
-    // An image that cannot be read is named when its turn comes.
-    let sample: Vec<Rgb> = sample.filter_map(Result::ok).collect();
-    if args.doctor.doctor {
-        if sample.is_empty() {
-            let problem = "needs at least one image that can be read";
-            return Err(Error::usage("INPUT", problem));
-        }
-        let dark = darkened(&sample);
-        let (model, n) = (model.display(), dark.len());
-        progress.say(&format!(
-            "{model} enhances {n} dark images with each convention"
-        ));
-        return doctor::doctor(&args.doctor, image, &mut enhancer, &dark, out);
-    }
+    let sample = sample(&images);
     if !sample.is_empty() {
-        enhancer.probe(&darkened(&sample), args.loading.probe.implausible())?;
+        enhancer.probe(&darkened(&sample), loading.probe.implausible())?;
     }
     let (bar, tally) = (
         progress.bar("images", images.entries.len()),
         InputTally::default(),
     );
-    let settings = origin::settings(&digest, &args.loading.size);
+    let settings = origin::settings(&digest, &loading.size);
     let used_anyway = enhancer.used_anyway();
     let (mut written, mut unchanged, mut failed) = (0, 0, 0);
     for entry in &images.entries {
@@ -156,7 +248,7 @@ pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome
             out.display(),
             enhancer.name(),
             if used_anyway.is_some() && written > 0 {
-                " because of --llie-anyway"
+                " because of --allow bad-enhancer"
             } else {
                 ""
             },
@@ -166,23 +258,15 @@ pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome
     ))
 }
 
-/// The enhancer, and whether it is known which of its outputs is the image. If it is not, `--doctor` examines all of them.
-fn open(file: ModelFile, model: &Path, args: &EnhanceArgs) -> Result<(Enhancer, ImageOutput)> {
-    let load = |file: ModelFile| -> Result<Enhancer> {
-        let enhancers = OpenEnhancers::load(vec![file], &args.loading)?.take()?;
-        let mut enhancers = enhancers.into_iter();
-        let only = enhancers.next();
-        only.ok_or_else(|| Error::usage("MODEL", "one model expected"))
-    };
-    let problem = match load(file) {
+/// The enhancer, and whether it is known which of its outputs is the image. If it is not, all of them are examined.
+fn open_unsure(args: &ModelArgs) -> Result<(Enhancer, ImageOutput)> {
+    let problem = match args.open(args.file()?) {
         Ok(enhancer) => return Ok((enhancer, ImageOutput::Known)),
         Err(problem) => problem,
     };
-    if args.doctor.doctor {
-        for place in 0..MOST_OUTPUTS {
-            if let Ok(enhancer) = load(ModelFile::read(model)?.with_output(place)) {
-                return Ok((enhancer, ImageOutput::Unknown));
-            }
+    for place in 0..MOST_OUTPUTS {
+        if let Ok(enhancer) = args.open(args.file()?.with_output(place)) {
+            return Ok((enhancer, ImageOutput::Unknown));
         }
     }
     Err(problem)

@@ -35,9 +35,9 @@ pub(crate) struct RealismArgs {
     /// Fit the sensor's gain K to the noise of each pair, in each light reading, and compare the fitted camera too
     ///
     /// The gain is the one whose noise has the spread of the low-light image in blocks that are smooth in normal light, as saved: a
-    /// smaller K than the sensor's means that noise was averaged away. paper and eld take the middle of the camera's r, or --ratio,
+    /// smaller K than the sensor's means that noise was averaged away. paper and eld take the middle of the camera's r, or --noise ratio,
     /// because images show the product rK alone. With 3 fitted pairs or more, each pair is judged by the gains of the others. --out
-    /// also gets a camera file for --camera: fitted.toml, or fitted-READING.toml for each of several readings.
+    /// also gets a camera file for --noise camera: fitted.toml, or fitted-READING.toml for each of several readings.
     #[arg(long, conflicts_with = "gain", add = Decides::Pixels)]
     pub fit: bool,
     /// The bins of the residuals' divergence

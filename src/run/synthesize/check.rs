@@ -1,4 +1,4 @@
-//! `synthesize --check`: holding images to the digests in their JSON files.
+//! `synthesize check`: holding images to the digests in their JSON files.
 
 use std::fs;
 use std::path::{Path, PathBuf};

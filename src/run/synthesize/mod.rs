@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, Subcommand};
 use rayon::prelude::*;
 
 use crate::dataset::inputs::{InputFrame, Inputs, stem};
@@ -33,28 +33,73 @@ use darkqa_light::{LightArgs, LightSettings, NoiseKey};
 pub(crate) use sheet::Sheet;
 use sheet::SheetRecipe;
 
+/// `synthesize`, or another form of it.
+#[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub(crate) struct SynthesizeCommand {
+    /// The form; `None` for images of all levels.
+    #[command(subcommand)]
+    form: Option<SynthesizeForm>,
+    /// Flags for images of all levels.
+    #[command(flatten)]
+    pub(crate) images: Option<SynthesizeArgs>,
+}
+
+/// The other forms of `synthesize`.
+#[derive(Debug, Subcommand)]
+enum SynthesizeForm {
+    /// Compare the images of a folder with the digests in their JSON files; nothing is made or changed
+    Check {
+        /// The folder of the images
+        #[arg(value_name = "DIR", add = Decides::Nothing)]
+        folder: PathBuf,
+    },
+    /// Make the image of a JSON file again, with the settings in it
+    From(ReplayArgs),
+}
+
+/// The flags of `synthesize from`.
+#[derive(Debug, Args)]
+struct ReplayArgs {
+    /// The JSON file of the image
+    #[arg(value_name = "FILE", add = Decides::Pixels)]
+    file: PathBuf,
+    /// The image that it was made from, or the folder of its frame
+    #[arg(value_name = "INPUT", add = Decides::Pixels)]
+    input: PathBuf,
+    /// Where the image goes, with its JSON file
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
+    out: PathBuf,
+    /// Overwrite any file that has the name of the image
+    #[arg(long, add = Decides::Nothing)]
+    force: bool,
+    /// The maximum size of an image.
+    #[command(flatten)]
+    limit: PixelLimit,
+    /// What the codes of images mean.
+    #[command(flatten)]
+    codes: CodesArgs,
+    /// Further folders of the images.
+    #[command(flatten)]
+    root: RootArgs,
+}
+
 /// The flags of `synthesize`.
 #[derive(Debug, Args)]
+#[group(arg = "inputs")]
 pub(crate) struct SynthesizeArgs {
     /// Images, folders of images, or folders of frames (frames.jsonl)
-    #[arg(required_unless_present = "check", value_name = "INPUT", add = Decides::Pixels)]
+    #[arg(required = true, value_name = "INPUT", add = Decides::Pixels)]
     pub inputs: Vec<PathBuf>,
-    /// Where the images go, each with a JSON file of all settings that made it; default: none; required without --check
-    #[arg(long, value_name = "DIR", required_unless_present = "check", add = Decides::Nothing)]
-    pub out: Option<PathBuf>,
+    /// Where the images go, each with a JSON file of all settings that made it
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
+    pub out: PathBuf,
     /// The flags for the degradations.
     #[command(flatten)]
     pub light: LightArgs,
-    /// Make again the image of this JSON file, from the one INPUT that it was made from; default: make images of all levels
-    #[arg(long, value_name = "FILE", help_heading = "Synthesis", conflicts_with = "shard", add = Decides::Pixels)]
-    pub from: Option<PathBuf>,
     /// One figure per input instead; default: images
-    #[arg(long, value_enum, help_heading = "Synthesis", conflicts_with = "from", add = Decides::Nothing)]
+    #[arg(long, value_enum, help_heading = "Synthesis", add = Decides::Nothing)]
     pub sheet: Option<Sheet>,
-    /// Compare the images of a folder with the digests in their JSON files; nothing is made or changed; default: make images
-    #[arg(long, value_name = "DIR", help_heading = "Synthesis",
-        conflicts_with_all = ["inputs", "out", "from", "sheet", "force", "shard"], add = Decides::Nothing)]
-    pub check: Option<PathBuf>,
     /// Overwrite any file that has the name of an image
     #[arg(long, help_heading = "Synthesis", add = Decides::Nothing)]
     pub force: bool,
@@ -78,9 +123,20 @@ pub(crate) struct SynthesizeArgs {
 /// The flags, and the light settings that they give.
 struct ImageMaking<'a> {
     args: &'a SynthesizeArgs,
-    /// The folder of the images.
-    out: &'a Path,
     light: LightSettings,
+}
+
+/// Makes images, makes one again, or checks images.
+///
+/// # Errors
+/// If images cannot be made, or none to check is found.
+pub(crate) fn synthesize(command: &SynthesizeCommand, progress: &Progress) -> Result<Outcome> {
+    match (&command.form, &command.images) {
+        (Some(SynthesizeForm::Check { folder }), _) => check::check(folder),
+        (Some(SynthesizeForm::From(args)), _) => replay(args),
+        (None, Some(args)) => make_images(args, progress),
+        (None, None) => Err(Error::usage("INPUT", "an image or a folder is missing")),
+    }
 }
 
 /// Writes the images or figures of all inputs.
@@ -89,15 +145,10 @@ struct ImageMaking<'a> {
 ///
 /// # Errors
 /// If an input is missing, two frames have the same name, or the folder cannot be written to.
-pub(crate) fn synthesize(args: &SynthesizeArgs, progress: &Progress) -> Result<Outcome> {
-    let out = match (&args.check, &args.out) {
-        (Some(folder), _) => return check::check(folder),
-        (None, Some(out)) => out,
-        (None, None) => return Err(Error::usage("--out", "a folder for the images is missing")),
-    };
+fn make_images(args: &SynthesizeArgs, progress: &Progress) -> Result<Outcome> {
+    let out = &args.out;
     let making = &ImageMaking {
         args,
-        out,
         light: LightSettings::resolve(&args.light, SetLight::Lit)?,
     };
     making.light.refuse_matches("synthesize knows none")?;
@@ -109,9 +160,6 @@ pub(crate) fn synthesize(args: &SynthesizeArgs, progress: &Progress) -> Result<O
     keep_part(&mut frames.entries, args.part.resolve()?)?;
     let workers = pool(args.threads.threads)?;
     fs::create_dir_all(out).map_err(|e| Error::file(out, "make", e))?;
-    if let Some(file) = &args.from {
-        return workers.install(|| replay(making, &frames, file));
-    }
     let (files, tally) = (files(making), InputTally::default());
     let bar = progress.bar("images", frames.entries.len() * files.len());
     let counts: Vec<ImageCounts> = workers.install(|| {
@@ -274,7 +322,7 @@ impl SynthesisWork<'_> {
         let picture = self.frame.picture()?;
         let file = (picture.digest(), picture.note());
         let recipe = ImageRecipe::new(&self.entry.id, file, how, applied.as_ref(), &key, seed);
-        let place = Placed::new(self.making.out, &name, self.making.args.force);
+        let place = Placed::new(&self.making.args.out, &name, self.making.args.force);
         place.put(&recipe, || Ok(Rgb::clone(self.frame.degraded(how)?)))
     }
 
@@ -282,20 +330,24 @@ impl SynthesisWork<'_> {
         let light = &self.making.light;
         let recipe = SheetRecipe::new(kind, &self.entry.id, self.frame.picture()?, light)?;
         let name = format!("{}_{kind}", self.entry.stem);
-        let place = Placed::new(self.making.out, &name, self.making.args.force);
+        let place = Placed::new(&self.making.args.out, &name, self.making.args.force);
         place.put(&recipe, || kind.draw(&mut self.frame, light))
     }
 }
 
 /// Makes the image of a JSON file again.
-fn replay(making: &ImageMaking<'_>, frames: &Inputs, file: &Path) -> Result<Outcome> {
+fn replay(args: &ReplayArgs) -> Result<Outcome> {
+    let input = std::slice::from_ref(&args.input);
+    let rule = args.codes.rule(args.limit);
+    let frames = Inputs::open(input, &args.root.data_root, rule)?;
+    let file = &args.file;
     let sidecar = Sidecar::<ImageRecipe>::read(file)?;
     let [entry] = &frames.entries[..] else {
         let problem = format_args!(
-            "one INPUT expected, the image that FILE was made from; got {}",
+            "one image expected, which FILE was made from; got {}",
             frames.entries.len()
         );
-        return Err(Error::usage("--from", problem));
+        return Err(Error::usage("INPUT", problem));
     };
     let picture = frames.picture(entry)?;
     let tally = InputTally::default();
@@ -303,11 +355,12 @@ fn replay(making: &ImageMaking<'_>, frames: &Inputs, file: &Path) -> Result<Outc
     tally.warn();
     let degraded = ImageRecipe::replay(&sidecar, &picture, file)?;
     let name = sidecar.recipe.name(&stem(&sidecar.recipe.frame())?);
-    let place = Placed::new(making.out, &name, making.args.force);
+    fs::create_dir_all(&args.out).map_err(|e| Error::file(&args.out, "make", e))?;
+    let place = Placed::new(&args.out, &name, args.force);
     let mut counts = ImageCounts::default();
     match place.put(&sidecar.recipe, || Ok(degraded))? {
         ImageOutcome::Written => counts.written = 1,
         ImageOutcome::Unchanged => counts.unchanged = 1,
     }
-    Ok(counts.outcome(making.out, 1))
+    Ok(counts.outcome(&args.out, 1))
 }

@@ -8,7 +8,7 @@ use crate::run_reports::join::JoinedRun;
 use crate::text::alert::{Alert, AlertKind};
 use crate::types::{ChoiceDetail, TrialRef, Trials};
 
-/// One alert for each model that was asked with `--probabilities` and has no reply with any.
+/// One alert for each model that was asked with `--request probabilities` and has no reply with any.
 pub(super) fn of_confidence(runs: &[JoinedRun], trials: &Trials<ChoiceDetail>) -> Vec<Alert> {
     let columns = runs
         .iter()

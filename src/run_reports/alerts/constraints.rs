@@ -7,7 +7,7 @@ use crate::text::alert::{Alert, AlertKind};
 use crate::text::words::plural;
 use crate::types::{ChoiceDetail, Trials};
 
-/// One alert for each model that was asked with `--constrain` and has replies of another form. A reply that keeps it is stored as its
+/// One alert for each model that was asked with `--request constrain` and has replies of another form. A reply that keeps it is stored as its
 /// letter alone.
 pub(super) fn of_constraints(runs: &[JoinedRun], trials: &Trials<ChoiceDetail>) -> Vec<Alert> {
     let columns = runs
@@ -28,7 +28,7 @@ pub(super) fn of_constraints(runs: &[JoinedRun], trials: &Trials<ChoiceDetail>) 
         (other > 0).then(|| {
             let replies = plural(all, "reply", "replies");
             let text = format!(
-                "Constraint not followed: {other} of {replies} of {model} have another form than --constrain {constraint} asks for, \
+                "Constraint not followed: {other} of {replies} of {model} have another form than --request constrain={constraint} asks for, \
                  and are read as any reply."
             );
             Alert::new(AlertKind::Constrain, text)

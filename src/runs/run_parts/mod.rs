@@ -1,4 +1,4 @@
-//! The parts of a run, read as one run: [`RunParts`]. `merge` writes that run, and `report` reports on it as it is.
+//! The parts of a run, read as one run: [`RunParts`]. `report merge` writes that run, and `report` reports on it as it is.
 
 mod coverage;
 mod joined;

@@ -34,7 +34,7 @@ impl ChangedQuestions {
         let remedy = match part {
             QuestionPart::Image if reads_alike() => "restore the file or its --data",
             QuestionPart::Image => {
-                "restore the file, and flags that decide how it is read (--colour, --transfer)"
+                "restore the file, and flags that decide how it is read (--decode)"
             }
             _ => "restore --data and --questions",
         };

@@ -82,7 +82,7 @@ fn a_part_that_is_too_large_for_the_quota_is_divided() {
     let mock = MockBatches::start([tiny]);
     let called = call_with(BLIND, &bench, &mock, "");
     assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(called.stderr.contains("--max-side"), "{called:?}");
+    assert!(called.stderr.contains("--image max-side"), "{called:?}");
 }
 
 #[test]

@@ -245,7 +245,10 @@ fn wrong_flags_are_named() {
                 "cam --white 9999 --crop 0,0,100,100",
                 "100 × 100 sites are too few",
             ),
-            ("cam --white 9999 --max-pixels 100", "raise --max-pixels"),
+            (
+                "cam --white 9999 --max-pixels 100",
+                "raise --decode max-pixels",
+            ),
             (
                 "cam --out camera.svg",
                 "--out: camera.svg does not end in .toml",

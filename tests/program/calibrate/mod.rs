@@ -109,7 +109,7 @@ fn a_known_sensor_comes_back() {
     camera_is_used(&bench);
 }
 
-/// The camera file in a folder is read by `--camera`, and its noise is that of the sensor.
+/// The camera file in a folder is read by `--noise camera`, and its noise is that of the sensor.
 fn camera_is_used(bench: &Bench) {
     let text = fs::read_to_string(bench.path("camera.toml")).unwrap();
     for part in [
@@ -220,7 +220,7 @@ fn the_table_and_the_flags() {
             "iso800",
             "fewer than 3 settings count: the slope is that of sony-a7s2",
             "checks: nothing to report",
-            "camera.toml: the camera, for --camera; camera.svg: its fits",
+            "camera.toml: the camera, for --noise camera; camera.svg: its fits",
         ],
         |part| assert!(table.stdout.contains(part), "{part}: {}", table.stdout),
     );

@@ -45,7 +45,7 @@ fn the_command_enhances_files_and_folders() {
         (code, out.as_str()),
         (
             1,
-            "mended: 2 made by gain because of --llie-anyway, 1 failed\n"
+            "mended: 2 made by gain because of --allow bad-enhancer, 1 failed\n"
         ),
         "{err}"
     );

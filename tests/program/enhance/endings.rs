@@ -66,7 +66,7 @@ fn an_image_that_takes_too_much_memory_is_an_error_and_others_go_on() {
     for _ in 0..3 {
         let message = enhancer.enhance(&bright).unwrap_err().to_string();
         assert!(message.contains("more than 0.01 GB"), "{message}");
-        assert!(message.contains("--llie-max-memory"), "{message}");
+        assert!(message.contains("--llie-options max-memory"), "{message}");
     }
     let message = enhancer.enhance(&dark).unwrap_err().to_string();
     assert!(message.contains("is not run any more"), "{message}");
@@ -82,7 +82,7 @@ fn a_file_that_is_too_new_for_the_library_says_so() {
         std::fs::write(&path, bytes).unwrap();
         let message = open(&path).err().unwrap().to_string();
         assert!(
-            message.contains(part) && message.contains("--ort-lib"),
+            message.contains(part) && message.contains("--llie-options ort-lib"),
             "{message}"
         );
     }

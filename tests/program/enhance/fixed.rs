@@ -72,7 +72,12 @@ fn a_global_model_of_a_fixed_size_is_refused_or_resized_by_flag() {
         let same = image(48, 48);
         enhancer.enhance(&same).unwrap();
         let message = enhancer.enhance(&image(60, 100)).unwrap_err().to_string();
-        for part in ["48 × 48", "100 × 60", "dynamic_axes", "--llie-resize"] {
+        for part in [
+            "48 × 48",
+            "100 × 60",
+            "dynamic_axes",
+            "--llie-options resize",
+        ] {
             assert!(message.contains(part), "{message}");
         }
         let mut enhancer = enhancer.with_fitting(Fitting::Resize);

@@ -1,4 +1,4 @@
-//! Models whose images cannot be enhanced images: in an evaluation, and examined by `enhance --doctor`.
+//! Models whose images cannot be enhanced images: in an evaluation, and examined by `enhance doctor`.
 
 use std::fs;
 use std::path::Path;
@@ -109,16 +109,16 @@ fn images_that_cannot_be_enhanced_ones_stop_the_run_with_what_was_seen() {
         let called = ask(&bench, "");
         assert_eq!(called.code, Some(2), "{seen}: {called:?}");
         assert!(called.stderr.contains(seen), "{seen}: {called:?}");
-        assert!(called.stderr.contains("--llie-anyway"), "{called:?}");
+        assert!(called.stderr.contains("--allow bad-enhancer"), "{called:?}");
         // It is not asked about, but it can be.
         let called = ask(&bench, "--llie-anyway");
         assert_eq!(called.code, Some(0), "{called:?}");
         assert!(
-            called.stdout.contains("because of --llie-anyway"),
+            called.stdout.contains("because of --allow bad-enhancer"),
             "{called:?}"
         );
         let page = fs::read_to_string(bench.path("run/report.html")).unwrap();
-        assert!(page.contains("because of --llie-anyway"));
+        assert!(page.contains("because of --allow bad-enhancer"));
         assert_eq!(
             manifest(&bench)["enhancers"]["model"]["probe"]["outcome"],
             "overruled"

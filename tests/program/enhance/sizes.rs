@@ -81,7 +81,7 @@ fn tiles_are_exact_or_refused() {
             .enhance(&image)
             .unwrap_err()
             .to_string();
-        assert!(message.contains("--tile"), "{message}");
+        assert!(message.contains("--llie-options tile"), "{message}");
     });
     check_rows([onnx::mean_added(), onnx::blurred()], |graph| {
         // Of the mean every pixel is part; of the blur more than is stated here.

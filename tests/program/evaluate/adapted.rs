@@ -58,17 +58,17 @@ fn what_the_user_asked_for_stops_the_run() {
             ["'none', 'low' and 'high'", "--reasoning-effort"],
         ),
         (
-            "--token-field max_tokens",
+            "--request token-field=max_tokens",
             Answer::json(
                 422,
                 &json!({"detail": [{"loc": ["body", "max_tokens"], "msg": "Extra inputs are not permitted"}]}),
             ),
-            ["Extra inputs are not permitted", "--token-field"],
+            ["Extra inputs are not permitted", "--request token-field"],
         ),
         (
-            "--wire chat",
+            "--request wire=chat",
             Answer::error(400, "x", "This model only support stream mode"),
-            ["only support stream mode", "--wire chat-stream"],
+            ["only support stream mode", "--request wire=chat-stream"],
         ),
     ];
     check_rows(rows, |(flags, answer, expected)| {

@@ -30,7 +30,7 @@ fn what_is_wrong_with_one_request_fails_it_at_once() {
             "413 as a page",
             Answer::new(413, "<html><title>Too Large</title>"),
             Request,
-            "--max-side",
+            "--image max-side",
         ),
         ("415", Answer::new(415, "image/webp"), Request, "image/webp"),
         (

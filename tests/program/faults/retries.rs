@@ -164,7 +164,7 @@ fn retries_come_to_an_end() {
     });
 }
 
-/// Waits that a server asks for are kept, in every form, and those beyond `--max-wait` are not begun.
+/// Waits that a server asks for are kept, in every form, and those beyond `--retries max-wait` are not begun.
 #[test]
 fn waits_are_kept_and_capped() {
     let limited = |name: &str, value: &str| Answer::error(429, "x", "slow").header(name, value);
@@ -222,13 +222,16 @@ fn waits_are_kept_and_capped() {
     check_rows(["600", "1e300", &date(86_400)], |wait| {
         let outcome = ask(vec![limited("retry-after", wait)]);
         let error = outcome.result.unwrap_err();
-        assert!(error.failure.message.contains("--max-wait"), "{error}");
+        assert!(
+            error.failure.message.contains("--retries max-wait"),
+            "{error}"
+        );
         assert_eq!((error.attempts, error.reach), (1, Reach::Endpoint));
         assert!(outcome.time < Duration::from_secs(2));
     });
 }
 
-/// Being turned away is a wait: it spends no retry, and only `--patience` ends it. A limit for the day ends it at once.
+/// Being turned away is a wait: it spends no retry, and only `--retries patience` ends it. A limit for the day ends it at once.
 #[test]
 fn a_request_that_is_turned_away_waits_and_spends_no_retry() {
     let away = || Answer::error(429, "x", "slow").header("retry-after", "0.02");
@@ -250,14 +253,17 @@ fn a_request_that_is_turned_away_waits_and_spends_no_retry() {
         (error.failure.kind, error.reach),
         (FailureKind::RateLimit, Reach::Endpoint)
     );
-    assert!(error.failure.message.contains("--patience"), "{error}");
+    assert!(
+        error.failure.message.contains("--retries patience"),
+        "{error}"
+    );
     assert!(error.attempts > 2, "{}", error.attempts);
     let daily =
         "Rate limit reached on requests per day (RPD): Limit 200. Please try again in 20ms.";
     let too_large = "Request too large for m on tokens per minute: Limit 1, Requested 2. Please try again in 2ms.";
     for (message, reach, words) in [
         (daily, Reach::Endpoint, "--resume"),
-        (too_large, Reach::Trial, "--max-side"),
+        (too_large, Reach::Trial, "--image max-side"),
     ] {
         let outcome = ask_with(
             vec![Answer::error(429, "x", message)],

@@ -135,7 +135,10 @@ fn auto_learns_the_wire_from_a_refusal() {
         let error = outcome.result.unwrap_err();
         assert_eq!((error.reach, error.attempts), (Reach::Endpoint, 1));
         let message = error.failure.message;
-        assert!(message.contains(&format!("--wire {wire}")), "{message}");
+        assert!(
+            message.contains(&format!("--request wire={wire}")),
+            "{message}"
+        );
     });
 }
 

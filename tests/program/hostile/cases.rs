@@ -193,7 +193,7 @@ pub(crate) const CASES: &[Case] = &[
     Case::new("figures run other --out out", &["run"], &["other"]),
     Case::new("bundle run --out out.zip", &["run"], &[]),
     Case::new("site run other --out out", &["run"], &["other"]),
-    Case::new("merge parts --out out", &["parts"], &[]),
+    Case::new("report merge parts --out out", &["parts"], &[]),
     Case::new(
         "show run q0 --out out",
         &["run", "set.jsonl", "a.png", "b.png"],
@@ -274,6 +274,12 @@ pub(crate) const CASES: &[Case] = &[
         &["frames"],
         &[],
     ),
+    Case::new("synthesize check made", &["made"], &[]),
+    Case::new(
+        "synthesize from made/a_L3-ev.json a.png --out out",
+        &["made/a_L3-ev.json", "a.png"],
+        &[],
+    ),
     Case::new("realism pairs --out out", &["pairs"], &[]),
     Case::new(
         "calibrate recording --white 16383 --out out.toml",
@@ -305,9 +311,14 @@ pub(crate) const CASES: &[Case] = &[
         &["a.png"],
     ),
     Case::new(
-        "enhance models/gain.onnx --describe --offline",
+        "enhance describe models/gain.onnx --offline",
         &["models/gain.onnx"],
         &[],
+    ),
+    Case::new(
+        "enhance doctor models/gain.onnx a.png --offline --llie-timeout 5 --out out",
+        &["models/gain.onnx"],
+        &["a.png"],
     ),
     // The other subcommands.
     Case::new("questions frames --out out.jsonl", &["frames"], &[]),
@@ -332,6 +343,11 @@ pub(crate) const CASES: &[Case] = &[
         &[],
     ),
     Case::new("import folder --src frames --out out", &["frames"], &[]),
+    Case::new(
+        "import script habitat --config plain.toml",
+        &["plain.toml"],
+        &[],
+    ),
     Case::new(
         "export vlmevalkit set.jsonl --levels L0 --out out",
         &["set.jsonl", "a.png", "b.png"],

@@ -103,7 +103,7 @@ fn fault(bytes: Vec<u8>) -> String {
     let file = file(bytes, ColourRule::Convert);
     let error = file.decode().unwrap_err().to_string();
     assert_eq!(file.check().unwrap_err().to_string(), error);
-    assert!(error.contains("--colour ignore"), "{error}");
+    assert!(error.contains("--decode colour=ignore"), "{error}");
     error
 }
 

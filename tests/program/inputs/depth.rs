@@ -213,14 +213,14 @@ fn linear_light_is_stated_by_the_flag_or_by_the_file() {
     ] {
         let file = linear(contradicting);
         let error = file.decode().unwrap_err().to_string();
-        assert!(error.contains("--transfer linear"), "{error}");
+        assert!(error.contains("--decode transfer=linear"), "{error}");
         assert_eq!(file.check().unwrap_err().to_string(), error);
     }
     // Eight bits are never linear light, and the note says that the flag does not apply.
     let eight = crate::support::image_files::png(&RgbImage::from_pixel(2, 2, Rgb([9; 3])));
     let file = linear(eight.clone());
     assert!(matches!(file.pixels().unwrap(), Pixels::Codes8(_)));
-    assert_eq!(file.note().no_light, ["--transfer linear"]);
+    assert_eq!(file.note().no_light, ["--decode transfer=linear"]);
     let digest = blake3::hash(&eight).to_hex().to_string();
     assert_eq!(file.digest().to_string(), digest);
 }

@@ -233,7 +233,7 @@ fn a_bomb_is_refused_before_it_is_decompressed() {
     for bytes in [webp, tiff(Order::Big, &[tall])] {
         let error = fault(bytes);
         assert!(
-            error.contains("pixels are more than") && error.contains("--max-pixels"),
+            error.contains("pixels are more than") && error.contains("--decode max-pixels"),
             "{error}"
         );
     }

@@ -225,7 +225,12 @@ fn what_is_no_light_is_refused_by_name() {
         ..ReadingRule::default()
     };
     let error = ImageFile::new(whole, "a file".to_owned(), rule).decode();
-    assert!(error.unwrap_err().to_string().contains("--max-pixels"));
+    assert!(
+        error
+            .unwrap_err()
+            .to_string()
+            .contains("--decode max-pixels")
+    );
 }
 
 /// The matrix of ITU-R BT.2087, table 1, inverted: from the primaries of BT.2020 to those of BT.709.
@@ -282,8 +287,8 @@ fn exposure_scales_light_alone() {
     ));
     assert_eq!(made.code, Some(0), "{made:?}");
     for said in [
-        "1 image is scaled by --exposure (1 EV: 1; for example a.exr)",
-        "1 image is not linear light, so that a flag does not apply (--exposure: 1; for example b.png)",
+        "1 image is scaled by --decode exposure (1 EV: 1; for example a.exr)",
+        "1 image is not linear light, so that a flag does not apply (--decode exposure: 1; for example b.png)",
         "1 image is of more than 8 bits, which are rounded to 8 only after the light is reduced (linear light: 1; for example a.exr)",
     ] {
         assert!(made.stderr.contains(said), "{said}: {made:?}");

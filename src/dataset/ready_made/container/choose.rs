@@ -65,7 +65,7 @@ pub(super) fn chosen(
             let place = tree.place().display();
             let note = note.map_or_else(String::new, |note| format!("; {note}"));
             let problem = format_args!("{place}: no configurations to choose {name:?} from{note}");
-            return Err(Error::usage("--config-name", problem));
+            return Err(Error::usage("--read config", problem));
         }
         let files = by_kind(tree, files)?.into_iter();
         let candidates = files.map(|path| Candidate {
@@ -106,11 +106,11 @@ fn of_card(
         Some("all") => configs.iter().collect(),
         Some(name) => vec![of_name(name).ok_or_else(|| {
             let problem = format_args!("no configuration {name:?}; there are {}", names.join(", "));
-            Error::usage("--config-name", problem)
+            Error::usage("--read config", problem)
         })?],
         None => vec![default.or_else(|| of_name("default")).or(only).ok_or_else(|| {
             let problem = format_args!(
-                "{} configurations, {}; --config-name NAME names one, --config-name all takes them together",
+                "{} configurations, {}; --read config=NAME names one, --read config=all takes them together",
                 names.len(),
                 names.join(", ")
             );

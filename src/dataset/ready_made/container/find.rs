@@ -101,8 +101,8 @@ fn folder_of(file: &Path) -> PathBuf {
 /// Refuses flags that choose among the files of a folder.
 fn refuse_choice(text: &str, args: &SetArgs) -> Result<()> {
     for (flag, value) in [
-        ("--config-name", &args.config_name),
-        ("--split", &args.split),
+        ("--read config", &args.config_name),
+        ("--read split", &args.split),
     ] {
         if let Some(value) = value {
             let problem =

@@ -1,4 +1,4 @@
-//! JSON files: one object a line, an array of objects, or objects inside another one (`--rows`).
+//! JSON files: one object a line, an array of objects, or objects inside another one (`--read rows`).
 
 use std::fs::File;
 use std::io::{BufRead as _, BufReader, Read as _, Seek as _, SeekFrom};
@@ -112,7 +112,7 @@ pub(super) fn read(path: &Path, rows: Option<&str>, table: &mut Table) -> Result
     walk().map_err(|problem| Error::data(path.display(), problem))?;
     if table.rows.len() == before && !steps.is_empty() {
         let problem = format_args!("{}: no list of objects there", steps.join("."));
-        return Err(Error::usage("--rows", problem).at("--rows"));
+        return Err(Error::usage("--read rows", problem).at("--read rows"));
     }
     Ok(())
 }
@@ -226,7 +226,7 @@ fn rows_by_id(path: &Path, table: &mut Table) -> Result<(), String> {
     };
     let names: Vec<&str> = lists.iter().map(|(name, _)| name.as_str()).collect();
     Err(format!(
-        "an object with the lists {}; {name:?} has the columns {}; say where the rows are: --rows {}, and which column is which if these are no common names: --map question=…,image=…,options=…,answer=…",
+        "an object with the lists {}; {name:?} has the columns {}; say where the rows are: --read rows={}, and which column is which if these are no common names: --map question=…,image=…,options=…,answer=…",
         names.join(", "),
         columns.join(", "),
         shell_word(name)

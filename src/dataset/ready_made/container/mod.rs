@@ -124,7 +124,7 @@ impl SetFile {
                 "{} is not a JSON file of one object that could hold {rows:?}",
                 self.label.path.display()
             );
-            return Err(Error::usage("--rows", problem));
+            return Err(Error::usage("--read rows", problem));
         }
         table.begin_file(self.label.clone());
         let path = self.read_path();

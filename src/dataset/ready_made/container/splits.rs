@@ -55,13 +55,13 @@ pub(super) fn chosen(
         Some(name) if splits.contains_key(name) => Some(name),
         Some(name) => {
             let problem = format_args!("no split {name:?}; there are {}", listed(tree, &splits));
-            return Err(Error::usage("--split", problem));
+            return Err(Error::usage("--read split", problem));
         }
         None if splits.len() == 1 => None,
         None if splits.contains_key("test") => Some("test"),
         None => {
             let problem = format_args!(
-                "the splits {}; --split NAME names one, --split all takes them together",
+                "the splits {}; --read split=NAME names one, --read split=all takes them together",
                 listed(tree, &splits)
             );
             return Err(Error::data(tree.place().display(), problem));
@@ -139,7 +139,7 @@ mod tests {
         assert_eq!(choose(&["dev", "train"], Some("all")).unwrap().len(), 2);
         let problem = choose(&["dev", "train"], None).unwrap_err().to_string();
         assert!(
-            problem.contains("dev (files: 1), train (files: 1); --split"),
+            problem.contains("dev (files: 1), train (files: 1); --read split"),
             "{problem}"
         );
         let problem = choose(&["dev"], Some("tset")).unwrap_err().to_string();

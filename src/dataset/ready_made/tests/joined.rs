@@ -195,7 +195,7 @@ fn two_rows_that_differ_in_their_answers_alone_contradict_each_other() {
     assert!(
         problem.contains("2 of 40 rows are broken")
             && problem.contains("line 1 (\"x\")")
-            && problem.contains("line 2 (\"y\") ask the same of the same image, and their answers differ; --bad skip"),
+            && problem.contains("line 2 (\"y\") ask the same of the same image, and their answers differ; --skip bad"),
         "{problem}"
     );
     let skip = SetArgs {

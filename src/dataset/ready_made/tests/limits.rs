@@ -142,7 +142,7 @@ fn a_flag_for_json_is_refused_for_other_files() {
         let (_folder, path) = set(name, &[question()]);
         let problem = refusal(&path, &args);
         assert!(
-            problem.contains("--rows") && problem.contains(name),
+            problem.contains("--read rows") && problem.contains(name),
             "{problem}"
         );
     }

@@ -102,7 +102,7 @@ fn what_cannot_be_found_is_said_with_the_columns() {
     .unwrap();
     let problem = refusal(&path, &SetArgs::default());
     assert!(
-        problem.contains("--rows items")
+        problem.contains("--read rows=items")
             && problem.contains("frage")
             && problem.contains("--map question="),
         "{problem}"
@@ -144,7 +144,7 @@ fn a_test_split_without_answers_is_named_so() {
     let problem = refusal(&path, &SetArgs::default());
     assert!(
         problem.contains("2 of 2 rows have several true options")
-            && problem.contains("--several skip"),
+            && problem.contains("--skip several"),
         "{problem}"
     );
 }
@@ -169,7 +169,7 @@ fn bad_rows_are_left_out_up_to_a_share() {
     let (_folder, path) = with(&rows[30..]);
     let problem = refusal(&path, &skip);
     assert!(
-        problem.contains("at most 5 %") && problem.contains("--bad skip:10%"),
+        problem.contains("at most 5 %") && problem.contains("--skip bad=10%"),
         "{problem}"
     );
     let raised = SetArgs {

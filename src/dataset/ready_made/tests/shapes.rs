@@ -250,7 +250,7 @@ fn several_images_none_and_open_questions_are_left_out_only_by_a_flag() {
     let problem = super::refusal(&path, &SetArgs::default());
     for says in [
         "1 of 3 rows show 2 images; --multi-image skip",
-        "no image in 1 of 3 rows; --no-image skip",
+        "no image in 1 of 3 rows; --skip no-image",
     ] {
         assert!(problem.contains(says), "{problem}");
     }
@@ -378,7 +378,7 @@ fn a_repository_has_configurations_splits_and_shards() {
     assert!(
         texts(None, None)
             .unwrap_err()
-            .contains("2 configurations, one, two; --config-name NAME")
+            .contains("2 configurations, one, two; --read config=NAME")
     );
     assert!(
         texts(Some("three"), None)
@@ -392,7 +392,7 @@ fn a_repository_has_configurations_splits_and_shards() {
     assert!(
         texts(Some("two"), None)
             .unwrap_err()
-            .contains("the splits train (files: 1), val (rows: 1); --split NAME")
+            .contains("the splits train (files: 1), val (rows: 1); --read split=NAME")
     );
     assert_eq!(
         texts(Some("two"), Some("train")).unwrap(),

@@ -159,12 +159,12 @@ impl Remark {
             Self::FirstOfSeveral => "the first picture of a file with several",
             Self::Converted => "converted to sRGB",
             Self::NotConverted => {
-                "taken as sRGB, because of --colour ignore, although the file states other colours"
+                "taken as sRGB, because of --decode colour=ignore, although the file states other colours"
             }
             Self::Deep => {
                 "of more than 8 bits, which are rounded to 8 only after the light is reduced"
             }
-            Self::Scaled => "scaled by --exposure",
+            Self::Scaled => "scaled by --decode exposure",
             Self::NoLight => "not linear light, so that a flag does not apply",
         }
     }

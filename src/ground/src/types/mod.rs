@@ -22,6 +22,7 @@ pub mod image_notes;
 mod input_note;
 pub mod isa;
 pub mod key_values;
+pub mod keyed_flag;
 pub mod kind_set;
 pub mod labels;
 pub mod light_group;

@@ -16,9 +16,9 @@ pub struct SizeLog {
     pub padded: usize,
     /// Images that were cut into tiles.
     pub tiled: usize,
-    /// Images that were resized to the model's fixed size and back (`--llie-resize`).
+    /// Images that were resized to the model's fixed size and back (`--llie-options resize`).
     pub resized: usize,
-    /// Images that were reduced by `--llie-max-side` and enlarged again.
+    /// Images that were reduced by `--llie-options max-side` and enlarged again.
     pub reduced: usize,
     /// Width and height that a side of every run has; `None` for any.
     pub fixed: Option<[Option<usize>; 2]>,
@@ -143,7 +143,7 @@ impl SizeLog {
         );
         part(
             self.reduced,
-            "reduced by --llie-max-side and enlarged".to_owned(),
+            "reduced by --llie-options max-side and enlarged".to_owned(),
         );
         let images = if self.images == 1 { "image" } else { "images" };
         let mut text = format!("{} {images}", self.images);

@@ -85,11 +85,11 @@ impl CameraModel {
                 "{name:?} is not one of {}, and not a TOML file of a calibration",
                 names.join(", ")
             );
-            Error::usage("--camera", problem)
+            Error::usage("--noise camera", problem)
         })
     }
 
-    /// Sets whether states are drawn or fixed (`--fixed`).
+    /// Sets whether states are drawn or fixed (`--noise fixed`).
     pub fn set_sampling(&mut self, sampling: Sampling) {
         self.sampling = sampling;
     }
@@ -116,12 +116,12 @@ impl CameraModel {
         self.calibration.gain
     }
 
-    /// Pins the system gain K, in ADU per electron (`--gain`).
+    /// Pins the system gain K, in ADU per electron (`--noise gain`).
     ///
     /// # Errors
     /// If K is not within 0.01 to 100.
     pub fn pin_gain(&mut self, gain: f64) -> Result<()> {
-        self.gain = Some(check_range("--gain", gain, GAINS)?);
+        self.gain = Some(check_range("--noise gain", gain, GAINS)?);
         Ok(())
     }
 
@@ -136,17 +136,18 @@ impl CameraModel {
     /// If it is not within 0.01 to 100, or runs backwards.
     pub fn set_gain_range(&mut self, range: [f64; 2]) -> Result<()> {
         let [low, high] = range;
-        check_range("--gain", high, [low, GAINS[1]])?;
-        Arc::make_mut(&mut self.calibration).gain = [check_range("--gain", low, GAINS)?, high];
+        check_range("--noise gain", high, [low, GAINS[1]])?;
+        Arc::make_mut(&mut self.calibration).gain =
+            [check_range("--noise gain", low, GAINS)?, high];
         Ok(())
     }
 
-    /// Pins the ratio r: the light is divided by it before the shot noise and multiplied by it after (`--ratio`).
+    /// Pins the ratio r: the light is divided by it before the shot noise and multiplied by it after (`--noise ratio`).
     ///
     /// # Errors
     /// If r is not within 1 to 10000.
     pub fn pin_ratio(&mut self, ratio: f64) -> Result<()> {
-        self.ratio = Some(check_range("--ratio", ratio, RATIOS)?);
+        self.ratio = Some(check_range("--noise ratio", ratio, RATIOS)?);
         Ok(())
     }
 }

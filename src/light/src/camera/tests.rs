@@ -134,9 +134,9 @@ fn pins_are_checked_and_name_their_flag() {
     let mut model = CameraModel::default();
     for wrong in [f64::NAN, f64::INFINITY, 0.0, -1.0, 1e9] {
         let gain = model.pin_gain(wrong).unwrap_err().to_string();
-        assert!(gain.contains("--gain"), "{gain}");
+        assert!(gain.contains("--noise gain"), "{gain}");
         let ratio = model.pin_ratio(wrong).unwrap_err().to_string();
-        assert!(ratio.contains("--ratio"), "{ratio}");
+        assert!(ratio.contains("--noise ratio"), "{ratio}");
     }
     assert_eq!(model, CameraModel::default());
 }

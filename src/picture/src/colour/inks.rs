@@ -151,7 +151,7 @@ mod tests {
         let tag = ColourTag::Profile(profile);
         let problem = Inks::new(&tag, ColourRule::Convert).unwrap_err();
         assert!(
-            problem.contains("not for CMYK") && problem.contains("--colour ignore"),
+            problem.contains("not for CMYK") && problem.contains("--decode colour=ignore"),
             "{problem}"
         );
         let ignored = Inks::new(&tag, ColourRule::Ignore).unwrap();

@@ -44,7 +44,7 @@ fn gamma_and_primaries_of_srgb_are_srgb() {
             .meaning(CodeDepth::Eight)
             .unwrap_err();
         assert!(problem.contains(says), "{problem}");
-        assert!(problem.contains("--colour ignore"), "{problem}");
+        assert!(problem.contains("--decode colour=ignore"), "{problem}");
     }
 }
 
@@ -83,7 +83,7 @@ fn code_points_are_converted_or_refused_by_name() {
             .meaning(CodeDepth::Eight)
             .unwrap_err();
         assert!(
-            problem.contains(says) && problem.contains("--colour ignore"),
+            problem.contains(says) && problem.contains("--decode colour=ignore"),
             "{problem}"
         );
     }
@@ -143,7 +143,7 @@ fn profiles_that_cannot_be_read_are_refused_by_name() {
             .meaning(CodeDepth::Eight)
             .unwrap_err();
         assert!(problem.contains(says), "{says}: {problem}");
-        assert!(problem.contains("ICC profile") && problem.contains("--colour ignore"));
+        assert!(problem.contains("ICC profile") && problem.contains("--decode colour=ignore"));
     }
     for chunk in [&b"no end of the name"[..], b"name\0", b"name\0\0no deflate"] {
         let problem = ColourTag::DeflatedProfile(chunk.to_vec())

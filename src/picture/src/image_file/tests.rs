@@ -69,7 +69,7 @@ fn the_limit_on_pixels_can_be_moved() {
     picture.rule.most_pixels = 4095;
     let error = picture.decode().unwrap_err().to_string();
     assert!(
-        error.contains("64 × 64 pixels") && error.contains("--max-pixels"),
+        error.contains("64 × 64 pixels") && error.contains("--decode max-pixels"),
         "{error}"
     );
 }
@@ -178,7 +178,7 @@ fn a_broken_profile_of_inks_is_named_and_can_be_ignored() {
     let file = inked(jpeg_encoder::ColorType::Cmyk, [0; 4], Some(b"no profile"));
     let problem = fault(file.clone());
     assert!(
-        problem.contains("ICC profile") && problem.contains("--colour ignore"),
+        problem.contains("ICC profile") && problem.contains("--decode colour=ignore"),
         "{problem}"
     );
     let mut file = encoded(file, "a.jpg");

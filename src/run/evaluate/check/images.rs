@@ -92,8 +92,8 @@ pub(super) fn images(
     }
     if unusable > 0 {
         findings.warn(format!(
-            "--bad {} leaves out the questions about {} that cannot be used",
-            SkipBad::enough(unusable, shown.len()),
+            "{} leaves out the questions about {} that cannot be used",
+            SkipBad::enough(unusable, shown.len()).flag(),
             counted(unusable, "image")
         ));
     }

@@ -70,7 +70,7 @@ fn commonest(questions: &[Question], findings: &mut Findings) {
         let share = *count as f64 / questions.len() as f64;
         if share >= COMMON {
             findings.warn(format!(
-                "always the {what} {:?} scores {:.0} %; ask the model without images too (--blind-model NAME), or show the choices in other orders (--shuffle-options)",
+                "always the {what} {:?} scores {:.0} %; ask the model without images too (--blind-model NAME), or show the choices in other orders (--choice-order shuffle)",
                 excerpt(answer, 60),
                 100.0 * share
             ));

@@ -50,7 +50,7 @@ fn what_does_not_pass_is_told_in_the_words_of_each_vendor() {
                 "Request too large for m in organization o on tokens per min (TPM): Limit 30000, Requested 32000. Please try again in 2ms.",
             ),
             (Request, Trial),
-            &["Requested 32000", "--max-side"],
+            &["Requested 32000", "--image max-side"],
         ),
         (
             "OpenAI, a limit of the day on tokens",
@@ -70,7 +70,7 @@ fn what_does_not_pass_is_told_in_the_words_of_each_vendor() {
                 "Rate limit reached on requests per min (RPM). Please try again in 7m12s.",
             ),
             (RateLimit, Endpoint),
-            &["432 s", "--max-wait"],
+            &["432 s", "--retries max-wait"],
         ),
         (
             "Gemini, a limit of the day",
@@ -154,7 +154,7 @@ fn what_does_not_pass_is_told_in_the_words_of_each_vendor() {
                 "Request too large for model `m` on tokens per minute (TPM): Limit 6000, Requested 9000, please reduce your message size and try again.",
             ),
             (Request, Trial),
-            &["Requested 9000", "--max-side"],
+            &["Requested 9000", "--image max-side"],
         ),
         (
             "Together, no money",
@@ -241,7 +241,7 @@ fn what_does_not_pass_is_told_in_the_words_of_each_vendor() {
             constrained(),
             routed(400, "This response_format type is unavailable now"),
             (Request, Endpoint),
-            &["response_format", "--constrain"],
+            &["response_format", "--request constrain"],
         ),
         (
             "TGI, a request that is not valid",

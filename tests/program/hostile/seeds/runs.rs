@@ -32,6 +32,9 @@ pub(super) fn make(bench: &Bench) {
     bench.complete(&words(
         "synthesize asked --levels L3 --variant ev --out dark",
     ));
+    bench.complete(&words(
+        "synthesize a.png --levels L3 --variant ev --out made",
+    ));
     bench.complete(&words("report run --out old --no-parquet"));
     fs::create_dir_all(bench.path("site")).unwrap();
     batches(bench);

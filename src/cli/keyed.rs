@@ -1,0 +1,169 @@
+//! Keyed flags in the definition of the command line: [`grouped`].
+
+use clap::builder::PossibleValue;
+use clap::{Arg, ArgAction, Command};
+
+use crate::types::Decides;
+use crate::types::keyed_flag::{KEYED_FLAGS, KeyedFlag, spelled};
+
+/// The name of a flag in files, which is the name of the field.
+pub(super) fn name_of(arg: &Arg) -> String {
+    arg.get_id().as_str().replace('_', "-")
+}
+
+/// The command with its keyed flags, and the flags for their keys hidden.
+pub(super) fn grouped(mut command: Command) -> Command {
+    for keyed in &KEYED_FLAGS {
+        command = with_keyed(command, keyed);
+    }
+    command.mut_subcommands(grouped)
+}
+
+fn with_keyed(command: Command, keyed: &KeyedFlag) -> Command {
+    let keys = keyed.keys.iter().filter(|(key, _)| !key.is_empty());
+    let members: Vec<(&str, Arg)> = keys
+        .filter_map(|(key, flag)| {
+            let mut args = command.get_arguments();
+            let arg = args.find(|arg| name_of(arg) == *flag)?;
+            Some((*key, arg.clone()))
+        })
+        .collect();
+    let Some((_, first)) = members.first() else {
+        return command;
+    };
+    let lines: Vec<String> = members.iter().map(|(key, arg)| line(key, arg)).collect();
+    let names: Vec<&str> = members.iter().map(|(key, _)| *key).collect();
+    let is_member = |arg: &Arg| members.iter().any(|(_, own)| own.get_id() == arg.get_id());
+    if keyed.has_plain_value() {
+        let plain = |arg: Arg| {
+            let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
+            let long = arg.get_long_help().map(ToString::to_string);
+            let long = long.unwrap_or_else(|| help.clone());
+            let keys = format!("; keys after a comma: {}", names.join(", "));
+            let (about, default) = help.split_at(help.find("; default: ").unwrap_or(help.len()));
+            arg.help(format!("{about}{keys}{default}"))
+                .long_help(format!("{long}; keys after a comma:\n{}", lines.join("\n")))
+        };
+        return command.mut_args(|arg| match name_of(&arg) {
+            name if name == keyed.name => plain(arg),
+            _ if is_member(&arg) => arg.hide(true),
+            _ => arg,
+        });
+    }
+    let (about, default) = keyed
+        .about
+        .split_once("; default: ")
+        .unwrap_or((keyed.about, ""));
+    let help = format!("{about}: {}; default: {default}", names.join(", "));
+    let has_values = keyed.alone.is_none()
+        && members
+            .iter()
+            .any(|(_, arg)| arg.get_action().takes_values());
+    let arg = Arg::new(keyed.name)
+        .long(keyed.name)
+        .value_name(if has_values {
+            "KEY=VALUE,…"
+        } else {
+            "KEY,…"
+        })
+        .action(ArgAction::Append)
+        .help_heading(keyed.heading)
+        .display_order(first.get_display_order())
+        .help(help)
+        .long_help(format!("{about}; keys:\n{}", lines.join("\n")));
+    let arg = match Decides::of(first) {
+        Some(decides) => arg.add(decides),
+        None => arg,
+    };
+    command
+        .mut_args(|arg| if is_member(&arg) { arg.hide(true) } else { arg })
+        .arg(arg)
+}
+
+/// The help of a key: its values, what it decides, and its default.
+fn line(key: &str, arg: &Arg) -> String {
+    let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
+    let defaults = arg.get_default_values().iter();
+    let defaults: Vec<_> = defaults.map(|value| value.to_string_lossy()).collect();
+    let default = match &defaults[..] {
+        _ if !arg.get_action().takes_values() => String::new(),
+        [] => String::new(),
+        values => format!("; default: {}", values.join(",")),
+    };
+    let class = Decides::of(arg).filter(|class| *class != Decides::Nothing);
+    let class = class.map_or_else(String::new, |class| format!(" [{}]", class.word()));
+    format!("  {}: {help}{default}{class}", with_value(key, arg))
+}
+
+/// A key with the name of its value or its possible values, as `gain=K`.
+pub(super) fn with_value(key: &str, arg: &Arg) -> String {
+    if !arg.get_action().takes_values() {
+        return key.to_owned();
+    }
+    let possible = arg.get_possible_values();
+    match &possible[..] {
+        // The only value is understood.
+        [_] => key.to_owned(),
+        [] => format!(
+            "{key}={}",
+            arg.get_value_names().unwrap_or_default().join(" ")
+        ),
+        several => {
+            let names: Vec<&str> = several.iter().map(PossibleValue::get_name).collect();
+            format!("{key}={}", names.join("|"))
+        }
+    }
+}
+
+/// The text of an error of the parser, with hidden flags spelled as keys.
+pub(super) fn respelled(text: &str) -> String {
+    let mut text = text.to_owned();
+    for (key, flag) in KEYED_FLAGS.iter().flat_map(|keyed| keyed.keys) {
+        if !key.is_empty() {
+            let spelled = spelled(flag);
+            text = text
+                .replace(&format!("'--{flag} <"), &format!("'{spelled}=<"))
+                .replace(&format!("'--{flag}'"), &format!("'{spelled}'"));
+        }
+    }
+    text
+}
+
+/// The command without hidden flags and commands, for the completions of shells.
+pub(super) fn visible(command: &Command) -> Command {
+    let args = command.get_arguments().filter(|arg| !arg.is_hide_set());
+    let commands = command
+        .get_subcommands()
+        .filter(|inner| !inner.is_hide_set());
+    let about = command.get_about().cloned().unwrap_or_default();
+    Command::new(lasting(command.get_name()))
+        .about(about)
+        .args(args.map(completed))
+        .subcommands(commands.map(visible))
+}
+
+/// What completions show of a flag or a positional argument.
+fn completed(arg: &Arg) -> Arg {
+    let help = arg.get_help().cloned().unwrap_or_default();
+    let completed = Arg::new(arg.get_id().clone())
+        .help(help)
+        .action(arg.get_action().clone())
+        .value_hint(arg.get_value_hint())
+        .global(arg.is_global_set());
+    let completed = match arg.get_long() {
+        Some(long) => completed.long(lasting(long)),
+        None => completed,
+    };
+    if !arg.get_action().takes_values() {
+        return completed;
+    }
+    let names = arg.get_value_names().unwrap_or_default().iter().cloned();
+    completed
+        .value_names(names)
+        .value_parser(arg.get_value_parser().clone())
+}
+
+/// A name for a command that is made once, before the process ends: the parser takes names that live as long.
+fn lasting(name: &str) -> &'static str {
+    name.to_owned().leak()
+}
