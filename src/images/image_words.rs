@@ -13,6 +13,7 @@ use crate::error::{Error, Result};
 use crate::images::walk::Walk;
 use crate::picture::ImageArgs;
 use crate::types::Decides;
+use crate::types::keyed_flag::spelled;
 use darkqa_enhance::{EnhancedFolder, SizeArgs};
 use darkqa_light::{CameraArgs, SensorArgs};
 
@@ -95,7 +96,7 @@ pub(crate) fn typed_flags(matches: &ArgMatches) -> Result<ImageWords> {
         let texts: Option<Vec<Value>> = texts.map(|text| Some(text.to_str()?.into())).collect();
         let mut texts = texts.ok_or_else(|| {
             let problem = "cannot be stored in the manifest: the value is not valid Unicode";
-            Error::usage(format!("--{flag}"), problem)
+            Error::usage(spelled(flag), problem)
         })?;
         let value = match texts.pop() {
             _ if !action.takes_values() => Value::Bool(true),

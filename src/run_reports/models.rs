@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::settings::{Setting, Settings, differing, is_digest, parameters};
 use crate::runs::stored::StoredRun;
+use crate::types::keyed_flag::spelled_setting;
 use crate::types::{Condition, QuestionId, RunQuestion, TrialKey, TrialRef, View};
 use darkqa_score::record::Detail;
 
@@ -195,7 +196,7 @@ fn suffixes(groups: &[Vec<usize>], differences: &[Setting], names: &[String]) ->
             let values = setting.values.iter();
             let mut values = values.filter(|(run, _)| group.contains(run));
             let (_, value) = values.next()?;
-            Some(format!("{} {value}", setting.flag))
+            Some(format!("{} {value}", spelled_setting(&setting.flag)))
         });
         Some(of_group.collect::<Option<Vec<_>>>()?.join(", "))
     };

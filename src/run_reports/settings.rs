@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::Value;
 
 use crate::types::degradation::Kind;
+use crate::types::keyed_flag::spelled_setting;
 use crate::types::manifest::{JUDGES, RunManifest};
 
 /// Settings by flag, as text.
@@ -67,7 +68,7 @@ impl Setting {
         let values: Vec<String> = values
             .map(|(value, runs)| format!("{} in {}", short(value), listed(&runs)))
             .collect();
-        format!("{} is {}", self.flag, listed(&values))
+        format!("{} is {}", spelled_setting(&self.flag), listed(&values))
     }
 }
 

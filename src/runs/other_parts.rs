@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::error::{Error, Result};
 use crate::runs::placed_trials::{append, trials_of};
 use crate::store::{self, Store};
+use crate::types::keyed_flag::spelled_setting;
 use crate::types::manifest::{RunManifest, differences};
 use crate::types::{FrameId, TextPlace, TrialKey};
 use darkqa_score::record::Detail;
@@ -43,6 +44,7 @@ impl OtherParts {
             if let Some((field, before, now)) =
                 differences(&other.identity, &manifest.identity).next()
             {
+                let field = spelled_setting(field);
                 return wrong(format!(
                     "this part is of another run: its {field} is {before}, now it is {now}; use another --out, or the same {field}"
                 ));

@@ -108,31 +108,31 @@ impl Scene {
 const SETTINGS: [(&str, &str); 32] = [
     ("--seed 1", "The light differs: --seed is 0 in base and 1 in other. noise and noise+one stand apart as @base and @other: 20 of 20 shared images differ."),
     ("--profile physical", "The light differs: --profile is paper in base and physical in other."),
-    ("--amplify all", "The light differs: --amplify is unset in base and all in other."),
-    ("--tone before-ev", "The light differs: --tone is unset in base and before-ev in other."),
-    ("--draws fresh", "The light differs: --draws is unset in base and fresh in other."),
-    ("--coupling photon", "The light differs: --coupling is unset in base and photon in other."),
-    ("--camera nikon-d850", "The light differs: --camera is unset in base and nikon-d850 in other."),
-    ("--gain 1.5", "The light differs: --gain is unset in base and 1.5 in other."),
-    ("--ratio 150", "The light differs: --ratio is unset in base and 150 in other."),
-    ("--fixed", "The light differs: --fixed is unset in base and true in other."),
+    ("--amplify all", "The light differs: --noise amplify is unset in base and all in other."),
+    ("--tone before-ev", "The light differs: --noise tone is unset in base and before-ev in other."),
+    ("--draws fresh", "The light differs: --noise draws is unset in base and fresh in other."),
+    ("--coupling photon", "The light differs: --noise coupling is unset in base and photon in other."),
+    ("--camera nikon-d850", "The light differs: --noise camera is unset in base and nikon-d850 in other."),
+    ("--gain 1.5", "The light differs: --noise gain is unset in base and 1.5 in other."),
+    ("--ratio 150", "The light differs: --noise ratio is unset in base and 150 in other."),
+    ("--fixed", "The light differs: --noise fixed is unset in base and true in other."),
     ("--llie other/one.onnx", "in other. noise+one stands apart as @base and @other: 10 of 10 shared images differ."),
-    ("--tile 64", "The light differs: --tile of one is unset in base and 64 in other."),
-    ("--llie-max-side 16", "The light differs: --llie-max-side of one is unset in base and 16 in other."),
-    ("--llie-resize", "The light differs: --llie-resize of one is unset in base and true in other."),
-    ("--max-side 16", "The size or encoding of images differs: --max-side is unset in base and 16 in other."),
+    ("--tile 64", "The light differs: --llie-options tile of one is unset in base and 64 in other."),
+    ("--llie-max-side 16", "The light differs: --llie-options max-side of one is unset in base and 16 in other."),
+    ("--llie-resize", "The light differs: --llie-options resize of one is unset in base and true in other."),
+    ("--max-side 16", "The size or encoding of images differs: --image max-side is unset in base and 16 in other."),
     ("--image jpeg:90", "The size or encoding of images differs: --image is png in base and jpeg:90 in other."),
     ("--image jpeg:50", "The size or encoding of images differs: --image is png in base and jpeg:50 in other."),
     ("--data elsewhere", "The frames of 40 shared questions are other files under the same names."),
-    ("--detail low", "The parameters of models differ: --detail is unset in base and low in other."),
+    ("--detail low", "The parameters of models differ: --image detail is unset in base and low in other."),
     ("--temperature 0.5", "The parameters of models differ: --temperature is auto in base and 0.5 in other."),
     ("--max-tokens 7", "The parameters of models differ: --max-tokens is 1024 in base and 7 in other."),
     ("--reasoning-effort low", "The parameters of models differ: --reasoning-effort is unset in base and low in other."),
     ("--top-p 0.9", "The parameters of models differ: --top-p is unset in base and 0.9 in other."),
-    ("--constrain json", "Replies are constrained differently: --constrain is none in base and json in other."),
+    ("--constrain json", "Replies are constrained differently: --request constrain is none in base and json in other."),
     ("--prompts own", "The prompts differ: --prompts is"),
-    ("--shuffle-options", "The orders of choices differ: --shuffle-options is unset in base and true in other."),
-    ("--circular", "The orders of choices differ: --circular is unset in base and true in other."),
+    ("--shuffle-options", "The orders of choices differ: --choice-order shuffle is unset in base and true in other."),
+    ("--circular", "The orders of choices differ: --choice-order circular is unset in base and true in other."),
     ("--repeats 2", "Questions were asked a different number of times: --repeats is 1 in base and 2 in other."),
     ("--families color", "The questions differ: 40 of base and 20 of other share 20 questions."),
     ("--limit 20", "The questions differ: 40 of base and 20 of other share 20 questions."),
@@ -254,9 +254,12 @@ fn models_of_one_name_are_named_by_what_differs() {
     scene.run("--detail low", "b");
     scene.run("--detail low --temperature 1 --max-tokens 9", "c");
     let pair = scene.bench.complete(&words("report a b --full"));
-    check_rows(["m (--detail unset)", "m (--detail low)"], |name| {
-        assert!(pair.contains(name), "{name}: {pair}");
-    });
+    check_rows(
+        ["m (--image detail unset)", "m (--image detail low)"],
+        |name| {
+            assert!(pair.contains(name), "{name}: {pair}");
+        },
+    );
     let three = scene.bench.complete(&words("report a b c --full"));
     check_rows(["m (a)", "m (b)", "m (c)"], |name| {
         assert!(three.contains(name), "{name}: {three}");

@@ -6,6 +6,7 @@ use std::fmt::Write;
 use serde_json::{Value, json};
 
 use crate::runs::stored::AnyRun;
+use crate::types::keyed_flag::keyed_form;
 use crate::types::manifest::{RunManifest, judge_flag};
 use crate::types::shown_text::shown;
 use crate::types::{AxisLevel, Trials, shell_word};
@@ -133,7 +134,10 @@ pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
     if !levels.is_empty() {
         words.extend(["--levels".to_owned(), word(&levels.join(","))]);
     }
-    let has = |flag: &str| words.iter().any(|known| known == flag);
+    let has = |flag: &str| {
+        let is_of_images = manifest.images.contains_key(flag.trim_start_matches("--"));
+        is_of_images || words.iter().any(|known| known == flag)
+    };
     let identity = manifest.identity.iter();
     let identity = identity.filter(|(flag, value)| {
         // Digests stand for files, which the flags of images name.
@@ -230,15 +234,25 @@ fn of_models(remote: &BTreeMap<&String, &Value>) -> Vec<String> {
 
 /// A flag with its value as words of a shell; several for a list, none for a value that is not set.
 fn flag_words(flag: &str, value: &Value) -> Vec<String> {
-    match value {
-        Value::Null | Value::Bool(false) | Value::Object(_) => Vec::new(),
-        Value::Bool(true) => vec![flag.to_owned()],
+    let text = match value {
+        Value::Null | Value::Bool(false) | Value::Object(_) => return Vec::new(),
         Value::Array(values) => {
             let values = values.iter();
-            values.flat_map(|value| flag_words(flag, value)).collect()
+            return values.flat_map(|value| flag_words(flag, value)).collect();
         }
-        Value::String(text) => vec![flag.to_owned(), word(text)],
-        Value::Number(number) => vec![flag.to_owned(), number.to_string()],
+        Value::Bool(true) => None,
+        Value::String(text) => Some(text.clone()),
+        Value::Number(number) => Some(number.to_string()),
+    };
+    let keyed = flag.strip_prefix("--").and_then(keyed_form);
+    match (keyed, text) {
+        (Some((keyed, key)), None) => vec![format!("--{}", keyed.name), key.to_owned()],
+        // Commas separate keys.
+        (Some((keyed, key)), Some(text)) if !text.contains(',') => {
+            vec![format!("--{}", keyed.name), word(&format!("{key}={text}"))]
+        }
+        (_, None) => vec![flag.to_owned()],
+        (_, Some(text)) => vec![flag.to_owned(), word(&text)],
     }
 }
 
@@ -263,5 +277,11 @@ mod tests {
         assert_eq!(words(serde_json::json!(["a", 2])), ["--x", "a", "--x", "2"]);
         assert_eq!(words(serde_json::json!(true)), ["--x"]);
         assert!(words(Value::Null).is_empty());
+        let gain = flag_words("--gain", &serde_json::json!(0.5));
+        assert_eq!(gain, ["--noise", "gain=0.5"]);
+        let fixed = flag_words("--fixed", &serde_json::json!(true));
+        assert_eq!(fixed, ["--noise", "fixed"]);
+        let camera = flag_words("--camera", &serde_json::json!("a,b.toml"));
+        assert_eq!(camera, ["--camera", "a,b.toml"]);
     }
 }

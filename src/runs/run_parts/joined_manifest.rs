@@ -7,6 +7,7 @@ use super::part::{StoredPart, no_part};
 use crate::error::{Error, Result};
 use crate::runs::part_cost::PartCost;
 use crate::types::InputSummary;
+use crate::types::keyed_flag::spelled_setting;
 use crate::types::manifest::{RunManifest, differences};
 
 /// Checks that all are parts of the same run.
@@ -35,10 +36,11 @@ pub(super) fn check_same_run(parts: &[StoredPart]) -> Result<()> {
 /// The first difference between two manifests that makes them different runs: the field, and its value in each.
 fn difference(first: &RunManifest, other: &RunManifest) -> Option<(String, String, String)> {
     let identity = differences(&first.identity, &other.identity).next();
-    let identity = identity.map(|(field, own, other)| (field.to_owned(), own, other));
+    let identity = identity.map(|(field, own, other)| (spelled_setting(field), own, other));
     identity.or_else(|| {
         let column = first.column_differences(other).into_iter().next()?;
-        let field = format!("{} of the {} {}", column.field, column.column, column.value);
+        let setting = spelled_setting(&column.field);
+        let field = format!("{setting} of the {} {}", column.column, column.value);
         Some((field, column.first, column.second))
     })
 }

@@ -22,6 +22,7 @@ use crate::images::source::Source;
 use crate::runs::part::{Divided, own_sources};
 use crate::runs::shard::Shard;
 use crate::store::PLAN;
+use crate::types::keyed_flag::spelled_setting;
 use crate::types::manifest::Identity;
 use crate::types::manifest::differences;
 use crate::types::{Digest, FrameId, Question, RunQuestion, shell_word};
@@ -90,8 +91,9 @@ impl RunPlan {
         match differences.min_by_key(|(field, ..)| field.contains(" of the ")) {
             None => Ok(()),
             Some((field, planned, now)) => Err(self.error(format!(
-                "the plan is of another run: its {field} is {planned}, now it is {now}; use the same {field}, or another --out, or write the \
-                 plan again with the new flags (`darkqa-eval plan`)"
+                "the plan is of another run: its {setting} is {planned}, now it is {now}; use the same {setting}, or another --out, or write the \
+                 plan again with the new flags (`darkqa-eval plan`)",
+                setting = spelled_setting(field)
             ))),
         }
     }

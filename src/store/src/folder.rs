@@ -16,6 +16,7 @@ use jiff::Timestamp;
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::files::folder_access::FolderAccess;
 use darkqa_ground::files::{self, is_unfinished, reading};
+use darkqa_ground::types::keyed_flag::spelled_setting;
 use darkqa_ground::types::manifest::{
     ColumnDifference, Columns, JUDGES, RunManifest, differences, judge_flag,
 };
@@ -331,6 +332,7 @@ pub(super) fn check_same_run(
     };
     if let Some((field, before, after)) = differences(&stored.identity, &requested.identity).next()
     {
+        let field = spelled_setting(field);
         return wrong(format!(
             "this run has another {field}: it was {before}, now it is {after}; use another --out, or the same {field}"
         ));
@@ -360,9 +362,9 @@ pub(super) fn check_same_run(
             continue;
         }
         let is_address = field == ADDRESS;
-        let field = match column {
-            JUDGES => judge_flag(&field),
-            _ => field,
+        let flag = match column {
+            JUDGES => spelled_setting(&judge_flag(&field)),
+            _ => spelled_setting(&field),
         };
         // Nothing was asked at an address that gave no reply, such as a mistyped one.
         let is_allowed = address_change == AddressChange::Allowed;
@@ -374,7 +376,7 @@ pub(super) fn check_same_run(
         }
         if field == ENHANCER_FILE {
             return wrong(format!(
-                "the {column} {value} ({field}) is another one in this run: its file, its sidecar or its preset was changed since ({before} before, \
+                "the {column} {value} ({flag}) is another one in this run: its file, its sidecar or its preset was changed since ({before} before, \
                  {after} now); restore it, or use another --out"
             ));
         }
@@ -384,8 +386,8 @@ pub(super) fn check_same_run(
             ""
         };
         return wrong(format!(
-            "the {column} {value} has another {field} in this run: it was {before}, now it is {after}; use another --out, or the same \
-             {field}{hint}"
+            "the {column} {value} has another {flag} in this run: it was {before}, now it is {after}; use another --out, or the same \
+             {flag}{hint}"
         ));
     }
     Ok(())

@@ -211,6 +211,27 @@ pub fn spelled(flag: &str) -> String {
     }
 }
 
+/// The name of a setting in a manifest for a message: `--noise camera or fixed` for `--camera or --fixed`.
+#[must_use]
+pub fn spelled_setting(setting: &str) -> String {
+    let is_name = |c: char| c == '-' || c.is_ascii_alphanumeric();
+    let (mut spelling, mut last) = (String::new(), "");
+    for word in setting.split_inclusive(' ') {
+        let name = word.strip_prefix("--").unwrap_or_default();
+        let end = name.find(|c| !is_name(c)).unwrap_or(name.len());
+        let (flag, rest) = name.split_at(end);
+        match keyed_form(flag) {
+            Some((keyed, key)) if keyed.name == last => spelling.extend([key, rest]),
+            Some((keyed, key)) => {
+                spelling.extend(["--", keyed.name, " ", key, rest]);
+                last = keyed.name;
+            }
+            None => spelling.push_str(word),
+        }
+    }
+    spelling
+}
+
 impl KeyedFlag {
     /// The keyed flag with this name.
     #[must_use]
@@ -360,5 +381,21 @@ mod tests {
         assert_eq!(spelled("gain"), "--noise gain");
         assert_eq!(spelled("image"), "--image");
         assert_eq!(spelled("model"), "--model");
+    }
+
+    #[test]
+    fn settings_of_manifests_are_spelled_as_keys() {
+        for (setting, spelling) in [
+            (
+                "--camera, --gain or --fixed",
+                "--noise camera, gain or fixed",
+            ),
+            ("--camera (name) of paper", "--noise camera (name) of paper"),
+            ("--model", "--model"),
+            ("--levels of the run --", "--levels of the run --"),
+            ("the version", "the version"),
+        ] {
+            assert_eq!(spelled_setting(setting), spelling);
+        }
     }
 }
