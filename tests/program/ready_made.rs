@@ -525,7 +525,7 @@ fn an_image_that_cannot_be_used_is_left_out_and_counted() {
         let called = run("--out run");
         assert_eq!(called.code, Some(2), "{called:?}");
         assert!(
-            called.stderr.contains("--bad skip") && called.stderr.contains('7'),
+            called.stderr.contains("--skip bad") && called.stderr.contains('7'),
             "{}",
             called.stderr
         );
@@ -559,7 +559,7 @@ fn the_limit_on_unusable_images_is_shared_with_missing_ones_and_can_be_raised() 
         "{}",
         called.stderr
     );
-    assert!(called.stderr.contains("--bad skip:9%"), "{}", called.stderr);
+    assert!(called.stderr.contains("--skip bad=9%"), "{}", called.stderr);
     let called = run("--bad skip:9% --out run");
     assert_eq!(called.code, Some(0), "{called:?}");
     let records = fs::read_to_string(bench.path("run/records.jsonl")).unwrap();

@@ -114,7 +114,7 @@ impl Graph {
             Ended::InTime(session) => session,
             Ended::Late => {
                 let problem = format!(
-                    "takes longer than {} s to load; --llie-timeout allows more, and 0 any time",
+                    "takes longer than {} s to load; --llie-options timeout allows more, and 0 any time",
                     limits.time
                 );
                 return Ok(Err(problem));

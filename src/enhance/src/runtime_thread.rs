@@ -236,7 +236,7 @@ mod tests {
         assert_eq!(left.unwrap(), Ended::Late);
         assert!(start.elapsed() < Duration::from_secs(2));
         let message = thread.run(|| 8).unwrap_err().to_string();
-        assert!(message.contains("--llie-timeout"), "{message}");
+        assert!(message.contains("--llie-options timeout"), "{message}");
     }
 
     #[test]

@@ -32,9 +32,11 @@ fn subcommands(bench: &Bench, above: &str) -> Vec<String> {
 fn every_subcommand_has_a_case() {
     let all = subcommands(&Bench::new(), "");
     assert!(all.len() > 25, "{all:?}");
+    // It reads no file.
+    const READS_NOTHING: &str = "enhance presets";
     let is_covered = |command: &&String| {
         let begin = format!("{command} ");
-        CASES.iter().any(|case| case.line.starts_with(&begin))
+        *command == READS_NOTHING || CASES.iter().any(|case| case.line.starts_with(&begin))
     };
     let missing: Vec<&String> = all.iter().filter(|command| !is_covered(command)).collect();
     assert!(missing.is_empty(), "without a case: {missing:?}");

@@ -68,9 +68,14 @@ fn pipes_and_devices_in_the_place_of_files_are_refused() {
                 symlink("/dev/zero", &path).unwrap();
             }
             let called = bench.call(&words(line));
-            // One walk that cannot be shown costs its questions alone.
+            // One walk that cannot be shown costs its questions alone, and thumbnails are left out of a report.
+            let expected = if file.ends_with("thumbnails.jsonl") {
+                0..=0
+            } else {
+                1..=2
+            };
             assert!(
-                matches!(called.code, Some(1 | 2)),
+                called.code.is_some_and(|code| expected.contains(&code)),
                 "{file}, {line}: {called:?}"
             );
             let name = path.file_name().unwrap().to_string_lossy();

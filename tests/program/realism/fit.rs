@@ -245,7 +245,7 @@ fn a_gain_is_not_both_pinned_and_fitted() {
     pair(&bench, "a", 1);
     let refused = bench.call(&["realism", "pairs", "--fit", "--gain", "1"]);
     assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(refused.stderr.contains("--gain"), "{refused:?}");
+    assert!(refused.stderr.contains("--noise gain"), "{refused:?}");
     // 96 blocks of 8 × 8 pixels are 12 in a bin.
     let few = bench.complete(&["realism", "pairs", "--fit"]);
     assert!(few.contains("a, paper: no fit: too few blocks"), "{few}");
