@@ -37,8 +37,10 @@ pub mod curve;
 pub mod exposure;
 mod exposures;
 mod isp;
+#[cfg(feature = "flags")]
 mod kind_levels;
 pub mod lanes;
+#[cfg(feature = "flags")]
 mod levels;
 mod motion;
 pub mod negative;
@@ -49,6 +51,7 @@ pub mod poisson;
 pub mod quantile;
 pub mod random;
 mod reading;
+#[cfg(feature = "flags")]
 mod settings;
 mod streak;
 pub mod unprocess;
@@ -66,7 +69,8 @@ pub use negative::{Negative, develop_with_state};
 pub use pair_ev::{PairEv, mean_luminance};
 pub use random::NoiseKey;
 pub use random::{Component, Site};
-pub use reading::{Amplify, Coupling, Draws, LightReading, Synthesis, Tone};
+pub use reading::{Amplify, Coupling, Draws, LightReading, Readings, Synthesis, Tone};
+#[cfg(feature = "flags")]
 pub use settings::{
     CameraArgs, KindSettings, LightArgs, LightSettings, SensorArgs, SensorSettings,
 };

@@ -3,12 +3,10 @@
 
 use std::collections::BTreeMap;
 
-use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
 use super::camera::CameraModel;
 use darkqa_ground::error::{Error, Result};
-use darkqa_ground::types::flag::flag_words;
 use darkqa_ground::types::{Degradation, ReadingName};
 
 /// Choices that define the sensor branch. The default follows the paper's words; where they leave a choice, `src/docs/method.md`
@@ -170,7 +168,8 @@ impl Readings {
 }
 
 /// Noise terms that the ratio r amplifies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "flags", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Amplify {
     /// The shot noise alone, and read, row and quantisation noise act after it (DarkQA, noise item 1).
@@ -181,7 +180,8 @@ pub enum Amplify {
 }
 
 /// Position of a forward tone curve, 3x² − 2x³, on the way back to sRGB.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "flags", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Tone {
     /// Nowhere, as the paper lists none.
@@ -194,7 +194,8 @@ pub enum Tone {
 }
 
 /// Random draws that the levels of a frame share.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "flags", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Draws {
     /// The camera and the noise field: levels differ in light alone.
@@ -205,7 +206,8 @@ pub enum Draws {
 }
 
 /// Quantity that the ratio r depends on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "flags", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Coupling {
     /// Nothing: it is drawn once per frame (DarkQA).
@@ -228,16 +230,18 @@ impl Coupling {
     }
 }
 
-flag_words!(Amplify, Tone, Draws, Coupling);
+#[cfg(feature = "flags")]
+darkqa_ground::types::flag::flag_words!(Amplify, Tone, Draws, Coupling);
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    #[cfg(feature = "flags")]
     #[test]
     fn values_are_written_as_they_are_read() {
         for name in ["none", "before-ev", "after-ev"] {
-            let tone = Tone::from_str(name, false).unwrap();
+            let tone = <Tone as clap::ValueEnum>::from_str(name, false).unwrap();
             assert_eq!(tone.to_string(), name);
             assert_eq!(serde_json::to_value(tone).unwrap(), name);
         }

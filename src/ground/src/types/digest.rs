@@ -3,9 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use serde::Serialize;
-use serde_json::Value;
-
+#[cfg(feature = "program")]
 use super::canonical::canonical;
 use super::words::as_text;
 use crate::error::Error;
@@ -26,15 +24,17 @@ impl Digest {
     ///
     /// # Errors
     /// If a number in it is infinite or NaN, or a key of a map is not a text.
-    pub fn canonical(domain: &'static str, value: &impl Serialize) -> Result<Self, Error> {
+    #[cfg(feature = "program")]
+    pub fn canonical(domain: &'static str, value: &impl serde::Serialize) -> Result<Self, Error> {
         Ok(Self::canonical_value(domain, value)?.0)
     }
 
     /// The same digest, with the value that it is the digest of: keys sorted, nulls and absent fields left out at every depth.
+    #[cfg(feature = "program")]
     pub fn canonical_value(
         domain: &'static str,
-        value: &impl Serialize,
-    ) -> Result<(Self, Value), Error> {
+        value: &impl serde::Serialize,
+    ) -> Result<(Self, serde_json::Value), Error> {
         let value = canonical(value).map_err(|e| Error::data(domain, e))?;
         let mut hasher = blake3::Hasher::new();
         hasher.update(domain.as_bytes()).update(&[0]);

@@ -1,13 +1,18 @@
 //! Images and their maps: [`Frame`], [`FrameId`].
 
+#[cfg(feature = "program")]
 use std::collections::BTreeMap;
 use std::fmt;
+#[cfg(feature = "program")]
 use std::sync::Arc;
 
+#[cfg(feature = "program")]
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
+#[cfg(feature = "program")]
 use super::image::Rgb;
+#[cfg(feature = "program")]
 use super::labels::SegmentName;
 
 /// The name of a frame, unique in its data set: `scene/frame`, or the path of an image in a ready-made set.
@@ -45,6 +50,7 @@ pub fn is_image_ending(ending: &str) -> bool {
 }
 
 /// One view of a scene: an image and, if the data set has them, its maps of the same height and width.
+#[cfg(feature = "program")]
 #[derive(Debug, Clone)]
 pub struct Frame {
     /// The name of the frame, unique in its data set.
@@ -72,7 +78,8 @@ pub struct Frame {
 }
 
 /// The direction along which depth is measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "program", derive(clap::ValueEnum))]
 #[serde(rename_all = "snake_case")]
 pub enum DepthKind {
     /// The optical axis: z.

@@ -2,10 +2,12 @@
 //! [`isa`] names the instruction sets that loops over pixels are compiled for.
 
 pub mod axis_level;
+#[cfg(feature = "program")]
 mod canonical;
 pub mod condition;
 mod condition_columns;
 pub mod control;
+#[cfg(feature = "program")]
 pub mod decides;
 pub mod degradation;
 pub mod detail;
@@ -13,10 +15,12 @@ pub mod digest;
 pub mod enhancer_note;
 mod experiment_detail;
 pub mod exposure_facts;
+#[cfg(feature = "program")]
 pub mod flag;
 mod flaw;
 pub mod frame;
 pub mod image;
+#[cfg(feature = "program")]
 pub mod image_mark;
 pub mod image_notes;
 mod input_note;
@@ -62,6 +66,7 @@ pub use axis_level::{AxisLevel, KindReading};
 pub use condition::{Condition, EnhancerName};
 pub use condition_columns::ConditionColumns;
 pub use control::Control;
+#[cfg(feature = "program")]
 pub use decides::Decides;
 pub use degradation::{Degradation, ReadingName};
 pub use detail::{
@@ -70,7 +75,9 @@ pub use detail::{
 pub use digest::Digest;
 pub use exposure_facts::ExposureFacts;
 pub use flaw::Flaw;
-pub use frame::{DepthKind, Frame, FrameId, Intrinsics, Segmentation};
+#[cfg(feature = "program")]
+pub use frame::Frame;
+pub use frame::{DepthKind, FrameId, Intrinsics, Segmentation};
 pub use image::{Codes16, Image, Light, Rgb};
 pub use image_notes::{ImageFidelity, ObjectCrop, Thumbnail};
 pub use input_note::{ColourHandling, ColourNote, DepthNote, InputNote, InputSummary};

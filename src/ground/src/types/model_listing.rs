@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
 /// A model of a file of models, as tables show it.
@@ -33,7 +32,8 @@ pub struct ModelListing {
 }
 
 /// A further column of tables, about the model of a row.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "program", derive(clap::ValueEnum))]
 pub enum ModelColumn {
     /// What the endpoint calls it
     Id,

@@ -1,22 +1,11 @@
 //! The light in which the photographs of a set were taken: [`SetLight`].
 
-use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
 /// The light in which the photographs of a set were taken.
+#[cfg_attr(feature = "program", derive(clap::ValueEnum))]
 #[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    Hash,
-    Default,
-    Serialize,
-    Deserialize,
-    ValueEnum,
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize,
 )]
 #[serde(rename_all = "lowercase")]
 pub enum SetLight {
