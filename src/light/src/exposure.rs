@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::clean::Clean;
+use super::codes::shown_light;
 use super::curve;
 use darkqa_ground::types::isa::{Isa, Kernel};
 use darkqa_ground::types::{Codes16, Light, Rgb, Severity};
@@ -91,6 +92,32 @@ fn expose_light(clean: &Light, drop_ev: f64, degraded: &mut Rgb) {
             *code = steps.partition_point(|step| *step <= f64::from(*light)) as u8;
         }
     });
+}
+
+/// The linear light of the image after any exposure drop in EV, as a display shows it, before it is rounded to codes.
+pub(super) fn expose_to_light(clean: Clean<'_>, drop_ev: f64) -> Light {
+    let mut degraded = Light::black(clean.height(), clean.width());
+    let factor = libm::exp2(-drop_ev);
+    let darker = |light: f64| (light * factor).min(1.0) as f32;
+    match clean {
+        Clean::Codes(codes) => {
+            let table = shown_light().map(|light| darker(f64::from(light)));
+            for (light, code) in degraded.samples_mut().iter_mut().zip(codes.samples()) {
+                *light = table[usize::from(*code)];
+            }
+        }
+        Clean::Codes16(codes) => {
+            for (light, code) in degraded.samples_mut().iter_mut().zip(codes.samples()) {
+                *light = darker(curve::gamma_expand(f64::from(*code) / 65_535.0));
+            }
+        }
+        Clean::Light(clean) | Clean::Scene(clean) => {
+            for (light, clean) in degraded.samples_mut().iter_mut().zip(clean.samples()) {
+                *light = darker(f64::from(*clean));
+            }
+        }
+    }
+    degraded
 }
 
 /// Writes the image after an exposure drop into `degraded`, an image of the same size.

@@ -21,11 +21,27 @@ use darkqa_ground::types::isa::{Isa, Kernel};
 /// Gamma compression of light from 2⁻³¹ up; light below 10⁻⁸ is treated as 10⁻⁸.
 static GAMMA: LazyLock<Piecewise> = LazyLock::new(|| Piecewise::new(-31, curve::gamma_compress));
 
+/// Light of display values from 2⁻³⁰ up.
+static LIGHT: LazyLock<Piecewise> = LazyLock::new(|| Piecewise::new(-30, curve::gamma_expand));
+
+/// Smallest display value in the table of light, 2⁻³⁰.
+const DARKEST_DISPLAY: f32 = 1.0 / 1_073_741_824.0;
+
 /// Smallest light in the table, 2⁻³¹: black, which is code 0 at every level.
 const DARKEST: f32 = 1.0 / 2_147_483_648.0;
 
 /// 2^23: adding it to a number from 0 to 255 leaves the nearest whole number in the lowest byte.
 const ROUND: f32 = 8_388_608.0;
+
+/// The light of a display value in [0, 1].
+#[inline(always)]
+fn expand(light: &Piecewise, display: f32) -> f32 {
+    light.at(if display > DARKEST_DISPLAY {
+        display
+    } else {
+        DARKEST_DISPLAY
+    })
+}
 
 /// Image processing of one camera, ready for any row.
 #[derive(Debug)]
@@ -110,6 +126,16 @@ impl Developer {
             factor: curve::display_factor(drop_ev - self.headroom_ev) as f32,
             tone: self.tone,
             codes,
+        });
+    }
+
+    /// Writes the linear light of display values after an exposure drop, which the codes of [`Developer::encode`] round.
+    pub(super) fn expand(&self, display: &[f32], drop_ev: f64, light: &mut [f32]) {
+        self.isa.run(Expand {
+            display,
+            factor: curve::display_factor(drop_ev - self.headroom_ev) as f32,
+            tone: self.tone,
+            light,
         });
     }
 }
@@ -237,6 +263,31 @@ impl Kernel for Encode<'_> {
                 let scaled = if scaled < 255.0 { scaled } else { 255.0 };
                 *code = (scaled + ROUND).to_bits() as u8;
             }
+        }
+    }
+}
+
+struct Expand<'a> {
+    display: &'a [f32],
+    /// Factor of the exposure drop on display values.
+    factor: f32,
+    tone: Tone,
+    light: &'a mut [f32],
+}
+
+impl Kernel for Expand<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let table = &*LIGHT;
+        for (light, value) in self.light.iter_mut().zip(self.display) {
+            let display = clip(value * self.factor);
+            *light = expand(
+                table,
+                match self.tone {
+                    Tone::AfterEv => curve::smoothstep(display),
+                    Tone::None | Tone::BeforeEv => display,
+                },
+            );
         }
     }
 }

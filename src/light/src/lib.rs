@@ -1,5 +1,19 @@
 //! Degraded versions of a clean frame, as a camera would take it in less light. [`degrade`] is the entry point.
 //!
+//! ```
+//! # use darkqa_ground::types::{FrameId, Rgb};
+//! # use darkqa_light::{NoiseKey, Synthesis, degrade};
+//! # let clean = Rgb::new(1, 2, vec![200; 6])?;
+//! let key = NoiseKey::new(0, &FrameId("kitchen/12.png".to_owned()));
+//! let how = "L3-noise@physical".parse()?;
+//! let dark = degrade(&clean, Some(&how), &key, &Synthesis::default())?;
+//! # assert_eq!((dark.height(), dark.width()), (1, 2));
+//! # Ok::<(), darkqa_ground::Error>(())
+//! ```
+//!
+//! [`negative::ladder`] makes several levels with less work. [`CaptureState`] holds every number that decides an image, can be
+//! written and read, and makes the image again, its noise-free form, or its linear light.
+//!
 //! ```text
 //! Exposure   sRGB ─ gamma ─ × 2^−ΔEV ─ gamma⁻¹ ─ 8 bit                            a table of 256 codes
 //! Sensor     sRGB ─ unprocess ─ RAW ─ shot, read, row, quantisation ─ balance ─┐
@@ -29,6 +43,7 @@ mod auto;
 pub mod bayer;
 pub mod blur;
 pub mod camera;
+mod capture_state;
 mod clean;
 mod clean_raw;
 mod codes;
@@ -59,6 +74,7 @@ pub mod unprocess;
 pub use applied::AppliedDegradation;
 pub use auto::{AutoExposure, AutoSettings, AutoShot};
 pub use camera::{Calibration, CameraModel, CameraState, Sampling};
+pub use capture_state::{CaptureState, NoiseTerms, SensorState};
 pub use clean::Clean;
 pub use clean_raw::CleanRaw;
 pub use exposure::{expose, expose_by};

@@ -4,14 +4,16 @@ use rayon::prelude::*;
 
 use super::bayer::Bayer;
 use super::camera::CameraState;
+use super::capture_state::SensorState;
 use super::clean::Clean;
 use super::isp::Developer;
 use super::noise::{Noise, Term};
 use super::random::NoiseKey;
 use super::reading::{Amplify, Coupling, Draws, Synthesis, Tone};
 use super::unprocess::Unprocess;
+use darkqa_ground::types::image::Sample;
 use darkqa_ground::types::isa::Isa;
-use darkqa_ground::types::{Rgb, Severity};
+use darkqa_ground::types::{Image, Rgb, Severity};
 
 /// Rows of a band, which is processed from RAW to codes within a core's cache; chosen.
 const BAND: usize = 32;
@@ -171,8 +173,28 @@ pub fn develop_with_state(
     image
 }
 
+/// A sample of a developed image.
+pub(super) trait Target: Sample + Send {
+    /// Writes the samples of display values after an exposure drop.
+    fn write(developer: &Developer, display: &[f32], drop_ev: f64, samples: &mut [Self]);
+}
+
+/// 8-bit codes.
+impl Target for u8 {
+    fn write(developer: &Developer, display: &[f32], drop_ev: f64, samples: &mut [Self]) {
+        developer.encode(display, drop_ev, samples);
+    }
+}
+
+/// Linear light.
+impl Target for f32 {
+    fn write(developer: &Developer, display: &[f32], drop_ev: f64, samples: &mut [Self]) {
+        developer.expand(display, drop_ev, samples);
+    }
+}
+
 /// One exposure of the sensor: camera state and noise, ready for any row.
-struct Capture {
+pub(super) struct Capture {
     unprocess: Unprocess,
     noise: Noise,
     developer: Developer,
@@ -187,6 +209,30 @@ impl Capture {
         };
         let Synthesis { amplify, tone, .. } = *synthesis;
         Self::with(&key, &state, amplify, tone, &Term::ALL, isa)
+    }
+
+    /// The exposure of a sensor whose state is known.
+    pub(super) fn of_sensor(key: &NoiseKey, sensor: &SensorState, terms: &[Term]) -> Self {
+        let SensorState {
+            amplify,
+            tone,
+            camera,
+            ..
+        } = sensor;
+        Self::with(key, camera, *amplify, *tone, terms, Isa::best())
+    }
+
+    /// The image of a frame after an exposure drop; drop and headroom of the light reading are in EV.
+    pub(super) fn image<T: Target>(
+        self,
+        clean: Clean<'_>,
+        drop_ev: f64,
+        headroom_ev: f64,
+    ) -> Image<T> {
+        let mut image = Image::black(clean.height(), clean.width());
+        let capture = self.of(clean, headroom_ev);
+        capture.develop(clean, &[drop_ev], std::slice::from_mut(&mut image));
+        image
     }
 
     fn with(
@@ -227,9 +273,9 @@ impl Capture {
     }
 
     /// Develops the frame after each of these exposure drops, band by band.
-    fn develop(&self, clean: Clean<'_>, drops: &[f64], images: &mut [Rgb]) {
+    fn develop<T: Target>(&self, clean: Clean<'_>, drops: &[f64], images: &mut [Image<T>]) {
         let (height, width) = (clean.height(), clean.width());
-        let mut bands: Vec<Vec<&mut [u8]>> = Vec::new();
+        let mut bands: Vec<Vec<&mut [T]>> = Vec::new();
         bands.resize_with(height.div_ceil(BAND), Vec::new);
         for image in &mut images[..drops.len()] {
             assert_eq!((image.height(), image.width()), (height, width));
@@ -256,8 +302,8 @@ impl Capture {
                 for row in 0..rows {
                     self.developer.display(raw, lead + row, display);
                     for (drop_ev, part) in drops.iter().zip(&mut parts) {
-                        let codes = &mut part[row * 3 * width..][..3 * width];
-                        self.developer.encode(display, *drop_ev, codes);
+                        let samples = &mut part[row * 3 * width..][..3 * width];
+                        T::write(&self.developer, display, *drop_ev, samples);
                     }
                 }
             },

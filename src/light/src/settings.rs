@@ -1,8 +1,6 @@
 //! Levels, kinds and noise of degradations: as flags ([`LightArgs`], [`SensorArgs`]) and resolved ([`LightSettings`],
 //! [`SensorSettings`]).
 
-use std::path::Path;
-
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
@@ -12,9 +10,8 @@ use super::levels::{LIGHT, Levels, ladder};
 use super::motion::{FrameView, Motion};
 use super::random::NoiseKey;
 use super::reading::{Amplify, Coupling, Draws, LightReading, Readings, Synthesis, Tone};
-use super::{Calibration, CameraModel, Sampling};
+use super::{CameraModel, Sampling};
 use darkqa_ground::error::{Error, Result};
-use darkqa_ground::files::reading;
 use darkqa_ground::types::degradation::Kind;
 use darkqa_ground::types::{
     AxisLevel, Decides, Degradation, KindSet, PairDark, ReadingName, SetLight,
@@ -358,13 +355,7 @@ fn synthesis(args: &SensorArgs, reading: Synthesis) -> Result<Synthesis> {
 }
 
 fn camera(args: &SensorArgs) -> Result<CameraModel> {
-    let path = Path::new(&args.camera);
-    let mut camera = if is_file(path) {
-        let text = reading::settings(path)?;
-        CameraModel::new(Calibration::parse(&text, path.display())?)
-    } else {
-        CameraModel::preset(&args.camera)?
-    };
+    let mut camera = CameraModel::open(&args.camera)?;
     if args.fixed {
         camera.set_sampling(Sampling::Fixed);
     }
@@ -375,11 +366,6 @@ fn camera(args: &SensorArgs) -> Result<CameraModel> {
         camera.pin_ratio(ratio)?;
     }
     Ok(camera)
-}
-
-/// Whether `--noise camera` is a file: it has an extension or a folder, which names of cameras do not have.
-fn is_file(path: &Path) -> bool {
-    path.extension().is_some() || path.components().count() > 1
 }
 
 #[cfg(test)]

@@ -112,6 +112,12 @@ impl<T: Sample> Image<T> {
         &self.samples
     }
 
+    /// The samples of an image that is no longer needed.
+    #[must_use]
+    pub fn into_samples(self) -> Vec<T> {
+        self.samples
+    }
+
     /// The samples, to change them in place.
     #[must_use]
     pub fn samples_mut(&mut self) -> &mut [T] {

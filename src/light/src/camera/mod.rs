@@ -2,6 +2,7 @@
 
 pub(super) mod calibration;
 
+use std::path::Path;
 use std::sync::Arc;
 
 pub use calibration::Calibration;
@@ -14,6 +15,7 @@ use serde::{Deserialize, Serialize, Serializer};
 use super::colour::{self, Matrix};
 use super::random::{Component, NoiseKey, Site, SiteWords, Stream};
 use darkqa_ground::error::{Error, Result};
+use darkqa_ground::files::reading;
 use darkqa_ground::types::Digest;
 
 /// Distribution that each frame's camera is drawn from.
@@ -87,6 +89,21 @@ impl CameraModel {
             );
             Error::usage("--noise camera", problem)
         })
+    }
+
+    /// Cameras of a built-in calibration by its name, or of the TOML file of a calibration.
+    ///
+    /// # Errors
+    /// If no calibration has this name, or the file cannot be used.
+    pub fn open(name_or_path: &str) -> Result<Self> {
+        let path = Path::new(name_or_path);
+        // Names of cameras have neither an extension nor a folder.
+        let is_file = path.extension().is_some() || path.components().count() > 1;
+        if !is_file {
+            return Self::preset(name_or_path);
+        }
+        let text = reading::settings(path)?;
+        Calibration::parse(&text, path.display()).map(Self::new)
     }
 
     /// Sets whether states are drawn or fixed (`--noise fixed`).
