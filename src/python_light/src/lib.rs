@@ -1,0 +1,304 @@
+//! The Python module `darkqa_light`: dark images of NumPy arrays, by the crate `darkqa-light`.
+//!
+//! - `lib.rs`: the four functions, as `darkqa_light/_core.pyi` types them.
+//! - [`arguments`]: Python values → settings; every wrong value is named in a `TypeError` or `ValueError`.
+//! - [`arrays`]: NumPy arrays ↔ images.
+//! - [`state`]: the dictionary of a capture.
+//! - [`pools`]: threads, one pool for each process and number of threads.
+//!
+//! Images are made without the GIL.
+
+mod arguments;
+mod arrays;
+mod pools;
+mod state;
+
+use darkqa_ground::types::degradation::Kind;
+use darkqa_ground::types::{Image, Light, Rgb, Severity};
+use darkqa_light::{CaptureState, Exposures, NoiseKey, NoiseTerms, negative};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use rayon::prelude::*;
+
+use arguments::{Level, Settings, noise_keys, numbered_keys};
+use arrays::{Batch, Output};
+
+/// Dark images, as a camera would take them in less light.
+#[pymodule]
+mod _core {
+    use super::{Bound, PyModule, PyModuleMethods, PyResult};
+    #[pymodule_export]
+    use super::{cameras, degrade, ladder, replay, sensor_state};
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}
+
+/// Names of the built-in cameras, the default first.
+#[pyfunction]
+fn cameras() -> Vec<&'static str> {
+    darkqa_light::Calibration::names().collect()
+}
+
+/// Return an image, or a batch of images, in less light.
+///
+/// `image` is a numpy.ndarray of dtype uint8 and shape (H, W, 3) or (N, H, W, 3): sRGB. The result has the same shape.
+///
+/// level: "L1" to "L5", "L0" for the image itself; with variant="motion" also an exposure time in ms, as "T33.33".
+/// ev: an exposure drop in EV instead, from 0 to 16, rounded to 0.01.
+/// variant: "ev" (less light alone), "noise" (with sensor noise), "auto" (automatic exposure), "motion" (motion blur).
+/// profile: "paper", "eld", "level" or "physical", the way the noise follows the light.
+/// camera: a name of cameras(), or the path of a TOML file of a calibration; None for the first of cameras().
+/// seed, key: the same seed and key give the same image. Key is the name of a frame in `darkqa-eval synthesize`. A batch
+///     takes a list of N keys; with one str, image i has the key f"{key}/{i}".
+/// noise: False for the noise-free image at the same exposure, a training target.
+/// linear: True for float32 linear light before it is rounded to 8-bit codes; white is 1.
+/// threads: from 1 to 256.
+#[pyfunction]
+#[pyo3(
+    signature = (image, level = None, variant = None, profile = None, camera = None, seed = None, key = None, *, ev = None, noise = None, linear = None, threads = None),
+    text_signature = "(image, level='L3', variant='noise', profile='paper', camera=None, seed=0, key='', *, ev=None, noise=True, linear=False, threads=1)"
+)]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
+fn degrade<'py>(
+    image: &Bound<'py, PyAny>,
+    level: Option<&Bound<'py, PyAny>>,
+    variant: Option<&Bound<'py, PyAny>>,
+    profile: Option<&Bound<'py, PyAny>>,
+    camera: Option<&Bound<'py, PyAny>>,
+    seed: Option<&Bound<'py, PyAny>>,
+    key: Option<&Bound<'py, PyAny>>,
+    ev: Option<&Bound<'py, PyAny>>,
+    noise: Option<&Bound<'py, PyAny>>,
+    linear: Option<&Bound<'py, PyAny>>,
+    threads: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let py = image.py();
+    let settings = Settings::new(variant, profile, camera, seed)?;
+    let level = settings.level(level, ev)?;
+    let noise = terms(arguments::switch("noise", noise, true)?);
+    let is_linear = arguments::switch("linear", linear, false)?;
+    let threads = arguments::threads(threads)?;
+    let batch = Batch::read(image)?;
+    let keys = noise_keys(settings.seed, key, &batch)?;
+    let states = keys
+        .iter()
+        .map(|key| settings.state(level, batch.width, key))
+        .collect::<PyResult<Vec<_>>>()?;
+    let capture = |index: usize| (&states[index], &keys[index]);
+    if is_linear {
+        let make = |index: usize, clean: &Rgb| {
+            let (state, key) = capture(index);
+            vec![state.light(clean.into(), key, noise)]
+        };
+        output(py, &batch, &[], threads, make)
+    } else {
+        let make = |index: usize, clean: &Rgb| {
+            let (state, key) = capture(index);
+            vec![state.image(clean.into(), key, noise)]
+        };
+        output(py, &batch, &[], threads, make)
+    }
+}
+
+/// Return an image, or each image of a batch, at several levels, with one camera and one noise field for each image.
+///
+/// The shape is (L, H, W, 3), or (N, L, H, W, 3) for a batch. Levels are str as in degrade(), or numbers of EV; each
+/// image equals that of degrade() at this level. They take less time together.
+#[pyfunction]
+#[pyo3(
+    signature = (image, levels = None, variant = None, profile = None, camera = None, seed = None, key = None, *, noise = None, linear = None, threads = None),
+    text_signature = "(image, levels=('L1', 'L2', 'L3', 'L4', 'L5'), variant='noise', profile='paper', camera=None, seed=0, key='', *, noise=True, linear=False, threads=1)"
+)]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
+fn ladder<'py>(
+    image: &Bound<'py, PyAny>,
+    levels: Option<&Bound<'py, PyAny>>,
+    variant: Option<&Bound<'py, PyAny>>,
+    profile: Option<&Bound<'py, PyAny>>,
+    camera: Option<&Bound<'py, PyAny>>,
+    seed: Option<&Bound<'py, PyAny>>,
+    key: Option<&Bound<'py, PyAny>>,
+    noise: Option<&Bound<'py, PyAny>>,
+    linear: Option<&Bound<'py, PyAny>>,
+    threads: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let py = image.py();
+    let settings = Settings::new(variant, profile, camera, seed)?;
+    let levels = settings.levels(levels)?;
+    let noise = terms(arguments::switch("noise", noise, true)?);
+    let is_linear = arguments::switch("linear", linear, false)?;
+    let threads = arguments::threads(threads)?;
+    let batch = Batch::read(image)?;
+    let keys = noise_keys(settings.seed, key, &batch)?;
+    let mut states: Vec<Vec<CaptureState>> = Vec::new();
+    for key in &keys {
+        let of_key = levels
+            .iter()
+            .map(|level| settings.state(*level, batch.width, key));
+        states.push(of_key.collect::<PyResult<_>>()?);
+    }
+    let shape = [levels.len()];
+    if is_linear {
+        let make = |index: usize, clean: &Rgb| -> Vec<Light> {
+            let states = states[index].iter();
+            states
+                .map(|state| state.light(clean.into(), &keys[index], noise))
+                .collect()
+        };
+        return output(py, &batch, &shape, threads, make);
+    }
+    let make = |index: usize, clean: &Rgb| {
+        if noise == NoiseTerms::All {
+            return together(&settings, &levels, clean, &keys[index]);
+        }
+        let states = states[index].iter();
+        states
+            .map(|state| state.image(clean.into(), &keys[index], noise))
+            .collect()
+    };
+    output(py, &batch, &shape, threads, make)
+}
+
+/// The images of one frame at several levels, which share their work.
+fn together(settings: &Settings, levels: &[Level], clean: &Rgb, key: &NoiseKey) -> Vec<Rgb> {
+    let severities: Vec<Severity> = levels.iter().filter_map(|level| level.0).collect();
+    let degraded: Vec<Rgb> = if settings.kind == Kind::Sensor {
+        let mut images = vec![Rgb::black(clean.height(), clean.width()); severities.len()];
+        negative::ladder(clean, key, &settings.synthesis, &severities, &mut images);
+        images
+    } else {
+        let mut exposures = Exposures::default();
+        // The states of all levels were made before, so that no level fails here.
+        let applied = severities
+            .iter()
+            .filter_map(|severity| settings.applied(*severity, clean.width(), key).ok());
+        applied
+            .map(|applied| exposures.degrade(clean.into(), &applied, key))
+            .collect()
+    };
+    let mut degraded = degraded.into_iter();
+    levels
+        .iter()
+        .map(|level| match level.0 {
+            Some(_) => degraded.next().unwrap_or_else(|| clean.clone()),
+            None => clean.clone(),
+        })
+        .collect()
+}
+
+/// Return the numbers that decide an image of degrade(): exposure drop, motion and the state of the sensor.
+///
+/// The dictionary holds int, float, str, and lists of float, so that it can be written as JSON. replay() makes the image
+/// again from it. `width` is the width of the image in pixels, which the motion of the variants "auto" and "motion" needs.
+#[pyfunction]
+#[pyo3(
+    signature = (level = None, variant = None, profile = None, camera = None, seed = None, key = None, *, ev = None, width = None),
+    text_signature = "(level='L3', variant='noise', profile='paper', camera=None, seed=0, key='', *, ev=None, width=None)"
+)]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
+fn sensor_state<'py>(
+    py: Python<'py>,
+    level: Option<&Bound<'py, PyAny>>,
+    variant: Option<&Bound<'py, PyAny>>,
+    profile: Option<&Bound<'py, PyAny>>,
+    camera: Option<&Bound<'py, PyAny>>,
+    seed: Option<&Bound<'py, PyAny>>,
+    key: Option<&Bound<'py, PyAny>>,
+    ev: Option<&Bound<'py, PyAny>>,
+    width: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let settings = Settings::new(variant, profile, camera, seed)?;
+    let level = settings.level(level, ev)?;
+    let key = arguments::key(key)?;
+    let width = settings.width(width)?;
+    let noise_key = arguments::noise_key(settings.seed, &key);
+    let capture = settings.state(level, width, &noise_key)?;
+    state::to_dict(
+        py,
+        &state::Replay {
+            kind: settings.kind,
+            seed: settings.seed,
+            key,
+            capture,
+        },
+    )
+}
+
+/// Return an image, or a batch of images, with the numbers of a dictionary of sensor_state(), which may have been changed.
+///
+/// All images of a batch have the same camera; image i of a batch has the noise of the key f"{key}/{i}".
+#[pyfunction]
+#[pyo3(
+    signature = (image, state, *, noise = None, linear = None, threads = None),
+    text_signature = "(image, state, *, noise=True, linear=False, threads=1)"
+)]
+fn replay<'py>(
+    image: &Bound<'py, PyAny>,
+    state: &Bound<'py, PyAny>,
+    noise: Option<&Bound<'py, PyAny>>,
+    linear: Option<&Bound<'py, PyAny>>,
+    threads: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let py = image.py();
+    let state = state
+        .cast::<PyDict>()
+        .map_err(|_| arguments::wrong_type("state", "a dict of sensor_state()", state))?;
+    let replay = state::from_dict(state)?;
+    let noise = terms(arguments::switch("noise", noise, true)?);
+    let is_linear = arguments::switch("linear", linear, false)?;
+    let threads = arguments::threads(threads)?;
+    let batch = Batch::read(image)?;
+    let keys = numbered_keys(replay.seed, &replay.key, &batch);
+    let capture = &replay.capture;
+    if is_linear {
+        let make =
+            |index: usize, clean: &Rgb| vec![capture.light(clean.into(), &keys[index], noise)];
+        output(py, &batch, &[], threads, make)
+    } else {
+        let make =
+            |index: usize, clean: &Rgb| vec![capture.image(clean.into(), &keys[index], noise)];
+        output(py, &batch, &[], threads, make)
+    }
+}
+
+fn terms(noise: bool) -> NoiseTerms {
+    if noise {
+        NoiseTerms::All
+    } else {
+        NoiseTerms::None
+    }
+}
+
+/// The array of the images that `make` makes of each image of a batch; `levels` is the number of them, if it is an axis.
+fn output<'py, T: Output>(
+    py: Python<'py>,
+    batch: &Batch,
+    levels: &[usize],
+    threads: usize,
+    make: impl Fn(usize, &Rgb) -> Vec<Image<T>> + Sync,
+) -> PyResult<Bound<'py, PyAny>> {
+    let pool = pools::pool(py, threads)?;
+    let samples: Vec<T> = py.detach(|| {
+        pool.install(|| {
+            if let [only] = &batch.images[..] {
+                return joined(make(0, only));
+            }
+            let images = batch.images.par_iter().enumerate();
+            let made = images.map(|(index, clean)| joined(make(index, clean)));
+            made.collect::<Vec<Vec<T>>>().concat()
+        })
+    });
+    arrays::to_numpy(py, samples, &batch.output_shape(levels))
+}
+
+/// The samples of images of one size, one after the other.
+fn joined<T: Output>(mut images: Vec<Image<T>>) -> Vec<T> {
+    if images.len() == 1 {
+        return images.pop().map_or_else(Vec::new, Image::into_samples);
+    }
+    let images: Vec<&[T]> = images.iter().map(Image::samples).collect();
+    images.concat()
+}
