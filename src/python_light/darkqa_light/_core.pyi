@@ -5,12 +5,14 @@ from typing import Any, Literal, TypedDict, overload
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = ["__version__", "cameras", "degrade", "ladder", "replay", "sensor_state"]
+
 __version__: str
 
-Variant = Literal["ev", "noise", "auto", "motion"]
-Profile = Literal["paper", "eld", "level", "physical"]
-Camera = str | os.PathLike[str]
-Key = str | Sequence[str]
+_Variant = Literal["ev", "noise", "auto", "motion"]
+_Profile = Literal["paper", "eld", "level", "physical"]
+_Camera = str | os.PathLike[str]
+_Key = str | Sequence[str]
 
 class _Sensor(TypedDict, total=False):
     # Only with sensor noise.
@@ -30,9 +32,9 @@ class _Sensor(TypedDict, total=False):
     bias: list[float]
     adu_range: float
 
-class State(_Sensor):
+class _State(_Sensor):
     version: int
-    variant: Variant
+    variant: _Variant
     seed: int
     key: str
     ev: float
@@ -44,11 +46,11 @@ def cameras() -> list[str]: ...
 def degrade(
     image: NDArray[np.uint8],
     level: str = "L3",
-    variant: Variant = "noise",
-    profile: Profile = "paper",
-    camera: Camera | None = None,
+    variant: _Variant = "noise",
+    profile: _Profile = "paper",
+    camera: _Camera | None = None,
     seed: int = 0,
-    key: Key = "",
+    key: _Key = "",
     *,
     ev: float | None = None,
     noise: bool = True,
@@ -59,11 +61,11 @@ def degrade(
 def degrade(
     image: NDArray[np.uint8],
     level: str = "L3",
-    variant: Variant = "noise",
-    profile: Profile = "paper",
-    camera: Camera | None = None,
+    variant: _Variant = "noise",
+    profile: _Profile = "paper",
+    camera: _Camera | None = None,
     seed: int = 0,
-    key: Key = "",
+    key: _Key = "",
     *,
     ev: float | None = None,
     noise: bool = True,
@@ -74,11 +76,11 @@ def degrade(
 def ladder(
     image: NDArray[np.uint8],
     levels: Sequence[str | float] = ("L1", "L2", "L3", "L4", "L5"),
-    variant: Variant = "noise",
-    profile: Profile = "paper",
-    camera: Camera | None = None,
+    variant: _Variant = "noise",
+    profile: _Profile = "paper",
+    camera: _Camera | None = None,
     seed: int = 0,
-    key: Key = "",
+    key: _Key = "",
     *,
     noise: bool = True,
     linear: Literal[False] = False,
@@ -88,11 +90,11 @@ def ladder(
 def ladder(
     image: NDArray[np.uint8],
     levels: Sequence[str | float] = ("L1", "L2", "L3", "L4", "L5"),
-    variant: Variant = "noise",
-    profile: Profile = "paper",
-    camera: Camera | None = None,
+    variant: _Variant = "noise",
+    profile: _Profile = "paper",
+    camera: _Camera | None = None,
     seed: int = 0,
-    key: Key = "",
+    key: _Key = "",
     *,
     noise: bool = True,
     linear: Literal[True],
@@ -100,19 +102,19 @@ def ladder(
 ) -> NDArray[np.float32]: ...
 def sensor_state(
     level: str = "L3",
-    variant: Variant = "noise",
-    profile: Profile = "paper",
-    camera: Camera | None = None,
+    variant: _Variant = "noise",
+    profile: _Profile = "paper",
+    camera: _Camera | None = None,
     seed: int = 0,
     key: str = "",
     *,
     ev: float | None = None,
     width: int | None = None,
-) -> State: ...
+) -> _State: ...
 @overload
 def replay(
     image: NDArray[np.uint8],
-    state: State | dict[str, Any],
+    state: _State | dict[str, Any],
     *,
     noise: bool = True,
     linear: Literal[False] = False,
@@ -121,7 +123,7 @@ def replay(
 @overload
 def replay(
     image: NDArray[np.uint8],
-    state: State | dict[str, Any],
+    state: _State | dict[str, Any],
     *,
     noise: bool = True,
     linear: Literal[True],
