@@ -142,6 +142,13 @@ class Refusals(unittest.TestCase):
         self.refuse(ValueError, ["image", "pixel", "(0, 5, 3)"], degrade, np.empty((0, 5, 3), np.uint8))
         self.refuse(ValueError, ["image", "pixel", "(2, 5, 0, 3)"], degrade, np.empty((2, 5, 0, 3), np.uint8))
 
+    def test_views_that_are_larger_than_memory(self):
+        sample = np.zeros((1, 1, 1, 3), np.uint8)
+        self.refuse(ValueError, ["image", "2**28 pixels"], darkqa_light.degrade, np.broadcast_to(sample[0], (10**6, 10**6, 3)))
+        batch = np.broadcast_to(sample, (10**9, 10**3, 10**3, 3))
+        for call in [darkqa_light.degrade, darkqa_light.ladder]:
+            self.refuse(MemoryError, ["image", "bytes"], call, batch)
+
     def test_levels(self):
         degrade = darkqa_light.degrade
         self.refuse(ValueError, ["level", "L0 to L5", "L7"], degrade, IMAGE, "L7")

@@ -6,10 +6,16 @@ use numpy::{
     Element, IxDyn, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
     PyUntypedArrayMethods,
 };
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::{PyMemoryError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::arguments::wrong_type;
+
+/// Most pixels of an image; chosen. An array of any size may be a view of a single sample.
+const MAX_PIXELS: usize = 1 << 28;
+
+/// Bytes that an image takes besides its samples, at most.
+const BYTES_OF_IMAGE: usize = 128;
 
 /// A sample of an array that is returned.
 pub(crate) trait Output: Sample + Element + Send + Sync {}
@@ -53,7 +59,12 @@ impl Batch {
         let array = array
             .try_readonly()
             .map_err(|_| PyValueError::new_err("image: another call is writing to this array"))?;
+        if height.saturating_mul(width) > MAX_PIXELS {
+            return Err(wrong_shape(shape, " with at most 2**28 pixels"));
+        }
         let size = 3 * height * width;
+        // All samples, and those of each image.
+        require_memory(count.unwrap_or(1), 2 * size)?;
         let samples = samples(&array);
         let images = samples.chunks_exact(size).map(|samples| {
             Rgb::new(height, width, samples.to_vec())
@@ -79,6 +90,18 @@ impl Batch {
         shape.extend([self.height, self.width, 3]);
         shape
     }
+}
+
+/// Holds the memory of as many images for a moment. A library that runs out of memory would end the interpreter.
+///
+/// # Errors
+/// `MemoryError` if the system does not have it.
+pub(crate) fn require_memory(images: usize, bytes: usize) -> PyResult<()> {
+    let bytes = images.saturating_mul(bytes.saturating_add(BYTES_OF_IMAGE));
+    let mut memory: Vec<u8> = Vec::new();
+    memory
+        .try_reserve_exact(bytes)
+        .map_err(|_| PyMemoryError::new_err(format!("image: {images} images take {bytes} bytes")))
 }
 
 /// The samples in the order of the axes.

@@ -280,6 +280,12 @@ fn output<'py, T: Output>(
     threads: usize,
     make: impl Fn(usize, &Rgb) -> Vec<Image<T>> + Sync,
 ) -> PyResult<Bound<'py, PyAny>> {
+    let shape = batch.output_shape(levels);
+    // The images, each frame's images together, and all of them.
+    let bytes = shape
+        .iter()
+        .fold(size_of::<T>(), |product, n| product.saturating_mul(*n));
+    arrays::require_memory(3, bytes)?;
     let pool = pools::pool(py, threads)?;
     let samples: Vec<T> = py.detach(|| {
         pool.install(|| {
@@ -291,7 +297,7 @@ fn output<'py, T: Output>(
             made.collect::<Vec<Vec<T>>>().concat()
         })
     });
-    arrays::to_numpy(py, samples, &batch.output_shape(levels))
+    arrays::to_numpy(py, samples, &shape)
 }
 
 /// The samples of images of one size, one after the other.
