@@ -1,7 +1,8 @@
 //! Every number that decides an image besides its frame and its noise key: [`CaptureState`], which can be written and replayed.
 
 use darkqa_ground::error::{Error, Result};
-use darkqa_ground::types::{Light, Rgb, Severity};
+use darkqa_ground::types::isa::Isa;
+use darkqa_ground::types::{Image, Light, Rgb, Severity};
 use serde::{Deserialize, Serialize};
 
 use super::applied::AppliedDegradation;
@@ -157,13 +158,20 @@ impl CaptureState {
         clean: Clean<'_>,
         key: &NoiseKey,
         noise: NoiseTerms,
-    ) -> darkqa_ground::types::Image<T> {
+    ) -> Image<T> {
         let blurred = (!self.streak.is_still()).then(|| blur(clean, self.streak));
         let exposed = blurred
             .as_ref()
             .map_or(clean, |light| clean.of_its_light(light));
-        let capture = Capture::of_sensor(key, sensor, noise.terms());
-        let headroom_ev = sensor.coupling.headroom_ev(self.drop_ev);
+        let SensorState {
+            amplify,
+            tone,
+            coupling,
+            camera,
+        } = sensor;
+        let terms = noise.terms();
+        let capture = Capture::with(key, camera, *amplify, *tone, terms, Isa::best());
+        let headroom_ev = coupling.headroom_ev(self.drop_ev);
         capture.image(exposed, self.drop_ev, headroom_ev)
     }
 }

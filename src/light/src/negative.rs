@@ -4,7 +4,6 @@ use rayon::prelude::*;
 
 use super::bayer::Bayer;
 use super::camera::CameraState;
-use super::capture_state::SensorState;
 use super::clean::Clean;
 use super::isp::Developer;
 use super::noise::{Noise, Term};
@@ -211,17 +210,6 @@ impl Capture {
         Self::with(&key, &state, amplify, tone, &Term::ALL, isa)
     }
 
-    /// The exposure of a sensor whose state is known.
-    pub(super) fn of_sensor(key: &NoiseKey, sensor: &SensorState, terms: &[Term]) -> Self {
-        let SensorState {
-            amplify,
-            tone,
-            camera,
-            ..
-        } = sensor;
-        Self::with(key, camera, *amplify, *tone, terms, Isa::best())
-    }
-
     /// The image of a frame after an exposure drop; drop and headroom of the light reading are in EV.
     pub(super) fn image<T: Target>(
         self,
@@ -235,7 +223,7 @@ impl Capture {
         image
     }
 
-    fn with(
+    pub(super) fn with(
         key: &NoiseKey,
         state: &CameraState,
         amplify: Amplify,
