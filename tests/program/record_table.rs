@@ -413,7 +413,7 @@ fn records_have_the_columns_and_rows_of_the_table() {
     let first = &records[0];
     assert_eq!(first.text("key").unwrap().map(str::len), Some(32));
     assert_eq!(first.number("attempts").unwrap(), Some(1.0));
-    let problem = first.text("levl").unwrap_err().to_string();
+    let problem = first.text("levels").unwrap_err().to_string();
     assert!(problem.contains("did you mean level?"), "{problem}");
     let problem = first.number("level").unwrap_err().to_string();
     assert!(problem.contains("no numbers"), "{problem}");
