@@ -82,6 +82,9 @@ fn each_parsed_line<T: StoredLine>(
     }
 }
 
+/// Most damaged files of one name that are kept; chosen. Then the first one is replaced.
+const MOST_ASIDE: usize = 1000;
+
 /// Gives a damaged file another name, beside it; returns that name.
 ///
 /// # Errors
@@ -96,7 +99,10 @@ pub(super) fn set_file_aside(path: &Path) -> Result<PathBuf> {
         PathBuf::from(name)
     };
     let is_free = |path: &PathBuf| fs::symlink_metadata(path).is_err();
-    let aside = (1..).map(name).find(is_free).unwrap_or_else(|| name(1));
+    let aside = (1..=MOST_ASIDE)
+        .map(name)
+        .find(is_free)
+        .unwrap_or_else(|| name(1));
     fs::rename(path, &aside).map_err(|e| Error::file(path, "rename", e))?;
     Ok(aside)
 }

@@ -210,10 +210,9 @@ pub fn is_locked(folder: &Path) -> Result<bool> {
         return Ok(false);
     };
     match records.try_lock_shared() {
-        Ok(()) => Ok(false),
         Err(TryLockError::WouldBlock) => Ok(true),
         // Without locks it is not known.
-        Err(TryLockError::Error(_)) => Ok(false),
+        Ok(()) | Err(TryLockError::Error(_)) => Ok(false),
     }
 }
 

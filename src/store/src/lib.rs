@@ -281,7 +281,12 @@ impl<D: Detail> Store<D> {
         let mut stored_questions: Vec<RunQuestion> = Vec::new();
         let damage = each_readable_line(&path, |question| stored_questions.push(question));
         let stored_ids = stored_questions.iter().map(|question| question.id.clone());
-        let lost = LostQuestions::find(&self.folder, &questions, stored_ids.collect(), &damage)?;
+        let lost = LostQuestions::find(
+            &self.folder,
+            &questions,
+            &stored_ids.collect(),
+            damage.as_deref(),
+        )?;
         lost.check(&path, planned)?;
         let mut changed = ChangedQuestions::default();
         let ids = questions.iter().map(|question| question.id.clone());

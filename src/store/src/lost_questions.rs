@@ -24,8 +24,8 @@ impl LostQuestions {
     pub(super) fn find(
         folder: &Path,
         data: &[RunQuestion],
-        stored: HashSet<QuestionId>,
-        damage: &Option<String>,
+        stored: &HashSet<QuestionId>,
+        damage: Option<&str>,
     ) -> Result<Self> {
         let mut lost = Self::default();
         let has_new = data.iter().any(|question| !stored.contains(&question.id));

@@ -45,7 +45,7 @@ fn images(folder: &Path, word: &str) -> Vec<PathBuf> {
     let mut all: Vec<PathBuf> = files(folder).flat_map(|room| files(&room)).collect();
     all.retain(|path| {
         let name = path.file_name().unwrap().to_str().unwrap();
-        name.ends_with(".png") && name.contains(word)
+        path.extension().is_some_and(|extension| extension == "png") && name.contains(word)
     });
     all.sort();
     all

@@ -28,12 +28,13 @@ fn subcommands(bench: &Bench, above: &str) -> Vec<String> {
     all
 }
 
+/// The subcommand that reads no file.
+const READS_NOTHING: &str = "enhance presets";
+
 #[test]
 fn every_subcommand_has_a_case() {
     let all = subcommands(&Bench::new(), "");
     assert!(all.len() > 25, "{all:?}");
-    // It reads no file.
-    const READS_NOTHING: &str = "enhance presets";
     let is_covered = |command: &&String| {
         let begin = format!("{command} ");
         *command == READS_NOTHING || CASES.iter().any(|case| case.line.starts_with(&begin))

@@ -59,7 +59,7 @@ fn replies_of_many_small_values_are_read() {
     let rows = [
         (200, reply("x", "{\"a\":1},"), 0),
         (200, reply("x", "[],"), 0),
-        (400, errors[..errors.len() / 2].as_bytes().to_vec(), 1),
+        (400, errors.as_bytes()[..errors.len() / 2].to_vec(), 1),
         (400, errors.into_bytes(), 1),
         (400, nested.into_bytes(), 1),
     ];
@@ -243,7 +243,8 @@ fn a_run_of_many_models_is_reported_without_their_pairs() {
             record["model"] = format!("m{model}").into();
             let digits = record["key"].as_str().unwrap().replace('-', "");
             record["key"] = format!("{model:04x}{}", &digits[4..]).into();
-            all += &format!("{record}\n");
+            all += &record.to_string();
+            all.push('\n');
         }
     }
     bench.file("run/records.jsonl", all);

@@ -120,7 +120,6 @@ impl FileFacts {
                     inks: outline.is_cmyk.then_some(InkForm::Tiff),
                     unshowable: unshowable(&outline),
                     whole: Some(outline.end),
-                    ..Self::NONE
                 }
             }
             FileFormat::Bmp => Self::NONE,
