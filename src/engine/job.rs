@@ -170,6 +170,7 @@ impl<'a, E: Experiment> Job<'a, E> {
             lost_manifest::restore(experiment, &folder, &manifest, &damage)?;
         }
         let mut store = Store::open(&folder, &manifest, folder::address_change(&settings.place))?;
+        let lacks_notes = store.repair_notes();
         store.add_questions(experiment.questions(), manifest.inputs.as_ref(), || {
             lost_manifest::planned_keys(experiment, &folder)
         })?;
@@ -188,6 +189,7 @@ impl<'a, E: Experiment> Job<'a, E> {
             progress,
             enhancers,
             store,
+            lacks_notes,
             manifest,
             keys: HashSet::new(),
             images,

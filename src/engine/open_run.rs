@@ -59,6 +59,8 @@ pub(crate) struct OpenRun<'a, E: Experiment> {
     pub(crate) progress: &'a Progress,
     pub(crate) enhancers: OpenEnhancers<'a>,
     pub(crate) store: Store<DetailOf<E>>,
+    /// Whether notes about images were lost before this command.
+    pub(crate) lacks_notes: bool,
     pub(crate) manifest: RunManifest,
     /// Keys of all trials planned so far, in all phases.
     pub(crate) keys: HashSet<TrialKey>,
@@ -216,7 +218,7 @@ impl<E: Experiment> OpenRun<'_, E> {
 
     /// Adds the images about which notes were lost to a plan, without trials.
     fn add_lost_notes(&self, phase: usize, plan: &mut Plan<E::Item>) -> Result<()> {
-        if !self.store.lacks_notes() {
+        if !self.lacks_notes {
             return Ok(());
         }
         let missing = missing_notes(self.experiment, self.store.folder());

@@ -85,8 +85,6 @@ pub struct Store<D = ChoiceDetail> {
     synced: Instant,
     /// The names of models in the records.
     names: RecordedNames,
-    /// Whether thumbnails or similarities of images were damaged, or the run has records and none of them.
-    lacks_notes: bool,
     kind: PhantomData<D>,
 }
 
@@ -139,11 +137,7 @@ impl<D: Detail> Store<D> {
             Err(TryLockError::Error(e)) => Some(UnlockedLog::begin(folder, &records, &e)?),
             _ => None,
         };
-        let lacks_thumbnails = lacks_notes::<Thumbnail>(&folder.join(THUMBNAILS));
-        let lacks_fidelity = lacks_notes::<ImageFidelity>(&folder.join(FIDELITY));
-        let has_records = records.metadata().is_ok_and(|log| log.len() > 0);
         Ok(Self {
-            lacks_notes: has_records && (lacks_thumbnails || lacks_fidelity),
             folder: folder.to_owned(),
             records,
             unlocked,
@@ -158,9 +152,13 @@ impl<D: Detail> Store<D> {
         self.unlocked.as_ref()?.problem(&self.folder)
     }
 
-    /// Whether notes about images were lost, or the run has records and no such notes.
-    pub fn lacks_notes(&self) -> bool {
-        self.lacks_notes
+    /// Replaces damaged notes about images by those that can be read. Returns whether notes were lost, or the run has records and no
+    /// such notes.
+    pub fn repair_notes(&self) -> bool {
+        let lacks_thumbnails = lacks_notes::<Thumbnail>(&self.folder.join(THUMBNAILS));
+        let lacks_fidelity = lacks_notes::<ImageFidelity>(&self.folder.join(FIDELITY));
+        let has_records = self.records.metadata().is_ok_and(|log| log.len() > 0);
+        has_records && (lacks_thumbnails || lacks_fidelity)
     }
 
     /// The last record of each trial, in the order of each trial's first record.
