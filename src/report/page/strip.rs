@@ -79,14 +79,13 @@ impl Strip {
             let places = rows
                 .iter()
                 .flat_map(|row| levels.iter().map(move |level| (row, *level)));
-            let wrong = places.filter(|(row, level)| {
+            let lost = places.filter(|(row, level)| {
                 models.iter().any(|model| {
-                    let seen = is_right(grid, model, item, *level, row);
-                    seen == Some(false)
-                        && is_right(grid, model, item, AxisLevel::L0, row) == Some(true)
+                    row.seen(grid, model, item, *level).is_right() == Some(false)
+                        && row.seen(grid, model, item, AxisLevel::L0).is_right() == Some(true)
                 })
             });
-            wrong.count()
+            lost.count()
         };
         let items = grid.items.iter().enumerate();
         // Of equal ones the first.
@@ -119,7 +118,24 @@ impl Strip {
     }
 }
 
-impl Row<'_> {
+impl<'a> Row<'a> {
+    /// An item as a model saw it at a level of this row.
+    fn seen(
+        &'a self,
+        grid: &'a Grid<'a>,
+        model: &'a str,
+        item: usize,
+        level: AxisLevel,
+    ) -> Seen<'a> {
+        Seen {
+            grid,
+            model,
+            item,
+            level,
+            row: self,
+        }
+    }
+
     /// The row with its images and the answers to an item.
     fn filled(
         &self,
@@ -136,7 +152,10 @@ impl Row<'_> {
                 .find(|thumbnail| thumbnail.frame == *frame && self.shows(thumbnail, *level))?;
             let answers: Vec<Answer> = models
                 .iter()
-                .filter_map(|model| answer(grid, model, item, *level, self, models.len() > 1))
+                .filter_map(|model| {
+                    let seen = self.seen(grid, model, item, *level);
+                    seen.answer(models.len() > 1)
+                })
                 .collect();
             let texts: Vec<String> = answers
                 .iter()
@@ -206,71 +225,60 @@ fn models<'a>(grid: &'a Grid<'_>) -> Vec<&'a str> {
     seeing
 }
 
-/// The result of a model on an item at a level of a row.
-fn result(
-    grid: &Grid<'_>,
-    model: &str,
+/// An item as a model saw it: at a level of a row.
+#[derive(Clone, Copy)]
+struct Seen<'a> {
+    grid: &'a Grid<'a>,
+    model: &'a str,
     item: usize,
     level: AxisLevel,
-    row: &Row<'_>,
-) -> Option<TrialResult> {
-    let subject = Subject::seeing(model, level, &row.variant, row.enhancer);
-    Some(grid.result(grid.stand_in(&subject)?, item))
+    row: &'a Row<'a>,
 }
 
-/// Whether the strict reading of a reply is right; `None` without a reply or a true choice.
-fn is_right(
-    grid: &Grid<'_>,
-    model: &str,
-    item: usize,
-    level: AxisLevel,
-    row: &Row<'_>,
-) -> Option<bool> {
-    let raw = Row {
-        variant: row.variant.clone(),
-        enhancer: row.enhancer.filter(|_| level != AxisLevel::L0),
-    };
-    let reading = result(grid, model, item, level, &raw)?.reading(ReadingMode::Strict)?;
-    grid.items[item].asked.truth?;
-    Some(grid.items[item].is_right(reading))
-}
-
-/// The answer of a model to an item at a level of a row; `None` if it was not asked there.
-fn answer(
-    grid: &Grid<'_>,
-    model: &str,
-    item: usize,
-    level: AxisLevel,
-    row: &Row<'_>,
-    is_named: bool,
-) -> Option<Answer> {
-    let result = result(grid, model, item, level, row)?;
-    if !result.is_asked() {
-        return None;
+impl Seen<'_> {
+    /// The result, with an enhancer of the row or without; `None` if the grid has no such subject.
+    fn result(self, enhancer: Option<&EnhancerName>) -> Option<TrialResult> {
+        let subject = Subject::seeing(self.model, self.level, &self.row.variant, enhancer);
+        Some(self.grid.result(self.grid.stand_in(&subject)?, self.item))
     }
-    let asked = grid.items[item].asked;
-    let (class, sign, text) = match result.reading(ReadingMode::Strict) {
-        None => ("none", '–', "no reply"),
-        Some(None) => ("none", '?', "not readable"),
-        Some(Some(chosen)) => {
-            let text = asked
-                .choices
-                .get(usize::from(chosen))
-                .map_or("", |text| text);
-            match asked.truth {
-                None => ("none", '·', text),
-                Some(_) if grid.items[item].is_right(Some(chosen)) => ("right", '✓', text),
-                Some(_) => ("wrong", '✗', text),
-            }
+
+    /// Whether the strict reading of the reply is right, that at L0 without an enhancer; `None` without a reply or a true choice.
+    fn is_right(self) -> Option<bool> {
+        let enhancer = self.row.enhancer.filter(|_| self.level != AxisLevel::L0);
+        let reading = self.result(enhancer)?.reading(ReadingMode::Strict)?;
+        let item = &self.grid.items[self.item];
+        item.asked.truth?;
+        Some(item.is_right(reading))
+    }
+
+    /// The answer, with the model's name or without; `None` if the item was not asked.
+    fn answer(self, is_named: bool) -> Option<Answer> {
+        let result = self.result(self.row.enhancer)?;
+        if !result.is_asked() {
+            return None;
         }
-    };
-    Some(Answer {
-        class,
-        sign,
-        text: if is_named {
-            format!("{model}: {text}")
-        } else {
-            text.to_owned()
-        },
-    })
+        let item = &self.grid.items[self.item];
+        let (class, sign, text) = match result.reading(ReadingMode::Strict) {
+            None => ("none", '–', "no reply"),
+            Some(None) => ("none", '?', "not readable"),
+            Some(Some(chosen)) => {
+                let text = item.asked.choices.get(usize::from(chosen));
+                let text = text.map_or("", String::as_str);
+                match item.asked.truth {
+                    None => ("none", '·', text),
+                    Some(_) if item.is_right(Some(chosen)) => ("right", '✓', text),
+                    Some(_) => ("wrong", '✗', text),
+                }
+            }
+        };
+        Some(Answer {
+            class,
+            sign,
+            text: if is_named {
+                format!("{}: {text}", self.model)
+            } else {
+                text.to_owned()
+            },
+        })
+    }
 }
