@@ -1,5 +1,6 @@
 //! A report as Markdown, for an issue or a README: [`MarkdownReport`], with the findings and the table by level.
 
+use std::borrow::Cow;
 use std::fmt::Write;
 
 use crate::report::choice_report::ChoiceReport;
@@ -24,7 +25,7 @@ pub(crate) struct MarkdownReport<'a> {
     alerts: &'a [Alert],
     sentences: &'a [Sentence],
     /// The line below the findings; `None` without one.
-    how_to_read: Option<&'static str>,
+    how_to_read: Option<Cow<'static, str>>,
     tables: Vec<&'a Table>,
 }
 
@@ -43,7 +44,7 @@ impl<'a> MarkdownReport<'a> {
             head: vec![head(report)],
             alerts: &report.alerts,
             sentences: &report.sentences,
-            how_to_read: has_tests.then(|| how_to_read(&report.sentences)),
+            how_to_read: has_tests.then(|| how_to_read(&report.sentences).into()),
             tables,
         }
     }
@@ -56,7 +57,7 @@ impl<'a> MarkdownReport<'a> {
             head: vec![parts.head],
             alerts: parts.alerts,
             sentences: parts.sentences,
-            how_to_read: Some(parts.how_to_read),
+            how_to_read: Some(parts.how_to_read.into()),
             tables: named(parts.tables, parts.levels),
         }
     }
@@ -100,7 +101,7 @@ impl<'a> MarkdownReport<'a> {
         if !self.sentences.is_empty() {
             text.push('\n');
         }
-        if let Some(line) = self.how_to_read {
+        if let Some(line) = &self.how_to_read {
             let _ = writeln!(text, "{}\n", block(line));
         }
         for table in &self.tables {

@@ -60,7 +60,7 @@ pub(crate) fn full(report: &ChoiceReport<'_>, runs: &[(&RunManifest, &Path)]) ->
         text += &marked::sentence(sentence);
     }
     if !report.sentences.is_empty() {
-        text += &line_of([" ", how_to_read(&report.sentences), " "]);
+        text += &line_of([" ", &how_to_read(&report.sentences), " "]);
         text.push('\n');
     }
     text += &render(&report.tables);
@@ -87,7 +87,7 @@ pub(crate) fn findings(report: &ChoiceReport<'_>) -> String {
     }
     let is_tested = |sentence: &Sentence| sentence.values.contains_key("p");
     if report.sentences.iter().any(is_tested) {
-        text += &wrapped(" ", how_to_read(&report.sentences), " ");
+        text += &wrapped(" ", &how_to_read(&report.sentences), " ");
     }
     text
 }

@@ -45,16 +45,19 @@ use darkqa_score::pooled_kind::PooledKind;
 /// Largest number of sentences that are shown first; the others follow on request.
 pub(crate) const FIRST: usize = 8;
 
-/// The line below the sentences, without a baseline and with one.
-const HOW_TO_READ: [&str; 2] = [
-    "Signs and p are corrected over all tests behind these sentences: a report without any effect has a sign with a probability of 5 % at most. A sign holds in the strict and the lenient parsing. An interval is of one test: it leaves out 0 if and only if the uncorrected p is below 0.05.",
-    "Signs and p are corrected over all tests behind these sentences: a report without any effect has a sign with a probability of 5 % at most, and 5 % more for the old run. A sign holds in the strict and the lenient parsing. An interval is of one test: it leaves out 0 if and only if the uncorrected p is below 0.05.",
-];
-
 /// The line below the sentences: how their signs, p-values and intervals are to be read.
-pub(crate) fn how_to_read(sentences: &[Sentence]) -> &'static str {
+pub(crate) fn how_to_read(sentences: &[Sentence]) -> String {
     let has_baseline = sentences.iter().any(|sentence| sentence.kind == "baseline");
-    HOW_TO_READ[usize::from(has_baseline)]
+    let old_run = if has_baseline {
+        ", and 5 % more for the old run"
+    } else {
+        ""
+    };
+    format!(
+        "Signs and p are corrected over all tests behind these sentences: a report without any effect has a sign with a probability of \
+         5 % at most{old_run}. A sign holds in the strict and the lenient parsing. An interval is of one test: it leaves out 0 if and \
+         only if the uncorrected p is below 0.05."
+    )
 }
 
 /// All sentences, in the order of their importance.

@@ -69,7 +69,7 @@ struct Page<'a> {
     intro: Vec<String>,
     /// The findings in words; `None` of an experiment that has none.
     sentences: Option<Vec<PageSentence<'a>>>,
-    how_to_read: &'static str,
+    how_to_read: String,
     /// Heading of the table of answers against answers.
     answers_title: &'static str,
     sections: Vec<sections::PageSection<'a>>,
@@ -110,7 +110,7 @@ pub(crate) struct PageContent<'a> {
     pub(crate) intro: Vec<String>,
     pub(crate) alerts: &'a [Alert],
     pub(crate) sentences: &'a [Sentence],
-    pub(crate) how_to_read: &'static str,
+    pub(crate) how_to_read: String,
     pub(crate) tables: &'a [Table],
     /// The sections in order.
     pub(crate) sections: &'static [Section],
@@ -216,7 +216,7 @@ pub(in crate::report) fn page_of_open_questions(
             family: "category",
             alerts: content.alerts.iter().map(String::as_str).collect(),
             sentences: None,
-            how_to_read: "",
+            how_to_read: String::new(),
             answers_title: "",
             intro: content.intro,
             sections: sections::sections(content.sections, content.tables, figures, &[]),

@@ -46,7 +46,7 @@ pub(crate) fn products<'a>(
         intro: intro(report.found),
         alerts: &report.alerts,
         sentences: &report.sentences,
-        how_to_read: HOW_TO_READ,
+        how_to_read: HOW_TO_READ.to_owned(),
         tables: &report.tables,
         sections: &sections::SECTIONS,
         grid: &report.found.grid,
