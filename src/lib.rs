@@ -92,6 +92,7 @@
 //! |---|---|---|
 //! | `ground` | `error`, `files`, `types`, `labels` | the one error type; files read with bounds and written whole; the vocabulary; the label spaces NYU40, mpcat40, ADE150 and NYU13 |
 //! | `light` | `darkqa_light` | a clean image × a degradation → a degraded one; pure, given a noise key |
+//! | `python_light` | | the Python module `darkqa_light`: what `light` does, on arrays; the program does not use it |
 //! | `picture` | `picture` | image files with their colour profiles and orientation, maps of numbers, scaling, and images encoded for a request |
 //! | `scenes` | `rooms` | the built-in rooms, drawn by a seed with all their maps |
 //! | `questions` | `darkqa_questions` | a frame with its maps → questions with one true answer, by rule; and the observer: what the rules could still answer from given pixels |

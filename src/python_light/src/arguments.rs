@@ -2,18 +2,18 @@
 
 use std::path::PathBuf;
 
-use darkqa_ground::error::Error;
 use darkqa_ground::types::degradation::{Axis, Kind};
 use darkqa_ground::types::{Degradation, FrameId, ReadingName, Severity};
 use darkqa_light::{
     AppliedDegradation, AutoExposure, AutoSettings, CameraModel, CaptureState, FrameView,
     LightReading, Motion, NoiseKey, Streak, Synthesis,
 };
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyFloat, PyInt, PyString};
 
 use crate::arrays::Batch;
+use crate::errors::{value_error, wrong_type};
 
 /// A level; `None` is L0, the image itself.
 #[derive(Debug, Clone, Copy)]
@@ -25,19 +25,6 @@ pub(crate) struct Settings {
     pub(crate) synthesis: Synthesis,
     pub(crate) seed: u64,
     auto: AutoExposure,
-}
-
-/// A `TypeError` that names an argument, what it takes, and the type of what was given.
-pub(crate) fn wrong_type(name: &str, expected: &str, given: &Bound<'_, PyAny>) -> PyErr {
-    let given = given.get_type().name();
-    let given = given.map_or_else(|_| "another type".to_owned(), |name| name.to_string());
-    PyTypeError::new_err(format!("{name}: {expected} expected, got {given}"))
-}
-
-/// A `ValueError` with the words of an error of the synthesis, and the name of an argument instead of the program's flag.
-pub(crate) fn value_error(error: &Error) -> PyErr {
-    let text = error.to_string();
-    PyValueError::new_err(text.strip_prefix("--").unwrap_or(&text).to_owned())
 }
 
 /// A text argument.

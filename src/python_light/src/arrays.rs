@@ -9,7 +9,7 @@ use numpy::{
 use pyo3::exceptions::{PyMemoryError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::arguments::wrong_type;
+use crate::errors::wrong_type;
 
 /// Most pixels of an image; chosen. An array of any size may be a view of a single sample.
 const MAX_PIXELS: usize = 1 << 28;

@@ -10,6 +10,7 @@
 
 mod arguments;
 mod arrays;
+mod errors;
 mod pools;
 mod state;
 
@@ -245,7 +246,7 @@ fn replay<'py>(
     let py = image.py();
     let state = state
         .cast::<PyDict>()
-        .map_err(|_| arguments::wrong_type("state", "a dict of sensor_state()", state))?;
+        .map_err(|_| errors::wrong_type("state", "a dict of sensor_state()", state))?;
     let replay = state::from_dict(state)?;
     let noise = terms(arguments::switch("noise", noise, true)?);
     let is_linear = arguments::switch("linear", linear, false)?;

@@ -8,7 +8,7 @@ use pyo3::types::PyDict;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value, json};
 
-use crate::arguments::value_error;
+use crate::errors::value_error;
 
 /// Everything that makes an image again from its frame.
 pub(crate) struct Replay {

@@ -32,12 +32,13 @@ const CRATES: [&str; 11] = [
 ];
 
 /// The folders of the other crates of the workspace, in `src/`.
-const MEMBERS: [&str; 10] = [
+const MEMBERS: [&str; 11] = [
     "choice/src/",
     "enhance/src/",
     "ground/src/",
     "light/src/",
     "picture/src/",
+    "python_light/src/",
     "questions/src/",
     "scenes/src/",
     "score/src/",
