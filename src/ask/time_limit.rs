@@ -38,24 +38,21 @@ impl TimeLimit {
     pub(super) async fn run<T>(&mut self, future: impl Future<Output = T>) -> Option<T> {
         let mut future = pin!(future);
         loop {
-            let step = if self.left.is_zero() {
-                self.step
-            } else {
-                self.step.min(self.left)
-            };
+            // With nothing left, what is there already is read.
+            let step = self.step.min(self.left);
             let started = Instant::now();
             let output = timeout(step, future.as_mut()).await;
             let took = started.elapsed();
-            let late = took.saturating_sub(step);
-            let was_paused = late > step.max(PAUSE);
-            if was_paused {
-                self.paused += late;
-            }
             self.left = self.left.saturating_sub(took.min(step));
+            let late = took.saturating_sub(step);
+            if late > self.step.max(PAUSE) {
+                self.paused += late;
+                // One more step reads what arrived during the pause.
+                self.left = self.left.max(self.step);
+            }
             match output {
                 Ok(output) => return Some(output),
-                Err(_) if self.left.is_zero() && !was_paused => return None,
-                // After a pause, one more step reads what arrived during it.
+                Err(_) if self.left.is_zero() => return None,
                 Err(_) => {}
             }
         }
@@ -102,6 +99,19 @@ mod tests {
         assert!(limit.run(sleep(LIMIT * 3 / 4)).await.is_some());
         assert!(limit.run(sleep(LIMIT / 2)).await.is_none());
         assert_eq!(limit.paused(), Duration::ZERO);
+    }
+
+    /// The pieces of a reply that arrive one by one.
+    #[tokio::test(start_paused = true)]
+    async fn short_futures_do_not_outlast_the_limit() {
+        let mut limit = TimeLimit::new(LIMIT);
+        let piece = Duration::from_millis(5);
+        let mut read = 0;
+        while limit.run(sleep(piece)).await.is_some() {
+            read += 1;
+            assert!(read <= LIMIT.as_millis() / piece.as_millis(), "{read}");
+        }
+        assert!(limit.run(async {}).await.is_some(), "what is there is read");
     }
 
     #[tokio::test]
