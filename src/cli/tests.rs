@@ -1,3 +1,4 @@
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
@@ -80,17 +81,23 @@ fn completions_offer_no_hidden_flag() {
 fn reference() -> String {
     let mut command = grouped(Cli::command());
     command.build();
-    let mut text = "# All flags\n\nAt the end of this page you know each flag, its default and what it decides. `UPDATE=1 cargo test --lib cli::` writes the page from \
-                    what `--help` shows. A variable is `DARKQA_` and the name of the \
-                    flag in capitals; a key of a `--config` file is the name of the flag; both have another name where one is given. What a flag \
-                    decides: which *trials* there are, what a model is sent besides the image (*reply*), the content of images (*pixels*), or *nothing* of these: \
-                    then a run is the same run with any value of it.\n"
+    let mut text = "# All flags\n\nEvery flag of every command, with its default and what it decides. A flag that means the same in several commands is \
+                    described at the first of them. A variable is `DARKQA_` and the name of the flag in capitals; a key of a `--config` file is the name of \
+                    the flag; both have another name where one is given. A flag decides which *trials* there are, what a model is sent besides the image \
+                    (*reply*), the content of images (*pixels*), or *nothing* of these: then a run is the same run with any value of it.\n\n\
+                    `UPDATE=1 cargo test --lib cli::` writes this page from `--help`.\n"
         .to_owned();
-    section(&mut text, &command, "darkqa-eval");
+    section(&mut text, &mut BTreeMap::new(), &command, "darkqa-eval");
     text
 }
 
-fn section(text: &mut String, command: &Clap, name: &str) {
+/// Appends a command and those in it. `described` maps each row of the tables so far to the command above it.
+fn section(
+    text: &mut String,
+    described: &mut BTreeMap<String, String>,
+    command: &Clap,
+    name: &str,
+) {
     let about = command
         .get_about()
         .map(ToString::to_string)
@@ -100,16 +107,42 @@ fn section(text: &mut String, command: &Clap, name: &str) {
     let mut args: Vec<&Arg> = command.get_arguments().filter(shown).collect();
     args.sort_by_key(|arg| order(command, arg));
     if !is_only_a_group(command) {
-        text.push_str("\n| flag | default | decides | |\n|---|---|---|---|\n");
+        let mut rows = String::new();
+        let mut elsewhere: Vec<(String, Vec<String>)> = Vec::new();
         for arg in args {
-            row(text, arg);
+            let row = row(arg);
+            let Some(first) = described.get(&row) else {
+                rows.push_str(&row);
+                described.insert(row, name.to_owned());
+                continue;
+            };
+            let flag = format!("`{}`", typed_name(arg));
+            match elsewhere.iter_mut().find(|(name, _)| name == first) {
+                Some((_, flags)) => flags.push(flag),
+                None => elsewhere.push((first.clone(), vec![flag])),
+            }
+        }
+        if !rows.is_empty() {
+            let _ = write!(
+                text,
+                "\n| flag | default | decides | |\n|---|---|---|---|\n{rows}"
+            );
+        }
+        for (first, flags) in elsewhere {
+            let anchor = first.replace(' ', "-");
+            let _ = write!(text, "\nAs in [{first}](#{anchor}): {}\n", flags.join(", "));
         }
     }
     for inner in command
         .get_subcommands()
         .filter(|inner| inner.get_name() != "help" && !inner.is_hide_set())
     {
-        section(text, inner, &format!("{name} {}", inner.get_name()));
+        section(
+            text,
+            described,
+            inner,
+            &format!("{name} {}", inner.get_name()),
+        );
     }
 }
 
@@ -144,7 +177,17 @@ fn typed_key(arg: &Arg) -> Option<String> {
     Some(format!("--{} {}", keyed.name, with_value(key, arg)))
 }
 
-fn row(text: &mut String, arg: &Arg) {
+/// The name of a flag, a key or an argument, as it is typed and without a value.
+fn typed_name(arg: &Arg) -> String {
+    match (keyed_form(&name_of(arg)), arg.get_long()) {
+        (Some((keyed, key)), _) => format!("--{} {key}", keyed.name),
+        (None, Some(long)) => format!("--{long}"),
+        (None, None) => arg.get_value_names().unwrap_or_default().join(" "),
+    }
+}
+
+/// The row of a flag in the table of its command.
+fn row(arg: &Arg) -> String {
     let id = arg.get_id().as_str().replace('_', "-");
     let values = arg.get_value_names().unwrap_or_default();
     let values = if arg.get_action().takes_values() {
@@ -194,14 +237,13 @@ fn row(text: &mut String, arg: &Arg) {
         format!(": {}", words.join(", "))
     };
     let escaped = |text: &str| text.replace('|', "\\|").replace('\n', " ");
-    let _ = writeln!(
-        text,
-        "| `{}`{key} | {} | {} | {}{words} |",
+    format!(
+        "| `{}`{key} | {} | {} | {}{words} |\n",
         escaped(&flag),
         escaped(&default),
         Decides::of(arg).map_or("", Decides::word),
         escaped(&what)
-    );
+    )
 }
 
 #[test]

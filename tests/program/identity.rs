@@ -529,20 +529,53 @@ const ELSEWHERE: [(&str, &str); 60] = [
 /// The flags of a command with what each decides, from the list that is written from the program.
 fn classes(command: &str) -> Vec<(&'static str, &'static str)> {
     let all = include_str!("../../src/docs/flags.md");
-    let title = format!("## darkqa-eval{command}\n");
-    let (_, section) = all.split_once(&title).unwrap();
-    let section = section.split("\n## ").next().unwrap();
-    let rows = section.lines().filter(|line| line.starts_with("| `--"));
-    rows.map(|row| {
-        let unescaped: Vec<&str> = row.split(" | ").collect();
-        // A key is known by its earlier flag.
-        let earlier = unescaped[0].strip_suffix("` until 0.2)");
-        let earlier = earlier.and_then(|flag| flag.split(" (`").last());
-        let flag = earlier.unwrap_or(unescaped[0].trim_start_matches("| `"));
-        let flag = flag.split([' ', '`']).next().unwrap();
-        (flag, unescaped[2])
-    })
-    .collect()
+    let section = |name: &str| {
+        let title = format!("## darkqa-eval{name}\n");
+        let (_, section) = all.split_once(&title).unwrap();
+        section.split("\n## ").next().unwrap()
+    };
+    let mut classes: Vec<_> = section(command).lines().filter_map(class_of_row).collect();
+    // Flags that an earlier command describes: `As in [darkqa-eval](#darkqa-eval): `--data`, `--map``.
+    for line in section(command).lines() {
+        let Some((name, flags)) = line
+            .strip_prefix("As in [darkqa-eval")
+            .and_then(|rest| rest.split_once("): "))
+        else {
+            continue;
+        };
+        let name = name.split(']').next().unwrap();
+        let rows = section(name).lines().filter(|row| {
+            let cell = row.trim_start_matches("| ").split("` ").next().unwrap();
+            let cell = cell.split(['=', '[']).next().unwrap();
+            let typed = row.starts_with("| `--").then(|| typed_of_cell(cell));
+            typed.is_some_and(|typed| flags.split(", ").any(|flag| flag == typed))
+        });
+        classes.extend(rows.filter_map(class_of_row));
+    }
+    classes
+}
+
+/// A flag without its value, in backticks: `--noise gain` of `--noise gain=K` and `--data` of `--data DIR`.
+fn typed_of_cell(cell: &str) -> String {
+    let mut words = cell.trim_matches('`').split(' ');
+    let flag = words.next().unwrap();
+    let key = words
+        .next()
+        .filter(|word| !word.contains(char::is_uppercase));
+    match key {
+        Some(key) => format!("`{flag} {key}`"),
+        None => format!("`{flag}`"),
+    }
+}
+
+/// The flag of a row, a key by its earlier flag, and what it decides.
+fn class_of_row(row: &'static str) -> Option<(&'static str, &'static str)> {
+    let cells: Vec<&str> = row.split(" | ").collect();
+    let first = row.starts_with("| `--").then_some(cells[0])?;
+    let earlier = first.strip_suffix("` until 0.2)");
+    let earlier = earlier.and_then(|flag| flag.split(" (`").last());
+    let flag = earlier.unwrap_or(first.trim_start_matches("| `"));
+    Some((flag.split([' ', '`']).next().unwrap(), cells[2]))
 }
 
 #[test]
