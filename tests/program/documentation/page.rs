@@ -95,13 +95,6 @@ impl Page {
         links
     }
 
-    /// The first line of text below the title.
-    pub(crate) fn first_sentence(&self) -> &str {
-        let mut prose = self.prose().map(|(_, line)| line);
-        let text = prose.find(|line| !line.is_empty() && !line.starts_with('#'));
-        text.unwrap_or_default()
-    }
-
     /// Whether a link to `#anchor` leads to a heading of the page.
     pub(crate) fn has_anchor(&self, anchor: &str) -> bool {
         let headings = self.prose().filter(|(_, line)| line.starts_with('#'));
