@@ -12,6 +12,7 @@ use crate::runs::stored::StoredRun;
 use crate::sentences::{against_baseline, no_verdict};
 use crate::tables::baseline;
 use crate::text::alert::Alert;
+use crate::types::manifest::RunManifest;
 use crate::types::{ChoiceDetail, TrialRef};
 use darkqa_score::baseline::{BaselineRow, baseline_rows};
 use darkqa_score::cluster::ClusterUnit;
@@ -43,7 +44,9 @@ impl Baseline {
         old: StoredRun<ChoiceDetail>,
     ) -> Result<Self> {
         let name = old.name();
+        let old_manifest = old.manifest.clone();
         let mut runs = new;
+        let new_manifests: Vec<RunManifest> = runs.iter().map(|run| run.manifest.clone()).collect();
         runs.push(old.clone());
         check_comparable(&runs)?;
         // The names of models and conditions tell nothing apart here: a new model is held against the old one of its name.
@@ -81,12 +84,12 @@ impl Baseline {
         }
         let cost = |index: usize| {
             let subject = &grid.subjects[index];
-            let unmarked = subject
-                .model
-                .strip_suffix(&mark(""))
-                .unwrap_or(&subject.model);
+            let (model, manifests) = match subject.model.strip_suffix(&mark("")) {
+                Some(old) => (old, std::slice::from_ref(&old_manifest)),
+                None => (&*subject.model, &*new_manifests),
+            };
             let trials = by_subject.get(subject).into_iter().flatten().copied();
-            dollars(combined.models.asked(unmarked), trials)
+            dollars(manifests, combined.models.asked(model), trials)
                 .ok()
                 .flatten()
         };

@@ -12,22 +12,28 @@ use crate::types::manifest::RunManifest;
 use crate::types::{TrialRef, Via};
 use darkqa_score::record::Detail;
 
-/// The cost of a model's trials at list prices, in US dollars, attempts without a reply included; `None` if the model has no known price or no
-/// reply says its tokens.
-pub(super) fn dollars<'t, D: Detail + 't>(
+/// The cost of a model's trials in US dollars, attempts without a reply included, at the prices of the first of these runs that knows the model;
+/// `None` if none does, or no reply states its tokens.
+///
+/// # Errors
+/// If the prices in a manifest are broken.
+pub(super) fn dollars<'m, 't, D: Detail + 't>(
+    runs: impl IntoIterator<Item = &'m RunManifest>,
     model: &str,
     trials: impl Iterator<Item = TrialRef<'t, D>>,
 ) -> Result<Option<f64>> {
-    let prices = Prices::built_in()?;
-    let Some(price) = prices.of(model) else {
-        return Ok(None);
-    };
-    let charged = trials.flat_map(|trial| {
-        let charged = Charged::new(price, prices.batch, trial);
-        [charged.reply, charged.lost]
-    });
-    let charged: Vec<f64> = charged.flatten().collect();
-    Ok((!charged.is_empty()).then(|| charged.iter().sum()))
+    for manifest in runs {
+        let prices = Prices::of_settings(&manifest.settings)?;
+        if let Some(price) = price(&prices, manifest, model) {
+            let charged = trials.flat_map(|trial| {
+                let charged = Charged::new(price, prices.batch, trial);
+                [charged.reply, charged.lost]
+            });
+            let charged: Vec<f64> = charged.flatten().collect();
+            return Ok((!charged.is_empty()).then(|| charged.iter().sum()));
+        }
+    }
+    Ok(None)
 }
 
 /// The cost of a trial, in US dollars.

@@ -298,6 +298,30 @@ fn models_that_were_asked_other_questions_are_compared_by_the_shared_ones() {
 }
 
 #[test]
+fn each_side_of_a_baseline_costs_what_its_run_paid() {
+    let scene = Scene::new();
+    for (run, dollars) in [("old", 10), ("new", 30)] {
+        let prices = format!(
+            "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = {{ input = {dollars}, output = {dollars} }}\n"
+        );
+        scene.bench.file("prices.toml", prices);
+        scene.run("--prices prices.toml", run);
+    }
+    scene
+        .bench
+        .complete(&words("report new --baseline old --out out"));
+    let rows = scene.csv("out/baseline.csv");
+    let cost = |row: &[String], name: &str| {
+        let place = rows[0].iter().position(|head| head == name).unwrap();
+        row[place].parse::<f64>().unwrap()
+    };
+    for row in &rows[1..] {
+        let (old, new) = (cost(row, "cost_old"), cost(row, "cost_new"));
+        assert!(old > 0.0 && (new / old - 3.0).abs() < 1e-9, "{row:?}");
+    }
+}
+
+#[test]
 fn a_new_run_is_held_against_a_baseline() {
     let scene = Scene::new();
     let run = |answers: &str, more: &str, out: &str| {
