@@ -1,7 +1,7 @@
 //! Adapters: other data sets → frames of the common interface.
 //!
 //! An [`Adapter`] lists the frames of one kind of data set and reads their maps one frame at a time. Maps have the units of the
-//! interface: millimetres, numbers of a label space, segments from 1. The README beside this file shows the layouts.
+//! interface: millimetres, numbers of a label space, segments from 1. `src/docs/importing.md` shows the layouts.
 
 mod adapter;
 mod files;
@@ -122,7 +122,7 @@ fn open(
     };
     if adapter.listing().frames.is_empty() {
         let problem = format_args!(
-            "no frames of {kind} in this folder; see the layouts in src/import/README.md"
+            "no frames of {kind} in this folder; see the layouts: https://github.com/darkqa-eval/darkqa-eval/blob/main/src/docs/importing.md"
         );
         return Err(Error::data(folder.display(), problem));
     }
@@ -137,19 +137,18 @@ mod tests {
 
     #[test]
     fn every_kind_is_described_and_tested() {
-        let readme = include_str!("README.md");
+        let page = include_str!("../docs/importing.md");
         let tests = include_str!("../../tests/program/import.rs");
         let missing: Vec<String> = DataSetKind::value_variants()
             .iter()
             .map(ToString::to_string)
             .filter(|kind| {
-                !readme.contains(&format!("\n## {kind}: "))
-                    || !tests.contains(&format!("\"{kind}\""))
+                !page.contains(&format!("\n## {kind}: ")) || !tests.contains(&format!("\"{kind}\""))
             })
             .collect();
         assert!(
             missing.is_empty(),
-            "import/README.md or tests/program/import.rs lacks {missing:?}"
+            "src/docs/importing.md or tests/program/import.rs lacks {missing:?}"
         );
     }
 }

@@ -69,7 +69,7 @@ fn several_runs_become_one_comparison() {
     check_rows(rows, |name| {
         assert!(bench.path("all").join(name).is_file(), "{name}");
     });
-    let described = include_str!("../../results/README.md");
+    let described = include_str!("../../src/docs/files.md");
     let files = fs::read_dir(bench.path("all")).unwrap();
     let files = files.map(|file| file.unwrap().file_name().into_string().unwrap());
     let missing: Vec<String> = files
@@ -80,7 +80,7 @@ fn several_runs_become_one_comparison() {
                 && !described.contains(&format!("`{file}`"))
         })
         .collect();
-    assert!(missing.is_empty(), "not in results/README.md: {missing:?}");
+    assert!(missing.is_empty(), "not in src/docs/files.md: {missing:?}");
     let rows = csv(&bench.path("all/comparisons.csv"));
     let place = |name: &str| rows[0].iter().position(|head| head == name).unwrap();
     let models = rows

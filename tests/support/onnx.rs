@@ -517,7 +517,7 @@ pub fn external_gain(file: &str) -> Graph {
         .giving_image()
 }
 
-/// Automatic exposure in linear light, the enhancer in `models/gray-gain.onnx`; `models/README.md` says what it computes.
+/// Automatic exposure in linear light, the enhancer in `models/gray-gain.onnx`; `src/docs/enhancers.md` says what it computes.
 pub fn gray_gain() -> Graph {
     // IEC 61966-2-1, both ways
     let decode = Graph::new()

@@ -2,7 +2,7 @@
 //!
 //! The rules find outputs that are read in the wrong way: another range, the wrong output, swapped colours or dimensions. They
 //! say nothing about the quality of an enhancement. Their thresholds were set on 9 trained models and 25 dark images each, so
-//! that none of these models is flagged; `models/README.md` states what they find and what they miss.
+//! that none of these models is flagged; `src/docs/enhancers.md` states what they find and what they miss.
 
 use std::fmt;
 

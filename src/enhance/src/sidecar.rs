@@ -131,7 +131,7 @@ const LONGEST_LINE: usize = 60;
 
 /// Where all keys stand.
 const KEYS: &str =
-    "; all keys: https://github.com/darkqa-eval/darkqa-eval/blob/main/models/README.md";
+    "; all keys: https://github.com/darkqa-eval/darkqa-eval/blob/main/src/docs/enhancers.md";
 
 /// Largest side, in pixels, that a sidecar may state; chosen: no image of this program is larger.
 const MOST_SIDE: usize = 1 << 16;

@@ -390,7 +390,7 @@ fn every_kind_of_degradation_is_made_described_and_tested() {
 
     let clean = ramps(32, 64);
     let key = super::NoiseKey::new(0, &FrameId("a".to_owned()));
-    let described = include_str!("../../../results/README.md");
+    let described = include_str!("../../docs/files.md");
     let tested = include_str!("../../../tests/program/synthesize.rs");
     let mut missing = Vec::new();
     for kind in Kind::ALL {
@@ -401,7 +401,7 @@ fn every_kind_of_degradation_is_made_described_and_tested() {
         }
         let word = kind.word();
         if !described.contains(&format!("`{word}`")) {
-            missing.push(format!("{word} in results/README.md"));
+            missing.push(format!("{word} in src/docs/files.md"));
         }
         if !tested.contains(&format!("-{word}")) {
             missing.push(format!("L…-{word} in tests/program/synthesize.rs"));

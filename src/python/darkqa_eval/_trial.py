@@ -1,6 +1,6 @@
 """The columns of a trial, and their values from its record.
 
-A record is one line of ``records.jsonl``; ``results/README.md`` describes it. The functions here add what the table shows
+A record is one line of ``records.jsonl``; ``src/docs/files.md`` describes it. The functions here add what the table shows
 besides, under the names of the columns.
 """
 

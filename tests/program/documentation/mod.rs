@@ -24,7 +24,7 @@ use page::{Block, BlockKind, Page, files, pages, root};
 use regex::Regex;
 
 /// Flags of other programs that pages name: `sbatch`, `pip`, `cargo`, `inspect eval`, and servers of models.
-const OF_OTHERS: [&str; 18] = [
+const OF_OTHERS: [&str; 20] = [
     "--array",
     "--no-deps",
     "--release",
@@ -37,6 +37,8 @@ const OF_OTHERS: [&str; 18] = [
     "--hm3d",
     "--walks",
     "--cover",
+    "--scenes",
+    "--height",
     "--generation-config",
     "--limit-mm-per-prompt",
     "--model-path",

@@ -71,7 +71,7 @@ fn a_file_that_is_named_after_another_preset_is_found() {
 #[test]
 fn every_preset_is_described_and_stands_in_the_help() {
     let texts = [
-        include_str!("../../../../models/README.md"),
+        include_str!("../../../docs/enhancers.md"),
         include_str!("../settings.rs"),
         include_str!("../../../run/enhance/mod.rs"),
     ];
@@ -84,7 +84,7 @@ fn every_preset_is_described_and_stands_in_the_help() {
         let [readme, ..] = texts;
         let written = readme.contains(&format!("[{}]", content.repository))
             && readme.contains(&content.commit);
-        assert!(written, "models/README.md lacks {row}");
+        assert!(written, "src/docs/enhancers.md lacks {row}");
     }
 }
 
