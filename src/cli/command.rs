@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, CommandFactory as _, Parser, Subcommand, ValueEnum};
+use clap::{Arg, Args, CommandFactory as _, Id, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 
 use crate::engine::batch::{BatchFileArgs, BatchRunArgs};
@@ -34,6 +34,29 @@ use crate::types::keyed_flag::KeyedFlag;
 use super::keyed::{grouped, name_of};
 
 pub(super) const NAME: &str = "darkqa-eval";
+
+/// The text of `darkqa-eval -h`.
+pub(super) const SHORT_HELP: &str = include_str!("short_help.txt");
+
+/// The flags of any command that also have a short form.
+const SHORT_FORMS: [(&str, char); 6] = [
+    ("model", 'm'),
+    ("data", 'd'),
+    ("llie", 'e'),
+    ("dry-run", 'n'),
+    ("out", 'o'),
+    ("quiet", 'q'),
+];
+
+/// The commands that take the flags of an evaluation.
+const ON_EVALUATIONS: [&str; 4] = ["check", "plan", "batch", "openeqa"];
+
+/// Shown by `-h` and `--help` of these commands, below their own flags.
+const TAKES_FLAGS_OF_EVALUATION: &str = "\
+It takes the flags of an evaluation, such as --model, --data and --levels: see darkqa-eval -h, or --help here for all.";
+
+/// The heading of the flags that `--help` lists first.
+const FIRST_HEADING: &str = "Model";
 
 const AFTER_HELP: &str = "\
 Precedence: flag, then environment (DARKQA_CONCURRENCY=16 for --concurrency 16), then --config FILE, then default.
@@ -80,7 +103,7 @@ pub(crate) enum Colours {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Output")]
 pub(crate) struct CommonArgs {
-    /// Show no progress bars, and print where results were written, not the results themselves; a table or JSON that a flag requests is
+    /// Show no progress, and print where results were written, not the results themselves; a table or JSON that a flag requests is
     /// printed
     #[arg(long, global = true, add = Decides::Nothing)]
     pub quiet: bool,
@@ -106,12 +129,11 @@ pub(crate) enum Command {
     Calibrate(Box<CalibrateArgs>),
     /// Make multiple-choice questions about frames, by rule, from their depth, class and segment maps
     Questions(Box<QuestionsArgs>),
-    /// Make a folder of data that a run takes as it is, to put your own images and questions in
+    /// Create a runnable example dataset, for your own images and questions
     Init(InitArgs),
-    /// Check data, images, models and enhancers before anything is asked or paid; takes the flags of the evaluation
+    /// Check data, images, models and enhancers before anything is asked or paid
     Check(Box<CheckCommand>),
-    /// Write the questions and frames of a run once, with what it will cost, so that no shard of it makes them again; takes the flags of
-    /// the evaluation
+    /// Write the questions and frames of a run once, with what it will cost, so that no shard of it makes them again
     Plan(Box<EvaluateArgs>),
     /// Import frames of another data set as a folder of frames
     Import(Box<ImportCommand>),
@@ -169,7 +191,7 @@ pub(crate) enum Command {
 /// The commands for batches.
 #[derive(Debug, Subcommand)]
 pub(crate) enum BatchCommand {
-    /// Ask what an evaluation has left to ask in batches, and wait for their replies; takes the flags of the evaluation
+    /// Ask what an evaluation has left to ask in batches, and wait for their replies
     ///
     /// Writes the requests as files, uploads them, makes batches of them, waits until they end, and imports the replies. Ctrl-C leaves the
     /// batches running, and the same command continues. What expires is asked again, up to three times.
@@ -180,7 +202,7 @@ pub(crate) enum BatchCommand {
     Fetch(BatchFolderArgs),
     /// Cancel the batches of a run, and import the replies that there are
     Cancel(BatchFolderArgs),
-    /// Write what an evaluation has left to ask as files of a Batch API; takes the flags of the evaluation
+    /// Write what an evaluation has left to ask as files of a Batch API
     Export(Box<BatchExportArgs>),
     /// Import the replies of a Batch API into a run
     Import(BatchImportArgs),
@@ -250,13 +272,58 @@ pub(crate) enum StudyCommand {
     Read(study::ReadArgs),
 }
 
-/// The command line, with keyed flags, and the class of each flag at the end of its help, such as `[pixels]`.
+/// The command line, with keyed flags, short forms, and the class of each flag at the end of its help, such as `[pixels]`.
 pub(super) fn command() -> clap::Command {
-    marked(grouped(Cli::command()))
+    let root = marked(with_short_forms(grouped(Cli::command())));
+    let shared: Vec<Arg> = root.get_arguments().cloned().collect();
+    let root = ON_EVALUATIONS.into_iter().fold(root, |root, name| {
+        root.mut_subcommand(name, |command| on_evaluation(command, &shared))
+    });
+    first_heading_first(root)
+}
+
+pub(super) fn with_short_forms(command: clap::Command) -> clap::Command {
+    let with_short = |arg: Arg| {
+        let forms = SHORT_FORMS.iter();
+        let mut form = forms.filter(|(long, _)| arg.get_long() == Some(long));
+        match form.next() {
+            Some((_, short)) => arg.short(*short),
+            None => arg,
+        }
+    };
+    command
+        .mut_args(with_short)
+        .mut_subcommands(with_short_forms)
+}
+
+/// A command that takes the flags of an evaluation, or whose subcommands do: `-h` leaves out those that mean the same there.
+fn on_evaluation(command: clap::Command, shared: &[Arg]) -> clap::Command {
+    let takes_models = |arg: &Arg| arg.get_long() == Some("model");
+    if !command.get_arguments().any(takes_models) {
+        return command.mut_subcommands(|inner| on_evaluation(inner, shared));
+    }
+    command
+        .after_help(TAKES_FLAGS_OF_EVALUATION)
+        .mut_args(|arg| {
+            let is_shared = shared
+                .iter()
+                .any(|own| own.get_id() == arg.get_id() && own.get_help() == arg.get_help());
+            arg.hide_short_help(is_shared)
+        })
+}
+
+/// The command with the flags under [`FIRST_HEADING`] first: help lists headings in the order of their flags, and a flag that is changed
+/// moves to the end.
+fn first_heading_first(command: clap::Command) -> clap::Command {
+    let others = command.get_arguments();
+    let others = others.filter(|arg| arg.get_help_heading() != Some(FIRST_HEADING));
+    let others: Vec<Id> = others.map(|arg| arg.get_id().clone()).collect();
+    let others = others.into_iter();
+    others.fold(command, |command, id| command.mut_arg(id, |arg| arg))
 }
 
 fn marked(command: clap::Command) -> clap::Command {
-    let mark = |arg: clap::Arg| {
+    let mark = |arg: Arg| {
         let class = Decides::of(&arg).filter(|class| *class != Decides::Nothing);
         let Some(class) = class.map(Decides::word) else {
             return arg;

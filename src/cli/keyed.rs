@@ -154,6 +154,10 @@ fn completed(arg: &Arg) -> Arg {
         Some(long) => completed.long(lasting(long)),
         None => completed,
     };
+    let completed = match arg.get_short() {
+        Some(short) => completed.short(short),
+        None => completed,
+    };
     if !arg.get_action().takes_values() {
         return completed;
     }

@@ -26,6 +26,7 @@ use self::expansion::Expansion;
 use self::invalid_toml::invalid_toml;
 use self::layered_value::LayeredValue;
 use self::value_text::text_of;
+use super::command::SHORT_HELP;
 use super::keyed::{name_of, respelled};
 use crate::ask::OPENAI_KEY;
 use crate::error::{Error, Result};
@@ -75,6 +76,9 @@ pub(super) fn parse(
     let lenient = all.clone().ignore_errors(true);
     all.build();
     let typed = current_words(&all, typed)?;
+    if !typed.iter().any(|word| word == "--help") {
+        all = all.override_help(SHORT_HELP);
+    }
     let Ok(matches) = lenient.try_get_matches_from(&typed) else {
         let matches = parse_words(all, typed, &BTreeMap::new())?;
         let typed = BTreeSet::new();
@@ -148,9 +152,9 @@ fn typed_command<'a>(all: &'a Command, words: &[OsString]) -> (&'a Command, usiz
         if word == "--" {
             break;
         }
-        if let Some(flag) = word.strip_prefix("--") {
+        if word.starts_with('-') {
             let mut args = command.get_arguments();
-            let arg = args.find(|arg| arg.get_long() == Some(flag));
+            let arg = args.find(|arg| has_form(arg, word));
             let has_value = arg.is_some_and(|arg| arg.get_action().takes_values());
             at += if has_value { 2 } else { 1 };
             continue;
@@ -162,6 +166,14 @@ fn typed_command<'a>(all: &'a Command, words: &[OsString]) -> (&'a Command, usiz
         at += 1;
     }
     (command, place)
+}
+
+/// Whether a word is a flag in its long or its short form, without a value.
+fn has_form(arg: &Arg, word: &str) -> bool {
+    match word.strip_prefix("--") {
+        Some(long) => arg.get_long() == Some(long),
+        None => arg.get_short().map(|short| format!("-{short}")).as_deref() == Some(word),
+    }
 }
 
 /// The matches of the command that is called.

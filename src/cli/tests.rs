@@ -1,4 +1,4 @@
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
@@ -77,9 +77,128 @@ fn completions_offer_no_hidden_flag() {
     }
 }
 
+/// The text of a help, as for a terminal of 80 columns.
+fn help(line: &str) -> String {
+    let words = line.split(' ').map(OsString::from).collect();
+    match layers::parse(command::command().term_width(80), words, |_| None) {
+        Err(layers::Problem::Help(help)) => help.to_string(),
+        _ => panic!("{line}: no help"),
+    }
+}
+
+#[test]
+fn short_help_fits_a_screen() {
+    let help = help("darkqa-eval -h");
+    assert!(help.lines().count() <= 60, "{}", help.lines().count());
+    for line in help.lines() {
+        assert!(line.chars().count() <= 80, "{line}");
+    }
+}
+
+#[test]
+fn short_help_names_flags_that_exist() {
+    let root = command::command();
+    let help = help("darkqa-eval -h");
+    let is_name = |c: char| c == '-' || c.is_ascii_alphanumeric();
+    let words = help.split(|c: char| !is_name(c));
+    let flags: BTreeSet<&str> = words.filter(|word| word.starts_with('-')).collect();
+    assert!(flags.len() > 20, "{flags:?}");
+    for flag in flags {
+        let is_flag = |arg: &Arg| {
+            let short = arg.get_short().map(|short| format!("-{short}"));
+            let long = arg.get_long().map(|long| format!("--{long}"));
+            [short, long].contains(&Some(flag.to_owned()))
+        };
+        let is_of_clap = matches!(flag, "-h" | "--help");
+        assert!(
+            is_of_clap || root.get_arguments().any(is_flag),
+            "{flag} is no flag"
+        );
+    }
+    // The two forms of a flag on one line are of one flag.
+    for line in help.lines().filter_map(|line| line.strip_prefix("  -")) {
+        let Some((short, rest)) = line.split_once(", --") else {
+            continue;
+        };
+        let long = rest.split(' ').next();
+        let mut args = root.get_arguments();
+        let arg = args.find(|arg| arg.get_long() == long).unwrap();
+        assert_eq!(arg.get_short().map(String::from).as_deref(), Some(short));
+    }
+}
+
+#[test]
+fn short_help_names_every_command() {
+    let help = help("darkqa-eval -h");
+    let words: BTreeSet<&str> = help
+        .split(|c: char| c != '-' && !c.is_ascii_alphanumeric())
+        .collect();
+    let root = command::command();
+    for command in root.get_subcommands().filter(|inner| !inner.is_hide_set()) {
+        assert!(words.contains(command.get_name()), "{command}");
+    }
+}
+
+#[test]
+fn long_help_lists_the_model_first() {
+    let help = help("darkqa-eval --help");
+    let (_, groups) = help.split_once("\nModel:\n").unwrap();
+    let first: String = groups.split_whitespace().take(3).collect();
+    assert_eq!(first, "-m,--model<NAME>");
+    assert!(groups.contains("(required") && groups.contains("\nData:\n"));
+}
+
+#[test]
+fn commands_on_evaluations_do_not_repeat_its_flags() {
+    for (command, own) in [
+        ("check", "--deep"),
+        ("plan", "--help"),
+        ("batch run", "--window"),
+        ("batch export", "--help"),
+        ("openeqa", "--questions"),
+    ] {
+        let short = help(&format!("darkqa-eval {command} -h"));
+        let long = help(&format!("darkqa-eval {command} --help"));
+        assert!(
+            short.contains("takes the flags of an evaluation"),
+            "{short}"
+        );
+        assert!(!short.contains("--top-p") && long.contains("--top-p"));
+        assert!(short.contains(own), "{own}: {short}");
+    }
+    let other = help("darkqa-eval batch status -h");
+    assert!(
+        !other.contains("takes the flags of an evaluation"),
+        "{other}"
+    );
+}
+
+#[test]
+fn short_forms_are_those_of_long_flags() {
+    let parsed = |line: &str| {
+        let words = line.split(' ').map(OsString::from).collect();
+        let parsed = layers::parse(command::command(), words, |_| None);
+        let Ok(parsed) = parsed else {
+            panic!("{line} is refused");
+        };
+        (
+            format!("{:?}", Cli::from_arg_matches(&parsed.matches)),
+            parsed.typed,
+        )
+    };
+    assert_eq!(
+        parsed("d -m random -d set.tsv -e lift -n -q -o out"),
+        parsed("d --model random --data set.tsv --llie lift --dry-run --quiet --out out")
+    );
+    assert_eq!(
+        parsed("d -q enhance m.onnx --describe"),
+        parsed("d --quiet enhance describe m.onnx")
+    );
+}
+
 /// All flags of all commands as Markdown.
 fn reference() -> String {
-    let mut command = grouped(Cli::command());
+    let mut command = command::with_short_forms(grouped(Cli::command()));
     command.build();
     let mut text = "# All flags\n\nEvery flag of every command, with its default and what it decides. A flag that means the same in several commands is \
                     described at the first of them. A variable is `DARKQA_` and the name of the flag in capitals; a key of a `--config` file is the name of \
@@ -198,8 +317,11 @@ fn row(arg: &Arg) -> String {
     let key_flag = typed_key(arg);
     let flag = match arg.get_long() {
         _ if key_flag.is_some() => key_flag.clone().unwrap_or_default(),
-        Some(long) if values.is_empty() => format!("--{long}"),
-        Some(long) => format!("--{long} {values}"),
+        Some(long) => {
+            let short = arg.get_short().map(|short| format!("-{short}, "));
+            let flag = format!("{}--{long} {values}", short.unwrap_or_default());
+            flag.trim_end().to_owned()
+        }
         None => values,
     };
     let key = match arg.get_long() {
@@ -219,7 +341,7 @@ fn row(arg: &Arg) -> String {
         .collect();
     let default = match &defaults[..] {
         _ if !arg.get_action().takes_values() => "off".to_owned(),
-        [] if arg.is_required_set() => "required".to_owned(),
+        [] if arg.is_required_set() || what.contains("(required") => "required".to_owned(),
         [] => stated,
         values => format!("`{}`", values.join(",")),
     };
@@ -292,6 +414,7 @@ fn every_flag_says_what_it_is_what_it_decides_and_its_default() {
             let has_default = !arg.get_action().takes_values()
                 || arg.is_required_set()
                 || arg.is_positional()
+                || help.contains("(required")
                 || !arg.get_default_values().is_empty()
                 || help.contains("; default: ");
             if !has_default {
@@ -330,8 +453,10 @@ fn the_manual_says_what_the_help_says() {
         for arg in command.get_arguments().filter(is_shown) {
             let help = arg.get_long_help().or(arg.get_help());
             let help = words_of(&help.map(ToString::to_string).unwrap_or_default());
-            for (text, place) in [(&page, "manual"), (&shown, "help")] {
-                if !text.contains(&help) {
+            // Pages of commands on evaluations refer to that of the program, as `-h` does.
+            let is_in_page = !arg.is_hide_short_help_set();
+            for (text, place, expected) in [(&page, "manual", is_in_page), (&shown, "help", true)] {
+                if expected && !text.contains(&help) {
                     wrong.push(format!(
                         "{} {}: not in the {place}",
                         command.get_name(),
