@@ -433,7 +433,17 @@ fn check_flags_before_command(command: &Command, matches: &ArgMatches) -> Result
     }
 }
 
+/// Words that people type as the command of an evaluation, which has none.
+const NO_COMMAND: [&str; 3] = ["run", "evaluate", "eval"];
+
 fn with_origin(error: &clap::Error, origins: &BTreeMap<String, String>) -> Error {
+    if let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidSubcommand)
+        && NO_COMMAND.contains(&&**word)
+    {
+        return Error::CommandLine(format!(
+            "no command {word}: an evaluation has none; leave the word out: darkqa-eval --model NAME [OPTIONS]"
+        ));
+    }
     let flag = match error.get(ContextKind::InvalidArg) {
         Some(ContextValue::String(flag)) => flag.trim_start_matches("--"),
         _ => "",

@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::dataset::Picture;
 use crate::error::{Error, Result};
-use crate::images::placed_image::{ImageOrigin, Sidecar};
+use crate::images::placed_image::{ImageOrigin, Sidecar, differing};
 use crate::types::degradation::{Axis, Kind};
 use crate::types::{
     Condition, Degradation, Digest, ExposureFacts, FrameId, InputNote, ReadingName, Rgb,
@@ -58,6 +58,60 @@ impl ImageOrigin for ImageRecipe {
     // The first schema had no digest of the image.
     const SCHEMAS: &'static [&'static str] = &["darkqa.image/2", "darkqa.image/1"];
     const IS_REPLACED: bool = false;
+
+    fn difference(&self, wanted: &Self) -> String {
+        let pair = self.sensor.as_ref().zip(wanted.sensor.as_ref());
+        let settings = pair.map_or_else(Vec::new, |(had, wanted)| had.differences(wanted));
+        let version = (self.synthesis != wanted.synthesis)
+            .then(|| format!("synthesis {}, now {}", self.synthesis, wanted.synthesis));
+        let settings: Vec<String> = version.into_iter().chain(settings).collect();
+        match (self.source == wanted.source, &settings[..]) {
+            (true, []) => {
+                let fields = differing(&json!(self), &json!(wanted));
+                format!("made with other settings ({})", fields.join(", "))
+            }
+            (true, settings) => format!("made with {}", settings.join("; ")),
+            (false, []) => "made from another image".to_owned(),
+            (false, settings) => format!("made from another image, with {}", settings.join("; ")),
+        }
+    }
+}
+
+impl SensorRecord {
+    /// The flags that differ, with both values. What follows from others is left out: the state is drawn by the seed, and a light reading
+    /// stands for its choices.
+    fn differences(&self, wanted: &Self) -> Vec<String> {
+        let mut differences = Vec::new();
+        let mut compare = |flag: &str, had: Value, wanted: Value| {
+            if had != wanted {
+                let [had, wanted] = [had, wanted].map(|value| match value {
+                    Value::String(text) => text,
+                    other => other.to_string(),
+                });
+                differences.push(format!("{flag} {had}, now {wanted}"));
+            }
+        };
+        compare("--seed", json!(self.seed), json!(wanted.seed));
+        compare("--profile", json!(self.reading), json!(wanted.reading));
+        if self.reading == wanted.reading {
+            compare(
+                "--noise amplify",
+                json!(self.amplify),
+                json!(wanted.amplify),
+            );
+            compare("--noise tone", json!(self.tone), json!(wanted.tone));
+            compare("--noise draws", json!(self.draws), json!(wanted.draws));
+            compare(
+                "--noise coupling",
+                json!(self.coupling),
+                json!(wanted.coupling),
+            );
+        }
+        if self.model != wanted.model {
+            differences.push("another --noise camera, gain, ratio or fixed".to_owned());
+        }
+        differences
+    }
 }
 
 impl ImageRecipe {
@@ -84,7 +138,7 @@ impl ImageRecipe {
                 tone: synthesis.tone,
                 draws: synthesis.draws,
                 coupling: synthesis.coupling,
-                model: serde_json::json!(synthesis.camera),
+                model: json!(synthesis.camera),
                 state: synthesis.state_by(key, applied.drop_ev()),
             })
         });

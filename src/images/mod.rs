@@ -24,6 +24,7 @@ pub(crate) mod progress;
 pub(crate) mod questions;
 pub(crate) mod questions_by_rule;
 pub(crate) mod recipe;
+pub(crate) mod refusals;
 pub(crate) mod resting_enhancer;
 pub(crate) mod source;
 pub(crate) mod stored_findings;

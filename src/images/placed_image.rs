@@ -23,6 +23,12 @@ pub(crate) trait ImageOrigin: Clone + PartialEq + Serialize + DeserializeOwned {
     const SCHEMAS: &'static [&'static str];
     /// Whether an intact image with other settings is replaced; else it is refused.
     const IS_REPLACED: bool;
+
+    /// How an image of this origin differs from the one that is asked for, as `made with --seed 0, now 9`.
+    fn difference(&self, wanted: &Self) -> String {
+        let fields = differing(&json!(self), &json!(wanted));
+        format!("{OTHER} ({})", fields.join(", "))
+    }
 }
 
 /// The content of a JSON file beside an image.
@@ -124,12 +130,30 @@ impl<R: ImageOrigin> Sidecar<R> {
 }
 
 /// What became of one output file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum ImageOutcome {
     /// The image was made.
     Written,
     /// The image was there.
     Unchanged,
+    /// Another image is there.
+    Refused(Refusal),
+}
+
+/// The reason why an image was not made.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Refusal {
+    /// The image in its place.
+    pub(crate) image: PathBuf,
+    /// How it differs, and the remedy.
+    pub(crate) problem: String,
+}
+
+impl Refusal {
+    /// The error of a command that makes one image.
+    pub(crate) fn into_error(self) -> Error {
+        Error::data(self.image.display(), self.problem)
+    }
 }
 
 /// What to do with what lies in the folder.
@@ -140,6 +164,8 @@ enum Verdict {
     Make(Option<&'static str>),
     /// It is the image if its pixels are, and then gets its JSON file; else the text says what is wrong.
     Compare(Rgb, String),
+    /// It is another image, which the text describes.
+    Refuse(String),
 }
 
 /// The place of an image and of its JSON file.
@@ -175,7 +201,7 @@ impl Placed {
     /// Puts the image of a recipe in its place, unless it is there.
     ///
     /// # Errors
-    /// If another image or JSON file is there, or a file cannot be read or written.
+    /// If a file cannot be read or written.
     pub(crate) fn put<R: ImageOrigin>(
         &self,
         recipe: &R,
@@ -191,12 +217,13 @@ impl Placed {
             }
             Verdict::Compare(there, problem) => {
                 if there != make()? {
-                    return Err(self.refusal(&problem));
+                    return Ok(self.refused(&problem));
                 }
                 let bytes = reading::bytes(&self.image)?;
                 Sidecar::new(recipe.clone(), self, &bytes).write(&self.json)?;
                 Ok(ImageOutcome::Unchanged)
             }
+            Verdict::Refuse(problem) => Ok(self.refused(&problem)),
         }
     }
 
@@ -213,8 +240,11 @@ impl Placed {
         let bytes = reading::bytes(&self.image)?;
         if !self.json.exists() {
             let problem = "no JSON file describes it, and its pixels differ";
-            let there = decoded(&self.image, &bytes).ok_or_else(|| self.refusal(problem))?;
-            return Ok(Verdict::Compare(there, problem.to_owned()));
+            let problem = problem.to_owned();
+            return Ok(match decoded(&self.image, &bytes) {
+                Some(there) => Verdict::Compare(there, problem),
+                None => Verdict::Refuse(problem),
+            });
         }
         let stored = Sidecar::<R>::read(&self.json)?;
         let fault = stored.output.as_ref().map(|output| output.fault(&bytes));
@@ -222,8 +252,7 @@ impl Placed {
             if R::IS_REPLACED && fault == Some(None) {
                 return Ok(Verdict::Make(Some(OTHER)));
             }
-            let fields = differing(&json!(stored.recipe), &json!(recipe));
-            return Err(self.refusal(&format!("{OTHER} ({})", fields.join(", "))));
+            return Ok(Verdict::Refuse(stored.recipe.difference(recipe)));
         }
         Ok(match (fault, decoded(&self.image, &bytes)) {
             (Some(None), _) => Verdict::Keep,
@@ -236,9 +265,11 @@ impl Placed {
         })
     }
 
-    fn refusal(&self, problem: &str) -> Error {
-        let remedy = "--force overwrites it, another --out keeps both";
-        Error::data(self.image.display(), format_args!("{problem}; {remedy}"))
+    fn refused(&self, problem: &str) -> ImageOutcome {
+        ImageOutcome::Refused(Refusal {
+            image: self.image.clone(),
+            problem: format!("{problem}; --force overwrites it, another --out keeps both"),
+        })
     }
 }
 

@@ -85,6 +85,16 @@ fn flags_of_an_evaluation_before_a_command_are_refused() {
 }
 
 #[test]
+fn words_for_an_evaluation_lead_to_its_form() {
+    let bench = Bench::new();
+    for word in ["run", "evaluate", "eval"] {
+        let parts = [word, "leave the word out: darkqa-eval --model NAME"];
+        refused(&bench, &format!("{word} --model random"), &parts);
+        refused(&bench, &format!("--quiet {word}"), &parts);
+    }
+}
+
+#[test]
 fn wrong_words_name_their_flag() {
     let bench = Bench::new();
     let rows = [

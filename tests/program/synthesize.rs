@@ -86,6 +86,10 @@ fn what_is_there_is_kept_unless_it_is_another() {
         let args = words("synthesize frames/a.png --out out --levels L2");
         bench.call(&[&args[..], more].concat())
     };
+    let at_two_levels = |more: &str| {
+        let line = format!("synthesize frames/a.png --out out --levels L2,L3 {more}");
+        bench.call(&words(&line))
+    };
     assert_eq!(call(&[]).stdout, "out: 2 made of 1 frame\n");
     assert_eq!(
         call(&[]).stdout,
@@ -97,7 +101,29 @@ fn what_is_there_is_kept_unless_it_is_another() {
         other.stdout,
         "out: 0 made of 1 frame, 1 left as they were (--force makes them again), 1 failed\n"
     );
-    assert!(other.stderr.contains("a_L2-noise.png") && other.stderr.contains("--force"));
+    assert!(
+        other.stderr.contains(
+            "a_L2-noise.png: made with --seed 0, now 1; --force overwrites it, another --out keeps both"
+        ),
+        "{}",
+        other.stderr
+    );
+    assert_eq!(at_two_levels("").code, Some(0));
+    let other = at_two_levels("--noise gain=2");
+    assert!(
+        other
+            .stderr
+            .contains("made with another --noise camera, gain, ratio or fixed; --force"),
+        "{}",
+        other.stderr
+    );
+    let other = at_two_levels("--seed 9");
+    let lines: Vec<&str> = other.stderr.lines().collect();
+    assert!(
+        lines.len() == 1
+            && lines[0].contains("a_L2-noise.png and 1 more: made with --seed 0, now 9"),
+        "{lines:?}"
+    );
     let before = fs::read(bench.path("out/a_L2-noise.png")).unwrap();
     assert_eq!(call(&["--seed", "1", "--force"]).code, Some(0));
     assert_ne!(before, fs::read(bench.path("out/a_L2-noise.png")).unwrap());

@@ -15,6 +15,7 @@ use crate::images::enhancers::{EnhancerRunArgs, OpenEnhancers};
 use crate::images::input_tally::InputTally;
 use crate::images::placed_image::{ImageOutcome, Placed};
 use crate::images::progress::Progress;
+use crate::images::refusals::Refusals;
 use crate::runs::Outcome;
 use crate::runs::part_args::{PartArgs, keep_part};
 use crate::types::manifest::Status;
@@ -209,6 +210,7 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
     let settings = origin::settings(&digest, &loading.size);
     let used_anyway = enhancer.used_anyway();
     let (mut written, mut unchanged, mut failed) = (0, 0, 0);
+    let refusals = Refusals::default();
     for entry in &images.entries {
         let picture = images.picture(entry);
         let outcome = picture.and_then(|picture| {
@@ -223,6 +225,10 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
         match outcome {
             Ok(ImageOutcome::Written) => written += 1,
             Ok(ImageOutcome::Unchanged) => unchanged += 1,
+            Ok(ImageOutcome::Refused(refusal)) => {
+                failed += 1;
+                refusals.add(refusal);
+            }
             Err(e) => {
                 failed += 1;
                 tracing::error!("{e}");
@@ -232,6 +238,7 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
     }
     drop(bar);
     tally.warn();
+    refusals.log();
     let count = |n: usize, what: &str| match n {
         0 => String::new(),
         n => format!(", {n} {what}"),

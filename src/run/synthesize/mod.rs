@@ -20,6 +20,7 @@ use crate::images::input_tally::InputTally;
 use crate::images::placed_image::{ImageOutcome, Placed, Sidecar};
 use crate::images::progress::{Progress, StepBar};
 use crate::images::recipe::Recipe;
+use crate::images::refusals::Refusals;
 use crate::images::source::Frames;
 use crate::images::timings::Timings;
 use crate::images::workers::{ThreadArgs, pool};
@@ -124,6 +125,8 @@ pub(crate) struct SynthesizeArgs {
 struct ImageMaking<'a> {
     args: &'a SynthesizeArgs,
     light: LightSettings,
+    /// Images that are not made because others are in their places.
+    refusals: Refusals,
 }
 
 /// Makes images, makes one again, or checks images.
@@ -141,15 +144,16 @@ pub(crate) fn synthesize(command: &SynthesizeCommand, progress: &Progress) -> Re
 
 /// Writes the images or figures of all inputs.
 ///
-/// If one frame fails, the error is logged and counted, and the others continue.
+/// If one frame fails, the error is logged and counted, and the others continue. The reason of images that are refused is logged once.
 ///
 /// # Errors
 /// If an input is missing, two frames have the same name, or the folder cannot be written to.
 fn make_images(args: &SynthesizeArgs, progress: &Progress) -> Result<Outcome> {
     let out = &args.out;
-    let making = &ImageMaking {
+    let making = ImageMaking {
         args,
         light: LightSettings::resolve(&args.light, SetLight::Lit)?,
+        refusals: Refusals::default(),
     };
     making.light.refuse_matches("synthesize knows none")?;
     let mut frames = Inputs::open(
@@ -160,16 +164,17 @@ fn make_images(args: &SynthesizeArgs, progress: &Progress) -> Result<Outcome> {
     keep_part(&mut frames.entries, args.part.resolve()?)?;
     let workers = pool(args.threads.threads)?;
     fs::create_dir_all(out).map_err(|e| Error::file(out, "make", e))?;
-    let (files, tally) = (files(making), InputTally::default());
+    let (files, tally) = (files(&making), InputTally::default());
     let bar = progress.bar("images", frames.entries.len() * files.len());
     let counts: Vec<ImageCounts> = workers.install(|| {
         let entries = frames.entries.par_iter();
         entries
-            .map(|entry| write_files(making, &frames, entry, &files, (&bar, &tally)))
+            .map(|entry| write_files(&making, &frames, entry, &files, (&bar, &tally)))
             .collect()
     });
     drop(bar);
     tally.warn();
+    making.refusals.log();
     let total = counts
         .iter()
         .fold(ImageCounts::default(), |sum, counts| ImageCounts {
@@ -277,6 +282,10 @@ fn write_files(
         match outcome {
             Ok(ImageOutcome::Written) => counts.written += 1,
             Ok(ImageOutcome::Unchanged) => counts.unchanged += 1,
+            Ok(ImageOutcome::Refused(refusal)) => {
+                making.refusals.add(refusal);
+                counts.failed += 1;
+            }
             Err(e) => {
                 if said.insert(e.to_string()) {
                     tracing::error!("{e}");
@@ -361,6 +370,7 @@ fn replay(args: &ReplayArgs) -> Result<Outcome> {
     match place.put(&sidecar.recipe, || Ok(degraded))? {
         ImageOutcome::Written => counts.written = 1,
         ImageOutcome::Unchanged => counts.unchanged = 1,
+        ImageOutcome::Refused(refusal) => return Err(refusal.into_error()),
     }
     Ok(counts.outcome(&args.out, 1))
 }
