@@ -26,7 +26,7 @@ use crate::engine::truncation::TruncationCheck;
 use crate::error::{Error, Result};
 use crate::images::image_notes::ImageNotes;
 use crate::images::image_pipeline::EnhancerStopper;
-use crate::images::progress::{Progress, StepBar};
+use crate::images::progress::{LINE_INTERVAL, Progress, TrialProgress};
 use crate::images::timings::{TimedStep, Timings};
 use crate::images::trial::{Item, PreparedGroup, Trial};
 use crate::images::workers::unstarted;
@@ -120,7 +120,7 @@ const CLOSING: Duration = Duration::from_millis(50);
 struct ReplySink<'a, I: Item> {
     dispatcher: &'a Dispatcher<'a>,
     store: &'a mut Store<I::Detail>,
-    bar: StepBar,
+    bar: TrialProgress,
     breaker: CircuitBreaker,
     /// Images for which the server fails again and again.
     suspects: Suspects,
@@ -172,6 +172,8 @@ impl<I: Item> ReplySink<'_, I> {
         let mut interrupt = Interrupt::listen()?;
         let mut grace = None;
         let mut more_groups = true;
+        // Counts are shown again when it ticks, although nothing has happened.
+        let mut tick = tokio::time::interval(LINE_INTERVAL);
         let spending = Arc::clone(self.budget.spending());
         self.limits.say_unlimited(&spending);
         loop {
@@ -231,6 +233,7 @@ impl<I: Item> ReplySink<'_, I> {
                     None => more_groups = false,
                 },
                 () = spending.released(), if lanes.is_held_back() => lanes.release(),
+                _ = tick.tick() => self.record_wait(state, since),
             }
         }
         // The image pipeline ends as soon as this channel is closed.

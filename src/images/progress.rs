@@ -2,24 +2,37 @@
 
 use std::fmt;
 use std::io::{self, IsTerminal, Write};
-use std::time::Duration;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use tracing_subscriber::fmt::MakeWriter;
 
-use crate::report::forecast::money;
+use crate::report::forecast::{hours, money};
 use crate::types::shown_text::shown;
 
-/// Progress bars on standard error, or nowhere if it is not a terminal.
+/// Progress on standard error: bars on a terminal, else a line a minute about the trials.
 #[derive(Debug, Clone)]
 pub(crate) struct Progress {
     bars: MultiProgress,
+    form: ProgressForm,
 }
+
+/// The form of progress.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum ProgressForm {
+    Bars,
+    Lines,
+    Nothing,
+}
+
+/// The time between two lines of progress.
+pub(crate) const LINE_INTERVAL: Duration = Duration::from_secs(60);
 
 /// Whether progress is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Verbosity {
-    /// Show progress if standard error is a terminal.
+    /// Show progress.
     Normal,
     /// Show no progress (`--quiet`).
     Quiet,
@@ -29,14 +42,18 @@ impl Progress {
     /// Progress on standard error.
     #[must_use]
     pub(crate) fn new(verbosity: Verbosity) -> Self {
-        let shown = verbosity == Verbosity::Normal && io::stderr().is_terminal();
-        let target = if shown {
-            ProgressDrawTarget::stderr()
-        } else {
-            ProgressDrawTarget::hidden()
+        let form = match verbosity {
+            Verbosity::Quiet => ProgressForm::Nothing,
+            Verbosity::Normal if io::stderr().is_terminal() => ProgressForm::Bars,
+            Verbosity::Normal => ProgressForm::Lines,
+        };
+        let target = match form {
+            ProgressForm::Bars => ProgressDrawTarget::stderr(),
+            ProgressForm::Lines | ProgressForm::Nothing => ProgressDrawTarget::hidden(),
         };
         Self {
             bars: MultiProgress::with_draw_target(target),
+            form,
         }
     }
 
@@ -64,8 +81,8 @@ impl Progress {
         StepBar(bar)
     }
 
-    /// The bar of the trials: answered, failed, rate, remaining time.
-    pub(crate) fn trials(&self, trials: usize, answered: usize) -> StepBar {
+    /// The progress of the trials: answered, failed, cost, rate, remaining time.
+    pub(crate) fn trials(&self, trials: usize, answered: usize) -> TrialProgress {
         let bar = ProgressBar::new(trials as u64).with_position(answered as u64);
         let bar = self.bars.add(bar);
         bar.reset_eta();
@@ -75,8 +92,14 @@ impl Progress {
         let bar = StepBar(style.map_or(bar.clone(), |style| {
             bar.with_style(style.with_key("rate", rate))
         }));
-        bar.count(answered, 0, None, "");
-        bar
+        let lines = TrialLines::new(trials, answered, Instant::now());
+        let progress = TrialProgress {
+            bar,
+            lines: (self.form == ProgressForm::Lines).then(|| Mutex::new(lines)),
+            log: self.clone(),
+        };
+        progress.count(answered, 0, None, "");
+        progress
     }
 }
 
@@ -97,20 +120,86 @@ impl StepBar {
     pub(crate) fn advance(&self, steps: usize) {
         self.0.inc(steps as u64);
     }
-
-    /// Shows the numbers of answered and failed trials, the US dollars spent, and a note about the pace.
-    pub(crate) fn count(&self, answered: usize, failed: usize, spent: Option<f64>, pace: &str) {
-        self.0.set_prefix(pace.to_owned());
-        self.0.set_position((answered + failed) as u64);
-        let spent = spent.map_or(String::new(), |dollars| format!(", {}", money(dollars)));
-        self.0
-            .set_message(format!("{answered} answered, {failed} failed{spent}"));
-    }
 }
 
 impl Drop for StepBar {
     fn drop(&mut self) {
         self.0.finish_and_clear();
+    }
+}
+
+/// The progress of the trials, as a bar or as lines.
+pub(crate) struct TrialProgress {
+    bar: StepBar,
+    /// The lines; `None` unless they are printed.
+    lines: Option<Mutex<TrialLines>>,
+    log: Progress,
+}
+
+impl TrialProgress {
+    /// Shows the numbers of answered and failed trials, the US dollars spent, and a note about the pace.
+    pub(crate) fn count(&self, answered: usize, failed: usize, spent: Option<f64>, pace: &str) {
+        if let Some(lines) = &self.lines {
+            let mut lines = lines.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some(line) = lines.next((answered, failed), spent, pace, Instant::now()) {
+                self.log.note(&line);
+            }
+        }
+        let StepBar(bar) = &self.bar;
+        bar.set_prefix(pace.to_owned());
+        bar.set_position((answered + failed) as u64);
+        let spent = spent.map_or(String::new(), |dollars| format!(", {}", money(dollars)));
+        bar.set_message(format!("{answered} answered, {failed} failed{spent}"));
+    }
+}
+
+/// Lines about the trials, one a minute.
+#[derive(Debug)]
+struct TrialLines {
+    trials: usize,
+    /// Trials that were done at the start.
+    before: usize,
+    start: Instant,
+    /// The time of the last line; at first that of the start.
+    last: Instant,
+}
+
+impl TrialLines {
+    fn new(trials: usize, before: usize, start: Instant) -> Self {
+        Self {
+            trials,
+            before,
+            start,
+            last: start,
+        }
+    }
+
+    /// The line for these numbers of answered and failed trials, and for the US dollars spent; `None` within a minute after the last line.
+    fn next(
+        &mut self,
+        (answered, failed): (usize, usize),
+        spent: Option<f64>,
+        pace: &str,
+        now: Instant,
+    ) -> Option<String> {
+        if now.duration_since(self.last) < LINE_INTERVAL {
+            return None;
+        }
+        self.last = now;
+        let done = answered + failed;
+        let left = self.trials.saturating_sub(done);
+        let seconds = now.duration_since(self.start).as_secs_f64();
+        let rate = done.saturating_sub(self.before) as f64 / seconds;
+        let spent = spent.map_or(String::new(), |dollars| format!(" · {}", money(dollars)));
+        let time = if rate > 0.0 {
+            format!("{} left", hours(left as f64 / rate))
+        } else {
+            "time left unknown".to_owned()
+        };
+        Some(format!(
+            "{answered} of {} trials answered, {failed} failed, {left} left{pace} · {rate:.1}/s{spent} · {time}",
+            self.trials
+        ))
     }
 }
 
@@ -139,5 +228,35 @@ impl<'a> MakeWriter<'a> for Progress {
 
     fn make_writer(&'a self) -> LogWriter {
         LogWriter(self.bars.clone())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_come_once_a_minute() {
+        let start = Instant::now();
+        let at = |seconds| start + Duration::from_secs(seconds);
+        let mut lines = TrialLines::new(1000, 100, start);
+        assert_eq!(lines.next((110, 0), None, "", at(59)), None);
+        assert_eq!(
+            lines.next((218, 2), Some(1.2), "", at(60)).as_deref(),
+            Some("218 of 1000 trials answered, 2 failed, 780 left · 2.0/s · $1.20 · 6 min left")
+        );
+        assert_eq!(lines.next((230, 2), None, "", at(119)), None);
+        assert!(lines.next((230, 2), None, "", at(120)).is_some());
+    }
+
+    #[test]
+    fn without_a_reply_the_time_left_is_unknown() {
+        let start = Instant::now();
+        let mut lines = TrialLines::new(10, 4, start);
+        let line = lines.next((4, 0), None, "", start + LINE_INTERVAL);
+        assert_eq!(
+            line.as_deref(),
+            Some("4 of 10 trials answered, 0 failed, 6 left · 0.0/s · time left unknown")
+        );
     }
 }

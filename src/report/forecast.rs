@@ -353,7 +353,8 @@ fn bytes(bytes: f64) -> String {
     }
 }
 
-fn hours(seconds: f64) -> String {
+/// A time as `2.0 h`, `6 min` or `40 s`.
+pub(crate) fn hours(seconds: f64) -> String {
     match seconds {
         s if s >= 3600.0 => format!("{:.1} h", s / 3600.0),
         s if s >= 60.0 => format!("{:.0} min", s / 60.0),

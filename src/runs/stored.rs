@@ -10,7 +10,7 @@ use crate::runs::run_files::RunFiles;
 use crate::runs::run_texts::HeldTexts;
 pub(crate) use crate::runs::run_texts::RunTexts;
 use crate::store;
-use crate::types::manifest::RunManifest;
+use crate::types::manifest::{Counts, RunManifest, Status};
 use crate::types::{
     ChoiceDetail, ImageFidelity, ListedModel, ModelListing, OpenDetail, QuestionId, Record,
     RunQuestion, StoredDetail as _, TextPlace, Thumbnail, TrialRef, Trials,
@@ -52,7 +52,7 @@ pub(crate) struct StoredRun<D: Detail> {
 }
 
 impl<D: Detail> StoredRun<D> {
-    /// Reads a run folder.
+    /// Reads a run folder. The manifest of a run that has not ended has the counts of its start: they are those of the records instead.
     ///
     /// # Errors
     /// If the folder holds no run with records of this kind.
@@ -63,7 +63,12 @@ impl<D: Detail> StoredRun<D> {
         store::each_record(folder, |record, place| {
             trials.add(record, TextPlace::new(place.start));
         })?;
-        Self::of_trials(folder, manifest, trials)
+        let mut run = Self::of_trials(folder, manifest, trials)?;
+        if run.manifest.status == Status::Started {
+            let failed = run.trials.iter().map(|trial| trial.failed());
+            run.manifest.counts = Counts::new(run.manifest.counts.trials, failed);
+        }
+        Ok(run)
     }
 
     /// Reads everything in a run folder except `manifest`, and its replies again by the rules of this version.

@@ -189,6 +189,26 @@ fn broken_records_are_named_or_passed_over() {
 }
 
 #[test]
+fn a_running_run_is_counted_by_its_records() {
+    let bench = Bench::with_questions(3);
+    run(&bench, "run", "");
+    let all = records(&bench.path("run")).len();
+    let path = bench.path("run/records.jsonl");
+    let text = fs::read_to_string(&path).unwrap();
+    let some: String = text.split_inclusive('\n').take(2).collect();
+    fs::write(&path, some).unwrap();
+    let file = bench.path("run/manifest.json");
+    let mut manifest: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(&file).unwrap()).unwrap();
+    manifest["status"] = "started".into();
+    manifest["counts"]["answered"] = 0.into();
+    fs::write(&file, manifest.to_string()).unwrap();
+    let report = bench.complete(&words("report run"));
+    let expected = format!("2 of {all} trials answered, 0 failed.");
+    assert!(report.contains(&expected), "{report}");
+}
+
+#[test]
 fn runs_of_earlier_versions_are_read() {
     let bench = Bench::with_questions(3);
     run(&bench, "run", "");
