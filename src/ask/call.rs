@@ -44,10 +44,10 @@ impl<'a> Query<'a> {
             Self::Open(id) => {
                 let message =
                     format!("question {id} has no choices, and this model can only choose");
-                let error = AskError::new(FailureKind::Request, message, 0);
                 Err(AskError {
+                    attempts: 0,
                     reach: Reach::Endpoint,
-                    ..error
+                    ..AskError::new(FailureKind::Request, message)
                 })
             }
         }

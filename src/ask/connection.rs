@@ -12,7 +12,7 @@ use super::access::{Access, connect_limit, with_causes};
 use super::body::Parts;
 use super::bounded_json::parse;
 use super::connection_fault::{lacks_open_files, permanent_cause};
-use super::failure::{Again, FailedTry, Reach};
+use super::failure::{Again, AskError, Reach};
 use super::parameters::Parameters;
 use super::secret::Scrub;
 use super::time_limit::TimeLimit;
@@ -150,7 +150,7 @@ impl Connection {
         headers: &HeaderMap,
         body: &Parts,
         deadline: Deadline,
-    ) -> Result<HttpReply, FailedTry> {
+    ) -> Result<HttpReply, AskError> {
         loop {
             let request = self
                 .client
@@ -163,7 +163,7 @@ impl Connection {
                 // The process was stopped while it connected: nothing was sent.
                 Err(failed)
                     if failed.failure.kind == FailureKind::Timeout
-                        && !failed.may_be_charged
+                        && !failed.may_have_effect
                         && !time.whole.paused().is_zero() => {}
                 sent => return sent,
             }
@@ -189,7 +189,7 @@ impl Connection {
         &self,
         request: RequestBuilder,
         deadline: Deadline,
-    ) -> Result<HttpReply, FailedTry> {
+    ) -> Result<HttpReply, AskError> {
         self.exchange_in(request, &mut TryTime::new(deadline)).await
     }
 
@@ -197,7 +197,7 @@ impl Connection {
         &self,
         request: RequestBuilder,
         time: &mut TryTime,
-    ) -> Result<HttpReply, FailedTry> {
+    ) -> Result<HttpReply, AskError> {
         let started = Instant::now();
         let response = self.in_time(time, request.send()).await?;
         let status = response.status();
@@ -247,13 +247,13 @@ impl Connection {
         request: RequestBuilder,
         to: &Path,
         most: u64,
-    ) -> Result<HttpReply, FailedTry> {
+    ) -> Result<HttpReply, AskError> {
         let started = Instant::now();
         let mut time = TryTime::new(Deadline::download(self.timeout));
         let mut response = self.in_time(&mut time, request.send()).await?;
         let (status, headers) = (response.status(), response.headers().clone());
         let body = if status.is_success() {
-            let failed = |what: String| FailedTry::new(FailureKind::Response, what);
+            let failed = |what: String| AskError::new(FailureKind::Response, what);
             let unwritten = |e| failed(format!("{}: cannot write: {e}", to.display()));
             let mut file = files::create_new(to).map_err(unwritten)?;
             let mut written = 0;
@@ -283,12 +283,12 @@ impl Connection {
         &self,
         mut response: Response,
         time: &mut TryTime,
-    ) -> Result<Vec<u8>, FailedTry> {
+    ) -> Result<Vec<u8>, AskError> {
         let mut body = Vec::new();
         while let Some(chunk) = self.in_time(time, response.chunk()).await? {
             if body.len() + chunk.len() > MAX_REPLY {
                 let message = format!("{} answered with more than 16 MiB", self.base);
-                return Err(FailedTry::new(FailureKind::Response, message));
+                return Err(AskError::new(FailureKind::Response, message));
             }
             body.extend_from_slice(&chunk);
         }
@@ -300,7 +300,7 @@ impl Connection {
         &self,
         time: &mut TryTime,
         step: impl Future<Output = reqwest::Result<T>>,
-    ) -> Result<T, FailedTry> {
+    ) -> Result<T, AskError> {
         let message = match time.step(step).await {
             Ok(done) => return done.map_err(|error| self.failed_try(error)),
             Err(TimeOut::Whole(limit)) => self.no_answer_within(limit),
@@ -310,9 +310,9 @@ impl Connection {
                 limit.as_secs_f64()
             ),
         };
-        Err(FailedTry {
+        Err(AskError {
             again: Again::Later,
-            ..FailedTry::new(FailureKind::Timeout, message)
+            ..AskError::new(FailureKind::Timeout, message)
         })
     }
 
@@ -326,15 +326,15 @@ impl Connection {
     }
 
     /// The failure of a request without a complete response.
-    fn failed_try(&self, error: reqwest::Error) -> FailedTry {
+    fn failed_try(&self, error: reqwest::Error) -> AskError {
         // A request whose connection was not made was not sent.
-        let may_be_charged = !error.is_connect();
+        let may_have_effect = !error.is_connect();
         if error.is_timeout() {
             let message = self.no_answer_within(connect_limit(self.timeout));
-            return FailedTry {
+            return AskError {
                 again: Again::Later,
-                may_be_charged,
-                ..FailedTry::new(FailureKind::Timeout, message)
+                may_have_effect,
+                ..AskError::new(FailureKind::Timeout, message)
             };
         }
         let lacks_files = lacks_open_files(&error);
@@ -344,23 +344,23 @@ impl Connection {
                 "{}: {text}; this process may open no more files: less --concurrency, or more with ulimit -n",
                 self.base
             );
-            return FailedTry {
+            return AskError {
                 again: Again::WhenTaken,
-                may_be_charged,
-                ..FailedTry::new(FailureKind::Connection, message)
+                may_have_effect,
+                ..AskError::new(FailureKind::Connection, message)
             };
         }
         let Some(remedy) = permanent_cause(&text, self.base.is_plain()) else {
-            return FailedTry {
+            return AskError {
                 again: Again::Later,
-                may_be_charged,
-                ..FailedTry::new(FailureKind::Connection, format!("{}: {text}", self.base))
+                may_have_effect,
+                ..AskError::new(FailureKind::Connection, format!("{}: {text}", self.base))
             };
         };
         let message = format!("{}: {remedy} ({text})", self.base);
-        FailedTry {
+        AskError {
             reach: Reach::Endpoint,
-            ..FailedTry::new(FailureKind::Connection, message)
+            ..AskError::new(FailureKind::Connection, message)
         }
     }
 }

@@ -13,7 +13,7 @@ use tracing::{debug, warn};
 
 use super::access::Access;
 use super::batch_api::BatchServer;
-use super::failure::{Again, AskError, FailedTry, Reach};
+use super::failure::{Again, AskError, Reach};
 use super::pace::{Allowance, Gate, Quota};
 use super::replica::Replica;
 use super::request::Request;
@@ -164,13 +164,13 @@ impl Endpoint {
     }
 
     /// Waits for something, or fails as soon as the endpoint is closed.
-    async fn unless_closed<T>(&self, future: impl Future<Output = T>) -> Result<T, FailedTry> {
+    async fn unless_closed<T>(&self, future: impl Future<Output = T>) -> Result<T, AskError> {
         let message = "the run ended before it was asked";
         tokio::select! {
             biased;
-            () = self.closed() => Err(FailedTry {
+            () = self.closed() => Err(AskError {
                 reach: Reach::Interrupted,
-                ..FailedTry::new(FailureKind::Connection, message.to_owned())
+                ..AskError::new(FailureKind::Connection, message.to_owned())
             }),
             value = future => Ok(value),
         }
@@ -193,7 +193,7 @@ impl Endpoint {
             .with_max_delay(MAX_DELAY)
             .with_max_times(self.sending.retries as usize)
             .build();
-        let (mut attempts, mut avoided, mut last) = (0, Vec::new(), None::<FailedTry>);
+        let (mut attempts, mut avoided, mut last) = (0, Vec::new(), None::<AskError>);
         let (mut retried, mut lost) = (None, LostAttempts::default());
         loop {
             let turn = match self.unless_closed(hold(request.reservation)).await {
@@ -224,7 +224,7 @@ impl Endpoint {
                 }
                 Err(failed) => failed,
             };
-            lost.add(failed.usage);
+            lost = lost.plus(*failed.lost);
             avoided.push(turn.replica);
             if effect == Effect::Elsewhere && self.services.has_other(request.model, &avoided) {
                 last = Some(failed);
@@ -258,9 +258,9 @@ impl Endpoint {
     fn delay(
         &self,
         model: ModelNumber,
-        mut failed: FailedTry,
+        mut failed: AskError,
         tries: &mut impl Iterator<Item = Duration>,
-    ) -> (Option<Duration>, FailedTry) {
+    ) -> (Option<Duration>, AskError) {
         let delay = match failed.again {
             Again::Never => None,
             Again::Later => tries.next().map(|delay| failed.wait.unwrap_or(delay)),
@@ -276,7 +276,7 @@ impl Endpoint {
     }
 
     /// Waits for the turn of a request: the user's limits, a replica that takes it, and the pace of that replica.
-    async fn turn(&self, request: &Request<'_>, avoided: &[usize]) -> Result<Turn, FailedTry> {
+    async fn turn(&self, request: &Request<'_>, avoided: &[usize]) -> Result<Turn, AskError> {
         let limited = match &self.quota {
             Some(gate) => Some(self.unless_closed(gate.pass()).await?),
             None => None,
@@ -292,9 +292,9 @@ impl Endpoint {
         let Choice::Replica(replica) = chosen else {
             let id = &request.sent.parameters.model;
             let message = format!("no replica of this endpoint can be asked for {id} any more");
-            return Err(FailedTry {
+            return Err(AskError {
                 reach: Reach::Endpoint,
-                ..FailedTry::new(FailureKind::Connection, message)
+                ..AskError::new(FailureKind::Connection, message)
             });
         };
         let passed = self.unless_closed(self.replicas[replica].gate.pass()).await;
@@ -312,7 +312,7 @@ impl Endpoint {
     }
 
     /// Sends a request to the replica of its turn; a failure with what follows from it.
-    async fn send(&self, request: &Request<'_>, turn: Turn) -> Result<Reply, (FailedTry, Effect)> {
+    async fn send(&self, request: &Request<'_>, turn: Turn) -> Result<Reply, (AskError, Effect)> {
         let Turn {
             replica: index,
             sent,
@@ -340,10 +340,9 @@ impl Endpoint {
         {
             let served = reply.served_model.unwrap_or_default();
             let message = format!("{} served the model {served}", replica.base());
-            let failed = FailedTry {
+            let failed = AskError {
                 reach: Reach::Endpoint,
-                usage: reply.usage,
-                ..FailedTry::new(FailureKind::Response, message)
+                ..AskError::new(FailureKind::Response, message).charged(reply.usage)
             };
             return Err((failed, effect));
         }
@@ -394,7 +393,7 @@ impl Endpoint {
     }
 
     /// The failure of a request that was turned away for too long: every other one is, too.
-    fn out_of_patience(&self, model: ModelNumber, mut failed: FailedTry) -> FailedTry {
+    fn out_of_patience(&self, model: ModelNumber, mut failed: AskError) -> AskError {
         failed.reach = Reach::Endpoint;
         failed.failure.message = format!(
             "{} (no request was accepted for {:.0} s, longer than --retries patience; continue later with --resume)",
@@ -414,17 +413,17 @@ async fn hold(reservation: Option<&Reservation>) -> bool {
 }
 
 /// The failure of a question that is not asked again because of `--max-cost`.
-fn over_budget(last: Option<FailedTry>) -> FailedTry {
+fn over_budget(last: Option<AskError>) -> AskError {
     let Some(mut failed) = last else {
         let message = "not asked again: --max-cost does not allow it".to_owned();
-        return FailedTry::new(FailureKind::Connection, message);
+        return AskError::new(FailureKind::Connection, message);
     };
     failed.failure.message += " (not asked again: --max-cost does not allow it)";
     failed
 }
 
 /// The failure of a request that was charged for as many attempts as `--retries paid` allows.
-fn out_of_paid_retries(mut failed: FailedTry, lost: LostAttempts) -> FailedTry {
+fn out_of_paid_retries(mut failed: AskError, lost: LostAttempts) -> AskError {
     failed.failure.message = format!(
         "{} ({} charged without a reply, {} tokens; remedies: a larger --max-tokens, --thinking off, or more --retries paid)",
         failed.failure.message,

@@ -1,25 +1,12 @@
-//! The class of a refused request, [`FailureClass`]: whether to retry it, which other requests would fail, and which flag helps.
+//! The failure of a refused request, [`AskError::refused`]: whether to retry it, which other requests would fail, and which flag helps.
 
 use super::complaint::Complaint;
-use super::failure::Reach;
+use super::failure::{Again, AskError, Reach};
 use super::field::{AdaptableField, FieldState, RequestField, SentFields, is_unsupported};
 use super::wire::other_wire;
 use super::wire_kind::Wire;
 use super::wording::Wording;
 use crate::types::FailureKind;
-
-/// The consequences of a refused request.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct FailureClass {
-    pub(super) kind: FailureKind,
-    pub(super) reach: Reach,
-    /// Whether the same request may succeed later.
-    pub(super) retryable: bool,
-    /// The remedy for the user.
-    pub(super) hint: Option<String>,
-    /// The field that the server refused, if the program can change how it is sent.
-    pub(super) refused_field: Option<AdaptableField>,
-}
 
 /// Codes and types that mean: no credit. Some servers send them with status 429, although waiting does not help.
 const NO_CREDIT: [&str; 6] = [
@@ -62,9 +49,15 @@ const NEXT_DAY: &str =
 /// The remedy for an account without credit.
 const ADD_CREDIT: &str = "the account has no credit left: add some, then continue with --resume";
 
-impl FailureClass {
-    /// The class of a refused request, from its status and the server's error.
-    pub(super) fn of(status: u16, complaint: &Complaint, wire: Wire, sent: SentFields<'_>) -> Self {
+impl AskError {
+    /// The failure of a refused request, from its status and the server's error. Its message is the remedy alone, empty if none is
+    /// known.
+    pub(super) fn refused(
+        status: u16,
+        complaint: &Complaint,
+        wire: Wire,
+        sent: SentFields<'_>,
+    ) -> Self {
         if let Some(wanted) = other_wire(complaint, wire).filter(|_| (400..500).contains(&status)) {
             return Self::of_wire(wanted);
         }
@@ -73,9 +66,9 @@ impl FailureClass {
                 && complaint.mentions_any(&NO_CREDIT_WORDS));
         // OpenAI forbids probabilities by a status that else is about the key.
         if status == 403
-            && let Some(class) = Self::of_refused_field(complaint, wire, sent)
+            && let Some(failed) = Self::of_refused_field(complaint, wire, sent)
         {
-            return class;
+            return failed;
         }
         if status >= 400
             && status != 401
@@ -89,8 +82,8 @@ impl FailureClass {
         }
         match status {
             429 if no_credit => Self {
-                kind: FailureKind::RateLimit,
-                ..Self::permanent(ADD_CREDIT)
+                reach: Reach::Endpoint,
+                ..Self::new(FailureKind::RateLimit, ADD_CREDIT.to_owned())
             },
             _ if no_credit => Self::permanent(ADD_CREDIT),
             300..400 => {
@@ -108,10 +101,7 @@ impl FailureClass {
             400..500
                 if complaint.has_code(&MODERATED) || (status == 403 && moderated(complaint)) =>
             {
-                Self {
-                    kind: FailureKind::Filtered,
-                    ..Self::request_refused()
-                }
+                Self::new(FailureKind::Filtered, String::new())
             }
             402 => Self::permanent(ADD_CREDIT),
             403 => Self::permanent(
@@ -123,17 +113,13 @@ impl FailureClass {
                 wire.path()
             )),
             408 | 425 => Self::transient(FailureKind::Timeout),
-            413 => Self {
-                hint: Some(SMALLER.to_owned()),
-                ..Self::request_refused()
-            },
-            429 if complaint.mentions_any(&TOO_LARGE) => Self {
-                hint: Some(SMALLER.to_owned()),
-                ..Self::request_refused()
-            },
+            413 => Self::new(FailureKind::Request, SMALLER.to_owned()),
+            429 if complaint.mentions_any(&TOO_LARGE) => {
+                Self::new(FailureKind::Request, SMALLER.to_owned())
+            }
             429 if complaint.is_daily() => Self {
-                kind: FailureKind::RateLimit,
-                ..Self::permanent(NEXT_DAY)
+                reach: Reach::Endpoint,
+                ..Self::new(FailureKind::RateLimit, NEXT_DAY.to_owned())
             },
             429 => Self::transient(FailureKind::RateLimit),
             // 424 is the status of Text Generation Inference for a generation that failed, 498 Groq's for no capacity, 499 nginx's
@@ -147,32 +133,19 @@ impl FailureClass {
     fn permanent(hint: &str) -> Self {
         Self {
             reach: Reach::Endpoint,
-            hint: Some(hint.to_owned()),
-            ..Self::request_refused()
+            ..Self::new(FailureKind::Request, hint.to_owned())
         }
     }
 
     /// A failure after which the same request may succeed later.
     fn transient(kind: FailureKind) -> Self {
         Self {
-            kind,
-            retryable: true,
-            ..Self::request_refused()
+            again: Again::Later,
+            ..Self::new(kind, String::new())
         }
     }
 
-    /// A failure of this request alone, which is not retried.
-    fn request_refused() -> Self {
-        Self {
-            kind: FailureKind::Request,
-            reach: Reach::Trial,
-            retryable: false,
-            hint: None,
-            refused_field: None,
-        }
-    }
-
-    /// The class of a request that the server takes through another wire alone.
+    /// The failure of a request that the server takes through another wire alone.
     fn of_wire(wanted: Wire) -> Self {
         let hint = match wanted {
             Wire::Responses => "ask the model through the Responses API: --request wire=responses",
@@ -184,13 +157,13 @@ impl FailureClass {
         }
     }
 
-    /// The class of a request that was refused for a field that the program can send in another way; `None` if it was not.
+    /// The failure of a request that was refused for a field that the program can send in another way; `None` if it was not.
     fn of_refused_field(complaint: &Complaint, wire: Wire, sent: SentFields<'_>) -> Option<Self> {
-        let class = Self::of_field(complaint, &wire.fields(sent));
-        class.refused_field.is_some().then_some(class)
+        Some(Self::of_field(complaint, &wire.fields(sent)))
+            .filter(|failed| failed.refused_field.is_some())
     }
 
-    /// The class of a request that may have been refused for one of its fields. If the server names the field, every other
+    /// The failure of a request that may have been refused for one of its fields. If the server names the field, every other
     /// request with it fails too, and so does every request if the server refuses what is not sent any more. If only the text mentions it, the
     /// cause may be this request alone.
     fn of_field(complaint: &Complaint, fields: &[RequestField<'_>]) -> Self {
@@ -205,7 +178,7 @@ impl FailureClass {
             }
             None => match with(FieldState::Sent).find(|field| field.is_mentioned(complaint)) {
                 Some(field) => (Reach::Trial, field),
-                None => return Self::request_refused(),
+                None => return Self::new(FailureKind::Request, String::new()),
             },
         };
         Self {

@@ -59,7 +59,7 @@ impl Local {
 
     pub(super) fn answer(&self, question: &Question, call: Call<'_>) -> Result<Reply, AskError> {
         let answer = (self.opinion)(question, &call);
-        let answer = answer.map_err(|message| AskError::new(FailureKind::Request, message, 1))?;
+        let answer = answer.map_err(|message| AskError::new(FailureKind::Request, message))?;
         let text = match answer.choice {
             Some(choice) => letter(choice).to_string(),
             None => self.prior.answer(question, call),

@@ -12,7 +12,6 @@ use super::constraint::letter_of;
 use super::endpoint::Endpoint;
 use super::extra_fields::ThinkingBudget;
 use super::failure::{AskError, Reach};
-use super::failure_class::FailureClass;
 use super::field::{AdaptableField, RequestFields, SentFields};
 use super::parameters::{Constrain, Parameters};
 use super::request::Request;
@@ -252,7 +251,10 @@ impl Remote {
         let body = fields.wire.body(parameters, fields, message, choices);
         let body = body.map_err(|error| {
             let message = format!("the request could not be written: {error}");
-            AskError::new(FailureKind::Request, message, 0)
+            AskError {
+                attempts: 0,
+                ..AskError::new(FailureKind::Request, message)
+            }
         })?;
         let request = Request {
             model: self.number,
@@ -324,7 +326,7 @@ impl Remote {
         };
         let wire = fields.wire.in_batch();
         let complaint = wire.complaint(body);
-        FailureClass::of(status, &complaint, wire, sent).refused_field
+        AskError::refused(status, &complaint, wire, sent).refused_field
     }
 
     /// The letter in a constrained reply, else the text. Warns once if the server does not follow the constraint.

@@ -9,8 +9,7 @@ use tracing::debug;
 use super::access::Access;
 use super::complaint::{Complaint, Unreadable, UnreadableReply};
 use super::connection::{Connection, Deadline, HttpReply};
-use super::failure::{Again, FailedTry, Reach};
-use super::failure_class::FailureClass;
+use super::failure::{Again, AskError, Reach};
 use super::pace::{Allowance, Gate, Window, asked_wait};
 use super::reply_secrets::without_secrets;
 use super::request::Request;
@@ -20,7 +19,7 @@ use super::vendor::Vendor;
 use super::wire::body_usage;
 use super::wire_kind::Wire;
 use crate::error::Result;
-use crate::types::{Failure, FailureKind, Finish, Reply};
+use crate::types::{FailureKind, Finish, Reply};
 
 /// One address of an endpoint: its key, pooled connections, and the pauses that it asked for.
 #[derive(Debug)]
@@ -79,7 +78,7 @@ impl Replica {
         request: &Request<'_>,
         headers: &HeaderMap,
         sent: Instant,
-    ) -> Result<Reply, FailedTry> {
+    ) -> Result<Reply, AskError> {
         let wire = request.wire;
         let timeout = self.sending.timeout;
         let deadline = match wire {
@@ -136,11 +135,10 @@ impl Replica {
                 } = *unreadable;
                 let scrub = &self.connection.scrub;
                 let message = format!("{} answered with {}", self.base(), scrub.line(&what));
-                FailedTry {
+                AskError {
                     again: if is_final { Again::Never } else { Again::Later },
-                    usage,
                     finish: finish.map(|word| scrub.line(&word)),
-                    ..FailedTry::new(FailureKind::Response, message)
+                    ..AskError::new(FailureKind::Response, message).charged(usage)
                 }
             }
         };
@@ -169,40 +167,33 @@ impl Replica {
         answer: &HttpReply,
         request: &Request<'_>,
         sent: Instant,
-    ) -> FailedTry {
-        let mut class = FailureClass::of(status, complaint, request.wire, request.sent);
-        match answer.header("x-should-retry") {
-            "true" => class.retryable = true,
-            "false" => class.retryable = false,
-            _ => {}
-        }
-        let hint = class.hint.as_deref();
-        let message = self.message(status, complaint, hint, &self.request_id(answer));
+    ) -> AskError {
+        let mut failed = AskError::refused(status, complaint, request.wire, request.sent);
+        let is_retryable = match answer.header("x-should-retry") {
+            "true" => true,
+            "false" => false,
+            _ => failed.again != Again::Never,
+        };
+        let remedy = &failed.failure.message;
+        let message = self.message(status, complaint, remedy, &self.request_id(answer));
+        failed.failure.message = message;
+        failed.failure.status = Some(status);
         let now = SystemTime::now();
         let stated = asked_wait(&answer.headers, now).max(complaint.wait);
         let reset = || Allowance::read(&answer.headers, now).pause();
-        let wait = stated
+        failed.wait = stated
             .or_else(|| reset().filter(|_| status == 429))
-            .filter(|_| class.retryable);
-        let again = match class.retryable {
+            .filter(|_| is_retryable);
+        let is_full = status == 429 || (asks_for_pause(status) && failed.wait.is_some());
+        failed.again = match is_retryable {
             false => Again::Never,
-            true if status == 429 || (asks_for_pause(status) && wait.is_some()) => Again::WhenTaken,
+            true if is_full => Again::WhenTaken,
             true => Again::Later,
         };
-        let mut failed = FailedTry {
-            failure: Failure {
-                kind: class.kind,
-                status: Some(status),
-                message,
-            },
-            reach: class.reach,
-            again,
-            wait,
-            refused_field: class.refused_field,
-            usage: body_usage(&String::from_utf8_lossy(&answer.body)),
-            may_be_charged: status >= 500 && !refuses_work(status),
-            finish: None,
-        };
+        failed
+            .lost
+            .add(body_usage(&String::from_utf8_lossy(&answer.body)));
+        failed.may_have_effect = status >= 500 && !refuses_work(status);
         self.pause(status, sent, &mut failed);
         failed
     }
@@ -212,7 +203,7 @@ impl Replica {
         &self,
         status: u16,
         complaint: &Complaint,
-        hint: Option<&str>,
+        remedy: &str,
         request_id: &str,
     ) -> String {
         let mut message = format!("{} answered {status}", self.base());
@@ -220,8 +211,8 @@ impl Replica {
         if !text.is_empty() {
             message = format!("{message}: {text}");
         }
-        if let Some(hint) = hint {
-            message = format!("{message} ({hint})");
+        if !remedy.is_empty() {
+            message = format!("{message} ({remedy})");
         }
         if !request_id.is_empty() {
             message = format!("{message} [request {request_id}]");
@@ -231,7 +222,7 @@ impl Replica {
 
     /// Makes all requests wait as long as the server asked; a request that would wait more than `--retries max-wait` is given up, and
     /// the time at which it could go on is said.
-    fn pause(&self, status: u16, sent: Instant, failed: &mut FailedTry) {
+    fn pause(&self, status: u16, sent: Instant, failed: &mut AskError) {
         let max_wait = self.sending.max_wait;
         match failed.wait {
             Some(wait) if wait > max_wait => {

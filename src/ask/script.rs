@@ -118,7 +118,7 @@ impl Script {
                 r#"{} has no reply to question {id} and no {{"default": ".."}} line"#,
                 self.path.display()
             );
-            AskError::new(FailureKind::Request, message, 1)
+            AskError::new(FailureKind::Request, message)
         })
     }
 }

@@ -6,7 +6,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use tokio::time::{Duration, Instant};
 use tracing::warn;
 
-use super::failure::{Again, FailedTry, Reach};
+use super::failure::{Again, AskError, Reach};
 use crate::types::FailureKind;
 
 /// The replica that a request prefers takes it while it has at most this many more in flight than the one with the fewest; chosen.
@@ -255,7 +255,7 @@ impl Services {
     }
 
     /// Notes a failure of a request to a model at a replica, and tells whether the request goes elsewhere.
-    pub(super) fn failed(&self, model: ModelNumber, index: usize, failed: &FailedTry) -> Effect {
+    pub(super) fn failed(&self, model: ModelNumber, index: usize, failed: &AskError) -> Effect {
         let (now, mut state) = (Instant::now(), self.state());
         let effect = |is_left: bool| {
             if is_left {

@@ -267,18 +267,9 @@ mod tests {
     }
 
     fn error(kind: FailureKind, reach: Reach) -> AskError {
-        let failure = Failure {
-            kind,
-            status: None,
-            message: "no".into(),
-        };
         AskError {
-            failure,
-            attempts: 1,
             reach,
-            refused_field: None,
-            lost: Box::default(),
-            finish: None,
+            ..AskError::new(kind, "no".into())
         }
     }
 

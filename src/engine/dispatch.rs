@@ -31,7 +31,7 @@ use crate::images::timings::{TimedStep, Timings};
 use crate::images::trial::{Item, PreparedGroup, Trial};
 use crate::images::workers::unstarted;
 use crate::store::Store;
-use crate::types::{Digest, Failure, FailureKind, Finish, LostAttempts, Record, Reply, SetLight};
+use crate::types::{Digest, FailureKind, Finish, LostAttempts, Record, Reply, SetLight};
 use darkqa_score::image_dependence::{ImageDependence, LitReply};
 use darkqa_score::record::answered;
 
@@ -405,18 +405,9 @@ impl<I: Item> ReplySink<'_, I> {
             self.breaker.ended(problem);
             return Ok(Vec::new());
         }
-        let message = problem.to_string();
         let error = AskError {
-            failure: Failure {
-                kind: FailureKind::Image,
-                status: None,
-                message,
-            },
             attempts: 0,
-            reach: Reach::Trial,
-            refused_field: None,
-            lost: Box::default(),
-            finish: None,
+            ..AskError::new(FailureKind::Image, problem.to_string())
         };
         for ready in ready {
             self.store_result(Ok((ready, Err(error.clone()))))?;

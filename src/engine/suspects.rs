@@ -76,21 +76,9 @@ impl Suspects {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::Failure;
 
     fn error(kind: FailureKind) -> AskError {
-        AskError {
-            failure: Failure {
-                kind,
-                status: None,
-                message: "no".into(),
-            },
-            attempts: 1,
-            reach: Reach::Trial,
-            refused_field: None,
-            lost: Box::default(),
-            finish: None,
-        }
+        AskError::new(kind, "no".into())
     }
 
     #[test]

@@ -3,7 +3,6 @@
 //! Each call is sent once. Whether it is repeated is decided by the caller, who knows what may have happened at the server.
 
 mod download;
-mod failure;
 mod objects;
 mod upload;
 
@@ -18,11 +17,12 @@ use super::batch::BatchLine;
 use super::bounded_json::parse;
 use super::complaint::Complaint;
 use super::connection::{Connection, Deadline, HttpReply};
-use super::failure::FailedTry;
+use super::failure::AskError;
 use super::pace::asked_wait;
+use super::quota_refusal::QuotaRefusal;
+use crate::types::FailureKind;
 
 use download::remove_secrets;
-pub(crate) use failure::{ApiFailure, Effect, QuotaRefusal};
 use objects::MARK;
 pub(crate) use objects::{BatchState, Readiness, RemoteBatch, RemoteFile};
 use upload::FileForm;
@@ -33,8 +33,8 @@ const SLOWEST: u64 = 50_000;
 /// The most pages of a list that are read; chosen: 10,000 files or batches.
 const MOST_PAGES: usize = 100;
 
-/// The result of a call.
-pub(crate) type ApiResult<T> = Result<T, ApiFailure>;
+/// The result of a call; `attempts`, `reach` and what depends on them are of no use in its error.
+pub(crate) type ApiResult<T> = Result<T, AskError>;
 
 /// A server with files and batches.
 #[derive(Debug)]
@@ -77,8 +77,8 @@ impl BatchServer {
         // No line of a file of requests has this text: a line is one JSON object, and the text follows no line end in it.
         let boundary = format!("darkqa-{name}").replace(|c: char| !c.is_ascii_alphanumeric(), "-");
         let boundary: String = boundary.chars().take(70).collect();
-        let form = FileForm::open(path, name, purpose, &boundary).map_err(|e| ApiFailure {
-            effect: Effect::None,
+        let form = FileForm::open(path, name, purpose, &boundary).map_err(|e| AskError {
+            may_have_effect: false,
             ..self.unreadable(&format!("{} could not be read: {e}", path.display()))
         })?;
         let bytes = path.metadata().map_or(0, |file| file.len());
@@ -113,12 +113,9 @@ impl BatchServer {
         let sent = self.connection.save(request, to, most).await;
         let answer = sent.map_err(not_answered)?;
         self.succeeded(answer)?;
-        remove_secrets(to, &self.connection.scrub).map_err(|e| ApiFailure {
-            status: None,
-            message: format!("{}: keys in it could not be removed: {e}", to.display()),
-            effect: Effect::None,
-            wait: None,
-            quota: None,
+        remove_secrets(to, &self.connection.scrub).map_err(|e| {
+            let message = format!("{}: keys in it could not be removed: {e}", to.display());
+            AskError::new(FailureKind::Request, message)
         })
     }
 
@@ -236,39 +233,27 @@ impl BatchServer {
         let (base, scrub) = (&self.connection.base, &self.connection.scrub);
         let text = scrub.line(&complaint.message);
         let separator = if text.is_empty() { "" } else { ": " };
-        Err(ApiFailure {
-            status: Some(status),
-            message: format!("{base} answered {status}{separator}{text}"),
-            effect: if status < 500 {
-                Effect::None
-            } else {
-                Effect::Unknown
-            },
-            wait: asked_wait(&answer.headers, SystemTime::now()).max(complaint.wait),
-            quota: QuotaRefusal::of(&complaint, scrub),
-        })
+        let message = format!("{base} answered {status}{separator}{text}");
+        let mut failed = AskError::new(FailureKind::Request, message);
+        failed.failure.status = Some(status);
+        failed.may_have_effect = status >= 500;
+        failed.wait = asked_wait(&answer.headers, SystemTime::now()).max(complaint.wait);
+        failed.quota = QuotaRefusal::of(&complaint, scrub).map(Box::new);
+        Err(failed)
     }
 
     /// The failure of a call that the server answered with something else.
-    fn unreadable(&self, what: &str) -> ApiFailure {
-        ApiFailure {
-            status: None,
-            message: format!("{} answered with {what}", self.connection.base),
-            effect: Effect::Unknown,
-            wait: None,
-            quota: None,
-        }
+    fn unreadable(&self, what: &str) -> AskError {
+        let message = format!("{} answered with {what}", self.connection.base);
+        AskError::new(FailureKind::Response, message)
     }
 }
 
 /// The failure of a call without a complete response.
-fn not_answered(failed: FailedTry) -> ApiFailure {
-    ApiFailure {
-        status: failed.failure.status,
-        message: failed.failure.message,
-        effect: Effect::Unknown,
-        wait: failed.wait,
-        quota: None,
+fn not_answered(failed: AskError) -> AskError {
+    AskError {
+        may_have_effect: true,
+        ..failed
     }
 }
 

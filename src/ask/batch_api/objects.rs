@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-use super::failure::QuotaRefusal;
 use crate::ask::complaint::Complaint;
+use crate::ask::quota_refusal::QuotaRefusal;
 use crate::ask::secret::Scrub;
 
 /// A file at a server.

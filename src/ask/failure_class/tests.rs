@@ -10,7 +10,7 @@ fn parameters() -> Parameters {
     }
 }
 
-fn classify(status: u16, body: &str) -> FailureClass {
+fn classify(status: u16, body: &str) -> AskError {
     let sent = SentFields {
         parameters: &parameters(),
         fields: RequestFields {
@@ -24,7 +24,7 @@ fn classify(status: u16, body: &str) -> FailureClass {
         has_image: true,
         has_key: true,
     };
-    FailureClass::of(status, &Complaint::of_body(body), Wire::Chat, sent)
+    AskError::refused(status, &Complaint::of_body(body), Wire::Chat, sent)
 }
 
 #[test]
@@ -32,11 +32,11 @@ fn each_status_has_its_class() {
     for status in [301, 302, 307, 401, 402, 403, 404, 405, 407, 410] {
         let class = classify(status, "");
         assert_eq!(
-            (class.reach, class.retryable),
-            (Reach::Endpoint, false),
+            (class.reach, class.again),
+            (Reach::Endpoint, Again::Never),
             "{status}"
         );
-        assert!(class.hint.is_some(), "{status}");
+        assert!(!class.failure.message.is_empty(), "{status}");
     }
     for (status, kind) in [
         (408, FailureKind::Timeout),
@@ -51,17 +51,17 @@ fn each_status_has_its_class() {
     ] {
         let class = classify(status, "");
         assert_eq!(
-            (class.reach, class.retryable),
-            (Reach::Trial, true),
+            (class.reach, class.again),
+            (Reach::Trial, Again::Later),
             "{status}"
         );
-        assert_eq!(class.kind, kind);
+        assert_eq!(class.failure.kind, kind);
     }
     for status in [400, 413, 415, 422] {
         let class = classify(status, "");
         assert_eq!(
-            (class.reach, class.retryable),
-            (Reach::Trial, false),
+            (class.reach, class.again),
+            (Reach::Trial, Again::Never),
             "{status}"
         );
     }
@@ -94,21 +94,21 @@ fn codes_and_texts_overrule_the_status() {
     ] {
         let class = classify(status, body);
         assert_eq!(
-            (class.reach, class.retryable),
-            (Reach::Endpoint, false),
+            (class.reach, class.again),
+            (Reach::Endpoint, Again::Never),
             "{body}"
         );
     }
     // Gemini's limit per minute mentions a quota too; waiting helps.
     let minute = r#"{"error":{"code":429,"status":"RESOURCE_EXHAUSTED","message":"You exceeded your current quota, please check your plan"}}"#;
-    assert!(classify(429, minute).retryable);
+    assert_eq!(classify(429, minute).again, Again::Later);
     let moderated = r#"{"error":{"code":403,"message":"x","metadata":{"reasons":["violence"]}}}"#;
     let filtered = r#"{"error":{"code":"content_filter","message":"x","innererror":{"code":"ResponsibleAIPolicyViolation"}}}"#;
     for (status, body) in [(403, moderated), (400, filtered)] {
         let class = classify(status, body);
         assert_eq!(
-            (class.reach, class.retryable, class.kind),
-            (Reach::Trial, false, FailureKind::Filtered)
+            (class.reach, class.again, class.failure.kind),
+            (Reach::Trial, Again::Never, FailureKind::Filtered)
         );
     }
 }
@@ -155,14 +155,14 @@ fn the_flag_that_helps_is_named() {
     ] {
         let class = classify(400, body);
         assert_eq!(class.reach, reach, "{body}");
-        assert!(class.hint.unwrap().contains(flag), "{body}");
+        assert!(class.failure.message.contains(flag), "{body}");
     }
     // A field that was not sent is not the cause.
     for body in [
         r#"{"error":{"param":"max_completion_tokens","message":"x"}}"#,
         r#"{"error":{"param":"messages.[0].content.[1].image_url.detail","message":"x"}}"#,
     ] {
-        assert_eq!(classify(400, body).hint, None, "{body}");
+        assert_eq!(classify(400, body).failure.message, "", "{body}");
     }
 }
 

@@ -1,6 +1,5 @@
 use super::*;
 use crate::ask::field::AdaptableField;
-use crate::types::Failure;
 
 fn services(count: usize) -> Services {
     let all = Services::new((0..count).map(|index| format!("r{index}")));
@@ -11,24 +10,17 @@ fn services(count: usize) -> Services {
 /// The first model at the replicas, which every test has.
 const ONE: ModelNumber = ModelNumber(0);
 
-fn failed(kind: FailureKind, status: Option<u16>, reach: Reach) -> FailedTry {
-    FailedTry {
-        usage: None,
-        may_be_charged: false,
-        finish: None,
-        failure: Failure {
-            kind,
-            status,
-            message: "no".to_owned(),
-        },
+fn failed(kind: FailureKind, status: Option<u16>, reach: Reach) -> AskError {
+    let mut failed = AskError::new(kind, "no".to_owned());
+    failed.failure.status = status;
+    AskError {
         reach,
         again: Again::Later,
-        wait: None,
-        refused_field: None,
+        ..failed
     }
 }
 
-fn refused_connection() -> FailedTry {
+fn refused_connection() -> AskError {
     failed(FailureKind::Connection, None, Reach::Trial)
 }
 
@@ -164,7 +156,7 @@ async fn what_the_request_may_have_caused_spends_a_retry() {
         (FailureKind::Server, 503, Again::WhenTaken),
     ] {
         for _ in 0..9 {
-            let failure = FailedTry {
+            let failure = AskError {
                 again,
                 ..failed(kind, Some(status), Reach::Trial)
             };
@@ -237,7 +229,7 @@ async fn each_model_has_replicas_of_its_own() {
 #[tokio::test(start_paused = true)]
 async fn a_refused_field_takes_no_replica_away() {
     let all = services(2);
-    let field = FailedTry {
+    let field = AskError {
         refused_field: Some(AdaptableField::Temperature),
         ..failed(FailureKind::Request, Some(403), Reach::Endpoint)
     };

@@ -290,7 +290,7 @@ impl<D: Detail> Driver<'_, D> {
             tried = server.delete(id).await;
         }
         Ok(match tried {
-            Err(failure) if failure.status == Some(404) => Ok(()),
+            Err(failure) if failure.failure.status == Some(404) => Ok(()),
             tried => tried,
         })
     }

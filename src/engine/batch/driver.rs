@@ -14,8 +14,8 @@ use super::part::{Part, Stage};
 use super::servers::Servers;
 use super::settings::BatchRunArgs;
 use super::stopped::Stopped;
-use crate::ask::BaseUrl;
-use crate::ask::batch_api::{ApiFailure, BatchServer};
+use crate::ask::batch_api::BatchServer;
+use crate::ask::{AskError, BaseUrl};
 use crate::engine::models::ModelUnderTest;
 use crate::engine::money::MoneySettings;
 use crate::error::{Error, Result};
@@ -254,7 +254,7 @@ impl<D: Detail> Driver<'_, D> {
     }
 
     /// The error for a call that would fail again.
-    pub(super) fn fatal(&self, part: usize, failure: &ApiFailure) -> Error {
+    pub(super) fn fatal(&self, part: usize, failure: &AskError) -> Error {
         let part = self.part(part);
         Error::Endpoint {
             endpoint: part.facts.base.clone(),
@@ -269,7 +269,7 @@ impl<D: Detail> Driver<'_, D> {
     ///
     /// # Errors
     /// If the last looks were refused, too: the key or the address is wrong.
-    pub(super) fn look_failed(&mut self, part: usize, failure: &ApiFailure) -> Result<Step> {
+    pub(super) fn look_failed(&mut self, part: usize, failure: &AskError) -> Result<Step> {
         tracing::debug!("{}: {failure}", self.part(part).name);
         if failure.is_permanent() {
             let looks = self.notes.refused_looks.entry(part).or_default();

@@ -8,7 +8,7 @@ use super::driver::{Driver, Step, Until};
 use super::event::{Event, PartFacts};
 use super::part::Part;
 use super::requests::SHARE_OF_QUOTA;
-use crate::ask::batch_api::QuotaRefusal;
+use crate::ask::QuotaRefusal;
 use crate::engine::budget::{Answering, Budget};
 use crate::engine::in_flight_cost::InFlightCost;
 use crate::error::Result;

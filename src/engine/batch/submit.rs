@@ -2,8 +2,8 @@
 
 use super::driver::{Driver, Step, Until};
 use super::event::Event;
-use crate::ask::BatchInterface;
-use crate::ask::batch_api::{ApiFailure, BatchState, Effect, NewBatch, Readiness, RemoteBatch};
+use crate::ask::batch_api::{BatchState, NewBatch, Readiness, RemoteBatch};
+use crate::ask::{AskError, BatchInterface};
 use crate::error::{Error, Result};
 use crate::report::forecast::money;
 use darkqa_score::record::Detail;
@@ -98,7 +98,7 @@ impl<D: Detail> Driver<'_, D> {
                     Readiness::Refused => return Err(self.unread(part)),
                 },
                 // It was deleted, so it is uploaded again.
-                Err(failure) if failure.status == Some(404) => {
+                Err(failure) if failure.failure.status == Some(404) => {
                     self.journal.record(part, Event::Uploading)?;
                     return self.refuse(part, "the file is not at the server any more");
                 }
@@ -190,12 +190,12 @@ impl<D: Detail> Driver<'_, D> {
     }
 
     /// What follows from an upload or a creation that did not succeed.
-    fn not_made(&mut self, part: usize, failure: &ApiFailure) -> Result<Step> {
+    fn not_made(&mut self, part: usize, failure: &AskError) -> Result<Step> {
         if let Some(quota) = &failure.quota {
             return self.quota_reached(part, quota);
         }
-        if failure.effect == Effect::None {
-            let why = failure.message.clone();
+        if !failure.may_have_effect {
+            let why = failure.failure.message.clone();
             self.journal.record(part, Event::Refused { why })?;
             if failure.is_permanent() {
                 return Err(self.fatal(part, failure));

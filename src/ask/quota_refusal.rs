@@ -1,18 +1,7 @@
-//! The reason why a call of the files or batches interface did not succeed: [`ApiFailure`].
+//! The refusal of a batch because of the tokens that wait: [`QuotaRefusal`].
 
-use std::time::Duration;
-
-use crate::ask::complaint::Complaint;
-use crate::ask::secret::Scrub;
-
-/// Whether a call that did not succeed may have changed something at the server.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Effect {
-    /// The server refused the call, so nothing was changed.
-    None,
-    /// The connection broke, or the server failed: the file or batch may exist.
-    Unknown,
-}
+use super::complaint::Complaint;
+use super::secret::Scrub;
 
 /// The refusal of a batch because too many tokens already wait for batches.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -43,35 +32,6 @@ fn stated_limit(message: &str) -> Option<u64> {
     let digits = number.take_while(|c| c.is_ascii_digit() || matches!(c, ',' | '_'));
     let digits: String = digits.filter(char::is_ascii_digit).collect();
     digits.parse().ok().filter(|limit| *limit > 0)
-}
-
-/// The reason why a call did not succeed; secrets are removed from its text.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{message}")]
-pub(crate) struct ApiFailure {
-    /// The HTTP status; `None` without a response.
-    pub status: Option<u16>,
-    /// The server's words with its address.
-    pub message: String,
-    /// Whether the call may have changed something.
-    pub effect: Effect,
-    /// The wait that the server asked for; `None` if it asked for none.
-    pub wait: Option<Duration>,
-    /// The refusal because too many tokens wait; `None` if the reason is another one.
-    pub quota: Option<QuotaRefusal>,
-}
-
-impl ApiFailure {
-    /// Whether the same call would fail again: the key, the address or the request is wrong.
-    pub(crate) fn is_permanent(&self) -> bool {
-        let passing = matches!(self.status, None | Some(408 | 409 | 425 | 429 | 500..));
-        !passing && self.quota.is_none()
-    }
-
-    /// Whether the server has no such interface.
-    pub(crate) fn is_unsupported(&self) -> bool {
-        matches!(self.status, Some(404 | 405 | 501))
-    }
 }
 
 #[cfg(test)]
