@@ -7,7 +7,9 @@ use crate::engine::models::ModelUnderTest;
 use crate::engine::money::MoneySettings;
 use crate::engine::prompt_bounds::{self, PromptBounds, PromptFacts};
 use crate::error::{Error, Result};
+use crate::images::source::Source;
 use crate::images::trial::{Item, Prompt, Trial};
+use crate::picture::Scaling;
 use crate::run_reports;
 use crate::store::StoredTrial;
 use crate::types::manifest::RunManifest;
@@ -304,8 +306,23 @@ pub(crate) fn text_tokens(prompt: &Prompt) -> f64 {
     characters.iter().sum::<usize>() as f64 / CHARACTERS_PER_TOKEN + MESSAGE_TOKENS
 }
 
+/// Tokens of the images that a request about a source shows a model, each `charged` tokens if that is known; `None` if those of one are
+/// unknown.
+pub(crate) fn shown_tokens(
+    model: &ModelUnderTest,
+    price: Option<Price>,
+    charged: Option<f64>,
+    source: &Source,
+    scaling: Scaling,
+) -> Option<f64> {
+    source.order.iter().try_fold(0.0, |sum, place| {
+        let (width, height) = scaling.size(source.frames[*place].size);
+        Some(sum + charged.or_else(|| image_tokens(model, price, width, height))?)
+    })
+}
+
 /// Tokens of an image for a model: from the table of prices, else by the model's family; `None` if unknown.
-pub(crate) fn image_tokens(
+fn image_tokens(
     model: &ModelUnderTest,
     price: Option<Price>,
     width: usize,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::ask::{ImageLimit, Price, Server};
-use crate::engine::budget::{Budget, image_tokens, text_tokens};
+use crate::engine::budget::{Budget, shown_tokens, text_tokens};
 use crate::engine::experiment::{ExpectedRequest, Experiment};
 use crate::engine::measured_tokens::MeasuredTokens;
 use crate::engine::models::ModelUnderTest;
@@ -167,13 +167,9 @@ fn lines<E: Experiment>(
             }
             let source = &sources[place];
             if group.condition.is_some() && tokens.requests > before {
-                let mut shown = source.order.iter().map(|place| source.frames[*place].size);
+                let scaling = experiment.recipe().scaling;
                 let charged = measured.image(index);
-                let of_request = shown.try_fold(0.0, |sum, size| {
-                    let (width, height) = experiment.recipe().scaling.size(size);
-                    let by_rule = || image_tokens(model, price, width, height);
-                    Some(sum + charged.or_else(by_rule)?)
-                });
+                let of_request = shown_tokens(model, price, charged, source, scaling);
                 let requests = (tokens.requests - before) as f64;
                 let known = tokens.image.zip(of_request);
                 tokens.image = known.map(|(sum, each)| sum + each * requests);

@@ -1,7 +1,7 @@
 //! The estimated cost of each source of a plan: [`costs`].
 
 use crate::ask::Price;
-use crate::engine::budget::{image_tokens, text_tokens};
+use crate::engine::budget::{shown_tokens, text_tokens};
 use crate::engine::experiment::Experiment;
 use crate::images::plan::{SourcePlan, TrialGroup};
 use crate::images::source::Source;
@@ -50,13 +50,6 @@ fn add_group<E: Experiment>(
     cost: &mut FrameCost,
 ) {
     let models = experiment.models(0);
-    let shown: Vec<(usize, usize)> = if group.condition.is_some() {
-        let frames = source.order.iter().map(|place| source.frames[*place].size);
-        let sent = frames.map(|size| experiment.recipe().scaling.size(size));
-        sent.collect()
-    } else {
-        Vec::new()
-    };
     if let Some(condition) = &group.condition {
         let each = match condition.enhancer {
             None => SECONDS_PER_MEGAPIXEL,
@@ -73,10 +66,10 @@ fn add_group<E: Experiment>(
         .iter()
         .map(|model| {
             let price = model.price(&experiment.settings().money.prices);
-            let mut shown = shown.iter();
-            let tokens = shown.try_fold(0.0, |sum, (width, height)| {
-                Some(sum + image_tokens(model, price, *width, *height)?)
-            });
+            let tokens = match &group.condition {
+                Some(_) => shown_tokens(model, price, None, source, experiment.recipe().scaling),
+                None => Some(0.0),
+            };
             (price, tokens)
         })
         .collect();

@@ -25,6 +25,7 @@ use crate::files::write;
 use crate::images::progress::Progress;
 use crate::images::questions::{QuestionBank, open_data, rules, select};
 use crate::runs::Outcome;
+use crate::text::words::counted;
 use crate::types::Decides;
 use crate::types::Question;
 use crate::types::manifest::Status;
@@ -89,17 +90,13 @@ pub(crate) fn check(
 }
 
 fn verdict(asked: usize, problems: usize, warnings: usize) -> String {
-    let many = |count: usize, noun: &str| match count {
-        1 => format!("1 {noun}"),
-        count => format!("{count} {noun}s"),
-    };
     let warnings = match warnings {
         0 => String::new(),
-        count => format!(", {}", many(count, "warning")),
+        count => format!(", {}", counted(count, "warning")),
     };
     match problems {
-        0 => format!("ok: {}{warnings}", many(asked, "question")),
-        count => format!("{}{warnings}", many(count, "problem")),
+        0 => format!("ok: {}{warnings}", counted(asked, "question")),
+        count => format!("{}{warnings}", counted(count, "problem")),
     }
 }
 
