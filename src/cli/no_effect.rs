@@ -8,7 +8,7 @@ use clap::{ArgMatches, Args, Command as Clap};
 use super::command::{BatchCommand, CheckCommand, Cli, Command};
 use super::layers;
 use crate::ask::{AccessArgs, Parameters, RequestArgs, Sending};
-use crate::dataset::{CodesArgs, SetArgs};
+use crate::dataset::{DecodeArgs, SetArgs};
 use crate::engine::batch::{BatchFileArgs, BatchRunArgs};
 use crate::engine::models::ModelName;
 use crate::engine::settings::JobArgs;
@@ -104,12 +104,12 @@ fn ids<A: Args>() -> Vec<String> {
 
 /// The flags that decide only degraded images. Without the seed, which decides guesses and orders, too.
 fn light() -> Vec<String> {
-    without_seed(ids::<LightArgs>())
+    without("seed", ids::<LightArgs>())
 }
 
 /// The flags that decide only noise.
 fn sensor() -> Vec<String> {
-    without_seed(ids::<SensorArgs>())
+    without("seed", ids::<SensorArgs>())
 }
 
 /// The flags that decide only automatic exposure and motion blur.
@@ -120,8 +120,8 @@ fn camera() -> Vec<String> {
 /// The flags of the sensor that automatic exposure takes: the others decide only the noise variant.
 const OF_AUTO: [&str; 2] = ["camera", "fixed"];
 
-fn without_seed(mut ids: Vec<String>) -> Vec<String> {
-    ids.retain(|id| id != "seed");
+fn without(name: &str, mut ids: Vec<String>) -> Vec<String> {
+    ids.retain(|id| id != name);
     ids
 }
 
@@ -253,7 +253,7 @@ impl NoEffect {
                 light(),
                 enhancement(),
                 ids::<ImageArgs>(),
-                ids::<CodesArgs>(),
+                without("max_pixels", ids::<DecodeArgs>()),
                 images.to_vec(),
             ];
             let shown = [shown.concat(), vec!["detail".into(), "max_image".into()]].concat();

@@ -48,7 +48,9 @@ use ready_made::{Form, LEFT_OUT, ReadQuestions, RowCounts, SceneNames, Series};
 pub(crate) use root::Root;
 pub(crate) use root::RootArgs;
 pub(crate) use scene_args::SceneArgs;
-pub(crate) use settings::{BankArgs, CodesArgs, DataArgs, PixelLimit, SelectionArgs, place};
+pub(crate) use settings::{
+    BankArgs, DataArgs, DecodeArgs, FolderArgs, PixelLimit, SelectionArgs, place,
+};
 use view::FrameFacts;
 pub(crate) use view::FrameFiles;
 

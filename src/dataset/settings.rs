@@ -1,4 +1,4 @@
-//! The flags for data: [`DataArgs`], [`SelectionArgs`], [`BankArgs`], [`PixelLimit`], [`CodesArgs`].
+//! The flags for data: [`DataArgs`], [`SelectionArgs`], [`BankArgs`], [`PixelLimit`], [`DecodeArgs`], [`FolderArgs`].
 
 use std::convert::Infallible;
 use std::fmt;
@@ -9,7 +9,7 @@ use clap::Args;
 
 use super::bank::BankPlace;
 use super::ready_made::{is_known_set, known_sets};
-use super::{DataPlace, SetArgs};
+use super::{DataPlace, RootArgs, SetArgs};
 use crate::picture::reading_rule::{ColourRule, MOST_PIXELS, ReadingRule, Transfer};
 use crate::rooms::Rooms;
 use crate::types::{Decides, Family, shell_word};
@@ -87,10 +87,13 @@ pub(crate) struct PixelLimit {
     pub max_pixels: NonZeroU64,
 }
 
-/// The flags for what the codes of images mean.
-#[derive(Debug, Clone, Copy, Default, Args)]
+/// The flags for the decoding of images.
+#[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Data")]
-pub(crate) struct CodesArgs {
+pub(crate) struct DecodeArgs {
+    /// The maximum size of an image.
+    #[command(flatten)]
+    pub limit: PixelLimit,
     /// What is done about images whose file states other colours than sRGB (an ICC profile, cICP, gAMA)
     #[arg(long, value_enum, default_value_t, add = Decides::Pixels)]
     pub colour: ColourRule,
@@ -102,6 +105,17 @@ pub(crate) struct CodesArgs {
     pub exposure: Option<f32>,
 }
 
+/// The flags for the reading of folders of images.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct FolderArgs {
+    /// The decoding of images.
+    #[command(flatten)]
+    pub decode: DecodeArgs,
+    /// Further folders in which images may lie.
+    #[command(flatten)]
+    pub root: RootArgs,
+}
+
 /// The number of EV in a text by which light is scaled.
 fn exposure(text: &str) -> Result<f32, String> {
     let ev = text.parse().ok();
@@ -109,11 +123,11 @@ fn exposure(text: &str) -> Result<f32, String> {
     ev.ok_or_else(|| "a number from -20 to 20 expected".to_owned())
 }
 
-impl CodesArgs {
+impl DecodeArgs {
     /// The rule by which images are read.
-    pub(crate) fn rule(self, limit: PixelLimit) -> ReadingRule {
+    pub(crate) fn rule(self) -> ReadingRule {
         ReadingRule {
-            most_pixels: limit.max_pixels.get(),
+            most_pixels: self.limit.max_pixels.get(),
             colour: self.colour,
             transfer: self.transfer,
             exposure_ev: self.exposure,

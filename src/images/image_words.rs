@@ -8,7 +8,7 @@ use clap::parser::ValueSource;
 use clap::{ArgAction, ArgMatches, CommandFactory as _, Parser};
 use serde_json::Value;
 
-use crate::dataset::{CodesArgs, DataArgs, PixelLimit, SceneArgs};
+use crate::dataset::{DataArgs, DecodeArgs, SceneArgs};
 use crate::error::{Error, Result};
 use crate::images::walk::Walk;
 use crate::picture::ImageArgs;
@@ -32,9 +32,7 @@ pub(crate) struct ImageFlags {
     #[command(flatten)]
     pub(crate) scene: SceneArgs,
     #[command(flatten)]
-    pub(crate) limit: PixelLimit,
-    #[command(flatten)]
-    pub(crate) codes: CodesArgs,
+    pub(crate) decode: DecodeArgs,
     #[command(flatten)]
     pub(crate) sensor: SensorArgs,
     #[command(flatten)]

@@ -9,8 +9,8 @@ use ndarray::Array2;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
+use crate::dataset::FolderArgs;
 use crate::dataset::frame_folder::{self, FramePaths};
-use crate::dataset::{CodesArgs, PixelLimit, RootArgs};
 use crate::error::{Error, Result};
 use crate::images::input_tally::InputTally;
 use crate::images::progress::Progress;
@@ -84,15 +84,9 @@ struct ImportArgs {
     /// Write into a folder that holds frames already
     #[arg(long, help_heading = "Output", add = Decides::Nothing)]
     force: bool,
-    /// The maximum size of an image.
+    /// The reading of frames.
     #[command(flatten)]
-    limit: PixelLimit,
-    /// What the codes of images mean.
-    #[command(flatten)]
-    codes: CodesArgs,
-    /// Further folders of the frames.
-    #[command(flatten)]
-    root: RootArgs,
+    folders: FolderArgs,
     /// The number of threads.
     #[command(flatten)]
     threads: ThreadArgs,
@@ -128,7 +122,7 @@ fn import_frames(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
             "the folder has frames already; --force overwrites them, another --out keeps both";
         return Err(Error::data(list.display(), problem));
     }
-    let adapter = open_all(args.kind, src, &args.stated, &args.root.data_root)?;
+    let adapter = open_all(args.kind, src, &args.stated, &args.folders.root.data_root)?;
     let frames = choose(
         &adapter.listing().frames,
         args.key_frames.selection(),
@@ -233,7 +227,7 @@ struct ImportedImage {
 
 impl ImportedImage {
     fn read(args: &ImportArgs, adapter: &dyn Adapter, frame: &ListedFrame) -> Result<Self> {
-        let file = ImageFile::open(&frame.rgb, args.codes.rule(args.limit))?.never_turned();
+        let file = ImageFile::open(&frame.rgb, args.folders.decode.rule())?.never_turned();
         let rgb = file.decode()?;
         let maps = adapter.read(frame, &rgb)?;
         let has_maps = maps.depth.is_some() || maps.semantic.is_some() || maps.segments.is_some();

@@ -90,7 +90,7 @@ impl ImageRebuilder {
         let recipe = recipe.with_elsewhere(elsewhere)?;
         let (frames, recipe) = if let Some(walk) = flags.walk {
             let recipe = recipe.of_walks(&walk);
-            let folder = WalkFolder::new(&walk, flags.codes.rule(flags.limit));
+            let folder = WalkFolder::new(&walk, flags.decode.rule());
             (FrameFolder::Walks(folder, walk), recipe)
         } else {
             let dataset = if manifest.identity.contains_key(ASK) {
@@ -100,7 +100,7 @@ impl ImageRebuilder {
             } else {
                 frames(&flags.data)?
             };
-            let dataset = dataset.with_rule(flags.codes.rule(flags.limit));
+            let dataset = dataset.with_rule(flags.decode.rule());
             (FrameFolder::Frames(dataset), recipe)
         };
         let loading = EnhancerRunArgs {

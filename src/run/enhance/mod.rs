@@ -7,8 +7,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
+use crate::dataset::FolderArgs;
 use crate::dataset::inputs::Inputs;
-use crate::dataset::{CodesArgs, PixelLimit, RootArgs};
 use crate::error::{Error, Result};
 use crate::images::dark_frames::{darkened, evenly};
 use crate::images::enhancers::{EnhancerRunArgs, OpenEnhancers};
@@ -72,15 +72,9 @@ struct InputArgs {
     /// Images (PNG, JPEG, WebP, TIFF, BMP) and folders of frames
     #[arg(value_name = "INPUT", required = true, add = Decides::Pixels)]
     inputs: Vec<PathBuf>,
-    /// The maximum size of an image.
+    /// The reading of images.
     #[command(flatten)]
-    limit: PixelLimit,
-    /// What the codes of images mean.
-    #[command(flatten)]
-    codes: CodesArgs,
-    /// Further folders of the images.
-    #[command(flatten)]
-    root: RootArgs,
+    folders: FolderArgs,
 }
 
 /// The flags of `enhance describe`.
@@ -140,8 +134,8 @@ impl ModelArgs {
 
 impl InputArgs {
     fn open(&self) -> Result<Inputs> {
-        let rule = self.codes.rule(self.limit);
-        Inputs::open(&self.inputs, &self.root.data_root, rule)
+        let FolderArgs { decode, root } = &self.folders;
+        Inputs::open(&self.inputs, &root.data_root, decode.rule())
     }
 }
 

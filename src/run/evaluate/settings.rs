@@ -8,7 +8,7 @@ use clap::Args;
 use super::choice_order::{ChoiceOrder, Repeats};
 use crate::ask::{Constrain, Prompts};
 use crate::dataset::{
-    BankArgs, CodesArgs, DataArgs, DataPlace, PixelLimit, SceneArgs, SelectionArgs, SetArgs,
+    BankArgs, DataArgs, DataPlace, DecodeArgs, SceneArgs, SelectionArgs, SetArgs,
 };
 use crate::engine::models::{ModelName, TextBaseline};
 use crate::engine::settings::{ExperimentSettings, JobArgs, JobSettings};
@@ -37,12 +37,9 @@ pub(crate) struct EvaluateArgs {
     /// The order in which choices are shown.
     #[command(flatten)]
     pub order: ChoiceOrder,
-    /// The maximum size of an image.
+    /// The reading of images.
     #[command(flatten)]
-    pub limit: PixelLimit,
-    /// What the codes of images mean.
-    #[command(flatten)]
-    pub codes: CodesArgs,
+    pub decode: DecodeArgs,
     /// The flags that every experiment has.
     #[command(flatten)]
     pub job: JobArgs,
@@ -166,7 +163,7 @@ impl EvaluateArgs {
             set: self.data.set,
             scene: self.scene,
             selection: self.selection,
-            rule: self.codes.rule(self.limit),
+            rule: self.decode.rule(),
             repeats: self.order.repeats(truths),
             order: self.order,
             bank,

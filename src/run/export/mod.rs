@@ -8,9 +8,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::dataset::{
-    self, CodesArgs, DataPlace, Dataset, PixelLimit, SceneArgs, SelectionArgs, SetArgs,
-};
+use crate::dataset::{self, DataPlace, Dataset, DecodeArgs, SceneArgs, SelectionArgs, SetArgs};
 use crate::error::{Error, Result};
 use crate::images::conditions::{check_enhanced, check_used, conditions};
 use crate::images::enhancers::{self, EnhancerRunArgs, OpenEnhancers};
@@ -57,12 +55,9 @@ pub(crate) struct ExportArgs {
     /// The flags that select questions.
     #[command(flatten)]
     pub selection: SelectionArgs,
-    /// The maximum size of an image.
+    /// The reading of images.
     #[command(flatten)]
-    pub limit: PixelLimit,
-    /// What the codes of images mean.
-    #[command(flatten)]
-    pub codes: CodesArgs,
+    pub decode: DecodeArgs,
     /// The flags for the degradations.
     #[command(flatten)]
     pub light: LightArgs,
@@ -94,7 +89,7 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
     let enhancement = args.enhancers.clone().for_set(set);
     check_used(&light, &enhancement)?;
     let rules = rules(args.selection.rules.as_deref())?;
-    let rule = args.codes.rule(args.limit);
+    let rule = args.decode.rule();
     let dataset = open_data(
         (&args.data, &args.scene, &args.set),
         &args.selection,

@@ -7,7 +7,7 @@ use clap::{Arg, Args};
 
 use super::judge::{Judge, JudgeArgs};
 use super::questions::OpenSelectionArgs;
-use crate::dataset::{CodesArgs, PixelLimit};
+use crate::dataset::DecodeArgs;
 use crate::engine::batch::{BatchFileArgs, BatchRunArgs};
 use crate::engine::models::ModelName;
 use crate::engine::settings::{ExperimentSettings, JobArgs, JobSettings};
@@ -29,12 +29,9 @@ pub(crate) struct OpenEqaArgs {
     /// The flags for showing walks.
     #[command(flatten)]
     pub walk: Walk,
-    /// The maximum size of an image.
+    /// The reading of images.
     #[command(flatten)]
-    pub limit: PixelLimit,
-    /// What the codes of images mean.
-    #[command(flatten)]
-    pub codes: CodesArgs,
+    pub decode: DecodeArgs,
     /// The seed of the servers' sampling, or none
     #[arg(
         long,
@@ -179,7 +176,7 @@ impl OpenEqaArgs {
             questions: self.questions,
             chosen: self.chosen,
             walk: self.walk,
-            rule: self.codes.rule(self.limit),
+            rule: self.decode.rule(),
             answers: self.answers,
             judge,
             protocol,

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::dataset::{CodesArgs, Dataset, PixelLimit, RootArgs};
+use crate::dataset::{Dataset, FolderArgs};
 use crate::error::{Error, Result};
 use crate::files::{reading, write};
 use crate::images::input_tally::InputTally;
@@ -89,15 +89,9 @@ pub(crate) struct QuestionsArgs {
     /// Print the statistics as JSON instead of a table
     #[arg(long, help_heading = "Output", add = Decides::Nothing)]
     pub json: bool,
-    /// The maximum size of an image.
+    /// The reading of frames.
     #[command(flatten)]
-    pub limit: PixelLimit,
-    /// What the codes of images mean.
-    #[command(flatten)]
-    pub codes: CodesArgs,
-    /// Further folders of the frames.
-    #[command(flatten)]
-    pub root: RootArgs,
+    pub folders: FolderArgs,
     /// Only measure this part of the frames, as 2/4, or auto/4 for the task of this process in a Slurm array or the pod of an indexed
     /// Kubernetes job. Questions are balanced over all frames: the same command without --shard makes them from what all parts measured;
     /// default: all frames
@@ -180,8 +174,8 @@ impl<'a> QuestionMaking<'a> {
         let Some(folder) = &args.against else {
             return Ok(None);
         };
-        let other = Dataset::of_images(folder, &args.root.data_root)?;
-        let other = other.with_rule(args.codes.rule(args.limit));
+        let other = Dataset::of_images(folder, &args.folders.root.data_root)?;
+        let other = other.with_rule(args.folders.decode.rule());
         against::compare([dataset, &other], &self.palette, args.threads, progress).map(Some)
     }
 }
@@ -205,8 +199,8 @@ fn read<T>(path: Option<&Path>, parse: fn(&str) -> Result<T>) -> Result<Option<T
 pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Outcome> {
     let making = &QuestionMaking::read(args)?;
     let folder = folder(args)?;
-    let dataset = Dataset::of_frames(folder, &args.root.data_root)?;
-    let dataset = dataset.with_rule(args.codes.rule(args.limit));
+    let dataset = Dataset::of_frames(folder, &args.folders.root.data_root)?;
+    let dataset = dataset.with_rule(args.folders.decode.rule());
     let labels = dataset.labels().ok_or_else(|| {
         let problem = "no classes.json in this folder, which gives the class of each number in its maps; `darkqa-eval import` writes one";
         Error::data(folder.display(), problem)

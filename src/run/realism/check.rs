@@ -41,7 +41,7 @@ pub(super) fn load(
     tally: Option<&InputTally>,
 ) -> Result<(Pixels, Rgb)> {
     let opened = |path: &Path| {
-        let file = ImageFile::open(path, args.codes.rule(args.limit))?;
+        let file = ImageFile::open(path, args.decode.rule())?;
         if let Some(tally) = tally {
             tally.add(&FrameId(path.display().to_string()), &file.note());
         }

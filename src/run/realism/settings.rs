@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::dataset::{CodesArgs, PixelLimit};
+use crate::dataset::DecodeArgs;
 use crate::images::workers::ThreadArgs;
 use crate::types::Decides;
 use darkqa_light::SensorArgs;
@@ -55,12 +55,9 @@ pub(crate) struct RealismArgs {
     /// Print the summary as JSON instead of a table
     #[arg(long, help_heading = "Output", add = Decides::Nothing)]
     pub json: bool,
-    /// The maximum size of an image.
+    /// The reading of images.
     #[command(flatten)]
-    pub limit: PixelLimit,
-    /// What the codes of images mean.
-    #[command(flatten)]
-    pub codes: CodesArgs,
+    pub decode: DecodeArgs,
     /// The number of threads.
     #[command(flatten)]
     pub threads: ThreadArgs,

@@ -11,7 +11,7 @@ use clap::{Args, Subcommand};
 use rayon::prelude::*;
 
 use crate::dataset::inputs::{InputFrame, Inputs, stem};
-use crate::dataset::{CodesArgs, Picture, PixelLimit, RootArgs};
+use crate::dataset::{FolderArgs, Picture};
 use crate::error::{Error, Result};
 use crate::images::frame_work::FrameWork;
 use crate::images::image_recipe::ImageRecipe;
@@ -74,15 +74,9 @@ struct ReplayArgs {
     /// Overwrite any file that has the name of the image
     #[arg(long, add = Decides::Nothing)]
     force: bool,
-    /// The maximum size of an image.
+    /// The reading of images.
     #[command(flatten)]
-    limit: PixelLimit,
-    /// What the codes of images mean.
-    #[command(flatten)]
-    codes: CodesArgs,
-    /// Further folders of the images.
-    #[command(flatten)]
-    root: RootArgs,
+    folders: FolderArgs,
 }
 
 /// The flags of `synthesize`.
@@ -104,15 +98,9 @@ pub(crate) struct SynthesizeArgs {
     /// Overwrite any file that has the name of an image
     #[arg(long, help_heading = "Synthesis", add = Decides::Nothing)]
     pub force: bool,
-    /// The maximum size of an image.
+    /// The reading of images.
     #[command(flatten)]
-    pub limit: PixelLimit,
-    /// What the codes of images mean.
-    #[command(flatten)]
-    pub codes: CodesArgs,
-    /// Further folders of the images.
-    #[command(flatten)]
-    pub root: RootArgs,
+    pub folders: FolderArgs,
     /// The part of the frames.
     #[command(flatten)]
     pub part: PartArgs,
@@ -158,8 +146,8 @@ fn make_images(args: &SynthesizeArgs, progress: &Progress) -> Result<Outcome> {
     making.light.refuse_matches("synthesize knows none")?;
     let mut frames = Inputs::open(
         &args.inputs,
-        &args.root.data_root,
-        args.codes.rule(args.limit),
+        &args.folders.root.data_root,
+        args.folders.decode.rule(),
     )?;
     keep_part(&mut frames.entries, args.part.resolve()?)?;
     let workers = pool(args.threads.threads)?;
@@ -347,8 +335,8 @@ impl SynthesisWork<'_> {
 /// Makes the image of a JSON file again.
 fn replay(args: &ReplayArgs) -> Result<Outcome> {
     let input = std::slice::from_ref(&args.input);
-    let rule = args.codes.rule(args.limit);
-    let frames = Inputs::open(input, &args.root.data_root, rule)?;
+    let rule = args.folders.decode.rule();
+    let frames = Inputs::open(input, &args.folders.root.data_root, rule)?;
     let file = &args.file;
     let sidecar = Sidecar::<ImageRecipe>::read(file)?;
     let [entry] = &frames.entries[..] else {

@@ -112,7 +112,7 @@ fn data(
     progress: &Progress,
     findings: &mut Findings,
 ) -> Result<usize> {
-    let rule = args.codes.rule(args.limit);
+    let rule = args.decode.rule();
     let selection = &args.selection;
     let place = args.scene.place(args.data.place());
     let set = &args.data.set;
