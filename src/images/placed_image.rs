@@ -156,6 +156,45 @@ impl Refusal {
     }
 }
 
+/// The numbers of images by outcome.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct ImageCounts {
+    pub(crate) written: usize,
+    pub(crate) unchanged: usize,
+    pub(crate) failed: usize,
+}
+
+impl ImageCounts {
+    /// Counts an image. One that was refused counts as failed; the reason is returned.
+    #[must_use]
+    pub(crate) fn add(&mut self, outcome: ImageOutcome) -> Option<Refusal> {
+        match outcome {
+            ImageOutcome::Written => self.written += 1,
+            ImageOutcome::Unchanged => self.unchanged += 1,
+            ImageOutcome::Refused(refusal) => {
+                self.failed += 1;
+                return Some(refusal);
+            }
+        }
+        None
+    }
+
+    /// The images that were not written, as words to append; empty if there are none.
+    pub(crate) fn unwritten(self) -> String {
+        [
+            (
+                self.unchanged,
+                "left as they were (--force makes them again)",
+            ),
+            (self.failed, "failed"),
+        ]
+        .iter()
+        .filter(|(number, _)| *number > 0)
+        .map(|(number, what)| format!(", {number} {what}"))
+        .collect()
+    }
+}
+
 /// What to do with what lies in the folder.
 enum Verdict {
     /// It is the image; nothing is to be done.

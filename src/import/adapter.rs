@@ -59,6 +59,22 @@ pub(crate) struct ListedFrame {
     pub(super) index: usize,
 }
 
+impl ListedFrame {
+    /// A frame of which nothing but the image and its other files is known.
+    pub(super) fn new(scene: &str, frame: String, rgb: PathBuf, index: usize) -> Self {
+        Self {
+            scene: scene.to_owned(),
+            frame,
+            time: None,
+            pose: None,
+            intrinsics: None,
+            room: None,
+            rgb,
+            index,
+        }
+    }
+}
+
 /// The maps of a frame, in the size of its image.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct FrameMaps {

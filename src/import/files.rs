@@ -191,3 +191,8 @@ pub(super) fn numbers(path: &Path) -> Result<Vec<f64>> {
         .collect::<Result<Vec<f64>, _>>();
     numbers.map_err(|e| Error::data(path.display(), format_args!("numbers expected: {e}")))
 }
+/// The paths of maps: of each frame a depth, which may be missing, and another map.
+pub(super) fn map_paths(maps: &[(Option<PathBuf>, PathBuf)]) -> impl Iterator<Item = &PathBuf> {
+    maps.iter()
+        .flat_map(|(depth, other)| depth.iter().chain([other]))
+}

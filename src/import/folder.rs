@@ -133,16 +133,9 @@ impl Folder {
                 classes: classes.remove(&frame),
                 segments: segments.remove(&frame),
             });
-            self.listing.frames.push(ListedFrame {
-                scene: scene.clone(),
-                frame,
-                time: None,
-                pose: None,
-                intrinsics: None,
-                room: None,
-                rgb,
-                index: self.maps.len() - 1,
-            });
+            let index = self.maps.len() - 1;
+            let listed = ListedFrame::new(&scene, frame, rgb, index);
+            self.listing.frames.push(listed);
         }
         let unmatched = depths
             .into_values()

@@ -11,7 +11,9 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs, class_numbers};
-use super::files::{IMAGES, check_same_size, depth_of, file_name, files, folders, segments};
+use super::files::{
+    IMAGES, check_same_size, depth_of, file_name, files, folders, map_paths, segments,
+};
 use super::{hm3d, mp3d, renders, replica};
 use crate::error::{Error, Result};
 use crate::files::reading::{json_lines, text};
@@ -159,11 +161,7 @@ impl Adapter for Habitat {
     }
 
     fn further_files(&self) -> Vec<PathBuf> {
-        let maps = self
-            .maps
-            .iter()
-            .flat_map(|(depth, semantic)| depth.iter().chain([semantic]));
-        maps.chain(&self.about).cloned().collect()
+        map_paths(&self.maps).chain(&self.about).cloned().collect()
     }
 
     fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {

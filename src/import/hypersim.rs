@@ -74,19 +74,10 @@ impl Hypersim {
                     classes: semantics.remove(&frame),
                     segments: instances.remove(&frame),
                 });
-                self.listing.frames.push(ListedFrame {
-                    scene: scene.clone(),
-                    frame: format!(
-                        "{camera}-{}",
-                        frame.strip_prefix("frame.").unwrap_or(&frame)
-                    ),
-                    time: None,
-                    pose: None,
-                    intrinsics: None,
-                    room: None,
-                    rgb,
-                    index: self.maps.len() - 1,
-                });
+                let frame = frame.strip_prefix("frame.").unwrap_or(&frame);
+                let (frame, index) = (format!("{camera}-{frame}"), self.maps.len() - 1);
+                let listed = ListedFrame::new(&scene, frame, rgb, index);
+                self.listing.frames.push(listed);
             }
         }
         Ok(())

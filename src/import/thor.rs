@@ -9,7 +9,9 @@ use std::path::{Path, PathBuf};
 use ndarray::Array2;
 
 use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs, class_numbers};
-use super::files::{IMAGES, check_same_size, depth_of, file_name, files, folders, image};
+use super::files::{
+    IMAGES, check_same_size, depth_of, file_name, files, folders, image, map_paths,
+};
 use crate::error::{Error, Result};
 use crate::files::reading::json;
 use crate::labels::names;
@@ -63,14 +65,8 @@ impl Thor {
             self.maps
                 .push((depths.get(&frame).cloned(), instance.clone()));
             self.listing.frames.push(ListedFrame {
-                scene: name.clone(),
-                frame,
-                time: None,
-                pose: None,
-                intrinsics: None,
                 room: room(&name).map(str::to_owned),
-                rgb,
-                index: self.maps.len() - 1,
+                ..ListedFrame::new(&name, frame, rgb, self.maps.len() - 1)
             });
         }
         self.listing.names.insert(name.clone(), names);
@@ -134,11 +130,10 @@ impl Adapter for Thor {
     }
 
     fn further_files(&self) -> Vec<PathBuf> {
-        let maps = self
-            .maps
-            .iter()
-            .flat_map(|(depth, instance)| depth.iter().chain([instance]));
-        maps.chain(&self.color_files).cloned().collect()
+        map_paths(&self.maps)
+            .chain(&self.color_files)
+            .cloned()
+            .collect()
     }
 
     fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {

@@ -198,11 +198,7 @@ fn import_frames(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
     output.push_str(&words(&listing.unlisted));
     Ok(Outcome::wrote(
         out,
-        if failed == 0 {
-            Status::Complete
-        } else {
-            Status::Incomplete
-        },
+        Outcome::complete_if(failed == 0),
         output,
     ))
 }

@@ -19,6 +19,15 @@ pub(crate) struct Outcome {
 }
 
 impl Outcome {
+    /// The status of a command whose work may have failed in part.
+    pub(crate) fn complete_if(is_whole: bool) -> Status {
+        if is_whole {
+            Status::Complete
+        } else {
+            Status::Incomplete
+        }
+    }
+
     /// A command whose text is its result.
     pub(crate) fn text(status: Status, output: String) -> Self {
         let written = Vec::new();

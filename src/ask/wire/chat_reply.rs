@@ -8,7 +8,7 @@ use super::logprobs;
 use super::stream;
 use super::usage;
 use crate::ask::complaint::{Complaint, Unreadable, UnreadableReply};
-use crate::types::{Finish, LostAttempts, Reply, TokenChances, Usage};
+use crate::types::{Finish, Reply, TokenChances, Usage};
 
 /// Reads a body; `latency_ms` and `attempts` stay zero.
 ///
@@ -56,24 +56,14 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
         return Err(charged(LOST).into());
     }
     Ok(Reply {
-        text,
         refusal,
         finish,
         usage,
-        served_model: completion
-            .get("model")
-            .and_then(Value::as_str)
-            .map(str::to_owned),
-        provider: completion
-            .get("provider")
-            .and_then(Value::as_str)
-            .map(str::to_owned),
-        endpoint: None,
-        latency_ms: 0,
+        served_model: json_body::word(&completion, "model"),
+        provider: json_body::word(&completion, "provider"),
         attempts: 0,
-        lost: LostAttempts::default(),
-        observed: None,
         chances,
+        ..Reply::local(text)
     })
 }
 

@@ -29,6 +29,11 @@ pub(super) fn parsed(text: &str, content_type: &str) -> Result<Value, Unreadable
     })
 }
 
+/// The text in a field of an object; `None` if it has none.
+pub(super) fn word(object: &Value, field: &str) -> Option<String> {
+    object.get(field)?.as_str().map(str::to_owned)
+}
+
 /// The description of a body that is not JSON.
 fn unreadable(text: &str, content_type: &str, error: &serde_json::Error) -> UnreadableReply {
     if text.trim().is_empty() {

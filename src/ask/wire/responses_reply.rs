@@ -8,7 +8,7 @@ use super::logprobs;
 use super::stream;
 use super::usage;
 use crate::ask::complaint::{Complaint, Unreadable, UnreadableReply};
-use crate::types::{Finish, LostAttempts, Reply, Thought, TokenChances, Usage};
+use crate::types::{Finish, Reply, Thought, TokenChances, Usage};
 
 /// Reads a body; `latency_ms` and `attempts` stay zero.
 ///
@@ -44,24 +44,14 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
     let (text, refusal) = words(items);
     let chances = chances(items, &response, &text);
     Ok(Reply {
-        text,
         refusal: Some(refusal).filter(|words| !words.is_empty()),
         finish,
         usage,
-        served_model: response
-            .get("model")
-            .and_then(Value::as_str)
-            .map(str::to_owned),
-        provider: response
-            .get("provider")
-            .and_then(Value::as_str)
-            .map(str::to_owned),
-        latency_ms: 0,
+        served_model: json_body::word(&response, "model"),
+        provider: json_body::word(&response, "provider"),
         attempts: 0,
-        lost: LostAttempts::default(),
-        endpoint: None,
-        observed: None,
         chances,
+        ..Reply::local(text)
     })
 }
 

@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::images::dark_frames::{darkened, evenly};
 use crate::images::enhancers::{EnhancerRunArgs, OpenEnhancers};
 use crate::images::input_tally::InputTally;
-use crate::images::placed_image::{ImageOutcome, Placed};
+use crate::images::placed_image::{ImageCounts, Placed};
 use crate::images::progress::Progress;
 use crate::images::refusals::Refusals;
 use crate::runs::Outcome;
@@ -203,7 +203,7 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
     );
     let settings = origin::settings(&digest, &loading.size);
     let used_anyway = enhancer.used_anyway();
-    let (mut written, mut unchanged, mut failed) = (0, 0, 0);
+    let mut counts = ImageCounts::default();
     let refusals = Refusals::default();
     for entry in &images.entries {
         let picture = images.picture(entry);
@@ -217,14 +217,13 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
             })
         });
         match outcome {
-            Ok(ImageOutcome::Written) => written += 1,
-            Ok(ImageOutcome::Unchanged) => unchanged += 1,
-            Ok(ImageOutcome::Refused(refusal)) => {
-                failed += 1;
-                refusals.add(refusal);
+            Ok(outcome) => {
+                if let Some(refusal) = counts.add(outcome) {
+                    refusals.add(refusal);
+                }
             }
             Err(e) => {
-                failed += 1;
+                counts.failed += 1;
                 tracing::error!("{e}");
             }
         }
@@ -233,28 +232,20 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
     drop(bar);
     tally.warn();
     refusals.log();
-    let count = |n: usize, what: &str| match n {
-        0 => String::new(),
-        n => format!(", {n} {what}"),
-    };
     Ok(Outcome::wrote(
         out,
-        if failed == 0 {
-            Status::Complete
-        } else {
-            Status::Incomplete
-        },
+        Outcome::complete_if(counts.failed == 0),
         format!(
-            "{}: {written} made by {}{}{}{}\n",
+            "{}: {} made by {}{}{}\n",
             out.display(),
+            counts.written,
             enhancer.name(),
-            if used_anyway.is_some() && written > 0 {
+            if used_anyway.is_some() && counts.written > 0 {
                 " because of --allow bad-enhancer"
             } else {
                 ""
             },
-            count(unchanged, "left as they were (--force makes them again)"),
-            count(failed, "failed")
+            counts.unwritten()
         ),
     ))
 }

@@ -25,7 +25,6 @@ use crate::report::questions::against::LookComparison;
 use crate::runs::Outcome;
 use crate::runs::part_args::{keep_part, part_of};
 use crate::runs::shard::Shard;
-use crate::types::manifest::Status;
 use crate::types::shell_word;
 use crate::types::{Decides, Digest, Family, FrameId, Labels, QuestionId};
 use darkqa_questions::balance::BalanceMode;
@@ -244,11 +243,7 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
         checked::review(page, &dataset, &frames, &generated.asked)?;
     }
     warn(&generated, making);
-    let status = if failed == 0 {
-        Status::Complete
-    } else {
-        Status::Incomplete
-    };
+    let status = Outcome::complete_if(failed == 0);
     if args.json {
         return Ok(Outcome::text(status, json));
     }
@@ -290,11 +285,7 @@ fn warn(generated: &Generated, making: &QuestionMaking<'_>) {
 /// The outcome of a call that measured a part. Questions are balanced over all frames, so that it makes none.
 fn part_measured(args: &QuestionsArgs, shard: Shard, frames: usize, failed: usize) -> Outcome {
     let path = statistics_path(&args.out, shard);
-    let status = if failed == 0 {
-        Status::Complete
-    } else {
-        Status::Incomplete
-    };
+    let status = Outcome::complete_if(failed == 0);
     let output = format!(
         "{}: statistics of {frames} frames; the same command without --shard makes the questions from those of all parts\n",
         path.display()

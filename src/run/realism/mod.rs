@@ -24,7 +24,6 @@ use crate::images::progress::Progress;
 use crate::images::workers::pool;
 use crate::report::realism::{ComparedData, RealismSummary, ResidualRules};
 use crate::runs::Outcome;
-use crate::types::manifest::Status;
 use darkqa_light::SensorSettings;
 use darkqa_score::realism::PairComparison;
 use darkqa_score::realism::gain::ReadingFit;
@@ -60,11 +59,7 @@ pub(crate) fn realism(args: &RealismArgs, progress: &Progress) -> Result<Outcome
     let (works, failed) = compare::compare(args, &sensor, &checked, &fits, &workers);
     left_out.failed.extend(failed);
     left_out.failed.sort();
-    let status = if left_out.is_empty() {
-        Status::Complete
-    } else {
-        Status::Incomplete
-    };
+    let status = Outcome::complete_if(left_out.is_empty());
     let source = ComparedData {
         seed: sensor.seed,
         synthesis: serde_json::json!(sensor.readings),

@@ -16,7 +16,6 @@ use crate::picture::Payload;
 use crate::runs::Outcome;
 use crate::runs::rebuild::ImageRebuilder;
 use crate::runs::run_parts::any_run;
-use crate::types::manifest::Status;
 use crate::types::{Condition, Digest, FrameId};
 
 use item::{ShownAnswer, ShownItem, read};
@@ -94,14 +93,7 @@ pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
     if !all_same {
         text += "the data, an enhancement model or this program has changed since the run\n";
     }
-    Ok(Outcome::text(
-        if all_same {
-            Status::Complete
-        } else {
-            Status::Incomplete
-        },
-        text,
-    ))
+    Ok(Outcome::text(Outcome::complete_if(all_same), text))
 }
 
 /// Where the images go.

@@ -9,7 +9,6 @@ use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::images::placed_image::OutputFile;
 use crate::runs::Outcome;
-use crate::types::manifest::Status;
 
 /// The schemas of JSON files that vouch for an image. Other JSON files of the folder are left alone.
 const SCHEMAS: [&str; 3] = ["darkqa.image/1", "darkqa.image/2", "darkqa.sheet/1"];
@@ -41,10 +40,7 @@ pub(super) fn check(folder: &Path) -> Result<Outcome> {
         return Err(Error::data(folder.display(), problem));
     }
     Ok(Outcome::text(
-        match wrong {
-            0 => Status::Complete,
-            _ => Status::Incomplete,
-        },
+        Outcome::complete_if(wrong == 0),
         format!(
             "{}: images as they were written: {intact}; not as they were written: {wrong}\n",
             folder.display()

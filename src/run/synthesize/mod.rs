@@ -17,7 +17,7 @@ use crate::images::frame_work::FrameWork;
 use crate::images::image_recipe::ImageRecipe;
 use crate::images::image_steps::ImageSteps;
 use crate::images::input_tally::InputTally;
-use crate::images::placed_image::{ImageOutcome, Placed, Sidecar};
+use crate::images::placed_image::{ImageCounts, ImageOutcome, Placed, Sidecar};
 use crate::images::progress::{Progress, StepBar};
 use crate::images::recipe::Recipe;
 use crate::images::refusals::Refusals;
@@ -27,7 +27,6 @@ use crate::images::workers::{ThreadArgs, pool};
 use crate::runs::Outcome;
 use crate::runs::part_args::{PartArgs, keep_part};
 use crate::text::words::counted;
-use crate::types::manifest::Status;
 use crate::types::{Condition, Decides, Degradation, FrameId, Rgb, SetLight};
 use darkqa_light::{LightArgs, LightSettings, NoiseKey};
 
@@ -170,46 +169,22 @@ fn make_images(args: &SynthesizeArgs, progress: &Progress) -> Result<Outcome> {
             unchanged: sum.unchanged + counts.unchanged,
             failed: sum.failed + counts.failed,
         });
-    Ok(total.outcome(out, frames.entries.len()))
+    Ok(outcome(total, out, frames.entries.len()))
 }
 
-/// The numbers of images by outcome.
-#[derive(Debug, Clone, Copy, Default)]
-struct ImageCounts {
-    written: usize,
-    unchanged: usize,
-    failed: usize,
-}
-
-impl ImageCounts {
-    fn outcome(self, out: &Path, frames: usize) -> Outcome {
-        let Self {
-            written,
-            unchanged,
-            failed,
-        } = self;
-        let unchanged = match unchanged {
-            0 => String::new(),
-            n => format!(", {n} left as they were (--force makes them again)"),
-        };
-        let failures = match failed {
-            0 => String::new(),
-            n => format!(", {n} failed"),
-        };
-        Outcome::wrote(
-            out,
-            if failed == 0 {
-                Status::Complete
-            } else {
-                Status::Incomplete
-            },
-            format!(
-                "{}: {written} made of {}{unchanged}{failures}\n",
-                out.display(),
-                counted(frames, "frame")
-            ),
-        )
-    }
+/// The outcome of a call that made images of frames.
+fn outcome(counts: ImageCounts, out: &Path, frames: usize) -> Outcome {
+    Outcome::wrote(
+        out,
+        Outcome::complete_if(counts.failed == 0),
+        format!(
+            "{}: {} made of {}{}\n",
+            out.display(),
+            counts.written,
+            counted(frames, "frame"),
+            counts.unwritten()
+        ),
+    )
 }
 
 /// The content of one output file of a frame: an image in a degradation (`None` for the clean frame), or a figure.
@@ -268,11 +243,10 @@ fn write_files(
             FrameFile::Sheet(sheet) => work.sheet(*sheet),
         };
         match outcome {
-            Ok(ImageOutcome::Written) => counts.written += 1,
-            Ok(ImageOutcome::Unchanged) => counts.unchanged += 1,
-            Ok(ImageOutcome::Refused(refusal)) => {
-                making.refusals.add(refusal);
-                counts.failed += 1;
+            Ok(outcome) => {
+                if let Some(refusal) = counts.add(outcome) {
+                    making.refusals.add(refusal);
+                }
             }
             Err(e) => {
                 if said.insert(e.to_string()) {
@@ -355,10 +329,8 @@ fn replay(args: &ReplayArgs) -> Result<Outcome> {
     fs::create_dir_all(&args.out).map_err(|e| Error::file(&args.out, "make", e))?;
     let place = Placed::new(&args.out, &name, args.force);
     let mut counts = ImageCounts::default();
-    match place.put(&sidecar.recipe, || Ok(degraded))? {
-        ImageOutcome::Written => counts.written = 1,
-        ImageOutcome::Unchanged => counts.unchanged = 1,
-        ImageOutcome::Refused(refusal) => return Err(refusal.into_error()),
+    if let Some(refusal) = counts.add(place.put(&sidecar.recipe, || Ok(degraded))?) {
+        return Err(refusal.into_error());
     }
-    Ok(counts.outcome(&args.out, 1))
+    Ok(outcome(counts, &args.out, 1))
 }

@@ -28,7 +28,6 @@ use crate::runs::Outcome;
 use crate::text::words::counted;
 use crate::types::Decides;
 use crate::types::Question;
-use crate::types::manifest::Status;
 use darkqa_light::LightSettings;
 use darkqa_score::tested_sentences::AskedSets;
 
@@ -82,11 +81,7 @@ pub(crate) fn check(
             verdict(asked, problems, warnings)
         )
     };
-    let status = match problems {
-        0 => Status::Complete,
-        _ => Status::Incomplete,
-    };
-    Ok(Outcome::text(status, output))
+    Ok(Outcome::text(Outcome::complete_if(problems == 0), output))
 }
 
 fn verdict(asked: usize, problems: usize, warnings: usize) -> String {
