@@ -1,18 +1,17 @@
 //! The engine that carries out an experiment: [`Job`].
 
 use std::collections::HashSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::engine::batch::{self, BatchFileArgs, BatchRunArgs};
 use crate::engine::dark_already;
 use crate::engine::estimate;
 use crate::engine::experiment::{DetailOf, Experiment};
 use crate::engine::folder;
-use crate::engine::lost_manifest;
 use crate::engine::manifest;
 use crate::engine::measured_tokens::MeasuredTokens;
 use crate::engine::open_run::{OpenRun, answered, lost_for_good, pipeline, truncated};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::images::enhancers::OpenEnhancers;
 use crate::images::image_maker::Maker;
 use crate::images::plan::Plan;
@@ -23,7 +22,7 @@ use crate::images::timings::Timings;
 use crate::report::forecast::{Forecast, json, render};
 use crate::runs::outcome::{Outcome, StdoutFormat};
 use crate::store::{self, Store};
-use crate::types::manifest::Status;
+use crate::types::manifest::{RunManifest, Status};
 use crate::types::{StoredDetail as _, TrialKey};
 use darkqa_enhance::ModelFile;
 
@@ -167,12 +166,12 @@ impl<'a, E: Experiment> Job<'a, E> {
         let manifest = manifest::of(experiment, stored)?;
         folder::make(&folder, settings)?;
         if let Some(damage) = damage {
-            lost_manifest::restore(experiment, &folder, &manifest, &damage)?;
+            restore_manifest(experiment, &folder, &manifest, &damage)?;
         }
         let mut store = Store::open(&folder, &manifest, folder::address_change(&settings.place))?;
         let lacks_notes = store.repair_notes();
         store.add_questions(experiment.questions(), manifest.inputs.as_ref(), || {
-            lost_manifest::planned_keys(experiment, &folder)
+            planned_keys(experiment, &folder)
         })?;
         let present: HashSet<TrialKey> = if experiment.imported_records().is_empty() {
             HashSet::new()
@@ -195,4 +194,47 @@ impl<'a, E: Experiment> Job<'a, E> {
             images,
         })
     }
+}
+
+/// Keys of all trials of this command, in all phases.
+fn planned_keys<E: Experiment>(experiment: &E, folder: &Path) -> Result<HashSet<TrialKey>> {
+    let mut keys = HashSet::new();
+    for phase in 0..E::PHASES.len() {
+        let plan = experiment.plan(phase, || store::read_records(folder))?;
+        keys.extend(Plan::new(plan).keys);
+    }
+    Ok(keys)
+}
+
+/// Writes the manifest of this command into a run folder that has lost its own. The key of a trial is a digest of all that decides its
+/// reply: if the command has the keys of all replies, it is the one that made them.
+///
+/// # Errors
+/// If a reply is not one to a trial of this command.
+fn restore_manifest<E: Experiment>(
+    experiment: &E,
+    folder: &Path,
+    manifest: &RunManifest,
+    damage: &str,
+) -> Result<()> {
+    let planned = planned_keys(experiment, folder)?;
+    let trials = store::read_trials(folder)?;
+    let replies = trials.iter().filter(|trial| !trial.failed());
+    let (own, others): (Vec<_>, Vec<_>) = replies.partition(|trial| planned.contains(&trial.key));
+    if !others.is_empty() {
+        let problem = format!(
+            "{damage}, and {} of {} replies are not of this command: the records are intact; call the command that made them, with all its \
+             models, levels and flags",
+            others.len(),
+            own.len() + others.len()
+        );
+        let path = folder.to_owned();
+        return Err(Error::Run { path, problem });
+    }
+    store::restore_manifest(folder, manifest)?;
+    tracing::warn!(
+        "{damage}; made again: all {} replies of the run are of this command",
+        own.len()
+    );
+    Ok(())
 }

@@ -19,7 +19,6 @@ pub(crate) mod interrupt;
 pub(crate) mod job;
 pub(crate) mod key_facts;
 pub(crate) mod lanes;
-pub(crate) mod lost_manifest;
 pub(crate) mod manifest;
 pub(crate) mod measured_tokens;
 pub(crate) mod models;

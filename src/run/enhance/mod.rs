@@ -1,28 +1,29 @@
 //! `enhance`: writing images that an enhancer made, describing the enhancer, or examining it.
 
 mod doctor;
-mod origin;
 
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
-use crate::dataset::FolderArgs;
 use crate::dataset::inputs::Inputs;
+use crate::dataset::{FolderArgs, Picture};
+use crate::engine::identity;
 use crate::error::{Error, Result};
 use crate::images::dark_frames::{darkened, evenly};
 use crate::images::enhancers::{EnhancerRunArgs, OpenEnhancers};
 use crate::images::input_tally::InputTally;
-use crate::images::placed_image::{ImageCounts, Placed};
+use crate::images::placed_image::{ImageCounts, ImageOrigin, Placed};
 use crate::images::progress::Progress;
 use crate::images::refusals::Refusals;
 use crate::runs::Outcome;
 use crate::runs::part_args::{PartArgs, keep_part};
 use crate::types::manifest::Status;
-use crate::types::{Decides, Rgb};
-use darkqa_enhance::{Enhancer, FRAMES, ImageOutput, ModelFile, list_of_presets};
+use crate::types::{Decides, Digest, FrameId, InputNote, Rgb};
+use darkqa_enhance::{Enhancer, FRAMES, ImageOutput, ModelFile, SizeArgs, list_of_presets};
 use doctor::DoctorFileArgs;
-use origin::EnhancedOrigin;
 
 /// Number of outputs that are tried as the image; chosen: models that give each of their steps have fewer.
 const MOST_OUTPUTS: usize = 16;
@@ -201,7 +202,7 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
         progress.bar("images", images.entries.len()),
         InputTally::default(),
     );
-    let settings = origin::settings(&digest, &loading.size);
+    let settings = pixel_settings(&digest, &loading.size);
     let used_anyway = enhancer.used_anyway();
     let mut counts = ImageCounts::default();
     let refusals = Refusals::default();
@@ -248,6 +249,47 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
             counts.unwritten()
         ),
     ))
+}
+
+/// Everything that decides the pixels of an enhanced image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct EnhancedOrigin {
+    frame: String,
+    /// The digest of the image that was enhanced.
+    source: String,
+    /// What reading the file did besides taking its codes; no fields if nothing.
+    #[serde(flatten)]
+    read: InputNote,
+    /// The digest of the model with its sidecar, and the sizes it takes, by flag.
+    enhancer: Value,
+}
+
+impl ImageOrigin for EnhancedOrigin {
+    const SCHEMAS: &'static [&'static str] = &["darkqa.enhanced/1"];
+    const IS_REPLACED: bool = false;
+}
+
+/// What decides the pixels besides the image, with a name for the digest that a reader of the message understands.
+fn pixel_settings(digest: &Digest, size: &SizeArgs) -> Value {
+    let mut settings = identity::enhancer(digest, size);
+    if let Some(fields) = settings.as_object_mut()
+        && let Some(digest) = fields.remove("--llie")
+    {
+        fields.insert("model with its sidecar".to_owned(), digest);
+    }
+    settings
+}
+
+impl EnhancedOrigin {
+    /// The origin of a frame's image, enhanced with these settings.
+    fn new(frame: &FrameId, picture: &Picture, enhancer: &Value) -> Self {
+        Self {
+            frame: frame.0.clone(),
+            source: picture.digest().to_string(),
+            read: picture.note(),
+            enhancer: enhancer.clone(),
+        }
+    }
 }
 
 /// The enhancer, and whether it is known which of its outputs is the image. If it is not, all of them are examined.

@@ -8,7 +8,6 @@ mod other_room;
 mod plan;
 mod plan_identity;
 mod power;
-mod record;
 mod settings;
 mod setup;
 mod unnamed_scenes;

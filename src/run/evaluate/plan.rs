@@ -6,13 +6,16 @@ use super::choice_order::arrange;
 use super::controls::is_other_room;
 use super::settings::ImagePlace;
 use super::setup::ChoiceSetup;
-use crate::ask::ImagePlaces;
+use crate::ask::{ImagePlaces, Query};
 use crate::engine::key_facts::KeyFacts;
 use crate::engine::models::{ModelUnderTest, asked_in};
 use crate::error::Result;
 use crate::images::plan::{SourcePlan, TrialGroup};
-use crate::images::trial::{Prompt, Trial};
-use crate::types::{Condition, Digest, FrameId, Question, View};
+use crate::images::trial::{Item, Prompt, Stimulus, Trial};
+use crate::picture::Payload;
+use crate::types::{
+    ChoiceDetail, Condition, Digest, FrameId, Question, Record, TrialOutcome, View,
+};
 
 /// A question with its choices in one order.
 #[derive(Debug, Clone)]
@@ -24,6 +27,51 @@ pub(crate) struct ChoiceItem {
     pub(super) turn: u32,
     /// The frame whose image is shown, if it is not the frame of the question.
     pub(super) shown_frame: Option<FrameId>,
+}
+
+impl Item for ChoiceItem {
+    type Detail = ChoiceDetail;
+
+    fn reply_tokens(&self) -> f64 {
+        // The reply is one letter.
+        4.0
+    }
+
+    fn query(&self) -> Query<'_> {
+        Query::Choice(&self.question)
+    }
+
+    fn source(&self) -> &str {
+        let shown = self.shown_frame.as_ref();
+        &shown.unwrap_or(&self.question.frame).0
+    }
+
+    fn turn(&self) -> u32 {
+        self.turn
+    }
+
+    fn blank(trial: &Trial<Self>, stimulus: &Stimulus, model: &str) -> Record {
+        let question = &*trial.item.question;
+        let facts = |image: &Arc<Payload>| image.facts().clone();
+        let mut images = stimulus.images.iter().map(facts);
+        let detail = ChoiceDetail {
+            frame: question.frame.clone(),
+            family: question.family.clone(),
+            choices: question.choices.texts().to_vec(),
+            truth: question.choices.truth(),
+            repeat: trial.item.repeat,
+            strict: None,
+            lenient: None,
+            outcome: TrialOutcome::Failed,
+            image: images.next(),
+            more_images: images.collect(),
+            shown_frame: trial.item.shown_frame.clone(),
+            observed: None,
+            options: None,
+        };
+        let condition = stimulus.condition.clone();
+        Record::blank(trial.key, question.id.clone(), model, condition, detail)
+    }
 }
 
 /// One order of a question, with the prompts for models that see the image and for blind models.

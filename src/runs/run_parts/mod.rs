@@ -5,12 +5,10 @@ mod joined;
 mod joined_manifest;
 mod missing;
 mod part;
-mod part_folders;
 mod questions;
 mod stored_parts;
 mod trials;
 
 pub(crate) use joined::RunParts;
 pub(crate) use missing::MissingParts;
-pub(crate) use part_folders::{one_kind, runs_in};
-pub(crate) use stored_parts::{any_run, choice_run};
+pub(crate) use stored_parts::{any_run, choice_run, one_kind, runs_in};

@@ -3,7 +3,6 @@
 //! It holds the questions and the digests of the frames, so that a shard measures no frame to make its questions, and opens none that
 //! it does not ask about. Its folder stands in that of the run.
 
-mod cost;
 mod file;
 mod frame;
 mod write;
@@ -27,10 +26,9 @@ use crate::types::manifest::Identity;
 use crate::types::manifest::differences;
 use crate::types::{Digest, FrameId, Question, RunQuestion, shell_word};
 
-pub(crate) use cost::FrameCost;
 pub(crate) use file::recorded_command;
 use file::{FRAMES, PLAN_FILE, PlanFile, QUESTIONS, SCHEMA};
-pub(crate) use frame::PlannedFrame;
+pub(crate) use frame::{FrameCost, PlannedFrame};
 pub(crate) use write::NewPlan;
 
 /// The plan of a run, read from its folder.
