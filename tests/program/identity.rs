@@ -545,9 +545,7 @@ fn classes(command: &str) -> Vec<(&'static str, &'static str)> {
         };
         let name = name.split(']').next().unwrap();
         let rows = section(name).lines().filter(|row| {
-            let cell = row.trim_start_matches("| ").split("` ").next().unwrap();
-            let cell = cell.split(['=', '[']).next().unwrap();
-            let typed = row.starts_with("| `--").then(|| typed_of_cell(cell));
+            let typed = long_form(row).map(typed_flag);
             typed.is_some_and(|typed| flags.split(", ").any(|flag| flag == typed))
         });
         classes.extend(rows.filter_map(class_of_row));
@@ -555,9 +553,20 @@ fn classes(command: &str) -> Vec<(&'static str, &'static str)> {
     classes
 }
 
-/// A flag without its value, in backticks: `--noise gain` of `--noise gain=K` and `--data` of `--data DIR`.
-fn typed_of_cell(cell: &str) -> String {
-    let mut words = cell.trim_matches('`').split(' ');
+/// The row of a flag from its long form on: `--data DIR` | …` of `| `-d, --data DIR` | …`; `None` for other lines.
+fn long_form(row: &str) -> Option<&str> {
+    let flag = row.strip_prefix("| `")?;
+    let flag = flag
+        .split_once(", ")
+        .filter(|(short, _)| short.len() == 2)
+        .map_or(flag, |(_, long)| long);
+    flag.starts_with("--").then_some(flag)
+}
+
+/// A flag without its value, in backticks: `--noise gain` of `--noise gain=K`, and `--data` of `--data DIR`.
+fn typed_flag(row: &str) -> String {
+    let cell = row.split(['=', '[', '`']).next().unwrap();
+    let mut words = cell.split(' ');
     let flag = words.next().unwrap();
     let key = words
         .next()
@@ -570,11 +579,11 @@ fn typed_of_cell(cell: &str) -> String {
 
 /// The flag of a row, a key by its earlier flag, and what it decides.
 fn class_of_row(row: &'static str) -> Option<(&'static str, &'static str)> {
+    let row = long_form(row)?;
     let cells: Vec<&str> = row.split(" | ").collect();
-    let first = row.starts_with("| `--").then_some(cells[0])?;
-    let earlier = first.strip_suffix("` until 0.2)");
+    let earlier = cells[0].strip_suffix("` until 0.2)");
     let earlier = earlier.and_then(|flag| flag.split(" (`").last());
-    let flag = earlier.unwrap_or(first.trim_start_matches("| `"));
+    let flag = earlier.unwrap_or(cells[0]);
     Some((flag.split([' ', '`']).next().unwrap(), cells[2]))
 }
 

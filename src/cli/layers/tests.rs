@@ -199,7 +199,8 @@ fn every_flag_states_its_default() {
                 || arg.get_long().is_none()
                 || arg.is_required_set()
                 || !arg.get_default_values().is_empty()
-                || help.contains("default: ");
+                || help.contains("default: ")
+                || help.contains("(required");
             assert!(stated, "{path:?} {}: no default is stated", arg.get_id());
         }
     }
