@@ -206,7 +206,7 @@ mod tests {
     /// A PNG file of this many bytes and this width.
     fn image(bytes: usize, width: usize) -> ImageFacts {
         ImageFacts {
-            digest: crate::types::Digest::of(b""),
+            digest: crate::types::Digest::from_bytes(b""),
             bytes,
             width,
             height: 10,

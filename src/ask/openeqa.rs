@@ -174,7 +174,7 @@ mod tests {
                 template.trim().len(),
                 bytes,
                 "{}",
-                Digest::of(template.as_bytes())
+                Digest::from_bytes(template.as_bytes())
             );
         }
         assert!(UNPRINTABLE.is_some());

@@ -90,7 +90,7 @@ impl Prices {
             Error::usage("--prices", problem)
         };
         let prices: Self = toml::from_str(&text).map_err(|e| {
-            let TomlFault { line, problem } = TomlFault::of(&text, &e);
+            let TomlFault { line, problem } = TomlFault::new(&text, &e);
             wrong(format!("line {line}: {problem}"))
         })?;
         let numbers = prices.models.iter().flat_map(|(name, price)| {

@@ -69,7 +69,7 @@ impl Prompts {
         let mut templates = Environment::new();
         templates.set_undefined_behavior(UndefinedBehavior::Strict);
         templates.set_auto_escape_callback(|_| AutoEscape::None);
-        let digest = Digest::of_parts([sources.choice.as_bytes(), sources.blind.as_bytes()]);
+        let digest = Digest::from_parts([sources.choice.as_bytes(), sources.blind.as_bytes()]);
         for (name, source) in [(CHOICE, sources.choice), (BLIND, sources.blind)] {
             templates
                 .add_template_owned(name, source)

@@ -27,7 +27,7 @@ impl Random {
         if call.turn > 0 {
             context = format!("{context} turn {}", call.turn);
         }
-        let mut digest = Digest::of_parts([
+        let mut digest = Digest::from_parts([
             Self::NAME.as_bytes(),
             &self.seed.to_le_bytes(),
             question.id.0.as_bytes(),
@@ -42,7 +42,7 @@ impl Random {
             if let Some(word) = words.find(|word| *word < fair) {
                 return letter((word % count) as usize).to_string();
             }
-            digest = Digest::of(digest.as_bytes());
+            digest = Digest::from_bytes(digest.as_bytes());
         }
     }
 }

@@ -86,7 +86,7 @@ impl Script {
         Ok(Self {
             name: format!("script:{}", path.display()),
             path: path.to_owned(),
-            digest: Digest::of(text.as_bytes()),
+            digest: Digest::from_bytes(text.as_bytes()),
             replies,
         })
     }

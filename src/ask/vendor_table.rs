@@ -38,7 +38,7 @@ impl VendorTable {
             Error::usage("--vendor", problem)
         };
         let Rows { vendor: rows, .. } = toml::from_str(&text).map_err(|e: toml::de::Error| {
-            let TomlFault { line, problem } = TomlFault::of(&text, &e);
+            let TomlFault { line, problem } = TomlFault::new(&text, &e);
             wrong(format!("line {line}: {problem}"))
         })?;
         if rows.is_empty() {

@@ -324,7 +324,7 @@ fn first_heading_first(command: clap::Command) -> clap::Command {
 
 fn marked(command: clap::Command) -> clap::Command {
     let mark = |arg: Arg| {
-        let class = Decides::of(&arg).filter(|class| *class != Decides::Nothing);
+        let class = Decides::from_arg(&arg).filter(|class| *class != Decides::Nothing);
         let Some(class) = class.map(Decides::word) else {
             return arg;
         };

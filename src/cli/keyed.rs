@@ -71,7 +71,7 @@ fn with_keyed(command: Command, keyed: &KeyedFlag) -> Command {
         .display_order(first.get_display_order())
         .help(help)
         .long_help(format!("{about}; keys:\n{}", lines.join("\n")));
-    let arg = match Decides::of(first) {
+    let arg = match Decides::from_arg(first) {
         Some(decides) => arg.add(decides),
         None => arg,
     };
@@ -90,7 +90,7 @@ fn line(key: &str, arg: &Arg) -> String {
         [] => String::new(),
         values => format!("; default: {}", values.join(",")),
     };
-    let class = Decides::of(arg).filter(|class| *class != Decides::Nothing);
+    let class = Decides::from_arg(arg).filter(|class| *class != Decides::Nothing);
     let class = class.map_or_else(String::new, |class| format!(" [{}]", class.word()));
     format!("  {}: {help}{default}{class}", with_value(key, arg))
 }

@@ -363,7 +363,7 @@ fn row(arg: &Arg) -> String {
         "| `{}`{key} | {} | {} | {}{words} |\n",
         escaped(&flag),
         escaped(&default),
-        Decides::of(arg).map_or("", Decides::word),
+        Decides::from_arg(arg).map_or("", Decides::word),
         escaped(&what)
     )
 }
@@ -408,7 +408,7 @@ fn every_flag_says_what_it_is_what_it_decides_and_its_default() {
             if help.is_empty() {
                 wrong.push(format!("{name}: no help"));
             }
-            if Decides::of(arg).is_none() {
+            if Decides::from_arg(arg).is_none() {
                 wrong.push(format!("{name}: no class, as `add = Decides::Nothing`"));
             }
             let has_default = !arg.get_action().takes_values()

@@ -179,7 +179,7 @@ impl Bank {
             if most < drawn.len() {
                 drawn.sort_by_cached_key(|index| {
                     let text = self.questions[*index].text.as_bytes();
-                    *Digest::of_parts([b"ask", frame.0.as_bytes(), text]).as_bytes()
+                    *Digest::from_parts([b"ask", frame.0.as_bytes(), text]).as_bytes()
                 });
                 drawn.truncate(most);
                 drawn.sort_unstable();

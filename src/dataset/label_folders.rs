@@ -38,7 +38,7 @@ pub(super) fn dataset(
                 names.clone()
             } else {
                 let bytes = reading::bytes(path)?;
-                drawn(&names, class, count, &Digest::of(&bytes))
+                drawn(&names, class, count, &Digest::from_bytes(&bytes))
             };
             let truth = offered.iter().position(|name| name == class);
             let texts = offered.into_iter().map(str::to_owned).collect();
@@ -113,7 +113,7 @@ fn count(folder: &Path, classes: usize, choices: Option<NonZeroUsize>) -> Result
 fn drawn<'n>(names: &[&'n str], own: &str, count: usize, image: &Digest) -> Vec<&'n str> {
     let mut others: Vec<&str> = names.iter().copied().filter(|name| *name != own).collect();
     others.sort_by_cached_key(|name| {
-        *Digest::of_parts([&b"darkqa.label/1"[..], image.as_bytes(), name.as_bytes()]).as_bytes()
+        *Digest::from_parts([&b"darkqa.label/1"[..], image.as_bytes(), name.as_bytes()]).as_bytes()
     });
     others.truncate(count - 1);
     names
@@ -131,7 +131,7 @@ mod tests {
 
     #[test]
     fn others_are_drawn_by_content_and_the_truth_is_always_there() {
-        let draw = |content: &[u8]| drawn(&NAMES, "Cup", 3, &Digest::of(content));
+        let draw = |content: &[u8]| drawn(&NAMES, "Cup", 3, &Digest::from_bytes(content));
         let mut seen = std::collections::BTreeSet::new();
         for content in 0..40_u8 {
             let names = draw(&[content]);

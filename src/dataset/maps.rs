@@ -213,10 +213,10 @@ impl MapFiles<'_> {
             None => String::new(),
         };
         let files = [&self.depth, &self.semantic, &self.segments].map(|file| {
-            let digest = file.as_deref().map(Digest::of);
+            let digest = file.as_deref().map(Digest::from_bytes);
             digest.map_or_else(Vec::new, |digest| digest.as_bytes().to_vec())
         });
-        Digest::of_parts(
+        Digest::from_parts(
             [unit.as_bytes()]
                 .into_iter()
                 .chain(files.iter().map(Vec::as_slice)),

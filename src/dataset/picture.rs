@@ -23,7 +23,7 @@ impl Picture {
             Self::Encoded(file) => file.digest(),
             Self::Drawn(room, _) => match self.note().exposure_ev {
                 None => room.digest(),
-                Some(ev) => Digest::of_parts([
+                Some(ev) => Digest::from_parts([
                     &b"darkqa.reading/1"[..],
                     room.digest().as_bytes(),
                     format!("exposure {ev}").as_bytes(),

@@ -52,7 +52,7 @@ impl FrameFiles<'_> {
             self.maps.digest(),
             Digest::canonical("darkqa.view/1", self.view)?,
         ];
-        Ok(Digest::of_parts(
+        Ok(Digest::from_parts(
             parts.iter().map(|part| &part.as_bytes()[..]),
         ))
     }

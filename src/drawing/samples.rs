@@ -195,7 +195,7 @@ mod tests {
         Thumbnail {
             frame: FrameId("a<b>&c".into()),
             condition: condition.parse().unwrap(),
-            image: Digest::of(condition.as_bytes()),
+            image: Digest::from_bytes(condition.as_bytes()),
             small: format!("data:{condition}"),
             crop: String::new(),
             stops: 0.0,

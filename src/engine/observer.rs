@@ -82,7 +82,7 @@ impl Observer {
         let rules = self.rules.digest();
         let mut parts = vec![VERSION.to_le_bytes().to_vec(), rules.as_bytes().to_vec()];
         parts.extend(control.map(|control| control.name().as_bytes().to_vec()));
-        let digest = Digest::of_parts(parts.iter().map(|part| &part[..]));
+        let digest = Digest::from_parts(parts.iter().map(|part| &part[..]));
         let opinion = move |question: &Question, call: &Call<'_>| {
             observer.answer(question, call, control, seed)
         };
@@ -114,7 +114,7 @@ impl Observer {
             let observed = self.observed_frame(frame)?;
             let mut pixels = image.decode().map_err(|e| e.to_string())?;
             if let Some(control) = control {
-                let key = Digest::of_parts([&seed.to_le_bytes()[..], frame.0.as_bytes()]);
+                let key = Digest::from_parts([&seed.to_le_bytes()[..], frame.0.as_bytes()]);
                 pixels = spoiled(control, &pixels, &observed, &key);
             }
             Ok::<_, String>(Arc::new(observed.look(&pixels)))

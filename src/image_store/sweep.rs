@@ -70,7 +70,7 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let folder = StoreFolder::new(place.path(), FolderAccess::Private);
         let now = SystemTime::now();
-        let key = |day: &u64| Digest::of(&day.to_le_bytes());
+        let key = |day: &u64| Digest::from_bytes(&day.to_le_bytes());
         for day in days {
             folder.write(&key(day), &[0; 100]).unwrap();
             let file = fs::File::options()
@@ -102,8 +102,8 @@ mod tests {
     fn abandoned_files_leave_and_foreign_ones_stay() {
         let place = tempfile::tempdir().unwrap();
         let folder = StoreFolder::new(place.path(), FolderAccess::Private);
-        folder.write(&Digest::of(b"a"), &[0; 9]).unwrap();
-        let inside = folder.place(&Digest::of(b"a"));
+        folder.write(&Digest::from_bytes(b"a"), &[0; 9]).unwrap();
+        let inside = folder.place(&Digest::from_bytes(b"a"));
         let inside = inside.parent().unwrap();
         for name in [".tmp-other-1-0", ".tmp-other-2-0", "notes.txt"] {
             fs::write(inside.join(name), b"123").unwrap();
@@ -124,7 +124,7 @@ mod tests {
     fn while_another_process_removes_files_none_is_removed() {
         let place = tempfile::tempdir().unwrap();
         let folder = StoreFolder::new(place.path(), FolderAccess::Private);
-        folder.write(&Digest::of(b"a"), &[0; 9]).unwrap();
+        folder.write(&Digest::from_bytes(b"a"), &[0; 9]).unwrap();
         let later = SystemTime::now() + UNUSED + ABANDONED;
         let lock = folder.lock_file().unwrap();
         lock.lock().unwrap();

@@ -121,7 +121,7 @@ impl EnhancedImages {
             .files
             .iter()
             .flat_map(|(path, file)| [path.as_bytes(), file.digest.as_bytes()]);
-        Digest::of_parts(std::iter::once(&b"darkqa.enhanced-folder/1"[..]).chain(parts))
+        Digest::from_parts(std::iter::once(&b"darkqa.enhanced-folder/1"[..]).chain(parts))
     }
 
     /// Digest of the image of a frame in a condition.
@@ -148,7 +148,7 @@ impl EnhancedImages {
         let place = self.folder.join(path(frame, condition)?);
         let wrong = |problem: &str| Error::data(place.display(), problem);
         let file = ImageFile::open(&place, ReadingRule::default())?;
-        if Digest::of(file.bytes()) != self.digest_of(frame, condition)? {
+        if Digest::from_bytes(file.bytes()) != self.digest_of(frame, condition)? {
             return Err(wrong(
                 "the image was changed during the run; restore it, or begin a new run",
             ));
@@ -273,7 +273,7 @@ impl EnhancedFile {
     fn open(path: &Path) -> Result<Self> {
         let file = ImageFile::open(path, ReadingRule::default())?;
         Ok(Self {
-            digest: Digest::of(file.bytes()),
+            digest: Digest::from_bytes(file.bytes()),
             size: size(&file),
         })
     }
@@ -284,7 +284,7 @@ impl EnhancedFile {
 /// # Errors
 /// What else the file is.
 fn size(file: &ImageFile) -> std::result::Result<(u32, u32), String> {
-    match FileFormat::of(file.bytes())? {
+    match FileFormat::detect(file.bytes())? {
         FileFormat::Png => {}
         other => return Err(other.name().to_owned()),
     }

@@ -220,7 +220,7 @@ impl ImageRecipe {
         let how = (sensor.amplify, sensor.tone);
         let blurred = (!streak.is_still()).then(|| blur(clean, streak));
         let light = blurred.as_ref();
-        let light = light.map_or(clean, |light| clean.of_its_light(light));
+        let light = light.map_or(clean, |light| clean.with_light(light));
         let drops = [drop_ev, sensor.coupling.headroom_ev(drop_ev)];
         Ok(develop_with_state(light, &key, &sensor.state, how, drops))
     }

@@ -48,7 +48,8 @@ pub(crate) fn tell(frames: &dyn Frames, sources: &[Source], progress: &Progress)
             let facts = photo.measured(&normal, &low);
             let is_of_one_size = (normal.height(), normal.width()) == (low.height(), low.width());
             let drop = facts.ev().filter(|_| is_of_one_size);
-            let other = drop.is_some_and(|ev| SceneMatch::of(&normal, &low, ev).is_of_two_scenes());
+            let other =
+                drop.is_some_and(|ev| SceneMatch::new(&normal, &low, ev).is_of_two_scenes());
             Some((facts, other.then(|| frame.id.0.clone())))
         });
         let (facts, others): (Vec<PairFacts>, Vec<Option<String>>) = measured.unzip();

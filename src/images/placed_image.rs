@@ -64,7 +64,7 @@ impl OutputFile {
         Self {
             file: name.to_string_lossy().into_owned(),
             bytes: bytes.len() as u64,
-            digest: Digest::of(bytes).to_string(),
+            digest: Digest::from_bytes(bytes).to_string(),
         }
     }
 
@@ -77,7 +77,7 @@ impl OutputFile {
                 self.bytes
             ));
         }
-        let is_same = Digest::of(bytes).to_string() == self.digest;
+        let is_same = Digest::from_bytes(bytes).to_string() == self.digest;
         (!is_same).then(|| "has other bytes than were written".to_owned())
     }
 }

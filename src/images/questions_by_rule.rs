@@ -35,7 +35,7 @@ pub(crate) fn by_rule(
     let bar = progress.bar("making questions", names.len());
     let frames = names.par_iter().map(|name| {
         let frame = dataset.frame(name)?;
-        let key = Digest::of(name.0.as_bytes());
+        let key = Digest::from_bytes(name.0.as_bytes());
         let statistics = measure(&frame, labels, rules, &palette, key);
         bar.inc();
         statistics

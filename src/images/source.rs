@@ -203,7 +203,7 @@ impl Source {
 
     /// The digest of all frames in the order shown; for a single frame, that of its file; `None` without frames.
     pub(crate) fn digest(&self) -> Option<Digest> {
-        Digest::of_files(self.order.iter().map(|index| self.frames[*index].digest))
+        Digest::from_file_digests(self.order.iter().map(|index| self.frames[*index].digest))
     }
 }
 

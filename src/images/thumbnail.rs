@@ -49,7 +49,7 @@ impl MissingThumbnails {
     ) -> Self {
         let frames: BTreeSet<&FrameId> = frames.into_iter().collect();
         let mut ranked: Vec<&FrameId> = frames.into_iter().collect();
-        ranked.sort_by_cached_key(|frame| *Digest::of(frame.0.as_bytes()).as_bytes());
+        ranked.sort_by_cached_key(|frame| *Digest::from_bytes(frame.0.as_bytes()).as_bytes());
         let present = present
             .into_iter()
             .map(|thumbnail| (thumbnail.frame, thumbnail.condition));

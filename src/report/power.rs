@@ -103,7 +103,7 @@ mod tests {
         let clusters = Clusters::new(pairs, &FrameTies::default());
         let of_questions: Vec<u32> = questions
             .iter()
-            .map(|(question, frame)| clusters.of(frame, question).unwrap())
+            .map(|(question, frame)| clusters.get(frame, question).unwrap())
             .collect();
         let asked = AskedSets {
             models,

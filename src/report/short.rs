@@ -175,7 +175,7 @@ struct TableLine<'a> {
 fn table(report: &ChoiceReport<'_>) -> String {
     let common = report.findings.common.as_ref();
     let summary = common.map_or(&report.findings.summary, |common| &common.summary);
-    let cells = summary.of(None, ReadingMode::Strict);
+    let cells = summary.family_cells(None, ReadingMode::Strict);
     let ladder = Ladder::new(cells.map(|cell| (&cell.subject, cell)))
         .in_light_of(report.findings)
         .with_clean();

@@ -57,7 +57,7 @@ pub(crate) fn page(items: &[StudyQuestion]) -> Result<String> {
         let shots = images.map(String::as_bytes);
         std::iter::once(item.id.as_bytes()).chain(shots)
     });
-    let set = Digest::of_parts(names);
+    let set = Digest::from_parts(names);
     Ok(PAGE.replacen(PLACEHOLDER, &embedded(&StudyPage { set, items })?, 1))
 }
 

@@ -60,7 +60,7 @@ impl Baseline {
         }
         let questions = combined.questions.iter().chain(&old.questions);
         let clusters = clusters(&trials, questions);
-        let grid = Grid::of_models(&trials, &clusters, &combined.listing, |_| true);
+        let grid = Grid::for_models(&trials, &clusters, &combined.listing, |_| true);
         let pairs = grid
             .subjects
             .iter()
@@ -78,7 +78,7 @@ impl Baseline {
         let mut by_subject = BTreeMap::<Subject, Vec<TrialRef<'_>>>::new();
         for trial in trials.iter() {
             by_subject
-                .entry(Subject::of(trial))
+                .entry(Subject::from_trial(trial))
                 .or_default()
                 .push(trial);
         }

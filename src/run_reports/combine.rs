@@ -35,7 +35,7 @@ impl Combined {
             &self.fidelity,
             &self.listing,
         );
-        let findings = findings.of_set(self.set()).of_groups(&self.questions);
+        let findings = findings.for_set(self.set()).for_groups(&self.questions);
         // Replies differ from time to time: that is no other model.
         let apart = self.models.apart.iter();
         let by_replies = apart.filter(|apart| apart.differs_by_replies_alone());

@@ -100,7 +100,7 @@ fn found(combined: &Combined) -> SelfAgreement<'_> {
         &combined.questions,
         &combined.listing,
     )
-    .of_set(combined.set())
+    .for_set(combined.set())
 }
 
 fn report<'a>(

@@ -13,7 +13,7 @@ pub(crate) fn first_source<'n>(
     let shard = shard.to_string();
     let mut parts: Vec<&[u8]> = models.map(str::as_bytes).collect();
     parts.push(shard.as_bytes());
-    let digest = Digest::of_parts(parts);
+    let digest = Digest::from_parts(parts);
     let bytes = digest.as_bytes();
     let number = bytes
         .iter()

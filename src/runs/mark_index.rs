@@ -45,6 +45,6 @@ impl<M> MarkIndex<M> {
     fn judged(&self, question: &QuestionId, answer: &str) -> Option<Digest> {
         let words = self.words.get(question)?;
         let parts = [words.to_string(), answer.to_owned()];
-        Some(Digest::of_parts(parts.iter().map(String::as_bytes)))
+        Some(Digest::from_parts(parts.iter().map(String::as_bytes)))
     }
 }

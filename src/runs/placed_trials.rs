@@ -25,7 +25,7 @@ pub(crate) fn read_part<D: Detail>(
     manifest: &RunManifest,
     part: usize,
 ) -> Result<()> {
-    let names = RecordedNames::of(manifest);
+    let names = RecordedNames::from_manifest(manifest);
     each_record(folder, |mut record: Record<D>, place| {
         let shown = names.shown(&record.model);
         if shown != record.model {
@@ -97,10 +97,10 @@ pub(crate) fn append<D: Detail>(
     parts: &[(&Path, &RunManifest)],
     trials: impl Iterator<Item = (TrialKey, TextPlace)>,
 ) -> Result<()> {
-    let names = RecordedNames::of(manifest);
+    let names = RecordedNames::from_manifest(manifest);
     let is_copied: Vec<bool> = parts
         .iter()
-        .map(|(_, part)| RecordedNames::of(part) == names)
+        .map(|(_, part)| RecordedNames::from_manifest(part) == names)
         .collect();
     let present = trials_of::<D>(store.folder(), manifest)?;
     let present: HashMap<TrialKey, TextPlace> = present

@@ -57,9 +57,9 @@ pub(crate) fn note(
     } = command;
     let empty = BTreeMap::new();
     let before = stored.columns.get("model").unwrap_or(&empty);
-    let stored_views = StoredViews::of(stored);
+    let stored_views = StoredViews::from_manifest(stored);
     let moves = moves(before, &stored_views, command);
-    let mut names = RecordedNames::of(stored);
+    let mut names = RecordedNames::from_manifest(stored);
     names.rename(&moves);
     for (name, content) in now {
         let digest = Digest::canonical("darkqa.model-name/1", &decides(content))?.to_string();
@@ -184,7 +184,7 @@ fn left_out(
     let earlier: BTreeSet<String> = earlier.chain(moves.values().cloned()).collect();
     let is_listed = |name: &str| {
         // A control is asked with the observer.
-        let asked = Control::of_model(name).map_or(name, |_| OBSERVER);
+        let asked = Control::from_model_name(name).map_or(name, |_| OBSERVER);
         let has = |name: &str| {
             now.contains_key(name) || manifest.models.iter().any(|model| model.name == name)
         };
@@ -216,7 +216,7 @@ pub(crate) fn left_out_models(manifest: &RunManifest) -> Vec<String> {
 
 /// Gives the records the names that the models have now.
 pub(crate) fn rename<D>(records: &mut [Record<D>], manifest: &RunManifest) {
-    let names = RecordedNames::of(manifest);
+    let names = RecordedNames::from_manifest(manifest);
     for record in records {
         let shown = names.shown(&record.model);
         if shown != record.model {
@@ -227,7 +227,7 @@ pub(crate) fn rename<D>(records: &mut [Record<D>], manifest: &RunManifest) {
 
 /// Gives trials the names that the models have now.
 pub(crate) fn rename_trials<D: Detail>(trials: &mut Trials<D>, manifest: &RunManifest) {
-    let names = RecordedNames::of(manifest);
+    let names = RecordedNames::from_manifest(manifest);
     trials.rename(|model| {
         let shown = names.shown(model);
         (shown != model).then(|| shown.to_owned())

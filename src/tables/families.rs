@@ -42,7 +42,7 @@ pub(super) fn families(findings: &Findings<'_>) -> Table {
 
 /// The cell of a subject and a family; `None` is chance.
 fn share(findings: &Findings<'_>, subject: Option<&Subject>, family: Option<&Family>) -> TableCell {
-    let mut cells = findings.summary.of(family, ReadingMode::Strict);
+    let mut cells = findings.summary.family_cells(family, ReadingMode::Strict);
     let cell = cells.find(|cell| match subject {
         Some(subject) => cell.subject == *subject,
         None => cell.subject.view.is_none(),

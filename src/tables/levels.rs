@@ -29,7 +29,7 @@ pub(super) fn levels(findings: &Findings<'_>) -> Vec<Table> {
 
 /// The table of each axis; `what` says on which items, if not on all.
 fn of_summary(findings: &Findings<'_>, summary: &AccuracySummary, what: &str) -> Vec<Table> {
-    let strict = summary.of(None, ReadingMode::Strict);
+    let strict = summary.family_cells(None, ReadingMode::Strict);
     let ladder = Ladder::new(strict.map(|cell| (&cell.subject, cell))).in_light_of(findings);
     let notes = notes(summary, &ladder);
     let ladders = ladder.by_axis().into_iter();
@@ -169,7 +169,7 @@ fn notes(summary: &AccuracySummary, ladder: &Ladder<'_, AccuracyCell>) -> Vec<St
         .into_iter()
         .map(|cell| note_without_images(summary, cell))
         .collect();
-    let mut all = summary.of(None, ReadingMode::Strict);
+    let mut all = summary.family_cells(None, ReadingMode::Strict);
     let unit = if all.any(|cell| cell.always.is_some()) {
         "orders of choices"
     } else {

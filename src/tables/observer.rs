@@ -155,7 +155,7 @@ pub(crate) fn notes(observer: &ObserverSummary) -> Vec<String> {
 
 /// What a standing control is, as `shown …` of it.
 pub(crate) fn what_it_is(control: &ObserverCell) -> &'static str {
-    if Control::of_model(&control.subject.model) == Some(Control::OtherRoom) {
+    if Control::from_model_name(&control.subject.model) == Some(Control::OtherRoom) {
         "the same observer, shown images of other rooms"
     } else {
         "the same observer, shown the tiles of the right images in another order"

@@ -170,7 +170,7 @@ fn numbers<'a>(
             "terminal accuracy | page accuracy | latex Accuracy",
             |line| {
                 let mode = ReadingMode::Strict;
-                let mut cells = findings.summary.of(line.family(), mode);
+                let mut cells = findings.summary.family_cells(line.family(), mode);
                 let cell = cells.find(|cell| match line {
                     Line::Cell(of) => cell.subject == of.subject,
                     Line::Chance(..) => cell.subject.view.is_none(),

@@ -6,7 +6,7 @@ use darkqa_score::accuracy::AccuracySummary;
 use darkqa_score::choice::ReadingMode;
 
 pub(super) fn subjects(summary: &AccuracySummary) -> Table {
-    let mut table = TableBuilder::new("subjects", summary.of(None, ReadingMode::Strict))
+    let mut table = TableBuilder::new("subjects", summary.family_cells(None, ReadingMode::Strict))
         .page(
             "accuracy",
             "Accuracy of every subject, all families together",

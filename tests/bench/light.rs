@@ -162,7 +162,7 @@ fn motion(c: &mut Criterion) {
     for how in ["L5-auto", "L5-noise@physical"] {
         let how: darkqa_eval::Degradation = how.parse().unwrap();
         let camera = (&auto, &motion);
-        let physical = Synthesis::of(LightReading::Physical, CameraModel::default());
+        let physical = Synthesis::new(LightReading::Physical, CameraModel::default());
         let applied = AppliedDegradation::new(&how, &physical, camera, view, &key()).unwrap();
         group.bench_function(how.to_string(), |b| {
             b.iter(|| Exposures::default().degrade(black_box((&clean).into()), &applied, &key()));

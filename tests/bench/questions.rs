@@ -121,7 +121,7 @@ fn stage(c: &mut Criterion) {
         Palette::built_in().unwrap(),
         labels(),
     );
-    let key = Digest::of(b"bench");
+    let key = Digest::from_bytes(b"bench");
     let mut group = c.benchmark_group("questions, 2560x1440");
     group.sample_size(10);
     group.throughput(Throughput::Elements((SIZE.0 * SIZE.1) as u64));

@@ -38,7 +38,7 @@ fn records() -> Vec<Record> {
         for condition in &conditions {
             for question in 0..4 * 456 {
                 let name = format!("model-{model}");
-                let drawn = Digest::of(format!("{name} {condition} {question}").as_bytes());
+                let drawn = Digest::from_bytes(format!("{name} {condition} {question}").as_bytes());
                 let severity = condition.level().severity();
                 let severities = Severity::LADDER.iter();
                 let level = severities.filter(|s| Some(**s) <= severity).count() as u32;

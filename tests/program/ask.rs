@@ -93,7 +93,7 @@ async fn a_request_is_the_smallest_every_server_takes() {
         .strip_prefix("data:image/png;base64,")
         .unwrap();
     let file = STANDARD.decode(base64).unwrap();
-    assert_eq!(Digest::of(&file), images[0].facts().digest);
+    assert_eq!(Digest::from_bytes(&file), images[0].facts().digest);
     let expected = json!({
         "model": "m", "temperature": 0.0, "max_tokens": 1024,
         "messages": [{"role": "user", "content": [

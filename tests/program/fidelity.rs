@@ -25,7 +25,7 @@ fn findings(
     let (mut records, mut measured) = (Vec::new(), Vec::new());
     for frame in 0..clusters {
         let rate: f64 = rates.sample(random);
-        let image = Digest::of(format!("image {frame}").as_bytes());
+        let image = Digest::from_bytes(format!("image {frame}").as_bytes());
         for question in 0..questions {
             let name = (frame * questions + question, frame);
             let mut reply: Record = record("m", &condition, name, random.random_bool(rate));
@@ -81,7 +81,7 @@ fn fidelity_that_says_nothing_is_rarely_called_a_predictor() {
 #[test]
 fn two_frames_with_the_same_dark_image_have_their_own_fidelity() {
     let condition: Condition = "L5-ev".parse().unwrap();
-    let black = Digest::of(b"black");
+    let black = Digest::from_bytes(b"black");
     let (mut records, mut measured) = (Vec::new(), Vec::new());
     for (frame, psnr) in [(0, 10.0), (1, 30.0)] {
         let mut reply: Record = record("m", &condition, (frame, frame), true);

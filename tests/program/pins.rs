@@ -275,7 +275,7 @@ fn small_copies_are_kept_of_the_frames_of_lowest_digest() {
     }
     bench.complete(&words("merge parts --out merged"));
     let mut ranked: Vec<String> = (0..FRAMES).map(|i| format!("frame-{i:02}.png")).collect();
-    ranked.sort_by_key(|frame| *Digest::of(frame.as_bytes()).as_bytes());
+    ranked.sort_by_key(|frame| *Digest::from_bytes(frame.as_bytes()).as_bytes());
     let due: BTreeSet<(String, String)> = ranked[..MOST]
         .iter()
         .flat_map(|frame| ["L0", "L5-noise"].map(|at| (frame.clone(), at.to_owned())))

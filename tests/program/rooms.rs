@@ -62,7 +62,7 @@ fn asked(rooms: Rooms) -> (Generated, BTreeMap<FrameId, Seen>, (usize, Vec<Strin
     let rooms: Vec<(FrameId, Room)> = rooms.all().collect();
     let measured = rooms.par_iter().map(|(id, room)| {
         let frame = room.frame().unwrap();
-        let key = Digest::of(id.0.as_bytes());
+        let key = Digest::from_bytes(id.0.as_bytes());
         let statistics = measure(&frame, &labels, &rules, &palette, key).unwrap();
         (statistics, (id.clone(), Seen::of(room, &frame)))
     });
@@ -283,7 +283,7 @@ fn pixels(rooms: Rooms, place: usize) -> Digest {
         .iter()
         .flat_map(|id| id.to_le_bytes());
     let maps: Vec<u8> = depth.chain(segments).collect();
-    Digest::of_parts([frame.rgb.samples(), &maps])
+    Digest::from_parts([frame.rgb.samples(), &maps])
 }
 
 #[test]
@@ -313,7 +313,7 @@ fn a_seed_gives_the_same_bytes_everywhere() {
     assert_eq!(pixels(Rooms { frames: 4, ..rooms }, 3), made[3]);
     assert_ne!(pixels(Rooms { seed: 8, ..rooms }, 3), made[3]);
     let digests: Vec<[u8; 32]> = made.iter().map(|digest| *digest.as_bytes()).collect();
-    let whole = Digest::of_parts(digests.iter().map(|digest| &digest[..]));
+    let whole = Digest::from_parts(digests.iter().map(|digest| &digest[..]));
     assert_eq!((VERSION, &*whole.to_string()), (2, PINNED));
 }
 

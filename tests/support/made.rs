@@ -35,7 +35,7 @@ pub fn record(
         observed: None,
         options: None,
     };
-    let key = Digest::of(format!("{question} {model} {condition}").as_bytes()).into();
+    let key = Digest::from_bytes(format!("{question} {model} {condition}").as_bytes()).into();
     let question = QuestionId(format!("q{question:05}"));
     Record {
         reply: Some(if right { "A" } else { "B" }.to_owned()),

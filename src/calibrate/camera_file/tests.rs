@@ -57,7 +57,7 @@ fn camera(settings: Vec<SettingFit>) -> CameraFit {
         row_deviation: line(NoiseKind::Row, |fit| fit.row_deviation.value),
         settings,
         frames: 30,
-        frames_digest: Digest::of(b"frames"),
+        frames_digest: Digest::from_bytes(b"frames"),
         dates: Some(["2026:01:01".to_owned(), "2026:01:02\nx = 1".to_owned()]),
         warnings: vec!["iso100: doubtful\n[gain]".to_owned()],
     }

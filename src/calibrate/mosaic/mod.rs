@@ -53,7 +53,7 @@ impl Mosaic {
                 form: decoded.form,
                 camera: decoded.camera,
                 taken: decoded.taken,
-                digest: Digest::of(&bytes),
+                digest: Digest::from_bytes(&bytes),
             },
         })
     }

@@ -83,7 +83,7 @@ fn naming(folded: &str) -> Naming {
     let all = |kinds: &[Role]| words.iter().all(|word| word.roles.has_any(kinds));
     let is_number = words
         .iter()
-        .all(|word| word.of(folded).chars().all(char::is_numeric));
+        .all(|word| word.slice(folded).chars().all(char::is_numeric));
     if !words.is_empty() && all(&[Role::Color, Role::Shade]) {
         Naming::Color
     } else if is_number || all(&[Role::Place, Role::Number]) || matches!(folded, "yes" | "no") {

@@ -33,7 +33,7 @@ pub(super) struct Element {
 
 impl Element {
     /// The element's characters in the text that it comes from.
-    pub(super) fn of<'a>(&self, folded: &'a str) -> &'a str {
+    pub(super) fn slice<'a>(&self, folded: &'a str) -> &'a str {
         &folded[self.start..self.end]
     }
 
@@ -95,7 +95,7 @@ impl<'a> Clauses<'a> {
     /// Whether an element is one of these signs.
     pub(super) fn is_sign(&self, at: usize, signs: &[char]) -> bool {
         self.elements.get(at).is_some_and(|element| {
-            element.kind == TokenKind::Sign && element.of(self.folded).starts_with(signs)
+            element.kind == TokenKind::Sign && element.slice(self.folded).starts_with(signs)
         })
     }
 
@@ -107,7 +107,7 @@ impl<'a> Clauses<'a> {
     /// Whether an element may stand between a verb and its predicate.
     pub(super) fn is_adverb(&self, at: usize) -> bool {
         let element = &self.elements[at];
-        element.has(Role::Adverb) || element.of(self.folded).ends_with("ly")
+        element.has(Role::Adverb) || element.slice(self.folded).ends_with("ly")
     }
 
     /// Index of the element before a predicate, behind adverbs: its verb, if it has one.
@@ -135,9 +135,9 @@ impl<'a> Clauses<'a> {
 
 /// The roles that a phrase has from its words: "it is" has a pronoun and a verb, "i'd say" is not so.
 fn inner(folded: &str, words: &[Token]) -> Roles {
-    const ANY: Roles = Roles::of(Role::ModalPast).with(Roles::of(Role::Image));
-    const FIRST: Roles = ANY.with(Roles::of(Role::Pronoun));
-    const LAST: Roles = ANY.with(Roles::of(Role::Copula));
+    const ANY: Roles = Roles::from_role(Role::ModalPast).with(Roles::from_role(Role::Image));
+    const FIRST: Roles = ANY.with(Roles::from_role(Role::Pronoun));
+    const LAST: Roles = ANY.with(Roles::from_role(Role::Copula));
     let own = |at: usize| {
         let known = phrase_at(folded, std::slice::from_ref(&words[at]));
         known.map_or(Roles::default(), |(_, roles)| roles)

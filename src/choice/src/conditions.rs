@@ -28,7 +28,7 @@ pub(super) fn conditional(clauses: &Clauses<'_>) -> Ranges {
 /// Whether a clause goes on with the condition before it: "Suppose there is a stove; then it is a kitchen."
 fn goes_on(clauses: &Clauses<'_>, first: usize) -> bool {
     let element = clauses.elements.get(first);
-    element.is_some_and(|element| element.of(clauses.folded) == "then")
+    element.is_some_and(|element| element.slice(clauses.folded) == "then")
 }
 
 /// Words that speak of light.

@@ -54,7 +54,7 @@ const PARENTHESIS_WITHIN: usize = 12;
 /// two commas directly behind it, or the rest of a list.
 fn passed(clauses: &Clauses<'_>, at: usize) -> Option<usize> {
     let before = clauses.elements[at - 1];
-    let word = before.of(clauses.folded);
+    let word = before.slice(clauses.folded);
     if clauses.is_sign(at, &['(']) {
         return before.has(Role::Not).then_some(at + 1);
     }
@@ -88,7 +88,7 @@ fn list(clauses: &Clauses<'_>, comma: usize) -> Option<usize> {
             words = 0;
             continue;
         }
-        closes |= element.has(Role::Or) || element.of(clauses.folded) == "nor";
+        closes |= element.has(Role::Or) || element.slice(clauses.folded) == "nor";
         words += 1;
         if words > ITEM_WORDS && !closes {
             return None;
@@ -124,7 +124,7 @@ fn behind(clauses: &Clauses<'_>, names: &Names<'_>) -> Vec<(usize, usize)> {
 fn subject_end(clauses: &Clauses<'_>, at: usize) -> Option<usize> {
     let elements = &clauses.elements;
     let element = &elements[at];
-    let word = element.of(clauses.folded);
+    let word = element.slice(clauses.folded);
     let before = at - 1;
     if element.has(Role::NotBehind)
         || (element.has(Role::Not) && (word.ends_with("n't") || word.starts_with("can")))

@@ -1,4 +1,4 @@
-//! Colors that a text says of the image, not of an object in it: [`of_image`].
+//! Colors that a text says of the image, not of an object in it: [`image_colors`].
 
 use super::choice_views::{ChoiceViews, Naming};
 use super::clauses::{Boundary, Clauses};
@@ -8,7 +8,7 @@ use super::tokens::TokenKind;
 use super::words::Role;
 
 /// The names of colors that describe the image: "the image is black", "gray noise", "I only see black", "completely black".
-pub(super) fn of_image(clauses: &Clauses<'_>, texts: &[Name], offered: &ChoiceViews) -> Ranges {
+pub(super) fn image_colors(clauses: &Clauses<'_>, texts: &[Name], offered: &ChoiceViews) -> Ranges {
     let is_color = |name: &&Name| {
         name.choice
             .is_some_and(|choice| offered.naming[choice] == Naming::Color)
@@ -76,7 +76,7 @@ fn after_subject(clauses: &Clauses<'_>, first: usize, behind: usize) -> bool {
     let mut entirely = false;
     for at in (first.saturating_sub(WITHIN)..first).rev() {
         let element = &elements[at];
-        let word = element.of(clauses.folded);
+        let word = element.slice(clauses.folded);
         let begins = clauses.begins(at);
         entirely |= element.has(Role::Entirely);
         let alone = matches!(word, "only" | "just" | "nothing but");
@@ -130,7 +130,7 @@ fn is_image(clauses: &Clauses<'_>, verb: usize, entirely: bool) -> bool {
 fn is_head(clauses: &Clauses<'_>, start: usize, noun: usize) -> bool {
     let elements = &clauses.elements;
     let article = |at: &usize| {
-        let word = elements[*at].of(clauses.folded);
+        let word = elements[*at].slice(clauses.folded);
         is_color(clauses, *at)
             || elements[*at].kind == TokenKind::Word
                 && matches!(

@@ -101,7 +101,7 @@ fn joined_to_letter(clauses: &Clauses<'_>, end: usize) -> bool {
         .elements
         .get(or)
         .is_some_and(|element| element.has(Role::Or))
-        && other.is_some_and(|other| other.of(clauses.folded).len() == 1)
+        && other.is_some_and(|other| other.slice(clauses.folded).len() == 1)
 }
 
 /// Whether a letter is part of a hyphenated word: "T-shirt", "Plan-B".

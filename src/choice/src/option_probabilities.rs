@@ -28,11 +28,11 @@ pub fn option_probabilities(
 ) -> Option<OptionProbabilities> {
     let position = &chances.positions[answer_position(&chances.positions)?];
     let by = |option: &dyn Fn(&str) -> Option<usize>| masses(position, choices.len(), option);
-    let letters = by(&|token| of_letter(token, choices.len()));
+    let letters = by(&|token| choice_by_letter(token, choices.len()));
     let masses = if letters.iter().sum::<f64>() >= LEAST_MASS {
         letters
     } else {
-        by(&|token| of_text(token, choices))
+        by(&|token| choice_by_text(token, choices))
     };
     let mass: f64 = masses.iter().sum();
     if mass < LEAST_MASS {
@@ -90,12 +90,12 @@ fn bare(token: &str) -> String {
 }
 
 /// The choice of a letter.
-fn of_letter(token: &str, choices: usize) -> Option<usize> {
+fn choice_by_letter(token: &str, choices: usize) -> Option<usize> {
     (0..choices).find(|index| letter(*index).to_lowercase().eq(token.chars()))
 }
 
 /// The choice whose text alone begins with a token; one letter is too little, unless it is the whole text.
-fn of_text(token: &str, choices: &[String]) -> Option<usize> {
+fn choice_by_text(token: &str, choices: &[String]) -> Option<usize> {
     let begins = |text: &&String| {
         let text = text.to_lowercase();
         text == token || (token.chars().count() > 1 && text.starts_with(token))

@@ -41,7 +41,7 @@ const REMAINS_WITHIN: usize = 6;
 /// Whether "only … remains" begins at an element.
 fn only_remains(clauses: &Clauses<'_>, at: usize) -> bool {
     let ahead = clauses.elements[at + 1..].iter().take(REMAINS_WITHIN);
-    clauses.elements[at].of(clauses.folded) == "only"
+    clauses.elements[at].slice(clauses.folded) == "only"
         && ahead
             .take_while(|element| !element.cuts())
             .any(|element| element.has(Role::Remains))

@@ -354,8 +354,8 @@ fn remains(view: &ReplyView<'_>, name: &Name) -> bool {
     let first = view.clauses.index(name.start);
     let only = elements[first.saturating_sub(ONLY_WITHIN)..first]
         .iter()
-        .any(|element| element.of(view.folded) == "only");
-    let verb = verb.of(view.folded);
+        .any(|element| element.slice(view.folded) == "only");
+    let verb = verb.slice(view.folded);
     let is_left = verb.starts_with("remain") || verb.ends_with("left");
     let excluded = |other: &Name| other.state == State::Excluded && other.start < name.start;
     only || (is_left && view.names.all().any(excluded))

@@ -106,7 +106,7 @@ fn joined<'a>(
             .collect::<Vec<_>>()
     };
     tokens.iter().enumerate().flat_map(move |(at, token)| {
-        let word = token.of(folded);
+        let word = token.slice(folded);
         if longest == 0 || token.kind != TokenKind::Word || word.len() > longest {
             return Vec::new();
         }
@@ -115,7 +115,7 @@ fn joined<'a>(
             .get(at + 1)
             .filter(|next| next.start == token.end + 1)
         {
-            let second = next.of(folded);
+            let second = next.slice(folded);
             let fits =
                 word.len().min(second.len()) >= MIN_PART && word.len() + second.len() <= longest;
             if fits && folded.as_bytes()[token.end] == b' ' {
@@ -172,7 +172,7 @@ fn modifies(
         known.is_some_and(|(_, roles)| roles.has(Role::Head))
     });
     // "Kitchen-cum-bathroom" is both.
-    let joins = next.is_some_and(|next| matches!(next.of(folded), "cum" | "and" | "or"));
+    let joins = next.is_some_and(|next| matches!(next.slice(folded), "cum" | "and" | "or"));
     let named = joins
         || names
             .binary_search_by_key(&(name.end + 1), |name| name.start)

@@ -25,13 +25,13 @@ pub(super) struct Token {
 
 impl Token {
     /// The token's characters in the text that it comes from.
-    pub(super) fn of<'a>(&self, text: &'a str) -> &'a str {
+    pub(super) fn slice<'a>(&self, text: &'a str) -> &'a str {
         &text[self.start..self.end]
     }
 
     /// Whether the token is this sign.
     pub(super) fn is_sign(&self, text: &str, signs: &[char]) -> bool {
-        self.kind == TokenKind::Sign && self.of(text).starts_with(signs)
+        self.kind == TokenKind::Sign && self.slice(text).starts_with(signs)
     }
 }
 
@@ -81,7 +81,7 @@ fn joins(text: &str, word: &Token, (previous, c): (char, char), end: usize) -> b
         _ if previous.is_numeric() => next.is_numeric(),
         ',' => false,
         _ => {
-            let letters = word.of(text);
+            let letters = word.slice(text);
             let begins = letters.len() == 1 && next.is_alphabetic() && !second.is_alphabetic();
             begins || (letters.len() <= 5 && letters.contains('.') && !next.is_alphanumeric())
         }

@@ -5,7 +5,7 @@ use super::clauses::Clauses;
 use super::conditions::conditional;
 use super::denials::denied;
 use super::exclusions::excluded;
-use super::image_words::of_image;
+use super::image_words::image_colors;
 use super::letters::letters;
 use super::named::Names;
 use super::names::{Delimiting, Name, State};
@@ -79,7 +79,7 @@ impl<'a> ReplyView<'a> {
             repeated: repetitions(&names, offered),
             questioned: questioned(&clauses, &names),
             conditional: conditional(&clauses),
-            of_image: of_image(&clauses, &names.texts, offered),
+            of_image: image_colors(&clauses, &names.texts, offered),
             excluded: excluded(&clauses, &names),
             denied: denied(&clauses, &names),
         };

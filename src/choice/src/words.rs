@@ -119,7 +119,7 @@ pub(super) struct Roles(u64);
 
 impl Roles {
     /// The set of one role.
-    pub(super) const fn of(role: Role) -> Self {
+    pub(super) const fn from_role(role: Role) -> Self {
         Self(1 << role as u64)
     }
 
@@ -161,10 +161,10 @@ static PHRASES: LazyLock<HashMap<String, Vec<Phrase>>> = LazyLock::new(|| {
             let rest: Vec<String> = words.collect();
             let same_start = phrases.entry(first).or_default();
             match same_start.iter_mut().find(|phrase| phrase.rest == rest) {
-                Some(known) => known.roles = known.roles.with(Roles::of(role)),
+                Some(known) => known.roles = known.roles.with(Roles::from_role(role)),
                 None => same_start.push(Phrase {
                     rest,
-                    roles: Roles::of(role),
+                    roles: Roles::from_role(role),
                 }),
             }
         }
@@ -190,7 +190,7 @@ fn words_of(phrase: &str) -> Vec<String> {
     let words = tokens(&folded);
     words
         .iter()
-        .map(|word| word.of(&folded).to_owned())
+        .map(|word| word.slice(&folded).to_owned())
         .collect()
 }
 
@@ -200,17 +200,17 @@ pub(super) fn phrase_at(folded: &str, tokens: &[Token]) -> Option<(usize, Roles)
     let first = tokens
         .first()
         .filter(|token| token.kind == TokenKind::Word)?;
-    let word = first.of(folded);
+    let word = first.slice(folded);
     let listed = PHRASES.get(word).into_iter().flatten().find(|phrase| {
         phrase.rest.len() < tokens.len()
             && phrase
                 .rest
                 .iter()
                 .zip(&tokens[1..])
-                .all(|(word, token)| token.of(folded) == word)
+                .all(|(word, token)| token.slice(folded) == word)
     });
     let contraction =
-        || (word.ends_with("n't") && word.len() > 3).then_some((1, Roles::of(Role::Not)));
+        || (word.ends_with("n't") && word.len() > 3).then_some((1, Roles::from_role(Role::Not)));
     listed
         .map(|phrase| (phrase.rest.len() + 1, phrase.roles))
         .or_else(contraction)

@@ -7,6 +7,6 @@ use crate::types::toml_fault::TomlFault;
 
 /// The error about invalid TOML, on one line and with its line number.
 pub(super) fn invalid_toml(path: &Path, text: &str, error: &toml::de::Error) -> Error {
-    let TomlFault { line, problem } = TomlFault::of(text, error);
+    let TomlFault { line, problem } = TomlFault::new(text, error);
     Error::line(path, line, format_args!("not valid TOML: {problem}"))
 }

@@ -67,8 +67,8 @@ pub(super) struct FileFacts {
 impl FileFacts {
     pub(super) fn of(bytes: &[u8]) -> Self {
         Self {
-            digest: Digest::of(bytes),
-            format: FileFormat::of(bytes).ok(),
+            digest: Digest::from_bytes(bytes),
+            format: FileFormat::detect(bytes).ok(),
         }
     }
 }

@@ -393,7 +393,7 @@ fn content_name(digest: &Digest) -> String {
 
 /// The name of several images in this order: that of the first, how many follow, and a digest of all names.
 fn series_name(frames: &[FrameId]) -> FrameId {
-    let digest = Digest::of_parts(frames.iter().map(|frame| frame.0.as_bytes()));
+    let digest = Digest::from_parts(frames.iter().map(|frame| frame.0.as_bytes()));
     let first = frames.first().map_or("", |frame| &frame.0);
     let more = frames.len().saturating_sub(1);
     FrameId(format!("{first} +{more} ({})", &digest.to_string()[..12]))

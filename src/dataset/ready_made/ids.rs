@@ -103,7 +103,7 @@ impl Frames<'_> {
         let digests = answered.iter().map(|question| {
             let images = self.of_row(question.row).map(|found| match (found?, by) {
                 (Found::Member(name) | Found::File(name, _), ImagesBy::Name) => {
-                    Ok(Digest::of(name.0.as_bytes()))
+                    Ok(Digest::from_bytes(name.0.as_bytes()))
                 }
                 (found, _) => self.image_digest(found, &mut files),
             });
@@ -111,7 +111,7 @@ impl Frames<'_> {
             let options = question.choices.texts().iter().map(String::as_bytes);
             let images = images.iter().map(|image| &image.as_bytes()[..]);
             let text = question.text.as_bytes();
-            Ok(Digest::of_parts(images.chain([text]).chain(options)))
+            Ok(Digest::from_parts(images.chain([text]).chain(options)))
         });
         digests.collect()
     }
@@ -120,17 +120,17 @@ impl Frames<'_> {
     fn image_digest(&self, found: Found, files: &mut HashMap<FrameId, Digest>) -> Result<Digest> {
         let (name, digest) = match found {
             Found::Cell { facts, .. } => return Ok(facts.digest),
-            Found::Frame(name) => return Ok(Digest::of(name.0.as_bytes())),
+            Found::Frame(name) => return Ok(Digest::from_bytes(name.0.as_bytes())),
             Found::Member(name) | Found::File(name, _) if files.contains_key(&name) => {
                 return Ok(files[&name]);
             }
             Found::Member(name) => {
                 let image = self.archive.map(|archive| archive.image(&name.0));
-                let digest = Digest::of(&image.transpose()?.unwrap_or_default());
+                let digest = Digest::from_bytes(&image.transpose()?.unwrap_or_default());
                 (name, digest)
             }
             Found::File(name, path) => {
-                let digest = Digest::of(&reading::bytes(&path)?);
+                let digest = Digest::from_bytes(&reading::bytes(&path)?);
                 (name, digest)
             }
         };

@@ -160,7 +160,10 @@ impl<'a> Overview<'a> {
 
     /// Flat lines: models without images, each in the style of its model, and chance.
     fn flat_lines(&self, family: Option<&Family>) -> Vec<PlotLine> {
-        let cells = self.findings.summary.of(family, ReadingMode::Strict);
+        let cells = self
+            .findings
+            .summary
+            .family_cells(family, ReadingMode::Strict);
         let flat = cells.filter(|cell| cell.subject.view != Some(View::Image));
         let lines = flat.filter_map(|cell| {
             let model = &*cell.subject.model;

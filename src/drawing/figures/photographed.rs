@@ -14,7 +14,7 @@ impl Overview<'_> {
         if findings.set.light == SetLight::Lit || self.models.is_empty() {
             return None;
         }
-        let chance = findings.summary.of(None, ReadingMode::Strict);
+        let chance = findings.summary.family_cells(None, ReadingMode::Strict);
         let mut chance = chance.filter(|cell| cell.subject.view.is_none());
         let line = chance.find_map(|cell| Some(cell.accuracy?.value));
         let panels = self.models.iter().map(|model| {

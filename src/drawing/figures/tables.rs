@@ -139,7 +139,10 @@ impl Overview<'_> {
 
     /// Models without images, and chance, in the first of `columns` cells.
     fn without_images(&self, columns: usize) -> impl Iterator<Item = TableRow> {
-        let cells = self.findings.summary.of(None, ReadingMode::Strict);
+        let cells = self
+            .findings
+            .summary
+            .family_cells(None, ReadingMode::Strict);
         let cells = cells.filter(|cell| cell.subject.view != Some(View::Image));
         cells.filter_map(move |cell| {
             let of = cell.accuracy?;

@@ -12,7 +12,7 @@ use darkqa_score::subject::Subject;
 /// Accuracy of each model in the light, on photographs in the dark, on synthetic images that are as dark, and on enhanced
 /// photographs; `None` where no scene was photographed in the dark.
 pub(super) fn drawing(findings: &Findings<'_>) -> Option<Drawing> {
-    let chance = findings.summary.of(None, ReadingMode::Strict);
+    let chance = findings.summary.family_cells(None, ReadingMode::Strict);
     let mut chance = chance.filter(|cell| cell.subject.view.is_none());
     let line = chance.find_map(|cell| Some(cell.accuracy?.value));
     let mut models: Vec<&str> = Vec::new();

@@ -52,7 +52,7 @@ impl ModelsFile {
         let in_line = |line: usize| format!("{}, line {line}", path.display());
         let at = |start: usize| in_line(line_at(&text, start));
         let invalid = |e: toml::de::Error| {
-            let TomlFault { line, problem } = TomlFault::of(&text, &e);
+            let TomlFault { line, problem } = TomlFault::new(&text, &e);
             Error::usage(in_line(line), format_args!("not valid TOML: {problem}"))
         };
         let values: Table = toml::from_str(&text).map_err(invalid)?;

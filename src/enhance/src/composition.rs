@@ -65,13 +65,13 @@ impl Composition {
     ///
     /// # Errors
     /// If the expression gives three channels where only the luma is wanted; the message follows the file's name.
-    pub(super) fn of(signature: &Signature, convention: &ModelSidecar) -> Result<Self, String> {
+    pub(super) fn new(signature: &Signature, convention: &ModelSidecar) -> Result<Self, String> {
         let channels = convention.channels.unwrap_or_default();
         let image = convention.image.clone();
         let outputs = signature.outputs.iter();
         let composition = Self {
             outputs: outputs
-                .map(|output| OutputReading::of(output, &signature.input, convention))
+                .map(|output| OutputReading::new(output, &signature.input, convention))
                 .collect(),
             image,
             channels,
@@ -191,7 +191,7 @@ impl Composition {
             INPUT => dark,
             _ => outputs.next(),
         });
-        let made = image.of(&images.collect::<Vec<_>>(), size);
+        let made = image.evaluate(&images.collect::<Vec<_>>(), size);
         let certainty = match self.range() {
             ValueRange::Unit => self.outputs[0].certainty,
             ValueRange::Bytes | ValueRange::Signed => Certainty::Known,

@@ -139,7 +139,7 @@ impl ValueRange {
     pub(super) const ALL: [Self; 3] = [Self::Unit, Self::Bytes, Self::Signed];
 
     /// Value of a code of 0..255 in this range, divided as the models' own scripts do.
-    pub(super) fn of_code(self, code: f32) -> f32 {
+    pub(super) fn scale_code(self, code: f32) -> f32 {
         match self {
             Self::Unit => code / 255.0,
             Self::Bytes => code,

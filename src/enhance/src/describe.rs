@@ -132,7 +132,7 @@ impl Description {
                     self.source(|s| s.multiple.is_some(), ""),
                 );
             }
-            None if SizeRule::of(fixed, convention, feeding.pad).takes_any_size() => {
+            None if SizeRule::new(fixed, convention, feeding.pad).takes_any_size() => {
                 let others = MULTIPLES[1..].iter().map(ToString::to_string);
                 let others = others.collect::<Vec<_>>().join(", ");
                 let source = format!("tried first, then {others} if it fails");

@@ -222,7 +222,7 @@ impl Enhancer {
         let convention = convention.fed(ranges.input).read(ranges.output);
         let graph = self.graph().with_convention(convention);
         let graph = graph.map_err(|problem| self.fault(problem))?;
-        let seen: Vec<Codes> = frames.iter().map(Codes::of).collect();
+        let seen: Vec<Codes> = frames.iter().map(Codes::from_rgb).collect();
         let made = made(&[graph], frames)?.unwrap_or_default();
         let columns = made.into_iter().map(|made| {
             let pair = PairTrial::new(ranges, &seen, made);
@@ -233,7 +233,7 @@ impl Enhancer {
 
     /// The images of the outputs that are not read.
     fn other_outputs(&self, frames: &[Rgb], ranges: RangePair) -> Result<Vec<ExaminedConvention>> {
-        let seen: Vec<Codes> = frames.iter().map(Codes::of).collect();
+        let seen: Vec<Codes> = frames.iter().map(Codes::from_rgb).collect();
         let mut columns = Vec::new();
         for Port { name, .. } in &self.graph().signature.unread {
             let convention = ModelSidecar {

@@ -254,7 +254,7 @@ impl Enhancer {
     fn rule(&self, size: [usize; 2]) -> SizeRule {
         let signature = &self.graph.signature;
         let fixed = [signature.height, signature.width];
-        let mut rule = SizeRule::of(fixed, &self.graph.convention, self.graph.feeding.pad);
+        let mut rule = SizeRule::new(fixed, &self.graph.convention, self.graph.feeding.pad);
         match self.search.found() {
             Some(TakenSizes::Multiple(multiple)) if self.refused.contains(&size) => {
                 rule.multiple = multiple;
@@ -333,7 +333,7 @@ impl Enhancer {
             self.check_memory(rule, rule.whole(size), size)?;
         }
         if must_fit {
-            let found = self.context.of(&self.graph, rule)?;
+            let found = self.context.measure(&self.graph, rule)?;
             self.log.reach = self.context.reach();
             context = found.map_err(|why| self.fault(global(rule, size, &why)))?;
             let tile = rule.whole([reach::FREE_SIDE; 2]);
@@ -345,10 +345,10 @@ impl Enhancer {
             rule.multiple = alignment;
         }
         let mut plan =
-            SizePlan::of(size, rule, self.tiling, context).map_err(|e| self.no_plan(e))?;
+            SizePlan::new(size, rule, self.tiling, context).map_err(|e| self.no_plan(e))?;
         if rule.takes_any_size() && plan.seams == SeamRule::MustHold && plan.tiles.count() > 1 {
             rule.multiple = self.alignment(rule, plan.fed(), plan.cut.context)?;
-            plan = SizePlan::of(size, rule, self.tiling, context).map_err(|e| self.no_plan(e))?;
+            plan = SizePlan::new(size, rule, self.tiling, context).map_err(|e| self.no_plan(e))?;
         }
         if rule.takes_any_size() {
             self.check_memory(rule, plan.fed(), size)?;
@@ -407,7 +407,7 @@ impl Enhancer {
     /// Enhances an image that is resized to `fed`, and resizes the result back.
     fn resized(&mut self, image: &Rgb, rule: SizeRule, fed: [usize; 2]) -> Result<Attempt> {
         self.check_memory(rule, fed, [image.height(), image.width()])?;
-        let planes = Planes::of(image).resized(fed[0], fed[1]);
+        let planes = Planes::from_rgb(image).resized(fed[0], fed[1]);
         let planes = planes.map_err(|e| self.fault(e))?;
         let enhanced = match self.graph.planes(&planes)? {
             RunResult::Output(planes) => planes,

@@ -73,7 +73,7 @@ impl Expression {
     }
 
     /// The expression of images of one size, in the order of [`Expression::names`].
-    pub(super) fn of(&self, images: &[&Planes], [height, width]: [usize; 2]) -> Planes {
+    pub(super) fn evaluate(&self, images: &[&Planes], [height, width]: [usize; 2]) -> Planes {
         let plane = height * width;
         let mut values = vec![Sample::One(0.0); images.len()];
         let mut stack = Vec::with_capacity(self.terms.len());

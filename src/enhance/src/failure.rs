@@ -53,7 +53,7 @@ pub(super) enum RunFailure {
 
 impl RunFailure {
     /// The failure of a run that ended with an error of ONNX Runtime.
-    pub(super) fn of_message(fed: [usize; 2], message: String) -> Self {
+    pub(super) fn from_message(fed: [usize; 2], message: String) -> Self {
         const MEMORY: [&str; 4] = [
             "Failed to allocate memory",
             "bad_alloc",
@@ -244,7 +244,7 @@ mod tests {
             assert!(failure.is_of_size() && !failure.words().contains("enlarges"));
         }
         let memory = "Failed to allocate memory for requested buffer of size 844424930131968";
-        let failure = RunFailure::of_message([1, 1], memory.to_owned());
+        let failure = RunFailure::from_message([1, 1], memory.to_owned());
         let requested = Some(844_424_930_131_968);
         assert_eq!(
             failure,
@@ -254,7 +254,7 @@ mod tests {
             }
         );
         assert!(!failure.is_of_size());
-        assert!(RunFailure::of_message([1, 1], "shape mismatch".to_owned()).is_of_size());
+        assert!(RunFailure::from_message([1, 1], "shape mismatch".to_owned()).is_of_size());
     }
 
     #[test]

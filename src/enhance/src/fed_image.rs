@@ -93,7 +93,7 @@ impl FedImage<'_> {
     pub(super) fn digest(&self) -> Digest {
         let of = |size: [usize; 2], bytes: &[u8]| {
             let size = size.map(|side| (side as u64).to_le_bytes());
-            Digest::of_parts([&size[0][..], &size[1], bytes])
+            Digest::from_parts([&size[0][..], &size[1], bytes])
         };
         match self {
             Self::Window { dark, .. } => *dark.digest.get_or_init(|| {

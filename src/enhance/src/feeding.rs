@@ -34,7 +34,7 @@ pub(super) struct Feeding {
 
 impl Feeding {
     /// The conversion that signature and convention define.
-    pub(super) fn of(signature: &Signature, convention: &ModelSidecar) -> Self {
+    pub(super) fn new(signature: &Signature, convention: &ModelSidecar) -> Self {
         let element = signature.input.port.element.clone();
         Self {
             layout: signature.input.layout,
@@ -62,8 +62,8 @@ impl Feeding {
                 match &self.input {
                     None => Some(self.planes(&dark.into_owned().with_channels(self.channels))),
                     Some(expression) => {
-                        let image =
-                            expression.of(&vec![&*dark; expression.names().len()], fed.size());
+                        let image = expression
+                            .evaluate(&vec![&*dark; expression.names().len()], fed.size());
                         let finite = image.samples.iter().all(|sample| sample.is_finite());
                         let image = image.spread().with_channels(self.channels);
                         finite.then(|| self.planes(&image))
@@ -149,7 +149,7 @@ impl Feeding {
         let float = |(channel, unit): (usize, f32)| {
             let value = match self.range {
                 ValueRange::Unit => unit,
-                ValueRange::Bytes | ValueRange::Signed => self.range.of_code(unit * 255.0),
+                ValueRange::Bytes | ValueRange::Signed => self.range.scale_code(unit * 255.0),
             };
             (value - self.mean[channel]) / self.std[channel]
         };
@@ -176,7 +176,7 @@ impl Feeding {
     fn table(&self) -> [[f32; 256]; 3] {
         [0, 1, 2].map(|channel: usize| {
             std::array::from_fn(|byte| {
-                let value = self.range.of_code(byte as f32);
+                let value = self.range.scale_code(byte as f32);
                 (value - self.mean[channel]) / self.std[channel]
             })
         })

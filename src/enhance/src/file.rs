@@ -46,7 +46,7 @@ impl ModelFile {
             let path = PathBuf::from(format!("{} (built in)", built_in.name));
             let name = EnhancerName::new(built_in.name)?;
             let bytes = built_in.model.to_vec();
-            let file = Self::of(path, name, None, bytes, built_in.sidecar)?;
+            let file = Self::from_bytes(path, name, None, bytes, built_in.sidecar)?;
             return Ok(Self {
                 named: model.to_owned(),
                 ..file
@@ -69,7 +69,7 @@ impl ModelFile {
             tracing::warn!("{} is called {name} in tables and records", path.display());
         }
         let text = sidecar::text_for(&path)?;
-        let file = Self::of(path, name, preset, bytes, &text)?;
+        let file = Self::from_bytes(path, name, preset, bytes, &text)?;
         Ok(Self {
             named: model.to_owned(),
             ..file
@@ -77,7 +77,7 @@ impl ModelFile {
     }
 
     /// The model of these bytes, with the text of its sidecar.
-    fn of(
+    fn from_bytes(
         path: PathBuf,
         name: EnhancerName,
         preset: Option<Preset>,
@@ -147,7 +147,7 @@ fn name_of(stem: &str) -> Result<EnhancerName> {
         .filter(|word| !word.is_empty());
     let mut name = words.collect::<Vec<_>>().join("-");
     if !stem.is_ascii() {
-        let digest: String = Digest::of(stem.as_bytes()).to_string();
+        let digest: String = Digest::from_bytes(stem.as_bytes()).to_string();
         let digest = digest.rsplit(':').next().unwrap_or_default();
         let digest: String = digest.chars().take(6).collect();
         name = [name, digest].join("-");
@@ -179,7 +179,7 @@ fn digest(
     for (location, size) in &weights.external {
         let file = external_path(path, location)?;
         let content = read_weights(path, &file, *size)?;
-        external.insert(location.as_ref(), Digest::of(&content));
+        external.insert(location.as_ref(), Digest::from_bytes(&content));
     }
     let sidecar = sidecar.clone();
     let convention = match preset {
@@ -190,7 +190,7 @@ fn digest(
     let read_by_preset =
         convention.output.is_none() && convention.image.is_none() && output_count(bytes) != 1;
     let facts = EnhancementFacts {
-        file: Digest::of(bytes),
+        file: Digest::from_bytes(bytes),
         external,
         convention: convention.without_defaults(),
         outputs: preset.filter(|_| read_by_preset).map(Preset::outputs),
@@ -364,7 +364,7 @@ mod tests {
         let file = model("a.bin");
         std::fs::write(&path, &file).unwrap();
         std::fs::write(folder.path().join("a.bin"), [1]).unwrap();
-        let hash = |bytes: &[u8]| serde_json::to_string(&Digest::of(bytes)).unwrap();
+        let hash = |bytes: &[u8]| serde_json::to_string(&Digest::from_bytes(bytes)).unwrap();
         for (sidecar, convention) in [
             ("", ""),
             (
@@ -388,7 +388,7 @@ mod tests {
                 hash(&file)
             );
             let found = ModelFile::read(&path).unwrap().digest();
-            assert_eq!(found, Digest::of(facts.as_bytes()), "{sidecar}");
+            assert_eq!(found, Digest::from_bytes(facts.as_bytes()), "{sidecar}");
         }
     }
 

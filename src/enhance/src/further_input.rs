@@ -30,7 +30,7 @@ struct Places {
 impl Places {
     /// The places in a tensor of the image's size. Its layout is the one in which it has one or three channels, first of all
     /// the image's own.
-    fn of(port: &Port, image: TensorLayout) -> Option<Self> {
+    fn for_port(port: &Port, image: TensorLayout) -> Option<Self> {
         if port.is_scalar() || vector_length(port).is_some() {
             return None;
         }
@@ -75,12 +75,12 @@ impl FurtherInput {
     ///
     /// # Errors
     /// If there is no value, or it does not fit; the message follows the file's name.
-    pub(super) fn of(
+    pub(super) fn new(
         port: &Port,
         value: Option<&ExtraValue>,
         image: TensorLayout,
     ) -> Result<Self, String> {
-        let places = Places::of(port, image);
+        let places = Places::for_port(port, image);
         let value = value.ok_or_else(|| missing(port, places))?;
         let input = Self {
             port: port.clone(),
@@ -189,7 +189,7 @@ impl FurtherInput {
             ExtraValue::From(expression) => {
                 let dark = fed.planes();
                 let images = vec![&*dark; expression.names().len()];
-                let mut image = expression.of(&images, fed.size());
+                let mut image = expression.evaluate(&images, fed.size());
                 if channels == Some(3) {
                     image = image.spread();
                 }

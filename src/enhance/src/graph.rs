@@ -153,23 +153,23 @@ impl Graph {
             batch,
         };
         let session = Arc::new(Mutex::new(session));
-        let graph = Self::of_session(session, Arc::new(ports), convention, runtime)?;
+        let graph = Self::from_session(session, Arc::new(ports), convention, runtime)?;
         Ok(Self { differing, ..graph })
     }
 
-    fn of_session(
+    fn from_session(
         session: Arc<Mutex<Session>>,
         ports: Arc<Ports>,
         convention: ModelSidecar,
         runtime: &Runtime,
     ) -> std::result::Result<Self, String> {
-        let signature = Signature::of(&ports.inputs, &ports.outputs, &convention)?;
-        let options = SessionOptions::of(&signature.outputs).map_err(|e| one_line(&e))?;
+        let signature = Signature::infer(&ports.inputs, &ports.outputs, &convention)?;
+        let options = SessionOptions::for_outputs(&signature.outputs).map_err(|e| one_line(&e))?;
         let releasing = SessionOptions::releasing_memory(&signature.outputs);
         let releasing = releasing.map_err(|e| one_line(&e))?;
         Ok(Self {
-            feeding: Feeding::of(&signature, &convention),
-            reading: Arc::new(Composition::of(&signature, &convention)?),
+            feeding: Feeding::new(&signature, &convention),
+            reading: Arc::new(Composition::new(&signature, &convention)?),
             convention,
             differing: None,
             signature: Arc::new(signature),
@@ -192,7 +192,7 @@ impl Graph {
         convention: ModelSidecar,
     ) -> std::result::Result<Self, String> {
         let (session, ports) = (Arc::clone(&self.session), Arc::clone(&self.ports));
-        let mut graph = Self::of_session(session, ports, convention, &self.runtime)?;
+        let mut graph = Self::from_session(session, ports, convention, &self.runtime)?;
         graph.clock = Mutex::new(*self.clock());
         graph.memory = self.memory;
         graph.differing.clone_from(&self.differing);
@@ -327,7 +327,7 @@ impl Graph {
             .iter()
             .map(|graph| Arc::clone(&graph.reading))
             .collect();
-        let dark = Planes::of(image);
+        let dark = Planes::from_rgb(image);
         let fed = dark.clone();
         self.run(&self.options, &FedImage::Whole(&fed), move |outputs| {
             let size = dark.size();
@@ -337,7 +337,7 @@ impl Graph {
                 // The rules about plausible images name values that are none.
                 planes.map_or_else(
                     |_| Codes::unusable(size),
-                    |planes| Codes::of_planes(&planes),
+                    |planes| Codes::from_planes(&planes),
                 )
             });
             Ok(codes.collect())
@@ -390,7 +390,8 @@ impl Graph {
                     Err(other) => RunResult::Failed(other.failure(size)),
                 },
             );
-            result.unwrap_or_else(|e| RunResult::Failed(RunFailure::of_message(size, one_line(&e))))
+            result
+                .unwrap_or_else(|e| RunResult::Failed(RunFailure::from_message(size, one_line(&e))))
         };
         let limits = JobLimits {
             time: clock.left(),

@@ -60,12 +60,12 @@ const PINS: [Pin; 4] = [
 
 impl Pin {
     /// Pin of the platform that this program was built for; `None` if no known wheel fits.
-    pub(super) fn of_this_platform() -> Option<Self> {
+    pub(super) fn for_this_platform() -> Option<Self> {
         // The wheels need the GNU C library.
         if cfg!(target_env = "musl") {
             return None;
         }
-        Self::of(consts::OS, consts::ARCH)
+        Self::for_platform(consts::OS, consts::ARCH)
     }
 
     /// Whether a file has the name of the library that is installed.
@@ -73,7 +73,7 @@ impl Pin {
         path.file_name().is_some_and(|name| name == self.file)
     }
 
-    fn of(os: &str, arch: &str) -> Option<Self> {
+    fn for_platform(os: &str, arch: &str) -> Option<Self> {
         PINS.into_iter()
             .find(|pin| pin.os == os && pin.arch == arch)
     }
@@ -122,7 +122,7 @@ pub(super) fn install(pin: Pin, folder: &Path) -> Result<PathBuf, String> {
 /// # Errors
 /// What is wrong with it; the message follows its path.
 pub(super) fn check_installed(library: &Path, pin: Pin) -> Result<(), String> {
-    LibraryFormat::of_this_system().check(library)?;
+    LibraryFormat::for_this_system().check(library)?;
     receipt::check(library, pin.sha256)
 }
 
@@ -247,9 +247,9 @@ mod tests {
             assert_eq!(pin.sha256.len(), 64);
             assert!(super::super::library::is_library_name(pin.os, pin.file));
             assert!(pin.os == "windows" || pin.file.contains(PINNED));
-            assert_eq!(Pin::of(pin.os, pin.arch), Some(pin));
+            assert_eq!(Pin::for_platform(pin.os, pin.arch), Some(pin));
         }
-        assert_eq!(Pin::of("linux", "riscv64"), None);
+        assert_eq!(Pin::for_platform("linux", "riscv64"), None);
     }
 
     #[test]

@@ -40,7 +40,7 @@ pub(super) fn probe(path: &Path) -> Result<String, String> {
     if !metadata.is_file() {
         return Err("is not a file; name the library itself".to_owned());
     }
-    LibraryFormat::of_this_system().check(path)?;
+    LibraryFormat::for_this_system().check(path)?;
     let version = version_of(path)?;
     match minor(&version) {
         Some(minor) if minor >= OLDEST => Ok(version),

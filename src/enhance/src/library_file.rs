@@ -32,7 +32,7 @@ const MOST_NAMES: u64 = 16 << 20;
 
 impl LibraryFormat {
     /// The format of this build's system.
-    pub(super) fn of_this_system() -> Self {
+    pub(super) fn for_this_system() -> Self {
         match consts::OS {
             "windows" => Self::Pe,
             "macos" => Self::MachO,

@@ -33,7 +33,7 @@ pub(super) struct MemoryCost {
 
 impl MemoryCost {
     /// Cost of the tensors of input and output alone, the least that a run needs.
-    pub(super) fn of_tensors() -> Self {
+    pub(super) fn for_tensors() -> Self {
         Self {
             linear: TENSORS,
             square: 0.0,
@@ -43,7 +43,7 @@ impl MemoryCost {
     /// Cost from the pixels of the last three probes and the resident bytes after each; `None` if they did not grow, or there
     /// are fewer than two probes. With two probes all growth counts as that of squares: the third was left out because it
     /// might be.
-    pub(super) fn of(measured: &[(usize, u64)]) -> Option<Self> {
+    pub(super) fn from_probes(measured: &[(usize, u64)]) -> Option<Self> {
         let points: Vec<(f64, f64)> = measured[measured.len().saturating_sub(3)..]
             .iter()
             .map(|(pixels, bytes)| (*pixels as f64, *bytes as f64))
@@ -78,7 +78,7 @@ impl MemoryCost {
     /// fewer than two probes.
     pub(super) fn at_worst(measured: &[(usize, u64)], pixels: usize) -> f64 {
         let last = measured.len().saturating_sub(2)..;
-        let cost = Self::of(&measured[last]);
+        let cost = Self::from_probes(&measured[last]);
         cost.map_or(0.0, |cost| cost.bytes(pixels))
     }
 
@@ -135,10 +135,16 @@ mod tests {
 
     #[test]
     fn growth_gives_the_cost() {
-        assert_eq!(MemoryCost::of(&[(64, 5), (128, 5), (256, 5)]), None);
-        assert_eq!(MemoryCost::of(&[(64, 7), (128, 6), (256, 5)]), None);
-        assert_eq!(MemoryCost::of(&[(64, 7)]), None);
-        let cost = MemoryCost::of(&measured(0.0, |pixels| 800.0 * pixels)).unwrap();
+        assert_eq!(
+            MemoryCost::from_probes(&[(64, 5), (128, 5), (256, 5)]),
+            None
+        );
+        assert_eq!(
+            MemoryCost::from_probes(&[(64, 7), (128, 6), (256, 5)]),
+            None
+        );
+        assert_eq!(MemoryCost::from_probes(&[(64, 7)]), None);
+        let cost = MemoryCost::from_probes(&measured(0.0, |pixels| 800.0 * pixels)).unwrap();
         assert_eq!(cost.fits(1_000_000, 801_000_000), Ok(()));
         let [needed, available] = cost.fits(1_000_000, 500_000_000).unwrap_err();
         assert!((needed - 0.8).abs() < 1e-3 && (available - 0.5).abs() < 1e-9);
@@ -149,13 +155,13 @@ mod tests {
         // Zero-DCE after an image of 1280 × 720, in megabytes: 77, 79, 110, 344.
         let zero_dce = [(64, 77), (128, 79), (256, 110), (512, 344)];
         let zero_dce = zero_dce.map(|(side, bytes): (usize, u64)| (side * side, bytes << 20));
-        let cost = MemoryCost::of(&zero_dce).unwrap();
+        let cost = MemoryCost::from_probes(&zero_dce).unwrap();
         let [needed, _] = cost.fits(2560 * 1440, 1).unwrap_err();
         assert!((3.0..5.0).contains(&needed), "{needed}");
         for per_pixel in [50.0, 200.0, 1000.0, 20_000.0] {
             for hidden in [0.0, HIDDEN] {
                 let points = measured(hidden, |pixels| per_pixel * pixels);
-                if let Some(cost) = MemoryCost::of(&points) {
+                if let Some(cost) = MemoryCost::from_probes(&points) {
                     assert!(cost.square.abs() < 1e-12, "{per_pixel} {hidden}");
                 }
             }
@@ -165,13 +171,13 @@ mod tests {
     #[test]
     fn attention_over_all_pixels_is_not_taken_for_linear() {
         let attention = measured(0.0, |pixels| 100.0 * pixels + 4.0 * pixels * pixels);
-        let cost = MemoryCost::of(&attention).unwrap();
+        let cost = MemoryCost::from_probes(&attention).unwrap();
         // 640 × 480: 378 GB of attention.
         let [needed, _] = cost.fits(640 * 480, 8_000_000_000).unwrap_err();
         assert!((needed - 377.5).abs() < 1.0, "{needed}");
         // At a quarter of the size within the graph, with memory hidden.
         let coarse = measured(HIDDEN, |pixels| 500.0 * pixels + pixels * pixels / 64.0);
-        let [needed, _] = MemoryCost::of(&coarse)
+        let [needed, _] = MemoryCost::from_probes(&coarse)
             .unwrap()
             .fits(2560 * 1440, 1)
             .unwrap_err();
@@ -179,7 +185,7 @@ mod tests {
         // The third probe would need 17 GB, as two show; without it the estimate is no smaller.
         let worst = MemoryCost::at_worst(&attention[..2], 256 * 256);
         assert!((worst / 17.2e9 - 1.0).abs() < 0.1, "{worst}");
-        let two = MemoryCost::of(&attention[..2]).unwrap();
+        let two = MemoryCost::from_probes(&attention[..2]).unwrap();
         assert!(two.fits(640 * 480, 370_000_000_000).is_err());
         // A linear model passes this bound.
         let linear = measured(0.0, |pixels| 1000.0 * pixels);

@@ -47,7 +47,7 @@ impl MemoryCheck {
             return Ok(Ok(()));
         };
         let runs = graph.batch().saturating_mul(pixels);
-        let tensors = MemoryCost::of_tensors();
+        let tensors = MemoryCost::for_tensors();
         let mut checked = tensors.fits(runs, available);
         if checked.is_ok() {
             if self.0 == Estimate::Unknown {
@@ -132,7 +132,7 @@ fn measure(graph: &Graph, rule: SizeRule, available: u64) -> Result<Estimate> {
         };
         measured.push((side * side, resident));
     }
-    Ok(MemoryCost::of(&measured).map_or(Estimate::Tensors, Estimate::Measured))
+    Ok(MemoryCost::from_probes(&measured).map_or(Estimate::Tensors, Estimate::Measured))
 }
 
 /// Runs a model on a small image; returns whether that worked.

@@ -56,7 +56,7 @@ impl Output {
                     channels.words()
                 ));
             }
-            return Self::of_slice(port, slice, fits);
+            return Self::from_slice(port, slice, fits);
         }
         let fits_count = &fits;
         let fits = |port: &Port| fits_count(port, channels.count());
@@ -117,7 +117,7 @@ impl Output {
         let outputs: Vec<Self> = names
             .map(|name| {
                 if let Some((port, slice)) = sliced(outputs, name) {
-                    return Self::of_slice(port, slice, &fits);
+                    return Self::from_slice(port, slice, &fits);
                 }
                 let port = outputs.iter().find(|port| port.name == *name);
                 let port = port.filter(|port| channels.iter().any(|count| fits(port, *count)));
@@ -152,7 +152,7 @@ impl Output {
     ///
     /// # Errors
     /// If it has not so many channels, or not the size of the input.
-    fn of_slice(
+    fn from_slice(
         port: &Port,
         slice: ChannelSlice,
         fits: impl Fn(&Port, usize) -> bool,

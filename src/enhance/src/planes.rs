@@ -18,7 +18,7 @@ pub(super) struct Planes {
 
 impl Planes {
     /// The planes of an image, its bytes divided by 255.
-    pub(super) fn of(image: &Rgb) -> Self {
+    pub(super) fn from_rgb(image: &Rgb) -> Self {
         let pixels = image.samples().chunks_exact(3);
         let samples = (0..3)
             .flat_map(|channel| {
@@ -139,7 +139,7 @@ mod tests {
     #[test]
     fn planes_are_red_green_blue() {
         let image = Rgb::new(1, 2, vec![0, 51, 102, 153, 204, 255]).unwrap();
-        let planes = Planes::of(&image);
+        let planes = Planes::from_rgb(&image);
         assert_eq!(planes.samples, [0.0, 0.6, 0.2, 0.8, 0.4, 1.0]);
         assert_eq!((planes.height, planes.width), (1, 2));
     }
@@ -147,7 +147,10 @@ mod tests {
     #[test]
     fn every_byte_comes_back() {
         let image = image(11, 24);
-        assert_eq!(Planes::of(&image).to_rgb(Rounding::Round).unwrap(), image);
+        assert_eq!(
+            Planes::from_rgb(&image).to_rgb(Rounding::Round).unwrap(),
+            image
+        );
     }
 
     #[test]
@@ -167,7 +170,7 @@ mod tests {
     #[test]
     fn resizing_preserves_flat_colours_and_the_range() {
         let flat = Rgb::new(9, 7, [3, 120, 255].repeat(63)).unwrap();
-        let resized = Planes::of(&flat).resized(4, 16).unwrap();
+        let resized = Planes::from_rgb(&flat).resized(4, 16).unwrap();
         assert_eq!(
             (resized.height, resized.width, resized.samples.len()),
             (4, 16, 192)
@@ -180,7 +183,7 @@ mod tests {
                 .unwrap(),
             flat
         );
-        let mut too_large = Planes::of(&image(8, 8));
+        let mut too_large = Planes::from_rgb(&image(8, 8));
         too_large.samples[0] = 5.0;
         let resized = too_large.resized(16, 5).unwrap();
         assert!(resized.samples.iter().all(|x| (0.0..=1.0).contains(x)));
@@ -191,7 +194,7 @@ mod tests {
         let halves: Vec<u8> = (0..16)
             .flat_map(|i| [if i % 4 < 2 { 0 } else { 255 }; 3])
             .collect();
-        let small = Planes::of(&Rgb::new(4, 4, halves).unwrap())
+        let small = Planes::from_rgb(&Rgb::new(4, 4, halves).unwrap())
             .resized(2, 2)
             .unwrap();
         for row in small.samples.chunks_exact(2) {

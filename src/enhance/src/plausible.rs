@@ -83,7 +83,7 @@ impl Codes {
     }
 
     /// The codes of an image of bytes.
-    pub(super) fn of(image: &Rgb) -> Self {
+    pub(super) fn from_rgb(image: &Rgb) -> Self {
         Self {
             height: image.height(),
             width: image.width(),
@@ -102,7 +102,7 @@ impl Codes {
         let factor = longer.div_ceil(JUDGED_SIDE);
         let [height, width] = [image.height(), image.width()].map(|side| side / factor);
         if factor == 1 || height == 0 || width == 0 {
-            return Self::of(image);
+            return Self::from_rgb(image);
         }
         let mut samples = vec![0.0; height * width * 3];
         let lines = image.samples().chunks_exact(3 * image.width());
@@ -129,7 +129,7 @@ impl Codes {
     }
 
     /// The codes of an image of floats.
-    pub(super) fn of_planes(planes: &Planes) -> Self {
+    pub(super) fn from_planes(planes: &Planes) -> Self {
         let pixels = planes.height * planes.width;
         let samples = (0..pixels).flat_map(|pixel| {
             [0, 1, 2].map(|channel| 255.0 * planes.samples[channel * pixels + pixel])

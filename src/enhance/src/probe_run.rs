@@ -159,7 +159,7 @@ impl Enhancer {
                 .iter()
                 .map(|frame| self.probe_image(frame, size))
                 .collect::<Result<_>>()?;
-            let seen: Vec<Codes> = frames.iter().map(Codes::of).collect();
+            let seen: Vec<Codes> = frames.iter().map(Codes::from_rgb).collect();
             let mut pairs = [(); N].map(|()| Vec::new());
             for fed_alike in RangePair::all(input, output).chunk_by(|a, b| a.input == b.input) {
                 let graphs = conventions.iter().flat_map(|convention| {
@@ -218,7 +218,7 @@ impl Enhancer {
             [shorter, longer]
         };
         let [height, width] = self.probe_size(size);
-        let planes = Planes::of(frame).resized(height, width);
+        let planes = Planes::from_rgb(frame).resized(height, width);
         let planes = planes.map_err(|problem| self.fault(problem))?;
         planes
             .to_rgb(Rounding::Round)

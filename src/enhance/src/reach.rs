@@ -37,7 +37,7 @@ pub(super) struct Context {
 
 impl Context {
     /// The context in pixels; the inner error says why the model counts as global.
-    pub(super) fn of(
+    pub(super) fn measure(
         &mut self,
         graph: &Graph,
         rule: SizeRule,
@@ -124,7 +124,7 @@ fn part(scene: &Rgb, [height, width]: [usize; 2], start: usize) -> Planes {
     for (line, row) in lines.zip(rows) {
         line.copy_from_slice(&row[3 * start..][..3 * width]);
     }
-    Planes::of(&part)
+    Planes::from_rgb(&part)
 }
 
 /// Whether an output and that of the moved image agree where both are farther than `margin` from their edges.
@@ -158,7 +158,7 @@ impl Reach {
         let mut farthest = 0;
         for codes in &CODES {
             let mut image = texture(size, codes);
-            let before = match output(graph, &Planes::of(&image))? {
+            let before = match output(graph, &Planes::from_rgb(&image))? {
                 Ok(before) => before,
                 Err(problem) => return Ok(Err(problem)),
             };
@@ -167,7 +167,7 @@ impl Reach {
             for sample in &mut image.samples_mut()[at..at + 3] {
                 *sample += 1;
             }
-            let after = match output(graph, &Planes::of(&image))? {
+            let after = match output(graph, &Planes::from_rgb(&image))? {
                 Ok(after) => after,
                 Err(problem) => return Ok(Err(problem)),
             };

@@ -86,7 +86,7 @@ impl<'a> TensorSamples<'a> {
 
 impl OutputReading {
     /// The conversion that an output, the input and the convention define.
-    pub(super) fn of(output: &Output, input: &ImageInput, convention: &ModelSidecar) -> Self {
+    pub(super) fn new(output: &Output, input: &ImageInput, convention: &ModelSidecar) -> Self {
         let mean_and_std = convention.mean_and_std_out();
         let (range, certainty) = match (convention.range_out, &output.port.element) {
             (Some(range), _) => (range, Certainty::Known),

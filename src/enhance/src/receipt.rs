@@ -32,7 +32,7 @@ fn path_for(library: &Path) -> PathBuf {
 
 impl Receipt {
     /// Receipt of a library with the given SHA-256, by the size and time that its file has now.
-    fn of(library: &Path, sha256: String) -> io::Result<Self> {
+    fn for_library(library: &Path, sha256: String) -> io::Result<Self> {
         let metadata = fs::metadata(library)?;
         let modified = metadata.modified().ok();
         let since_1970 = modified.and_then(|time| time.duration_since(UNIX_EPOCH).ok());
@@ -58,7 +58,7 @@ impl Receipt {
 /// What is wrong with the library; the message follows its path.
 pub(super) fn check(library: &Path, sha256: &str) -> Result<(), String> {
     let unreadable = |e: io::Error| format!("cannot be read: {e}");
-    let expected = Receipt::of(library, sha256.to_owned()).map_err(unreadable)?;
+    let expected = Receipt::for_library(library, sha256.to_owned()).map_err(unreadable)?;
     let stored = fs::read_to_string(path_for(library)).ok();
     let stored: Option<Receipt> = stored.and_then(|text| toml::from_str(&text).ok());
     if stored.as_ref() == Some(&expected) {

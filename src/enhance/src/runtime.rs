@@ -94,7 +94,7 @@ impl RuntimeSearch {
                     place,
                 }
             }
-            None => find(&Surroundings::of_this_process(), self.install)?,
+            None => find(&Surroundings::from_this_process(), self.install)?,
         };
         let runtime = Runtime::start(found)?;
         Ok(open.insert(runtime).clone())
@@ -171,7 +171,7 @@ fn find(surroundings: &Surroundings, allowed: Install) -> Result<FoundLibrary> {
 /// Checks a candidate, one of the cache against its receipt too; returns its version.
 fn check(place: LibraryPlace, path: &Path) -> Result<String, String> {
     if place == LibraryPlace::Cache
-        && let Some(pin) = Pin::of_this_platform()
+        && let Some(pin) = Pin::for_this_platform()
         && pin.is_for(path)
     {
         check_installed(path, pin)?;
@@ -181,7 +181,7 @@ fn check(place: LibraryPlace, path: &Path) -> Result<String, String> {
 
 /// Installs the pinned library into the cache.
 fn install_here(surroundings: &Surroundings, rejected: &[String]) -> Result<FoundLibrary, String> {
-    let pin = Pin::of_this_platform().ok_or_else(|| {
+    let pin = Pin::for_this_platform().ok_or_else(|| {
         format!(
             "no library is known for {} {}",
             std::env::consts::OS,

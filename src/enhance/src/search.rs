@@ -67,7 +67,7 @@ impl fmt::Display for LibraryPlace {
 
 impl Surroundings {
     /// The surroundings of this process.
-    pub(super) fn of_this_process() -> Self {
+    pub(super) fn from_this_process() -> Self {
         let folder = |name| {
             env::var_os(name)
                 .map(PathBuf::from)

@@ -26,7 +26,7 @@ pub(super) struct SessionOptions {
 
 impl SessionOptions {
     /// Options for runs that return these outputs.
-    pub(super) fn of(outputs: &[Output]) -> ort::Result<Self> {
+    pub(super) fn for_outputs(outputs: &[Output]) -> ort::Result<Self> {
         let none = OutputSelector::no_default();
         let selected = outputs
             .iter()
@@ -39,7 +39,7 @@ impl SessionOptions {
 
     /// The same options for runs that give back the memory of ONNX Runtime's arena at their end.
     pub(super) fn releasing_memory(outputs: &[Output]) -> ort::Result<Self> {
-        let mut own = Self::of(outputs)?;
+        let mut own = Self::for_outputs(outputs)?;
         own.options
             .set("memory.enable_memory_arena_shrinkage", "cpu:0")?;
         Ok(own)
@@ -65,7 +65,7 @@ impl SessionOptions {
 }
 
 // SAFETY: `ort` withholds `Sync` because a selected output may hold a preallocated tensor, which two runs would write at
-// once. None is ever preallocated here (`SessionOptions::of` selects by name alone), and the session's mutex keeps runs
+// once. None is ever preallocated here (`SessionOptions::for_outputs` selects by name alone), and the session's mutex keeps runs
 // apart. The only calls during a run are `terminate` and `unterminate`, which ONNX Runtime documents for use from another
 // thread: they set one flag.
 #[expect(unsafe_code, reason = "there is no other way to stop a run")]

@@ -157,7 +157,7 @@ impl ModelSidecar {
         let path = path_for(model);
         let wrong = |problem: &str| Error::data(path.display(), format_args!("{problem}{KEYS}"));
         let sidecar: Self = toml::from_str(text).map_err(|e| {
-            let TomlFault { line, problem } = TomlFault::of(text, &e);
+            let TomlFault { line, problem } = TomlFault::new(text, &e);
             let stated = text.lines().nth(line - 1).unwrap_or_default().trim();
             let stated: String = stated.chars().take(LONGEST_LINE).collect();
             Error::line(&path, line, format_args!("`{stated}`: {problem}{KEYS}"))

@@ -1,4 +1,4 @@
-//! Roles of a graph's tensors: the degraded image, the enhanced image and further inputs ([`Signature::of`]).
+//! Roles of a graph's tensors: the degraded image, the enhanced image and further inputs ([`Signature::infer`]).
 //!
 //! A graph states element types, ranks and fixed sizes. Value range and colour order come from a sidecar or a preset; by
 //! default they are those of the published models: RGB, 0..1.
@@ -40,7 +40,7 @@ impl Signature {
     ///
     /// # Errors
     /// What was found and how to repair it; the message follows the file's name.
-    pub(super) fn of(
+    pub(super) fn infer(
         inputs: &[Port],
         outputs: &[Port],
         convention: &ModelSidecar,
@@ -59,7 +59,7 @@ impl Signature {
         }
         let extras = inputs.iter().filter(|port| port.name != image.name);
         let extras = extras
-            .map(|port| FurtherInput::of(port, convention.extra.get(&port.name), layout))
+            .map(|port| FurtherInput::new(port, convention.extra.get(&port.name), layout))
             .collect::<Result<Vec<_>, String>>()?;
         let mut stated = convention.extra.keys();
         if let Some(name) =

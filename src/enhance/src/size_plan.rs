@@ -36,7 +36,7 @@ pub(super) struct SizeRule {
 
 impl SizeRule {
     /// The rule that a convention states, for a graph of these fixed sides.
-    pub(super) fn of(fixed: [Option<usize>; 2], convention: &ModelSidecar, pad: Padding) -> Self {
+    pub(super) fn new(fixed: [Option<usize>; 2], convention: &ModelSidecar, pad: Padding) -> Self {
         let stated = convention.fixed.map(|[width, height]| [height, width]);
         Self {
             fixed: stated.map_or(fixed, |sides| sides.map(|side| Some(side.get()))),
@@ -125,7 +125,7 @@ pub(super) enum NoPlan {
 
 impl SizePlan {
     /// The plan for an image of this size. `context` is that of a model of a fixed size, in pixels.
-    pub(super) fn of(
+    pub(super) fn new(
         size: [usize; 2],
         rule: SizeRule,
         tiling: Tiling,
@@ -138,7 +138,7 @@ impl SizePlan {
         } else {
             fitting(size, rule, context)
         };
-        let tiles = TilePlan::of(cut).ok_or_else(|| NoPlan::Other(too_small(cut)))?;
+        let tiles = TilePlan::new(cut).ok_or_else(|| NoPlan::Other(too_small(cut)))?;
         Ok(Self {
             cut,
             tiles,
@@ -281,7 +281,7 @@ mod tests {
     #[test]
     fn each_side_is_filled_or_cut_for_itself() {
         // Height smaller, width larger, as an image of 250 × 110 for a model of 200 × 152.
-        let plan = SizePlan::of([110, 250], fixed([152, 200]), Tiling::Auto, 8).unwrap();
+        let plan = SizePlan::new([110, 250], fixed([152, 200]), Tiling::Auto, 8).unwrap();
         assert_eq!((plan.cut.area, plan.fed()), ([152, 250], [152, 200]));
         assert_eq!(plan.tiles.count(), 2);
         let starts: Vec<_> = plan
@@ -290,7 +290,7 @@ mod tests {
             .map(|(_, column)| column.input_start)
             .collect();
         assert_eq!(starts, [0, 50]);
-        let equal = SizePlan::of([152, 200], fixed([152, 200]), Tiling::Auto, 8).unwrap();
+        let equal = SizePlan::new([152, 200], fixed([152, 200]), Tiling::Auto, 8).unwrap();
         assert_eq!((equal.cut.area, equal.tiles.count()), ([152, 200], 1));
         // One side is free.
         let half = SizeRule {
@@ -298,7 +298,7 @@ mod tests {
             multiple: 8,
             ..RULE
         };
-        let plan = SizePlan::of([60, 99], half, Tiling::Auto, 8).unwrap();
+        let plan = SizePlan::new([60, 99], half, Tiling::Auto, 8).unwrap();
         assert_eq!((plan.cut.area, plan.fed()), ([64, 104], [64, 104]));
     }
 
@@ -323,7 +323,7 @@ mod tests {
             ..RULE
         };
         let area = |size| {
-            SizePlan::of(size, always, Tiling::Auto, 0)
+            SizePlan::new(size, always, Tiling::Auto, 0)
                 .unwrap()
                 .cut
                 .area
@@ -334,7 +334,7 @@ mod tests {
 
     #[test]
     fn tiles_without_room_for_their_context_are_refused() {
-        let refused = SizePlan::of([100, 100], fixed([20, 20]), Tiling::Auto, 8);
+        let refused = SizePlan::new([100, 100], fixed([20, 20]), Tiling::Auto, 8);
         assert!(
             matches!(refused, Err(NoPlan::Other(problem)) if problem.contains("nothing is left"))
         );
@@ -343,7 +343,7 @@ mod tests {
             ..RULE
         };
         let tile = Tiling::Side(NonZeroUsize::new(64).unwrap());
-        let refused = SizePlan::of([100, 100], global, tile, 8);
+        let refused = SizePlan::new([100, 100], global, tile, 8);
         assert!(matches!(refused, Err(NoPlan::TileFlag(_))));
     }
 

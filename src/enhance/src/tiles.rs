@@ -132,7 +132,7 @@ pub(super) struct Cutting {
 
 impl TilePlan {
     /// The tiles of an area; `None` if a tile is not larger than its context.
-    pub(super) fn of(cut: Cutting) -> Option<Self> {
+    pub(super) fn new(cut: Cutting) -> Option<Self> {
         let spans = |side: usize| spans(cut.area[side], cut.tile[side], cut.context, cut.multiple);
         Some(Self {
             rows: spans(0)?,
@@ -302,7 +302,7 @@ mod tests {
             context: 3,
             multiple: 1,
         };
-        let plan = TilePlan::of(cut).unwrap();
+        let plan = TilePlan::new(cut).unwrap();
         // An image tile by tile; with a shift, pixels depend on the tile's position, so that seams differ.
         let tiled = |shift: usize| {
             let mut canvas = TiledImage::new([37, 50]);

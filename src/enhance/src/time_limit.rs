@@ -23,7 +23,7 @@ impl TimeLimit {
 
     /// A limit in seconds; 0 is none.
     #[must_use]
-    pub fn of(limit: Duration) -> Self {
+    pub fn new(limit: Duration) -> Self {
         Self((!limit.is_zero()).then_some(limit))
     }
 
@@ -52,7 +52,7 @@ impl FromStr for TimeLimit {
     fn from_str(text: &str) -> Result<Self, String> {
         match text.parse::<f64>() {
             Ok(0.0) => Ok(Self::NONE),
-            _ => seconds(text).map(Self::of),
+            _ => seconds(text).map(Self::new),
         }
     }
 }

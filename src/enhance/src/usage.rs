@@ -211,7 +211,7 @@ impl Usage {
             return Ok(());
         };
         let place = [frame, condition].map(ToString::to_string);
-        let key = Digest::of_parts(place.iter().map(String::as_bytes));
+        let key = Digest::from_parts(place.iter().map(String::as_bytes));
         if !self.with(|state| state.judged.insert(key)) {
             return Ok(());
         }

@@ -11,7 +11,10 @@ use darkqa_light::KindSettings;
 
 fn recipe() -> Recipe {
     Recipe {
-        enhancers: vec![(EnhancerName::new("one").unwrap(), Digest::of(b"one"))],
+        enhancers: vec![(
+            EnhancerName::new("one").unwrap(),
+            Digest::from_bytes(b"one"),
+        )],
         ..Recipe::lossless(&KindSettings::default(), &[])
     }
 }
@@ -19,7 +22,7 @@ fn recipe() -> Recipe {
 fn frame() -> SourceFrame {
     SourceFrame {
         id: FrameId("a".to_owned()),
-        digest: Digest::of(b"pixels"),
+        digest: Digest::from_bytes(b"pixels"),
         note: InputNote::default(),
         size: (8, 6),
         focal: None,
@@ -97,7 +100,7 @@ fn every_part_of_what_decides_an_image_gives_another_key() {
             recipe.degraded_at = DegradedAt::Resized;
         }),
         changed(|recipe| recipe.camera_of = CameraOf::Episode),
-        changed(|recipe| recipe.enhancers[0].1 = Digest::of(b"another file")),
+        changed(|recipe| recipe.enhancers[0].1 = Digest::from_bytes(b"another file")),
         made_by("2", |_| {}),
         made_by("1", |sizes| sizes.tile = darkqa_enhance::Tiling::Whole),
         made_by("1", |sizes| sizes.llie_max_side = NonZeroUsize::new(64)),
@@ -108,7 +111,7 @@ fn every_part_of_what_decides_an_image_gives_another_key() {
     ];
     let id = FrameId("b".to_owned());
     others.push(of(&SourceFrame { id, ..frame() }, CONDITION));
-    let digest = Digest::of(b"other pixels");
+    let digest = Digest::from_bytes(b"other pixels");
     others.push(of(&SourceFrame { digest, ..frame() }, CONDITION));
     for (place, other) in others.iter().enumerate() {
         assert_ne!(*other, same, "{place}");

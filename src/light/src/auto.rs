@@ -59,7 +59,7 @@ impl AutoSettings {
     /// The settings for a camera. The gain that is not named ends at the camera's greatest K, [`MOST_GAIN`] stops above K₀ if the camera
     /// has so many.
     #[must_use]
-    pub fn of_camera(&self, camera: &CameraModel) -> AutoExposure {
+    pub fn for_camera(&self, camera: &CameraModel) -> AutoExposure {
         let [low, high] = camera.gain_range();
         let base_gain = self
             .base_gain
@@ -77,7 +77,7 @@ impl AutoSettings {
 impl Default for AutoExposure {
     /// That of the paper's camera.
     fn default() -> Self {
-        AutoSettings::default().of_camera(&CameraModel::default())
+        AutoSettings::default().for_camera(&CameraModel::default())
     }
 }
 
@@ -139,7 +139,7 @@ impl AutoShot {
         }
         let mut camera = camera.unpinned();
         camera.pin_gain(gain)?;
-        Ok(Synthesis::of(LightReading::Physical, camera))
+        Ok(Synthesis::new(LightReading::Physical, camera))
     }
 }
 
@@ -248,7 +248,7 @@ mod tests {
     fn a_gain_that_the_camera_lacks_is_refused() {
         let camera = CameraModel::default();
         let settings = |auto: &str| auto.parse::<AutoSettings>().unwrap();
-        let shot = |auto: &str, drop| settings(auto).of_camera(&camera).shot(drop);
+        let shot = |auto: &str, drop| settings(auto).for_camera(&camera).shot(drop);
         let most = shot("gain=4", Severity::L3).synthesis(&camera).unwrap();
         assert_eq!(most.name().as_str(), "physical");
         for auto in [
@@ -271,7 +271,7 @@ mod tests {
     fn the_gain_follows_from_the_camera() {
         let of = |auto: &str, camera: &CameraModel| {
             let settings: AutoSettings = auto.parse().unwrap();
-            let auto = settings.of_camera(camera);
+            let auto = settings.for_camera(camera);
             // Whatever the camera, no level is refused.
             for drop in [Severity::L1, Severity::L3, Severity::L5] {
                 auto.shot(drop).synthesis(camera).unwrap();
@@ -290,7 +290,7 @@ mod tests {
         assert_eq!(of("shutter=2", &own), (0.399_7, 0.0));
         assert_eq!(of("gain=0,base-gain=0.4", &own), (0.4, 0.0));
         let shot = "gain=0,base-gain=0.401".parse::<AutoSettings>().unwrap();
-        let shot = shot.of_camera(&own).shot(Severity::L1);
+        let shot = shot.for_camera(&own).shot(Severity::L1);
         let error = shot.synthesis(&own).unwrap_err().to_string();
         assert!(
             error.contains("K is 0.401, but sony-a7s2 has K from 0.3997 to 0.3997"),

@@ -88,9 +88,9 @@ struct RowWeights {
 const FEWEST_EQUAL: usize = 5;
 
 impl Weights {
-    fn of(streak: Streak) -> Self {
+    fn from_streak(streak: Streak) -> Self {
         let taps = streak.taps();
-        match RowWeights::of(&taps) {
+        match RowWeights::from_taps(&taps) {
             Some(row) if row.equal >= FEWEST_EQUAL => Self::Row(row),
             _ => Self::Each(taps),
         }
@@ -99,7 +99,7 @@ impl Weights {
 
 impl RowWeights {
     /// The weights of a path along a row; `None` for another path.
-    fn of(taps: &[Tap]) -> Option<Self> {
+    fn from_taps(taps: &[Tap]) -> Option<Self> {
         if taps.iter().any(|tap| tap.offset[1] != 0) {
             return None;
         }
@@ -166,7 +166,7 @@ impl Blur {
             height,
             stride,
             margin,
-            weights: Weights::of(streak),
+            weights: Weights::from_streak(streak),
             isa,
         }
     }

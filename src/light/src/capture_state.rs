@@ -162,7 +162,7 @@ impl CaptureState {
         let blurred = (!self.streak.is_still()).then(|| blur(clean, self.streak));
         let exposed = blurred
             .as_ref()
-            .map_or(clean, |light| clean.of_its_light(light));
+            .map_or(clean, |light| clean.with_light(light));
         let SensorState {
             amplify,
             tone,
@@ -207,7 +207,7 @@ mod tests {
 
     fn applied(how: &str, reading: LightReading) -> AppliedDegradation {
         let how: Degradation = how.parse().unwrap();
-        let synthesis = Synthesis::of(reading, crate::CameraModel::default());
+        let synthesis = Synthesis::new(reading, crate::CameraModel::default());
         let view = FrameView {
             width: 640,
             focal: None,

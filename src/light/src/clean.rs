@@ -40,7 +40,7 @@ impl Clean<'_> {
 impl Clean<'_> {
     /// Light that was made from this frame, in the same sense: of a scene if the frame is one, else as a display shows it.
     #[must_use]
-    pub fn of_its_light(self, light: &Light) -> Clean<'_> {
+    pub fn with_light(self, light: &Light) -> Clean<'_> {
         match self {
             Self::Scene(_) => Clean::Scene(light),
             Self::Codes(_) | Self::Codes16(_) | Self::Light(_) => Clean::Light(light),

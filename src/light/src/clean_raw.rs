@@ -56,7 +56,7 @@ impl CleanRaw {
         let noise = Noise::new(state, key, amplify, &Term::ALL, isa);
         let developer = Developer::new(&self.camera, tone, isa);
         let developer = match self.headroom_ev {
-            Some(headroom_ev) => developer.of_light(headroom_ev),
+            Some(headroom_ev) => developer.for_linear_light(headroom_ev),
             None => developer,
         };
         let mut balanced = self.raw.clone();
@@ -68,7 +68,7 @@ impl CleanRaw {
                 developer.balance(row, &mut line);
                 line.repeat_edges();
             });
-        Negative::of_balanced(developer, balanced, self.size)
+        Negative::from_balanced(developer, balanced, self.size)
     }
 }
 

@@ -65,7 +65,7 @@ impl Exposures {
         let (_, light) = self
             .blurred
             .insert(cached.unwrap_or_else(|| (streak, blur(clean, streak))));
-        clean.of_its_light(light)
+        clean.with_light(light)
     }
 }
 
@@ -110,7 +110,7 @@ mod tests {
         motion: &str,
     ) -> Result<AppliedDegradation> {
         let auto: AutoSettings = auto.parse().unwrap();
-        let auto = auto.of_camera(&CameraModel::default());
+        let auto = auto.for_camera(&CameraModel::default());
         let motion: Motion = motion.parse().unwrap();
         let how: Degradation = how.parse().unwrap();
         let view = FrameView {
@@ -125,7 +125,7 @@ mod tests {
         let mut camera = CameraModel::default();
         camera.pin_gain(3.0).unwrap();
         camera.pin_ratio(7.0).unwrap();
-        let synthesis = Synthesis::of(LightReading::Eld, camera);
+        let synthesis = Synthesis::new(LightReading::Eld, camera);
         applied_by(&synthesis, how, auto, motion).unwrap()
     }
 
@@ -137,7 +137,7 @@ mod tests {
     fn physical(severity: Severity, gain: f64) -> Rgb {
         let mut camera = CameraModel::default();
         camera.pin_gain(gain).unwrap();
-        let synthesis = Synthesis::of(LightReading::Physical, camera);
+        let synthesis = Synthesis::new(LightReading::Physical, camera);
         Negative::new(&picture(), &key("a"), &synthesis, severity).develop(severity)
     }
 

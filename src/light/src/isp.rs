@@ -70,7 +70,7 @@ impl Developer {
 
     /// The same for light in front of a sensor that saturates this many EV above white. Display values are then in units of its
     /// saturation, and no tone curve stands before the drop.
-    pub(super) fn of_light(self, headroom_ev: f64) -> Self {
+    pub(super) fn for_linear_light(self, headroom_ev: f64) -> Self {
         let tone = match self.tone {
             Tone::BeforeEv => Tone::None,
             tone => tone,

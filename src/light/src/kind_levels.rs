@@ -12,7 +12,7 @@ impl Levels {
     ///
     /// # Errors
     /// If a kind has no level, or a level no kind.
-    pub(super) fn of_kinds(&self, kinds: KindSet) -> Result<Vec<AxisLevel>> {
+    pub(super) fn for_kinds(&self, kinds: KindSet) -> Result<Vec<AxisLevel>> {
         let mut levels = self.0.clone();
         levels.retain(|level| *level != AxisLevel::PAIR);
         let on = |axis: Axis| move |level: &&AxisLevel| level.axis() == Some(axis);
@@ -95,7 +95,7 @@ mod tests {
     fn each_kind_has_its_levels() {
         let of = |levels: &str, kinds: &str| {
             let levels: Levels = levels.parse().unwrap();
-            let levels = levels.of_kinds(kinds.parse().unwrap());
+            let levels = levels.for_kinds(kinds.parse().unwrap());
             let levels = levels.map_err(|e| e.to_string())?;
             let names: Vec<String> = levels.iter().map(ToString::to_string).collect();
             Ok::<String, String>(names.join(" "))

@@ -41,7 +41,7 @@ impl Negative {
     ) -> Self {
         let clean = clean.into();
         let capture = Capture::new(key, synthesis, severity, Isa::best());
-        let capture = capture.of(clean, synthesis.headroom_ev(severity.value()));
+        let capture = capture.for_clean(clean, synthesis.headroom_ev(severity.value()));
         Self {
             only_level: (!synthesis.shares_negative()).then_some(severity),
             ..Self::developed_by(clean, capture)
@@ -62,11 +62,11 @@ impl Negative {
     ) -> Self {
         let clean = clean.into();
         let capture = Capture::with(key, state, amplify, tone, terms, Isa::best());
-        Self::developed_by(clean, capture.of(clean, headroom_ev))
+        Self::developed_by(clean, capture.for_clean(clean, headroom_ev))
     }
 
     /// The negative of a noisy, white-balanced RAW image that covers `size`, for all levels.
-    pub(super) fn of_balanced(developer: Developer, balanced: Bayer, size: [usize; 2]) -> Self {
+    pub(super) fn from_balanced(developer: Developer, balanced: Bayer, size: [usize; 2]) -> Self {
         Self {
             developer,
             balanced,
@@ -80,7 +80,7 @@ impl Negative {
         let mut balanced = Bayer::covering(height, width);
         let lines = balanced.lines_mut().enumerate();
         lines.for_each(|(row, mut line)| capture.capture_row(clean, row, &mut line));
-        Self::of_balanced(capture.developer, balanced, [height, width])
+        Self::from_balanced(capture.developer, balanced, [height, width])
     }
 
     /// Whether a level may be developed from this negative.
@@ -130,12 +130,12 @@ pub fn ladder<'a>(
         if let Some(level) = levels.first() {
             let drops: Vec<f64> = levels.iter().map(|level| level.value()).collect();
             let capture = Capture::new(key, synthesis, *level, isa);
-            capture.of(clean, 0.0).develop(clean, &drops, images);
+            capture.for_clean(clean, 0.0).develop(clean, &drops, images);
         }
     } else {
         for (level, image) in levels.iter().zip(images) {
             let capture = Capture::new(key, synthesis, *level, isa);
-            let capture = capture.of(clean, synthesis.headroom_ev(level.value()));
+            let capture = capture.for_clean(clean, synthesis.headroom_ev(level.value()));
             capture.develop(clean, &[level.value()], std::slice::from_mut(image));
         }
     }
@@ -166,7 +166,7 @@ pub fn develop_with_state(
     [drop_ev, headroom_ev]: [f64; 2],
 ) -> Rgb {
     let capture = Capture::with(key, state, amplify, tone, &Term::ALL, Isa::best());
-    let capture = capture.of(clean, headroom_ev);
+    let capture = capture.for_clean(clean, headroom_ev);
     let mut image = Rgb::black(clean.height(), clean.width());
     capture.develop(clean, &[drop_ev], std::slice::from_mut(&mut image));
     image
@@ -218,7 +218,7 @@ impl Capture {
         headroom_ev: f64,
     ) -> Image<T> {
         let mut image = Image::black(clean.height(), clean.width());
-        let capture = self.of(clean, headroom_ev);
+        let capture = self.for_clean(clean, headroom_ev);
         capture.develop(clean, &[drop_ev], std::slice::from_mut(&mut image));
         image
     }
@@ -241,13 +241,13 @@ impl Capture {
     /// The same exposure, ready for a clean frame. Codes end at white, and so does the sensor. For light in front of the camera the
     /// sensor saturates this many EV above white, and the tone curve before the drop is left out: it undoes what the
     /// inverse tone curve does to codes, and light has none.
-    fn of(self, clean: Clean<'_>, headroom_ev: f64) -> Self {
+    fn for_clean(self, clean: Clean<'_>, headroom_ev: f64) -> Self {
         if !matches!(clean, Clean::Scene(_)) {
             return self;
         }
         Self {
             unprocess: self.unprocess.with_headroom(libm::exp2(headroom_ev) as f32),
-            developer: self.developer.of_light(headroom_ev),
+            developer: self.developer.for_linear_light(headroom_ev),
             ..self
         }
     }

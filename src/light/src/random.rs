@@ -32,7 +32,7 @@ impl NoiseKey {
             &seed.to_le_bytes(),
             frame.0.as_bytes(),
         ];
-        let noise = Digest::of_parts(parts);
+        let noise = Digest::from_parts(parts);
         Self {
             noise,
             camera: noise,
@@ -54,7 +54,7 @@ impl NoiseKey {
     #[must_use]
     pub fn at(&self, severity: Severity) -> Self {
         let level = Kind::Sensor.label(severity);
-        let at = |digest: &Digest| Digest::of_parts([digest.as_bytes(), level.as_bytes()]);
+        let at = |digest: &Digest| Digest::from_parts([digest.as_bytes(), level.as_bytes()]);
         Self {
             noise: at(&self.noise),
             camera: at(&self.camera),
@@ -72,7 +72,7 @@ impl NoiseKey {
             | Component::Motion
             | Component::Resamples => self.noise,
         };
-        let digest = Digest::of_parts([key.as_bytes(), component.name().as_bytes()]);
+        let digest = Digest::from_parts([key.as_bytes(), component.name().as_bytes()]);
         let [low, high] = [0, 4].map(|at| {
             let mut word = [0; 4];
             word.copy_from_slice(&digest.as_bytes()[at..at + 4]);

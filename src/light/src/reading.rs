@@ -48,9 +48,9 @@ impl LightReading {
     pub fn name(self) -> ReadingName {
         match self {
             Self::Paper => ReadingName::PAPER,
-            Self::Eld => ReadingName::of("eld"),
-            Self::Level => ReadingName::of("level"),
-            Self::Physical => ReadingName::of("physical"),
+            Self::Eld => ReadingName::from_static("eld"),
+            Self::Level => ReadingName::from_static("level"),
+            Self::Physical => ReadingName::from_static("physical"),
         }
     }
 }
@@ -58,7 +58,7 @@ impl LightReading {
 impl Synthesis {
     /// The choices of a named reading, with the given camera.
     #[must_use]
-    pub fn of(reading: LightReading, camera: CameraModel) -> Self {
+    pub fn new(reading: LightReading, camera: CameraModel) -> Self {
         let (amplify, tone, coupling) = match reading {
             LightReading::Paper => Default::default(),
             LightReading::Eld => (Amplify::All, Tone::None, Coupling::Independent),
@@ -78,7 +78,7 @@ impl Synthesis {
     #[must_use]
     pub fn name(&self) -> ReadingName {
         let mut readings = LightReading::ALL.into_iter();
-        let same = readings.find(|reading| Self::of(*reading, self.camera.clone()) == *self);
+        let same = readings.find(|reading| Self::new(*reading, self.camera.clone()) == *self);
         same.map_or(ReadingName::CUSTOM, LightReading::name)
     }
 }
@@ -106,10 +106,10 @@ impl Readings {
     pub fn named(readings: &[LightReading], camera: &CameraModel) -> Self {
         let contents = readings.iter();
         let contents: BTreeMap<_, _> = contents
-            .map(|reading| (reading.name(), Synthesis::of(*reading, camera.clone())))
+            .map(|reading| (reading.name(), Synthesis::new(*reading, camera.clone())))
             .collect();
         if contents.is_empty() {
-            return Synthesis::of(LightReading::Paper, camera.clone()).into();
+            return Synthesis::new(LightReading::Paper, camera.clone()).into();
         }
         Self(contents)
     }
@@ -130,7 +130,7 @@ impl Readings {
     ///
     /// # Errors
     /// If the run does not have the reading.
-    pub fn of(&self, degradation: Option<&Degradation>) -> Result<&Synthesis> {
+    pub fn for_degradation(&self, degradation: Option<&Degradation>) -> Result<&Synthesis> {
         let content = match degradation.and_then(Degradation::reading) {
             None => self.0.values().next(),
             Some(name) => self.get(name),
@@ -251,10 +251,10 @@ mod tests {
     fn the_default_is_the_paper() {
         let camera = CameraModel::default();
         assert_eq!(
-            Synthesis::of(LightReading::Paper, camera.clone()),
+            Synthesis::new(LightReading::Paper, camera.clone()),
             Synthesis::default()
         );
-        let physical = Synthesis::of(LightReading::Physical, camera);
+        let physical = Synthesis::new(LightReading::Physical, camera);
         assert_eq!(physical.amplify, Amplify::All);
         assert_eq!(physical.coupling, Coupling::Photon);
     }
@@ -264,7 +264,7 @@ mod tests {
         let mut camera = CameraModel::default();
         camera.pin_gain(0.1).unwrap();
         for reading in LightReading::ALL {
-            let synthesis = Synthesis::of(reading, camera.clone());
+            let synthesis = Synthesis::new(reading, camera.clone());
             assert_eq!(synthesis.name(), reading.name());
             let fresh = Synthesis {
                 draws: Draws::Fresh,
@@ -278,13 +278,16 @@ mod tests {
     fn a_reading_that_the_run_lacks_is_named() {
         let readings = Readings::named(&[LightReading::Paper], &CameraModel::default());
         let degradation: Degradation = "L3-noise@eld".parse().unwrap();
-        let error = readings.of(Some(&degradation)).unwrap_err().to_string();
+        let error = readings
+            .for_degradation(Some(&degradation))
+            .unwrap_err()
+            .to_string();
         assert!(
             error.contains(
                 "L3-noise@eld needs a light reading that is not among those of --profile (paper)"
             ),
             "{error}"
         );
-        assert!(readings.of(None).is_ok());
+        assert!(readings.for_degradation(None).is_ok());
     }
 }

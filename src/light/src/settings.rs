@@ -195,7 +195,7 @@ impl LightSettings {
         let levels = args.levels(set);
         let kinds = KindSettings::resolve(&args.sensor, &args.camera)?;
         let light = Self {
-            levels: levels.of_kinds(args.variant)?,
+            levels: levels.for_kinds(args.variant)?,
             matches: levels.matches(args.variant, &kinds.sensor.readings)?,
             variants: args.variant,
             kinds,
@@ -254,7 +254,7 @@ impl KindSettings {
     pub fn resolve(sensor: &SensorArgs, camera: &CameraArgs) -> Result<Self> {
         let sensor = SensorSettings::resolve(sensor)?;
         Ok(Self {
-            auto: camera.auto.of_camera(&sensor.readings.camera()),
+            auto: camera.auto.for_camera(&sensor.readings.camera()),
             sensor,
             motion: camera.motion,
         })
@@ -271,7 +271,7 @@ impl KindSettings {
         view: FrameView,
         key: &NoiseKey,
     ) -> Result<AppliedDegradation> {
-        let synthesis = self.sensor.readings.of(Some(how))?;
+        let synthesis = self.sensor.readings.for_degradation(Some(how))?;
         let camera = (&self.auto, &self.motion);
         AppliedDegradation::new(how, synthesis, camera, view, key)
     }
@@ -313,7 +313,7 @@ fn readings(args: &SensorArgs) -> Result<Readings> {
     }
     let camera = camera(args)?;
     if let [reading] = chosen[..] {
-        return synthesis(args, Synthesis::of(reading, camera)).map(Readings::from);
+        return synthesis(args, Synthesis::new(reading, camera)).map(Readings::from);
     }
     let choices = [
         ("--noise amplify", args.amplify.is_some()),
@@ -326,7 +326,7 @@ fn readings(args: &SensorArgs) -> Result<Readings> {
         return Err(Error::usage(flag, problem));
     }
     let by_light = |reading: &&LightReading| {
-        Synthesis::of(**reading, camera.clone()).coupling == Coupling::Photon
+        Synthesis::new(**reading, camera.clone()).coupling == Coupling::Photon
     };
     if args.ratio.is_some()
         && let Some(reading) = chosen.iter().find(by_light)

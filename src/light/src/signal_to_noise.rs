@@ -30,7 +30,7 @@ fn fixed(reading: LightReading, gain: f64) -> Synthesis {
     let mut camera = CameraModel::default();
     camera.set_sampling(Sampling::Fixed);
     camera.pin_gain(gain).unwrap();
-    Synthesis::of(reading, camera)
+    Synthesis::new(reading, camera)
 }
 
 fn flat(code: u8) -> Rgb {

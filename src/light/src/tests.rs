@@ -75,7 +75,7 @@ fn bytes_are_those_of_this_version() {
     for level in Severity::LADDER {
         bytes.extend_from_slice(expose(&clean, level).samples());
     }
-    let exposure = Digest::of(&bytes).to_string();
+    let exposure = Digest::from_bytes(&bytes).to_string();
     bytes.clear();
     for frame in ["first", "second", "third", "fourth"] {
         let negative = Negative::new(&clean, &key(20, frame), &Synthesis::default(), Severity::L1);
@@ -83,7 +83,7 @@ fn bytes_are_those_of_this_version() {
             bytes.extend_from_slice(negative.develop(level).samples());
         }
     }
-    let sensor = Digest::of(&bytes).to_string();
+    let sensor = Digest::from_bytes(&bytes).to_string();
     assert_eq!(VERSION, 2);
     assert_eq!(
         exposure,
@@ -101,12 +101,12 @@ fn bytes_of_every_choice_are_those_of_this_version() {
     let clean = ramps(37, 130);
     let camera = || CameraModel::preset("nikon-d850").unwrap();
     let choices = [
-        Synthesis::of(LightReading::Physical, CameraModel::default()),
-        Synthesis::of(LightReading::Physical, camera()),
+        Synthesis::new(LightReading::Physical, CameraModel::default()),
+        Synthesis::new(LightReading::Physical, camera()),
         Synthesis {
             draws: Draws::Fresh,
             tone: Tone::AfterEv,
-            ..Synthesis::of(LightReading::Paper, camera())
+            ..Synthesis::new(LightReading::Paper, camera())
         },
     ];
     let mut bytes = Vec::new();
@@ -125,7 +125,7 @@ fn bytes_of_every_choice_are_those_of_this_version() {
     }
     assert_eq!(VERSION, 2);
     let digest = "135736c6e5e5372959f81423e99612b894d09f2ba87bad7c88d6cd5ed9fcf884";
-    assert_eq!(Digest::of(&bytes).to_string(), digest);
+    assert_eq!(Digest::from_bytes(&bytes).to_string(), digest);
 }
 
 #[test]
@@ -320,7 +320,7 @@ fn the_tone_curve_is_applied_where_it_is_set() {
 /// With `photon`, less light means fewer photons: the ratio grows with the level. In the paper's reading it does not.
 #[test]
 fn coupling_makes_the_ratio_the_drop() {
-    let physical = Synthesis::of(LightReading::Physical, CameraModel::default());
+    let physical = Synthesis::new(LightReading::Physical, CameraModel::default());
     let ratios = Severity::LADDER.map(|level| physical.state(&key(1, "a"), level).ratio);
     for (found, expected) in ratios.iter().zip([4.0, 16.0, 64.0, 181.02, 512.0]) {
         assert!((found - expected).abs() < 0.01, "{found}");
@@ -335,7 +335,7 @@ fn coupling_makes_the_ratio_the_drop() {
 fn ladders_are_their_negatives() {
     let settings = [
         Synthesis::default(),
-        Synthesis::of(LightReading::Physical, CameraModel::default()),
+        Synthesis::new(LightReading::Physical, CameraModel::default()),
         Synthesis {
             draws: Draws::Fresh,
             tone: Tone::AfterEv,

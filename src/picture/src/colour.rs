@@ -117,11 +117,11 @@ impl ColourTag {
     pub(super) fn meaning(&self, depth: CodeDepth) -> Result<Meaning, String> {
         match self {
             Self::None | Self::Srgb => Ok(Meaning::Srgb),
-            Self::CodePoints(points) => of_code_points(*points),
-            Self::Profile(profile) => of_profile(profile),
-            Self::DeflatedProfile(chunk) => of_profile(&inflated(chunk)?),
+            Self::CodePoints(points) => meaning_from_code_points(*points),
+            Self::Profile(profile) => meaning_from_profile(profile),
+            Self::DeflatedProfile(chunk) => meaning_from_profile(&inflated(chunk)?),
             Self::Gamma(gamma) => gamma.meaning(depth),
-            Self::Primaries(primaries) => Ok(of_primaries(primaries)),
+            Self::Primaries(primaries) => Ok(meaning_from_primaries(primaries)),
         }
     }
 
@@ -139,7 +139,7 @@ impl ColourTag {
 }
 
 /// The meaning of linear light with these primaries.
-fn of_primaries(primaries: &Primaries) -> Meaning {
+fn meaning_from_primaries(primaries: &Primaries) -> Meaning {
     let Primaries {
         red,
         green,
@@ -161,7 +161,7 @@ fn of_primaries(primaries: &Primaries) -> Meaning {
 }
 
 /// The meaning of code points of H.273 (tables 2 to 4).
-fn of_code_points(points: [u8; 4]) -> Result<Meaning, String> {
+fn meaning_from_code_points(points: [u8; 4]) -> Result<Meaning, String> {
     let other = |name: &str, curve: ToneCurve, primaries: &Primaries| {
         let conversion =
             Conversion::new([curve.clone(), curve.clone(), curve], primaries.to_srgb());
@@ -188,12 +188,12 @@ fn of_code_points(points: [u8; 4]) -> Result<Meaning, String> {
 }
 
 /// The meaning of codes by a profile. The last profiles are cached by their digests.
-fn of_profile(profile: &[u8]) -> Result<Meaning, String> {
+fn meaning_from_profile(profile: &[u8]) -> Result<Meaning, String> {
     static KNOWN: LazyLock<Recent<Digest, Meaning>> = LazyLock::new(|| Recent::new(CACHED));
     if profile.len() > MOST_PROFILE {
         return Err(too_large());
     }
-    let digest = Digest::of(profile);
+    let digest = Digest::from_bytes(profile);
     KNOWN.get(&digest, || {
         let Profile {
             name,

@@ -130,11 +130,11 @@ impl ImageFile {
     /// they are, it is the digest of the file.
     #[must_use]
     pub fn digest(&self) -> Digest {
-        let file = Digest::of(&self.bytes);
+        let file = Digest::from_bytes(&self.bytes);
         match self.note().rule() {
             None => file,
             Some(rule) => {
-                Digest::of_parts([&b"darkqa.reading/1"[..], file.as_bytes(), rule.as_bytes()])
+                Digest::from_parts([&b"darkqa.reading/1"[..], file.as_bytes(), rule.as_bytes()])
             }
         }
     }
@@ -172,7 +172,7 @@ impl ImageFile {
         if facts.inks.is_some() {
             return self.ink_colours().ok().map(|inks| inks.note());
         }
-        match (self.rule.colour, colour.meaning(depth.of_codes())) {
+        match (self.rule.colour, colour.meaning(depth.code_depth())) {
             (ColourRule::Convert, Err(_) | Ok(Meaning::Linear)) | (_, Ok(Meaning::Srgb)) => None,
             (ColourRule::Convert, Ok(Meaning::Other(space))) => {
                 Some(space.note(ColourHandling::Converted))
@@ -201,7 +201,7 @@ impl ImageFile {
         }
         let meaning = match colour {
             ColourRule::Ignore => Meaning::Srgb,
-            ColourRule::Convert => facts.colour.meaning(facts.depth.of_codes())?,
+            ColourRule::Convert => facts.colour.meaning(facts.depth.code_depth())?,
         };
         let is_linear = transfer == Transfer::Linear && facts.depth == Depth::Sixteen;
         Ok(match (meaning, facts.depth) {
@@ -222,7 +222,7 @@ impl ImageFile {
     /// The usual ending of a name for the file: by its content, not by its own name.
     #[must_use]
     pub fn ending(&self) -> &'static str {
-        FileFormat::of(&self.bytes).map_or("", FileFormat::ending)
+        FileFormat::detect(&self.bytes).map_or("", FileFormat::ending)
     }
 
     /// The width and height in pixels, after a check that the file can be decoded.
@@ -230,7 +230,7 @@ impl ImageFile {
     /// For an RGB PNG the checksums are enough: they find any damage at a hundredth of the cost of decompressing. Every
     /// other file is decoded, because JPEG has no checksums and an alpha channel may be transparent.
     pub fn check(&self) -> Result<(u32, u32)> {
-        if FileFormat::of(&self.bytes) == Ok(FileFormat::Png) {
+        if FileFormat::detect(&self.bytes) == Ok(FileFormat::Png) {
             let decoder = self.decoder()?;
             if matches!(decoder.color_type(), ColorType::Rgb8 | ColorType::Rgb16) {
                 let (width, height) = decoder.dimensions();
@@ -265,7 +265,7 @@ impl ImageFile {
     /// # Errors
     /// If the file is broken, or cannot be shown as it is; the error names the file.
     pub fn pixels(&self) -> Result<Pixels> {
-        if FileFormat::of(&self.bytes) == Ok(FileFormat::OpenExr) {
+        if FileFormat::detect(&self.bytes) == Ok(FileFormat::OpenExr) {
             return self.light_of_layers();
         }
         if let Some(form) = self.facts().inks {
@@ -388,8 +388,8 @@ impl ImageFile {
 
     /// The facts of the file beside its pixels; of a file that is no image, none.
     fn facts(&self) -> &FileFacts {
-        let read = || match FileFormat::of(&self.bytes) {
-            Ok(format) => FileFacts::of(&self.bytes, format),
+        let read = || match FileFormat::detect(&self.bytes) {
+            Ok(format) => FileFacts::read(&self.bytes, format),
             Err(_) => FileFacts::NONE,
         };
         self.facts.get_or_init(read)
@@ -397,7 +397,7 @@ impl ImageFile {
 
     /// The decoder of a file of codes.
     fn decoder(&self) -> Result<impl ImageDecoder + '_> {
-        let format = FileFormat::of(&self.bytes).map_err(|problem| self.wrong(problem))?;
+        let format = FileFormat::detect(&self.bytes).map_err(|problem| self.wrong(problem))?;
         if let Some(problem) = &self.facts().unshowable {
             return Err(self.wrong(problem));
         }
@@ -426,7 +426,8 @@ impl ImageFile {
 
     /// Checks that the file reaches its end, and that the checksums of a PNG are right.
     fn check_complete(&self) -> Result<()> {
-        match FileFormat::of(&self.bytes).map(|format| fault(&self.bytes, format, self.facts())) {
+        match FileFormat::detect(&self.bytes).map(|format| fault(&self.bytes, format, self.facts()))
+        {
             Ok(Some(fault)) => Err(self.wrong(format_args!(
                 "not a whole image: {fault}; copy or export it again"
             ))),
@@ -445,7 +446,7 @@ enum Samples {
 
 impl Depth {
     /// The bits of a code; of floats, which have none, it does not matter.
-    fn of_codes(self) -> CodeDepth {
+    fn code_depth(self) -> CodeDepth {
         match self {
             Self::Eight => CodeDepth::Eight,
             Self::Sixteen | Self::Float => CodeDepth::Sixteen,

@@ -33,7 +33,7 @@ enum NumberForm {
 
 impl NumberForm {
     /// The size of one number in bytes, and its type; `None` unless `descr` is of one byte or little-endian.
-    fn of(descr: &str) -> Option<(usize, Self)> {
+    fn from_descr(descr: &str) -> Option<(usize, Self)> {
         Some(match descr {
             "<f2" => (
                 2,
@@ -102,7 +102,7 @@ impl<'a> Npy<'a> {
         (rows, columns): (usize, usize),
         data: &'a [u8],
     ) -> Result<Self, String> {
-        let (width, numbers) = NumberForm::of(descr).ok_or_else(|| {
+        let (width, numbers) = NumberForm::from_descr(descr).ok_or_else(|| {
             format!("its numbers are {descr:?}; little-endian integers or floats of 2, 4 or 8 bytes expected")
         })?;
         let count = rows.checked_mul(columns);

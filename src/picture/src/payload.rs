@@ -54,7 +54,7 @@ impl Payload {
     pub fn from_file(file: Vec<u8>, (width, height): (u32, u32), format: PayloadFormat) -> Self {
         Self {
             facts: ImageFacts {
-                digest: Digest::of(&file),
+                digest: Digest::from_bytes(&file),
                 bytes: file.len(),
                 width: width as usize,
                 height: height as usize,
@@ -97,7 +97,7 @@ impl Payload {
 
     /// The digest of images that are sent together, as in a record; `None` of none.
     pub fn joint_digest(images: &[Arc<Self>]) -> Option<Digest> {
-        Digest::of_files(images.iter().map(|image| image.facts.digest))
+        Digest::from_file_digests(images.iter().map(|image| image.facts.digest))
     }
 
     /// The width and height in pixels.
@@ -215,7 +215,7 @@ mod tests {
         assert_eq!(payload.file(), file);
         let facts = payload.facts();
         assert_eq!((facts.width, facts.height, facts.bytes), (7, 5, file.len()));
-        assert_eq!(facts.digest, Digest::of(&file));
+        assert_eq!(facts.digest, Digest::from_bytes(&file));
     }
 
     #[test]

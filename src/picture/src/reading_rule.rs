@@ -67,7 +67,7 @@ impl ReadingRule {
             no_light: if is_light {
                 Vec::new()
             } else {
-                self.of_light()
+                self.linear_flags()
             },
             ..InputNote::default()
         }
@@ -89,7 +89,7 @@ impl ReadingRule {
     }
 
     /// The flags for linear light that were given.
-    fn of_light(&self) -> Vec<String> {
+    fn linear_flags(&self) -> Vec<String> {
         let linear = (self.transfer == Transfer::Linear).then_some("--decode transfer=linear");
         let exposure = self.exposure_ev.map(|_| "--decode exposure");
         let flags = [linear, exposure].into_iter().flatten();

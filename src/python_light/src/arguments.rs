@@ -58,7 +58,7 @@ impl Settings {
             None => Kind::Sensor,
             Some(given) => {
                 let word = text("variant", "a str", given)?;
-                Kind::of_word(&word)
+                Kind::from_word(&word)
                     .ok_or_else(|| one_of("variant", &word, &Kind::ALL.map(Kind::word)))?
             }
         };
@@ -94,8 +94,8 @@ impl Settings {
         };
         Ok(Self {
             kind,
-            auto: AutoSettings::default().of_camera(&camera),
-            synthesis: Synthesis::of(reading, camera),
+            auto: AutoSettings::default().for_camera(&camera),
+            synthesis: Synthesis::new(reading, camera),
             seed,
         })
     }

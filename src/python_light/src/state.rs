@@ -59,7 +59,7 @@ pub(crate) fn from_dict(state: &Bound<'_, PyDict>) -> PyResult<Replay> {
         return Err(PyValueError::new_err("state: a dict expected"));
     };
     let word: String = taken(&mut fields, "variant")?;
-    let kind = Kind::of_word(&word).ok_or_else(|| {
+    let kind = Kind::from_word(&word).ok_or_else(|| {
         let words = Kind::ALL.map(Kind::word).join(", ");
         PyValueError::new_err(format!("state: variant {word:?} is not one of {words}"))
     })?;

@@ -133,7 +133,7 @@ fn groups<K: Ord>(
         }
     }
     for list in groups.values_mut() {
-        list.sort_by_key(|i| Digest::of(asked[*i].question.id.0.as_bytes()));
+        list.sort_by_key(|i| Digest::from_bytes(asked[*i].question.id.0.as_bytes()));
     }
     groups
 }

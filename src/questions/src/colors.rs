@@ -164,7 +164,7 @@ impl Palette {
     /// The digest of the bins; comments of the table do not change it.
     #[must_use]
     pub fn digest(&self) -> Digest {
-        Digest::of(&self.bins[..])
+        Digest::from_bytes(&self.bins[..])
     }
 }
 

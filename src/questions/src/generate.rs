@@ -115,8 +115,8 @@ pub fn generate(
     mut explain: impl FnMut(&FrameId, &RuleResult),
 ) -> Result<Generated> {
     let book = request.rules.book();
-    let views = Views::of(frames, request.palette, book);
-    let vocabulary = Vocabulary::of(frames, request.labels, book);
+    let views = Views::new(frames, request.palette, book);
+    let vocabulary = Vocabulary::new(frames, request.labels, book);
     let mut frames: Vec<&FrameStatistics> = frames.iter().collect();
     frames.sort_by(|a, b| (&a.scene, &a.frame).cmp(&(&b.scene, &b.frame)));
     let mut generated = Generated::default();
@@ -340,6 +340,6 @@ fn id(candidate: &Candidate, frame: &FrameStatistics, dataset: &str) -> Question
     ];
     let choices = candidate.choices.iter().map(String::as_str);
     let parts = head.into_iter().chain(choices).chain([candidate.answer()]);
-    let digest = Digest::of_parts(parts.map(str::as_bytes)).to_string();
+    let digest = Digest::from_parts(parts.map(str::as_bytes)).to_string();
     QuestionId(format!("{}-{}", candidate.family, &digest[..16]))
 }

@@ -37,7 +37,7 @@ pub struct FrameLook {
 impl FrameLook {
     /// The look of a frame, its colours named by a palette. The depth is taken as its map has it.
     #[must_use]
-    pub fn of(frame: &Frame, palette: &Palette) -> Self {
+    pub fn new(frame: &Frame, palette: &Palette) -> Self {
         let pixels = (frame.rgb.height() * frame.rgb.width()).max(1) as f64;
         let mut colors = [0_u64; BINS];
         let (codes, _) = frame.rgb.samples().as_chunks::<3>();

@@ -31,7 +31,7 @@ impl Picker<'_> {
             family.as_bytes(),
             purpose.as_bytes(),
         ];
-        let digest = Digest::of_parts(parts);
+        let digest = Digest::from_parts(parts);
         digest
             .as_bytes()
             .iter()

@@ -23,7 +23,7 @@ pub(super) fn candidates(context: &RuleContext<'_>) -> Vec<RuleResult> {
     let asked = classes.filter(|(_, class)| class.flags.contains(&ClassFlag::Asked));
     asked
         .flat_map(|(class, _)| {
-            let present = context.statistics.of_class(class) > 0;
+            let present = context.statistics.class_pixels(class) > 0;
             let result = if present {
                 yes(context, class)
             } else {
@@ -87,7 +87,7 @@ fn no(
     class: &str,
     expected: Option<&BTreeSet<String>>,
 ) -> Result<Vec<RuleResult>, Reason> {
-    let words: Vec<&str> = context.vocabulary.of_class(class).collect();
+    let words: Vec<&str> = context.vocabulary.class_words(class).collect();
     if words.is_empty() || !context.labels.expressible.contains(class) {
         return Err(Reason::Inexpressible);
     }
@@ -106,7 +106,7 @@ fn no(
         group
             .classes
             .iter()
-            .any(|other| context.statistics.of_class(other) > 0)
+            .any(|other| context.statistics.class_pixels(other) > 0)
             || context
                 .statistics
                 .words
@@ -123,7 +123,7 @@ fn no(
     let evidence = json!({
         "pixels": 0,
         "void_ppm": context.statistics.ppm(context.statistics.effective_void),
-        "mirror_ppm": context.statistics.ppm(context.statistics.of_class("mirror")),
+        "mirror_ppm": context.statistics.ppm(context.statistics.class_pixels("mirror")),
         "confusable": groups.flat_map(|group| &group.classes).collect::<BTreeSet<_>>(),
     });
     let denied = words.into_iter();

@@ -51,7 +51,7 @@ pub enum RoomSource {
 /// small and far behind, because that is a room seen through a door.
 #[must_use]
 pub fn classify(statistics: &FrameStatistics, book: &RuleBook) -> RoomSigns {
-    let signs = Signs::of(statistics, book);
+    let signs = Signs::new(statistics, book);
     let mut scores = BTreeMap::new();
     let mut segments: BTreeMap<String, Vec<u32>> = BTreeMap::new();
     for clue in &book.clue {
@@ -87,7 +87,7 @@ struct Signs<'a> {
 }
 
 impl<'a> Signs<'a> {
-    fn of(statistics: &'a FrameStatistics, book: &'a RuleBook) -> Self {
+    fn new(statistics: &'a FrameStatistics, book: &'a RuleBook) -> Self {
         let mut tokens: BTreeMap<&str, Vec<&Segment>> = BTreeMap::new();
         for segment in statistics.evidence(book) {
             tokens.entry(segment.token(book)).or_default().push(segment);

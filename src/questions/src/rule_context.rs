@@ -148,7 +148,7 @@ impl RuleContext<'_> {
         let rule = &self.book.closed_world;
         if self.statistics.ppm(self.statistics.effective_void) > rule.void_ppm {
             Some(Reason::Void)
-        } else if self.statistics.ppm(self.statistics.of_class("mirror")) > rule.mirror_ppm {
+        } else if self.statistics.ppm(self.statistics.class_pixels("mirror")) > rule.mirror_ppm {
             Some(Reason::Mirror)
         } else {
             None

@@ -142,7 +142,7 @@ impl QuestionSummary {
             candidates: generated
                 .counts
                 .iter()
-                .map(|(family, counts)| (family.clone(), CandidateCounts::of(counts)))
+                .map(|(family, counts)| (family.clone(), CandidateCounts::new(counts)))
                 .collect(),
             per_frame: BTreeMap::new(),
             answers: BTreeMap::new(),
@@ -201,7 +201,7 @@ impl QuestionSummary {
 }
 
 impl CandidateCounts {
-    fn of(counts: &FamilyCounts) -> Self {
+    fn new(counts: &FamilyCounts) -> Self {
         let omitted = |reason| counts.omitted.get(&reason).copied().unwrap_or(0);
         Self {
             viable: counts.viable,

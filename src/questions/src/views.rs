@@ -15,7 +15,7 @@ pub struct Views(BTreeMap<(String, u32, String), BTreeSet<Option<Color>>>);
 
 impl Views {
     /// The colours in these frames; the colour of a view is that of its median.
-    pub fn of(frames: &[FrameStatistics], palette: &Palette, book: &RuleBook) -> Self {
+    pub fn new(frames: &[FrameStatistics], palette: &Palette, book: &RuleBook) -> Self {
         let mut views = Self::default();
         for frame in frames {
             let named = frame.segments.iter();

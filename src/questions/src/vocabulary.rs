@@ -20,7 +20,7 @@ pub struct Vocabulary {
 
 impl Vocabulary {
     /// The words of these frames and labels.
-    pub fn of(frames: &[FrameStatistics], labels: &Labels, book: &RuleBook) -> Self {
+    pub fn new(frames: &[FrameStatistics], labels: &Labels, book: &RuleBook) -> Self {
         let mut vocabulary = Self::default();
         let segments = || frames.iter().flat_map(|frame| &frame.segments);
         for segment in segments().filter(|segment| segment.source != WordSource::Coarse) {
@@ -47,7 +47,7 @@ impl Vocabulary {
     }
 
     /// The words by which things of a class are called.
-    pub fn of_class(&self, class: &str) -> impl Iterator<Item = &str> {
+    pub fn class_words(&self, class: &str) -> impl Iterator<Item = &str> {
         self.words
             .get(class)
             .into_iter()

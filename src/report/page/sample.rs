@@ -46,7 +46,7 @@ fn chosen(grid: &Grid<'_>, most: usize) -> Vec<bool> {
     let mut strata = BTreeMap::<(&Family, Fate), Vec<(Digest, usize)>>::new();
     for (place, (item, fate)) in grid.items.iter().zip(fates).enumerate() {
         let name = format!("{} {}", item.asked.question, item.asked.repeat);
-        let draw = (Digest::of(name.as_bytes()), place);
+        let draw = (Digest::from_bytes(name.as_bytes()), place);
         strata
             .entry((&item.asked.family, fate))
             .or_default()

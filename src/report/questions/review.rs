@@ -62,7 +62,7 @@ struct ReviewPage<'a> {
 /// # Errors
 /// If the questions cannot be written.
 pub(crate) fn page(items: &[ReviewItem<'_>]) -> Result<String> {
-    let set = Digest::of_parts(items.iter().map(|item| item.id.as_bytes()));
+    let set = Digest::from_parts(items.iter().map(|item| item.id.as_bytes()));
     Ok(PAGE.replacen(PLACEHOLDER, &embedded(&ReviewPage { set, items })?, 1))
 }
 

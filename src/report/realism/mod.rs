@@ -136,7 +136,7 @@ impl RealismSummary {
                 pairs: pairs.len(),
                 kl_rule: rules.named(rules.empty),
                 kl_other_rule: (rules.bins == Bins::Fu).then(|| rules.named(rules.empty.other())),
-                drop: Mean::of(&drops)?,
+                drop: Mean::from_values(&drops)?,
                 exposure: MethodRow::of(&exposures)?,
                 noise: NoiseRow::all(pairs),
                 source,

@@ -21,7 +21,7 @@ impl MethodRow {
     pub(super) fn of(images: &[&ImageComparison]) -> Option<Self> {
         let mean = |number: fn(&ImageComparison) -> f64| {
             let numbers: Vec<f64> = images.iter().map(|image| number(image)).collect();
-            Mean::of(&numbers)
+            Mean::from_values(&numbers)
         };
         Some(Self {
             psnr: mean(|m| m.psnr)?,
@@ -79,12 +79,12 @@ impl NoiseRow {
         let differences: Vec<[f64; 3]> = differences.collect();
         let mean = |index: usize| {
             let numbers: Vec<f64> = differences.iter().map(|numbers| numbers[index]).collect();
-            Mean::of(&numbers)
+            Mean::from_values(&numbers)
         };
         Some(Self {
             method: method.clone(),
             images: MethodRow::of(&images)?,
-            clean_psnr: Mean::of(&clean)?,
+            clean_psnr: Mean::from_values(&clean)?,
             differences: Differences {
                 psnr: mean(0)?,
                 ssim: mean(1)?,
@@ -126,7 +126,10 @@ mod tests {
             (&[f64::NEG_INFINITY, 1.0], "−∞"),
             (&[f64::INFINITY, 1.0], "+∞"),
         ] {
-            assert_eq!(difference_text(&Mean::of(numbers).unwrap(), 2), text);
+            assert_eq!(
+                difference_text(&Mean::from_values(numbers).unwrap(), 2),
+                text
+            );
         }
     }
 }

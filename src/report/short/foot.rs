@@ -42,7 +42,10 @@ pub(super) fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyC
             Some(_) => format!("{} {}", subject.model, with_interval(share)),
         });
     }
-    let cells = report.findings.summary.of(None, ReadingMode::Strict);
+    let cells = report
+        .findings
+        .summary
+        .family_cells(None, ReadingMode::Strict);
     let mut cells = cells.filter(|cell| cell.subject.level.is_some());
     if cells.any(|cell| !report.findings.below_blind(&cell.subject, None).is_empty()) {
         parts.push(format!("{BELOW} shown to be below the words alone"));

@@ -97,7 +97,7 @@ pub(super) fn arrange(
                 question.id.0.as_bytes(),
                 text,
             ];
-            *Digest::of_parts(parts).as_bytes()
+            *Digest::from_parts(parts).as_bytes()
         });
     }
     let rotations = if choice_order.circular {

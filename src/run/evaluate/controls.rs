@@ -9,7 +9,7 @@ use crate::types::Control;
 
 /// Whether a model is the control that is shown the image of another scene; the plan gives it that image.
 pub(super) fn is_other_room(model: &ModelUnderTest) -> bool {
-    Control::of_model(model.model.name()) == Some(Control::OtherRoom)
+    Control::from_model_name(model.model.name()) == Some(Control::OtherRoom)
 }
 
 /// The controls that are added to a run with the observer.

@@ -38,7 +38,7 @@ pub(super) fn power(
     let clusters = Clusters::new(pairs, &ties);
     let of_questions = questions
         .iter()
-        .filter_map(|question| clusters.of(&question.frame, &question.id));
+        .filter_map(|question| clusters.get(&question.frame, &question.id));
     PowerForecast::new(&clusters, &of_questions.collect::<Vec<u32>>(), asked)
 }
 

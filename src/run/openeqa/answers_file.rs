@@ -146,5 +146,5 @@ fn key(name: &str, entry: &AnswerEntry, condition: &Condition, person: Option<&s
         person.unwrap_or_default(),
         answer.as_deref().unwrap_or_default(),
     ];
-    Digest::of_parts(parts.map(str::as_bytes)).into()
+    Digest::from_parts(parts.map(str::as_bytes)).into()
 }

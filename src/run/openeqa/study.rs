@@ -102,7 +102,7 @@ pub(super) fn pack(
 
 /// The file name of an image, which does not reveal the level.
 fn image(walk: &str, condition: &Condition, place: usize, payload: &Payload) -> String {
-    let digest = Digest::of_parts([walk.as_bytes(), condition.to_string().as_bytes()]);
+    let digest = Digest::from_parts([walk.as_bytes(), condition.to_string().as_bytes()]);
     let ending = if payload.facts().format == "png" {
         "png"
     } else {

@@ -49,7 +49,7 @@ fn looks(
         let frames = names.par_iter().map(|name| {
             let files = dataset.files(name)?;
             tally.add(name, &files.note());
-            let look = FrameLook::of(&files.decode()?, palette);
+            let look = FrameLook::new(&files.decode()?, palette);
             bar.inc();
             Ok(look)
         });

@@ -338,7 +338,7 @@ fn context(making: &QuestionMaking<'_>, labels: &Labels) -> Digest {
         making.palette.digest(),
         labels.digest(),
     ];
-    Digest::of_parts(
+    Digest::from_parts(
         [&version[..]]
             .into_iter()
             .chain(parts.iter().map(|part| &part.as_bytes()[..])),
@@ -361,7 +361,7 @@ fn measure_frame(
         content.as_bytes(),
         name.0.as_bytes(),
     ];
-    let key = Digest::of_parts(parts);
+    let key = Digest::from_parts(parts);
     let found = if let Some(found) = cache.get(key) {
         found
     } else {

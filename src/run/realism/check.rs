@@ -118,7 +118,7 @@ fn light(args: &RealismArgs, pair: &Pair, tally: &InputTally) -> Result<PairLigh
     Ok(PairLight {
         drop,
         estimated,
-        scene: SceneMatch::of(&normal, &low, f64::from(drop)),
+        scene: SceneMatch::new(&normal, &low, f64::from(drop)),
     })
 }
 

@@ -88,9 +88,9 @@ fn compare_pair(
     let drop = f64::from(checked.drop);
     let exposure = expose_by(&normal, drop);
     let key = NoiseKey::new(sensor.seed, &FrameId(checked.pair.name.clone()));
-    let of_real = Residuals::of(&real, &exposure)?;
+    let of_real = Residuals::new(&real, &exposure)?;
     let measured = |image: &Rgb| -> Result<(ImageComparison, Residuals)> {
-        let residuals = Residuals::of(image, &exposure)?;
+        let residuals = Residuals::new(image, &exposure)?;
         let kl = |rule| divergence(&of_real, &residuals, args.kl_bins, rule);
         let comparison = ImageComparison {
             psnr: psnr(&real, image)?,

@@ -91,7 +91,7 @@ fn fit_pair(
     // Other draws than those of the comparison: the noise of a synthetic low-light image of the same name must not be met again.
     let key = NoiseKey::new(seed, &FrameId(format!("fit of {}", checked.pair.name)));
     let drop = f64::from(checked.drop);
-    let smooth = SmoothBlocks::of(&normal.codes(), drop);
+    let smooth = SmoothBlocks::new(&normal.codes(), drop);
     let real = smooth.spread(low);
     let fits = readings.iter().map(|reading| {
         let mut raw = None;
@@ -103,7 +103,7 @@ fn fit_pair(
             let negative = raw.negative(&key, &state, synthesis.amplify, synthesis.tone);
             smooth.spread(&negative.develop_by(drop))
         });
-        GainFit::of(&real, &curves)
+        GainFit::fit(&real, &curves)
     });
     fits.collect()
 }

@@ -203,7 +203,7 @@ impl ServerState {
                 self.likenesses.len()
             );
         }
-        let words = Digest::of(request.text.as_bytes()).to_string();
+        let words = Digest::from_bytes(request.text.as_bytes()).to_string();
         let image = request.image.as_ref().map(|(_, payload)| payload);
         let images = image.map(std::slice::from_ref);
         let seen = image.map_or_else(String::new, |image| image.facts().digest.to_string());

@@ -87,7 +87,7 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
                 return Err(wrong(problem));
             }
             // The name does not reveal the level.
-            let name = Digest::of_parts([frame.0.as_bytes(), condition.to_string().as_bytes()]);
+            let name = Digest::from_parts([frame.0.as_bytes(), condition.to_string().as_bytes()]);
             let stem = format!("images/{}", &name.to_string()[..16]);
             let names = shown.iter().enumerate().map(|(place, image)| {
                 let place = match shown.len() {
@@ -158,7 +158,8 @@ fn first_order(trials: &Trials<ChoiceDetail>) -> BTreeMap<QuestionId, Vec<String
 
 /// The `count` questions whose ids have the lowest digests.
 fn chosen(mut questions: Vec<RunQuestion>, count: usize) -> Vec<RunQuestion> {
-    questions.sort_by_cached_key(|question| *Digest::of(question.id.0.as_bytes()).as_bytes());
+    questions
+        .sort_by_cached_key(|question| *Digest::from_bytes(question.id.0.as_bytes()).as_bytes());
     questions.truncate(count);
     questions
 }

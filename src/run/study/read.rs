@@ -258,7 +258,7 @@ impl People {
             .map(ToString::to_string)
             .unwrap_or_default();
         let head = ["darkqa.person/1", name, &person, &asked.question.0, &place];
-        let key: TrialKey = Digest::of_parts(head.map(str::as_bytes)).into();
+        let key: TrialKey = Digest::from_parts(head.map(str::as_bytes)).into();
         let next = self
             .next
             .entry((asked.question.clone(), asked.condition.clone()))

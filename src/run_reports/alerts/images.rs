@@ -29,7 +29,7 @@ pub(super) fn of_images(combined: &Combined) -> Vec<Alert> {
             continue;
         }
         let words = std::iter::once(&question.text).chain(trial.choices());
-        let wording = || Digest::of_parts(words.map(String::as_bytes));
+        let wording = || Digest::from_parts(words.map(String::as_bytes));
         if let Some(reply) = LitReply::from_trial(trial, wording) {
             replies.entry(trial.model()).or_default().push(reply);
         }

@@ -274,7 +274,7 @@ mod tests {
             settings: settings.collect(),
             images: HashMap::from([(
                 ("q".to_owned(), "L3-noise".to_owned()),
-                BTreeSet::from([Digest::of(image)]),
+                BTreeSet::from([Digest::from_bytes(image)]),
             )]),
             truths: HashMap::from([("q".to_owned(), (choices, Some(truth.to_owned())))]),
         }

@@ -72,7 +72,7 @@ fn best(
     questions: &[RunQuestion],
 ) -> (Option<BestInTheDark>, String) {
     let clusters = clusters(trials, questions);
-    let grid = Grid::of_models(trials, &clusters, &ModelListing::default(), |_| true);
+    let grid = Grid::for_models(trials, &clusters, &ModelListing::default(), |_| true);
     (
         best_in_the_dark(&grid, ReadingMode::Strict),
         clusters.unit().to_string(),

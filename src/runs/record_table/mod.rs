@@ -36,12 +36,12 @@ pub(crate) fn update(folder: &Path, table: RecordTable) -> Result<()> {
 fn update_of<D: Tabled>(folder: &Path, table: RecordTable) -> Result<()> {
     let path = folder.join(RECORDS_PARQUET);
     let name = ("darkqa.schema", D::TABLE.to_owned());
-    let pairs = LogMark::of(folder)?.pairs().into_iter().chain([name]);
+    let pairs = LogMark::read(folder)?.pairs().into_iter().chain([name]);
     let metadata = FileMetadata {
         created_by: CREATED_BY.to_owned(),
         pairs: pairs.map(|(key, value)| (key.to_owned(), value)).collect(),
     };
-    if FileMetadata::of(&path)?.as_ref() == Some(&metadata) {
+    if FileMetadata::read(&path)?.as_ref() == Some(&metadata) {
         return Ok(());
     }
     if table == RecordTable::LeftOut {

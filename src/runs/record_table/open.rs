@@ -62,7 +62,7 @@ impl Tabled for OpenDetail {
         let setting = |name| manifest.settings.get(name).and_then(Value::as_str);
         let judge = setting(JUDGE).map(str::to_owned);
         let protocol = setting(PROTOCOL).map_or(Ok(Protocol::Upstream), read_word)?;
-        let names = RecordedNames::of(manifest);
+        let names = RecordedNames::from_manifest(manifest);
         let mut marks = MarkIndex::of(questions);
         each_record(folder, |record: Record<Self>, _| {
             let is_of_judge = Some(names.shown(&record.model)) == judge.as_deref();

@@ -33,7 +33,7 @@ pub(super) fn places(
     manifest: &RunManifest,
     questions: &[RunQuestion],
 ) -> Result<Vec<LinePlace>> {
-    let names = RecordedNames::of(manifest);
+    let names = RecordedNames::from_manifest(manifest);
     let ids = questions.iter().map(|question| &question.id);
     let ids: HashMap<&QuestionId, u32> = ids.zip(1..).collect();
     let mut conditions = Seen::<Option<Condition>>::default();

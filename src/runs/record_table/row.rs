@@ -81,7 +81,7 @@ pub(super) struct LightTexts {
 
 impl LightTexts {
     fn of(condition: Option<&Condition>) -> Self {
-        let columns = ConditionColumns::of(condition);
+        let columns = ConditionColumns::new(condition);
         Self {
             condition: columns.condition.map(ToString::to_string),
             level: columns.level.map(|level| level.to_string()),
@@ -128,7 +128,7 @@ impl<D: Tabled> Rows<D> {
             (question.id.clone(), Arc::new(texts))
         });
         Ok(Self {
-            names: RecordedNames::of(manifest),
+            names: RecordedNames::from_manifest(manifest),
             lights: HashMap::new(),
             questions: texts.collect(),
             context: D::context(folder, manifest, questions)?,

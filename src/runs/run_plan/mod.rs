@@ -247,7 +247,7 @@ fn lines<T: DeserializeOwned + Send>(
 ) -> Result<Vec<T>> {
     let bytes = reading::bytes(path)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    if digests.get(&*name) != Some(&Digest::of(&bytes)) {
+    if digests.get(&*name) != Some(&Digest::from_bytes(&bytes)) {
         let problem = format!(
             "the file is not the one that {PLAN_FILE} was written with; write the plan again with `darkqa-eval plan`"
         );

@@ -87,7 +87,7 @@ impl NewPlan {
 
     fn file(&self, questions: &[u8], frames: &[u8], forecast: &Forecast) -> PlanFile {
         let files = [(QUESTIONS, questions), (FRAMES, frames)];
-        let files = files.map(|(name, content)| (name.to_owned(), Digest::of(content)));
+        let files = files.map(|(name, content)| (name.to_owned(), Digest::from_bytes(content)));
         let scenes: BTreeSet<&str> = self.frames.iter().map(|frame| &*frame.scene).collect();
         let seconds = self.frames.iter().map(|frame| frame.cost.seconds);
         PlanFile {

@@ -15,7 +15,7 @@ impl Dice {
         let all = [&b"darkqa-eval rooms"[..], &seed]
             .into_iter()
             .chain(parts.iter().map(|part| part.as_bytes()));
-        let digest = Digest::of_parts(all);
+        let digest = Digest::from_parts(all);
         Self(blake3::Hasher::new_keyed(digest.as_bytes()).finalize_xof())
     }
 

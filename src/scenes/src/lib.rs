@@ -177,7 +177,7 @@ impl Room {
             RoomLight::Display => None,
             RoomLight::Linear => Some(b"linear light"),
         };
-        Digest::of_parts(parts.into_iter().chain(light))
+        Digest::from_parts(parts.into_iter().chain(light))
     }
 
     /// Width and height in pixels.

@@ -109,7 +109,7 @@ impl FloorPlan {
             }
             3 => seats::chair(
                 kind("chair/otherroom", "chair"),
-                Paint::of(&ALL, dice),
+                Paint::random(&ALL, dice),
                 dice,
             ),
             _ => plants::plant(1.2, dice).named("potted plant/otherroom"),

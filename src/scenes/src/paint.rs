@@ -50,7 +50,7 @@ pub(super) fn rgb([red, green, blue]: [u8; 3]) -> Vec3 {
 
 impl Paint {
     /// A random paint with one of these names.
-    pub(super) fn of(names: &[&str], dice: &mut Dice) -> Self {
+    pub(super) fn random(names: &[&str], dice: &mut Dice) -> Self {
         let name = dice.pick(names);
         let known = NAMED.iter().find(|(known, _)| *known == name);
         let (name, codes) = known.map_or(NAMED[0], |found| *found);

@@ -40,13 +40,13 @@ impl Spot {
     /// The first point that a ray hits; a mirror counts as a thing.
     pub(super) fn first(scene: &Scene, tree: &Bvh, ray: &Ray) -> Option<Self> {
         let hit = tree.first(ray, FAR)?;
-        Some(Self::of(scene, ray, hit))
+        Some(Self::new(scene, ray, hit))
     }
 
     /// The first point that a ray hits; for a mirror, with the colour of what is seen in it.
     pub(super) fn through_mirror(scene: &Scene, tree: &Bvh, ray: &Ray) -> Option<Self> {
         let hit = tree.first(ray, FAR)?;
-        let spot = Self::of(scene, ray, hit);
+        let spot = Self::new(scene, ray, hit);
         if scene.surface(hit.face).finish != SurfaceFinish::Mirror {
             return Some(spot);
         }
@@ -62,7 +62,7 @@ impl Spot {
         })
     }
 
-    fn of(scene: &Scene, ray: &Ray, hit: Hit) -> Self {
+    fn new(scene: &Scene, ray: &Ray, hit: Hit) -> Self {
         let face = &scene.mesh.faces[hit.face];
         let thing = scene.owners[hit.face];
         let surface = scene.surface(hit.face);

@@ -57,7 +57,7 @@ pub struct AccuracySummary {
 
 impl AccuracySummary {
     /// Cells of a family in one reading. `None` selects the cells of all families together.
-    pub fn of<'s>(
+    pub fn family_cells<'s>(
         &'s self,
         family: Option<&'s Family>,
         mode: ReadingMode,
@@ -169,7 +169,7 @@ fn always(
     // Items of a question stand together.
     let mut last: Option<&GridItem<'_>> = None;
     let mut count = ClusterCount::default();
-    for (item, result) in grid.of_family(subject, family) {
+    for (item, result) in grid.family_items(subject, family) {
         let Some(chosen) = result.reading(mode) else {
             continue;
         };

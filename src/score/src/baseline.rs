@@ -95,7 +95,7 @@ fn correct(mut rows: Vec<&mut BaselineRow>) {
         row.holm = holm;
         row.detectable = row.paired.spread.detectable(level);
         if row.paired.difference.n >= MIN_PAIRS {
-            row.significance = Significance::of(row.paired.difference.value, holm, least);
+            row.significance = Significance::new(row.paired.difference.value, holm, least);
         }
     }
 }

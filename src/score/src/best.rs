@@ -416,7 +416,7 @@ impl Scores {
         let least_holm = pairs.len() as f64 * least_p(self.clusters());
         for (pair, holm) in pairs.iter_mut().zip(corrected) {
             pair.holm = holm;
-            pair.significance = Significance::of(pair.difference.value, holm, least_holm);
+            pair.significance = Significance::new(pair.difference.value, holm, least_holm);
         }
         pairs
     }

@@ -255,7 +255,7 @@ struct Sides<'g, 'a> {
 
 impl Sides<'_, '_> {
     /// The two subjects of a claim at a level under a reading, by their indices.
-    fn of(
+    fn find(
         &self,
         claim: &LightClaim,
         level: AxisLevel,
@@ -307,7 +307,7 @@ fn finding(
 ) -> Option<FindingByReading> {
     let asked_at = |reading: &ReadingName| {
         let levels = claim.levels().into_iter();
-        let asked = levels.filter(|level| sides.of(&claim, *level, reading).is_some());
+        let asked = levels.filter(|level| sides.find(&claim, *level, reading).is_some());
         asked.collect::<BTreeSet<AxisLevel>>()
     };
     let levels: Vec<BTreeSet<AxisLevel>> = readings.iter().map(|name| asked_at(name)).collect();
@@ -317,7 +317,9 @@ fn finding(
     let pairs: Vec<Vec<(usize, usize)>> = readings
         .iter()
         .map(|reading| {
-            let pairs = levels.iter().map(|level| sides.of(&claim, *level, reading));
+            let pairs = levels
+                .iter()
+                .map(|level| sides.find(&claim, *level, reading));
             pairs.collect::<Option<_>>().unwrap_or_default()
         })
         .collect();

@@ -16,7 +16,7 @@ pub struct OfferedChoices {
 
 impl OfferedChoices {
     /// The choices that an item offers.
-    pub fn of(item: &AskedItem) -> Self {
+    pub fn from_item(item: &AskedItem) -> Self {
         Self {
             family: item.family.as_ref().clone(),
             choices: item.choices.len(),

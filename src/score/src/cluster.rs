@@ -125,7 +125,7 @@ impl Clusters {
 
     /// Index of the cluster of a question about a frame, from 0; `None` if that question was not asked.
     #[must_use]
-    pub fn of(&self, frame: &FrameId, question: &QuestionId) -> Option<u32> {
+    pub fn get(&self, frame: &FrameId, question: &QuestionId) -> Option<u32> {
         self.by_frame
             .get(frame)
             .or_else(|| self.by_question.get(question))
@@ -206,7 +206,7 @@ mod tests {
             ..FrameTies::default()
         };
         let found = Clusters::new(ids.iter().zip(&frames), &ties);
-        let of = |frame: usize| found.of(&frames[frame], &ids[frame]);
+        let of = |frame: usize| found.get(&frames[frame], &ids[frame]);
         assert_eq!((found.count(), found.unit()), (3, ClusterUnit::Frame));
         assert!([1, 2, 5].iter().all(|frame| of(*frame) == of(0)));
         assert!(of(3) != of(0) && of(4) != of(0) && of(3) != of(4));
@@ -227,7 +227,7 @@ mod tests {
         };
         let found = Clusters::new(ids.iter().zip(&frames), &ties);
         assert_eq!((found.unit(), found.count()), (ClusterUnit::Scene, 8 + 6));
-        let of = |frame: usize| found.of(&frames[frame], &ids[frame]);
+        let of = |frame: usize| found.get(&frames[frame], &ids[frame]);
         assert!(of(0) == of(8) && of(0) != of(1) && of(28) != of(29));
     }
 
@@ -247,13 +247,13 @@ mod tests {
         let found = clusters(20, 10, 60);
         let (first, second) = (FrameId("f003".into()), FrameId("f013".into()));
         let question = QuestionId("q000".into());
-        assert_eq!(found.of(&first, &question), found.of(&second, &question));
-        assert_eq!(found.of(&FrameId("else".into()), &question), None);
+        assert_eq!(found.get(&first, &question), found.get(&second, &question));
+        assert_eq!(found.get(&FrameId("else".into()), &question), None);
         let single = clusters(1, 0, 5);
         let frame = FrameId("f000".into());
         assert_ne!(
-            single.of(&frame, &question),
-            single.of(&frame, &QuestionId("q001".into()))
+            single.get(&frame, &question),
+            single.get(&frame, &QuestionId("q001".into()))
         );
     }
 }

@@ -35,14 +35,14 @@ pub struct CommonItems {
 impl CommonItems {
     /// The common items of a grid; `None` if all models were asked the same questions.
     #[must_use]
-    pub fn of(grid: &Grid<'_>) -> Option<Self> {
+    pub fn new(grid: &Grid<'_>) -> Option<Self> {
         let all: BTreeSet<&QuestionId> = grid
             .items
             .iter()
             .map(|item| &*item.asked.question)
             .collect();
         let mut asked = BTreeMap::<(bool, &str), BTreeSet<&QuestionId>>::new();
-        for (index, subject) in of_models(grid) {
+        for (index, subject) in model_subjects(grid) {
             let model = (subject.view == Some(View::Blind), &*subject.model);
             let questions = asked.entry(model).or_default();
             if questions.len() == all.len() {
@@ -60,7 +60,7 @@ impl CommonItems {
         let items = restricted.items.iter();
         let offers: Vec<OfferedChoices> = items
             .clone()
-            .map(|item| OfferedChoices::of(item.asked))
+            .map(|item| OfferedChoices::from_item(item.asked))
             .collect();
         let shared: BTreeSet<&QuestionId> = items.map(|item| &*item.asked.question).collect();
         let asked = asked
@@ -80,7 +80,7 @@ impl CommonItems {
 }
 
 /// The subjects with their indices, without those of people beside models.
-fn of_models<'g>(grid: &'g Grid<'_>) -> impl Iterator<Item = (usize, &'g Subject)> {
+fn model_subjects<'g>(grid: &'g Grid<'_>) -> impl Iterator<Item = (usize, &'g Subject)> {
     let models = grid.subjects.iter().map(|subject| &*subject.model);
     let models: BTreeSet<&str> = grid.listing.without_people(models).into_iter().collect();
     let subjects = grid.subjects.iter().enumerate();
@@ -92,7 +92,7 @@ fn of_models<'g>(grid: &'g Grid<'_>) -> impl Iterator<Item = (usize, &'g Subject
 #[must_use]
 pub fn shared_items(grid: &Grid<'_>) -> Vec<bool> {
     let mut models = BTreeMap::<&str, Vec<bool>>::new();
-    for (index, subject) in of_models(grid) {
+    for (index, subject) in model_subjects(grid) {
         if subject.view != Some(View::Image) {
             continue;
         }

@@ -244,7 +244,7 @@ fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
                 tested.significance = if is_too_small {
                     Significance::TooFew
                 } else {
-                    Significance::of(difference, holm, least[place])
+                    Significance::new(difference, holm, least[place])
                 };
             }
         }

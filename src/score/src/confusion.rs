@@ -53,7 +53,7 @@ pub fn confusions(grid: &Grid<'_>) -> Vec<Confusion> {
                     counts,
                     collapse: None,
                 };
-                confusion.collapse = Collapse::of(grid, index, &confusion);
+                confusion.collapse = Collapse::from_confusion(grid, index, &confusion);
                 all.push(confusion);
             }
         }
@@ -63,7 +63,7 @@ pub fn confusions(grid: &Grid<'_>) -> Vec<Confusion> {
 
 fn counts(grid: &Grid<'_>, subject: usize, family: &Family, labels: &[String]) -> Vec<Vec<usize>> {
     let mut counts = vec![vec![0; labels.len() + 1]; labels.len()];
-    for (item, result) in grid.of_family(subject, Some(family)) {
+    for (item, result) in grid.family_items(subject, Some(family)) {
         let Some(chosen) = result.reading(ReadingMode::Strict) else {
             continue;
         };
@@ -193,7 +193,7 @@ const MIN_CLUSTERS: usize = 8;
 
 impl Collapse {
     /// The answer that a subject gives most often; of several, the first by name.
-    fn of(grid: &Grid<'_>, subject: usize, confusion: &Confusion) -> Option<Self> {
+    fn from_confusion(grid: &Grid<'_>, subject: usize, confusion: &Confusion) -> Option<Self> {
         let shares = confusion.shares();
         let labels = shares.iter().enumerate().rev();
         let (top, (predicted, truth)) = labels.max_by_key(|(_, (predicted, _))| *predicted)?;
@@ -203,7 +203,7 @@ impl Collapse {
         let top = &confusion.labels[top];
         let mut clusters = BTreeMap::<u32, ClusterCount>::new();
         let mut guess = 0.0;
-        for (item, result) in grid.of_family(subject, Some(&confusion.family)) {
+        for (item, result) in grid.family_items(subject, Some(&confusion.family)) {
             let Some(chosen) = result.reading(ReadingMode::Strict) else {
                 continue;
             };
@@ -326,7 +326,7 @@ pub fn hallucinations(grid: &Grid<'_>) -> Vec<Hallucination> {
 /// Share of a false answer among the replies to presence questions to which it is false.
 fn rate(grid: &Grid<'_>, subject: usize, answer: FalseAnswer) -> Option<Estimate> {
     let mut clusters = BTreeMap::<u32, ClusterCount>::new();
-    for (item, result) in grid.of_family(subject, Some(&Family::Presence)) {
+    for (item, result) in grid.family_items(subject, Some(&Family::Presence)) {
         if let Some(chosen) = result.reading(ReadingMode::Strict)
             && answer.is_false_for(item)
         {

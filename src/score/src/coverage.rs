@@ -56,7 +56,7 @@ impl Coverage {
     }
 
     /// Numbers of items of `most` at a level, and of those among them that are answered here.
-    fn of_level(&self, most: &Self, level: AxisLevel) -> [usize; 2] {
+    fn level_counts(&self, most: &Self, level: AxisLevel) -> [usize; 2] {
         let Some(all) = most.0.get(&level) else {
             return [0, 0];
         };
@@ -70,7 +70,7 @@ impl Coverage {
     /// The levels at which less is answered than [`LEAST_SHARE`] of what `most` has, with both numbers of items.
     pub(super) fn lacking(&self, most: &Self) -> Lacking {
         let levels = most.0.keys();
-        let counts = levels.map(|level| (*level, self.of_level(most, *level)));
+        let counts = levels.map(|level| (*level, self.level_counts(most, *level)));
         counts
             .filter(|(_, [all, here])| (*here as f64) < LEAST_SHARE * *all as f64)
             .collect()

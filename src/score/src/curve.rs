@@ -137,7 +137,7 @@ fn curve(
 /// Expected number of right guesses among the replies at L0, by cluster.
 fn guesses(grid: &Grid<'_>, clean: usize, family: Option<&Family>) -> Vec<f32> {
     let mut guesses = vec![0.0_f32; grid.clusters];
-    for (item, result) in grid.of_family(clean, family) {
+    for (item, result) in grid.family_items(clean, family) {
         if let TrialResult::Read { .. } = result {
             guesses[item.cluster as usize] += 1.0 / item.asked.choices.len() as f32;
         }

@@ -235,7 +235,7 @@ fn correct(rows: &mut [ConditionFidelity]) {
         for (prediction, holm) in predictions.iter_mut().zip(holm(&values)) {
             prediction.holm = holm;
             prediction.significance =
-                Significance::of(prediction.auc.estimate.value - 0.5, holm, 0.0);
+                Significance::new(prediction.auc.estimate.value - 0.5, holm, 0.0);
         }
     }
 }

@@ -111,12 +111,12 @@ impl<'a> Findings<'a> {
     ) -> Self {
         let clusters = Clusters::new(trials.questions(), ties);
         let questions: Vec<OfferedChoices> = questions.into_iter().collect();
-        let observer = ObserverSummary::of(trials, &clusters);
+        let observer = ObserverSummary::new(trials, &clusters);
         let is_model = |model: &str| !is_control(model);
         let is_shown = |model: &str| is_model(model) && !is_observer(model);
         let without_observer = observer.is_hidden().then(|| {
-            let grid = Grid::of_models(trials, &clusters, listing, is_shown);
-            Box::new(Self::of(
+            let grid = Grid::for_models(trials, &clusters, listing, is_shown);
+            Box::new(Self::build(
                 grid,
                 &clusters,
                 &questions,
@@ -124,28 +124,28 @@ impl<'a> Findings<'a> {
                 measured,
             ))
         });
-        let grid = Grid::of_models(trials, &clusters, listing, is_model);
+        let grid = Grid::for_models(trials, &clusters, listing, is_model);
         Self {
             without_observer,
-            ..Self::of(grid, &clusters, &questions, observer, measured)
+            ..Self::build(grid, &clusters, &questions, observer, measured)
         }
     }
 
     /// The same results of a set whose photographs were taken in this light.
     #[must_use]
-    pub fn of_set(mut self, set: PhotographedSet) -> Self {
+    pub fn for_set(mut self, set: PhotographedSet) -> Self {
         self.set = set;
         let shown = self.without_observer.take();
-        self.without_observer = shown.map(|shown| Box::new(shown.of_set(set)));
+        self.without_observer = shown.map(|shown| Box::new(shown.for_set(set)));
         self
     }
 
     /// The same results with the strict score of the groups that these questions name.
     #[must_use]
-    pub fn of_groups(mut self, questions: &[RunQuestion]) -> Self {
-        self.strict = StrictScore::of(&self.grid, questions);
+    pub fn for_groups(mut self, questions: &[RunQuestion]) -> Self {
+        self.strict = StrictScore::new(&self.grid, questions);
         let shown = self.without_observer.take();
-        self.without_observer = shown.map(|shown| Box::new(shown.of_groups(questions)));
+        self.without_observer = shown.map(|shown| Box::new(shown.for_groups(questions)));
         self
     }
 
@@ -155,7 +155,7 @@ impl<'a> Findings<'a> {
         self.without_observer.as_deref().unwrap_or(self)
     }
 
-    fn of(
+    fn build(
         grid: Grid<'a>,
         clusters: &Clusters,
         questions: &[OfferedChoices],
@@ -206,9 +206,9 @@ impl<'a> Findings<'a> {
             agreements: Vec::new(),
             light_agreements: Vec::new(),
             set: PhotographedSet::default(),
-            pairs: pair_darkness::of_grid(&grid),
+            pairs: pair_darkness::from_grid(&grid),
             fidelity: FidelityFindings::new(&grid, measured),
-            common: CommonItems::of(&grid),
+            common: CommonItems::new(&grid),
             strict: None,
             tests: 0,
             observer,
@@ -223,7 +223,7 @@ impl<'a> Findings<'a> {
     #[must_use]
     pub fn sentences_only(trials: &'a Trials<ChoiceDetail>, ties: &FrameTies) -> Self {
         let clusters = Clusters::new(trials.questions(), ties);
-        let observer = ObserverSummary::of(trials, &clusters);
+        let observer = ObserverSummary::new(trials, &clusters);
         let grid = Grid::new(trials, &clusters);
         Self::for_sentences(grid, &clusters, &[], observer, &[])
     }

@@ -100,19 +100,19 @@ impl<'a> Grid<'a> {
     /// without a cluster are ignored.
     #[must_use]
     pub fn new(trials: &'a Trials<ChoiceDetail>, clusters: &Clusters) -> Self {
-        Self::of_models(trials, clusters, &ModelListing::default(), |_| true)
+        Self::for_models(trials, clusters, &ModelListing::default(), |_| true)
     }
 
     /// Table of the trials of some models in their order, else as [`Grid::new`].
     #[must_use]
-    pub fn of_models(
+    pub fn for_models(
         trials: &'a Trials<ChoiceDetail>,
         clusters: &Clusters,
         listing: &ModelListing,
         is_shown: impl Fn(&str) -> bool,
     ) -> Self {
         // A question whose true choice nobody knows is never scored.
-        Self::of(trials, clusters, listing, |asked, model| {
+        Self::build(trials, clusters, listing, |asked, model| {
             asked.truth.is_some() && is_shown(model)
         })
     }
@@ -124,17 +124,17 @@ impl<'a> Grid<'a> {
         clusters: &Clusters,
         listing: &ModelListing,
     ) -> Self {
-        Self::of(trials, clusters, listing, |asked, _| asked.truth.is_none())
+        Self::build(trials, clusters, listing, |asked, _| asked.truth.is_none())
     }
 
-    fn of(
+    fn build(
         trials: &'a Trials<ChoiceDetail>,
         clusters: &Clusters,
         listing: &ModelListing,
         is_shown: impl Fn(&AskedItem, &str) -> bool,
     ) -> Self {
-        let met = Met::of(trials, |item, model| {
-            let has_cluster = clusters.of(&item.frame, &item.question).is_some();
+        let met = Met::new(trials, |item, model| {
+            let has_cluster = clusters.get(&item.frame, &item.question).is_some();
             has_cluster && is_shown(item, model)
         });
         let asked = trials.asked();
@@ -159,7 +159,7 @@ impl<'a> Grid<'a> {
         let mut keys = HashMap::<_, u32>::new();
         let mut items: Vec<GridItem<'a>> = Vec::new();
         for asked in met.items.iter().map(|number| trials.item(*number)) {
-            if let Some(cluster) = clusters.of(&asked.frame, &asked.question) {
+            if let Some(cluster) = clusters.get(&asked.frame, &asked.question) {
                 keys.entry(asked.key()).or_insert_with(|| {
                     items.push(GridItem { asked, cluster });
                     0
@@ -256,7 +256,7 @@ impl<'a> Grid<'a> {
     }
 
     /// Items of a family, each with its result for a subject.
-    pub fn of_family<'s>(
+    pub fn family_items<'s>(
         &'s self,
         subject: usize,
         family: Option<&'s Family>,
@@ -275,7 +275,7 @@ impl<'a> Grid<'a> {
         mode: ReadingMode,
     ) -> Vec<ClusterCount> {
         let mut counts = vec![ClusterCount::default(); self.clusters];
-        for (item, result) in self.of_family(subject, family) {
+        for (item, result) in self.family_items(subject, family) {
             if let Some(chosen) = result.reading(mode) {
                 let count = &mut counts[item.cluster as usize];
                 count.replies += 1;
@@ -334,7 +334,7 @@ struct Met {
 }
 
 impl Met {
-    fn of(trials: &Trials<ChoiceDetail>, is_shown: impl Fn(&AskedItem, &str) -> bool) -> Self {
+    fn new(trials: &Trials<ChoiceDetail>, is_shown: impl Fn(&AskedItem, &str) -> bool) -> Self {
         let mut met = Self {
             asked: vec![false; trials.asked().len()],
             items: Vec::new(),

@@ -40,7 +40,7 @@ impl ObserverCell {
     /// Whether this is the control that each run with the observer asks.
     #[must_use]
     pub fn is_standing(&self) -> bool {
-        Control::of_model(&self.subject.model)
+        Control::from_model_name(&self.subject.model)
             .is_some_and(|control| Control::STANDING.contains(&control))
     }
 
@@ -51,7 +51,8 @@ impl ObserverCell {
         let tolerance = 1e-9;
         let excludes =
             self.score.low > self.chance + tolerance || self.score.high < self.chance - tolerance;
-        Control::of_model(&self.subject.model).is_some_and(Control::leaves_nothing) && excludes
+        Control::from_model_name(&self.subject.model).is_some_and(Control::leaves_nothing)
+            && excludes
     }
 }
 
@@ -67,13 +68,13 @@ pub struct ObserverSummary {
 impl ObserverSummary {
     /// The results of these trials.
     #[must_use]
-    pub fn of(trials: &Trials<ChoiceDetail>, clusters: &Clusters) -> Self {
+    pub fn new(trials: &Trials<ChoiceDetail>, clusters: &Clusters) -> Self {
         // Of two trials for the same item, the later one counts.
         let mut items = BTreeMap::<Subject, BTreeMap<ItemKey<'_>, TrialRef<'_>>>::new();
         for trial in trials.iter() {
             if trial.observed().is_some() {
                 let key = trial.item().key();
-                let subject = items.entry(Subject::of(trial)).or_default();
+                let subject = items.entry(Subject::from_trial(trial)).or_default();
                 subject.insert(key, trial);
             }
         }
@@ -122,8 +123,9 @@ impl ObserverSummary {
     #[must_use]
     pub fn standing_controls(&self) -> Vec<&ObserverCell> {
         let of = |standing| -> Vec<&ObserverCell> {
-            let is_it =
-                |cell: &&ObserverCell| Control::of_model(&cell.subject.model) == Some(standing);
+            let is_it = |cell: &&ObserverCell| {
+                Control::from_model_name(&cell.subject.model) == Some(standing)
+            };
             self.controls.iter().filter(is_it).collect()
         };
         let mut all = Control::STANDING.into_iter().map(of);
@@ -162,7 +164,7 @@ fn cell(subject: Subject, trials: &[TrialRef<'_>], clusters: &Clusters) -> Optio
     let mut frames = BTreeMap::<(&FrameId, String), &Observed>::new();
     let (mut guesses, mut evidence, mut n) = (0.0, 0, 0);
     for trial in trials {
-        let cluster = clusters.of(trial.frame(), trial.question());
+        let cluster = clusters.get(trial.frame(), trial.question());
         let (Some(cluster), Some(observed)) = (cluster, trial.observed()) else {
             continue;
         };

@@ -22,7 +22,7 @@ pub fn pair_facts<'g>(grid: &Grid<'g>, subject: usize) -> BTreeMap<&'g FrameId, 
 
 /// How dark all photographs of a grid are, by name.
 #[must_use]
-pub fn of_grid(grid: &Grid<'_>) -> Vec<PairDarkness> {
+pub fn from_grid(grid: &Grid<'_>) -> Vec<PairDarkness> {
     let named = grid.subjects.iter().enumerate();
     let named = named.filter_map(|(index, subject)| Some((subject.variant.photograph()?, index)));
     let named: Vec<(&PhotoName, usize)> = named.collect();
@@ -153,7 +153,7 @@ impl PairDarkness {
 mod tests {
     use super::*;
 
-    fn of(facts: &[(Option<f64>, f64, f64)]) -> PairDarkness {
+    fn pair(facts: &[(Option<f64>, f64, f64)]) -> PairDarkness {
         let facts = facts.iter().map(|(stated, mean, median)| PairFacts {
             stated: *stated,
             mean: Some(*mean),
@@ -165,7 +165,7 @@ mod tests {
 
     #[test]
     fn one_exposure_is_its_median_with_quartiles_and_nothing_odd() {
-        let pairs = of(&[(None, 3.5, 3.6), (None, 3.6, 3.6), (None, 3.7, 3.7)]);
+        let pairs = pair(&[(None, 3.5, 3.6), (None, 3.6, 3.6), (None, 3.7, 3.7)]);
         assert_eq!(pairs.short(), "3.6 EV");
         assert_eq!(pairs.long(), "3.6 EV (quartiles 3.55–3.65), as measured");
         assert!(pairs.oddities().is_empty(), "{:?}", pairs.oddities());
@@ -173,28 +173,28 @@ mod tests {
 
     #[test]
     fn what_the_data_state_goes_first_and_is_no_lower_bound() {
-        let pairs = of(&[(Some(8.0), 6.9, 6.9)]);
+        let pairs = pair(&[(Some(8.0), 6.9, 6.9)]);
         assert_eq!(
             pairs.long(),
             "8.0 EV (quartiles 8.00–8.00), as the data state"
         );
         assert!(pairs.oddities().is_empty());
-        let measured = of(&[(None, 6.9, 6.9)]);
+        let measured = pair(&[(None, 6.9, 6.9)]);
         assert_eq!(measured.short(), "≥ 6.9 EV");
         assert!(measured.oddities()[0].contains("lower bound"));
     }
 
     #[test]
     fn swapped_pairs_and_other_tones_are_told() {
-        let swapped = of(&[(None, -3.0, -3.1)]);
+        let swapped = pair(&[(None, -3.0, -3.1)]);
         assert!(
             swapped.oddities()[0].contains("swapped"),
             "{:?}",
             swapped.oddities()
         );
-        let some = of(&[(None, 3.0, 3.0), (None, 3.0, 3.1), (None, 0.0, 0.0)]);
+        let some = pair(&[(None, 3.0, 3.0), (None, 3.0, 3.1), (None, 0.0, 0.0)]);
         assert!(some.oddities()[0].starts_with("1 of 3 photographs dark are not darker"));
-        let tone = of(&[(None, 2.17, 3.33)]);
+        let tone = pair(&[(None, 2.17, 3.33)]);
         assert!(tone.oddities()[0].contains("not one exposure apart"));
     }
 

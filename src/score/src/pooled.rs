@@ -165,7 +165,7 @@ impl PooledSet {
         let seeing = seeing
             .filter(|subject| subject.view == Some(View::Image) && subject.variant.pair.is_none());
         let sets = seeing.flat_map(|subject| {
-            let raw = PooledKind::of_raw(subject.variant.kind);
+            let raw = PooledKind::for_raw(subject.variant.kind);
             let kinds = match subject.enhancer {
                 None => raw,
                 Some(_) => vec![PooledKind::Enhancer],
@@ -323,7 +323,9 @@ impl SideCounts {
 #[must_use]
 pub fn pooled(grid: &Grid<'_>) -> (Vec<PooledFinding>, Vec<PooledFinding>) {
     let sets: Vec<PooledSet> = PooledSet::all(grid).into_iter().collect();
-    let findings = sets.into_par_iter().flat_map_iter(|set| of_set(grid, &set));
+    let findings = sets
+        .into_par_iter()
+        .flat_map_iter(|set| set_findings(grid, &set));
     let findings: Vec<PooledFinding> = findings.collect();
     findings
         .into_iter()
@@ -397,7 +399,7 @@ struct PoolOfLevels<'m> {
 }
 
 /// The findings of a set, with all families together and with each family.
-fn of_set(grid: &Grid<'_>, set: &PooledSet) -> Vec<PooledFinding> {
+fn set_findings(grid: &Grid<'_>, set: &PooledSet) -> Vec<PooledFinding> {
     let levels = set.levels(grid);
     let models = set.models(grid, &levels).pooled;
     if models.is_empty() {
@@ -576,7 +578,7 @@ fn corrected(mut set: Vec<PooledFinding>) -> Vec<PooledFinding> {
         ] {
             parsed.holm = holm;
             let gain = kind.gain(parsed.difference.value);
-            parsed.verdict = Significance::of(gain, holm, least[index]);
+            parsed.verdict = Significance::new(gain, holm, least[index]);
         }
     }
     set

@@ -22,7 +22,7 @@ pub enum PooledKind {
 
 impl PooledKind {
     /// The kinds for raw images of a kind of degradation; `None` is L0.
-    pub(super) fn of_raw(degradation: Option<Kind>) -> Vec<Self> {
+    pub(super) fn for_raw(degradation: Option<Kind>) -> Vec<Self> {
         let Some(degradation) = degradation else {
             return vec![Self::Blind];
         };

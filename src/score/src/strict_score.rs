@@ -82,7 +82,7 @@ enum GroupResult {
 impl StrictScore {
     /// The strict score of a grid, whose questions name their groups; `None` if none has one.
     #[must_use]
-    pub fn of(grid: &Grid<'_>, questions: &[RunQuestion]) -> Option<Self> {
+    pub fn new(grid: &Grid<'_>, questions: &[RunQuestion]) -> Option<Self> {
         let groups = groups(grid, questions);
         if groups.is_empty() {
             return None;

@@ -27,7 +27,7 @@ pub fn is_observer(model: &str) -> bool {
 /// Whether a model of this name is a control of the observer.
 #[must_use]
 pub fn is_control(model: &str) -> bool {
-    Control::of_model(model).is_some()
+    Control::from_model_name(model).is_some()
 }
 
 /// Whether a model of this name is built in and stands for comparison only: `random`, `observer` and its controls
@@ -76,7 +76,7 @@ pub struct Subject {
 impl Subject {
     /// The subject of a trial.
     #[must_use]
-    pub fn of(trial: TrialRef<'_>) -> Self {
+    pub fn from_trial(trial: TrialRef<'_>) -> Self {
         Self::new(trial.model(), trial.condition())
     }
 

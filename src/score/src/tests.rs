@@ -50,7 +50,7 @@ pub(super) fn records(model: &str, condition: &str, answers: Answers) -> Vec<Rec
             observed: None,
             options: None,
         };
-        let key = Digest::of(format!("{item} {model} {condition:?}").as_bytes()).into();
+        let key = Digest::from_bytes(format!("{item} {model} {condition:?}").as_bytes()).into();
         let question = QuestionId(format!("q{item:02}"));
         Record::blank(key, question, model, condition.clone(), detail)
     };

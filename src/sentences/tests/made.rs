@@ -37,7 +37,7 @@ fn asked(model: &str, frames: usize, conditions: &[(&str, f64)]) -> Vec<Record> 
                     &["a", "b", "c"],
                 )
             };
-            let key = Digest::of(format!("{item} {model} {name}").as_bytes()).into();
+            let key = Digest::from_bytes(format!("{item} {model} {name}").as_bytes()).into();
             let question = QuestionId(format!("q{item:02}"));
             records.push(Record::blank(
                 key,

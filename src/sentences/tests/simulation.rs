@@ -89,7 +89,8 @@ impl Design {
                 for item in 0..4 * self.frames {
                     let (family, choices) = &QUESTIONS[item % 4];
                     let detail = unanswered(format!("f{:03}", item / 4), family.clone(), choices);
-                    let key = Digest::of(format!("{item} {model} {name}").as_bytes()).into();
+                    let key =
+                        Digest::from_bytes(format!("{item} {model} {name}").as_bytes()).into();
                     let question = QuestionId(format!("q{item:04}"));
                     records.push(Record::blank(
                         key,

@@ -27,7 +27,7 @@ pub enum Significance {
 impl Significance {
     /// Result of a difference from its corrected p-value, and from the smallest corrected one that the clusters allow.
     #[must_use]
-    pub fn of(difference: f64, holm: f64, least_holm: f64) -> Self {
+    pub fn new(difference: f64, holm: f64, least_holm: f64) -> Self {
         if least_holm >= ALPHA {
             Self::TooFewClusters
         } else if holm >= ALPHA {
@@ -402,10 +402,10 @@ mod tests {
     fn no_verdict_is_possible_with_few_clusters() {
         assert!((least_p(8) - 2.0 / 256.0).abs() < 1e-15);
         assert!((least_p(0) - 1.0).abs() < 1e-15);
-        let verdict = |least_holm| Significance::of(-0.3, least_holm, least_holm);
+        let verdict = |least_holm| Significance::new(-0.3, least_holm, least_holm);
         assert_eq!(verdict(5.0 * least_p(8)), Significance::Worse);
         assert_eq!(verdict(5.0 * least_p(7)), Significance::TooFewClusters);
-        assert_eq!(Significance::of(0.3, 0.05, 0.01), Significance::NotShown);
+        assert_eq!(Significance::new(0.3, 0.05, 0.01), Significance::NotShown);
     }
 
     #[test]

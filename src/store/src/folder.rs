@@ -397,7 +397,7 @@ fn has_reply(folder: &Path, stored: &RunManifest, model: &str) -> Result<bool> {
     if folder.join(BATCH).exists() {
         return Ok(true);
     }
-    let names = RecordedNames::of(stored);
+    let names = RecordedNames::from_manifest(stored);
     let mut has_reply = false;
     each_line(&folder.join(RECORDS), |trial: StoredTrial| {
         has_reply |= !trial.failed() && names.shown(&trial.model) == model;

@@ -142,7 +142,7 @@ impl<D: Detail> Store<D> {
             records,
             unlocked,
             synced: Instant::now(),
-            names: RecordedNames::of(manifest),
+            names: RecordedNames::from_manifest(manifest),
             kind: PhantomData,
         })
     }

@@ -29,12 +29,12 @@ impl LogMark {
     ///
     /// # Errors
     /// If a file cannot be read.
-    pub fn of(folder: &Path) -> Result<Self> {
+    pub fn read(folder: &Path) -> Result<Self> {
         let whole = |name: &str| {
             let path = folder.join(name);
             match reading::read(&path) {
-                Ok(content) => Ok(Digest::of(&content)),
-                Err(e) if e.kind() == ErrorKind::NotFound => Ok(Digest::of(&[])),
+                Ok(content) => Ok(Digest::from_bytes(&content)),
+                Err(e) if e.kind() == ErrorKind::NotFound => Ok(Digest::from_bytes(&[])),
                 Err(e) => Err(Error::file(path, "read", e)),
             }
         };
@@ -51,7 +51,7 @@ impl LogMark {
             manifest: whole(MANIFEST)?,
             questions: whole(QUESTIONS)?,
             log_bytes,
-            log_tail: Digest::of(&tail),
+            log_tail: Digest::from_bytes(&tail),
         })
     }
 
@@ -74,7 +74,7 @@ mod tests {
     fn a_mark_changes_with_each_file_that_it_is_of() {
         let folder = tempfile::tempdir().unwrap();
         let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text);
-        let mark = || LogMark::of(folder.path()).unwrap();
+        let mark = || LogMark::read(folder.path()).unwrap();
         write(RECORDS, &"one line\n".repeat(20_000)).unwrap();
         let mut marks = vec![mark()];
         write(MANIFEST, "{}").unwrap();
@@ -95,7 +95,7 @@ mod tests {
             assert!(marks[i + 1..].iter().all(|other| other != one), "{i}");
         }
         std::fs::remove_file(folder.path().join(RECORDS)).unwrap();
-        let missing = LogMark::of(folder.path()).unwrap_err().to_string();
+        let missing = LogMark::read(folder.path()).unwrap_err().to_string();
         assert!(missing.contains(RECORDS), "{missing}");
     }
 }

@@ -45,7 +45,7 @@ fn record(name: &str, outcome: TrialOutcome) -> Record {
         observed: None,
         options: None,
     };
-    let key = Digest::of(name.as_bytes()).into();
+    let key = Digest::from_bytes(name.as_bytes()).into();
     Record {
         reply: Some("A\u{2028}\n".into()),
         attempts: 1,

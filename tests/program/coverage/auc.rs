@@ -123,7 +123,7 @@ impl MadeRun {
         let (mut records, mut measured) = (Vec::new(), Vec::new());
         for condition in design.names() {
             for frame in 0..design.scenes * FRAMES {
-                let image = Digest::of(format!("{condition} {frame}").as_bytes());
+                let image = Digest::from_bytes(format!("{condition} {frame}").as_bytes());
                 for question in frame * QUESTIONS..(frame + 1) * QUESTIONS {
                     let mut reply = record("m", &condition, (question, frame), true);
                     reply.detail.family = families[question % families.len()].clone();

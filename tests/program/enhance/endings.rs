@@ -27,7 +27,7 @@ fn what_no_size_mends_is_named_without_a_multiple() {
 #[test]
 fn an_image_that_takes_too_long_is_an_error_and_others_go_on() {
     let (_folder, enhancer) = loaded(&onnx::endless_if_bright());
-    let limit = TimeLimit::of(Duration::from_millis(300));
+    let limit = TimeLimit::new(Duration::from_millis(300));
     let mut enhancer = enhancer.with_time_limit(limit);
     let (dark, bright) = (
         Rgb::new(4, 4, vec![50; 48]).unwrap(),

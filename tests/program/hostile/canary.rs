@@ -64,7 +64,7 @@ fn entries(folder: &Path) -> Vec<Entry> {
             all.extend(entries(&path));
         }
         all.push(Entry {
-            digest: fs::read(&path).ok().map(|bytes| Digest::of(&bytes)),
+            digest: fs::read(&path).ok().map(|bytes| Digest::from_bytes(&bytes)),
             changed: meta.and_then(|meta| meta.modified().ok()),
             path,
         });

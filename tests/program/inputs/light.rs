@@ -70,7 +70,7 @@ fn flat(light: f32) -> Light {
 
 /// The mean code of a flat image in a light reading without noise.
 fn without_noise(reading: LightReading, light: f32, drop: Severity) -> f64 {
-    let synthesis = Synthesis::of(reading, CameraModel::default());
+    let synthesis = Synthesis::new(reading, CameraModel::default());
     let key = NoiseKey::new(0, &FrameId("a".to_owned()));
     let state = synthesis.state(&key, drop);
     let headroom = synthesis.headroom_ev(drop.value());

@@ -65,7 +65,7 @@ impl Set {
         let statistics: Vec<_> = frames
             .par_iter()
             .map(|frame| {
-                let key = Digest::of(frame.id.0.as_bytes());
+                let key = Digest::from_bytes(frame.id.0.as_bytes());
                 measure(frame, labels, &rules, &palette, key).unwrap()
             })
             .collect();

@@ -30,11 +30,11 @@ static SMALL: LazyLock<Set> = LazyLock::new(|| {
 
 /// The light reading whose read noise is amplified, too.
 fn physical() -> Synthesis {
-    Synthesis::of(LightReading::Physical, CameraModel::default())
+    Synthesis::new(LightReading::Physical, CameraModel::default())
 }
 
 fn spoiled(set: &Set, place: usize, asked: &Asked, control: Control) -> Rgb {
-    let key = Digest::of(asked.id.0.as_bytes());
+    let key = Digest::from_bytes(asked.id.0.as_bytes());
     match control {
         Control::OtherRoom => set.other(place).image.clone(),
         control => {

@@ -125,7 +125,7 @@ fn every_neutral_phrase_hides_an_active_word() {
         let acts = |start: usize, end: usize| {
             let known = phrase_at(&folded, &words[start..end]);
             known.is_some_and(|(_, roles)| {
-                roles != Roles::of(Role::Neutral) && roles.has_any(&ACTIVE)
+                roles != Roles::from_role(Role::Neutral) && roles.has_any(&ACTIVE)
             })
         };
         let parts = (0..words.len())

@@ -148,7 +148,7 @@ impl Enhancer {
         let mut white = Rgb::black(height, width);
         white.samples_mut().fill(u8::MAX);
         graph.restart_clock();
-        Ok(match graph.planes(&Planes::of(&white))? {
+        Ok(match graph.planes(&Planes::from_rgb(&white))? {
             RunResult::Output(planes) => {
                 let sum: f64 = planes.samples.iter().map(|sample| f64::from(*sample)).sum();
                 sum / planes.samples.len().max(1) as f64 <= MOST_RESIDUAL

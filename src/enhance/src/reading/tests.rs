@@ -125,7 +125,7 @@ fn every_convention_gives_every_byte_back() {
                 assert_eq!(read(part).samples(), bytes);
                 assert_eq!(read(whole(&image)), image);
                 if element != ElementType::Float16 {
-                    let planes = Planes::of(&image);
+                    let planes = Planes::from_rgb(&image);
                     let fed = feeding.tensor(&FedImage::Whole(&planes)).unwrap();
                     assert!(near(&fed.data, &input.data) && fed.dims == input.dims);
                 }
@@ -273,6 +273,6 @@ fn the_luma_of_an_expression_is_fed_in_its_range() {
         input: "image / 0".parse().ok(),
         ..FEEDING
     };
-    let planes = Planes::of(&image);
+    let planes = Planes::from_rgb(&image);
     assert_eq!(endless.tensor(&FedImage::Whole(&planes)), None);
 }

@@ -25,12 +25,12 @@ fn curves(name: &str) -> Port {
     port(name, &[1, 24, 0, 0])
 }
 
-fn of(inputs: &[Port], outputs: &[Port]) -> Result<Signature, String> {
-    Signature::of(inputs, outputs, &ModelSidecar::default())
+fn signature(inputs: &[Port], outputs: &[Port]) -> Result<Signature, String> {
+    Signature::infer(inputs, outputs, &ModelSidecar::default())
 }
 
 fn choose(outputs: &[Port]) -> Result<String, String> {
-    of(&[image("input")], outputs).map(|signature| signature.outputs[0].port.name.clone())
+    signature(&[image("input")], outputs).map(|signature| signature.outputs[0].port.name.clone())
 }
 
 #[test]
@@ -101,7 +101,7 @@ fn a_stated_output_is_taken_where_it_can_be_an_image() {
             output: Some(choice),
             ..ModelSidecar::default()
         };
-        let found = Signature::of(&[image("input")], outputs, &sidecar);
+        let found = Signature::infer(&[image("input")], outputs, &sidecar);
         found.map(|signature| signature.outputs[0].port.name.clone())
     };
     let index = OutputChoice::Index;
@@ -125,16 +125,16 @@ fn a_stated_output_is_taken_where_it_can_be_an_image() {
 #[test]
 fn fixed_sizes_are_read_and_must_agree() {
     let fixed = port("in", &[1, 3, 96, 128]);
-    let found = of(
+    let found = signature(
         std::slice::from_ref(&fixed),
         &[port("out", &[1, 3, 0, 128])],
     )
     .unwrap();
     assert_eq!((found.height, found.width), (Some(96), Some(128)));
-    let half = of(&[port("in", &[1, 3, 0, 128])], &[image("out")]).unwrap();
+    let half = signature(&[port("in", &[1, 3, 0, 128])], &[image("out")]).unwrap();
     assert_eq!((half.height, half.width), (None, Some(128)));
     for dims in [[1, 3, 96, 127], [1, 3, 128, 96], [2, 3, 96, 128]] {
-        assert!(of(std::slice::from_ref(&fixed), &[port("out", &dims)]).is_err());
+        assert!(signature(std::slice::from_ref(&fixed), &[port("out", &dims)]).is_err());
     }
 }
 
@@ -155,30 +155,30 @@ fn layouts_and_elements_are_read() {
                 element,
                 ..port("x", dims)
             };
-            let found = of(&[input], &[port("y", &[])]).unwrap();
+            let found = signature(&[input], &[port("y", &[])]).unwrap();
             assert_eq!(
                 (found.input.layout, found.outputs[0].layout),
                 (layout, None)
             );
         }
     }
-    let out = of(&[image("x")], &[port("y", &[0, 0, 3])]).unwrap();
+    let out = signature(&[image("x")], &[port("y", &[0, 0, 3])]).unwrap();
     assert_eq!(out.outputs[0].layout, Some(TensorLayout::Hwc));
 }
 
 #[test]
 fn a_layout_that_the_graph_leaves_open_must_be_stated() {
     let open = [port("x", &[0, 0, 0, 0])];
-    let message = of(&open, &[image("y")]).unwrap_err();
+    let message = signature(&open, &[image("y")]).unwrap_err();
     assert!(message.contains("layout_in = \"nchw\""), "{message}");
     let stated = |layout| ModelSidecar {
         layout_in: Some(layout),
         ..ModelSidecar::default()
     };
-    let found = Signature::of(&open, &[image("y")], &stated(TensorLayout::Nhwc)).unwrap();
+    let found = Signature::infer(&open, &[image("y")], &stated(TensorLayout::Nhwc)).unwrap();
     assert_eq!(found.input.layout, TensorLayout::Nhwc);
     for layout in [TensorLayout::Chw, TensorLayout::Nhwc] {
-        assert!(Signature::of(&[image("x")], &[image("y")], &stated(layout)).is_err());
+        assert!(Signature::infer(&[image("x")], &[image("y")], &stated(layout)).is_err());
     }
 }
 
@@ -194,19 +194,19 @@ fn typed(element: ElementType, port: Port) -> Port {
 #[test]
 fn further_numbers_need_values() {
     let inputs = [image("x"), port("strength", &[1])];
-    let message = of(&inputs, &[image("y")]).unwrap_err();
+    let message = signature(&inputs, &[image("y")]).unwrap_err();
     assert!(message.contains("`strength = NUMBER`"), "{message}");
     // A value is proposed only where a preset knows the name.
     let known = [image("x"), port("exposure", &[])];
-    let message = of(&known, &[image("y")]).unwrap_err();
+    let message = signature(&known, &[image("y")]).unwrap_err();
     assert!(
         message.contains("`exposure = 0.2`, as preset pairlie has it"),
         "{message}"
     );
     let switch = [image("x"), typed(ElementType::Bool, port("on", &[1]))];
-    let message = of(&switch, &[image("y")]).unwrap_err();
+    let message = signature(&switch, &[image("y")]).unwrap_err();
     assert!(message.contains("`on = true` or `on = false`"), "{message}");
-    let given = |text: &str| Signature::of(&inputs, &[image("y")], &sidecar(text));
+    let given = |text: &str| Signature::infer(&inputs, &[image("y")], &sidecar(text));
     let found = given("[extra]\nstrength = 0.25").unwrap();
     assert_eq!(
         found.extras[0].value,
@@ -273,7 +273,7 @@ fn further_inputs_take_what_fits_them() {
     for (further, value, problem) in rows {
         let inputs = [image("x"), further];
         let convention = sidecar(&format!("[extra]\na = {value}"));
-        let found = Signature::of(&inputs, &[image("y")], &convention).err();
+        let found = Signature::infer(&inputs, &[image("y")], &convention).err();
         let words = format!("{} {value}: {found:?}", inputs[1]);
         match problem {
             None => assert_eq!(found, None, "{words}"),
@@ -302,12 +302,12 @@ fn what_a_further_input_may_be_is_told_by_its_shape_and_name() {
         ),
     ] {
         let name = further.to_string();
-        let message = of(&[image("x"), further], &[image("y")]).unwrap_err();
+        let message = signature(&[image("x"), further], &[image("y")]).unwrap_err();
         assert!(message.contains(&name), "{message}");
         assert!(message.contains(part), "{message}");
     }
     // An input of such a name is not the image, even if it is the first.
-    let message = of(&[image("mask"), image("x")], &[image("y")]).unwrap_err();
+    let message = signature(&[image("mask"), image("x")], &[image("y")]).unwrap_err();
     assert!(message.starts_with("takes \"mask\""), "{message}");
 }
 
@@ -316,7 +316,7 @@ fn an_expression_of_the_image_names_outputs() {
     let outputs = [port("L", &[1, 1, 0, 0]), image("R"), curves("c")];
     let read = |text: &str| {
         let convention = sidecar(&format!("image = \"{text}\""));
-        let found = Signature::of(&[image("x")], &outputs, &convention)?;
+        let found = Signature::infer(&[image("x")], &outputs, &convention)?;
         let names = found.outputs.into_iter().map(|output| output.port.name);
         Ok::<_, String>(names.collect::<Vec<_>>())
     };
@@ -336,14 +336,14 @@ fn an_expression_of_the_image_names_outputs() {
 fn one_channel_must_be_stated_to_be_the_luma() {
     let inputs = [port("a", &[1, 1, 0, 0])];
     let outputs = [port("b", &[1, 1, 0, 0])];
-    let message = of(&inputs, &outputs).unwrap_err();
+    let message = signature(&inputs, &outputs).unwrap_err();
     assert!(message.contains("`channels = \"y\"`"), "{message}");
-    let stated = |text: &str| Signature::of(&inputs, &outputs, &sidecar(text));
+    let stated = |text: &str| Signature::infer(&inputs, &outputs, &sidecar(text));
     let found = stated("channels = \"y\"").unwrap();
     assert_eq!(found.input.layout, TensorLayout::Nchw);
     let message = stated("channels = \"y\"\nmean = [0, 0, 1]").unwrap_err();
     assert!(message.contains("three different numbers"), "{message}");
-    let colour = Signature::of(&[image("a")], &outputs, &sidecar("channels = \"y\""));
+    let colour = Signature::infer(&[image("a")], &outputs, &sidecar("channels = \"y\""));
     assert!(colour.unwrap_err().contains("leave that line out"));
 }
 
@@ -364,7 +364,7 @@ fn other_conventions_are_refused_by_name() {
         (vec![port("a", &[1, 85])], "flat values"),
     ];
     for (inputs, part) in cases {
-        let message = of(&inputs, &[image("out")]).unwrap_err();
+        let message = signature(&inputs, &[image("out")]).unwrap_err();
         assert!(message.contains(part), "{message}");
     }
 }

@@ -27,7 +27,7 @@ pub struct ConditionColumns<'a> {
 
 impl<'a> ConditionColumns<'a> {
     /// The columns of a condition.
-    pub fn of(condition: Option<&'a Condition>) -> Self {
+    pub fn new(condition: Option<&'a Condition>) -> Self {
         let degradation = condition.and_then(|condition| condition.degradation());
         let level = condition.map(Condition::level);
         // The darkness of pairs differs by frame; it is in the facts about the image.

@@ -76,7 +76,7 @@ impl Control {
     pub const STANDING: [Self; 2] = [Self::OtherRoom, Self::Tiles];
 
     /// The control that a model name names, also with a run behind it, as `observer:tiles (night)`; `None` for all other models.
-    pub fn of_model(model: &str) -> Option<Self> {
+    pub fn from_model_name(model: &str) -> Option<Self> {
         let name = model.strip_prefix(OBSERVER)?.strip_prefix(':')?;
         name.split_once(" (")
             .map_or(name, |(name, _)| name)

@@ -22,7 +22,7 @@ impl ArgExt for Decides {}
 
 impl Decides {
     /// The class of a flag; `None` for flags that clap adds.
-    pub fn of(arg: &Arg) -> Option<Self> {
+    pub fn from_arg(arg: &Arg) -> Option<Self> {
         arg.get::<Self>().copied()
     }
 

@@ -123,7 +123,7 @@ impl FromStr for Degradation {
         let (label, word) = plain
             .split_once('-')
             .ok_or_else(|| wrong(&"not of that form"))?;
-        let kind = Kind::of_word(word)
+        let kind = Kind::from_word(word)
             .ok_or_else(|| wrong(&format_args!("no kind of degradation is named {word:?}")))?;
         if reading == Some(ReadingName::PAPER) {
             return Err(wrong(&"the reading paper is written without its name"));
@@ -323,7 +323,7 @@ impl Kind {
 
     /// The kind with this [word](Self::word).
     #[must_use]
-    pub fn of_word(word: &str) -> Option<Self> {
+    pub fn from_word(word: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.word() == word)
     }
 }
@@ -367,7 +367,7 @@ impl ReadingName {
     }
 
     /// A name that needs no check.
-    pub const fn of(name: &'static str) -> Self {
+    pub const fn from_static(name: &'static str) -> Self {
         Self(Cow::Borrowed(name))
     }
 

@@ -128,7 +128,7 @@ impl ChoiceDetail {
     /// The digest of the file that was sent, or of all files in order; `None` without an image.
     #[must_use]
     pub fn sent(&self) -> Option<Digest> {
-        Digest::of_files(self.images().map(|image| image.digest))
+        Digest::from_file_digests(self.images().map(|image| image.digest))
     }
 
     /// The frame whose image was shown.

@@ -15,7 +15,7 @@ pub struct Digest([u8; 32]);
 impl Digest {
     /// The digest of some bytes.
     #[must_use]
-    pub fn of(bytes: &[u8]) -> Self {
+    pub fn from_bytes(bytes: &[u8]) -> Self {
         Self(*blake3::hash(bytes).as_bytes())
     }
 
@@ -43,7 +43,7 @@ impl Digest {
     }
 
     /// The digest of several parts in order. Each part's length is hashed too, so that no two lists have the same input.
-    pub fn of_parts<'a>(parts: impl IntoIterator<Item = &'a [u8]>) -> Self {
+    pub fn from_parts<'a>(parts: impl IntoIterator<Item = &'a [u8]>) -> Self {
         let mut hasher = blake3::Hasher::new();
         for part in parts {
             hasher
@@ -54,12 +54,12 @@ impl Digest {
     }
 
     /// The digest of files that are shown together: of one file its own, of several that of all digests in order; `None` of none.
-    pub fn of_files(files: impl IntoIterator<Item = Self>) -> Option<Self> {
+    pub fn from_file_digests(files: impl IntoIterator<Item = Self>) -> Option<Self> {
         let files: Vec<Self> = files.into_iter().collect();
         match &*files {
             [] => None,
             [only] => Some(*only),
-            several => Some(Self::of_parts(several.iter().map(|file| &file.0[..]))),
+            several => Some(Self::from_parts(several.iter().map(|file| &file.0[..]))),
         }
     }
 
@@ -105,7 +105,10 @@ mod tests {
         };
         let value = [Some(1), None];
         let first = digest("darkqa.test/1", value);
-        assert_eq!(first, Digest::of(b"darkqa.test/1\0{\"a\":[1,null]}"));
+        assert_eq!(
+            first,
+            Digest::from_bytes(b"darkqa.test/1\0{\"a\":[1,null]}")
+        );
         assert_ne!(first, digest("darkqa.test/2", value));
         assert!(Digest::canonical("darkqa.test/1", &f32::NAN).is_err());
     }

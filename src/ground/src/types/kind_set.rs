@@ -60,7 +60,7 @@ impl FromStr for KindSet {
                 "all" => Self::ALL,
                 word => {
                     let words = Kind::ALL.map(Kind::word).join(", ");
-                    let kind = Kind::of_word(word).map(Self::only);
+                    let kind = Kind::from_word(word).map(Self::only);
                     kind.ok_or_else(|| format!("{word:?} is not one of {words}, both, all"))?
                 }
             };

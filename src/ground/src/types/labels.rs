@@ -55,7 +55,7 @@ impl Labels {
             .chain(expressible)
             .flatten()
             .collect();
-        Digest::of_parts(words.iter().map(String::as_bytes))
+        Digest::from_parts(words.iter().map(String::as_bytes))
     }
 }
 

@@ -44,7 +44,7 @@ struct Noted {
 
 impl StoredViews {
     /// What a manifest says.
-    pub fn of(manifest: &RunManifest) -> Self {
+    pub fn from_manifest(manifest: &RunManifest) -> Self {
         let read = |value: &Value| serde_json::from_value::<Views>(value.clone()).ok();
         if let Some(known) = manifest.settings.get(VIEWS).and_then(read) {
             return Self {

@@ -50,7 +50,7 @@ impl PhotoName {
             && letters.next().is_some_and(|c| c.is_ascii_digit());
         let is_taken = ["none", "blind", "chance", "guessing", MATCH].contains(&name)
             || name.starts_with("match-")
-            || Kind::of_word(name).is_some();
+            || Kind::from_word(name).is_some();
         if has_label || is_taken {
             return wrong("another condition is written so; take another name");
         }
@@ -164,7 +164,7 @@ impl FromStr for PairDark {
             None => (kind, None),
             Some((kind, reading)) => (kind, Some(ReadingName::new(reading)?)),
         };
-        let kind = Kind::of_word(word).filter(|kind| kind.can_match());
+        let kind = Kind::from_word(word).filter(|kind| kind.can_match());
         let kind =
             kind.ok_or_else(|| wrong("the forms are match-ev, match-noise and match-auto"))?;
         if reading.is_some() && !kind.has_readings() {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::image::{Codes16, Light, Rgb};
-use super::shown_codes::{of_16_bits, of_light};
+use super::shown_codes::{from_linear, from_rgb16};
 /// The pixels of a clean frame. A copy shares them.
 #[derive(Debug, Clone)]
 pub enum Pixels {
@@ -41,8 +41,8 @@ impl Pixels {
     pub fn codes(&self) -> Arc<Rgb> {
         match self {
             Self::Codes8(codes) => Arc::clone(codes),
-            Self::Codes16(codes) => Arc::new(of_16_bits(codes)),
-            Self::Light(light) => Arc::new(of_light(light)),
+            Self::Codes16(codes) => Arc::new(from_rgb16(codes)),
+            Self::Light(light) => Arc::new(from_linear(light)),
         }
     }
 }

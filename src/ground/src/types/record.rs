@@ -68,7 +68,7 @@ fn condition_columns<S: Serializer>(
     condition: &Option<Condition>,
     serializer: S,
 ) -> std::result::Result<S::Ok, S::Error> {
-    ConditionColumns::of(condition.as_ref()).serialize(serializer)
+    ConditionColumns::new(condition.as_ref()).serialize(serializer)
 }
 
 /// The fields that an experiment adds to a record.

@@ -18,7 +18,7 @@ pub struct RecordedNames(BTreeMap<String, String>);
 
 impl RecordedNames {
     /// The names that a manifest holds.
-    pub fn of(manifest: &RunManifest) -> Self {
+    pub fn from_manifest(manifest: &RunManifest) -> Self {
         let names = manifest.settings.get(RENAMED).cloned();
         Self(
             names

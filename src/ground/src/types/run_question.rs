@@ -143,7 +143,7 @@ impl RunQuestion {
             std::iter::once(&b"extra"[..]).chain(answers)
         });
         let words = [self.text.as_bytes(), answer.as_bytes()].into_iter();
-        Digest::of_parts(words.chain(further))
+        Digest::from_parts(words.chain(further))
     }
 
     /// The name of the question among those that are asked about every image; its own name if it is about one image alone.
@@ -210,7 +210,7 @@ mod tests {
     fn the_part_that_differs_is_named() {
         let question: RunQuestion = serde_json::from_value(serde_json::json!({
             "id": "q", "frame": "f", "family": "color", "question": "?", "choices": ["x", "y"], "answer": "x",
-            "image": Digest::of(b"one"),
+            "image": Digest::from_bytes(b"one"),
         }))
         .unwrap();
         assert_eq!(question.difference(&question), None);
@@ -225,7 +225,7 @@ mod tests {
             (change(|q| q.answer = None), QuestionPart::Answer),
             (change(|q| q.frame.0.push('2')), QuestionPart::Frame),
             (
-                change(|q| q.image = Some(Digest::of(b"two"))),
+                change(|q| q.image = Some(Digest::from_bytes(b"two"))),
                 QuestionPart::Image,
             ),
             (change(|q| q.scene.push('s')), QuestionPart::Scene),

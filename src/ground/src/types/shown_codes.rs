@@ -1,4 +1,4 @@
-//! The 8-bit codes of an image of more depth, as it is shown undarkened: [`of_16_bits`] and [`of_light`].
+//! The 8-bit codes of an image of more depth, as it is shown undarkened: [`from_rgb16`] and [`from_linear`].
 
 use std::sync::LazyLock;
 
@@ -9,7 +9,7 @@ use super::image::{Codes16, Light, Rgb};
 const GAMMA: f64 = 2.2;
 
 /// The nearest 8-bit codes.
-pub(super) fn of_16_bits(codes: &Codes16) -> Rgb {
+pub(super) fn from_rgb16(codes: &Codes16) -> Rgb {
     let nearest = |code: u16| ((u32::from(code) + 128) / 257) as u8;
     filled(
         codes.height(),
@@ -19,7 +19,7 @@ pub(super) fn of_16_bits(codes: &Codes16) -> Rgb {
 }
 
 /// The codes floor(255 · min(1, L)^(1/2.2) + ½) of light L.
-pub(super) fn of_light(light: &Light) -> Rgb {
+pub(super) fn from_linear(light: &Light) -> Rgb {
     /// The least light of each code above 0.
     static STEPS: LazyLock<[f64; 255]> = LazyLock::new(|| {
         std::array::from_fn(|below| libm::pow((below as f64 + 0.5) / 255.0, GAMMA))
@@ -48,7 +48,7 @@ mod tests {
     #[test]
     fn sixteen_bits_become_the_nearest_eight() {
         let codes: Vec<u16> = (0..=65_535).chain([0, 0]).collect();
-        let image = of_16_bits(&Codes16::new(1, codes.len() / 3, codes.clone()).unwrap());
+        let image = from_rgb16(&Codes16::new(1, codes.len() / 3, codes.clone()).unwrap());
         for (code, shown) in codes.iter().zip(image.samples()) {
             let expected = (f64::from(*code) / 257.0).round();
             assert!((f64::from(*shown) - expected).abs() < 0.5, "{code}");
@@ -58,7 +58,7 @@ mod tests {
     #[test]
     fn light_becomes_codes_by_the_power_of_the_exposure_drop() {
         let lights: Vec<f32> = (0..30_000).map(|i| (i as f32 / 20_000.0).powi(2)).collect();
-        let image = of_light(&Light::new(100, 100, lights.clone()).unwrap());
+        let image = from_linear(&Light::new(100, 100, lights.clone()).unwrap());
         for (light, shown) in lights.iter().zip(image.samples()) {
             let value = 255.0 * f64::from(*light).min(1.0).powf(1.0 / 2.2) + 0.5;
             // Between two codes both are right.

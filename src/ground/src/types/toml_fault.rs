@@ -13,7 +13,7 @@ pub struct TomlFault {
 
 impl TomlFault {
     /// The fault of a text, as the parser found it.
-    pub fn of(text: &str, error: &toml::de::Error) -> Self {
+    pub fn new(text: &str, error: &toml::de::Error) -> Self {
         let message: Vec<&str> = error.message().lines().map(str::trim).collect();
         Self {
             line: line_at(text, error.span().map_or(0, |span| span.start)),
@@ -76,7 +76,7 @@ mod tests {
             ),
             ("range_in = 2024-01-01", 1, "; a text stands in quotes"),
         ] {
-            let fault = TomlFault::of(text, &toml::from_str::<Known>(text).unwrap_err());
+            let fault = TomlFault::new(text, &toml::from_str::<Known>(text).unwrap_err());
             assert_eq!(fault.line, line, "{fault:?}");
             assert!(fault.problem.ends_with(part), "{fault:?}");
             assert!(!fault.problem.contains('\n'), "{fault:?}");
@@ -94,7 +94,7 @@ mod tests {
             "\"a=b\" = 3 4",
             "zoom = 2024-01-01",
         ] {
-            let fault = TomlFault::of(text, &toml::from_str::<Known>(text).unwrap_err());
+            let fault = TomlFault::new(text, &toml::from_str::<Known>(text).unwrap_err());
             assert!(!fault.problem.contains(';'), "{fault:?}");
         }
     }

@@ -92,14 +92,14 @@ impl TreatmentSet {
             .collect()
     }
 
-    fn of_word(word: &str) -> Result<Self, String> {
+    fn from_word(word: &str) -> Result<Self, String> {
         match word {
             UNTOUCHED => Ok(Self::only(None)),
             PHOTOGRAPHS => Ok(Self::DARK),
             ALL => Ok(Self::all()),
             "both" => Ok(Self::both()),
             _ => {
-                let kind = Kind::of_word(word).map(|kind| Self::only(Some(kind)));
+                let kind = Kind::from_word(word).map(|kind| Self::only(Some(kind)));
                 let words = Kind::ALL.map(Kind::word).join(", ");
                 kind.ok_or_else(|| {
                     format!(
@@ -135,7 +135,7 @@ impl FromStr for TreatmentSet {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let mut words = text.split(',');
-        words.try_fold(Self::NONE, |set, word| Ok(set.or(Self::of_word(word)?)))
+        words.try_fold(Self::NONE, |set, word| Ok(set.or(Self::from_word(word)?)))
     }
 }
 

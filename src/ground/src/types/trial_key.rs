@@ -59,7 +59,7 @@ mod tests {
 
     #[test]
     fn keys_read_back() {
-        let key = TrialKey::from(Digest::of(b"a trial"));
+        let key = TrialKey::from(Digest::from_bytes(b"a trial"));
         assert_eq!(key.to_string().parse::<TrialKey>().unwrap(), key);
         for wrong in ["", "12", &"g".repeat(32), &format!("+{}", "1".repeat(31))] {
             assert!(wrong.parse::<TrialKey>().is_err(), "{wrong}");

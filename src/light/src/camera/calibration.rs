@@ -99,7 +99,7 @@ impl Calibration {
     /// [`Error::Data`] with the key that is missing, unknown or out of range.
     pub fn parse(text: &str, place: impl Display) -> Result<Self> {
         let calibration: Self = toml::from_str(text).map_err(|e| {
-            let TomlFault { line, problem } = TomlFault::of(text, &e);
+            let TomlFault { line, problem } = TomlFault::new(text, &e);
             Error::data(
                 format_args!("{place}, line {line}"),
                 format_args!("not a calibration: {problem}"),

@@ -56,7 +56,7 @@ impl Serialize for CameraModel {
             serde_json::to_vec(&*self.calibration).map_err(serde::ser::Error::custom)?;
         let mut fields = serializer.serialize_struct("CameraModel", 5)?;
         fields.serialize_field("name", &self.calibration.name)?;
-        fields.serialize_field("calibration", &Digest::of(&calibration).to_string())?;
+        fields.serialize_field("calibration", &Digest::from_bytes(&calibration).to_string())?;
         fields.serialize_field("sampling", &self.sampling)?;
         fields.serialize_field("gain", &self.gain)?;
         fields.serialize_field("ratio", &self.ratio)?;
@@ -240,7 +240,7 @@ impl CameraState {
             ratio: model
                 .ratio
                 .unwrap_or_else(|| draws.between(StateNumber::Ratio, low, high)),
-            ..Self::of(weights, &noise, calibration)
+            ..Self::new(weights, &noise, calibration)
         }
     }
 
@@ -257,12 +257,12 @@ impl CameraState {
             blue_gain: 1.7,
             system_gain,
             ratio: model.ratio.unwrap_or(f64::midpoint(low, high)),
-            ..Self::of([1.0; 4], &noise, calibration)
+            ..Self::new([1.0; 4], &noise, calibration)
         }
     }
 
     /// A state with this colour and noise; all gains and the ratio are 1.
-    fn of(weights: [f64; 4], noise: &SensorNoise, calibration: &Calibration) -> Self {
+    fn new(weights: [f64; 4], noise: &SensorNoise, calibration: &Calibration) -> Self {
         let rgb_to_camera = colour::rgb_to_camera(weights);
         Self {
             rgb_to_camera,

@@ -28,7 +28,7 @@ impl Conversion {
         let light: Vec<Vec<f64>> = light.collect();
         // 16-bit codes show parts of a code.
         let is_near = |light: f64, value: f64| {
-            let code = f64::from(SIXTEEN.of(light)) / 65_535.0;
+            let code = f64::from(SIXTEEN.encode(light)) / 65_535.0;
             (code - value).abs() * 255.0 <= 1.0
         };
         (0..17 * 17 * 17).all(|i| {
@@ -81,6 +81,6 @@ impl Conversion {
     }
 
     fn codes(&self, lights: [f64; 3], codes: &SrgbCodes) -> [u32; 3] {
-        times(self.matrix, lights).map(|light| codes.of(light))
+        times(self.matrix, lights).map(|light| codes.encode(light))
     }
 }

@@ -24,7 +24,7 @@ impl ToneCurve {
     ///
     /// # Errors
     /// If a number of it is not finite.
-    pub(super) fn of_profile(curve: &ToneReprCurve) -> Result<Self, String> {
+    pub(super) fn from_profile(curve: &ToneReprCurve) -> Result<Self, String> {
         let numbers = match curve {
             ToneReprCurve::Lut(table) => match table[..] {
                 [] => return Ok(Self::Gamma(1.0)),
@@ -96,7 +96,7 @@ mod tests {
 
     #[test]
     fn curves_of_profiles_follow_the_specification() {
-        let of = |curve: ToneReprCurve, at: f64| ToneCurve::of_profile(&curve).unwrap().light(at);
+        let of = |curve: ToneReprCurve, at: f64| ToneCurve::from_profile(&curve).unwrap().light(at);
         let segments = |numbers: &[f32]| ToneReprCurve::Parametric(numbers.to_vec());
         let table = |numbers: &[u16]| ToneReprCurve::Lut(numbers.to_vec());
         let srgb = [2.4, 1.0 / 1.055, 0.055 / 1.055, 1.0 / 12.92, 0.04045];
@@ -125,8 +125,8 @@ mod tests {
         let is_one = |found: f64| (found - 1.0).abs() < f64::EPSILON;
         assert!(is_one(of(segments(&[-1.0]), 0.0)));
         assert!(is_one(of(segments(&[2.0, 9.0, 0.0]), 1.0)));
-        assert!(ToneCurve::of_profile(&segments(&[f32::NAN])).is_err());
-        assert!(ToneCurve::of_profile(&segments(&[1.0, 1.0])).is_err());
+        assert!(ToneCurve::from_profile(&segments(&[f32::NAN])).is_err());
+        assert!(ToneCurve::from_profile(&segments(&[1.0, 1.0])).is_err());
     }
 
     #[test]

@@ -50,7 +50,7 @@ impl Profile {
         let lacks = |what: &str| format!("the ICC profile {name:?} has no {what}");
         let curve = |curve: &Option<ToneReprCurve>| {
             let curve = curve.as_ref().ok_or_else(|| lacks("curve"))?;
-            ToneCurve::of_profile(curve)
+            ToneCurve::from_profile(curve)
         };
         let is_grey = profile.color_space == DataColorSpace::Gray;
         let (curves, matrix) = if is_grey {

@@ -102,7 +102,7 @@ fn by_profile(profile: &[u8]) -> Result<Arc<InkColours>, String> {
     if profile.len() > MOST_PROFILE {
         return Err(too_large());
     }
-    let digest = Digest::of(profile);
+    let digest = Digest::from_bytes(profile);
     KNOWN.get(&digest, || {
         let (name, table) = table(profile).map_err(|problem| format!("{problem}; {REMEDY}"))?;
         Ok(Arc::new(InkColours {

@@ -43,7 +43,7 @@ impl SrgbCodes {
     }
 
     /// The nearest code of light, which is clamped to [0, 1].
-    pub(super) fn of(&self, light: f64) -> u32 {
+    pub(super) fn encode(&self, light: f64) -> u32 {
         let light = light.clamp(0.0, 1.0);
         let bin = (light * Self::BINS as f64) as usize;
         let (first, last) = (self.first[bin], self.first[(bin + 1).min(Self::BINS)]);
@@ -62,11 +62,11 @@ mod tests {
             let value = |code: f64| light(code / f64::from(most));
             for code in 0..=most {
                 let at = f64::from(code);
-                assert_eq!(codes.of(value(at)), code);
-                assert_eq!(codes.of(value((at + 0.499).min(f64::from(most)))), code);
-                assert_eq!(codes.of(value((at - 0.499).max(0.0))), code);
+                assert_eq!(codes.encode(value(at)), code);
+                assert_eq!(codes.encode(value((at + 0.499).min(f64::from(most)))), code);
+                assert_eq!(codes.encode(value((at - 0.499).max(0.0))), code);
             }
-            assert_eq!([codes.of(-1.0), codes.of(2.0)], [0, most]);
+            assert_eq!([codes.encode(-1.0), codes.encode(2.0)], [0, most]);
         }
     }
 }

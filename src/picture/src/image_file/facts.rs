@@ -62,7 +62,7 @@ impl FileFacts {
         whole: None,
     };
 
-    pub(super) fn of(file: &[u8], format: FileFormat) -> Self {
+    pub(super) fn read(file: &[u8], format: FileFormat) -> Self {
         let of_exif = |exif: Option<&[u8]>| exif.and_then(Orientation::from_exif_chunk);
         let several = |pictures: usize, kind| (pictures > 1).then_some(kind);
         let profile =
@@ -77,7 +77,7 @@ impl FileFacts {
         };
         match format {
             FileFormat::Png => {
-                let outline = PngOutline::of(file);
+                let outline = PngOutline::parse(file);
                 Self {
                     orientation: turn(of_exif(outline.exif)),
                     first_of: several(outline.frames, "animated PNG"),
@@ -87,7 +87,7 @@ impl FileFacts {
                 }
             }
             FileFormat::Jpeg => {
-                let outline = JpegOutline::of(file);
+                let outline = JpegOutline::parse(file);
                 let form = if outline.is_adobe {
                     InkForm::Adobe
                 } else {
@@ -101,7 +101,7 @@ impl FileFacts {
                 }
             }
             FileFormat::WebP => {
-                let outline = WebpOutline::of(file);
+                let outline = WebpOutline::parse(file);
                 Self {
                     orientation: turn(of_exif(outline.exif)),
                     first_of: several(outline.frames, "animated WebP"),
@@ -110,7 +110,7 @@ impl FileFacts {
                 }
             }
             FileFormat::Tiff => {
-                let outline = TiffOutline::of(file);
+                let outline = TiffOutline::parse(file);
                 let stated = u8::try_from(outline.orientation).ok();
                 Self {
                     orientation: turn(stated.and_then(Orientation::from_exif)),

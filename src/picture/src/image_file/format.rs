@@ -65,7 +65,7 @@ impl FileFormat {
     ///
     /// # Errors
     /// If it is not one that is read. The error names the format if it is known, and says what to do.
-    pub fn of(file: &[u8]) -> Result<Self, String> {
+    pub fn detect(file: &[u8]) -> Result<Self, String> {
         let has =
             |at: usize, mark: &[u8]| file.get(at..).is_some_and(|rest| rest.starts_with(mark));
         if let Some((.., name, remedy)) = UNREAD.iter().find(|(at, mark, ..)| has(*at, mark)) {
@@ -133,7 +133,7 @@ mod tests {
 
     #[test]
     fn formats_are_known_by_their_first_bytes() {
-        let of = |file: &[u8]| FileFormat::of(file);
+        let of = |file: &[u8]| FileFormat::detect(file);
         assert_eq!(of(b"\xFF\xD8\xFF\xE0"), Ok(FileFormat::Jpeg));
         assert_eq!(of(b"RIFF\x10\0\0\0WEBPVP8 "), Ok(FileFormat::WebP));
         assert_eq!(of(b"MM\0*\0\0\0\x08"), Ok(FileFormat::Tiff));

@@ -35,7 +35,7 @@ pub(super) struct JpegOutline<'a> {
 
 impl<'a> JpegOutline<'a> {
     /// Reads the markers one after another up to the samples; a truncated file is read up to its end.
-    pub(super) fn of(file: &'a [u8]) -> Self {
+    pub(super) fn parse(file: &'a [u8]) -> Self {
         let mut outline = Self::default();
         let headers = Segments(file).take_while(|(marker, _)| *marker != SAMPLES);
         for (marker, segment) in headers {
@@ -131,7 +131,7 @@ mod tests {
         let mut grey = HEAD;
         grey[11] = 1;
         let file = [&grey[..2], &inner[..], &grey[2..], &TAIL].concat();
-        let components = |file| JpegOutline::of(file).components;
+        let components = |file| JpegOutline::parse(file).components;
         assert_eq!((components(&file), ends(&file)), (Some(1), true));
         for length in 0..file.len() {
             let expected = (length >= file.len() - TAIL.len()).then_some(1);
@@ -148,7 +148,7 @@ mod tests {
     fn a_wrong_length_ends_the_reading() {
         for length in [[0, 0], [0, 1], [0xFF, 0xFF]] {
             let file = [&[0xFF, 0xD8, 0xFF, 0xC0][..], &length, &TAIL].concat();
-            assert_eq!(JpegOutline::of(&file), JpegOutline::default());
+            assert_eq!(JpegOutline::parse(&file), JpegOutline::default());
             assert!(!ends(&file));
         }
     }
@@ -158,8 +158,8 @@ mod tests {
         let exif = [0xFF, 0xE1, 0, 10, b'E', b'x', b'i', b'f', 0, 0, 7, 9];
         let other = [0xFF, 0xE1, 0, 6, b'h', b't', b't', b'p'];
         let file = [&HEAD[..2], &other, &exif, &HEAD[2..], &TAIL].concat();
-        assert_eq!(JpegOutline::of(&file).exif, Some(&[7, 9][..]));
+        assert_eq!(JpegOutline::parse(&file).exif, Some(&[7, 9][..]));
         let late = [&HEAD[..], &TAIL[..5], &exif, &TAIL[5..]].concat();
-        assert_eq!(JpegOutline::of(&late).exif, None);
+        assert_eq!(JpegOutline::parse(&late).exif, None);
     }
 }

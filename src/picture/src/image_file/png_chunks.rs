@@ -30,10 +30,10 @@ pub(super) enum PngFault {
 
 impl<'a> PngOutline<'a> {
     /// Reads the chunks one after another; a truncated file is read up to its end.
-    pub(super) fn of(file: &'a [u8]) -> Self {
+    pub(super) fn parse(file: &'a [u8]) -> Self {
         let mut outline = Self::default();
         let mut colour = ColourChunks::default();
-        for Chunk { kind, data, .. } in Chunks::of(file) {
+        for Chunk { kind, data, .. } in Chunks::new(file) {
             match kind {
                 b"IHDR" => outline.bits = data.get(8).copied().unwrap_or(0),
                 b"IDAT" => colour.is_closed = true,
@@ -95,12 +95,12 @@ impl<'a> ColourChunks<'a> {
 /// The file without chunks that decide no samples. The decoder would decompress profiles and texts, to any size.
 pub(super) fn samples_alone(file: &[u8]) -> Cow<'_, [u8]> {
     const NEEDED: [&[u8; 4]; 5] = [b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND"];
-    let mut chunks = Chunks::of(file);
+    let mut chunks = Chunks::new(file);
     if chunks.by_ref().all(|chunk| NEEDED.contains(&chunk.kind)) {
         return Cow::Borrowed(file);
     }
     let mut alone = SIGNATURE.to_vec();
-    let mut chunks = Chunks::of(file);
+    let mut chunks = Chunks::new(file);
     for chunk in chunks.by_ref().filter(|chunk| NEEDED.contains(&chunk.kind)) {
         alone.extend((chunk.data.len() as u32).to_be_bytes());
         alone.extend(chunk.body);
@@ -113,7 +113,7 @@ pub(super) fn samples_alone(file: &[u8]) -> Cow<'_, [u8]> {
 
 /// The first fault in the chunks of a PNG file, up to the last chunk, `IEND`; `None` if there is none.
 pub(super) fn fault(file: &[u8]) -> Option<PngFault> {
-    for chunk in Chunks::of(file) {
+    for chunk in Chunks::new(file) {
         if crc32fast::hash(chunk.body) != chunk.checksum {
             return Some(PngFault::Checksum);
         }
@@ -137,7 +137,7 @@ struct Chunk<'a> {
 struct Chunks<'a>(&'a [u8]);
 
 impl<'a> Chunks<'a> {
-    fn of(file: &'a [u8]) -> Self {
+    fn new(file: &'a [u8]) -> Self {
         Self(file.strip_prefix(SIGNATURE).unwrap_or_default())
     }
 }

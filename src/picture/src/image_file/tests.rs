@@ -156,7 +156,7 @@ fn inks_become_rgb_with_a_note() {
             assert_eq!(file.check().unwrap(), (32, 32));
             let note = file.note().colour.unwrap();
             assert_eq!(note.from, "CMYK without a profile");
-            assert_ne!(file.digest(), Digest::of(file.bytes()));
+            assert_ne!(file.digest(), Digest::from_bytes(file.bytes()));
         }
     }
 }

@@ -57,7 +57,7 @@ pub(super) struct TiffOutline<'a> {
 
 impl<'a> TiffOutline<'a> {
     /// Reads the tags; of a broken file those that can be read.
-    pub(super) fn of(file: &'a [u8]) -> Self {
+    pub(super) fn parse(file: &'a [u8]) -> Self {
         let mut outline = Self::default();
         let Some((reader, first)) = Reader::open(file) else {
             return outline;

@@ -13,9 +13,9 @@ pub(super) struct WebpOutline<'a> {
 
 impl<'a> WebpOutline<'a> {
     /// Reads the chunks one after another; a truncated file is read up to its end.
-    pub(super) fn of(file: &'a [u8]) -> Self {
+    pub(super) fn parse(file: &'a [u8]) -> Self {
         let mut outline = Self::default();
-        for (kind, data) in Chunks::of(file) {
+        for (kind, data) in Chunks::new(file) {
             match kind {
                 b"ICCP" if outline.profile.is_none() => outline.profile = Some(data),
                 b"ANMF" => outline.frames += 1,
@@ -41,7 +41,7 @@ pub(super) fn missing(file: &[u8]) -> Option<u64> {
 struct Chunks<'a>(&'a [u8]);
 
 impl<'a> Chunks<'a> {
-    fn of(file: &'a [u8]) -> Self {
+    fn new(file: &'a [u8]) -> Self {
         // RIFF, the size, WEBP.
         Self(file.get(12..).unwrap_or_default())
     }

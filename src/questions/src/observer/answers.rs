@@ -14,7 +14,7 @@ impl Observation {
     /// not one of the rulebook (see [`understood`](super::understood)).
     #[must_use]
     pub fn answer(&self, question: &Question, rules: &Rules, palette: &Palette) -> Option<usize> {
-        let answer = match QuestionTopic::of(question, rules.book())? {
+        let answer = match QuestionTopic::from_question(question, rules.book())? {
             QuestionTopic::Room => self.room(rules),
             QuestionTopic::Activity(activity) => self.affordance(activity, rules),
             QuestionTopic::Presence(thing) => self.presence(&thing, rules),

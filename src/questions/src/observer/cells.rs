@@ -77,7 +77,7 @@ pub(super) struct Cells {
 
 impl Cells {
     /// The cells of a map of masks of a given width and height.
-    pub(super) fn of(masks: &[u32], [width, height]: [usize; 2]) -> Self {
+    pub(super) fn from_masks(masks: &[u32], [width, height]: [usize; 2]) -> Self {
         let side = (width.min(height) / CELLS).next_multiple_of(2).max(4);
         let (runs, patches) = cut(masks, width, side);
         let columns = width.div_ceil(side);
@@ -85,7 +85,7 @@ impl Cells {
             side,
             runs,
             masks: masks.iter().max().map_or(0, |mask| *mask as usize),
-            scales: SCALES.map(|scale| Scale::of(&patches, columns, side, scale)),
+            scales: SCALES.map(|scale| Scale::from_patches(&patches, columns, side, scale)),
         }
     }
 
@@ -134,7 +134,7 @@ fn cut(masks: &[u32], width: usize, side: usize) -> (Vec<Run>, Vec<Patch>) {
 
 impl Scale {
     /// The patches in cells of `scale` times the smallest side, from those of the smallest.
-    fn of(smallest: &[Patch], columns: usize, side: usize, scale: usize) -> Self {
+    fn from_patches(smallest: &[Patch], columns: usize, side: usize, scale: usize) -> Self {
         let wide = columns.div_ceil(scale);
         let cell_of = |cell: usize| cell / columns / scale * wide + cell % columns / scale;
         let mut counts = BTreeMap::<(usize, u32), u32>::new();
@@ -196,7 +196,7 @@ mod tests {
         let [width, height] = [37, 29];
         let mask = |i: usize| (i % width / 9 + i / width / 11) as u32 % 3;
         let masks: Vec<u32> = (0..width * height).map(mask).collect();
-        let cells = Cells::of(&masks, [width, height]);
+        let cells = Cells::from_masks(&masks, [width, height]);
         assert_eq!(cells.side, 4);
         assert_eq!(cells.mask_of_pixels(), masks);
         for (scale, times) in cells.scales.iter().zip(SCALES) {
@@ -224,7 +224,7 @@ mod tests {
             (vec![1; 400], [20, 20]),
             (vec![0; 400], [20, 20]),
         ] {
-            let cells = Cells::of(&masks, size);
+            let cells = Cells::from_masks(&masks, size);
             assert!(cells.scales.iter().all(|scale| scale.elements.is_empty()));
         }
     }

@@ -55,7 +55,7 @@ struct Draws(u64);
 
 impl Draws {
     fn new(key: &Digest, control: Control) -> Self {
-        let seed = Digest::of_parts([&key.as_bytes()[..], control.name().as_bytes()]);
+        let seed = Digest::from_parts([&key.as_bytes()[..], control.name().as_bytes()]);
         let (words, _) = seed.as_bytes().as_chunks::<8>();
         Self(u64::from_le_bytes(words[0]))
     }

@@ -51,7 +51,7 @@ pub(super) fn fit(tiles: &Tiles, sums: &TileSums) -> Fit {
 fn by_tile(tiles: &Tiles, sums: &TileSums, whole: &Fit) -> Option<Fit> {
     let curves = curves(tiles, sums, whole);
     let moments = moments(tiles, sums, &curves);
-    let found: Vec<Contrast> = moments.iter().map(Contrast::of).collect();
+    let found: Vec<Contrast> = moments.iter().map(Contrast::from_moments).collect();
     let votes = (0..tiles.len()).filter(|tile| tiles.has_contrast(*tile));
     let [yes, all] = votes.fold([0, 0], |[yes, all], tile| {
         let agrees = AGREEING.contains(&found[tile].amplitude);
@@ -213,7 +213,7 @@ struct Contrast {
 }
 
 impl Contrast {
-    fn of(channels: &[Moments; 3]) -> Self {
+    fn from_moments(channels: &[Moments; 3]) -> Self {
         let (mut product, mut power, mut residual, mut samples) = (0.0, 0.0, 0.0, 0.0);
         for moments in channels {
             let (gain, pixels) = (moments.gain(), moments.pixels.max(1.0));

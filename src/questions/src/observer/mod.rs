@@ -78,10 +78,10 @@ impl ObservedFrame {
     /// # Errors
     /// If the frame has no classes.
     pub fn new(frame: &Frame, labels: &Labels, rules: &Rules, palette: &Palette) -> Result<Self> {
-        let key = Digest::of(frame.id.0.as_bytes());
+        let key = Digest::from_bytes(frame.id.0.as_bytes());
         let statistics = measure(frame, labels, rules, palette, key)?;
-        let scene = SceneMaps::of(frame, labels)?;
-        let cells = Cells::of(&scene.masks, scene.size);
+        let scene = SceneMaps::new(frame, labels)?;
+        let cells = Cells::from_masks(&scene.masks, scene.size);
         Ok(Self {
             untouched: frame.rgb.clone(),
             tiles: Tiles::new(&frame.rgb, TILE * cells.side),

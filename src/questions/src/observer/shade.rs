@@ -158,7 +158,7 @@ impl<'a> Light<'a> {
                     sums.received[channel] as f64 / pixels / gains[channel]
                 });
             let gain = gains.iter().map(|gains| gains[channel]).sum::<f64>() / gains.len() as f64;
-            Posterior::of(&self.fit.channels[channel], means.collect(), gain)
+            Posterior::new(&self.fit.channels[channel], means.collect(), gain)
         })))
     }
 
@@ -236,7 +236,7 @@ impl Shade {
 impl Posterior {
     /// The posterior of the code behind the median of these means, with a flat prior over all codes. The means are received codes
     /// divided by the gain of the light.
-    fn of(fit: &ChannelFit, mut means: Vec<f64>, gain: f64) -> Self {
+    fn new(fit: &ChannelFit, mut means: Vec<f64>, gain: f64) -> Self {
         let middle = median(&mut means);
         let mut distances: Vec<f64> = means.iter().map(|mean| (mean - middle).abs()).collect();
         let error = DEVIATION * median(&mut distances) * MEDIAN_ERROR / (means.len() as f64).sqrt();

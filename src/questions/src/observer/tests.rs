@@ -64,7 +64,7 @@ struct Untouched<'a> {
 
 impl<'a> Untouched<'a> {
     fn new(masks: &[u32], image: &'a Rgb) -> Self {
-        let cells = Cells::of(masks, SIZE);
+        let cells = Cells::from_masks(masks, SIZE);
         let tiles = Tiles::new(image, TILE * cells.side);
         Self {
             image,
@@ -109,7 +109,7 @@ fn z_is_contrast_over_noise_times_the_root_of_the_pixels() {
             120.0
         }
     });
-    let cells = Cells::of(&masks, SIZE);
+    let cells = Cells::from_masks(&masks, SIZE);
     // An element of n inside and m outside has as much as 1 / (1/n + 1/m) pixels, in each of three channels.
     let pixels = cells.scales.iter().map(|scale| -> f64 {
         let own = scale.elements.iter().filter(|element| element.mask == 2);

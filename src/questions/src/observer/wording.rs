@@ -35,7 +35,7 @@ pub(super) enum QuestionTopic {
 
 impl QuestionTopic {
     /// Compares the text of a question with the templates of the rulebook. The evidence, which holds the answer, is not read.
-    pub(super) fn of(question: &Question, book: &RuleBook) -> Option<Self> {
+    pub(super) fn from_question(question: &Question, book: &RuleBook) -> Option<Self> {
         let text = question.text.trim();
         if text == book.room_type.text {
             return Some(Self::Room);
@@ -71,5 +71,5 @@ impl QuestionTopic {
 /// Whether a question is one of the rulebook, so that the observer can answer it.
 #[must_use]
 pub fn understood(question: &Question, rules: &Rules) -> bool {
-    QuestionTopic::of(question, rules.book()).is_some()
+    QuestionTopic::from_question(question, rules.book()).is_some()
 }

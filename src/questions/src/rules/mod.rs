@@ -83,12 +83,12 @@ impl Rules {
     pub fn parse(text: &str) -> Result<Self> {
         let wrong = |problem: String| Error::data("rules", problem);
         let book: RuleBook = toml::from_str(text).map_err(|e| {
-            let TomlFault { line, problem } = TomlFault::of(text, &e);
+            let TomlFault { line, problem } = TomlFault::new(text, &e);
             wrong(format!("line {line}: {problem}"))
         })?;
         book.check().map_err(wrong)?;
         // The digest covers the values, not the text: a comment does not change it.
-        let content = |part: String| Digest::of_parts([part.as_bytes()]);
+        let content = |part: String| Digest::from_parts([part.as_bytes()]);
         let whole = serde_json::to_string(&book).map_err(|e| wrong(e.to_string()))?;
         let measured = (&book.measure, &book.coarse);
         let measure = serde_json::to_string(&measured).map_err(|e| wrong(e.to_string()))?;

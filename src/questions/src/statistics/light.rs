@@ -19,7 +19,7 @@ pub(super) struct MaskCore {
 
 impl MaskCore {
     /// An empty core, with memory for the depths of `area` pixels.
-    pub(super) fn of(area: u64, frame: &Frame) -> Self {
+    pub(super) fn new(area: u64, frame: &Frame) -> Self {
         Self {
             count: 0,
             colors: [0; BINS],
@@ -97,7 +97,7 @@ pub(super) struct PixelLight<'a> {
 }
 
 impl<'a> PixelLight<'a> {
-    pub(super) fn of(frame: &'a Frame, rule: &'a MeasureRule, palette: &'a Palette) -> Self {
+    pub(super) fn new(frame: &'a Frame, rule: &'a MeasureRule, palette: &'a Palette) -> Self {
         let slopes = rays(frame).map(|camera| {
             let square = |length: usize, focal: f64, center: f64| -> Vec<f64> {
                 (0..length)

@@ -28,13 +28,13 @@ pub fn measure(
     key: Digest,
 ) -> Result<FrameStatistics> {
     let rule = &rules.book().measure;
-    let scene = SceneMaps::of(frame, labels)?;
+    let scene = SceneMaps::new(frame, labels)?;
     let size = scene.size;
-    let shapes = MaskShapes::of(&scene, rule);
+    let shapes = MaskShapes::measure(&scene, rule);
     let (void, effective_void, lower_void) = scene.void(&shapes.joint, rule);
     let mut cores = shapes.cores(frame, &scene, rule, palette);
     let coarse = &rules.book().coarse;
-    let samples = LightSamples::of(frame, &scene, rule);
+    let samples = LightSamples::from_frame(frame, &scene, rule);
     let (mut classes, mut loose, mut words) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
     let mut unnamed = BTreeMap::new();
     for (&(mask, id), &count) in &shapes.joint {

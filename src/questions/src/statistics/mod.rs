@@ -220,7 +220,7 @@ impl FrameStatistics {
 
     /// The number of pixels of a class.
     #[must_use]
-    pub fn of_class(&self, class: &str) -> u64 {
+    pub fn class_pixels(&self, class: &str) -> u64 {
         self.classes.get(class).copied().unwrap_or(0)
     }
 
@@ -270,7 +270,7 @@ impl FrameStatistics {
     /// Whether the frame has any pixel of a token, tiny segments included.
     #[must_use]
     pub fn shows(&self, token: &str, book: &RuleBook) -> bool {
-        if book.class.contains_key(token) && self.of_class(token) > 0 {
+        if book.class.contains_key(token) && self.class_pixels(token) > 0 {
             return true;
         }
         // Words are looked up without a class, because tiny segments are counted by word only. A token that needs a class

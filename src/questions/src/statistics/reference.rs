@@ -25,7 +25,7 @@ pub(super) struct LightSamples {
 
 impl LightSamples {
     /// Samples a frame.
-    pub(super) fn of(frame: &Frame, scene: &SceneMaps<'_>, rule: &MeasureRule) -> Self {
+    pub(super) fn from_frame(frame: &Frame, scene: &SceneMaps<'_>, rule: &MeasureRule) -> Self {
         let [width, height] = scene.size;
         let step = (height / rule.light_rows).max(1);
         let (pixels, _) = frame.rgb.samples().as_chunks::<3>();

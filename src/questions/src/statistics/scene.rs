@@ -42,7 +42,7 @@ pub(crate) struct SceneMaps<'a> {
 const NAMED: u32 = 1 << 16;
 
 impl<'a> SceneMaps<'a> {
-    pub(crate) fn of(frame: &'a Frame, labels: &'a Labels) -> Result<Self> {
+    pub(crate) fn new(frame: &'a Frame, labels: &'a Labels) -> Result<Self> {
         let size = [frame.rgb.width(), frame.rgb.height()];
         let mut scene = Self {
             size,

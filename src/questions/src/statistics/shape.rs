@@ -74,7 +74,7 @@ pub(super) struct MaskShapes {
 
 impl MaskShapes {
     /// Measures the shapes of all masks.
-    pub(super) fn of(scene: &SceneMaps<'_>, rule: &MeasureRule) -> Self {
+    pub(super) fn measure(scene: &SceneMaps<'_>, rule: &MeasureRule) -> Self {
         let [width, height] = scene.size;
         let mut shapes = Self {
             list: vec![MaskShape::NONE; scene.numbers.len()],
@@ -185,9 +185,9 @@ impl MaskShapes {
         let mut found: Vec<Option<MaskCore>> = self
             .list
             .iter()
-            .map(|shape| large(shape).then(|| MaskCore::of(shape.area, frame)))
+            .map(|shape| large(shape).then(|| MaskCore::new(shape.area, frame)))
             .collect();
-        let light = PixelLight::of(frame, rule, palette);
+        let light = PixelLight::new(frame, rule, palette);
         let radius = rounded(scene.size[1], rule.erosion_per_height);
         cores(&scene.masks, scene.size, radius, |y, left, right, mask| {
             if let Some(core) = &mut found[mask as usize - 1] {

@@ -65,7 +65,7 @@ fn measured(frame: &Frame) -> FrameStatistics {
 
 fn measured_by(frame: &Frame, rules: &Rules) -> FrameStatistics {
     let palette = Palette::built_in().unwrap();
-    measure(frame, &labels(), rules, &palette, Digest::of(b"")).unwrap()
+    measure(frame, &labels(), rules, &palette, Digest::from_bytes(b"")).unwrap()
 }
 
 /// The built-in rulebook with one text replaced.
@@ -183,7 +183,7 @@ fn names_of_segments_override_the_words_of_labels() {
         &labels(),
         &Rules::built_in().unwrap(),
         &Palette::built_in().unwrap(),
-        Digest::of(b""),
+        Digest::from_bytes(b""),
     );
     assert!(
         error
@@ -300,7 +300,7 @@ fn tiny_segments_count_only_for_their_class_and_word() {
         );
         (
             found.segments.len(),
-            found.of_class("chair"),
+            found.class_pixels("chair"),
             found.words.contains_key("chair"),
         )
     };
@@ -446,7 +446,7 @@ fn the_light_of_a_frame_is_that_of_its_surfaces() {
     labels.labels.insert(5, window);
     let rules = Rules::built_in().unwrap();
     let palette = Palette::built_in().unwrap();
-    let measured = measure(&frame, &labels, &rules, &palette, Digest::of(b"")).unwrap();
+    let measured = measure(&frame, &labels, &rules, &palette, Digest::from_bytes(b"")).unwrap();
     assert_eq!(measured.light, [200; 3]);
     let around = |class: &str| {
         let mut segments = measured.segments.iter();

@@ -33,7 +33,7 @@ use darkqa_ground::types::{Digest, Family, FrameId, Label, Labels, QuestionId};
 pub(crate) fn frame(segments: &[(&str, &str, u64)]) -> FrameStatistics {
     let mut frame = FrameStatistics {
         frame: FrameId("scene/0".into()),
-        key: Digest::of(b""),
+        key: Digest::from_bytes(b""),
         scene: "scene".into(),
         size: [1000, 1000],
         luma: [60, 120, 200],

@@ -12,21 +12,21 @@ use super::{FurnitureSet, at, parts};
 
 fn ceramic(dice: &mut Dice) -> (Surface, &'static str) {
     let names = ["white", "white", "white", "pink", "green", "blue", "black"];
-    let paint = Paint::of(&names, dice);
+    let paint = Paint::random(&names, dice);
     (Surface::gloss(paint), paint.name)
 }
 
 /// A sink on a cabinet, with its tap.
 pub(in super::super) fn vanity(dice: &mut Dice) -> FurnitureSet {
     let names = ["brown", "brown", "grey", "blue", "green", "black"];
-    let paint = Paint::of(&names, dice);
+    let paint = Paint::random(&names, dice);
     let base = cabinet_of(
         kind("bathroom cabinet", "cabinet"),
         vec3(0.8, 0.74, 0.48),
         2,
         paint,
     );
-    FurnitureSet::of(base).and(parts::piece("sink:3", dice), at(vec3(0.0, 0.74, 0.0), 0.0))
+    FurnitureSet::from_piece(base).and(parts::piece("sink:3", dice), at(vec3(0.0, 0.74, 0.0), 0.0))
 }
 
 /// A bathtub along the wall, open above.

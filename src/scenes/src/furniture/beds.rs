@@ -21,9 +21,9 @@ pub(in super::super) fn bed(dice: &mut Dice) -> FurnitureSet {
     let half = width / 2.0;
     let length = 2.05;
     let mut mesh = Mesh::default();
-    let wood = Surface::wood(Paint::of(&["brown", "brown", "black"], dice), 0);
+    let wood = Surface::wood(Paint::random(&["brown", "brown", "black"], dice), 0);
     let sheet = Surface::cloth(Paint::nameless([238, 236, 230]));
-    let cover = Paint::of(&USUAL, dice);
+    let cover = Paint::random(&USUAL, dice);
     let blanket = Surface::fabric(cover, dice);
     legs(&mut mesh, vec3(width, 0.2, length), 0.06, 0.07, &wood);
     mesh.board(half, [0.16, 0.3], [0.02, length], &wood);
@@ -52,9 +52,9 @@ pub(in super::super) fn bed(dice: &mut Dice) -> FurnitureSet {
         0.05,
         &if dice.chance(0.5) { sheet } else { blanket },
     );
-    let mut set = FurnitureSet::of(Piece::new(kind("bed", "bed"), mesh, cover.name));
+    let mut set = FurnitureSet::from_piece(Piece::new(kind("bed", "bed"), mesh, cover.name));
     set.size = vec3(width + 0.1, head, length + 0.04);
-    let paint = Paint::of(&["white", "grey", "pink", "yellow", "blue", "green"], dice);
+    let paint = Paint::random(&["white", "grey", "pink", "yellow", "blue", "green"], dice);
     let count = if double { 2 } else { 1 };
     for i in 0..count {
         let x = (i as f32 - (count as f32 - 1.0) / 2.0) * width * 0.48;
@@ -80,11 +80,11 @@ pub(in super::super) fn pillow(
 
 /// A cushion for a sofa or a chair, with its center at the origin.
 pub(in super::super) fn cushion(dice: &mut Dice) -> Piece {
-    let paint = Paint::of(&USUAL, dice);
+    let paint = Paint::random(&USUAL, dice);
     let mut surface = Surface::fabric(paint, dice);
     let mut name = paint.name;
     if dice.chance(0.15) {
-        let other = Paint::of(&["white", "black"], dice);
+        let other = Paint::random(&["white", "black"], dice);
         surface = surface.with(Pattern::Stripes(0.05, other.color));
         name = "";
     }

@@ -30,9 +30,9 @@ impl Style {
         ];
         let counters = ["white", "black", "grey", "brown", "green", "blue"];
         Self {
-            cabinets: Paint::of(&cabinets, dice),
-            counter: Paint::of(&counters, dice),
-            appliances: Paint::of(&["white", "black", "grey", "red", "blue"], dice),
+            cabinets: Paint::random(&cabinets, dice),
+            counter: Paint::random(&counters, dice),
+            appliances: Paint::random(&["white", "black", "grey", "red", "blue"], dice),
         }
     }
 
@@ -78,7 +78,7 @@ pub(in super::super) fn base_cabinets(
     }
     mesh.board(width / 2.0, [high, high + 0.06], [0.0, 0.02], &top);
     let counter = Piece::new(kind("kitchen counter", "counter"), mesh, style.counter.name);
-    let set = FurnitureSet::of(base).and(counter, at(Vec3::ZERO, 0.0));
+    let set = FurnitureSet::from_piece(base).and(counter, at(Vec3::ZERO, 0.0));
     let set = if sink {
         set.and(parts::piece("sink:2", dice), at(Vec3::ZERO, 0.0))
     } else {

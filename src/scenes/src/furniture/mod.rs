@@ -27,7 +27,7 @@ pub(super) struct FurnitureSet {
 
 impl FurnitureSet {
     /// A set of one piece, with the size of that piece.
-    pub(super) fn of(piece: Piece) -> Self {
+    pub(super) fn from_piece(piece: Piece) -> Self {
         let [low, high] = bounds(&piece.mesh.faces);
         let width = 2.0 * high.x.max(-low.x);
         let size = vec3(width, high.y, high.z);

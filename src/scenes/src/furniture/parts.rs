@@ -173,7 +173,7 @@ fn paint(word: &str, dice: &mut Dice) -> Paint {
     let number = u32::from_str_radix(word, 16).ok();
     match number.filter(|_| word.len() == 6) {
         Some(number) => Paint::nameless(paint::codes(number)),
-        None => Paint::of(&[word], dice),
+        None => Paint::random(&[word], dice),
     }
 }
 
@@ -197,7 +197,7 @@ fn surface(word: &str, main: Paint, dice: &mut Dice) -> Surface {
             };
         }
         "main" => main,
-        "any" => Paint::of(&ALL, dice),
+        "any" => Paint::random(&ALL, dice),
         color => paint(color, dice),
     };
     match &word[color.len()..] {

@@ -10,7 +10,7 @@ use super::super::surface::Surface;
 
 /// A plant in its pot, with its height in metres.
 pub(in super::super) fn plant(height: f32, dice: &mut Dice) -> Piece {
-    let pot = Surface::paint(Paint::of(
+    let pot = Surface::paint(Paint::random(
         &["brown", "black", "grey", "orange", "blue"],
         dice,
     ));

@@ -59,8 +59,8 @@ pub(in super::super) fn chair_of(
 
 /// A sofa for a number of people, with cushions.
 pub(in super::super) fn sofa(seats: usize, dice: &mut Dice) -> FurnitureSet {
-    let paint = Paint::of(&USUAL, dice);
-    let set = FurnitureSet::of(upholstered(kind("sofa", "sofa"), seats, paint, dice));
+    let paint = Paint::random(&USUAL, dice);
+    let set = FurnitureSet::from_piece(upholstered(kind("sofa", "sofa"), seats, paint, dice));
     let mut set = set;
     let width = set.size.x;
     for x in [-1.0, 1.0] {
@@ -79,7 +79,7 @@ pub(in super::super) fn sofa(seats: usize, dice: &mut Dice) -> FurnitureSet {
 }
 
 pub(in super::super) fn armchair(dice: &mut Dice) -> Piece {
-    let paint = Paint::of(&USUAL, dice);
+    let paint = Paint::random(&USUAL, dice);
     upholstered(kind("armchair", "chair"), 1, paint, dice)
 }
 

@@ -30,7 +30,7 @@ pub(in super::super) fn chest(
     dice: &mut Dice,
 ) -> Piece {
     let half = size.x / 2.0;
-    let paint = Paint::of(&COLORS, dice);
+    let paint = Paint::random(&COLORS, dice);
     let surface = finish(paint);
     let knob = Surface::steel();
     let mut mesh = Mesh::default();
@@ -80,7 +80,7 @@ pub(in super::super) fn cabinet(
     doors: usize,
     dice: &mut Dice,
 ) -> Piece {
-    let paint = Paint::of(&COLORS, dice);
+    let paint = Paint::random(&COLORS, dice);
     cabinet_of(name, size, doors, paint)
 }
 
@@ -154,7 +154,7 @@ pub(in super::super) fn cabinet_of(
 
 /// Shelves with books and boxes on them.
 pub(in super::super) fn bookshelf(dice: &mut Dice) -> Piece {
-    let paint = Paint::of(&["brown", "grey", "black"], dice);
+    let paint = Paint::random(&["brown", "grey", "black"], dice);
     let surface = Surface::wood(paint, 1);
     let (width, height, depth) = (dice.between(0.8, 1.2), dice.between(1.6, 2.0), 0.3);
     let half = width / 2.0;
@@ -195,7 +195,7 @@ fn books(mesh: &mut Mesh, [from, to]: [f32; 2], y: f32, rise: f32, dice: &mut Di
             continue;
         }
         let (thick, tall) = (dice.between(0.022, 0.05), dice.between(0.55, 0.82) * rise);
-        let paint = Paint::of(&ALL, dice);
+        let paint = Paint::random(&ALL, dice);
         let dull = Surface {
             color: paint.color * 0.7 + rgb([120, 110, 100]) * 0.2,
             pattern: Pattern::Plain,
@@ -212,7 +212,7 @@ fn books(mesh: &mut Mesh, [from, to]: [f32; 2], y: f32, rise: f32, dice: &mut Di
 
 /// A wall shelf with a few books. Its back is at the wall, and its board at y = 0.
 pub(in super::super) fn wall_shelf(dice: &mut Dice) -> Piece {
-    let paint = Paint::of(
+    let paint = Paint::random(
         &["white", "brown", "black", "blue", "green", "yellow", "red"],
         dice,
     );

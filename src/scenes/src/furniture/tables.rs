@@ -24,7 +24,7 @@ fn finish(paint: Paint) -> Surface {
 
 /// A table of a size, with four legs.
 pub(in super::super) fn table(name: ThingKind, size: Vec3, dice: &mut Dice) -> Piece {
-    let paint = Paint::of(&COLORS, dice);
+    let paint = Paint::random(&COLORS, dice);
     let surface = finish(paint);
     let mut mesh = Mesh::default();
     legs(&mut mesh, size - vec3(0.0, 0.03, 0.0), 0.06, 0.06, &surface);
@@ -46,7 +46,7 @@ pub(in super::super) fn table(name: ThingKind, size: Vec3, dice: &mut Dice) -> P
 
 /// A round table on one foot.
 pub(in super::super) fn round(name: ThingKind, radius: f32, height: f32, dice: &mut Dice) -> Piece {
-    let paint = Paint::of(&COLORS, dice);
+    let paint = Paint::random(&COLORS, dice);
     let surface = finish(paint);
     let mut mesh = Mesh::default();
     mesh.oval(

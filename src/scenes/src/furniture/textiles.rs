@@ -12,7 +12,7 @@ use super::super::surface::Surface;
 /// The two curtains at the sides of a window of a width, from y = 0 downwards. Each is one thing; the rod belongs to the
 /// first.
 pub(in super::super) fn curtains(window: f32, drop: f32, dice: &mut Dice) -> [Piece; 2] {
-    let paint = Paint::of(&USUAL, dice);
+    let paint = Paint::random(&USUAL, dice);
     let cloth = Surface::fabric(paint, dice);
     let width = dice.between(0.42, 0.6);
     let name = kind("curtain", "curtain");
@@ -32,7 +32,7 @@ pub(in super::super) fn curtains(window: f32, drop: f32, dice: &mut Dice) -> [Pi
 
 /// A towel over a rail on the wall, with the rail at y = 0.
 pub(in super::super) fn towel(dice: &mut Dice) -> Piece {
-    let paint = Paint::of(&USUAL, dice);
+    let paint = Paint::random(&USUAL, dice);
     let cloth = Surface::paint(paint).with(Pattern::Pile);
     let (width, drop) = (dice.between(0.36, 0.5), dice.between(0.55, 0.75));
     let mut mesh = Mesh::default();

@@ -42,7 +42,7 @@ fn sheet(mesh: &mut Mesh, width: f32, height: f32, z: f32, surface: &Surface) {
 pub(in super::super) fn picture(dice: &mut Dice) -> Piece {
     let width = dice.between(0.25, 0.9);
     let height = (width * dice.between(0.6, 1.35)).min(0.75);
-    let wood = Surface::paint(Paint::of(&["black", "brown", "grey"], dice));
+    let wood = Surface::paint(Paint::random(&["black", "brown", "grey"], dice));
     let pattern = Pattern::Canvas(vec2(width, height), dice.below(100_000) as u32);
     let canvas = Surface::plain([200, 200, 200]).with(pattern);
     let mut mesh = Mesh::default();
@@ -53,7 +53,7 @@ pub(in super::super) fn picture(dice: &mut Dice) -> Piece {
 
 /// A mirror of a size in its frame.
 pub(in super::super) fn mirror(width: f32, height: f32, dice: &mut Dice) -> Piece {
-    let rim = Surface::gloss(Paint::of(&["black", "brown", "grey"], dice));
+    let rim = Surface::gloss(Paint::random(&["black", "brown", "grey"], dice));
     let glass = Surface::plain([255, 255, 255]).finished(SurfaceFinish::Mirror);
     let mut mesh = Mesh::default();
     frame(&mut mesh, width, height, 0.025, 0.03, &rim);
@@ -127,7 +127,7 @@ pub(in super::super) fn window(width: f32, height: f32, daylight: f32) -> Piece 
 /// Blinds in front of a window of a size with its sill at y = 0; `share` is the covered part of the height.
 pub(in super::super) fn blinds(width: f32, height: f32, share: f32, dice: &mut Dice) -> Piece {
     let half = width / 2.0;
-    let paint = Paint::of(
+    let paint = Paint::random(
         &[
             "white", "grey", "brown", "green", "blue", "yellow", "orange", "red",
         ],

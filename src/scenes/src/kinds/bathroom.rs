@@ -17,12 +17,12 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     let tub = plan.dice.chance(0.65);
     if tub {
         plan.focus_on_next();
-        let set = FurnitureSet::of(bath::bathtub(&mut plan.dice));
+        let set = FurnitureSet::from_piece(bath::bathtub(&mut plan.dice));
         plan.corner(&set, &WALLS);
     }
     if !tub || plan.dice.chance(0.5) {
         plan.focus_on_next();
-        let set = FurnitureSet::of(parts::piece(
+        let set = FurnitureSet::from_piece(parts::piece(
             ["shower", "shower:2"][plan.dice.below(2)],
             &mut plan.dice,
         ));
@@ -30,7 +30,7 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     }
     if plan.dice.chance(0.92) {
         plan.focus_on_next();
-        let set = FurnitureSet::of(parts::piece("toilet", &mut plan.dice));
+        let set = FurnitureSet::from_piece(parts::piece("toilet", &mut plan.dice));
         if let Some(pose) = plan.stand(&set, &WALLS) {
             plan.add_part(&pose, "toilet paper", vec3(0.42, 0.72, -0.01));
         }
@@ -39,7 +39,7 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
         let set = if plan.dice.chance(0.7) {
             bath::vanity(&mut plan.dice)
         } else {
-            FurnitureSet::of(parts::piece("sink", &mut plan.dice))
+            FurnitureSet::from_piece(parts::piece("sink", &mut plan.dice))
         };
         plan.focus_on_next();
         if let Some(pose) = plan.stand(&set, &WALLS)

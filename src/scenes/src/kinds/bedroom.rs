@@ -42,7 +42,7 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
         storage::cabinet(kind("wardrobe", "furniture"), vec3(1.2, 2.0, 0.58), 2, dice)
     });
     plan.maybe_stand(0.4, |dice| {
-        let paint = super::super::paint::Paint::of(&super::super::paint::ALL, dice);
+        let paint = super::super::paint::Paint::random(&super::super::paint::ALL, dice);
         seats::chair(kind("chair", "chair"), paint, dice)
     });
     plan.maybe_stand(0.3, low_stool);
@@ -69,7 +69,7 @@ fn bed(plan: &mut FloorPlan, wall: Wall) {
     for side in [-1.0, 1.0] {
         if plan.dice.chance(0.75) {
             let stand = nightstand(&mut plan.dice);
-            let set = FurnitureSet::of(stand);
+            let set = FurnitureSet::from_piece(stand);
             let top = set.size.y;
             let place = along + side * (size.x / 2.0 + set.size.x / 2.0 + 0.06);
             if let Some(pose) = plan.stand_at(set, wall, place)

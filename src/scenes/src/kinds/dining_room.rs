@@ -28,7 +28,10 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     if plan.dice.chance(0.65) {
         let (width, name) = (plan.dice.between(1.2, 1.6), kind("cabinet", "cabinet"));
         let piece = storage::cabinet(name, vec3(width, 0.85, 0.45), 3, &mut plan.dice);
-        if plan.stand(&FurnitureSet::of(piece), &WALLS).is_some() {
+        if plan
+            .stand(&FurnitureSet::from_piece(piece), &WALLS)
+            .is_some()
+        {
             plan.focus_things.push(plan.scene.things.len() - 1);
         }
     }
@@ -99,9 +102,9 @@ fn table(plan: &mut FloorPlan) {
 
 /// Two to six chairs of one kind around a table, whose sizes are its length and depth.
 fn chairs(plan: &mut FloorPlan, around: &Pose, [length, depth]: [f32; 2], round: bool) {
-    let mut paint = Paint::of(&USUAL, &mut plan.dice);
+    let mut paint = Paint::random(&USUAL, &mut plan.dice);
     if plan.dice.chance(0.4) {
-        paint = Paint::of(&["brown"], &mut plan.dice);
+        paint = Paint::random(&["brown"], &mut plan.dice);
     }
     let style = plan.dice.below(2);
     let surface = if paint.name == "brown" {

@@ -60,18 +60,18 @@ fn sofa_group(plan: &mut FloorPlan, wall: Wall) {
         } else {
             tables::table(name, vec3(1.0, 0.42, 0.55), &mut plan.dice)
         };
-        let piece = FurnitureSet::of(piece);
+        let piece = FurnitureSet::from_piece(piece);
         plan.focus_things.push(plan.scene.things.len());
         plan.stand_free(piece, before, pose.angle);
     }
     if plan.dice.chance(0.55) {
         let side = if plan.dice.chance(0.5) { -1.0 } else { 1.0 };
         let place = pose.to_room(vec3(side * (size.x / 2.0 + 0.3), 0.0, 1.75));
-        let piece = FurnitureSet::of(seats::armchair(&mut plan.dice));
+        let piece = FurnitureSet::from_piece(seats::armchair(&mut plan.dice));
         plan.stand_free(piece, place, pose.angle - side * 1.9);
     }
     if plan.dice.chance(0.5) {
-        let piece = FurnitureSet::of(tables::round(
+        let piece = FurnitureSet::from_piece(tables::round(
             kind("side table", "table"),
             0.24,
             0.5,
@@ -89,7 +89,7 @@ fn opposite_sofa(plan: &mut FloorPlan, wall: Wall) {
     let along = plan.width(wall) / 2.0 + plan.dice.between(-0.3, 0.3);
     plan.focus_on_next();
     if plan.dice.chance(0.5) {
-        let piece = FurnitureSet::of(parts::piece("fireplace", &mut plan.dice));
+        let piece = FurnitureSet::from_piece(parts::piece("fireplace", &mut plan.dice));
         if let Some(pose) = plan.stand_at(piece, wall, along)
             && plan.dice.chance(0.5)
         {
@@ -105,7 +105,7 @@ fn opposite_sofa(plan: &mut FloorPlan, wall: Wall) {
         3,
         &mut plan.dice,
     );
-    if let Some(pose) = plan.stand_at(FurnitureSet::of(cabinet), wall, along) {
+    if let Some(pose) = plan.stand_at(FurnitureSet::from_piece(cabinet), wall, along) {
         let screen = plan.dice.between(1.0, 1.25);
         let tv = walls::television(screen, true);
         let top = plan.add_relative(&pose, tv, vec3(0.0, 0.5, 0.06), 0.0);

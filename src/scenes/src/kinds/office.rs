@@ -44,7 +44,7 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
 
 /// Places a desk with its chair, monitor, keyboard and lamp.
 fn desk(plan: &mut FloorPlan, wall: Wall) {
-    let set = FurnitureSet::of(parts::piece("desk", &mut plan.dice));
+    let set = FurnitureSet::from_piece(parts::piece("desk", &mut plan.dice));
     let size = set.size;
     let along = plan.width(wall) / 2.0 + plan.dice.between(-0.5, 0.5);
     plan.focus_on_next();
@@ -66,7 +66,7 @@ fn desk(plan: &mut FloorPlan, wall: Wall) {
     let turned = pose.angle + std::f32::consts::PI + plan.dice.between(-0.6, 0.6);
     let aside = plan.dice.between(-0.2, 0.1);
     let place = pose.to_room(vec3(aside, 0.0, size.z + 0.32));
-    let chair = FurnitureSet::of(parts::piece("office chair", &mut plan.dice));
+    let chair = FurnitureSet::from_piece(parts::piece("office chair", &mut plan.dice));
     plan.focus_on_next();
     plan.stand_free(chair, place, turned);
 }

@@ -24,7 +24,7 @@ impl FloorPlan {
             return None;
         }
         let piece = make(&mut self.dice);
-        self.stand(&FurnitureSet::of(piece), &WALLS)
+        self.stand(&FurnitureSet::from_piece(piece), &WALLS)
     }
 
     /// Hangs a piece on a wall at height `up`, with this probability.

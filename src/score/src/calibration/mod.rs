@@ -114,7 +114,7 @@ fn calibration(grid: &Grid<'_>, draws: &Resamples, subject: usize) -> Option<Cal
             n,
         },
         nll: mean(|reply| reply.nll),
-        risk: RiskCoverage::of(replies),
+        risk: RiskCoverage::new(replies),
         auroc: auroc(grid.clusters, replies),
         blind_shift: blind_shift(grid, draws, subject),
         over_orders: rotations::accuracy(grid, subject),

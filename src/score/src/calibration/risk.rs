@@ -20,7 +20,7 @@ pub struct RiskCoverage {
 
 impl RiskCoverage {
     /// The risk of replies in order of rising confidence; there is at least one.
-    pub(super) fn of(replies: &[ConfidentReply]) -> Self {
+    pub(super) fn new(replies: &[ConfidentReply]) -> Self {
         let n = replies.len();
         let mut risks = Vec::with_capacity(n);
         let mut wrong = 0.0;
@@ -62,7 +62,7 @@ mod tests {
                 nll: 0.0,
             })
             .collect();
-        RiskCoverage::of(&replies)
+        RiskCoverage::new(&replies)
     }
 
     #[test]

@@ -57,7 +57,7 @@ impl Run {
             _ => truth,
         };
         LitReply {
-            wording: Digest::of(&[place as u8]),
+            wording: Digest::from_bytes(&[place as u8]),
             choices,
             truth,
             chosen,
@@ -145,7 +145,7 @@ fn one_reply_to_all_questions_with_as_many_choices_is_found() {
 fn answers_that_are_true_of_all_images_are_no_sign() {
     let replies: Vec<LitReply> = (0..200)
         .map(|place| LitReply {
-            wording: Digest::of(&[place % 4]),
+            wording: Digest::from_bytes(&[place % 4]),
             choices: 4,
             truth: usize::from(place % 4),
             chosen: usize::from(place % 4),

@@ -65,7 +65,7 @@ pub enum FitOutcome {
 impl GainFit {
     /// The gain at which the synthetic spreads, one curve for each gain of [`ladder`], are nearest to the real one.
     #[must_use]
-    pub fn of(real: &SpreadCurve, synthetic: &[SpreadCurve; LADDER_STEPS]) -> Self {
+    pub fn fit(real: &SpreadCurve, synthetic: &[SpreadCurve; LADDER_STEPS]) -> Self {
         let bins: Vec<(f64, [f64; LADDER_STEPS])> = (0..BINS)
             .filter_map(|bin| {
                 let mut curve = [0.0; LADDER_STEPS];
@@ -161,11 +161,11 @@ pub struct PooledGain {
 impl PooledGain {
     /// The fitted gains of pairs as one; `None` without any.
     #[must_use]
-    pub fn of(gains: &[f64]) -> Option<Self> {
+    pub fn new(gains: &[f64]) -> Option<Self> {
         let mut logs: Vec<f64> = gains.iter().map(|gain| libm::log(*gain)).collect();
         logs.sort_by(f64::total_cmp);
         let range = [quantile(&logs, 0.1)?, quantile(&logs, 0.9)?].map(libm::exp);
-        let mean = Mean::of(&logs).filter(|mean| mean.interval.is_some());
+        let mean = Mean::from_values(&logs).filter(|mean| mean.interval.is_some());
         Some(Self {
             mean: mean.map(|mean| Mean {
                 value: libm::exp(mean.value),
@@ -207,7 +207,7 @@ impl ReadingFit {
         Self {
             reading,
             ratio,
-            pooled: PooledGain::of(&gains),
+            pooled: PooledGain::new(&gains),
             pairs,
         }
     }
@@ -222,7 +222,7 @@ impl ReadingFit {
         }
         let others = self.pairs.iter().filter(|pair| pair.pair != name);
         let gains: Vec<f64> = others.filter_map(|pair| pair.fit.fitted()).collect();
-        PooledGain::of(&gains).map(|gains| (gains, CameraOrigin::OtherPairs))
+        PooledGain::new(&gains).map(|gains| (gains, CameraOrigin::OtherPairs))
     }
 }
 
@@ -246,7 +246,7 @@ mod tests {
     #[test]
     fn the_gain_of_a_synthetic_curve_is_found() {
         for gain in [0.03, 0.7746, 11.0] {
-            let fit = GainFit::of(&curve(gain, |_| 1.0), &synthetic());
+            let fit = GainFit::fit(&curve(gain, |_| 1.0), &synthetic());
             assert!((fit.fitted().unwrap() / gain).ln().abs() < 0.01, "{fit:?}");
             assert!(fit.misfit.unwrap() < 0.01);
         }
@@ -255,28 +255,28 @@ mod tests {
     #[test]
     fn a_curve_of_another_shape_or_beyond_the_ladder_is_not_fitted() {
         let wild = |bin: usize| if bin.is_multiple_of(2) { 1.0 } else { 2.0 };
-        let fit = GainFit::of(&curve(1.0, wild), &synthetic());
+        let fit = GainFit::fit(&curve(1.0, wild), &synthetic());
         assert_eq!((fit.outcome, fit.fitted()), (FitOutcome::Misfit, None));
         assert!((fit.misfit.unwrap() - f64::ln(2.0) / 2.0).abs() < 0.01);
         for gain in [0.001, 900.0] {
-            let fit = GainFit::of(&curve(gain, |_| 1.0), &synthetic());
+            let fit = GainFit::fit(&curve(gain, |_| 1.0), &synthetic());
             assert_eq!((fit.outcome, fit.fitted()), (FitOutcome::EndOfLadder, None));
         }
         let mut few = curve(1.0, |_| 1.0);
         few.bins[..5].fill(None);
-        let fit = GainFit::of(&few, &synthetic());
+        let fit = GainFit::fit(&few, &synthetic());
         assert_eq!((fit.outcome, fit.gain), (FitOutcome::FewBlocks, None));
         few.bins[4] = Some(0.5 * f64::ln(5.0));
-        assert_eq!(GainFit::of(&few, &synthetic()).outcome, FitOutcome::Fitted);
+        assert_eq!(GainFit::fit(&few, &synthetic()).outcome, FitOutcome::Fitted);
     }
 
     #[test]
     fn pairs_have_a_geometric_mean_from_three_on() {
-        assert_eq!(PooledGain::of(&[]), None);
-        let two = PooledGain::of(&[0.5, 2.0]).unwrap();
+        assert_eq!(PooledGain::new(&[]), None);
+        let two = PooledGain::new(&[0.5, 2.0]).unwrap();
         assert_eq!((two.mean, two.n), (None, 2));
         assert!((two.range[0] * two.range[1] - 1.0).abs() < 1e-12);
-        let three = PooledGain::of(&[4.0, 0.25, 1.0]).unwrap();
+        let three = PooledGain::new(&[4.0, 0.25, 1.0]).unwrap();
         let mean = three.mean.unwrap();
         // Deviation ln 4 of ln K, t of 2 degrees of freedom 4.302653.
         let half = 4.302_652_730 * f64::ln(4.0) / f64::sqrt(3.0);

@@ -22,7 +22,7 @@ pub struct Mean {
 impl Mean {
     /// Mean of numbers, some of which may be infinite; `None` without numbers.
     #[must_use]
-    pub fn of(numbers: &[f64]) -> Option<Self> {
+    pub fn from_values(numbers: &[f64]) -> Option<Self> {
         let n = numbers.len();
         if n == 0 {
             return None;
@@ -44,17 +44,17 @@ mod tests {
 
     #[test]
     fn an_interval_needs_three_numbers() {
-        assert_eq!(Mean::of(&[]), None);
+        assert_eq!(Mean::from_values(&[]), None);
         for few in [&[3.0][..], &[1.0, 3.0]] {
-            assert_eq!(Mean::of(few).unwrap().interval, None);
+            assert_eq!(Mean::from_values(few).unwrap().interval, None);
         }
-        let mean = Mean::of(&[1.0, 2.0, 3.0]).unwrap();
+        let mean = Mean::from_values(&[1.0, 2.0, 3.0]).unwrap();
         let [low, high] = mean.interval.unwrap();
         // t of 2 degrees of freedom, times 1/√3.
         let half = 4.302_652_730 / f64::sqrt(3.0);
         assert!((mean.value - 2.0).abs() < 1e-12);
         assert!((high - 2.0 - half).abs() < 1e-6 && (2.0 - low - half).abs() < 1e-6);
-        let infinite = Mean::of(&[1.0, 2.0, f64::INFINITY]).unwrap();
+        let infinite = Mean::from_values(&[1.0, 2.0, f64::INFINITY]).unwrap();
         assert_eq!(infinite.interval, None);
     }
 }

@@ -36,7 +36,7 @@ impl Residuals {
     ///
     /// # Errors
     /// If the sizes differ.
-    pub fn of(image: &Rgb, clean: &Rgb) -> Result<Self> {
+    pub fn new(image: &Rgb, clean: &Rgb) -> Result<Self> {
         same_size(image, clean)?;
         let mut residuals = Self::default();
         for (code, clean) in image.samples().iter().zip(clean.samples()) {
@@ -87,7 +87,7 @@ impl Residuals {
     fn binned(&self, bins: Bins) -> Vec<u64> {
         let mut binned = vec![0; bins.count()];
         for (difference, count) in (-255..).zip(&self.counts) {
-            binned[bins.of(difference)] += count;
+            binned[bins.index(difference)] += count;
         }
         binned
     }
@@ -135,7 +135,7 @@ impl Bins {
     }
 
     /// The bin of a difference of codes.
-    fn of(self, difference: i32) -> usize {
+    fn index(self, difference: i32) -> usize {
         match self {
             // An edge belongs to the bin above it, as in numpy.
             Self::Fu => {
@@ -295,11 +295,11 @@ mod tests {
     /// The bins of numpy for the residuals k/255, k from −26 to 26: `np.histogram` with the edges above.
     #[test]
     fn bins_are_those_of_numpy() {
-        let found: Vec<usize> = (-26..=26).map(|k| Bins::Fu.of(k)).collect();
+        let found: Vec<usize> = (-26..=26).map(|k| Bins::Fu.index(k)).collect();
         assert_eq!(found, NUMPY);
-        assert_eq!((Bins::Fu.of(-255), Bins::Fu.of(255)), (0, 65));
+        assert_eq!((Bins::Fu.index(-255), Bins::Fu.index(255)), (0, 65));
         assert_eq!(
-            [-255, -1, 0, 3, 4, 255].map(|k| Bins::Kousha.of(k)),
+            [-255, -1, 0, 3, 4, 255].map(|k| Bins::Kousha.index(k)),
             [1, 64, 65, 65, 66, 128]
         );
     }
@@ -308,7 +308,7 @@ mod tests {
     fn spread_is_reported_by_clean_code() {
         let clean = Rgb::new(1, 2, vec![10, 10, 10, 10, 20, 20]).unwrap();
         let noisy = Rgb::new(1, 2, vec![8, 12, 8, 12, 21, 21]).unwrap();
-        let found: Vec<_> = Residuals::of(&noisy, &clean).unwrap().by_code().collect();
+        let found: Vec<_> = Residuals::new(&noisy, &clean).unwrap().by_code().collect();
         assert_eq!(found.len(), 2);
         assert_eq!((found[0].0, found[0].1), (10, 4));
         assert!(found[0].2[0].abs() < 1e-12 && (found[0].2[1] - 2.0).abs() < 1e-12);

@@ -35,8 +35,8 @@ pub struct SceneMatch {
 impl SceneMatch {
     /// Compares an image in normal light with one of the same size that is `drop_ev` EV darker.
     #[must_use]
-    pub fn of(normal: &Rgb, low: &Rgb, drop_ev: f64) -> Self {
-        let [normal, low] = [normal, low].map(BlockMeans::of);
+    pub fn new(normal: &Rgb, low: &Rgb, drop_ev: f64) -> Self {
+        let [normal, low] = [normal, low].map(BlockMeans::new);
         let (clean, noisy) = (normal.structure(), low.structure());
         let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let (squares, others) = (sum(&clean, &clean), sum(&noisy, &noisy));
@@ -73,7 +73,7 @@ struct BlockMeans {
 }
 
 impl BlockMeans {
-    fn of(image: &Rgb) -> Self {
+    fn new(image: &Rgb) -> Self {
         let shorter = image.height().min(image.width());
         let side = (shorter / BLOCKS / SIDE_STEP * SIDE_STEP).max(SIDE_STEP);
         let size = [image.height() / side, image.width() / side];
@@ -177,11 +177,11 @@ mod tests {
         for number in 0..6 {
             let normal = scene(number);
             for noise in [0.0, 20.0] {
-                let found = SceneMatch::of(&normal, &low(&normal, noise), 4.4);
+                let found = SceneMatch::new(&normal, &low(&normal, noise), 4.4);
                 assert!(found.correlation.unwrap() > 0.8, "{number}: {found:?}");
                 assert!(!found.is_of_two_scenes());
                 let other = low(&scene(number + 100), noise);
-                let found = SceneMatch::of(&normal, &other, 4.4);
+                let found = SceneMatch::new(&normal, &other, 4.4);
                 assert!(found.is_of_two_scenes(), "{number}: {found:?}");
             }
         }
@@ -193,7 +193,7 @@ mod tests {
         let rows = normal.samples().chunks(3 * SIZE[1]);
         let mirrored = rows.flat_map(|row| row.chunks(3).rev().flatten().copied());
         let mirrored = Rgb::new(SIZE[0], SIZE[1], mirrored.collect()).unwrap();
-        assert!(SceneMatch::of(&normal, &low(&mirrored, 4.0), 4.4).is_of_two_scenes());
+        assert!(SceneMatch::new(&normal, &low(&mirrored, 4.0), 4.4).is_of_two_scenes());
     }
 
     /// Nothing can be said of a bare wall, of structure below the noise, or of very small images.
@@ -212,11 +212,11 @@ mod tests {
             (&faint, low(&faint, 60.0)),
             (&Rgb::black(5, 5), Rgb::black(5, 5)),
         ] {
-            let found = SceneMatch::of(normal, &low, 4.4);
+            let found = SceneMatch::new(normal, &low, 4.4);
             assert_eq!(found.correlation, None);
             assert!(!found.is_of_two_scenes());
         }
-        let black = SceneMatch::of(&scene(5), &Rgb::black(height, width), 4.4);
+        let black = SceneMatch::new(&scene(5), &Rgb::black(height, width), 4.4);
         assert!(black.is_of_two_scenes(), "{black:?}");
     }
 }

@@ -47,10 +47,10 @@ struct BlockLight {
 impl SmoothBlocks {
     /// Smooth blocks of an image in normal light whose partner is `drop_ev` EV darker.
     #[must_use]
-    pub fn of(normal: &Rgb, drop_ev: f64) -> Self {
+    pub fn new(normal: &Rgb, drop_ev: f64) -> Self {
         let dropped = libm::exp2(-drop_ev / 2.2);
         let blocks = (0..count(normal)).filter_map(|index| {
-            let block = Block::of(normal, index);
+            let block = Block::new(normal, index);
             let code = block.mean() * dropped;
             let is_used = block.brightest() < f64::from(BRIGHT) && code > DARKEST;
             is_used.then(|| BlockLight {
@@ -83,7 +83,7 @@ impl SmoothBlocks {
             bins: self.bins.each_ref().map(|blocks| {
                 let squares = blocks
                     .iter()
-                    .map(|index| Block::of(image, *index).spread().powi(2));
+                    .map(|index| Block::new(image, *index).spread().powi(2));
                 let mean = squares.sum::<f64>() / blocks.len() as f64;
                 (!blocks.is_empty()).then(|| libm::log(mean.sqrt().max(LEAST_SPREAD)))
             }),
@@ -118,7 +118,7 @@ struct Block([[f64; SIDE]; SIDE]);
 
 impl Block {
     /// The block of an index below [`count`].
-    fn of(image: &Rgb, index: usize) -> Self {
+    fn new(image: &Rgb, index: usize) -> Self {
         let across = image.width() / SIDE;
         let [top, left] = [index / across, index % across].map(|block| block * SIDE);
         Self(std::array::from_fn(|row| {
@@ -181,9 +181,9 @@ mod tests {
 
     #[test]
     fn a_plane_has_no_spread_and_a_chequer_has_its_own() {
-        assert!(Block::of(&ramp(|_| 0), 7).spread() < 1e-12);
+        assert!(Block::new(&ramp(|_| 0), 7).spread() < 1e-12);
         // ±2 about the mean: 4 · 64/61.
-        let spread = Block::of(&ramp(|_| 4), 7).spread();
+        let spread = Block::new(&ramp(|_| 4), 7).spread();
         assert!(
             (spread - f64::sqrt(4.0 * 64.0 / 61.0)).abs() < 0.02,
             "{spread}"
@@ -194,7 +194,7 @@ mod tests {
     fn blocks_with_texture_are_not_smooth() {
         // Texture in every second block column.
         let clean = ramp(|column| if (column / 8) % 2 == 0 { 5 } else { 0 });
-        let smooth = SmoothBlocks::of(&clean, 1.0);
+        let smooth = SmoothBlocks::new(&clean, 1.0);
         let across = clean.width() / SIDE;
         let kept: Vec<usize> = smooth.bins.concat();
         assert!(kept.len() > 100);
@@ -215,7 +215,7 @@ mod tests {
         let white = Rgb::new(160, 240, vec![255; 160 * 240 * 3]).unwrap();
         let black = Rgb::black(160, 240);
         for image in [white, black, Rgb::black(7, 7)] {
-            let curve = SmoothBlocks::of(&image, 1.0).spread(&image);
+            let curve = SmoothBlocks::new(&image, 1.0).spread(&image);
             assert_eq!(curve.bins, [None; BINS]);
         }
     }

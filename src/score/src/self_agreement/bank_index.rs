@@ -28,7 +28,7 @@ impl<'a> BankIndex<'a> {
     }
 
     /// The number of the bank's question that a question about an image asks; `None` if the run does not store it.
-    pub(super) fn of(&self, question: &QuestionId) -> Option<usize> {
+    pub(super) fn position(&self, question: &QuestionId) -> Option<usize> {
         self.by_id.get(question).copied()
     }
 }

@@ -88,7 +88,7 @@ pub(super) fn cells(
         .filter(|question| question.is_informative());
     let informative: BTreeSet<usize> = informative.map(|question| question.index).collect();
     let kept = grid.items.iter().map(|item| {
-        let question = bank.of(&item.asked.question);
+        let question = bank.position(&item.asked.question);
         question.is_some_and(|question| informative.contains(&question))
     });
     let restricted = grid.restricted(&kept.collect::<Vec<_>>());
@@ -106,7 +106,7 @@ pub(super) fn cells(
             let few = restricted.counts(subject, family, mode);
             cell.informative = Estimate::clustered(&few);
             if cell.role() == CellRole::Other {
-                let bounds = Bounds::of(grid, (&cell.subject, family), mode, draws);
+                let bounds = Bounds::new(grid, (&cell.subject, family), mode, draws);
                 let share = bounds.map(|bounds| evidence(&counts, &bounds, draws));
                 cell.evidence = share.transpose();
             }
@@ -131,8 +131,8 @@ impl Part<'_, '_> {
     fn cell(&self, bank: &BankIndex<'_>, counts: &[ClusterCount]) -> AgreementCell {
         let (grid, subject, mode) = (self.grid, self.subject, self.mode);
         let agreement = Estimate::clustered(counts);
-        let answers = BankCounts::of(grid, subject, self.family, mode, bank);
-        let items = grid.of_family(subject, self.family);
+        let answers = BankCounts::new(grid, subject, self.family, mode, bank);
+        let items = grid.family_items(subject, self.family);
         let failed = items.filter(|(_, result)| *result == TrialResult::Failed);
         AgreementCell {
             subject: grid.subjects[subject].clone(),
@@ -153,7 +153,7 @@ impl Part<'_, '_> {
     /// Share of the replies of which something holds; it takes the answer, if one could be read, and the choices.
     fn share(&self, holds: impl Fn(Option<&str>, &[String]) -> bool) -> Option<Estimate> {
         let mut counts = vec![ClusterCount::default(); self.grid.clusters];
-        for (item, result) in self.grid.of_family(self.subject, self.family) {
+        for (item, result) in self.grid.family_items(self.subject, self.family) {
             let Some(reading) = result.reading(self.mode) else {
                 continue;
             };
@@ -167,7 +167,7 @@ impl Part<'_, '_> {
     }
 
     fn cannot_tell(&self) -> Option<Estimate> {
-        let mut items = self.grid.of_family(self.subject, self.family);
+        let mut items = self.grid.family_items(self.subject, self.family);
         let has_way_out = items.any(|(item, _)| {
             let mut choices = item.asked.choices.iter();
             choices.any(|choice| is_way_out(choice))

@@ -28,7 +28,7 @@ pub(super) struct BankCounts<'g> {
 
 impl<'g> BankCounts<'g> {
     /// The answers of a subject to questions of a family.
-    pub(super) fn of(
+    pub(super) fn new(
         grid: &'g Grid<'_>,
         subject: usize,
         family: Option<&Family>,
@@ -42,7 +42,7 @@ impl<'g> BankCounts<'g> {
         for (index, item) in grid.items.iter().enumerate() {
             let result = grid.result(subject, index);
             let (Some(question), Some(reading)) =
-                (bank.of(&item.asked.question), result.reading(mode))
+                (bank.position(&item.asked.question), result.reading(mode))
             else {
                 continue;
             };

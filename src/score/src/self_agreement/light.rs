@@ -81,7 +81,7 @@ pub(super) fn is_refused(trial: TrialRef<'_>) -> bool {
 
 impl<'a> LightAnswers<'a> {
     /// The first reply of a model to each question at L0.
-    pub(super) fn of(trials: &'a Trials<ChoiceDetail>, model: &'a str) -> Self {
+    pub(super) fn new(trials: &'a Trials<ChoiceDetail>, model: &'a str) -> Self {
         let mut by_question = HashMap::<QuestionKey<'a>, Vec<TrialRef<'a>>>::new();
         let of_model = trials.iter().filter(|trial| trial.model() == model);
         let first = of_model.filter(|trial| is_light(*trial) && trial.repeat() == 0);

@@ -104,7 +104,7 @@ impl<'a> SelfAgreement<'a> {
             grid,
         };
         for model in &models {
-            let answers = LightAnswers::of(trials, model);
+            let answers = LightAnswers::new(trials, model);
             for mode in ReadingMode::ALL {
                 let replies = answers.replies(mode);
                 let held = answers.held_against(trials, mode);
@@ -133,7 +133,7 @@ impl<'a> SelfAgreement<'a> {
 
     /// The same results of a set whose photographs were taken in this light.
     #[must_use]
-    pub fn of_set(self, set: PhotographedSet) -> Self {
+    pub fn for_set(self, set: PhotographedSet) -> Self {
         Self { set, ..self }
     }
 

@@ -32,7 +32,7 @@ pub(super) fn models_in_light(
     let mode = ReadingMode::Strict;
     let mut pairs = Vec::new();
     for (place, first) in models.iter().enumerate() {
-        let answers = LightAnswers::of(trials, first);
+        let answers = LightAnswers::new(trials, first);
         for second in &models[place + 1..] {
             let held = answers.held_against_other(trials, second, mode);
             let grid = Grid::new(&held, clusters);
@@ -41,7 +41,7 @@ pub(super) fn models_in_light(
             }
             let counts = grid.counts(0, None, mode);
             if let Some(same) = Estimate::clustered(&counts) {
-                let answers = BankCounts::of(&grid, 0, None, mode, bank);
+                let answers = BankCounts::new(&grid, 0, None, mode, bank);
                 pairs.push(ModelsInLight {
                     first: first.clone(),
                     second: second.clone(),

@@ -46,7 +46,7 @@ pub(super) fn questions_in_light(
 ) -> Vec<QuestionInLight> {
     let mut counts = BTreeMap::<usize, BTreeMap<&str, usize>>::new();
     for trial in answers.first().filter(|trial| !trial.failed()) {
-        let Some(question) = bank.of(trial.question()) else {
+        let Some(question) = bank.position(trial.question()) else {
             continue;
         };
         let counts = counts.entry(question).or_default();

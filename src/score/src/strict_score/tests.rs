@@ -50,7 +50,7 @@ fn by_frame(item: usize) -> String {
 }
 
 fn score(records: &[Record], questions: &[RunQuestion]) -> StrictScore {
-    with_grid(records, |grid| StrictScore::of(grid, questions)).unwrap()
+    with_grid(records, |grid| StrictScore::new(grid, questions)).unwrap()
 }
 
 /// The cell of all groups of a condition, in the strict reading.
@@ -142,7 +142,7 @@ fn chance_is_the_mean_product_of_one_over_the_choices() {
     assert_eq!(families.len(), 1);
     assert_eq!(families[0].share, Some(Estimate::exact(1.0 / 3.0, 1)));
     assert_eq!(
-        with_grid(&made, |grid| StrictScore::of(
+        with_grid(&made, |grid| StrictScore::new(
             grid,
             &questions(&made, |_| None)
         )),

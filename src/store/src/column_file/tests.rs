@@ -131,7 +131,7 @@ fn values_and_nulls_are_read_back() {
         assert_eq!(read["right"], serde_json::json!(row.right));
         assert_eq!(read["digest"].is_null(), row.digest.is_none());
     }
-    assert_eq!(FileMetadata::of(&path).unwrap(), Some(metadata()));
+    assert_eq!(FileMetadata::read(&path).unwrap(), Some(metadata()));
     let reader = SerializedFileReader::new(File::open(&path).unwrap()).unwrap();
     let group = reader.metadata().row_group(0);
     let Some(Statistics::Int32(numbers)) = group.column(5).statistics() else {
@@ -218,11 +218,11 @@ fn what_does_not_fit_is_null_or_an_error() {
 fn metadata_of_no_file_and_of_another_file_are_none() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("table");
-    assert_eq!(FileMetadata::of(&path).unwrap(), None);
+    assert_eq!(FileMetadata::read(&path).unwrap(), None);
     write(&path, &[row(0)], 1, LIMITS);
     let whole = fs::read(&path).unwrap();
     for cut in [0, 3, whole.len() / 2, whole.len() - 1] {
         fs::write(&path, &whole[..cut]).unwrap();
-        assert_eq!(FileMetadata::of(&path).unwrap(), None, "{cut}");
+        assert_eq!(FileMetadata::read(&path).unwrap(), None, "{cut}");
     }
 }

@@ -108,9 +108,9 @@ fn digests_of_debug_output_are_found() {
         rule,
         &["error.rs f true"],
         &[
-            "error.rs: fn f() { Digest::of(format!(\"{:?}\", x).as_bytes()) }",
+            "error.rs: fn f() { Digest::from_bytes(format!(\"{:?}\", x).as_bytes()) }",
             "error.rs: impl A { fn f() { types::Digest::canonical(format!(\"{x:#?}\")) } }",
-            "error.rs: trait A { fn f() { json!({ \"a\": Digest::of_parts([x]) }); g(\"{x:>5?}\") } }",
+            "error.rs: trait A { fn f() { json!({ \"a\": Digest::from_parts([x]) }); g(\"{x:>5?}\") } }",
             "error.rs: macro_rules! f { () => { blake3::hash(format!(\"{:?}\", 1)) } }",
         ],
     );
@@ -118,9 +118,9 @@ fn digests_of_debug_output_are_found() {
         rule,
         &["error.rs f false"],
         &[
-            "error.rs: fn f() { Digest::of(b\"{:?}\"); g(\"{x} {{?}\") }",
-            "error.rs: /// As `{:?}`.\n#[expect(a, reason = \"{:?}\")] fn f() { Digest::of(x) }",
-            "error.rs: fn f() { Digest::of(x) } fn g() { h(\"{:?}\") }",
+            "error.rs: fn f() { Digest::from_bytes(b\"{:?}\"); g(\"{x} {{?}\") }",
+            "error.rs: /// As `{:?}`.\n#[expect(a, reason = \"{:?}\")] fn f() { Digest::from_bytes(x) }",
+            "error.rs: fn f() { Digest::from_bytes(x) } fn g() { h(\"{:?}\") }",
         ],
     );
     check(
@@ -128,7 +128,7 @@ fn digests_of_debug_output_are_found() {
         &[],
         &[
             "error.rs: fn f() { Digest::from_hex(\"{:?}\") }",
-            "error.rs: #[cfg(test)] mod tests { fn f() { Digest::of(\"{:?}\") } }",
+            "error.rs: #[cfg(test)] mod tests { fn f() { Digest::from_bytes(\"{:?}\") } }",
         ],
     );
 }

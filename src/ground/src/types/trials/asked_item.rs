@@ -45,7 +45,7 @@ impl AskedItem {
     }
 
     /// The item of a record.
-    pub(super) fn of(question: &QuestionId, parts: &AskedParts<'_>) -> Self {
+    pub(super) fn new(question: &QuestionId, parts: &AskedParts<'_>) -> Self {
         Self {
             question: question.clone().into(),
             frame: FrameId(parts.frame.to_owned()).into(),

@@ -73,7 +73,7 @@ impl ChoiceTables {
     /// What reports keep of a record.
     pub fn keep(&mut self, record: &Record<ChoiceDetail>) -> ChoiceFacts {
         let detail = &record.detail;
-        let images = SentImages::of(detail);
+        let images = SentImages::from_detail(detail);
         let images = images.map_or(NONE, |images| self.images.number(images));
         let observed = detail.observed.as_ref().map(|observed| Observed {
             from: observed.from,

@@ -289,7 +289,7 @@ impl<D: StoredDetail> Trials<D> {
             (known, &known_parts) == key
         };
         self.items.find(&key, known).unwrap_or_else(|| {
-            let item = self.shared(AskedItem::of(question, parts));
+            let item = self.shared(AskedItem::new(question, parts));
             self.items.push(item)
         })
     }

@@ -22,7 +22,7 @@ pub struct SentImages {
 
 impl SentImages {
     /// The images of a record; `None` if there are none.
-    pub(super) fn of(detail: &ChoiceDetail) -> Option<Self> {
+    pub(super) fn from_detail(detail: &ChoiceDetail) -> Option<Self> {
         let first = detail.image.as_ref()?;
         let count = detail.images().count();
         let all = detail.sent().filter(|_| count > 1);

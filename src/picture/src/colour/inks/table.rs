@@ -57,14 +57,14 @@ impl InkTable {
             _ => return Err("its connection space is neither Lab nor XYZ".to_owned()),
         };
         match table {
-            LutWarehouse::Lut(table) => Self::of_tables(table, is_lab),
-            LutWarehouse::Multidimensional(table) => Self::of_curves(table, is_lab),
+            LutWarehouse::Lut(table) => Self::from_lut(table, is_lab),
+            LutWarehouse::Multidimensional(table) => Self::from_a_to_b(table, is_lab),
         }
         .ok_or_else(|| "its table is not one from four inks to three values, or is cut".to_owned())
     }
 
     /// The table of the type `lut8Type` or `lut16Type`. `None` if it is broken.
-    fn of_tables(table: &LutDataType, is_lab: bool) -> Option<Self> {
+    fn from_lut(table: &LutDataType, is_lab: bool) -> Option<Self> {
         if (table.num_input_channels, table.num_output_channels) != (4, 3) {
             return None;
         }
@@ -81,7 +81,7 @@ impl InkTable {
     }
 
     /// The table of the type `lutAToBType`. `None` if it is broken.
-    fn of_curves(table: &LutMultidimensionalType, is_lab: bool) -> Option<Self> {
+    fn from_a_to_b(table: &LutMultidimensionalType, is_lab: bool) -> Option<Self> {
         if (table.num_input_channels, table.num_output_channels) != (4, 3) {
             return None;
         }
@@ -148,7 +148,7 @@ impl InkTable {
                 ])
             }
         };
-        times(self.to_srgb, xyz).map(|light| EIGHT.of(light) as u8)
+        times(self.to_srgb, xyz).map(|light| EIGHT.encode(light) as u8)
     }
 
     /// The value of the grid between its sixteen points around amounts of ink.
@@ -207,7 +207,7 @@ fn channels<const N: usize>(values: &[f64]) -> Option<[Vec<f64>; N]> {
 
 /// A curve each; `None` if there are fewer or more, or a number is not finite.
 fn curves<const N: usize>(curves: &[moxcms::ToneReprCurve]) -> Option<[ToneCurve; N]> {
-    let curves = curves.iter().map(ToneCurve::of_profile);
+    let curves = curves.iter().map(ToneCurve::from_profile);
     let curves: Vec<ToneCurve> = curves.collect::<Result<_, _>>().ok()?;
     curves.try_into().ok()
 }

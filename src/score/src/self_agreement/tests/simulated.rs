@@ -72,7 +72,8 @@ pub(super) fn record(
         observed: None,
         options: None,
     };
-    let key = Digest::of(format!("{question} {image} {condition:?} {repeat}").as_bytes()).into();
+    let key =
+        Digest::from_bytes(format!("{question} {image} {condition:?} {repeat}").as_bytes()).into();
     let id = QuestionId(format!("q{question:02}@i{image:03}"));
     Record::blank(key, id, "m", condition, detail)
 }
