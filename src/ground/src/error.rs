@@ -18,7 +18,7 @@ pub enum Error {
     Usage {
         /// The flag, variable or file that holds the value.
         origin: String,
-        /// What was expected, and how to fix it.
+        /// The mismatch, the expected content, and the remedy.
         problem: String,
     },
     /// A command line that could not be parsed, in the words of the parser.
@@ -39,7 +39,7 @@ pub enum Error {
     Data {
         /// The file, with the line or frame if known.
         place: String,
-        /// What was expected, and how to fix it.
+        /// The mismatch, the expected content, and the remedy.
         problem: String,
     },
     /// An enhancement model that cannot be used.
@@ -47,7 +47,7 @@ pub enum Error {
     Enhancer {
         /// The path of the ONNX file.
         path: PathBuf,
-        /// What is wrong with it, and how to fix it.
+        /// The fault and the remedy.
         problem: String,
     },
     /// An enhancement model that cannot be used any further, so that the run ends.
@@ -55,7 +55,7 @@ pub enum Error {
     EnhancerEnded {
         /// The path of the ONNX file.
         path: PathBuf,
-        /// What it did, and how to go on.
+        /// The failure, and how to continue.
         problem: String,
     },
     /// The library of ONNX Runtime was not found, is not suitable or could not be installed.
@@ -66,7 +66,7 @@ pub enum Error {
     Prompt {
         /// The template's name or path.
         name: String,
-        /// What is wrong with it.
+        /// Description of the fault.
         problem: String,
     },
     /// An endpoint that cannot be used: every further request would fail in the same way.
@@ -74,7 +74,7 @@ pub enum Error {
     Endpoint {
         /// The base URL without credentials.
         endpoint: String,
-        /// What it answered, and how to fix it.
+        /// The endpoint's answer, and the remedy.
         problem: String,
     },
     /// A run folder that does not match the command.
@@ -82,7 +82,7 @@ pub enum Error {
     Run {
         /// The run folder or its file.
         path: PathBuf,
-        /// What is wrong, and how to fix it.
+        /// The fault and the remedy.
         problem: String,
     },
 }

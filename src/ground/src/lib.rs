@@ -1,4 +1,4 @@
-//! What every crate of darkqa-eval shares: errors, files, types and label spaces.
+//! Errors, files, types and label spaces, shared by all crates of darkqa-eval.
 //!
 //! - [`error`]: the one error type.
 //! - [`types`]: the vocabulary, without input or output.

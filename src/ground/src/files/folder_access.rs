@@ -12,12 +12,12 @@ pub enum FolderAccess {
     /// modes of the files are; so `chmod` of the folder alone shares it later.
     #[default]
     Private,
-    /// What the system gives new folders (`umask`).
+    /// The system's default for new folders (`umask`).
     Shared,
 }
 
 impl FolderAccess {
-    /// The access that the flag `--shared` says.
+    /// The access for a value of the flag `--shared`.
     pub fn new(is_shared: bool) -> Self {
         if is_shared {
             Self::Shared

@@ -30,7 +30,7 @@ pub fn write_synced(path: &Path, content: &[u8]) -> Result<()> {
     replace(path, content, File::sync_all)
 }
 
-/// Whether a name is that of an unfinished file, which a killed process leaves behind.
+/// True for the name of an unfinished file, as a killed process leaves one behind.
 pub fn is_unfinished(name: &OsStr) -> bool {
     name.to_string_lossy().ends_with(UNFINISHED)
 }
@@ -83,7 +83,7 @@ pub fn unfinished(path: &Path) -> PathBuf {
     path.with_file_name(format!(".{name}{UNFINISHED}"))
 }
 
-/// Creates an empty file in the place of what a killed process may have left there. A link there is replaced, not followed.
+/// Creates an empty file and replaces a leftover of a killed process. A link at the path is replaced, not followed.
 ///
 /// # Errors
 /// If a folder is there, or the file cannot be created.

@@ -34,8 +34,8 @@ pub fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// Opens a file to read it. A pipe or a device in the place of a file is refused: it may have no end, or wait for ever. It is opened
-/// where the path itself lies in `/dev` or `/proc`, as `/dev/stdin` and what a shell writes for `<(command)`.
+/// Opens a file for reading. Pipes and devices are refused, because they may never end or block for ever, unless the path itself is in
+/// `/dev` or `/proc`: `/dev/stdin`, or the shell's `<(command)`.
 ///
 /// # Errors
 /// If the file cannot be opened.
@@ -121,7 +121,7 @@ pub fn settings(path: &Path) -> Result<String> {
     text.map_err(|e| Error::file(path, "read", e))
 }
 
-/// The bytes of a file that has no more than so many.
+/// Reads a file of at most `most` bytes.
 ///
 /// # Errors
 /// If the file cannot be read or is larger.

@@ -54,7 +54,7 @@ pub fn space(name: &str) -> Option<Labels> {
     })
 }
 
-/// The canonical classes: those of mpcat40 without `void` and `unlabeled`.
+/// The canonical classes: mpcat40 without `void` and `unlabeled`.
 #[must_use]
 pub fn canonical() -> BTreeSet<String> {
     space("mpcat40").map_or_else(BTreeSet::new, |labels| labels.expressible)

@@ -14,7 +14,7 @@ use super::words::written_as_text;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct AxisLevel(Point);
 
-/// What an [`AxisLevel`] is.
+/// Position of an [`AxisLevel`] on its axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 enum Point {
     Untouched,
@@ -53,7 +53,7 @@ impl AxisLevel {
         }
     }
 
-    /// Whether the level has a place in the tables of an axis: L0 in all of them, pairs in those of light.
+    /// True if the level belongs in the tables of an axis: L0 in all of them, photographed pairs in those of light.
     #[must_use]
     pub fn is_shown_on(self, axis: Axis) -> bool {
         match self.0 {

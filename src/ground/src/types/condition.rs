@@ -51,7 +51,7 @@ impl fmt::Display for EnhancerName {
 /// images as dark as it `match-KIND[@READING][+ENHANCER]`; `&` is reserved for several degradations in sequence.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Condition {
-    /// What becomes of the frame before it is enhanced.
+    /// Treatment of the frame before it is enhanced.
     pub treatment: Treatment,
     /// The enhancer; `None` if the image is not enhanced.
     pub enhancer: Option<EnhancerName>,

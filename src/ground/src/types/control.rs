@@ -65,14 +65,14 @@ impl Control {
         Self::Outlines,
     ];
 
-    /// Whether nothing is left to see, so that the score must be that of chance. The others are limits of the observer.
+    /// True if the image carries no information, so that the score must be at chance. The other controls are limits of the observer.
     #[must_use]
     pub fn leaves_nothing(self) -> bool {
         !matches!(self, Self::Shift4 | Self::Mosaic12)
     }
 
-    /// The controls of which each run with the observer asks the first that is possible: other-room, or the tiles of the right image
-    /// if all frames are of one scene.
+    /// Default controls of a run with the observer, which asks the first that is possible: other-room, or the tiles of the right image if
+    /// all frames are of one scene.
     pub const STANDING: [Self; 2] = [Self::OtherRoom, Self::Tiles];
 
     /// The control that a model name names, also with a run behind it, as `observer:tiles (night)`; `None` for all other models.

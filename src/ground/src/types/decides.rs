@@ -1,4 +1,4 @@
-//! The class of a flag by what it changes: [`Decides`].
+//! [`Decides`]: the class of a flag by its effect on a run.
 
 use clap::Arg;
 use clap::builder::ArgExt;

@@ -141,7 +141,7 @@ pub enum Kind {
     Exposure,
     /// Less light, with sensor noise.
     Sensor,
-    /// Less light, met by a camera with automatic exposure: a longer exposure, gain, and what is left dark.
+    /// Less light, met by a camera with automatic exposure: a longer exposure, gain, and a remaining darkness.
     Auto,
     /// The motion blur of an exposure, without less light.
     Motion,
@@ -246,8 +246,8 @@ impl Kind {
         self.base().unwrap_or(self)
     }
 
-    /// The gain that brightens a small copy of a degraded image, in EV; 0 for a kind that does not reduce the light, or of which
-    /// the camera's settings decide how dark it is.
+    /// Gain in EV that brightens a small copy of a degraded image for display. It is 0 for kinds that do not reduce the light, and for
+    /// kinds whose darkness depends on the camera's settings.
     #[must_use]
     pub fn relight(self, severity: Severity) -> f32 {
         match self {

@@ -82,7 +82,7 @@ macro_rules! details {
 }
 
 details! {
-    /// A question with choices, and what was read from the reply.
+    /// A question with choices, and the answer parsed from the reply.
     ChoiceDetail, ChoiceLine {
         /// The frame of the question.
         frame: FrameId,
@@ -110,10 +110,10 @@ details! {
         /// otherwise.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         shown_frame: Option<FrameId>,
-        /// What the observer saw; not in the file for other models, and without an image.
+        /// The observer's view of the frame; absent in the file for other models and without an image.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         observed: Option<Observed>,
-        /// How likely the model held each choice; not in the file if it was not asked for, or if the server did not say.
+        /// The model's probability of each choice; absent in the file if it was not requested, or not reported by the server.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         options: Option<OptionProbabilities>,
     }
@@ -191,7 +191,7 @@ pub struct WalkFacts {
     pub height: usize,
     /// The file format: `png` or `jpeg`.
     pub format: String,
-    /// What the camera did in all frames alike; not in the file for kinds that leave it open.
+    /// Camera settings that all frames share; absent in the file for kinds that do not state them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure: Option<ExposureFacts>,
 }
@@ -252,7 +252,7 @@ pub struct ImageFacts {
     /// The EXIF orientation by which the frame was turned when its file was read, 2 to 8; not in the file if it was not turned.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub orientation: Option<u8>,
-    /// What the camera did for the image; not in the file for kinds that leave it open.
+    /// Camera settings for this image; absent in the file for kinds that do not state them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure: Option<ExposureFacts>,
     /// How dark the photograph of the frame is, of images in its darkness; not in the file for others.

@@ -53,7 +53,7 @@ impl Digest {
         Self(*hasher.finalize().as_bytes())
     }
 
-    /// The digest of files that are shown together: of one file its own, of several that of all digests in order; `None` of none.
+    /// The digest of one file, or the combined digest, in order, of several that are shown together; `None` if there is no file.
     pub fn from_file_digests(files: impl IntoIterator<Item = Self>) -> Option<Self> {
         let files: Vec<Self> = files.into_iter().collect();
         match &*files {

@@ -1,4 +1,4 @@
-//! What a run records of an enhancer: [`EnhancerNote`].
+//! [`EnhancerNote`]: the manifest's entry about an enhancer.
 
 use std::collections::BTreeMap;
 
@@ -15,22 +15,22 @@ pub struct EnhancerNote {
     /// How the model is fed and read.
     #[serde(default)]
     pub convention: Vec<ConventionLine>,
-    /// What was done to the images because of their sizes, in words; empty before the first image.
+    /// How image sizes were adapted to the model, in words; empty before the first image.
     #[serde(default)]
     pub sizes: String,
     /// The counts behind these words. An image that was enhanced again, after an interruption, counts again.
     #[serde(default)]
     pub size_counts: SizeLog,
-    /// Whether an image was resized for the model, so that its results are not those of the model at the image's own size.
+    /// True if an image was resized for the model: the results are then not those of the model at the image's own size.
     #[serde(default)]
     pub resized: bool,
-    /// What the probe found before the first question; `None` if it was not run.
+    /// Findings of the probe before the first question; `None` if it was not run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub probe: Option<ProbeNote>,
-    /// What a reader of the results must know, in sentences that follow the enhancer's name.
+    /// Caveats for readers of the results, as sentences that follow the enhancer's name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub remarks: Vec<String>,
-    /// What its images of dark frames looked like during the run.
+    /// Flaws of the images enhanced during the run.
     #[serde(default)]
     pub judged: JudgedImages,
 }
@@ -42,25 +42,25 @@ pub struct ConventionLine {
     pub key: String,
     /// The value.
     pub value: String,
-    /// Where the value is from: the sidecar, a preset, the graph, the probe, or what is usual.
+    /// Origin of the value: the sidecar, a preset, the graph, the probe, or the default.
     pub source: String,
 }
 
-/// What the probe of an enhancer found.
+/// Result of probing an enhancer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ProbeNote {
     /// The number of dark frames.
     pub frames: usize,
     /// The value ranges with which its images can be enhanced images.
     pub plausible: Vec<String>,
-    /// What was wrong; `None` if nothing was.
+    /// The problem found; `None` if there was none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub problem: Option<String>,
-    /// What follows.
+    /// Consequence for the run.
     pub outcome: ProbeOutcome,
 }
 
-/// What follows from a probe.
+/// Consequence of a probe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ProbeOutcome {
@@ -92,7 +92,7 @@ pub struct FlawedImage {
     pub frame: String,
     /// The condition.
     pub condition: String,
-    /// What is wrong with it.
+    /// Flaw of the image.
     pub flaw: Flaw,
 }
 
@@ -185,7 +185,7 @@ mod tests {
         let both = note(31, 2).after(earlier());
         assert_eq!(both.size_counts, note(40, 2).size_counts);
         assert_eq!(both.sizes, note(40, 2).sizes);
-        // A session that enhances nothing leaves what was counted.
+        // A session without images keeps the earlier counts.
         assert_eq!(EnhancerNote::default().after(earlier()), note(9, 0));
         // A manifest of an earlier version has the words alone.
         let words = EnhancerNote {

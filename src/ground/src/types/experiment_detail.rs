@@ -1,4 +1,4 @@
-//! What reports keep of the details of the two experiments.
+//! Details of the two experiments' records, as reports keep them.
 
 use std::borrow::Cow;
 

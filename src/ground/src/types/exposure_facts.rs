@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// What a camera did in a simulated exposure, for records and sidecars. All numbers are finite.
+/// Camera settings of a simulated exposure, for records and sidecars. All numbers are finite.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ExposureFacts {
@@ -12,7 +12,7 @@ pub struct ExposureFacts {
     /// Stops of gain, in EV.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gain: Option<f64>,
-    /// What is left dark, in EV.
+    /// Darkness that the exposure did not compensate, in EV.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dark: Option<f64>,
     /// Exposure time, in milliseconds.
@@ -29,7 +29,7 @@ pub struct ExposureFacts {
 }
 
 impl ExposureFacts {
-    /// What is equal in all frames of a walk; `None` if a frame has none.
+    /// The settings that all frames of a walk share; `None` if a frame has none.
     #[must_use]
     pub fn shared(mut all: impl Iterator<Item = Option<Self>>) -> Option<Self> {
         let first = all.next()??;

@@ -1,6 +1,6 @@
 //! Parsers for flags whose values are numbers or words, and the macro `flag_words`.
 //!
-//! An error says which value is expected; the command line adds the name of the flag.
+//! Errors name the expected value; the command line adds the name of the flag.
 
 use std::fmt;
 use std::num::NonZeroUsize;
@@ -16,7 +16,7 @@ const MAX_THREADS: usize = 1024;
 /// Reads a finite number above 0.
 ///
 /// # Errors
-/// The text says which value is expected.
+/// The text names the expected value.
 pub fn positive(text: &str) -> Result<f64, String> {
     let value = text.trim().parse().ok();
     let value = value.filter(|value: &f64| value.is_finite() && *value > 0.0);
@@ -26,7 +26,7 @@ pub fn positive(text: &str) -> Result<f64, String> {
 /// Reads a duration above 0, in seconds.
 ///
 /// # Errors
-/// The text says which value is expected.
+/// The text names the expected value.
 pub fn seconds(text: &str) -> Result<Duration, String> {
     let duration = positive(text)
         .ok()
@@ -38,7 +38,7 @@ pub fn seconds(text: &str) -> Result<Duration, String> {
 /// Reads a number of threads.
 ///
 /// # Errors
-/// The text says which value is expected.
+/// The text names the expected value.
 pub fn threads(text: &str) -> Result<NonZeroUsize, String> {
     let threads = text.trim().parse().ok();
     let threads = threads.filter(|threads: &NonZeroUsize| threads.get() <= MAX_THREADS);

@@ -1,10 +1,10 @@
-//! What is wrong with an image that should be an enhanced one: [`Flaw`].
+//! [`Flaw`]: a reason to distrust an enhanced image.
 
 use serde::{Deserialize, Serialize};
 
 use super::words::words;
 
-/// What is wrong with an enhancer's image of a dark frame, in the order in which it is looked for.
+/// A fault of an enhancer's image of a dark frame, in the order of the checks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Flaw {
@@ -41,7 +41,7 @@ words!(Flaw {
 });
 
 impl Flaw {
-    /// What the flaw is, as it follows "the enhanced images".
+    /// Predicate that describes the flaw, to follow "the enhanced images".
     #[must_use]
     pub fn words(self) -> &'static str {
         match self {

@@ -43,7 +43,7 @@ impl fmt::Display for FrameId {
 /// The endings of the names of image files that are read, in lower case.
 pub const IMAGE_ENDINGS: [&str; 8] = ["png", "jpg", "jpeg", "webp", "tif", "tiff", "bmp", "exr"];
 
-/// Whether the ending of a name is that of an image file that is read, in any case of its letters.
+/// True if the extension, in any case, is that of a supported image format.
 pub fn is_image_ending(ending: &str) -> bool {
     let mut known = IMAGE_ENDINGS.iter();
     known.any(|known| ending.eq_ignore_ascii_case(known))

@@ -37,7 +37,7 @@ pub struct Thumbnail {
 pub struct ObjectCrop {
     /// The box of the thing, in pixels of the frame.
     pub object: PixelBox,
-    /// The thing and some of what is around it, as a `data:` URL.
+    /// Crop of the object and its surroundings, as a `data:` URL.
     pub crop: String,
 }
 

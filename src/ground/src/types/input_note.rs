@@ -1,5 +1,4 @@
-//! What reading a file did to an image besides taking its codes: [`InputNote`]; and the same for all images of a run:
-//! [`InputSummary`].
+//! Changes made to images when their files were read: of one image ([`InputNote`]), and of all images of a run ([`InputSummary`]).
 
 use std::collections::BTreeMap;
 
@@ -11,7 +10,7 @@ use super::frame::FrameId;
 /// Version of the conversion of colours, raised whenever a code changes.
 const COLOUR_VERSION: u32 = 1;
 
-/// What was done to one image when it was read. By default its codes were taken as they are.
+/// Changes made to one image when it was read. By default its codes were used unchanged.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct InputNote {
     /// The EXIF orientation by which the image was turned: 2 to 8.
@@ -20,7 +19,7 @@ pub struct InputNote {
     /// The EXIF orientation by which the image was not turned, because its maps have the size of the image as stored.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub orientation_ignored: Option<u8>,
-    /// The kind of file, as `animated WebP`, if it has several pictures of which the first was read.
+    /// Kind of the file, as `animated WebP`, if it has several pictures; only the first was read.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub first_of: Option<String>,
     /// The colours of the file, if they are not sRGB.
@@ -48,19 +47,19 @@ pub enum DepthNote {
     Light,
 }
 
-/// Colours of a file that are not sRGB, and what was done about them.
+/// Colours of a file that are not sRGB, and their handling.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ColourNote {
-    /// The name of the colours, as `Display P3`: that of their profile or of the standard.
+    /// Name of the colour space, as `Display P3`, from the profile or the standard.
     pub from: String,
     /// The digest of the profile; `None` without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub profile: Option<Digest>,
-    /// What was done.
+    /// How the colours were handled.
     pub handling: ColourHandling,
 }
 
-/// What was done about colours that are not sRGB.
+/// Handling of colours that are not sRGB.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ColourHandling {
@@ -85,7 +84,7 @@ impl InputNote {
         (!parts.is_empty()).then(|| parts.join("; "))
     }
 
-    /// What was done, for messages; empty if nothing was.
+    /// The changes, for messages; empty if there were none.
     fn remarks(&self) -> Vec<(Remark, String)> {
         let mut remarks = Vec::new();
         if let Some(orientation) = self.orientation {
@@ -149,7 +148,7 @@ pub(super) enum Remark {
 }
 
 impl Remark {
-    /// What was done, after "are" or "is".
+    /// The handling as a predicate after "are" or "is".
     fn words(self) -> &'static str {
         match self {
             Self::Turned => "turned as the EXIF orientation of the file states",
@@ -170,7 +169,7 @@ impl Remark {
     }
 }
 
-/// What was done to the images of a command or a run when they were read.
+/// Changes made to the images of a command or a run when they were read.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct InputSummary(BTreeMap<Remark, RemarkCount>);

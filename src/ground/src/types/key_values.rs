@@ -1,6 +1,6 @@
 //! Flags whose value is a list of settings, as `speed=30,angle=0`: [`pairs`] and [`number`].
 //!
-//! An error says what is wrong and what is expected; the command line adds the name of the flag.
+//! Errors name the fault and the expected value; the command line adds the name of the flag.
 
 use std::ops::RangeInclusive;
 

@@ -28,7 +28,7 @@ pub struct KeyedSetting {
     pub value: Option<String>,
 }
 
-/// All keyed flags. A command has those of whose keys it has the flags.
+/// All keyed flags. A command takes those for whose keys it has hidden flags.
 pub const KEYED_FLAGS: [KeyedFlag; 14] = [
     KeyedFlag {
         name: "noise",
@@ -245,7 +245,7 @@ impl KeyedFlag {
         self.keys.iter().any(|(key, _)| key.is_empty())
     }
 
-    /// The settings in a text such as `gain=3,fixed`; `has` says which hidden flags the command has.
+    /// Parses a text such as `gain=3,fixed`; `has` tells which hidden flags the command has.
     ///
     /// A text without any of the keys is the value without a key, whatever commas it has.
     ///

@@ -49,7 +49,7 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Counts of trials, of which those that are stored have `failed` or not.
+    /// Counts the trials; `failed` has one entry for each stored trial.
     #[must_use]
     pub fn new(trials: usize, failed: impl IntoIterator<Item = bool>) -> Self {
         let (mut all, mut failures) = (0, 0);
@@ -89,7 +89,7 @@ pub fn judge_flag(flag: &str) -> String {
     flag.replacen("--", "--judge-", 1)
 }
 
-/// A value of a column with different meanings in two runs: the field that differs, and what it is in each run.
+/// A column value with different meanings in two runs: the field that differs, and its content in each run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ColumnDifference<'a> {
     /// The column, as `model`.
@@ -173,7 +173,7 @@ pub struct PartPlace {
     pub of: usize,
 }
 
-/// What a part of a run does.
+/// Task of one part of a run.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RunPart {
     /// The place of its sources.
@@ -219,13 +219,13 @@ pub struct RunManifest {
     /// How each enhancer was used, by its name; empty in runs of earlier versions.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub enhancers: BTreeMap<String, EnhancerNote>,
-    /// What was done to the images when their files were read; `None` if nothing was.
+    /// Changes made to the images when their files were read; `None` if there were none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inputs: Option<InputSummary>,
     /// The part of an evaluation, as `2/4`; `None` for the whole evaluation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shard: Option<String>,
-    /// What the part does; `None` for the whole evaluation.
+    /// Task of the part; `None` for the whole evaluation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub part: Option<RunPart>,
     /// The settings that change no reply: concurrency, timeouts.

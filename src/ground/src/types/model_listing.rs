@@ -14,16 +14,16 @@ pub struct ListedModel {
     pub group: Option<String>,
 }
 
-/// The models of a report. Their order: those without a group first, then group by group, each as listed. Models that are not listed stand behind
-/// those without a group, by name. Without a list the order is that of the names.
+/// The models of a report, in order: first those without a group, then group by group, each as listed. Unlisted models follow those without
+/// a group, by name. Without a list the order is by name.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ModelListing {
     listed: Vec<ListedModel>,
     /// The groups in the order of their first models.
     groups: Vec<String>,
-    /// How the requests to a model were changed because its server refused what was set, by model.
+    /// Changes to the requests that a server's refusals made necessary, by model.
     adapted: BTreeMap<String, Vec<String>>,
-    /// What is known of each model.
+    /// Facts about each model, for the further columns.
     facts: BTreeMap<(ModelColumn, String), String>,
     /// The further columns of tables.
     columns: Vec<ModelColumn>,
@@ -162,7 +162,7 @@ impl ModelListing {
         &self.columns
     }
 
-    /// What stands in a further column about a model; empty if nothing is known.
+    /// Content of a further column for a model; empty if unknown.
     pub fn fact(&self, column: ModelColumn, model: &str) -> &str {
         let fact = self.facts.get(&(column, model.to_owned()));
         fact.map_or("", String::as_str)
@@ -177,7 +177,7 @@ impl ModelListing {
         }
     }
 
-    /// What the mark means, if one of these models has it.
+    /// Footnote that explains the mark, if one of these models has it.
     pub fn foot<'m>(&self, models: impl IntoIterator<Item = &'m str>) -> Option<String> {
         let mut seen: Vec<&str> = Vec::new();
         let mut notes: Vec<String> = Vec::new();

@@ -1,4 +1,4 @@
-//! What the models of a run are shown: [`StoredViews`], what its manifest says of it.
+//! [`StoredViews`]: the inputs that each model of a stored run was shown, from its manifest.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,23 +11,23 @@ use super::manifest::RunManifest;
 /// The entry of a manifest's settings that holds the views of models which are asked without images.
 const VIEWS: &str = "views of models";
 
-/// What each model is shown, by its name in tables.
+/// Inputs shown to each model, by its name in tables.
 pub type Views = BTreeMap<String, BTreeSet<View>>;
 
-/// How well what a model was shown fits what another one is shown.
+/// How well the inputs of one model match those of another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Fit {
     /// One is shown images alone, and the other one none.
     Apart,
-    /// The manifest does not say it.
+    /// Not recorded in the manifest.
     Unknown,
-    /// One is shown what the other one is, and more.
+    /// One is shown everything that the other one is, and more.
     Part,
     /// The same.
     Whole,
 }
 
-/// What the models of a stored run were shown, as far as its manifest says it.
+/// The inputs that the models of a stored run were shown, as far as its manifest records them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StoredViews {
     known: Views,
@@ -43,7 +43,7 @@ struct Noted {
 }
 
 impl StoredViews {
-    /// What a manifest says.
+    /// Reads the views that a manifest records.
     pub fn from_manifest(manifest: &RunManifest) -> Self {
         let read = |value: &Value| serde_json::from_value::<Views>(value.clone()).ok();
         if let Some(known) = manifest.settings.get(VIEWS).and_then(read) {
@@ -62,12 +62,12 @@ impl StoredViews {
         }
     }
 
-    /// Whether the manifest says it of all models.
+    /// True if the manifest records the views of all models.
     pub fn is_noted(&self) -> bool {
         self.is_whole
     }
 
-    /// How well a stored model fits what a model is shown now.
+    /// Compares the stored inputs of a model with those that a model is shown now.
     pub fn fit(&self, stored: &str, now: &BTreeSet<View>) -> Fit {
         match self.views(stored) {
             None => Fit::Unknown,
@@ -77,7 +77,7 @@ impl StoredViews {
         }
     }
 
-    /// Notes the views in a manifest under the names of now: those of the stored models, each with its new name, and those of the
+    /// Records the views in a manifest under the current names: those of the stored models, each with its new name, and those of the
     /// command.
     pub fn note<'a>(
         &self,

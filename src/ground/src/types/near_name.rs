@@ -1,4 +1,4 @@
-//! Which known name is meant by an unknown one: [`nearest`].
+//! Spelling suggestions for unknown names: [`nearest`].
 
 use strsim::{damerau_levenshtein, jaro_winkler};
 
@@ -14,7 +14,7 @@ pub fn nearest<'a, S: AsRef<str> + 'a>(
     let known = known.into_iter().map(AsRef::as_ref);
     let alike = known.map(|other| (jaro_winkler(&name, &other.to_lowercase()), other));
     let near = alike.filter(|(alike, _)| *alike > ALIKE);
-    // Of equal ones, the minimum is the first, and the maximum the last.
+    // `min_by` returns the first of equal elements, `max_by` the last.
     let nearest = near.min_by(|(a, _), (b, _)| b.total_cmp(a));
     nearest.map(|(_, other)| other)
 }

@@ -1,10 +1,10 @@
-//! What the observer saw of a frame when it answered: [`Observed`].
+//! [`Observed`]: the observer's view of a frame when it answered.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// What the observer saw of a frame, and whether its answer follows from that.
+/// The observer's view of a frame, and whether its answer follows from it.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Observed {
     /// Where the answer comes from.

@@ -1,4 +1,4 @@
-//! What a model held likely besides what it said: [`TokenChances`] of a reply, and [`OptionProbabilities`] of a trial.
+//! Token probabilities of a reply ([`TokenChances`]) and of the choices in a trial ([`OptionProbabilities`]).
 
 use serde::{Deserialize, Serialize};
 
@@ -20,12 +20,12 @@ pub struct TokenPosition {
     pub likeliest: Vec<(String, f64)>,
 }
 
-/// Whether a reply had reasoning before the answer, which has then decided it: the probability of a letter says little.
+/// Whether a reply had reasoning before the answer. If so, the reasoning decided the answer, and a letter's probability tells little.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Thought {
     /// It had.
     Before,
-    /// It had not, as far as the server says.
+    /// No reasoning was reported.
     None,
 }
 

@@ -9,8 +9,8 @@ use super::run_question::RunQuestion;
 pub type PixelBox = [u32; 4];
 
 impl RunQuestion {
-    /// The boxes of the things that its evidence says it is about: of all segments with the word asked about; of all candidates for
-    /// the closest object. None for a question about the whole room, and without evidence.
+    /// Boxes of the objects in the question's evidence: all segments with the word asked about, or all candidates for the closest object.
+    /// Empty for questions about the whole room and for those without evidence.
     #[must_use]
     pub fn outlines(&self) -> Vec<PixelBox> {
         let about = self.evidence.get("about").and_then(Value::as_str);
@@ -40,7 +40,7 @@ impl RunQuestion {
     }
 }
 
-/// A box of evidence; `None` of what is no box.
+/// Parses a box of evidence; `None` if the value is not a box.
 fn pixel_box(value: &Value) -> Option<PixelBox> {
     let numbers: Option<Vec<u32>> = value
         .as_array()?

@@ -76,7 +76,7 @@ impl<'de> Deserialize<'de> for PhotoName {
     }
 }
 
-/// A darkness that each frame has of its own: of its photograph, or that of its photograph made by synthesis.
+/// A darkness that differs by frame: that of its photograph, or of the synthetic image that matches the photograph.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum PairDark {
     /// Synthesis on the frame, with the exposure drop that its photograph has: the kind, and the reading if the kind has readings.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PairFacts {
-    /// What the data state, from exposure time and gain; `None` if they do not.
+    /// Drop in EV from exposure time and gain, as the data state them; `None` if they do not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stated: Option<f64>,
     /// log₂ of the ratio of the mean linear luminances, as measured; `None` if one of the images is black.
@@ -25,13 +25,13 @@ impl PairFacts {
     /// light, 6 EV measure 5.9, 7.5 EV 6.8 and 9 EV 7.3.
     pub const MEASURABLE: f64 = 6.0;
 
-    /// The drop: what the data state, else what was measured; `None` if neither is known.
+    /// The stated drop, or else the measured one; `None` if neither is known.
     #[must_use]
     pub fn ev(&self) -> Option<f64> {
         self.stated.or(self.mean)
     }
 
-    /// The drop by which synthesis darkens the frame to match: what the data state, else the one that makes it as dark.
+    /// The drop with which synthesis matches the photograph: the stated one, or else the one that gives the same darkness.
     #[must_use]
     pub fn matching(&self) -> Option<f64> {
         self.stated.or(self.synthesis)

@@ -110,7 +110,7 @@ impl Choices {
         Self::known_by(texts.into(), Some(truth))
     }
 
-    /// Checks a list of choices of which nobody knows the true one, as [`new`](Self::new) does.
+    /// Checks a list of choices without a known true one, as [`new`](Self::new) does.
     ///
     /// # Errors
     /// [`Error::Data`] at the place `choices`.

@@ -26,7 +26,7 @@ impl<K: PartialEq + Clone, V: Clone> Recent<K, V> {
     /// The value of a key, computed by `make` if it is not cached. Errors are not cached.
     ///
     /// # Errors
-    /// Those of `make`.
+    /// Errors of `make`.
     pub fn get<E>(&self, key: &K, make: impl FnOnce() -> Result<V, E>) -> Result<V, E> {
         let slot = self.slot(key);
         let mut value = slot.lock().unwrap_or_else(PoisonError::into_inner);

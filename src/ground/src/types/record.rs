@@ -1,4 +1,4 @@
-//! The record of a trial: what a model was asked, and the result: [`Record`].
+//! [`Record`]: one trial with its question, model, condition and result.
 
 use std::fmt;
 
@@ -38,10 +38,10 @@ pub struct Record<D> {
     pub via: Via,
     /// The reason why no reply came; `None` if one came.
     pub failure: Option<Failure>,
-    /// The limit of the reply's tokens, if it is larger than that of the run's first call; not in the file otherwise.
+    /// Token limit of the reply if it exceeds that of the run's first call; absent in the file otherwise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_tokens: Option<u32>,
-    /// The tokens that the server charged; `None` if it did not say.
+    /// The tokens that the server charged; `None` if it did not report them.
     pub usage: Option<Usage>,
     /// The model's name in the server's reply.
     pub served_model: Option<String>,
@@ -76,28 +76,28 @@ pub trait StoredDetail: Clone + PartialEq + Serialize + Send {
     /// A complete line of a record file; records are read through this type in one pass.
     type Line: DeserializeOwned + Into<Record<Self>>;
 
-    /// What reports keep of a record, beside what they keep of every record.
+    /// Facts that reports keep in addition to those of every record.
     type Facts: Clone + fmt::Debug + Send + Sync;
 
-    /// What these facts refer to.
+    /// Tables that these facts refer to.
     type Tables: Clone + Default + fmt::Debug + Send + Sync;
 
     /// The schema of a run with these records.
     const SCHEMA: &'static str;
 
-    /// What was asked, whoever was asked.
+    /// The question as asked, independent of the model.
     fn asked(&self) -> AskedParts<'_>;
 
-    /// What reports keep of a record.
+    /// Extracts the facts that reports keep of a record.
     fn keep(record: &Record<Self>, tables: &mut Self::Tables) -> Self::Facts;
 
     /// The same facts, which refer to other tables.
     fn move_facts(facts: &Self::Facts, from: &Self::Tables, to: &mut Self::Tables) -> Self::Facts;
 
-    /// The name of what was shown, if it is not the frame that was asked about.
+    /// Name of the frame or walk that was shown, if it differs from the frame that was asked about.
     fn source_of<'t>(facts: &'t Self::Facts, tables: &'t Self::Tables) -> Option<&'t str>;
 
-    /// The digest of what was sent of it; `None` if nothing was sent, or if that is not known.
+    /// Digest of the images sent; `None` if no image was sent or the digest is unknown.
     fn sent_of(facts: &Self::Facts, tables: &Self::Tables) -> Option<Digest>;
 
     /// The choices in the order shown; empty if the question is open.
@@ -106,10 +106,10 @@ pub trait StoredDetail: Clone + PartialEq + Serialize + Send {
     /// How many times the same question was asked before.
     fn repeat(&self) -> u32;
 
-    /// The name of what was shown: the frame or the walk.
+    /// Name of the frame or walk that was shown.
     fn source(&self) -> &str;
 
-    /// The digest of what was sent of it; `None` if nothing was sent, or if that is not known.
+    /// Digest of the images sent; `None` if no image was sent or the digest is unknown.
     fn shown(&self) -> Option<Digest>;
 }
 
@@ -158,7 +158,7 @@ impl<D> Record<D> {
         self.failure.is_some()
     }
 
-    /// The text of the reply; else that of a refusal, else what the error says.
+    /// Text of the reply, or else of the refusal, or else of the error.
     #[must_use]
     pub fn text_or_error(&self) -> Option<&str> {
         let reply = self.reply.as_deref().filter(|text| !text.is_empty());

@@ -1,4 +1,4 @@
-//! The names of models in the records of a run, where they are not those of its tables: [`RecordedNames`].
+//! [`RecordedNames`]: model names in a run's records that differ from those of its tables.
 
 use std::collections::BTreeMap;
 
@@ -103,7 +103,7 @@ mod tests {
             ("m (before)", "m [1]")
         );
         assert_eq!(names.shown("m [1]"), "m");
-        // Back to what it was, and forth again.
+        // Rename back and forth again.
         moved(&mut names, &[("m (before)", "m"), ("m", "m (before)")]);
         assert_eq!((names.shown("m"), names.recorded("m")), ("m", "m"));
         assert_eq!(names.shown("m [1]"), "m (before)");

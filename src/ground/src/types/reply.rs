@@ -17,7 +17,7 @@ pub enum Finish {
     Filter,
     /// Another reason, in the server's words.
     Other(String),
-    /// The server did not say.
+    /// Not reported by the server.
     Unknown,
 }
 
@@ -38,7 +38,7 @@ impl Finish {
     }
 }
 
-/// The tokens that the server charged for a request; `None` where it did not say.
+/// The tokens that the server charged for a request; `None` where it did not report them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash, Serialize, Deserialize)]
 pub struct Usage {
     /// The number of tokens in the prompt, image included.
@@ -78,15 +78,15 @@ impl Usage {
     }
 }
 
-/// Attempts that were charged and gave no reply, with their tokens; and requests of which the server stated no tokens.
+/// Charged attempts without a reply, with their tokens; and requests for which the server stated no tokens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash, Serialize, Deserialize)]
 pub struct LostAttempts {
     /// The number of attempts.
     pub attempts: u32,
     /// The tokens of all of them.
     pub usage: Usage,
-    /// The requests that may have been charged, without tokens stated by the server; that of the reply is one of them. Not in the
-    /// file if there are none.
+    /// Number of possibly charged requests, that of the reply included, for which the server stated no tokens. Absent in the file if there
+    /// are none.
     #[serde(default, skip_serializing_if = "Unstated::is_none")]
     pub unstated: Unstated,
 }
@@ -157,7 +157,7 @@ pub struct Reply {
     pub refusal: Option<String>,
     /// The reason why the model stopped.
     pub finish: Finish,
-    /// The tokens that the server charged; `None` if it did not say.
+    /// The tokens that the server charged; `None` if it did not report them.
     pub usage: Option<Usage>,
     /// The model's name in the server's reply.
     pub served_model: Option<String>,
@@ -171,7 +171,7 @@ pub struct Reply {
     pub attempts: u32,
     /// The attempts before it that were charged and gave no reply.
     pub lost: LostAttempts,
-    /// What the observer saw; `None` for every other model.
+    /// The observer's view of the frame; `None` for every other model.
     pub observed: Option<Observed>,
     /// The likeliest tokens; `None` if the server was not asked for them or stated none.
     pub chances: Option<TokenChances>,

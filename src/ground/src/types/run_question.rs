@@ -133,7 +133,7 @@ impl RunQuestion {
         self
     }
 
-    /// The digest of what a judge is told of the question: its words and its right answers. The same answer to two such questions has
+    /// Digest of the question as a judge sees it: its words and its right answers. The same answer to two questions with equal digests has
     /// one mark.
     #[must_use]
     pub fn judged_words(&self) -> Digest {

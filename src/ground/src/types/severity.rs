@@ -15,7 +15,7 @@ pub struct Axis {
     pub title: &'static str,
     /// The unit of the quantity, as `EV`.
     pub unit: &'static str,
-    /// What more of the quantity brings, as `darkness`: findings say what it costs.
+    /// Noun for an increase of the quantity, as `darkness`: findings name it as the cause of a loss.
     pub cause: &'static str,
     /// Where there is much of it, as `in the dark`.
     pub place: &'static str,

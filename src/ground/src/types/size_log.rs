@@ -4,8 +4,7 @@ use std::fmt::Write as _;
 
 use serde::{Deserialize, Serialize};
 
-/// Counts of what was done to the sizes of an enhancer's images, and the figures that decided it. An image can be counted as
-/// both padded and tiled.
+/// Counts of the size adaptations of an enhancer's images, and the figures that decided them. An image can count as both padded and tiled.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SizeLog {
     /// Images that were enhanced.
@@ -22,7 +21,7 @@ pub struct SizeLog {
     pub reduced: usize,
     /// Width and height that a side of every run has; `None` for any.
     pub fixed: Option<[Option<usize>; 2]>,
-    /// Number of which sides are multiples; `None` if any will do.
+    /// Sides must be multiples of this many pixels; `None` if any size will do.
     pub multiple: Option<usize>,
     /// Pixels that filled images, as `reflect`; `None` if none was filled.
     pub pad: Option<String>,
@@ -43,7 +42,7 @@ pub struct SizeLog {
 pub struct SeamCounts {
     /// Samples that were compared.
     pub compared: usize,
-    /// Those of them that are nearly black in both tiles, which shows nothing.
+    /// Number of these that are nearly black in both tiles, where a seam cannot be seen.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub black: usize,
     /// Samples that differed.
@@ -100,7 +99,7 @@ impl SizeLog {
         self.seam.most = self.seam.most.max(seam.most);
     }
 
-    /// What was done since an earlier state of this log.
+    /// Difference to an earlier state of this log.
     #[must_use]
     pub fn since(&self, earlier: &Self) -> Self {
         Self {
@@ -122,7 +121,7 @@ impl SizeLog {
         }
     }
 
-    /// What was done, in words, as `12 images: 8 as they are, 4 in tiles of 512 × 512 with 8 px context`.
+    /// Summary in words, as `12 images: 8 as they are, 4 in tiles of 512 × 512 with 8 px context`.
     #[must_use]
     pub fn summary(&self) -> String {
         let mut parts = Vec::new();

@@ -1,4 +1,4 @@
-//! What is wrong with a TOML text, as messages say it: [`TomlFault`].
+//! [`TomlFault`]: a TOML syntax or type error, worded for messages.
 
 use super::near_name::suggestion;
 
@@ -36,7 +36,7 @@ fn meant(message: &str) -> String {
     }
 }
 
-/// That a text needs quotes, if the parser took one for a number or a date: of others it says so itself.
+/// Hint to quote a text that the parser took for a number or a date; other errors carry their own hint.
 fn quotes(message: &str) -> &'static str {
     let is_number = ["invalid fraction", "invalid float", "invalid integer"]
         .iter()

@@ -1,4 +1,4 @@
-//! What becomes of a frame before it is enhanced: [`Treatment`].
+//! [`Treatment`]: the processing of a frame before it is enhanced.
 
 use std::fmt;
 use std::str::FromStr;
@@ -7,12 +7,11 @@ use super::degradation::Degradation;
 use super::pair_dark::PairDark;
 use crate::error::Error;
 
-/// What becomes of a frame before it is enhanced.
+/// Processing of a frame before it is enhanced.
 ///
-/// A photograph in the dark stands here beside the degradations and is none of them: it has a name instead of a kind and a severity,
-/// so no synthesis ever meets one, and no curve, threshold or mean over levels does, which all ask for a [`Degradation`]. A synthetic
-/// image that is as dark as the photograph of its frame is of the same sort, because its exposure drop differs by frame: it is resolved
-/// to a degradation where its frame is known.
+/// A photograph in the dark is not a degradation: it has a name instead of a kind and a severity, so synthesis, curves, thresholds and
+/// means over levels, which all take a [`Degradation`], exclude it by type. The synthetic image that matches a photograph is treated alike,
+/// because its exposure drop differs by frame; it becomes a degradation once its frame is known.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Treatment {
     /// The frame as it is, L0.
@@ -66,7 +65,7 @@ impl FromStr for Treatment {
         if text == "L0" {
             return Ok(Self::Untouched);
         }
-        // A word in lower case is no level; where it is no pair either, the problem is told with the forms of levels.
+        // Levels are in upper case, so a lower-case word is meant as a pair; the error lists the forms of levels too.
         if text.starts_with(|c: char| c.is_ascii_lowercase()) {
             match text.parse::<PairDark>() {
                 Ok(dark) => return Ok(Self::Paired(dark)),

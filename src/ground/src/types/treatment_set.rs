@@ -82,7 +82,7 @@ impl TreatmentSet {
         KindSet::BOTH.into()
     }
 
-    /// The words of the treatments, that of the untouched frame first.
+    /// Names of the treatments; the untouched frame comes first.
     fn words(self) -> Vec<&'static str> {
         let kinds = Kind::ALL.map(Some).into_iter();
         let all = std::iter::once(None).chain(kinds);

@@ -1,4 +1,4 @@
-//! What was asked, whoever was asked: [`AskedItem`].
+//! [`AskedItem`]: a question as asked, independent of the model.
 
 use std::borrow::Cow;
 use std::hash::{Hash, Hasher};
@@ -22,7 +22,7 @@ pub struct AskedItem {
     pub repeat: u32,
 }
 
-/// What a record says of its item, beside the question.
+/// The fields of a record's item, without the question.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct AskedParts<'r> {
     /// The name of the frame or walk.
@@ -38,7 +38,7 @@ pub struct AskedParts<'r> {
 }
 
 impl AskedItem {
-    /// What tells items apart: the question, the order of its choices and the repeat.
+    /// Identity of an item: the question, the order of its choices and the repeat.
     #[must_use]
     pub fn key(&self) -> (&QuestionId, &[String], u32) {
         (&self.question, &self.choices, self.repeat)
@@ -56,7 +56,7 @@ impl AskedItem {
         }
     }
 
-    /// What a record says of this item.
+    /// The item's fields as a record holds them.
     pub(super) fn parts(&self) -> (&QuestionId, AskedParts<'_>) {
         let parts = AskedParts {
             frame: &self.frame.0,

@@ -1,4 +1,4 @@
-//! Who was asked and what was shown: [`AskedModel`]; and how that ended: [`Ending`].
+//! The model, condition and image of a trial ([`AskedModel`]), and how the trial ended ([`Ending`]).
 
 use crate::types::Condition;
 use crate::types::LostAttempts;
@@ -29,6 +29,6 @@ pub(super) struct Ending {
     pub(super) attempts: u32,
     /// The attempts that were charged and gave no reply, or one that was asked again.
     pub(super) lost: LostAttempts,
-    /// The limit of the reply's tokens, if it is larger than that of the run's first call.
+    /// Token limit of the reply if it exceeds that of the run's first call.
     pub(super) max_tokens: Option<u32>,
 }

@@ -1,4 +1,4 @@
-//! What reports keep of a trial with choices: [`ChoiceFacts`], and what these refer to ([`ChoiceTables`]).
+//! [`ChoiceFacts`]: the facts that reports keep of a trial with choices, and the tables that they refer to ([`ChoiceTables`]).
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ use crate::types::{
 /// A number that stands for none.
 const NONE: u32 = u32::MAX;
 
-/// What was read from the reply to a question with choices.
+/// Answers parsed from the reply to a question with choices.
 #[derive(Debug, Clone, Copy)]
 pub struct ChoiceFacts {
     images: u32,
@@ -53,14 +53,14 @@ impl From<Reading> for AnswerReading {
     }
 }
 
-/// What few trials have: what the observer saw, and how likely a model held each choice.
+/// Facts that few trials have: the observer's view, and the model's probability of each choice.
 #[derive(Debug, Clone, Copy)]
 struct More {
     observed: u32,
     options: u32,
 }
 
-/// What the facts of trials with choices refer to.
+/// Tables that the facts of trials with choices refer to.
 #[derive(Debug, Clone, Default)]
 pub struct ChoiceTables {
     images: Values<SentImages>,
@@ -70,7 +70,7 @@ pub struct ChoiceTables {
 }
 
 impl ChoiceTables {
-    /// What reports keep of a record.
+    /// Extracts the facts that reports keep of a record.
     pub fn keep(&mut self, record: &Record<ChoiceDetail>) -> ChoiceFacts {
         let detail = &record.detail;
         let images = SentImages::from_detail(detail);
@@ -126,12 +126,12 @@ impl ChoiceTables {
         (facts.images != NONE).then(|| self.images.get(facts.images))
     }
 
-    /// The frame that was shown, if it is not that of the question.
+    /// The frame that was shown, if it differs from that of the question.
     pub fn shown_frame(&self, facts: ChoiceFacts) -> Option<&FrameId> {
         self.images(facts)?.shown_frame.as_ref()
     }
 
-    /// What the observer saw, without the outlines of single things.
+    /// The observer's view, without the outlines of single objects.
     pub(super) fn observed(&self, facts: ChoiceFacts) -> Option<&Observed> {
         let number = self.more.get(facts.more as usize)?.observed;
         (number != NONE).then(|| self.observed.get(number))
@@ -155,7 +155,7 @@ impl ChoiceFacts {
         self.lenient.map(AnswerReading::from)
     }
 
-    /// The same readings, held against a choice that stands in the place of the truth. Images and what the observer saw are left out.
+    /// The same answers, scored against `reference` instead of the truth. Images and the observer's view are dropped.
     pub(super) fn held_against(self, reference: usize) -> Self {
         let outcome = match self.strict() {
             None => TrialOutcome::Failed,

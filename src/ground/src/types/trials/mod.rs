@@ -1,7 +1,7 @@
 //! The trials of runs as reports need them: [`Trials`], and one of them ([`TrialRef`]).
 //!
-//! What many trials have in common is held once, and the texts of replies stay in the file of the run. So a trial with choices takes
-//! 60 bytes, and 16 more as long as its key is needed.
+//! Facts that many trials share are stored once, and the texts of replies stay in the file of the run. A trial with choices therefore takes
+//! 60 bytes, and 16 more while its key is needed.
 
 mod asked_item;
 mod asked_model;
@@ -35,7 +35,7 @@ use super::{
     ChoiceDetail, Condition, Distinct, Family, Finish, FrameId, LostAttempts, QuestionId, TrialKey,
 };
 
-/// Trials with what they refer to.
+/// Trials with the tables that they refer to.
 #[derive(Debug, Clone)]
 pub struct Trials<D: StoredDetail> {
     facts: Vec<TrialFacts<D::Facts>>,
@@ -50,7 +50,7 @@ pub struct Trials<D: StoredDetail> {
     texts: Texts,
 }
 
-/// Which of two trials of one key is kept.
+/// The trial to keep of two with one key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum KeptTrial {
     /// The one whose text stands first.
@@ -263,7 +263,7 @@ impl<D: StoredDetail> Trials<D> {
         taken
     }
 
-    /// Adds a copy of a trial of other runs; `logs` files stand before those of its run.
+    /// Adds a copy of a trial of other runs; `logs` is the number of log files before those of its run.
     pub fn copy(&mut self, trial: TrialRef<'_, D>, logs: usize) {
         let other = trial.trials();
         let facts = trial.facts();
@@ -303,11 +303,11 @@ impl<D: StoredDetail> Trials<D> {
         item
     }
 
-    /// Keeps one trial of each key. `choose` is asked about each two in the order in which they were added. What was paid for a trial that
-    /// is not kept is added to the one of the same file that is.
+    /// Keeps one trial of each key. `choose` is called for every two, in the order of their addition. The cost of a dropped trial is added
+    /// to the kept one of the same file.
     ///
     /// # Errors
-    /// What `choose` returns.
+    /// Errors of `choose`.
     pub fn each_key_once(
         &mut self,
         mut choose: impl FnMut(TrialRef<'_, D>, TrialRef<'_, D>) -> Result<KeptTrial, Error>,

@@ -1,4 +1,4 @@
-//! What was sent with a question: [`SentImages`].
+//! [`SentImages`]: the images sent with a question.
 
 use std::hash::{Hash, Hasher};
 
@@ -16,7 +16,7 @@ pub struct SentImages {
     pub bytes: u64,
     /// How dark the photograph of the frame is, of images in its darkness.
     pub pair: Option<Box<PairFacts>>,
-    /// The frame that was shown, if it is not that of the question.
+    /// The frame that was shown, if it differs from that of the question.
     pub(super) shown_frame: Option<FrameId>,
 }
 

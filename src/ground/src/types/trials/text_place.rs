@@ -28,7 +28,7 @@ impl TextPlace {
         }
     }
 
-    /// The number of the file among those of all runs.
+    /// Index of the file among those of all runs.
     #[must_use]
     pub fn log(self) -> usize {
         usize::from(self.log)
@@ -40,7 +40,7 @@ impl TextPlace {
         u64::from(self.high) << 32 | u64::from(self.low)
     }
 
-    /// The same place, if this many files stand before those of its run.
+    /// The same place, with the file index raised by the `logs` files before those of its run.
     pub(super) fn after(self, logs: usize) -> Self {
         Self {
             log: self.log + logs as u16,

@@ -1,13 +1,13 @@
-//! What is held of one trial: [`TrialFacts`].
+//! [`TrialFacts`]: one trial as held in memory.
 
 use super::TextPlace;
 use crate::types::small_number::{SmallNumber, Tokens};
 
-/// What is held of one trial beside its key. Numbers are those of the tables of its [`Trials`](super::Trials).
+/// Facts of one trial, without its key. Numbers are indices into the tables of its [`Trials`](super::Trials).
 #[derive(Debug, Clone)]
 pub(super) struct TrialFacts<F> {
     pub(super) text: TextPlace,
-    /// What tells replies apart; see [`reply_digest`].
+    /// Fingerprint that distinguishes replies; see [`reply_digest`].
     pub(super) reply: [u32; 2],
     pub(super) item: u32,
     pub(super) asked: u32,

@@ -65,13 +65,13 @@ impl<'t, D: StoredDetail> TrialRef<'t, D> {
         self.facts().text
     }
 
-    /// What was asked.
+    /// The question as asked.
     #[must_use]
     pub fn item(self) -> &'t AskedItem {
         self.trials.items.get(self.facts().item)
     }
 
-    /// The number of what was asked among [`Trials::items`].
+    /// Index of the item in [`Trials::items`].
     pub fn item_number(self) -> usize {
         self.facts().item as usize
     }
@@ -141,7 +141,7 @@ impl<'t, D: StoredDetail> TrialRef<'t, D> {
         self.facts().reply != [0; 2]
     }
 
-    /// Whether the reply, with its refusal, is that of another trial.
+    /// True if reply and refusal equal those of another trial.
     pub fn has_reply_of(self, other: Self) -> bool {
         self.facts().reply == other.facts().reply
     }
@@ -164,7 +164,7 @@ impl<'t, D: StoredDetail> TrialRef<'t, D> {
         self.ending().provider.as_deref()
     }
 
-    /// The tokens that the server charged; `None` if it did not say.
+    /// The tokens that the server charged; `None` if it did not report them.
     #[must_use]
     pub fn usage(self) -> Option<Usage> {
         self.facts().tokens.usage()
@@ -188,13 +188,13 @@ impl<'t, D: StoredDetail> TrialRef<'t, D> {
         self.ending().lost
     }
 
-    /// The limit of the reply's tokens, if it is larger than that of the run's first call.
+    /// Token limit of the reply if it exceeds that of the run's first call.
     #[must_use]
     pub fn max_tokens(self) -> Option<u32> {
         self.ending().max_tokens
     }
 
-    /// Which of two trials of one key counts, of which `later` was stored later: a failure does not replace a reply.
+    /// The trial that counts of two with one key, where `later` was stored later: a failure does not replace a reply.
     #[must_use]
     pub fn or_later(self, later: Self) -> KeptTrial {
         if later.failed() && !self.failed() {
@@ -204,8 +204,8 @@ impl<'t, D: StoredDetail> TrialRef<'t, D> {
         }
     }
 
-    /// What was paid for this trial besides another of its key, which counts in its place. A reply with the same limit is the same
-    /// reply, read again.
+    /// Cost of this trial in addition to that of `other`, which has the same key and counts in its place. A reply with the same limit is
+    /// the same reply, read again, and costs nothing.
     pub(super) fn paid_besides(self, other: Self) -> LostAttempts {
         let is_asked_again = self.max_tokens() < other.max_tokens();
         let mut paid = LostAttempts::default();
@@ -218,13 +218,13 @@ impl<'t, D: StoredDetail> TrialRef<'t, D> {
         paid
     }
 
-    /// The name of what was shown: the frame or the walk.
+    /// Name of the frame or walk that was shown.
     #[must_use]
     pub fn source(self) -> &'t str {
         D::source_of(&self.facts().facts, &self.trials.tables).unwrap_or(&self.item().frame.0)
     }
 
-    /// The digest of what was sent of it; `None` if nothing was sent, or if that is not known.
+    /// Digest of the images sent; `None` if no image was sent or the digest is unknown.
     #[must_use]
     pub fn sent(self) -> Option<Digest> {
         D::sent_of(&self.facts().facts, &self.trials.tables)
@@ -286,7 +286,7 @@ impl<'t> TrialRef<'t, ChoiceDetail> {
         other.unwrap_or(self.frame())
     }
 
-    /// What the observer saw, without the outlines of single things.
+    /// The observer's view, without the outlines of single objects.
     #[must_use]
     pub fn observed(self) -> Option<&'t Observed> {
         self.trials.tables.observed(self.facts().facts)
