@@ -42,7 +42,7 @@ pub enum AppliedDegradation {
 }
 
 impl AppliedDegradation {
-    /// What a degradation does to a frame. `synthesis` is the content of its light reading; a kind without readings has its sensor.
+    /// Resolves a degradation for a frame. `synthesis` is the content of its light reading; a kind without readings uses only its sensor.
     ///
     /// # Errors
     /// If the sensor lacks the gain of an automatic exposure, or the picture would move too far.
@@ -79,7 +79,7 @@ impl AppliedDegradation {
         })
     }
 
-    /// What the camera did, for records and files; `None` for a kind that leaves it open.
+    /// Camera settings of the exposure, for records and files; `None` for a kind without them.
     #[must_use]
     pub fn exposure(&self) -> Option<ExposureFacts> {
         let (shot, time, streak) = match self {

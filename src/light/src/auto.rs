@@ -1,9 +1,9 @@
 //! An exposure drop as a camera with automatic exposure meets it: [`AutoExposure`] and its answer, [`AutoShot`].
 //!
-//! The scene is ΔEV darker. The camera opens its shutter s stops longer, adds g stops of gain, and leaves d = ΔEV − s − g dark. So
-//! the photons fall by 2^−(ΔEV − s), the picture by 2^−d, and the longer exposure blurs it if the camera turns. What the sensor
-//! adds is the light reading `physical` at the drop d, with the gain K = K₀ · 2^g and the ratio r = 2^d. The shot noise of a sample y
-//! then has the relative variance K · r / y = K₀ · 2^(ΔEV − s) / y, whatever is gain and whatever stays dark.
+//! The scene is ΔEV darker. The camera opens its shutter s stops longer, adds g stops of gain, and leaves d = ΔEV − s − g dark. So the
+//! photons fall by 2^−(ΔEV − s), the picture by 2^−d, and the longer exposure blurs it if the camera turns. The sensor adds the noise of
+//! the light reading `physical` at the drop d, with the gain K = K₀ · 2^g and the ratio r = 2^d. The shot noise of a sample y then has the
+//! relative variance K · r / y = K₀ · 2^(ΔEV − s) / y, however the rest is divided between gain and darkness.
 
 use std::fmt;
 use std::str::FromStr;
@@ -34,7 +34,7 @@ pub struct AutoExposure {
 /// Most stops of gain by default, where noise reduction would take over; chosen.
 const MOST_GAIN: f64 = 4.0;
 
-/// The same as the user writes it (`--auto`). What is not named of the gain follows from the camera.
+/// The settings as the user writes them (`--auto`). Gain settings that are not given follow from the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AutoSettings {
     shutter: f64,
@@ -56,8 +56,8 @@ impl Default for AutoSettings {
 }
 
 impl AutoSettings {
-    /// The settings for a camera. The gain that is not named ends at the camera's greatest K, [`MOST_GAIN`] stops above K₀ if the camera
-    /// has so many.
+    /// The settings for a camera. If the gain is not given, it ends at the camera's greatest K, [`MOST_GAIN`] stops above K₀ if the
+    /// camera's range is that large.
     #[must_use]
     pub fn for_camera(&self, camera: &CameraModel) -> AutoExposure {
         let [low, high] = camera.gain_range();
@@ -75,7 +75,7 @@ impl AutoSettings {
 }
 
 impl Default for AutoExposure {
-    /// That of the paper's camera.
+    /// Settings for the paper's camera.
     fn default() -> Self {
         AutoSettings::default().for_camera(&CameraModel::default())
     }
@@ -88,7 +88,7 @@ pub struct AutoShot {
     pub shutter: f64,
     /// Stops of gain, in EV.
     pub gain: f64,
-    /// What is left dark, in EV.
+    /// Darkness that the exposure does not compensate, in EV.
     pub dark: f64,
     /// Exposure time, in seconds.
     pub time: f64,
@@ -146,7 +146,7 @@ impl AutoShot {
 impl FromStr for AutoSettings {
     type Err = String;
 
-    /// Reads `shutter=2,gain=4,base-gain=0.375,base-time=1/120`; what is not named is as by default.
+    /// Parses `shutter=2,gain=4,base-gain=0.375,base-time=1/120`; missing keys keep their defaults.
     fn from_str(text: &str) -> Result<Self, String> {
         let mut auto = Self::default();
         for (key, value) in pairs(text, &["shutter", "gain", "base-gain", "base-time"])? {
@@ -185,7 +185,7 @@ fn seconds(value: &str) -> Result<f64, String> {
 }
 
 impl fmt::Display for AutoSettings {
-    /// What is named, as it is read.
+    /// Writes the given settings in the form that is parsed.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "shutter={},", self.shutter)?;
         for (key, value) in [("gain", self.gain), ("base-gain", self.base_gain)] {

@@ -137,7 +137,7 @@ impl Blur {
         let margin = reach.unwrap_or_default();
         let (height, width) = (clean.height(), clean.width());
         let stride = 3 * (width + 2 * margin);
-        // Whole lanes are read, of which the last ones are beyond the row.
+        // Whole lanes are read; the last of them extend beyond the row.
         let mut light = vec![0.0; height * stride + 2 * LANES];
         let rows = light[..height * stride].par_chunks_mut(stride).enumerate();
         rows.for_each(|(row, padded)| {

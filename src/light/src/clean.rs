@@ -9,7 +9,7 @@ pub enum Clean<'a> {
     Codes(&'a Rgb),
     /// 16-bit sRGB codes.
     Codes16(&'a Codes16),
-    /// Light as a display shows it, of which codes are the power 1/2.2; above 1 it counts as 1. It is not rounded to codes.
+    /// Light as a display shows it; codes are its power 1/2.2. Above 1 it counts as 1. It is not rounded to codes.
     Light(&'a Light),
     /// Light in front of the camera, which no tone curve has changed. It may be more than 1, the light of white.
     Scene(&'a Light),

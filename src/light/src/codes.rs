@@ -20,14 +20,14 @@ pub(crate) fn encode(light: &[f32], codes: &mut [u8], isa: Isa) {
     isa.run(Encode { light, codes });
 }
 
-/// Pieces per octave of light, a power of two: so many that no piece has more than one edge between two codes.
+/// Pieces per octave of light, a power of two, large enough that no piece has more than one edge between two codes.
 const PIECES: usize = 128;
 /// Low bits of a single-precision number that give its position within a piece.
 const WITHIN: u32 = 23 - PIECES.ilog2();
 /// Octaves from 2⁻²⁰ to 1, which has its own. The edge between the codes 0 and 1 is the light 1.16 · 2⁻²⁰.
 const OCTAVES: usize = 21;
 
-/// The first light of the table, 2⁻²⁰; what is darker has its code, 0.
+/// The first light of the table, 2⁻²⁰; darker light has the same code, 0.
 const DARKEST: f32 = 1.0 / 1_048_576.0;
 
 /// The codes of light by pieces of equal width in each octave.

@@ -1,4 +1,4 @@
-//! What the choices cost that the paper does not state: the figures of the table in `src/docs/method.md`, measured.
+//! Effect of the choices that the paper does not state: the figures of the table in `src/docs/method.md`, measured.
 //!
 //! The camera is the middle of its ranges (K 0.7746, r 200, brightness gain 1.25), the frame a flat grey.
 
@@ -205,7 +205,7 @@ fn the_effects_of_the_departures_are_measured() {
     assert!(off.is_empty(), "\n{}", off.join("\n"));
 }
 
-/// One draw for each sensor row, as the test of the table computes it, is what the pipeline adds.
+/// The table's test draws one number for each sensor row, as the pipeline does.
 #[test]
 fn row_noise_is_drawn_for_each_sensor_row() {
     let pipeline = deviation(raw(128, Amplify::All, &[Term::Row]));

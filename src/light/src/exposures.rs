@@ -231,7 +231,7 @@ mod tests {
         }
     }
 
-    /// Common random numbers: what is drawn for a frame is the same in every kind, and a random direction moves no other draw.
+    /// Common random numbers: the draws for a frame are the same in every kind, and a random direction moves no other draw.
     #[test]
     fn draws_are_those_of_the_noise_variant() {
         let state = |how: &str, motion: &str| -> CameraState {

@@ -54,7 +54,7 @@ impl Default for Motion {
 impl Motion {
     /// The path of a frame's middle during an exposure of this many seconds: its length is focal length · angular speed · time.
     ///
-    /// It is exact for a small turn to the side in the middle of the picture. The same path is taken for the whole picture.
+    /// Exact for a small turn to the side in the middle of the picture; used as an approximation for the whole picture.
     ///
     /// # Errors
     /// If it is longer than 256 pixels.
@@ -77,7 +77,7 @@ impl Motion {
 impl FromStr for Motion {
     type Err = String;
 
-    /// Reads `speed=30,hfov=79,angle=0`; what is not named is as by default.
+    /// Parses `speed=30,hfov=79,angle=0`; missing keys keep their defaults.
     fn from_str(text: &str) -> Result<Self, String> {
         let mut motion = Self::default();
         for (key, value) in pairs(text, &["speed", "hfov", "angle"])? {

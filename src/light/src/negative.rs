@@ -238,9 +238,9 @@ impl Capture {
         }
     }
 
-    /// The same exposure, ready for a clean frame. Codes end at white, and so does the sensor. For light in front of the camera the
-    /// sensor saturates this many EV above white, and the tone curve before the drop is left out: it undoes what the
-    /// inverse tone curve does to codes, and light has none.
+    /// The same exposure, prepared for a clean frame. Codes end at white, and so does the sensor. For linear light the sensor saturates
+    /// `headroom_ev` EV above white, and the tone curve before the drop is left out: it undoes the inverse tone curve of codes, and linear
+    /// light has none.
     fn for_clean(self, clean: Clean<'_>, headroom_ev: f64) -> Self {
         if !matches!(clean, Clean::Scene(_)) {
             return self;

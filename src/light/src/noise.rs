@@ -66,10 +66,10 @@ pub fn read(adu: &mut Lanes<f32>, scale: f32, shape: &Quantile, offset: f32, wor
     }
 }
 
-/// Row noise: one number of N(0, σ_r²) for a whole sensor row, that is for both of its planes (Wei et al. 2021).
+/// Row noise: one number of N(0, σ_r²) for a whole sensor row, that is, for both of its planes (Wei et al. 2021).
 ///
-/// The paper writes "each row" of a RAW image of H/2 × W/2 × 4 samples. Circuits read out rows of the sensor, two of which are one
-/// such row, so each has its own number.
+/// The paper writes "each row" of a RAW image of H/2 × W/2 × 4 samples. Circuits read out rows of the sensor; one row of the RAW image has
+/// two of them, each with its own number.
 #[must_use]
 pub fn row(deviation: f64, stream: Stream, row: usize) -> f32 {
     (deviation * stream.at(Site::new(row, 0)).normal()) as f32

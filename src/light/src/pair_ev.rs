@@ -101,7 +101,7 @@ mod tests {
         Rgb::new(96, 128, samples.collect()).unwrap()
     }
 
-    /// The image with so many EV less light, rounded to 8 bits with a dither, so that dark codes keep their mean.
+    /// The image with `ev` EV less light, rounded to 8 bits with a dither, so that dark codes keep their mean.
     fn darker(image: &Rgb, ev: f64) -> Rgb {
         let mut dark = image.clone();
         for (place, code) in dark.samples_mut().iter_mut().enumerate() {

@@ -206,7 +206,7 @@ impl LightSettings {
         Ok(light)
     }
 
-    /// Refuses synthetic images that are as dark as photographs, because there are none; `why` says why.
+    /// Refuses synthetic images that match photographs, because there are no photographs; `why` gives the reason.
     ///
     /// # Errors
     /// If `--levels` has `match`.
@@ -260,7 +260,7 @@ impl KindSettings {
         })
     }
 
-    /// What a degradation does to a frame.
+    /// Resolves a degradation for a frame.
     ///
     /// # Errors
     /// If the light reading is not among those of `--profile`, the sensor lacks the gain of an automatic exposure, or the picture would

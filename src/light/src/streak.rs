@@ -15,7 +15,7 @@ use darkqa_ground::error::{Error, Result};
 /// in 1/7.5 s), and a picture that moves farther shows little but streaks.
 pub(super) const LONGEST: f64 = 256.0;
 
-/// Smallest weight that counts, and smallest extent of a path along an axis: what is below is an error of rounding.
+/// Smallest weight that counts, and smallest extent of a path along an axis; smaller values are rounding errors.
 const LEAST: f64 = 1e-12;
 
 /// The straight path of a picture's middle during an exposure, centred on the pixel.

@@ -114,7 +114,7 @@ impl Undoing for Scene {
 /// Light of each displayed light in front of the camera.
 static UNTONED: LazyLock<Untoned> = LazyLock::new(Untoned::new);
 
-/// Smallest light, and smallest distance from white, that is not taken for black or white: 2⁻³¹.
+/// Smallest light, and smallest distance from white, that is distinguished from black or white: 2⁻³¹.
 const LEAST: f32 = 1.0 / 2_147_483_648.0;
 
 /// The light in front of the camera as a function of displayed light: that of the codes, for any light in [0, 1].
@@ -425,7 +425,7 @@ mod tests {
             let expected = curve::gamma_expand(curve::inverse_smoothstep(display));
             let found = curve.light(at);
             let off = (f64::from(found) - expected).abs();
-            // What is below the least light is black.
+            // Light below the smallest one is black.
             assert!(
                 at <= 2.0 * LEAST || off < 1e-7 + 4e-6 * expected,
                 "{at}: {off}"

@@ -53,7 +53,7 @@ pub struct LogFit {
     pub deviation: f64,
 }
 
-/// Measurements at one gain, of which one shape and one set of offsets are drawn.
+/// Measurements at one gain. Synthesis draws one shape and one set of offsets of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GainStep {
