@@ -1,9 +1,8 @@
 //! The light that reaches a point: [`Lighting`].
 //!
-//! Direct light comes from lamps and windows; each is sampled with a shadow ray. Indirect light comes from other things:
-//! rays over the half-space (cosine-weighted) return the colour of what they hit, lit by one light each, plus a constant
-//! ambient light. So the first bounce is sampled and later bounces are averaged. This gives soft shadows, dark corners and
-//! colour bleeding, but no caustics.
+//! Direct light comes from lamps and windows; each is sampled with a shadow ray. Indirect light comes from other surfaces: rays over the
+//! half-space (cosine-weighted) return the colour of the surface that they hit, lit by one light each, plus a constant ambient light. So
+//! the first bounce is sampled and later bounces are averaged. This gives soft shadows, dark corners and colour bleeding, but no caustics.
 
 use glam::{Vec3, vec3};
 

@@ -173,7 +173,7 @@ impl<'a> LightGrid<'a> {
         }
     }
 
-    /// The typical brightness of the light that reaches what is in the view.
+    /// Typical brightness of the light that reaches the objects in view.
     pub(super) fn typical(&self) -> f32 {
         self.typical
     }

@@ -1,4 +1,4 @@
-//! Doors and windows of a room, and what is seen through an open door.
+//! Doors and windows of a room, and the view through an open door.
 
 use glam::vec3;
 

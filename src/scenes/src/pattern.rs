@@ -191,7 +191,7 @@ impl PatternPoint {
 }
 
 impl Pattern {
-    /// What becomes of a colour at a point with a surface normal, both in the coordinates of the thing. `pixel` is the width of a
+    /// Applies the pattern to a colour at a point with a surface normal, both in the coordinates of the object. `pixel` is the width of a
     /// pixel there, in metres.
     pub(super) fn color(self, color: Vec3, place: Vec3, normal: Vec3, pixel: f32) -> Vec3 {
         let point = PatternPoint {

@@ -107,7 +107,7 @@ pub(super) fn render(scene: &Scene, tree: &Bvh, camera: &Camera, shown: RoomLigh
     }
 }
 
-/// What the ray through the middle of each pixel meets.
+/// The first surface point on the ray through the middle of each pixel.
 fn spots(scene: &Scene, tree: &Bvh, camera: &Camera) -> Vec<Option<Spot>> {
     let [width, height] = camera.size;
     let places = (0..width * height).into_par_iter().with_min_len(width);

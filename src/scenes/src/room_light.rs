@@ -1,10 +1,10 @@
-//! What the pixels of the built-in rooms are: [`RoomLight`].
+//! [`RoomLight`]: encoding of the pixels of the built-in rooms.
 
 use clap::ValueEnum;
 
 use darkqa_ground::types::flag::flag_words;
 
-/// What the pixels of the rooms are.
+/// Encoding of the pixels of the rooms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum RoomLight {
     /// 8-bit codes of a display, with highlights compressed

@@ -168,9 +168,8 @@ impl Scene {
         });
     }
 
-    /// The radiance of each thing that is a source of light: of a window that of the daylight, and of a lamp that of its shade. The
-    /// flux of a bulb, 4π²r² times its radiance, leaves through the shade, which is taken for a Lambertian surface: π times its
-    /// area times its radiance.
+    /// Radiance of each light source: of a window that of the daylight, and of a lamp that of its shade. The flux of a bulb, 4π²r² times
+    /// its radiance, leaves through the shade, which is modelled as a Lambertian surface: π times its area times its radiance.
     pub(super) fn radiances(&self) -> Vec<Option<Vec3>> {
         let mut areas = vec![0.0_f32; self.things.len()];
         for (place, (face, owner)) in self.mesh.faces.iter().zip(&self.owners).enumerate() {

@@ -54,7 +54,7 @@ pub(super) const THICK: f32 = 0.1;
 #[derive(Debug)]
 pub(super) struct Shell {
     pub(super) walls: [Surface; 4],
-    /// What covers the lower part of all walls up to a height, if anything does.
+    /// Covering of the lower part of all walls, with its height in metres; `None` for a uniform wall.
     pub(super) lower: Option<(Surface, f32)>,
     pub(super) skirting: Surface,
     /// The doorways: their wall, their two sides along it, and their height.

@@ -43,7 +43,7 @@ impl Spot {
         Some(Self::new(scene, ray, hit))
     }
 
-    /// The first point that a ray hits; for a mirror, with the colour of what is seen in it.
+    /// The first point that a ray hits; a mirror takes the colour of its reflection.
     pub(super) fn through_mirror(scene: &Scene, tree: &Bvh, ray: &Ray) -> Option<Self> {
         let hit = tree.first(ray, FAR)?;
         let spot = Self::new(scene, ray, hit);

@@ -1,7 +1,7 @@
-//! Pieces that a table describes: [`piece`], by name, and [`found`], by the place where such things lie.
+//! Pieces that a table describes: [`piece`], by name, and [`found`], by the place where such things are found.
 //!
-//! `parts.txt` has the small things of a house, lamps and other furniture of a fixed form, so that a new thing is some lines of
-//! text. The head of the table says how a line is written.
+//! `parts.txt` lists small objects, lamps and other furniture of a fixed form; a new object is a few lines of text. The head of the table
+//! documents the format.
 
 use std::sync::LazyLock;
 
