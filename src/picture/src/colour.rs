@@ -1,7 +1,7 @@
-//! What the codes of an image mean by the colour information of its file: [`ColourTag`], and [`Meaning`].
+//! Colour space of an image's codes by the colour information of its file: [`ColourTag`] and [`Meaning`].
 //!
-//! The first of these counts, as PNG's specification says (third edition, section 4.3): code points (`cICP`), an ICC profile, the mark
-//! `sRGB`, and gamma with primaries (`gAMA`, `cHRM`). Without any, codes are sRGB. Other formats have profiles alone.
+//! The first of these counts, as in PNG's specification (third edition, section 4.3): code points (`cICP`), an ICC profile, the mark
+//! `sRGB`, and gamma with primaries (`gAMA`, `cHRM`). Without any, codes are sRGB. Other formats have only profiles.
 
 mod conversion;
 mod curve;
@@ -28,7 +28,7 @@ const MOST_PROFILE: usize = 4 << 20;
 /// The number of profiles whose conversions are cached. The images of a data set mostly have one.
 const CACHED: usize = 16;
 
-/// What to do with colours that are not converted.
+/// Remedy for colours that cannot be converted.
 const REMEDY: &str =
     "convert it to sRGB first, or take its codes as sRGB with --decode colour=ignore";
 
@@ -99,7 +99,7 @@ impl ColourSpace {
         Ok(())
     }
 
-    /// What is noted of images with these colours, that are converted or not.
+    /// Note for images with these colours and this handling.
     pub(super) fn note(&self, handling: ColourHandling) -> ColourNote {
         ColourNote {
             from: self.name.clone(),
@@ -113,7 +113,7 @@ impl ColourTag {
     /// The meaning of the codes.
     ///
     /// # Errors
-    /// If it cannot be known, or the colours cannot be converted. The error names them, and says what to do.
+    /// If the colour space is unknown or cannot be converted. The error names the colours and the remedy.
     pub(super) fn meaning(&self, depth: CodeDepth) -> Result<Meaning, String> {
         match self {
             Self::None | Self::Srgb => Ok(Meaning::Srgb),

@@ -1,8 +1,8 @@
 //! Two-dimensional arrays in HDF5 files, as h5py writes them: [`Hdf5Array`].
 //!
-//! Read is what the library writes by default (HDF5 File Format Specification, version 3.0): superblocks 0 and 1, groups as symbol
-//! tables, object headers of version 1, integers and floats, arrays in one piece or in chunks, with the filters deflate, shuffle and
-//! fletcher32. Files of `libver="latest"` are refused by name.
+//! Supports the library's default output (HDF5 File Format Specification, version 3.0): superblocks 0 and 1, groups as symbol tables,
+//! object headers of version 1, integers and floats, arrays in one piece or in chunks, with the filters deflate, shuffle and fletcher32.
+//! Files of `libver="latest"` are refused by name.
 
 use std::io::Read as _;
 
@@ -27,10 +27,10 @@ pub struct Hdf5Array {
 }
 
 impl Hdf5Array {
-    /// Reads the array of this name in the root group; the only one if there is none of the name.
+    /// Reads the array of this name in the root group; if there is none, the only array of the group.
     ///
     /// # Errors
-    /// If the file is broken, or holds something else. The error says what.
+    /// If the file is broken, or holds anything else. The error names the fault.
     pub fn parse(file: &[u8], name: &str) -> Result<Self, String> {
         let file = Bytes(file);
         let root = file.root()?;
@@ -456,7 +456,7 @@ fn inflated(bytes: &[u8], most: usize) -> Result<Vec<u8>, String> {
     Ok(whole)
 }
 
-/// The numbers of which all first bytes stand first, then all second ones.
+/// Reverses the shuffle filter: the input has the first bytes of all numbers, then all second bytes, and so on.
 fn unshuffled(bytes: &[u8], width: usize) -> Vec<u8> {
     let count = bytes.len() / width;
     let numbers =

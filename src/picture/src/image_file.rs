@@ -139,7 +139,7 @@ impl ImageFile {
         }
     }
 
-    /// What reading the file does besides taking its codes.
+    /// Changes that reading makes to the image.
     #[must_use]
     pub fn note(&self) -> InputNote {
         let facts = self.facts();
@@ -166,7 +166,7 @@ impl ImageFile {
         }
     }
 
-    /// What is done about the colours of the file; `None` if they are sRGB, or cannot be shown.
+    /// Handling of the file's colours; `None` if they are sRGB, or cannot be converted.
     fn colour_note(&self, facts: &FileFacts) -> Option<ColourNote> {
         let FileFacts { colour, depth, .. } = facts;
         if facts.inks.is_some() {
@@ -188,7 +188,7 @@ impl ImageFile {
         }
     }
 
-    /// What the samples of the file are, by its colour information and by the rule.
+    /// Interpretation of the file's samples, by its colour information and by the rule.
     ///
     /// # Errors
     /// If it cannot be known, or the two contradict each other.
@@ -363,7 +363,7 @@ impl ImageFile {
         Ok(Pixels::Light(self.rule.scaled(light)))
     }
 
-    /// What the samples are, after a check that an image with colours has no profile of grey.
+    /// Interpretation of the samples, after a check that a colour image has no grey profile.
     fn samples_of(&self, is_grey: bool) -> Result<Samples> {
         let samples = self.samples(self.facts()).and_then(|samples| {
             if let Samples::Codes(Some(space)) = &samples {
@@ -436,7 +436,7 @@ impl ImageFile {
     }
 }
 
-/// What the samples of a file are, and the colours from which they are converted.
+/// Interpretation of a file's samples, and the colours from which they are converted.
 enum Samples {
     /// Codes, which are sRGB after the conversion.
     Codes(Option<Arc<ColourSpace>>),

@@ -39,8 +39,8 @@ impl Payload {
         Ok(Self::from_file(file, (width, height), format))
     }
 
-    /// The bytes of a PNG file, without decoding or encoding. The file must have plain 8-bit RGB, and nothing that changes how it
-    /// is shown or says more than its pixels. `None` for every other file.
+    /// The bytes of a PNG file, without decoding or encoding. The file must have plain 8-bit RGB, and no chunk that changes its display or
+    /// adds information. `None` for every other file.
     ///
     /// The file is not checked for damage: it must have been decoded before.
     #[must_use]
@@ -75,7 +75,7 @@ impl Payload {
         self
     }
 
-    /// The image with what the camera did for it.
+    /// The image, with the camera settings of its exposure.
     #[must_use]
     pub fn exposed_by(mut self, exposure: Option<ExposureFacts>) -> Self {
         self.facts.exposure = exposure;

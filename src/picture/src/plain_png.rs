@@ -28,7 +28,7 @@ pub(super) fn size(file: &[u8]) -> Option<(u32, u32)> {
     }
 }
 
-/// Width and height in pixels, if the header says 8-bit RGB without interlacing.
+/// Width and height in pixels, if the header states 8-bit RGB without interlacing.
 fn plain_header(header: &[u8]) -> Option<(u32, u32)> {
     let (width, rest) = header.split_first_chunk::<4>()?;
     let (height, rest) = rest.split_first_chunk::<4>()?;

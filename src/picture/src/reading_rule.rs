@@ -18,9 +18,9 @@ const MOST_ASPECT: usize = 1000;
 pub struct ReadingRule {
     /// The maximum number of pixels. A larger image is refused before it is decompressed.
     pub most_pixels: u64,
-    /// What is done about colours that are not sRGB.
+    /// Handling of colours that are not sRGB.
     pub colour: ColourRule,
-    /// What the samples of 16-bit PNG and TIFF images are.
+    /// Interpretation of the samples of 16-bit PNG and TIFF images.
     pub transfer: Transfer,
     /// By how many EV linear light is scaled when it is read.
     pub exposure_ev: Option<f32>,
@@ -58,7 +58,7 @@ impl ReadingRule {
         Ok(())
     }
 
-    /// What reading does to an image besides its colours and its orientation: of light, or of codes of 8 bits.
+    /// Changes that reading makes to an image, other than those of colours and orientation. `is_light` tells linear light from 8-bit codes.
     #[must_use]
     pub fn note_of(&self, is_light: bool) -> InputNote {
         InputNote {
@@ -97,7 +97,7 @@ impl ReadingRule {
     }
 }
 
-/// What the samples of 16-bit images are.
+/// Interpretation of the samples of 16-bit images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum Transfer {
     /// Codes of sRGB
@@ -107,7 +107,7 @@ pub enum Transfer {
     Linear,
 }
 
-/// What is done about images whose file states other colours than sRGB.
+/// Handling of images whose file states other colours than sRGB.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum ColourRule {
     /// Convert them to sRGB

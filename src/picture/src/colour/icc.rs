@@ -162,7 +162,7 @@ fn name(profile: &ColorProfile) -> String {
     }
 }
 
-/// A text without what is not printed, cut to [`LONGEST`] letters.
+/// The printable characters of a text, cut to [`LONGEST`] letters.
 fn readable(text: &str) -> String {
     let printed = text.chars().filter(|letter| !letter.is_control());
     let text: String = printed.take(LONGEST).collect();

@@ -26,7 +26,7 @@ pub(crate) struct Primaries {
 }
 
 impl Primaries {
-    /// Those of sRGB and BT.709 (IEC 61966-2-1).
+    /// Primaries of sRGB and BT.709 (IEC 61966-2-1).
     pub(crate) const SRGB: Self = Self {
         red: [0.64, 0.33],
         green: [0.30, 0.60],
@@ -34,7 +34,7 @@ impl Primaries {
         white: [0.3127, 0.3290],
     };
 
-    /// Those of Display P3 (SMPTE EG 432-1).
+    /// Primaries of Display P3 (SMPTE EG 432-1).
     pub(super) const DISPLAY_P3: Self = Self {
         red: [0.680, 0.320],
         green: [0.265, 0.690],

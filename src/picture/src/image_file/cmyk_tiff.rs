@@ -6,7 +6,7 @@ use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::{ColorType, TiffError};
 
 /// The amounts of cyan, magenta, yellow and black of each pixel, row by row, 0 for none and 255 for full (TIFF 6.0, section 16), of an
-/// image of so many pixels.
+/// image with `pixels` pixels.
 ///
 /// # Errors
 /// If the file is broken, or compressed in a way that is not read.

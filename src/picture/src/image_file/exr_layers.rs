@@ -17,7 +17,7 @@ pub(super) const SIGNATURE: &[u8] = b"\x76\x2F\x31\x01";
 /// The names of the channels of colour.
 const CHANNELS: [&str; 3] = ["R", "G", "B"];
 
-/// The most negative light that is taken for black: filters leave such values at edges (chosen).
+/// The most negative light that counts as black: filters leave such values at edges (chosen).
 const LEAST: f32 = -1e-3;
 
 /// How far primaries may be away from those of BT.709; files state them with six digits (chosen).

@@ -1,4 +1,4 @@
-//! The facts of an image file beside its pixels: [`FileFacts`]; what cannot be shown, and what is cut or damaged.
+//! [`FileFacts`]: the properties of an image file other than its pixels; unsupported, cut and damaged files.
 
 use image::metadata::Orientation;
 
@@ -17,7 +17,7 @@ use darkqa_ground::files::guarded::guarded;
 pub(super) struct FileFacts {
     /// The orientation that the file states; no turn if it states none, or none of the eight values.
     pub(super) orientation: Orientation,
-    /// The kind of file, if it has several pictures of which the first is read.
+    /// Kind of the file, if it has several pictures; only the first is read.
     pub(super) first_of: Option<&'static str>,
     pub(super) colour: ColourTag,
     pub(super) depth: Depth,
@@ -173,7 +173,7 @@ pub(super) fn fault(file: &[u8], format: FileFormat, facts: &FileFacts) -> Optio
             let length = u64::from(length.map_or(0, u32::from_le_bytes));
             (length > file.len() as u64).then(|| short(length))
         }
-        // Its reader names what is missing.
+        // The OpenEXR reader names the missing part.
         FileFormat::OpenExr => None,
     }
 }

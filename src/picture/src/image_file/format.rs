@@ -22,7 +22,7 @@ pub enum FileFormat {
 /// The names of the formats that are read, for messages.
 pub const READ: &str = "PNG, JPEG, WebP, TIFF, BMP or OpenEXR";
 
-/// What to do with images of formats that are not read.
+/// Remedy for images in unsupported formats.
 const CONVERT: &str = "convert it to PNG, TIFF or JPEG first";
 const DEVELOP: &str = "develop it to a 16-bit TIFF or PNG first";
 
@@ -64,7 +64,7 @@ impl FileFormat {
     /// The format of a file with these bytes.
     ///
     /// # Errors
-    /// If it is not one that is read. The error names the format if it is known, and says what to do.
+    /// If the format is not supported. The error names it, if known, and the remedy.
     pub fn detect(file: &[u8]) -> Result<Self, String> {
         let has =
             |at: usize, mark: &[u8]| file.get(at..).is_some_and(|rest| rest.starts_with(mark));

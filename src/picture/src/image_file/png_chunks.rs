@@ -20,7 +20,7 @@ pub(super) struct PngOutline<'a> {
     pub(super) colour: ColourTag,
 }
 
-/// What is wrong with the chunks of a file.
+/// Fault in the chunks of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum PngFault {
     /// The file ends before the last chunk does.
@@ -106,7 +106,7 @@ pub(super) fn samples_alone(file: &[u8]) -> Cow<'_, [u8]> {
         alone.extend(chunk.body);
         alone.extend(chunk.checksum.to_be_bytes());
     }
-    // What a file that is cut has of its last chunk.
+    // The rest of a cut file: a part of its last chunk.
     alone.extend(chunks.0);
     Cow::Owned(alone)
 }
@@ -128,7 +128,7 @@ pub(super) fn fault(file: &[u8]) -> Option<PngFault> {
 struct Chunk<'a> {
     kind: &'a [u8; 4],
     data: &'a [u8],
-    /// Kind and data, of which the checksum is.
+    /// Kind and data, the bytes that the checksum covers.
     body: &'a [u8],
     checksum: u32,
 }

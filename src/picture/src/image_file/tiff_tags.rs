@@ -45,7 +45,7 @@ pub(super) struct TiffOutline<'a> {
     pub(super) colours: Option<&'static str>,
     /// The ICC profile; `None` if there is none.
     pub(super) profile: Option<&'a [u8]>,
-    /// Whether the file is a camera's RAW file, of which the first picture is a preview.
+    /// True for a camera's RAW file, whose first picture is a preview.
     pub(super) is_raw: bool,
     /// The number of bits of a sample.
     pub(super) bits: u64,

@@ -140,7 +140,7 @@ fn a_bomb_is_refused_before_it_is_decompressed() {
     );
 }
 
-/// Each cause of a refusal is told from the others.
+/// Each cause of a refusal has its own error.
 #[test]
 fn refusals_have_causes() {
     let deep = png((2, 1), ColorType::Grayscale, BitDepth::Sixteen, &[0; 4]);
