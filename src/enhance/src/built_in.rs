@@ -7,8 +7,8 @@ use darkqa_models::{BUILT_IN, BuiltIn};
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::near_name::nearest;
 
-/// The enhancer that a word names; `None` if the word is the path of a file: one with an extension or a folder. So a file
-/// that happens to be named `lift` is never taken for the enhancer, nor the other way round.
+/// The built-in enhancer of this name; `None` if the word is the path of a file, that is, has an extension or a folder. A file named `lift`
+/// is therefore never confused with the enhancer.
 ///
 /// # Errors
 /// If the word is neither.

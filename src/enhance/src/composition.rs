@@ -159,7 +159,7 @@ impl Composition {
         dark: Option<&Planes>,
     ) -> Result<Planes, OutOfRange> {
         let planes = self.outputs.iter().zip(outputs).map(|(reading, output)| {
-            // What an expression is made of may have any values.
+            // The operands of an expression may have any range.
             let certainty = match self.image {
                 None => reading.certainty,
                 Some(_) => Certainty::Known,

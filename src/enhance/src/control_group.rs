@@ -8,7 +8,7 @@ use std::path::{Component, Path};
 
 /// How one version of control groups is laid out.
 struct Layout {
-    /// The words between the colons of the line of `/proc/self/cgroup` that names the group: controllers, of which one counts.
+    /// The controllers between the colons of the group's line in `/proc/self/cgroup`.
     controller: &'static str,
     /// The folder of all groups, below where the system mounts them.
     folder: &'static str,

@@ -32,7 +32,7 @@ impl TensorLayout {
         matches!(self, Self::Nchw | Self::Chw)
     }
 
-    /// Dimensions of one image of so many channels.
+    /// Dimensions of one image with `channels` channels.
     pub(super) fn dims(self, [height, width]: [usize; 2], channels: usize) -> Vec<usize> {
         match self {
             Self::Nchw => vec![1, channels, height, width],
@@ -166,7 +166,7 @@ impl fmt::Display for ValueRange {
 /// Mean and deviation that networks for other tasks were trained with, on values of 0..1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Normalisation {
-    /// Those of ImageNet, as `torchvision.models` takes them.
+    /// ImageNet's mean and standard deviation, as in `torchvision.models`.
     ImageNet,
     /// Mean 0.5, deviation 1: values of −0.5..0.5.
     Centred,

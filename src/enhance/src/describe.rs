@@ -26,7 +26,7 @@ pub(super) struct Description {
     pub(super) preset: Option<Preset>,
     /// Whether nothing states the ranges and the usual ones, which are plausible, are assumed.
     pub(super) assumed: bool,
-    /// What a reader of the results must know, in sentences that follow the model's name.
+    /// Caveats for readers of the results, as sentences that follow the model's name.
     pub(super) remarks: Vec<String>,
     /// Number of subnormal weights that were set to zero.
     pub(super) flushed: usize,

@@ -1,7 +1,6 @@
-//! Examination of a model whose convention is not known: [`Enhancer::examine`].
+//! Examination of a model with an unknown convention: [`Enhancer::examine`].
 //!
-//! The model runs on a few dark frames with each convention that could be meant. What is proposed is the only convention whose images
-//! can be enhanced images; if there are several or none, nothing is.
+//! The model runs on a few dark frames with each possible convention. If exactly one of them gives plausible images, it is proposed.
 
 mod proposal;
 
@@ -21,7 +20,7 @@ use darkqa_ground::types::Rgb;
 use proposal::{Found, propose};
 pub use proposal::{ProposedLine, Settled};
 
-/// What a model makes of dark frames, by convention.
+/// Results of a model on dark frames, by convention.
 #[derive(Debug)]
 pub struct Examination {
     /// The dark frames as they are fed.
@@ -32,9 +31,9 @@ pub struct Examination {
     pub proposal: Vec<ProposedLine>,
     /// Why they are proposed, or why nothing is.
     pub conclusion: String,
-    /// What was done because of the sizes of the frames, or why it failed.
+    /// How the sizes of the frames were handled, or why the model failed.
     pub sizes: String,
-    /// Which parts of the convention the frames decide.
+    /// Parts of the convention that the frames decide.
     pub settled: Settled,
 }
 
@@ -50,11 +49,11 @@ pub enum ImageOutput {
 /// The images of one convention.
 #[derive(Debug)]
 pub struct ExaminedConvention {
-    /// What it is, as a heading.
+    /// Heading that describes the convention.
     pub title: String,
-    /// What the model made of each frame.
+    /// Output of the model for each frame.
     pub images: Vec<ExaminedImage>,
-    /// What is wrong with at least half of them; `None` if they can be enhanced images.
+    /// Flaw of at least half of the images; `None` if they are plausible.
     pub problem: Option<String>,
 }
 
@@ -65,7 +64,7 @@ pub struct ExaminedImage {
     pub image: Rgb,
     /// Its figures before it was clamped.
     pub facts: Facts,
-    /// What is wrong with it; `None` if it can be an enhanced image.
+    /// Flaw of the image; `None` if it is plausible.
     pub problem: Option<String>,
 }
 
@@ -134,7 +133,7 @@ impl Enhancer {
         swapped(stated.color_out.or(stated.color).unwrap_or_default())
     }
 
-    /// What the model makes of dark frames with all ranges, in the order of colours that is stated and in the other.
+    /// Runs the model on dark frames with all ranges, in the stated order of colours and in the other.
     fn trials_of_all(&self, dark: &[Rgb]) -> Result<Option<Trials<2>>> {
         let stated = self.convention().clone();
         let swapped = ModelSidecar {
@@ -184,7 +183,7 @@ impl Enhancer {
         })
     }
 
-    /// Runs the model on a frame of each size, which shows what it takes. What is wrong with its images is not looked at here.
+    /// Runs the model on a frame of each size to find the sizes that it accepts. The images are not checked here.
     fn try_sizes(&mut self, frames: &[Rgb]) -> String {
         let mut tried = BTreeSet::new();
         for frame in frames {
@@ -263,8 +262,8 @@ fn swapped(order: ChannelOrder) -> ChannelOrder {
     }
 }
 
-/// The conventions that are drawn: the plausible ones, and the one of which something is stated, which a run would
-/// use. All without a plausible one. `output` names the output that is read, if it is not known which is the image.
+/// The conventions to draw: the plausible ones, and the partly stated one that a run would use. If none is plausible, all of them. `output`
+/// names the output to read if the image is not known.
 fn shown(
     output: &str,
     probe: &Probe,

@@ -103,7 +103,7 @@ impl Expression {
         }
     }
 
-    /// Number of channels of the result, if those of the names have so many.
+    /// Number of channels of the result; `names` are the numbers of channels of the names.
     pub(super) fn channels(&self, names: &[usize]) -> usize {
         let names = names.iter().map(|channels| match channels {
             1 => Sample::One(0.0),

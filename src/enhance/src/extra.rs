@@ -11,7 +11,7 @@ use super::expression::Expression;
 /// Most numbers of a list; chosen.
 const MOST_NUMBERS: usize = 4096;
 
-/// What a further input is given.
+/// Value of a further input.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum ExtraValue {
     /// One number: `ratio = 3`.
@@ -202,10 +202,10 @@ impl<'de> Deserialize<'de> for Number {
 }
 
 impl ExtraValue {
-    /// Checks what needs no graph: numbers are finite, and the names of an expression are known.
+    /// Checks everything that needs no graph: numbers are finite, and the names of an expression are known.
     ///
     /// # Errors
-    /// What is wrong with the value of `name`.
+    /// A description of the faulty value of `name`.
     pub(super) fn check(&self, name: &str) -> Result<(), String> {
         match self {
             Self::Number(Number::Float(value)) | Self::Map(Number::Float(value))

@@ -40,7 +40,7 @@ pub(super) enum RunFailure {
     NoMemory {
         /// Height and width of the input.
         fed: [usize; 2],
-        /// Bytes of the allocation that failed, if ONNX Runtime says it.
+        /// Bytes of the allocation that failed, if ONNX Runtime reports them.
         requested: Option<u64>,
     },
     /// The image took longer than the limit.
@@ -90,7 +90,7 @@ impl RunFailure {
         }
     }
 
-    /// What went wrong, without a remedy; it follows the file's name. Memory has words of its own.
+    /// Description of the failure without a remedy, to follow the file's name. Lack of memory is described elsewhere.
     pub(super) fn words(&self) -> String {
         match self {
             Self::OtherSize { fed, dims, given } => match self.enlarges_by() {
@@ -132,8 +132,7 @@ impl RunFailure {
     }
 }
 
-/// What is wrong with the values of an output for an image of this size, of which `range` was expected; the message follows the
-/// file's name.
+/// Message about output values outside the expected `range`, for an image of this size; it follows the file's name.
 pub(super) fn unusable(values: OutOfRange, range: ValueRange, size: [usize; 2]) -> String {
     match values {
         OutOfRange::NotFed => format!(
@@ -150,7 +149,7 @@ pub(super) fn unusable(values: OutOfRange, range: ValueRange, size: [usize; 2]) 
     }
 }
 
-/// What to export if the output of a model has another size than its input.
+/// Advice on the export of a model whose output differs in size from its input.
 fn other_size_remedy(fed: [usize; 2], given: [usize; 2]) -> &'static str {
     let lost = [0, 1].map(|side| fed[side].checked_sub(given[side]));
     match lost {
@@ -169,8 +168,7 @@ pub(super) fn by([height, width]: [usize; 2]) -> String {
     format!("{width} × {height}")
 }
 
-/// What is wrong with a file that ONNX Runtime refuses to load; the message follows the file's name. `version` is that of the
-/// library.
+/// Message about a file that ONNX Runtime `version` refuses to load; it follows the file's name.
 pub(super) fn load_problem(message: &str, version: &str) -> String {
     let newer = |what: &str, needed: u32, most: u32, pinned: u32| {
         let way_out = if needed <= pinned && version != PINNED {

@@ -22,7 +22,7 @@ pub(super) struct Feeding {
     pub(super) layout: TensorLayout,
     pub(super) element: ElementType,
     pub(super) channels: Channels,
-    /// What is fed, as an expression of `image`, the dark image in 0..1; `None` for the image itself.
+    /// The model's input as an expression of `image`, the dark image in 0..1; `None` for the image itself.
     pub(super) input: Option<Expression>,
     pub(super) color: ChannelOrder,
     pub(super) range: ValueRange,

@@ -98,7 +98,7 @@ impl ModelFile {
         })
     }
 
-    /// The same file, of which the output at this place is read if nothing states another one.
+    /// The same file, with this output as the default to read.
     #[must_use]
     pub fn with_output(mut self, place: usize) -> Self {
         let stated = &mut self.sidecar.output;
@@ -117,8 +117,8 @@ impl ModelFile {
         &self.path
     }
 
-    /// Digest of all that decides what is found when the model is opened and tried: also which statements are from the sidecar and
-    /// which from the preset, which decides no image.
+    /// Digest of everything that affects opening and probing the model. It includes which statements are from the sidecar and which from
+    /// the preset, although that affects no image.
     ///
     /// # Errors
     /// If a number of the sidecar is infinite or NaN.
@@ -162,7 +162,7 @@ struct EnhancementFacts<'a> {
     /// Digests of external data, by the location that the model states.
     external: BTreeMap<&'a str, Digest>,
     convention: ModelSidecar,
-    /// What decides which of several outputs is taken, where no sidecar says it.
+    /// The preset's rules that choose an output, if no sidecar states one.
     outputs: Option<PresetOutputs<'a>>,
 }
 
@@ -186,7 +186,7 @@ fn digest(
         None => sidecar,
         Some(preset) => sidecar.with_defaults(&preset.content.sidecar),
     };
-    // A sidecar says it, or there is no choice.
+    // The preset chooses the output unless a sidecar does, or there is only one.
     let read_by_preset =
         convention.output.is_none() && convention.image.is_none() && output_count(bytes) != 1;
     let facts = EnhancementFacts {
@@ -356,7 +356,7 @@ mod tests {
         }
     }
 
-    /// A digest is of the canonical JSON of what is stated, so that keys of later versions change no digest.
+    /// The digest is of the canonical JSON of the stated keys alone, so that keys added later change no digest.
     #[test]
     fn what_is_not_stated_is_not_in_the_digest() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! What is known of an enhancer that was opened and tried before: [`Findings`].
+//! [`Findings`]: cached results of opening and probing an enhancer.
 
 use std::path::Path;
 
@@ -11,14 +11,14 @@ use darkqa_ground::error::Result;
 use darkqa_ground::types::EnhancerName;
 use darkqa_ground::types::enhancer_note::{ConventionLine, ProbeNote, ProbeOutcome};
 
-/// What opening an enhancer and trying it on dark frames found: all that its note has before its first image.
+/// Results of opening an enhancer and trying it on dark frames: the content of its note before the first image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Findings {
     /// How the model is fed and read.
     convention: Vec<ConventionLine>,
-    /// What the probe found; `None` if the model takes none of its sizes.
+    /// Result of the probe; `None` if the model accepts none of its sizes.
     probe: Option<ProbeNote>,
-    /// What a reader of the results must know.
+    /// Caveats for readers of the results.
     #[serde(default)]
     remarks: Vec<String>,
     /// The sizes that the model takes, in words, if they were found by trial.
@@ -44,7 +44,7 @@ impl Findings {
         usage
     }
 
-    /// Says again what the probe said.
+    /// Repeats the probe's warning.
     pub fn warn(&self, name: &EnhancerName, path: &Path) {
         if let Some(sizes) = &self.sizes {
             tracing::warn!("{}: {sizes}", path.display());
@@ -78,7 +78,7 @@ impl Enhancer {
         probe.problem.filter(|_| is_overruled)
     }
 
-    /// What is known of it now; to be called after the probe.
+    /// The findings so far; to be called after the probe.
     pub fn findings(&self) -> Findings {
         let note = self.usage().note();
         Findings {

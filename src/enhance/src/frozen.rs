@@ -1,8 +1,8 @@
 //! Sizes that an exporter froze into a graph: [`traced_sizes`].
 //!
-//! Tracing turns `int(x.shape[2])` into a number. Such a graph says that it takes any size, and its Reshape operators fail at
-//! every size but the traced one. The number stands in their constant shapes: as the last two entries, or split into windows
-//! as the product of two and two (`[1, 3, 6, 8, 8, 8]` is 48 × 64). What is found here is a guess that a run must confirm.
+//! Tracing turns `int(x.shape[2])` into a number. Such a graph declares that it accepts any size, but its Reshape operators fail at every
+//! size except the traced one. The number is in their constant shapes: as the last two entries, or split into windows as the product of two
+//! and two (`[1, 3, 6, 8, 8, 8]` is 48 × 64). The sizes found here are guesses that a run must confirm.
 //!
 //! Field numbers are those of `onnx/onnx.proto` (IR version 13).
 
@@ -11,7 +11,7 @@ use std::ops::Range;
 
 use super::protobuf::{FieldValue, fields};
 
-/// Sides in pixels that are taken for sizes; chosen.
+/// Range of numbers that can be the side of a size, in pixels; chosen.
 const SIDES: Range<usize> = 8..4097;
 /// Largest size in pixels that is tried; chosen.
 const MOST_PIXELS: usize = 4 << 20;

@@ -8,12 +8,12 @@ use super::port::{Dim, Port};
 use super::preset;
 use super::tensor::{Tensor, TensorData};
 
-/// An input beside the image, and what it is given.
+/// An input in addition to the image, with its value.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct FurtherInput {
     /// Name, type and dimensions in the graph.
     pub(super) port: Port,
-    /// What it is given.
+    /// Value of the input.
     pub(super) value: ExtraValue,
     /// Places of its channels, if it has any, its rows and its columns among its dimensions; `None` for one number.
     places: Option<Places>,
@@ -249,7 +249,7 @@ impl FurtherInput {
     }
 }
 
-/// Number of elements of an input of fixed dimensions, of which at most one is not 1; `None` for another.
+/// Number of elements of an input with fixed dimensions, at most one of them not 1; `None` for others.
 fn vector_length(port: &Port) -> Option<usize> {
     let sizes = port.dims.iter().map(Dim::known);
     let sizes = sizes.collect::<Option<Vec<usize>>>()?;
@@ -264,7 +264,7 @@ fn list_line(key: &str, length: usize) -> String {
     format!("`{key} = [{some}{rest}]`")
 }
 
-/// What a sidecar must say of an input that has no value.
+/// Message that names the sidecar lines needed for an input without a value.
 fn missing(port: &Port, places: Option<Places>) -> String {
     let key = quoted(&port.name);
     let beside = "state it in MODEL.onnx.toml beside the model: `[extra]` and below it";

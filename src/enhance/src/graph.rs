@@ -34,9 +34,9 @@ pub(super) struct Graph {
     pub(super) signature: Arc<Signature>,
     pub(super) feeding: Feeding,
     pub(super) reading: Arc<Composition>,
-    /// What sidecar and preset state.
+    /// Statements of sidecar and preset.
     pub(super) convention: ModelSidecar,
-    /// What of it is not as the authors of its preset have it.
+    /// Differences between the graph and the model that the preset's authors published.
     pub(super) differing: Option<String>,
     runtime: Runtime,
     session: Arc<Mutex<Session>>,
@@ -49,7 +49,7 @@ pub(super) struct Graph {
     memory: MemoryLimit,
 }
 
-/// What loading a model, and then each image, may take: its operators on constants are computed when it is loaded.
+/// Limits for loading a model, and then for each image. Loading is limited too, because ONNX Runtime folds constants then.
 #[derive(Debug, Clone, Copy)]
 pub struct LoadLimits {
     /// The longest time.
@@ -70,11 +70,11 @@ impl LoadLimits {
 struct Ports {
     inputs: Vec<Port>,
     outputs: Vec<Port>,
-    /// Number of images of each run: 1, or what the graph fixes.
+    /// Number of images of each run: 1, or the graph's fixed batch size.
     batch: usize,
 }
 
-/// What happens to the memory that ONNX Runtime holds for later runs, its arena, at the end of a run.
+/// Treatment at the end of a run of the arena, the memory that ONNX Runtime keeps for later runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Arena {
     Kept,
@@ -83,7 +83,7 @@ pub(super) enum Arena {
 
 /// Result of a run of a model.
 pub(super) enum RunResult<T> {
-    /// What was read from the output.
+    /// Content read from the output.
     Output(T),
     /// It gave no image of this size.
     Failed(RunFailure),
@@ -95,7 +95,7 @@ impl Graph {
     /// Loads a model, with the statements of its sidecar and its preset.
     ///
     /// # Errors
-    /// The inner error is what is wrong with the model; the message follows the file's name.
+    /// The inner error describes the fault of the model, to follow the file's name.
     pub(super) fn load(
         source: GraphSource,
         sidecar: &ModelSidecar,
@@ -199,8 +199,7 @@ impl Graph {
         Ok(graph)
     }
 
-    /// The remark on outputs that have the image's size and are not read; `None` if there are none, or a statement or a preset says
-    /// what the image is made of.
+    /// Remark on unread outputs that have the image's size; `None` if there are none, or if a statement or a preset defines the image.
     pub(super) fn unread_images(&self) -> Option<String> {
         let is_stated = self.convention.image.is_some() || self.convention.output.is_some();
         let unread: Vec<String> = self
@@ -227,7 +226,7 @@ impl Graph {
         &self.runtime
     }
 
-    /// Number of images of each run: 1, or what the graph fixes.
+    /// Number of images of each run: 1, or the graph's fixed batch size.
     pub(super) fn batch(&self) -> usize {
         self.ports.batch
     }

@@ -93,7 +93,7 @@ const PIPS: [&[&str]; 4] = [
 /// install at once, and an interrupted one leaves nothing that could be loaded.
 ///
 /// # Errors
-/// A message that says what failed.
+/// A message that names the step that failed.
 pub(super) fn install(pin: Pin, folder: &Path) -> Result<PathBuf, String> {
     let parent = folder.parent().unwrap_or(folder);
     fs::create_dir_all(parent).map_err(|e| path_error(parent, "cannot be created", &e))?;
@@ -120,7 +120,7 @@ pub(super) fn install(pin: Pin, folder: &Path) -> Result<PathBuf, String> {
 /// Checks that a library in the cache is the pinned one, whole and unchanged.
 ///
 /// # Errors
-/// What is wrong with it; the message follows its path.
+/// A description of the fault, to follow its path.
 pub(super) fn check_installed(library: &Path, pin: Pin) -> Result<(), String> {
     LibraryFormat::for_this_system().check(library)?;
     receipt::check(library, pin.sha256)

@@ -6,10 +6,10 @@
 //! ModelFile::read ─► name, digest ┘
 //! ```
 //!
-//! The convention of a model (how it is fed and read) comes from its graph (layout, type, sizes), else from a sidecar
-//! `MODEL.onnx.toml`, else from a preset (`zero-dce:FILE`), else from what published models do (RGB, 0..1). A model that
-//! still lacks something is refused, with its name. A run goes from the dark image to the result in these steps; those in
-//! brackets are rare:
+//! The convention of a model (how its input is prepared and its output is decoded) comes from its graph (layout, type, sizes), else from a
+//! sidecar `MODEL.onnx.toml`, else from a preset (`zero-dce:FILE`), else from the convention of most published models (RGB, 0..1). A model
+//! that still lacks a statement is refused, with its name. A run takes these steps from the dark image to the result; those in brackets are
+//! rare:
 //!
 //! ```text
 //! window ─ [input = EXPRESSION] ─ [luma] ─ range, mean, std ─► Feeding      ─┐
@@ -20,13 +20,13 @@
 //! [`ModelFile::read`] needs no runtime: a file that is not an ONNX model
 //! is refused before anything is searched or installed, and a resumed run knows its digest.
 //!
-//! Of the size of an image, [`Enhancer::enhance`] makes a plan (`size_plan`): whole, filled, in tiles, or resized if a flag
-//! says so. What a graph does not say is found by trial: the multiple or the traced size that it takes (`size_search`, `frozen`),
-//! and how far a pixel sees (`reach`). Memory is estimated before (`memory_check`), time is limited (`time_limit`), and a library
-//! is checked before it is loaded (`library_file`, `receipt`).
+//! [`Enhancer::enhance`] makes a plan for the size of an image (`size_plan`): whole, padded, in tiles, or resized if a flag allows it.
+//! Properties that a graph does not declare are found by trial: the multiple or the traced size that it accepts (`size_search`, `frozen`),
+//! and how far a pixel sees (`reach`). Memory is estimated before (`memory_check`), time is limited (`time_limit`), and a library is
+//! checked before it is loaded (`library_file`, `receipt`).
 //!
 //! A wrong convention gives a wrong image and no error. So a model is tried on dark frames before a run ([`Enhancer::probe`]), and its
-//! images are looked at during it ([`Usage::judge`]), both by the rules in `plausible`. `doctor` shows what a model makes with each
+//! images are checked during it ([`Usage::judge`]), both by the rules in `plausible`. `doctor` shows the model's images with each
 //! convention.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]

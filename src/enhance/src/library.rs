@@ -34,7 +34,7 @@ pub(super) fn is_library_name(os: &str, name: &str) -> bool {
 /// Nothing is loaded that is not a whole library with ONNX Runtime's entry; libraries of custom operators never are. All that could fail later is tried here, because `ort` panics if a library does not give it the API.
 ///
 /// # Errors
-/// What is wrong with the file; the message follows its path.
+/// A description of the fault, to follow its path.
 pub(super) fn probe(path: &Path) -> Result<String, String> {
     let metadata = std::fs::metadata(path).map_err(|e| format!("cannot be read: {e}"))?;
     if !metadata.is_file() {
@@ -67,7 +67,7 @@ fn version_of(path: &Path) -> Result<String, String> {
     // SAFETY: loading runs the library's initialisers. The file has the name of ONNX Runtime's library, or the user asked
     // for it to be loaded; ONNX Runtime's initialisers have no preconditions.
     let library = unsafe { Library::new(path) }.map_err(|e| {
-        // The loader's message is in the source; the error itself only says that loading failed.
+        // The loader's message is in the source; the error itself states only that loading failed.
         let reason = e
             .source()
             .map_or_else(|| e.to_string(), ToString::to_string);

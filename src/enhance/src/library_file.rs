@@ -40,10 +40,10 @@ impl LibraryFormat {
         }
     }
 
-    /// Checks that a file is a whole library for this build's processor, and that no other process writes it meanwhile.
+    /// Checks that a file is a whole library for this build's processor, and that no other process is writing it.
     ///
     /// # Errors
-    /// What is wrong with it; the message follows its path.
+    /// A description of the fault, to follow its path.
     pub(super) fn check(self, path: &Path) -> Result<(), String> {
         let unreadable = |e: std::io::Error| format!("cannot be read: {e}");
         let mut file = File::open(path).map_err(unreadable)?;

@@ -33,8 +33,7 @@ impl MemoryCheck {
         Self(Estimate::Unknown)
     }
 
-    /// Checks a run of this height and width on an image of `size`; the inner error says what is needed and free, and what
-    /// helps.
+    /// Checks a run of this height and width on an image of `size`; the inner error states the required and the free memory, and a remedy.
     pub(super) fn run(
         &mut self,
         graph: &Graph,
@@ -81,7 +80,7 @@ pub(super) fn no_memory(failure: &RunFailure, rule: SizeRule, size: [usize; 2]) 
     format!("{words}: {requested}{free} are free; {remedy}")
 }
 
-/// What helps if memory is short for a run of `fed` on an image of `size`.
+/// Remedy for lack of memory in a run of `fed` on an image of `size`.
 fn remedy(rule: SizeRule, fed: [usize; 2], size: [usize; 2]) -> String {
     const SMALLER: &str = "--llie-options max-side=1280 enhances a smaller image";
     let much_larger = fed[0] * fed[1] > 4 * size[0] * size[1];
@@ -118,7 +117,7 @@ fn measure(graph: &Graph, rule: SizeRule, available: u64) -> Result<Estimate> {
         _ => side,
     });
     let mut measured: Vec<(usize, u64)> = Vec::new();
-    // What earlier images left in the arena is released first, else the probes would reuse it and show no growth.
+    // Memory that earlier images left in the arena is released first; else the probes would reuse it and show no growth.
     if !probe(graph, sides[0], Arena::Released)? {
         return Ok(Estimate::Tensors);
     }

@@ -23,7 +23,7 @@ impl MemoryLimit {
     /// No limit.
     pub const NONE: Self = Self(None);
 
-    /// What the process takes now, and four fifths of what is free.
+    /// Memory of the process now, plus four fifths of the free memory.
     #[must_use]
     pub fn automatic() -> Self {
         let now = resident().zip(available());

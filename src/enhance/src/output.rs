@@ -35,8 +35,8 @@ pub(super) struct Output {
 }
 
 impl Output {
-    /// The image among the outputs: the stated one, the only one, else the one that names and structure agree on. `fits`
-    /// says whether an output can be the image.
+    /// The image among the outputs: the stated one, the only one, else the one on which names and structure agree. `fits` tells whether an
+    /// output can be the image.
     ///
     /// # Errors
     /// The message follows the file's name.
@@ -151,7 +151,7 @@ impl Output {
     /// Some channels of an output.
     ///
     /// # Errors
-    /// If it has not so many channels, or not the size of the input.
+    /// If it has fewer channels, or another size than the input.
     fn from_slice(
         port: &Port,
         slice: ChannelSlice,
@@ -266,7 +266,7 @@ fn no_image(outputs: &[Port], channels: Channels, fits: impl Fn(&Port, usize) ->
 /// Name of the dark image in an expression of the image.
 pub(super) const INPUT: &str = "input";
 
-/// What is asked where nothing tells which output is the image. Presets are named if they know such a list.
+/// Question to the user if the image among the outputs is unknown. Presets that know such a list are named.
 fn ambiguous(outputs: &[Port]) -> String {
     let presets = preset::that_know(outputs);
     let presets = match presets.as_slice() {

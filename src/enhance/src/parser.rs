@@ -25,7 +25,7 @@ pub(super) struct Parsed {
 /// Reads an expression.
 ///
 /// # Errors
-/// What was expected, and at which character.
+/// The expected element and the position in characters.
 pub(super) fn parse(text: &str) -> Result<Parsed, String> {
     let characters: Vec<char> = text.chars().collect();
     if characters.len() > MOST_CHARACTERS {

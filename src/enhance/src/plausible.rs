@@ -1,8 +1,8 @@
-//! Whether what a model made of a dark image can be an enhanced image: [`judge`].
+//! Plausibility of an enhanced image, given the dark one: [`judge`].
 //!
-//! The rules find outputs that are read in the wrong way: another range, the wrong output, swapped colours or dimensions. They
-//! say nothing about the quality of an enhancement. Their thresholds were set on 9 trained models and 25 dark images each, so
-//! that none of these models is flagged; `src/docs/enhancers.md` states what they find and what they miss.
+//! The rules find outputs that are decoded in the wrong way: another range, the wrong output, swapped colours or dimensions. They do not
+//! judge the quality of an enhancement. Their thresholds were set on 9 trained models and 25 dark images each, so that none of these models
+//! is flagged; `src/docs/enhancers.md` lists the faults that they find and miss.
 
 use std::fmt;
 
@@ -34,7 +34,7 @@ pub(super) enum Gravity {
     Doubtful,
 }
 
-/// What is wrong with one output, and the figure that shows it.
+/// Flaw of one output, with the figure that shows it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct Verdict {
     pub(super) flaw: Flaw,
@@ -44,7 +44,7 @@ pub(super) struct Verdict {
 }
 
 impl fmt::Display for Verdict {
-    /// What was seen, as it follows "the images": `are flat (their brightness varies by 0.2 of 255)`.
+    /// The finding as it follows "the images": `are flat (their brightness varies by 0.2 of 255)`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let figure = self.figure;
         let percent = 100.0 * figure;
@@ -224,7 +224,7 @@ pub fn brightness(image: &Rgb) -> f64 {
         / pixels
 }
 
-/// What is wrong with an output for a dark image of the same size: the first flaw that is found.
+/// First flaw that is found in an output for a dark image of the same size; `None` if the output is plausible.
 pub(super) fn judge(dark: &Codes, made: &Codes) -> Option<Verdict> {
     let count = made.samples.len() as f64;
     let share = |is: &dyn Fn(&f32) -> bool| {

@@ -66,7 +66,7 @@ impl fmt::Display for Port {
 }
 
 impl Port {
-    /// Layout of an image of so many channels; `None` if the dimensions do not determine it.
+    /// Layout of an image with `channels` channels; `None` if the dimensions do not determine it.
     pub(super) fn layout(&self, channels: usize) -> Option<TensorLayout> {
         let mut fitting = TensorLayout::ALL.into_iter().filter(|layout| {
             self.dims.len() == layout.rank()
@@ -84,7 +84,7 @@ impl Port {
         (3..=4).contains(&self.dims.len()) && !grey && last.iter().any(|dim| dim.can_be(3))
     }
 
-    /// Whether it can be an image of so many channels and this height and width in a layout. Open dimensions can have any size.
+    /// True if it can be an image with this many channels, height and width in a layout. Open dimensions can have any size.
     pub(super) fn can_be_image(
         &self,
         layout: TensorLayout,

@@ -28,7 +28,7 @@ pub(super) struct Preset {
     pub(super) content: PresetContent,
 }
 
-/// What the file of presets says of one.
+/// Entry of the file of presets.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct PresetContent {
@@ -53,7 +53,7 @@ pub(super) struct PresetContent {
     /// All outputs of the repository's own export, by name; the first is the image.
     #[serde(default)]
     own_export: Vec<String>,
-    /// Lists of outputs of which the image is known by its place.
+    /// Lists of outputs whose image is known by its place.
     #[serde(default)]
     signatures: Vec<OutputList>,
     /// The image as an expression of outputs.
@@ -94,7 +94,7 @@ impl StackedOutput {
     }
 }
 
-/// What decides, beside the sidecar's keys, which output of a file a preset takes; for the digest of an enhancer.
+/// The preset's rules that choose an output, in addition to the sidecar's keys; part of an enhancer's digest.
 #[derive(Serialize)]
 pub(super) struct PresetOutputs<'a> {
     names: &'a [String],
@@ -304,7 +304,7 @@ impl Preset {
         named.max_by_key(|name| (is_named(name), std::cmp::Reverse(name.len())))
     }
 
-    /// What decides which output is taken.
+    /// The rules that choose an output.
     pub(super) fn outputs(&self) -> PresetOutputs<'_> {
         PresetOutputs {
             names: &self.content.names,
@@ -315,7 +315,7 @@ impl Preset {
         }
     }
 
-    /// The preset's statements for a graph: what they say of further inputs that the graph has, and how the image is read.
+    /// The preset's statements for a graph: the values of its further inputs, and how the image is read.
     ///
     /// # Errors
     /// If none of the outputs is known to be the image.
@@ -384,7 +384,7 @@ impl Preset {
         self.content.image.is_none() && outputs.iter().filter(may_be).count() == 1
     }
 
-    /// What of a graph is not as the authors' model has it; `None` if nothing is.
+    /// Differences between a graph and the authors' model; `None` if there are none.
     pub(super) fn differing(&self, inputs: &[Port], outputs: &[Port]) -> Option<String> {
         let content = &self.content;
         let known = outputs.len() == 1
@@ -392,7 +392,7 @@ impl Preset {
             || content.by_channels(outputs).is_some();
         let is_stacked = |stacked: &StackedOutput| stacked.image_of(outputs).is_some();
         let known = content.stacked.as_ref().map_or(known, is_stacked);
-        // Some authors' models have one output, and an export that adds others says by name which it is.
+        // Some authors' models have one output; an export that adds others identifies it by name.
         let named = content.signatures.is_empty() && content.by_name(outputs).is_some();
         if !known && !named {
             return Some(format!(

@@ -20,7 +20,7 @@ pub(super) struct RangePair {
 }
 
 impl RangePair {
-    /// The pairs with these ranges, each of which is tried if it is `None`.
+    /// The pairs with these ranges; `None` stands for each range in turn.
     pub(super) fn all(input: Option<ValueRange>, output: Option<ValueRange>) -> Vec<Self> {
         let of = |stated: Option<ValueRange>| {
             let all = ValueRange::ALL.into_iter();
@@ -78,9 +78,9 @@ impl fmt::Display for RangePair {
 #[derive(Debug, Clone)]
 pub(super) struct PairTrial {
     pub(super) ranges: RangePair,
-    /// What the model made of each frame.
+    /// Output of the model for each frame.
     pub(super) made: Vec<Codes>,
-    /// What is wrong with each of them.
+    /// Flaw of each output.
     pub(super) verdicts: Vec<Option<Verdict>>,
 }
 
@@ -109,7 +109,7 @@ impl PairTrial {
         let flawed: Vec<Verdict> = self.verdicts.iter().flatten().copied().collect();
         let half = |count: usize| 2 * count >= self.verdicts.len().max(1);
         let count = |flaw: Flaw| flawed.iter().filter(|one| one.flaw == flaw).count();
-        // Of equally frequent flaws the first.
+        // Reversed, because `max_by_key` returns the last of equally frequent flaws and the first is wanted.
         let example = flawed.iter().rev().max_by_key(|one| count(one.flaw))?;
         let impossible = flawed
             .iter()
@@ -138,7 +138,7 @@ pub(super) struct FlawedFrames {
 }
 
 impl fmt::Display for FlawedFrames {
-    /// What was seen, as it follows the file's name.
+    /// The finding as it follows the file's name.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             example,
@@ -153,12 +153,12 @@ impl fmt::Display for FlawedFrames {
     }
 }
 
-/// Which ranges the user, a preset or the element types state.
+/// Ranges that the user, a preset or the element types state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Ranges {
     /// Both.
     Stated,
-    /// That of the input or that of the output.
+    /// Range of either the input or the output.
     OneStated,
     /// None.
     Open,
@@ -173,7 +173,7 @@ pub(super) struct Probe {
     pub(super) pairs: Vec<PairTrial>,
 }
 
-/// What follows from a probe.
+/// Conclusion of a probe.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Conclusion {
     /// The ranges are stated, and the images can be enhanced images.
@@ -197,7 +197,7 @@ impl Probe {
         pairs.map(|pair| pair.ranges).collect()
     }
 
-    /// What follows.
+    /// Draws the conclusion.
     pub(super) fn conclusion(&self) -> Conclusion {
         let usual = self.pairs.iter().find(|pair| pair.ranges == self.usual);
         let advised = self.advised();
@@ -246,8 +246,7 @@ impl Probe {
         self.plausible().first().copied().unwrap_or(self.usual)
     }
 
-    /// What was seen and the lines of the sidecar that would repair it, as it follows the file's name; `None` if the images are
-    /// plausible.
+    /// The finding and the sidecar lines that would repair it, to follow the file's name; `None` if the images are plausible.
     pub(super) fn problem(&self) -> Option<String> {
         let usual = self.usual.stated();
         let dim = |seen: &FlawedFrames| {
@@ -282,7 +281,7 @@ impl Probe {
         })
     }
 
-    /// What may repair a flaw that no other range explains.
+    /// Remedy for a flaw that no other range explains.
     fn remedy(&self, seen: &FlawedFrames) -> String {
         match (seen.example.flaw, self.ranges) {
             (Flaw::Unlit, Ranges::Open | Ranges::OneStated) => format!(
@@ -297,7 +296,7 @@ impl Probe {
     }
 }
 
-/// What may repair a flaw that no other range explains.
+/// Remedy for a flaw that no other range explains.
 fn remedy(flaw: Flaw, ranges: Ranges) -> &'static str {
     match (flaw, ranges) {
         (Flaw::Hue, _) => {

@@ -17,11 +17,11 @@ use darkqa_ground::types::{EnhancerName, Rgb};
 /// Sizes that are tried one after another, longer and shorter side in pixels: most multiples that models need divide one of them.
 const SIZES: [[usize; 2]; 3] = [[144, 96], [160, 120], [128, 128]];
 
-/// What a model made of dark frames.
+/// Results of a model on dark frames.
 pub(super) struct Trials<const N: usize> {
     /// The frames as they were fed.
     pub(super) frames: Vec<Rgb>,
-    /// What was made by each of the conventions.
+    /// Results by convention.
     pub(super) probes: [Probe; N],
 }
 
@@ -80,11 +80,11 @@ impl Enhancer {
         self.set_probed(note)
     }
 
-    /// What is wrong with the images of a probe, and what would repair it; `None` if nothing is. If lines of the sidecar are wrong, those
-    /// that are right are found by trial.
+    /// Flaw of a probe's images, with a remedy; `None` if they are plausible. If lines of the sidecar are wrong, the right ones are found
+    /// by trial.
     fn problem(&self, probe: &Probe, dark: &[Rgb]) -> Result<Option<String>> {
         let problem = match probe.conclusion() {
-            // What the authors of a preset do is not contradicted.
+            // The convention of a preset's authors is not contradicted.
             Conclusion::Implausible(seen) | Conclusion::Doubtful(seen)
                 if !self.follows_preset() =>
             {
@@ -140,8 +140,8 @@ impl Enhancer {
         seen.judge_in(&self.usage(), self.path(), place, implausible)
     }
 
-    /// What the model makes of dark frames by each of these conventions, which differ in how its output is read, with each pair of
-    /// ranges that is not stated; `None` if it fails at all sizes that are tried. It runs once for each frame and range of the input.
+    /// Runs the model on dark frames by each of these conventions, which differ in how the output is read, and with each pair of ranges
+    /// that is not stated. The model runs once for each frame and input range. Returns `None` if it fails at all sizes that are tried.
     pub(super) fn trials<const N: usize>(
         &self,
         dark: &[Rgb],
@@ -168,7 +168,7 @@ impl Enhancer {
                         .map(|ranges| self.read_by(convention, *ranges))
                 });
                 let graphs: Vec<Graph> = graphs.collect::<Result<_>>()?;
-                // What fails in one range says nothing about the others at this size.
+                // A failure in one range does not predict failure in the others at this size.
                 let Some(made) = made(&graphs, &frames)? else {
                     continue 'sizes;
                 };
@@ -233,7 +233,7 @@ fn warn_of_assumed(name: &EnhancerName, usual: RangePair) {
     );
 }
 
-/// What a model makes of each frame, read by each of these graphs of it, which feed it alike; `None` if it fails on a frame.
+/// Outputs of a model for each frame, read by each of these graphs, which share the input; `None` if it fails on a frame.
 pub(super) fn made(graphs: &[Graph], frames: &[Rgb]) -> Result<Option<Vec<Vec<Codes>>>> {
     let mut all = vec![Vec::with_capacity(frames.len()); graphs.len()];
     let Some(graph) = graphs.first() else {

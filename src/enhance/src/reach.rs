@@ -36,7 +36,7 @@ pub(super) struct Context {
 }
 
 impl Context {
-    /// The context in pixels; the inner error says why the model counts as global.
+    /// Measures the context in pixels; the inner error explains why the model counts as global.
     pub(super) fn measure(
         &mut self,
         graph: &Graph,
@@ -79,8 +79,8 @@ impl Context {
         self.alignment.is_none()
     }
 
-    /// The multiple at which tiles of this height and width must start, so that they give what the whole image gives: 2 to the power of
-    /// the number of poolings. 1 if none is found; the comparison of seams then speaks.
+    /// Multiple at which tiles of this height and width must start to equal the whole image: 2 to the power of the number of poolings. 1 if
+    /// none is found; the comparison of seams then decides.
     pub(super) fn alignment(
         &mut self,
         graph: &Graph,
@@ -153,7 +153,7 @@ fn same_interior(still: &Planes, moved: &Planes, shift: usize, margin: usize) ->
 pub(super) struct Reach(usize);
 
 impl Reach {
-    /// Reach of a model, measured at one size (height, width); the inner error says why it cannot be.
+    /// Measures the reach of a model at one size (height, width); the inner error explains why it cannot be measured.
     fn probe(graph: &Graph, size: [usize; 2]) -> error::Result<Result<Self, String>> {
         let mut farthest = 0;
         for codes in &CODES {
@@ -184,7 +184,7 @@ impl Reach {
     }
 }
 
-/// Output of a trial; the inner error says why there is none.
+/// Output of a trial; the inner error explains why it failed.
 fn output(graph: &Graph, planes: &Planes) -> error::Result<Result<Planes, String>> {
     graph.restart_clock();
     let unmeasured = |why: &str| Err(format!("how far it looks cannot be measured: it {why}"));
@@ -199,7 +199,7 @@ fn output(graph: &Graph, planes: &Planes) -> error::Result<Result<Planes, String
 fn farthest_moved(before: &Planes, after: &Planes, middle: [usize; 2]) -> usize {
     let pairs = before.samples.iter().zip(&after.samples);
     let moved = pairs.enumerate().filter(|(_, (a, b))| {
-        // Of two values that are not numbers neither has moved.
+        // False for two NaNs: neither has moved.
         (*a - *b).abs() > MOVED
     });
     let pixels = before.height * before.width;

@@ -55,7 +55,7 @@ impl Receipt {
 /// Checks that an installed library has the given SHA-256, and writes its receipt if it has changed or is missing.
 ///
 /// # Errors
-/// What is wrong with the library; the message follows its path.
+/// A description of the fault, to follow its path.
 pub(super) fn check(library: &Path, sha256: &str) -> Result<(), String> {
     let unreadable = |e: io::Error| format!("cannot be read: {e}");
     let expected = Receipt::for_library(library, sha256.to_owned()).map_err(unreadable)?;

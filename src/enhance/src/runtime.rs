@@ -70,12 +70,12 @@ pub unsafe fn forbid_telemetry() {
 static OPEN: Mutex<Option<Runtime>> = Mutex::new(None);
 
 impl RuntimeSearch {
-    /// Opens the named library. Without one, it opens the first usable one in the places of [`LibraryPlace`]. Else it installs
-    /// version 1.31.1 with pip, if allowed.
+    /// Opens the named library. Without a name, it opens the first usable one in the places of [`LibraryPlace`]; if there is none, it
+    /// installs version 1.31.1 with pip, if allowed.
     ///
     /// # Errors
-    /// If the named library is not usable, or none was found and none could be installed. The message says what was tried
-    /// and how to provide one.
+    /// If the named library is not usable, or none was found and none could be installed. The message lists the places tried and the
+    /// remedy.
     pub fn open(&self) -> Result<Runtime> {
         // The lock is held to the end, so that a second thread waits for the first one's installation.
         let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -140,7 +140,7 @@ fn find(surroundings: &Surroundings, allowed: Install) -> Result<FoundLibrary> {
             }
             Err(problem) if place == LibraryPlace::Cache && allowed == Install::Allowed => {
                 rejected.push(format!("{} {problem}", path.display()));
-                // What this program installed is replaced, so that no other version is used instead.
+                // A broken library that this program installed is replaced, rather than another version used.
                 match install_here(surroundings, &rejected) {
                     Ok(found) => return Ok(found),
                     Err(problem) => tracing::warn!("it cannot be installed again: {problem}"),
@@ -219,7 +219,7 @@ fn skipped(rejected: &[String]) -> String {
     }
 }
 
-/// Message for a missing library: what was tried, and how to provide one.
+/// Message for a missing library: the places tried, and how to provide one.
 fn not_found_message(problem: &str, rejected: &[String]) -> String {
     let rejected = skipped(rejected);
     let places = LibraryPlace::ALL.map(|place| place.to_string()).join(", ");

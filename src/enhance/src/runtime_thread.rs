@@ -31,7 +31,7 @@ pub(super) enum Ended<T> {
     TooLarge,
 }
 
-/// What a job may take.
+/// Limits of a job.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct JobLimits {
     /// Time from its start; `None` for any.

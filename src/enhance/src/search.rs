@@ -42,7 +42,7 @@ pub(super) enum LibraryPlace {
 }
 
 impl LibraryPlace {
-    /// All, in the order of the search. What was installed with the program goes first, so that a job on a cluster needs no
+    /// All places, in the order of the search. The library installed with the program comes first, so that a job on a cluster needs no
     /// setting.
     pub(super) const ALL: [Self; 5] = [
         Self::Program,

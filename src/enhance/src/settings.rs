@@ -48,7 +48,7 @@ impl EnhancerArgs {
         self.llie.is_empty() && self.enhanced.is_empty()
     }
 
-    /// The same flags for a set in this light, of which the untouched photographs are enhanced by default if it is dark.
+    /// The same flags for a set in this light. If it is dark, the untouched photographs are enhanced by default.
     #[must_use]
     pub fn for_set(self, set: SetLight) -> Self {
         let of_set = match set {
@@ -103,7 +103,7 @@ pub struct ProbeArgs {
 }
 
 impl ProbeArgs {
-    /// What becomes of an enhancer whose images are implausible.
+    /// Treatment of an enhancer with implausible images.
     pub fn implausible(&self) -> Implausible {
         if self.llie_anyway {
             Implausible::Used

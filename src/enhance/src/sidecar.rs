@@ -32,7 +32,7 @@ pub(super) struct ModelSidecar {
     pub(super) color_out: Option<ChannelOrder>,
     /// Channels of input and output.
     pub(super) channels: Option<Channels>,
-    /// What is fed, as an expression of `image`, the dark image in 0..1.
+    /// The model's input, as an expression of `image`, the dark image in 0..1.
     pub(super) input: Option<Expression>,
     /// The enhanced image, as an expression of outputs in 0..1 and of `input`, the dark image in 0..1.
     pub(super) image: Option<Expression>,
@@ -50,14 +50,14 @@ pub(super) struct ModelSidecar {
     /// Number that each channel of the output is multiplied by before.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) std_out: Option<[f32; 3]>,
-    /// Number of pixels of which height and width must be multiples.
+    /// Height and width must be multiples of this many pixels.
     pub(super) multiple: Option<NonZeroUsize>,
     /// Pixels that fill an image up to a multiple.
     pub(super) pad: Option<Padding>,
     /// Whether at least one row and one column are filled, even if the sides are multiples already.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) pad_always: Option<bool>,
-    /// Width and height that a graph takes alone, which tracing has frozen although the graph says any size.
+    /// The only width and height that a graph accepts: tracing froze them, although the graph declares any size.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) fixed: Option<[NonZeroUsize; 2]>,
     /// Output that is the enhanced image.
@@ -274,7 +274,7 @@ impl ModelSidecar {
     pub(super) fn with_defaults(self, preset: &Self) -> Self {
         let mut extra = preset.extra.clone();
         extra.extend(self.extra);
-        // Each says what is read.
+        // Either key selects the output to read.
         let (output, image) = match (self.output, self.image) {
             (None, None) => (preset.output.clone(), preset.image.clone()),
             stated => stated,

@@ -39,7 +39,7 @@ impl Signature {
     /// Finds the role of each tensor.
     ///
     /// # Errors
-    /// What was found and how to repair it; the message follows the file's name.
+    /// The finding and the remedy, to follow the file's name.
     pub(super) fn infer(
         inputs: &[Port],
         outputs: &[Port],
@@ -121,7 +121,7 @@ fn image_input<'a>(
     let channels = convention.channels.unwrap_or_default();
     let is_free = |port: &&Port| !port.is_scalar() && !convention.extra.contains_key(&port.name);
     let images: Vec<&Port> = inputs.iter().filter(is_free).collect();
-    // Of several, all but one lack a value, and the message names the first of those.
+    // If all but one lack a value, the message names the first of those.
     let likely = |port: &&&Port| {
         let name = port.name.to_lowercase();
         port.layout(channels.count()).is_some() && !ATTENTION.iter().any(|word| name.contains(word))

@@ -24,7 +24,7 @@ const CONTEXT: usize = 32;
 pub(super) struct SizeRule {
     /// Height and width that every run must have; `None` for any.
     pub(super) fixed: [Option<usize>; 2],
-    /// Number of which free sides must be multiples.
+    /// Free sides must be multiples of this number.
     pub(super) multiple: usize,
     /// Pixels that are filled at least, even up to the next multiple: 0 or 1.
     pub(super) least_fill: usize,
@@ -52,7 +52,7 @@ impl SizeRule {
         self.fixed == [None; 2]
     }
 
-    /// Sides filled to what the authors' own multiple asks for.
+    /// Sides padded to the authors' own multiple.
     fn filled(self, size: [usize; 2]) -> [usize; 2] {
         size.map(|side| (side + self.least_fill).next_multiple_of(self.multiple))
     }
@@ -105,7 +105,7 @@ pub(super) struct SizePlan {
     pub(super) seams: SeamRule,
 }
 
-/// What tiles that differ at their seams mean.
+/// Consequence of tiles that differ at their seams.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum SeamRule {
     /// Parts that overlap because the model needs multiples may differ.
@@ -174,7 +174,7 @@ fn cropping(size: [usize; 2], rule: SizeRule) -> Result<Cutting, NoPlan> {
     })
 }
 
-/// Tiles for a model that takes any size, by `--llie-options tile` and what is stated.
+/// Tiles for a model that accepts any size, by `--llie-options tile` and the stated tile.
 fn cutting(size: [usize; 2], rule: SizeRule, tiling: Tiling) -> Result<Cutting, NoPlan> {
     let area = rule.filled(size);
     let exact = match rule.tile {

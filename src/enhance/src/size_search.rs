@@ -22,7 +22,7 @@ pub(super) enum TakenSizes {
 }
 
 impl TakenSizes {
-    /// What was found, and the line of a sidecar that states it.
+    /// The finding, with the sidecar line that states it.
     pub(super) fn words(self) -> String {
         match self {
             Self::Multiple(multiple) => format!(
@@ -65,7 +65,7 @@ impl SizeSearch {
         }
     }
 
-    /// What the search found, if it has been made.
+    /// Result of the search; `None` before it was made or if it found nothing.
     pub(super) fn found(&self) -> Option<TakenSizes> {
         match self.state {
             SearchState::Found(found) => Some(found),
@@ -73,7 +73,7 @@ impl SizeSearch {
         }
     }
 
-    /// Searches, at the first call; returns what was found.
+    /// Searches at the first call, and returns the result.
     pub(super) fn run(&mut self, graph: &Graph) -> Result<Option<TakenSizes>> {
         if self.state == SearchState::Open {
             let found = match multiple(graph)? {
@@ -99,9 +99,9 @@ impl SizeSearch {
     }
 }
 
-/// The smallest of [`MULTIPLES`] of which the sides of images must be multiples; `None` if none of them suits.
+/// The smallest of [`MULTIPLES`] that the model needs the sides of images to be multiples of; `None` if none of them suits.
 ///
-/// A multiple is tried at a size that is none of a larger multiple, so that a success shows this one.
+/// A multiple is tried at a size that is not a multiple of any larger one, so that a success is evidence for this one.
 fn multiple(graph: &Graph) -> Result<Option<usize>> {
     for multiple in MULTIPLES {
         match trial(graph, trial_size(multiple))? {

@@ -1,4 +1,4 @@
-//! What an input of a graph is given: [`Tensor`].
+//! [`Tensor`]: the value of one graph input.
 
 use half::{bf16, f16};
 
@@ -111,7 +111,7 @@ impl TensorData {
     }
 }
 
-/// A whole number as one of an integer type, so many times.
+/// Converts a whole number to an integer type and repeats it `count` times.
 fn whole<T: Copy + TryFrom<i128>>(number: Number, count: usize) -> Option<Vec<T>> {
     let whole = match number {
         Number::Integer(value) => i128::from(value),

@@ -21,9 +21,9 @@ pub(super) enum Term {
     Divide,
     /// a to the power of b; a negative base counts as 0.
     Power,
-    /// The smallest of so many arguments; of a single one, the smallest of its channels.
+    /// The smallest of this many arguments; of a single one, the smallest of its channels.
     Min(usize),
-    /// The largest of so many arguments; of a single one, the largest of its channels.
+    /// The largest of this many arguments; of a single one, the largest of its channels.
     Max(usize),
     /// The first argument, held between the second and the third.
     Clip,
@@ -100,7 +100,7 @@ impl Term {
         }
     }
 
-    /// The value of the step; `names` are the values of the names, `arguments` as many as [`Term::arguments`] says.
+    /// Value of the step. `names` holds the values of the names; `arguments` has [`Term::arguments`] elements.
     ///
     /// Powers are those of `libm`, so that every machine gives the same bytes.
     pub(super) fn value(self, names: &[Sample], arguments: &[Sample]) -> Sample {

@@ -1,4 +1,5 @@
-//! What an enhancer did in a run, shared by all threads that use it: [`Usage`]; and what follows if that is odd: [`Implausible`].
+//! Counters of an enhancer in a run, shared by all threads that use it ([`Usage`]), and the reaction to implausible images
+//! ([`Implausible`]).
 
 use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
@@ -16,7 +17,7 @@ const ENOUGH: usize = super::probe::FRAMES;
 /// Number of the twin that stands for images that were read from a store.
 const STORED: usize = usize::MAX;
 
-/// What happens to a model whose images cannot be enhanced images.
+/// Reaction to a model with implausible images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Implausible {
     /// It is refused.
@@ -28,18 +29,18 @@ pub enum Implausible {
     NotLookedFor,
 }
 
-/// What was seen on an enhanced image.
+/// Finding about one enhanced image.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(super) enum Seen {
     /// It was not looked at, because the degraded image is not dark: good models fail the rules on those.
     #[default]
     Bright,
-    /// The degraded image is dark; what is wrong with the enhanced one, if something is.
+    /// The degraded image is dark. Holds the flaw of the enhanced one, if it has one.
     Dark(Option<Verdict>),
 }
 
 impl Seen {
-    /// What is seen on the enhanced image of a degraded one.
+    /// Compares the enhanced image with the degraded one.
     pub(super) fn on([degraded, made]: [&Rgb; 2]) -> Self {
         if brightness(degraded) > DARK {
             Self::Bright
@@ -49,11 +50,11 @@ impl Seen {
     }
 }
 
-/// What the note of an enhancer gets from one image; kept with images that are stored.
+/// Contribution of one image to the enhancer's note; stored with the image.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ImageUse {
     pub(super) seen: Seen,
-    /// What was done because of the size of the image.
+    /// How the size of the image was handled.
     pub(super) sizes: SizeLog,
 }
 
@@ -107,7 +108,7 @@ impl ImageUse {
 }
 
 impl Seen {
-    /// Counts what was seen on the image of a frame in a condition, unless images are not looked at. The model is named by its file.
+    /// Counts the finding about a frame's image in a condition, unless images are not checked. The model is named by its file.
     ///
     /// # Errors
     /// If most images of dark frames so far cannot be enhanced images.
@@ -142,7 +143,7 @@ struct State {
     impossible: usize,
     /// The digests of the frames and conditions whose images were looked at.
     judged: HashSet<Digest>,
-    /// What each twin did because of sizes.
+    /// Size adaptations by twin.
     sizes: BTreeMap<usize, SizeLog>,
 }
 
@@ -182,12 +183,12 @@ impl Usage {
         });
     }
 
-    /// Adds what was done because of sizes to an image that was made earlier and is read now.
+    /// Adds the size adaptations of an image that was made earlier and is read now.
     pub(super) fn add_sizes_of_stored(&self, log: &SizeLog) {
         self.change_sizes(STORED, |sizes| sizes.add(log));
     }
 
-    /// Forgets what was done to stored images because of sizes.
+    /// Resets the size adaptations of stored images.
     pub(super) fn count_stored_anew(&self) {
         self.set_sizes(STORED, &SizeLog::default());
     }
@@ -197,10 +198,10 @@ impl Usage {
         self.with(|state| change(&mut state.note));
     }
 
-    /// Counts what was seen on the image of a frame in a condition; an image that is made again counts once.
+    /// Counts the finding about a frame's image in a condition; an image that is made again counts once.
     ///
     /// # Errors
-    /// What was seen, if more than half of at least six images cannot be enhanced images, unless such images are used.
+    /// The finding, if more than half of at least six images cannot be enhanced images, unless such images are used.
     pub(super) fn judge(
         &self,
         seen: &Seen,

@@ -1,4 +1,4 @@
-//! What follows from an examination: the lines of a sidecar that are proposed, and why ([`Found`]).
+//! Conclusion of an examination ([`Found`]): the proposed lines of a sidecar, with the reason.
 
 use crate::convention::ChannelOrder;
 use crate::probe::{Conclusion, Probe, RangePair};
@@ -22,7 +22,7 @@ pub struct ProposedLine {
     pub reason: String,
 }
 
-/// What an examination found.
+/// Findings of an examination.
 pub(super) struct Found {
     pub(super) lines: Vec<ProposedLine>,
     pub(super) conclusion: String,
@@ -88,9 +88,9 @@ impl Found {
     }
 }
 
-/// What follows from the pairs of ranges: the only plausible one is proposed. `swapped` is the probe with the other order of the
-/// output's colours, which is considered if the colours are why nothing else is plausible; of several pairs that are plausible
-/// with it, that which is `stated` is taken.
+/// Conclusion from the pairs of ranges: the only plausible one is proposed. `swapped` is the probe with the output's colours in the other
+/// order; it counts if the colours are the reason that nothing else is plausible. If several of its pairs are plausible, the `stated` one
+/// is taken.
 pub(super) fn propose(
     probe: &Probe,
     stated: Option<RangePair>,

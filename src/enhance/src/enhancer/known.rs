@@ -1,4 +1,4 @@
-//! What is known of an enhancer, for its probe and its examination.
+//! Properties of an enhancer that its probe and its examination read.
 
 use std::path::{Path, PathBuf};
 
@@ -28,7 +28,7 @@ impl Enhancer {
         sidecar::path_for(&self.path)
     }
 
-    /// A handle to what it did so far.
+    /// Handle to the enhancer's counters.
     #[must_use]
     pub fn usage(&self) -> Usage {
         self.usage.clone()
@@ -45,7 +45,7 @@ impl Enhancer {
         &self.graph
     }
 
-    /// What sidecar and preset state.
+    /// Statements of sidecar and preset.
     pub(crate) fn convention(&self) -> &ModelSidecar {
         &self.graph.convention
     }
@@ -80,7 +80,7 @@ impl Enhancer {
             convention.range_in.or(normalised_in),
             convention.range_out.or(normalised_out),
         ];
-        // Authors who normalise the input and say nothing of the output give it in 0..1.
+        // Authors who normalise the input and do not document the output return 0..1.
         let output = output.or(normalised_in);
         [
             of(input, &signature.input.port.element),
@@ -88,7 +88,7 @@ impl Enhancer {
         ]
     }
 
-    /// Whether a preset says how it is fed and read, and no sidecar says otherwise.
+    /// True if a preset defines input and output, and no sidecar overrides it.
     pub(crate) fn follows_preset(&self) -> bool {
         let sidecar = &self.description.sidecar;
         let is_stated = sidecar.range_in.is_some() || sidecar.range_out.is_some();
@@ -166,7 +166,7 @@ impl Enhancer {
         rule.whole(size)
     }
 
-    /// Counts from now on what is done because of sizes.
+    /// Resets the counts of size adaptations.
     pub fn count_anew(&mut self) {
         self.log = SizeLog::default();
         self.usage.set_sizes(self.twin, &self.log);
@@ -178,7 +178,7 @@ impl Enhancer {
         self.search.found()
     }
 
-    /// Notes what the probe found. From now on it is fed and read in the ranges that were tried, and no value is out of range.
+    /// Stores the result of the probe. The model is then used with the ranges that were tried, and no value counts as out of range.
     ///
     /// # Errors
     /// If the graph contradicts its own convention, which is a bug.

@@ -48,8 +48,8 @@ impl Enhancer {
     }
 }
 
-/// Number of sets of enhancers that can work at the same time: at most `cores`, and as many as the free memory holds. What the process
-/// holds now, after the first image of each enhancer, is taken for the memory of one set.
+/// Number of sets of enhancers that can work at the same time: at most `cores`, and at most the number that fits in free memory. The memory
+/// of one set is estimated as that of the process after the first image of each enhancer.
 pub fn sets_in_memory(cores: usize) -> usize {
     match (memory::resident(), memory::available()) {
         (Some(resident), Some(available)) => {

@@ -27,7 +27,7 @@ fn each(codes: &Codes, change: impl Fn(f32) -> f32) -> Codes {
     }
 }
 
-/// What a good enhancer makes: four times the light.
+/// Output of a good enhancer: four times the light.
 fn good() -> Codes {
     each(&dark(), |code| 4.0 * code)
 }

@@ -7,7 +7,7 @@ fn preset(name: &str) -> Preset {
     preset.unwrap()
 }
 
-/// Float images of so many channels and any size, one number if they are 0.
+/// Float images with these numbers of channels and any size; a single number if 0.
 fn ports(all: &[(&str, usize)]) -> Vec<Port> {
     let any = || Dim::Free("n".into());
     let ports = all.iter().map(|(name, channels)| Port {
@@ -21,7 +21,7 @@ fn ports(all: &[(&str, usize)]) -> Vec<Port> {
     ports.collect()
 }
 
-/// What a preset states for a graph of these outputs.
+/// A preset's statements for a graph with these outputs.
 fn stated(name: &str, outputs: &[(&str, usize)]) -> std::result::Result<ModelSidecar, String> {
     let sidecar = ModelSidecar::default();
     preset(name).for_graph(&sidecar, &ports(&[("x", 3)]), &ports(outputs))
@@ -106,7 +106,7 @@ fn every_preset_has_its_source() {
             assert!((1..=list.channels.len()).contains(&list.nth), "{name}");
             assert_eq!(list.channels[list.nth - 1], 3, "{name}");
         }
-        // What names an output stands beside the names, where it can be checked against a graph.
+        // The output is identified next to the names, where it can be checked against a graph.
         assert!(content.sidecar.output.is_none() && content.sidecar.image.is_none());
         let source = content.to_string();
         assert!(source.contains(&content.repository) && source.contains(&content.commit));
