@@ -63,7 +63,7 @@ fn can_be_enabled(context: &RuleContext<'_>, activity: &ActivityRule) -> bool {
     })
 }
 
-/// Whether a segment is what its class says: its token is its own word, or questions call it by its word. The sofa of a coarse
+/// True if a segment is a typical member of its class: its token is its own word, or questions call it by its word. The sofa of a coarse
 /// label space may be an armchair.
 fn is_called(context: &RuleContext<'_>, segment: &Segment) -> bool {
     segment.token(context.book) != segment.class || segment.called(context.book).is_some()

@@ -107,7 +107,7 @@ fn luma(image: &Rgb) -> Array2<f32> {
     })
 }
 
-/// A map with at most [`ROWS`] rows: each new pixel is the mean of what it covers.
+/// A map with at most [`ROWS`] rows: each new pixel is the mean of those that it covers.
 fn reduced(map: &Array2<f32>) -> Array2<f32> {
     let (height, width) = map.dim();
     if height <= ROWS {

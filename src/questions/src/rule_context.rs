@@ -26,7 +26,7 @@ pub struct RuleContext<'a> {
     pub any_room: Option<&'a str>,
     /// Classes that are common in each type of room.
     pub frequency: &'a Frequency,
-    /// The words that the data set can say.
+    /// The words that the data set can name.
     pub vocabulary: &'a Vocabulary,
     /// The colours of things in all views of their scenes.
     pub views: &'a Views,
@@ -116,7 +116,7 @@ impl RuleContext<'_> {
         RuleResult::Viable(candidate)
     }
 
-    /// What a person needs to check a segment, as JSON.
+    /// The facts that a person needs to check a segment, as JSON.
     fn json(&self, segment: &Segment) -> Value {
         let mut json = json!({
             "id": segment.id,

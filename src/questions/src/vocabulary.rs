@@ -1,4 +1,4 @@
-//! The words that a data set can say: [`Vocabulary`].
+//! [`Vocabulary`]: the words that a data set can name.
 
 use std::collections::{BTreeMap, BTreeSet};
 

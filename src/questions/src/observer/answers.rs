@@ -1,4 +1,4 @@
-//! Answers from what is seen alone: [`Observation::answer`].
+//! Answers from visible evidence alone: [`Observation::answer`].
 
 use super::wording::{QuestionTopic, ThingWord};
 use super::{Observation, Shade};

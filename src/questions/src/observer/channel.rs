@@ -1,8 +1,8 @@
-//! What a degradation did to the codes of one colour channel, estimated from one image: [`ChannelFit`].
+//! [`ChannelFit`]: effect of a degradation on the codes of one colour channel, estimated from one image.
 //!
-//! The tone curve is the increasing function of the untouched code that is nearest to the received codes (isotonic regression
-//! by pool adjacent violators: Ayer et al., Ann. Math. Stat. 26:641, 1955). What is left counts as noise. A global tone curve
-//! or gain therefore changes nothing, and what an enhancer invents is no function of the untouched code, so that it is noise.
+//! The tone curve is the increasing function of the untouched code that is nearest to the received codes (isotonic regression by pool
+//! adjacent violators: Ayer et al., Ann. Math. Stat. 26:641, 1955). The residual counts as noise. A global tone curve or gain therefore
+//! changes nothing, and content that an enhancer invents is noise, because it is no function of the untouched code.
 
 use super::tiles::{CODES, SameCode, TileSums, Tiles};
 

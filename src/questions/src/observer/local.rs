@@ -12,7 +12,7 @@
 use super::channel::{ChannelFit, CodeTotals, Fit, ROUNDING, TileFit};
 use super::tiles::{CODES, TileSums, Tiles};
 
-/// Rounds of reweighting without a field of light, so that a covered part is not taken for a bright one (chosen).
+/// Rounds of reweighting without a field of light, so that a covered part is not mistaken for a bright one (chosen).
 const ROUNDS_WITHOUT_FIELD: usize = 3;
 
 /// Rounds of reweighting (chosen).
@@ -273,7 +273,7 @@ fn field(tiles: &Tiles, moments: &[[Moments; 3]], weights: &[f64]) -> Vec<[f64; 
     gains.collect()
 }
 
-/// Normal equations of a weighted linear regression on `N` terms, of which the first is constant.
+/// Normal equations of a weighted linear regression on `N` terms; the first is constant.
 #[derive(Debug, Clone)]
 pub(super) struct Equations<const N: usize> {
     matrix: [[f64; N]; N],

@@ -16,8 +16,8 @@
 //! 4. The answer (`answers`): by the rules, from the seen things alone. If nothing that is seen bears on a question, there is
 //!    no answer, and the caller guesses.
 //!
-//! What follows: for one who knows frame, place and appearance, and only has to confirm each thing piece by piece, this share of
-//! the answers can still be read. What does not follow:
+//! Conclusion: this share of the answers can still be found by a viewer who knows frame, place and appearance, and only has to confirm each
+//! object piece by piece. It does not follow:
 //!
 //! - that a model could do this: to know the signal exactly is far more than a viewer knows;
 //! - a bound: the covariance is diagonal with two measured factors, half of an outline is a rule, and one who uses the inside
@@ -61,7 +61,7 @@ pub use wording::understood;
 /// Version of the observer's method; it enters the digest of the model.
 pub const VERSION: u32 = 3;
 
-/// What the observer knows of a frame: its untouched pixels, and the place of every segment.
+/// The observer's knowledge of a frame: its untouched pixels, and the place of every segment.
 #[derive(Debug)]
 pub struct ObservedFrame {
     untouched: Rgb,
@@ -149,7 +149,7 @@ impl ObservedFrame {
     }
 }
 
-/// What the observer sees in one image of a frame.
+/// The observer's findings in one image of a frame.
 #[derive(Debug, Clone)]
 pub struct Observation {
     /// Share of the image's variance that the untouched frame explains (R²), from 0 to 1.

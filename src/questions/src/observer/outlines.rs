@@ -1,11 +1,10 @@
-//! Whether the contrast along each outline is the one that the untouched frame predicts: [`Outline`].
+//! [`Outline`]: comparison of the contrast along each outline with the one that the untouched frame predicts.
 //!
-//! In each element (the pixels of a mask, and all else, in one cell) the difference of the means is compared with the one that
-//! is predicted: a matched filter whose template is the prediction, whitened by measured variances. Its amplitude is 1 where the
-//! contrast is as predicted and 0 where it is not there; its detectability d′ is the signal-to-noise ratio of the prediction.
-//! Noise is neither white nor independent along an outline. Two factors say by how much, each measured in the same image from
-//! what is left of the contrasts, and never below 1. Those of disturbed tiles are measured apart from those of all others, so that
-//! what covers a part of the image changes nothing elsewhere.
+//! In each element (the pixels of a mask, and all others, in one cell) the difference of the means is compared with the predicted one: a
+//! matched filter whose template is the prediction, whitened by measured variances. Its amplitude is 1 for the predicted contrast and 0 for
+//! none; its detectability d′ is the signal-to-noise ratio of the prediction. Noise is neither white nor independent along an outline. Two
+//! factors correct for this, each measured in the same image from the residual of the contrasts, and never below 1. Those of disturbed
+//! tiles are measured separately, so that an object that covers a part of the image changes nothing elsewhere.
 
 use super::cells::{Cells, Element, Scale};
 use super::channel::{Fit, ROUNDING, TileFit};
@@ -106,7 +105,7 @@ pub(super) fn patch_sums(
     sums
 }
 
-/// What is known of the outline of one mask in one image.
+/// Evidence for the outline of one mask in one image.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Outline {
     /// Largest share of confirmed elements at one scale, from 0 to 1.
@@ -151,7 +150,7 @@ struct Filter {
     output: f64,
     /// Σ p² / v: the power of the prediction.
     power: f64,
-    /// Σ p (d − p) / v: what is left.
+    /// Σ p (d − p) / v: the residual.
     rest: f64,
 }
 
@@ -206,7 +205,7 @@ fn measure(
     }
 }
 
-/// By how much the outputs of filters scatter more than their power says; at least 1.
+/// Ratio of the scatter of the filters' outputs to that expected from their power; at least 1.
 fn inflation<'a>(filters: impl Iterator<Item = &'a Filter> + Clone) -> f64 {
     let power: f64 = filters.clone().map(|filter| filter.power).sum();
     let squares: f64 = filters.map(|filter| filter.rest * filter.rest).sum();
@@ -217,7 +216,7 @@ fn inflation<'a>(filters: impl Iterator<Item = &'a Filter> + Clone) -> f64 {
     }
 }
 
-/// The filter of each element, after the variance of each channel is raised to what is left of its contrasts.
+/// The filter of each element, after the variance of each channel is raised to the residual of its contrasts.
 fn filters(scale: &Scale, smallest: &[PatchSums], tiles: &[TileFit]) -> Vec<Filter> {
     let mut sums = vec![PatchSums::default(); scale.patches.len()];
     for (part, whole) in smallest.iter().zip(&scale.part_of) {
@@ -257,7 +256,7 @@ fn filters(scale: &Scale, smallest: &[PatchSums], tiles: &[TileFit]) -> Vec<Filt
     elements().map(filter).collect()
 }
 
-/// By how much the contrasts scatter about the predicted ones more than their variances say; at least 1.
+/// Ratio of the contrasts' scatter about the predicted ones to that expected from their variances; at least 1.
 fn excess(contrasts: impl Iterator<Item = Contrast>) -> f64 {
     let [sum, count] = contrasts.fold([0.0, 0.0], |[sum, count], contrast| {
         let rest = contrast.received - contrast.predicted;

@@ -36,8 +36,8 @@ struct Posterior {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Shade([Posterior; 3]);
 
-/// The light on the things of a frame, as their surroundings show it. The colour of a thing says nothing of the light on it: in
-/// local light of its own, each thing would have the colour that is expected.
+/// The light on the objects of a frame, estimated from their surroundings. An object's own colour is no evidence of its light: with a local
+/// light of its own, each object would have the expected colour.
 pub(super) struct Light<'a> {
     cells: &'a Cells,
     tiles: &'a Tiles,

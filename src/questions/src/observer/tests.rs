@@ -55,7 +55,7 @@ fn image(code: impl Fn(usize) -> f64) -> Rgb {
     Rgb::new(height, width, samples.collect()).unwrap()
 }
 
-/// What is known of an image.
+/// The untouched frame behind an image.
 struct Untouched<'a> {
     image: &'a Rgb,
     cells: Cells,

@@ -82,24 +82,24 @@ pub struct GrammarRule {
     pub spelled: BTreeMap<String, String>,
 }
 
-/// Words that do not say what a thing is, because they stand for several kinds of things.
+/// Vague words, which stand for several kinds of objects.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CoarseRule {
-    /// Names of segments that say nothing.
+    /// Names of segments without information.
     pub vague: BTreeSet<String>,
-    /// By label space, the words that do say what a thing is. In a space that is not listed, all words do.
+    /// By label space, the words that identify an object. In a space that is not listed, all words do.
     pub spaces: BTreeMap<String, BTreeSet<String>>,
 }
 
 impl CoarseRule {
-    /// Whether the name of a segment says what the thing is.
+    /// True if the name of a segment identifies the object.
     #[must_use]
     pub fn is_name(&self, name: &str) -> bool {
         !name.is_empty() && !name.starts_with("unknown") && !self.vague.contains(name)
     }
 
-    /// Whether the word of a label space says what a thing is.
+    /// True if the word of a label space identifies an object.
     #[must_use]
     pub fn says(&self, space: &str, word: &str) -> bool {
         let words = self.spaces.get(space);

@@ -53,7 +53,7 @@ pub struct FrameStatistics {
     pub classes: BTreeMap<String, u64>,
     /// Number of pixels of each class that belong to no segment.
     pub loose: BTreeMap<String, u64>,
-    /// Number of pixels of each class that have no word of their own: neither a name nor a label that says what the thing is.
+    /// Number of pixels of each class without a word of their own: neither a name nor a label that identifies the object.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub unnamed: BTreeMap<String, u64>,
     /// Number of pixels of segments by word, with tiny segments.
@@ -174,7 +174,7 @@ pub enum WordSource {
     /// The segment's own name.
     #[default]
     Name,
-    /// The label of its pixels, which says what the thing is.
+    /// The label of its pixels, which identifies the object.
     Label,
     /// The label of its pixels, or a name, that stands for things of several kinds.
     Coarse,

@@ -216,8 +216,7 @@ impl<'a> SceneMaps<'a> {
         label.map_or("", |label| &label.name)
     }
 
-    /// Whether pixels of a mask and a label have a word of their own: the name of their segment, or a label that says what the
-    /// thing is.
+    /// True if pixels of a mask and a label have a word of their own: the name of their segment, or a label that identifies the object.
     pub(super) fn is_named(
         &self,
         frame: &Frame,

@@ -209,7 +209,7 @@ fn two_views_of_a_thing_must_show_the_same_colour() {
     assert_eq!(reason(view("a/1", "a", brown, 100_000, named)), None);
     let disagreed = Some(Reason::Disagreed);
     assert_eq!(reason(view("a/1", "a", white, 100_000, named)), disagreed);
-    // Too few pixels, another scene, and numbers without names say nothing about it.
+    // Too few pixels, another scene, and numbers without names are no evidence.
     assert_eq!(reason(view("a/1", "a", white, 499, named)), None);
     assert_eq!(reason(view("a/1", "a", white, 500, named)), disagreed);
     assert_eq!(reason(view("b/1", "b", white, 100_000, named)), None);
