@@ -9,7 +9,7 @@ use super::tokens::tokens;
 use super::words::Role;
 use darkqa_ground::types::question::Choices;
 
-/// What a choice is a name of.
+/// Kind of thing that a choice names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Naming {
     /// A thing or a room. "Table lamp" is no table.
@@ -28,7 +28,7 @@ pub(super) struct ChoiceViews {
     pub(super) folded: Vec<(String, usize)>,
     /// The choices of letters and blanks alone, by their letters without blanks.
     pub(super) joined: HashMap<String, Vec<usize>>,
-    /// What each choice is a name of.
+    /// Kind of thing that each choice names.
     pub(super) naming: Vec<Naming>,
     /// Indices of "yes" and "no", if both are choices.
     pub(super) yes_no: Option<(usize, usize)>,
@@ -77,7 +77,7 @@ impl ChoiceViews {
     }
 }
 
-/// What a choice is a name of, by its words: those of a color, or of a place or a number, and nothing else.
+/// Classifies a choice by its words: an attribute or a color if it has only words of that class, else a thing.
 fn naming(folded: &str) -> Naming {
     let words = Clauses::new(folded, &tokens(folded)).elements;
     let all = |kinds: &[Role]| words.iter().all(|word| word.roles.has_any(kinds));

@@ -3,7 +3,7 @@
 use super::tokens::{Token, TokenKind};
 use super::words::{Role, Roles, phrase_at};
 
-/// What ends at an element of a text.
+/// Unit of the text that ends at an element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Boundary {
     /// Nothing.
@@ -133,7 +133,7 @@ impl<'a> Clauses<'a> {
     }
 }
 
-/// The roles that a phrase has from its words: "it is" has a pronoun and a verb, "i'd say" is not so.
+/// The roles of a phrase that follow from its words: "it is" has a pronoun and a verb; "i'd say" is counterfactual.
 fn inner(folded: &str, words: &[Token]) -> Roles {
     const ANY: Roles = Roles::from_role(Role::ModalPast).with(Roles::from_role(Role::Image));
     const FIRST: Roles = ANY.with(Roles::from_role(Role::Pronoun));
@@ -147,7 +147,7 @@ fn inner(folded: &str, words: &[Token]) -> Roles {
     middle.with(own(0).both(FIRST)).with(own(last).both(LAST))
 }
 
-/// What ends at an element.
+/// Unit of the text that ends at an element.
 fn boundary(kind: TokenKind, roles: Roles, characters: &str) -> Boundary {
     match kind {
         TokenKind::Break => Boundary::Sentence,

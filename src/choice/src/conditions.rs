@@ -1,4 +1,4 @@
-//! Stretches of a text that say what is not so, or what would be: [`conditional`].
+//! Conditional and counterfactual parts of a text: [`conditional`].
 
 use super::clauses::{Boundary, Clauses, Element};
 use super::ranges::Ranges;
@@ -77,7 +77,7 @@ fn within(
     ranges
 }
 
-/// Whether the elements have an "if" that makes all of them unsure: it begins them, or they say what would be.
+/// True if the elements have an "if" that makes all of them uncertain: it begins them, or they are counterfactual.
 fn is_unmet(elements: &[Element], head: &Element) -> bool {
     let has = |role: Role| elements.iter().any(|element| element.has(role));
     has(Role::If) && !has(Role::Forced) && (head.has(Role::If) || has(Role::ModalPast))

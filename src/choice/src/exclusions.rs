@@ -101,7 +101,7 @@ impl Exclusions<'_> {
         let verb = clauses.verb_before(at)?;
         if elements[verb].has(Role::Copula) {
             let is_named = self.names.any(self.clause, element.start);
-            // "It is wrong" is said of what was named last.
+            // "It is wrong" refers to the last name.
             let pronoun = !is_named && last && self.is_pronoun(verb);
             let name = self.names.last_before(element.start).filter(|_| pronoun);
             return Some(name.unwrap_or(self.clause));

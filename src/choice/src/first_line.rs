@@ -6,8 +6,8 @@ use super::view::ReplyView;
 use super::words::Role;
 use darkqa_ground::types::question::{Answer, UnreadReason};
 
-/// The first line, if it reads strictly. Another line that reads strictly as another choice makes it ambiguous, and so does
-/// another choice behind words that take back what was said ("On reflection, it is C").
+/// The first line, if it parses strictly. It is ambiguous if another line parses strictly as another choice, or if another choice follows a
+/// retraction ("On reflection, it is C").
 pub(super) fn first_line(view: &ReplyView<'_>) -> Option<Answer> {
     let (line, rest) = view.text.split_once('\n')?;
     let read = |line: &str| match strict::read(line.trim(), &view.offered.texts) {

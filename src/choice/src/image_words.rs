@@ -1,4 +1,4 @@
-//! Colors that a text says of the image, not of an object in it: [`image_colors`].
+//! Colors that a text attributes to the image, not to an object in it: [`image_colors`].
 
 use super::choice_views::{ChoiceViews, Naming};
 use super::clauses::{Boundary, Clauses};

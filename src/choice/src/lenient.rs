@@ -1,4 +1,4 @@
-//! The lenient reading: a sequence of levels, of which the first that finds something decides.
+//! Lenient parsing: a sequence of levels; the first that finds something decides.
 //!
 //! 1. A letter with the text of another choice is a contradiction, wherever it stands.
 //! 2. JSON with an answer key, `\boxed{}`, `<answer>`.
@@ -8,9 +8,8 @@
 //! 6. The first line alone, if it reads strictly; a leading "yes" or "no".
 //! 7. The letters that are left, then the texts that are left.
 //!
-//! From level 5 on, only names count that the text says to be there. A name does not count that is in a list of all choices,
-//! in a question, in a condition, a color of the image, or denied ([`State`]). A level that finds two different answers
-//! accepts neither, and no later level is tried.
+//! From level 5 on, only affirmed names count. A name does not count that is in a list of all choices, in a question, in a condition, a
+//! color of the image, or denied ([`State`]). A level that finds two different answers accepts neither, and no later level is tried.
 
 use super::choice_views::ChoiceViews;
 use super::clean;

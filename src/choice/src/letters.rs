@@ -112,7 +112,7 @@ pub(super) fn hyphenated(left: &str, right: &str) -> bool {
         || (dash(after.next()) && continues_word(after.next()))
 }
 
-/// Whether the words before a letter say that it is one: "option A".
+/// True if the words before a letter mark it as a choice: "option A".
 pub(super) fn called_letter(left: &str) -> bool {
     const WORDS: [&str; 8] = [
         "option",

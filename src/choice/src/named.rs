@@ -104,7 +104,7 @@ impl Names<'_> {
         self.letters.iter().chain(&self.texts)
     }
 
-    /// Sets what the text says of each name.
+    /// Sets the state of each name.
     pub(super) fn set_states(&mut self, state: impl Fn(&Name) -> State) {
         for name in self.letters.iter_mut().chain(&mut self.texts) {
             name.state = state(name);

@@ -1,4 +1,4 @@
-//! Names of choices in a text: the position of a letter or a choice's text, and what the text says of it.
+//! Names of choices in a text: the position of a letter or a choice's text, and its state.
 
 /// How clearly a name is delimited from the text around it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -11,7 +11,7 @@ pub(super) enum Delimiting {
     Firm,
 }
 
-/// What a text says of a choice where it names it.
+/// Attitude of a text to a choice that it names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub(super) enum State {
     /// The choice is said to be there.
@@ -19,11 +19,11 @@ pub(super) enum State {
     Affirmed,
     /// It is denied, and makes another choice ambiguous ("not A but C").
     Denied,
-    /// It is taken out of the running: what is left may be the answer ("I rule out A").
+    /// Ruled out, so that the answer is among the other choices ("I rule out A").
     Excluded,
     /// It is a color of the image.
     OfImage,
-    /// It stands in a condition, or in what is expected of a choice.
+    /// Named in a condition, or in a description of expectations.
     Conditional,
     /// It stands in a question.
     Questioned,

@@ -120,7 +120,7 @@ fn masses(
     masses
 }
 
-/// The most that a token can have that is not listed: less than the least likely one that is, and no more than what they leave.
+/// Upper bound for the probability of an unlisted token: that of the least likely listed one, and at most the rest to 1.
 fn bound(position: &TokenPosition) -> f64 {
     let listed = position
         .likeliest
@@ -181,7 +181,7 @@ mod tests {
         }
         assert!(options.p[3] == 0.0);
         assert!((options.mass - mass).abs() < 1e-6);
-        // What is not listed has at most what is left, e^-6.0 being less or more than that.
+        // An unlisted token has at most the remaining probability; e^-6.0 is less or more than that.
         let rest = 1.0 - mass - (-6.0_f64).exp();
         assert!((options.bound - rest.max(0.0).min((-6.0_f64).exp())).abs() < 1e-6);
         assert!((options.confidence() - options.p[1]).abs() < 1e-12);
@@ -208,7 +208,7 @@ mod tests {
         // A quotation mark may be in the token of the letter.
         let quoted = [at("{\"answer\":", &[]), at("\"B", &[("\"B", -0.01)])];
         assert!(read(&quoted, &FOUR).is_some());
-        // A reply that does not begin with a choice says nothing of them.
+        // Replies that do not begin with a choice have no probabilities of choices.
         for before in [&["The", " answer", " is"][..], &[" "; 8]] {
             assert_eq!(read(&marks(before), &FOUR), None, "{before:?}");
         }

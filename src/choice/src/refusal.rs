@@ -22,7 +22,7 @@ static REFUSAL: LazyLock<Regex> = LazyLock::new(|| {
     ))
 });
 
-/// Whether a text in lower case declines to answer or says that nothing can be seen.
+/// True if a text in lower case declines to answer or states that nothing can be seen.
 pub(super) fn declines(folded: &str) -> bool {
     REFUSAL.is_match(folded)
 }

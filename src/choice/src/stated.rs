@@ -36,7 +36,7 @@ pub(super) fn stated(view: &ReplyView<'_>) -> Option<Answer> {
     let mut announcements: Vec<Announcement> = confirmed(view).collect();
     let mut end = view.text.len();
     for marker in found.into_iter().rev() {
-        // What is asked, what would be and what repeats the prompt announces nothing.
+        // Questions, counterfactuals and repetitions of the prompt announce nothing.
         if matches!(
             view.state(marker.start),
             State::Questioned | State::Conditional | State::Repeated
@@ -60,7 +60,7 @@ pub(super) fn stated(view: &ReplyView<'_>) -> Option<Answer> {
         .or_else(|| only(&of(MarkerKind::Mention), Some(view)))
 }
 
-/// The markers of what is left over, if a choice was denied before: "A and C are out, which leaves B".
+/// The markers of a remainder, if a choice was denied before: "A and C are out, which leaves B".
 fn leftovers<'a>(view: &'a ReplyView<'_>) -> impl Iterator<Item = Marker> + 'a {
     let denied = view
         .names

@@ -217,7 +217,7 @@ fn long_replies_are_read() {
     );
     let found = read(&answered, &rooms, ReadingMode::Lenient);
     assert_eq!(found, Answer::Chosen(1));
-    // Repetitions of what the steps search for. If one step were quadratic, this test would take very long.
+    // Repetitions of the strings that the steps search for. If one step were quadratic, this test would take very long.
     for piece in [
         "answer: ",
         "answer is ",

@@ -12,10 +12,10 @@ use darkqa_ground::types::question::{Answer, UnreadReason};
 static MARK: LazyLock<Regex> =
     LazyLock::new(|| compiled(r"(?P<yes>[✓✔✅☑👍]|\[[xX]\])|(?P<no>[✗✘❌❎✖👎☐]|\[ \])"));
 
-/// A mark of which it is not known whether it means yes or no.
+/// A mark that may mean yes or no.
 const UNKNOWN: char = '☒';
 
-/// What a mark says of the item beside it.
+/// Meaning of a mark for the item next to it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Mark {
     Yes,
@@ -31,7 +31,7 @@ pub(super) struct Ticks {
     is_endless: bool,
 }
 
-/// Maximum number of marks that are read. A reply with more repeats itself, and says nothing.
+/// Maximum number of marks that are parsed. A reply with more repeats itself and is not evaluated.
 const MAX_MARKS: usize = 100;
 
 impl Ticks {
@@ -57,7 +57,7 @@ impl Ticks {
     }
 }
 
-/// The text without the lines that have a mark of unknown meaning: they say nothing.
+/// The text without the lines that have a mark of unknown meaning.
 pub(super) fn without_unknown(tidy: &str) -> Cow<'_, str> {
     if !tidy.contains(UNKNOWN) {
         return Cow::Borrowed(tidy);

@@ -1,4 +1,4 @@
-//! A plain text with every name of a choice in it, and what the text says of each: [`ReplyView`].
+//! [`ReplyView`]: a plain text with every name of a choice in it, and the state of each.
 
 use super::choice_views::ChoiceViews;
 use super::clauses::Clauses;
@@ -24,7 +24,7 @@ pub(super) struct ReplyView<'a> {
     pub(super) offered: &'a ChoiceViews,
     /// The words, phrases and clauses.
     pub(super) clauses: Clauses<'a>,
-    /// The names of choices, each with what the text says of it.
+    /// The names of choices, each with its state.
     pub(super) names: Names<'a>,
     scopes: Scopes,
 }
@@ -40,7 +40,7 @@ struct Scopes {
 }
 
 impl Scopes {
-    /// What the text says of a name that begins at a byte. The first rule that applies decides.
+    /// State of a name that begins at a byte. The first rule that applies decides.
     fn state(&self, byte: usize) -> State {
         let states = [
             (&self.repeated, State::Repeated),
@@ -94,7 +94,7 @@ impl<'a> ReplyView<'a> {
         }
     }
 
-    /// What the text says of a name that begins at a byte.
+    /// State of a name that begins at a byte.
     pub(super) fn state(&self, byte: usize) -> State {
         self.scopes.state(byte)
     }

@@ -1,4 +1,4 @@
-//! The words by which the lenient reading tells what a reply says of a choice: [`Role`], [`phrase_at`].
+//! Vocabulary of lenient parsing: [`Role`], [`phrase_at`].
 //!
 //! The lists are data, in `words.toml`. A phrase is looked up word by word; no list is searched as a regular expression.
 
@@ -13,7 +13,7 @@ use super::tokens::{Token, TokenKind, tokens};
 /// The lists of words and phrases.
 const WORDS: &str = include_str!("words.toml");
 
-/// What a phrase does in a reply; each is a list in `words.toml`, which explains it.
+/// Function of a phrase in a reply. Each has a list in `words.toml`, which explains it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Role {
@@ -25,7 +25,7 @@ pub(super) enum Role {
     ExcludedLast,
     /// Excludes together with a [`Role::Candidate`].
     Untrue,
-    /// What a choice is called.
+    /// A word for a choice, as "option".
     Candidate,
     /// Denies the names behind it, which stay in the way.
     Not,
@@ -51,19 +51,19 @@ pub(super) enum Role {
     Adverb,
     /// Announces the choices that are left over.
     Leaves,
-    /// Behind a name, says that it is left over.
+    /// Follows a name and marks it as the remainder.
     Remains,
     /// Joins alternatives.
     Or,
     /// Joins names.
     And,
-    /// Begins what is asked.
+    /// Begins a question.
     Question,
     /// Begins a condition.
     If,
-    /// A verb of what is not so.
+    /// A verb of a counterfactual.
     ModalPast,
-    /// Says that a clause is about what is not so.
+    /// Marks a clause as counterfactual.
     Condition,
     /// A preposition of [`Role::Better`] light.
     Given,
@@ -77,7 +77,7 @@ pub(super) enum Role {
     Expected,
     /// A condition that only makes the model choose.
     Forced,
-    /// Takes back what was said before.
+    /// Retracts an earlier statement.
     Retraction,
     /// A word between "or" and a name.
     Hedge,
@@ -144,7 +144,7 @@ impl Roles {
     }
 }
 
-/// One phrase: the words behind its first one, and what it does.
+/// One phrase: the words after its first one, and its role.
 #[derive(Debug)]
 struct Phrase {
     rest: Vec<String>,

@@ -161,7 +161,7 @@ fn colors_and_places_are_no_things() {
     assert_eq!(naming("12")[0], Naming::Attribute);
 }
 
-/// The last words of things that the questions name which are no heads, and a thing that stays what it is with the word behind it.
+/// Last words of object names in questions that are no heads, and an object that keeps its meaning with the word behind it.
 const NO_HEADS: [(&str, &str); 4] = [
     ("photo", "kitchen"),
     ("monitor", "TV"),
