@@ -180,7 +180,7 @@ mod tests {
             degrees > student(49.0) - 1e-9 && degrees < student(30.0),
             "{degrees}"
         );
-        // Seven clusters in which the first model errs say too little.
+        // Errors in seven clusters only are too few for an interval of the first model.
         let few = [
             vec![cell(1, 1, 1); 40],
             vec![cell(0, 0, 1); 7],

@@ -28,7 +28,7 @@ pub struct BaselineRow {
     pub sides: [BaselineSide; 2],
 }
 
-/// What one side of a comparison with a baseline cost, and what could not be used of it.
+/// Cost and losses of one side of a comparison with a baseline.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BaselineSide {
     /// Number of trials with a reply.

@@ -1,4 +1,4 @@
-//! Which model sees best in the dark: [`BestInTheDark`].
+//! Ranking of models by accuracy in the dark: [`BestInTheDark`].
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -45,7 +45,7 @@ pub struct BestInTheDark {
     pub dropped: usize,
     /// Number of clusters of the items.
     pub clusters: usize,
-    /// The smallest p-value that so many clusters allow, 2 / 2ᶜ.
+    /// Smallest p-value that this number of clusters, c, allows: 2 / 2ᶜ.
     pub least_p: f64,
     /// p-value of the leader being the best, after the correction over all tests that sentences rest on.
     pub p_report: Option<f64>,
@@ -157,8 +157,9 @@ pub fn is_dark(level: AxisLevel, kind: Kind) -> bool {
 /// A model and the levels at which it was asked.
 type Asked<'g> = (&'g str, BTreeSet<AxisLevel>);
 
-/// The comparison of the models in the dark, in one parsing; `None` if fewer than two of them were asked at L0 and at a degraded level,
-/// if they share no item, or if there are so many that models are not compared. If they share no dark level, the darkest one that they share counts as dark.
+/// Compares the models in the dark, in one parsing. Returns `None` if fewer than two of them were asked at L0 and at a degraded level, if
+/// they share no item, or if there are too many models to compare. If they share no dark level, the darkest one that they share counts as
+/// dark.
 #[must_use]
 pub fn best_in_the_dark(grid: &Grid<'_>, mode: ReadingMode) -> Option<BestInTheDark> {
     if !compares_models(grid) {
@@ -235,7 +236,8 @@ fn levels(grid: &Grid<'_>, model: &str, variant: &KindReading) -> BTreeSet<AxisL
     subjects.filter_map(|subject| subject.level).collect()
 }
 
-/// The models that answered most, and those that answered less, so that none of them takes away what is compared of the others.
+/// Splits the models into those that answered most and those that answered less. The latter are compared separately, so that they do not
+/// reduce the items of the others.
 fn with_most_answers<'g>(
     grid: &Grid<'_>,
     models: Vec<Asked<'g>>,
@@ -428,7 +430,7 @@ impl Scores {
         let by_lighter = |a: &&(DarkAccuracy, usize), b: &&(DarkAccuracy, usize)| {
             a.0.lighter.total_cmp(&b.0.lighter)
         };
-        // Of several, the first: the better one in the dark.
+        // `rev`, because `max_by` returns the last of equal elements; the first one is better in the dark.
         let (light, light_index) = models.iter().rev().max_by(by_lighter)?;
         let ahead = |level: usize| light.by_level[level] - dark.by_level[level];
         let split = (1..self.levels).find(|split| ahead(*split) < 0.0)?;

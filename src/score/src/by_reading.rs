@@ -1,9 +1,9 @@
-//! Whether a finding about noise holds under each light reading: [`FindingByReading`].
+//! [`FindingByReading`]: a finding about noise, tested under each light reading.
 //!
-//! The paper's noise can be read in several ways. A conclusion that holds under one of them alone is a conclusion about that
-//! reading. So each finding is computed under every reading on the same items, by the same formula, and the results stand beside
-//! each other. Only the levels of the paper, L1–L5, count. What is said rests on Holm's correction over all claims of all models under
-//! all readings (Holm 1979, Scand. J. Stat. 6:65), so that a report without any effect names none with 95 % probability.
+//! The paper's noise model can be interpreted in several ways. A conclusion that holds under one of them alone is a conclusion about that
+//! interpretation. So each finding is computed under every reading on the same items, by the same formula, and the results are reported
+//! next to each other. Only the levels of the paper, L1–L5, count. Holm's correction covers all claims of all models under all readings
+//! (Holm 1979, Scand. J. Stat. 6:65), so that a report without any effect names none with 95 % probability.
 
 use std::collections::BTreeSet;
 
@@ -20,7 +20,7 @@ use darkqa_ground::types::{
     AxisLevel, EnhancerName, Family, KindReading, LightGroup, ReadingName, View,
 };
 
-/// A statement about noise, of which each light reading may say something else.
+/// A statement about noise that may hold under one light reading and not under another.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LightClaim {
     /// With noise, accuracy is lower than by the exposure drop alone: L1–L5 together, or one level.
@@ -92,7 +92,7 @@ fn paper_levels() -> Vec<AxisLevel> {
         .collect()
 }
 
-/// What the test of an effect says about a claim, after the correction over claims and readings.
+/// Test result of a claim, after the correction over claims and readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Standing {
     /// The effect is detected on the side of the claim.
@@ -158,7 +158,7 @@ pub struct EffectInReading {
 pub struct TestedEffect {
     /// The difference of accuracies with its 95 % interval by clusters.
     pub difference: Estimate,
-    /// What the test says about the claim.
+    /// Test result of the claim.
     pub standing: Standing,
     /// p-value of no difference.
     pub p: f64,
@@ -173,7 +173,7 @@ pub struct FindingByReading {
     pub model: String,
     /// The runs that show these images, in a report on runs that show different ones.
     pub group: Option<LightGroup>,
-    /// What is claimed.
+    /// The claim that was tested.
     pub claim: LightClaim,
     /// The levels that every reading was asked at.
     pub levels: Vec<AxisLevel>,
@@ -411,7 +411,7 @@ fn effect(grid: &Grid<'_>, pairs: &[(usize, usize)], kept: &[usize]) -> Option<T
     })
 }
 
-/// The findings with what their tests say, after Holm's correction over all of them and all readings.
+/// The findings with their test results, after Holm's correction over all of them and all readings.
 fn corrected(mut found: Vec<FindingByReading>) -> Vec<FindingByReading> {
     let effects = found.iter().flat_map(|finding| &finding.effects);
     let values = effects.filter_map(|effect| Some(effect.effect.as_ref()?.p));

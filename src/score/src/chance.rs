@@ -10,7 +10,7 @@ pub struct OfferedChoices {
     pub family: Family,
     /// Number of its choices.
     pub choices: usize,
-    /// Number of orders of the choices, each of which counts as one question.
+    /// Number of orders of the choices; each counts as one question.
     pub orders: usize,
 }
 

@@ -1,4 +1,4 @@
-//! What people found when they checked questions: [`CheckedShare`], and how far two of them agree: [`CheckAgreement`].
+//! Manual checks of questions: the share that people found right ([`CheckedShare`]), and the agreement of two of them ([`CheckAgreement`]).
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,7 +7,7 @@ use super::estimate::ClusterCount;
 use super::estimate::Estimate;
 use darkqa_ground::types::{Family, QuestionId};
 
-/// What a person found about a question.
+/// A person's finding about a question.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum CheckFinding {
     /// The person gave the answer of the rule.

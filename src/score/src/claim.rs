@@ -1,8 +1,8 @@
-//! What a report may say of a finding: [`Claim`].
+//! [`Claim`]: the statement that a finding supports.
 
 use super::significance::{ALPHA, Significance};
 
-/// What the sentences of a report may claim of a finding that was tested in both parsings.
+/// Statement that a report's sentences may make about a finding tested in both parsings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Claim {
     /// Detected after the correction over all sentences, in both parsings and in the same direction.

@@ -26,7 +26,7 @@ impl fmt::Display for ClusterUnit {
     }
 }
 
-/// What ties frames to each other.
+/// Relations between frames that put them into one cluster.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FrameTies {
     /// The scene of each frame for which it is known; empty if the data name none.

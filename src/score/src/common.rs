@@ -19,7 +19,7 @@ pub struct AskedQuestions {
     pub questions: usize,
 }
 
-/// What the models share that were not asked the same questions.
+/// Items that models share although they were not asked the same questions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CommonItems {
     /// The questions of each model, with and without images.

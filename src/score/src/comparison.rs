@@ -116,7 +116,7 @@ impl Comparison {
         is_across && self.strict.paired.difference.n < MIN_PAIRS
     }
 
-    /// What sentences may claim.
+    /// The statement that sentences may make.
     #[must_use]
     pub fn claim(&self) -> Claim {
         let parsed = |tested: &TestedComparison| ParsedFinding {

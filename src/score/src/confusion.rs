@@ -260,9 +260,9 @@ fn entropy(counts: impl Iterator<Item = usize> + Clone) -> f64 {
 /// A false answer to a presence question.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum FalseAnswer {
-    /// “no” to what is there: a present object is overlooked.
+    /// “no” about a present object: a miss.
     No,
-    /// “yes” to what is not there: an absent object is reported.
+    /// “yes” about an absent object: a hallucination.
     Yes,
 }
 

@@ -80,9 +80,9 @@ impl Coverage {
 /// Levels with the numbers of items that the others and a model answered there.
 pub(super) type Lacking = Vec<(AxisLevel, [usize; 2])>;
 
-/// What a mean is about: of all coverages that of which most answers remain if the models that lack some of it stand apart; of several
-/// the larger one, then the first. So neither a model that was asked less nor one that was asked more takes away what is said of the
-/// others. `None` without models.
+/// The coverage to average over: the one that retains most answers if models that lack some of it are reported separately. Ties go to the
+/// larger one, then to the first. A model that was asked less or more than the others therefore does not change their results. `None`
+/// without models.
 pub(super) fn shared(coverages: &[Coverage]) -> Option<&Coverage> {
     let mut seen = BTreeSet::new();
     let mut best: Option<((usize, usize), &Coverage)> = None;

@@ -11,7 +11,7 @@ use darkqa_ground::types::{
 };
 use darkqa_statistics::auc::{Auc, PairCounts, RankedReply};
 
-/// What the similarity of images to their clean frames says about the answers.
+/// Relation between the similarity of images to their clean frames and the answers.
 ///
 /// Within a condition, replies are compared of the same model and family alone: pairs over conditions would only show that
 /// darker is worse. Models are pooled; built-in reference models are left out if there are others, and never mixed.

@@ -72,11 +72,11 @@ pub struct Findings<'a> {
     pub set: PhotographedSet,
     /// How dark the photographs in the dark are beside their frames, by name.
     pub pairs: Vec<PairDarkness>,
-    /// What the similarity of images to their clean frames says about the answers; `None` if it was not measured.
+    /// Relation between the similarity of images to their clean frames and the answers; `None` if it was not measured.
     pub fidelity: Option<FidelityFindings>,
-    /// What the models share; `None` if all were asked the same questions.
+    /// Items that all models share; `None` if all were asked the same questions.
     pub common: Option<CommonItems>,
-    /// Shares of groups of which all questions are right; `None` if questions have no groups.
+    /// Shares of groups with only right answers; `None` if questions have no groups.
     pub strict: Option<StrictScore>,
     /// Number of tests that sentences rest on, corrected together.
     pub tests: usize,
@@ -87,8 +87,8 @@ pub struct Findings<'a> {
 }
 
 impl<'a> Findings<'a> {
-    /// Results of the trials. `ties` says what ties frames to each other; `questions` are all questions
-    /// of the run, for the chance line; `measured` holds the images that were compared with their clean frames.
+    /// Computes the results of the trials. `ties` relates frames to each other; `questions` are all questions of the run, for the chance
+    /// line; `measured` holds the images that were compared with their clean frames.
     #[must_use]
     pub fn new(
         trials: &'a Trials<ChoiceDetail>,
@@ -149,7 +149,7 @@ impl<'a> Findings<'a> {
         self
     }
 
-    /// What is shown: without the observer, if one of its controls is not at chance or none was asked.
+    /// The findings to report: without the observer, if one of its controls is not at chance or none was asked.
     #[must_use]
     pub fn shown(&self) -> &Self {
         self.without_observer.as_deref().unwrap_or(self)
@@ -251,8 +251,8 @@ impl<'a> Findings<'a> {
         models
     }
 
-    /// The models without images than which a subject is shown to be less accurate: itself, or any if it was not asked without
-    /// images. The paired test says so after Holm's correction over the conditions of the two models.
+    /// The blind models that are significantly more accurate than a subject: the subject's own model, or any if that one was not asked
+    /// without images. The test is paired, with Holm's correction over the conditions of the two models.
     #[must_use]
     pub fn below_blind(&self, subject: &Subject, family: Option<&Family>) -> Vec<&str> {
         let below = self.comparisons.iter().filter(|comparison| {

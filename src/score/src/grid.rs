@@ -55,7 +55,7 @@ impl TrialResult {
 /// One question in one order of its choices and one repeat.
 #[derive(Debug, Clone, Copy)]
 pub struct GridItem<'a> {
-    /// What was asked.
+    /// The question as asked.
     pub asked: &'a AskedItem,
     /// Index of its cluster.
     pub cluster: u32,
@@ -117,7 +117,7 @@ impl<'a> Grid<'a> {
         })
     }
 
-    /// Table of what was answered to questions whose true choice nobody knows: to look at, not to score.
+    /// Table of the answers to questions without a known true choice, for inspection only.
     #[must_use]
     pub fn without_truths(
         trials: &'a Trials<ChoiceDetail>,
@@ -325,7 +325,7 @@ impl<'a> Grid<'a> {
     }
 }
 
-/// What of trials a grid shows.
+/// The models in conditions and the items that a grid includes.
 struct Met {
     /// Whether a model in a condition is shown, by its number.
     asked: Vec<bool>,

@@ -46,7 +46,7 @@ impl<T> TestTree<T> {
         }
     }
 
-    /// Tests of which each starts once the one before is rejected.
+    /// A chain of tests: each starts once the one before is rejected.
     pub(super) fn chain(tests: impl DoubleEndedIterator<Item = T>) -> Self {
         let below = tests.rev().fold(None, |below, test| {
             Some(Self::before(test, below.into_iter().collect()))

@@ -267,8 +267,8 @@ impl Counts {
         counts
     }
 
-    /// The p-value of so many usual replies, if each is given at most every second time, or as often as the most frequent letter of all
-    /// replies; `None` if it is above the level.
+    /// The p-value of this number of usual replies, if each is given at most every second time, or as often as the most frequent letter of
+    /// all replies; `None` if it is above the level.
     fn binomial_test(&self, replies: &[LitReply]) -> Option<f64> {
         let (_, preferred) = most_frequent(replies)?;
         let chance = (preferred as f64 / replies.len() as f64).max(0.5);

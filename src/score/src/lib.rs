@@ -1,13 +1,13 @@
-//! From records to numbers with their intervals. [`choice`] reads a reply; the primitives ([`estimate`], [`bootstrap`],
-//! [`significance`], [`threshold`]) are of the crate `darkqa-statistics`.
+//! Statistics of a run's records, with their intervals. [`choice`] parses a reply; the primitives ([`estimate`], [`bootstrap`],
+//! [`significance`], [`threshold`]) are in the crate `darkqa-statistics`.
 //!
 //! [`findings`] is the entry point. It arranges the records as a [`grid`] and computes from it the accuracies
 //! ([`accuracy`]), the paired differences ([`comparison`]), the curves over the levels ([`curve`]), the answers given
 //! against the true ones ([`confusion`]) and the agreement of models ([`agreement`]).
 //!
-//! Intervals come from the clusters ([`cluster`]). Each was chosen because its 95 % intervals hold the truth in simulation
-//! (`tests/program/statistics.rs` and `coverage/`; `src/docs/numbers.md` says where they do so less than 93 times in a hundred).
-//! The plain percentile bootstrap does not do so with fewer than about 50 clusters, or near 0 and 1.
+//! Intervals are computed from the clusters ([`cluster`]). Each method was chosen because its 95 % intervals cover the true value in
+//! simulation (`tests/program/statistics.rs` and `coverage/`; `src/docs/numbers.md` lists the cases with a coverage below 93 %). The plain
+//! percentile bootstrap does not do so with fewer than about 50 clusters, or near 0 and 1.
 //!
 //! - shares: Wilson's score interval at the clusters' effective number of replies ([`estimate::Estimate::clustered`]);
 //! - differences: Bonett and Price's adjusted interval with the clusters' variance ([`paired`]), and an exact test;

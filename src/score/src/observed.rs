@@ -1,4 +1,4 @@
-//! What the observer could still read in each condition, and whether its controls are at chance: [`ObserverSummary`].
+//! [`ObserverSummary`]: the observer's accuracy in each condition, and whether its controls are at chance.
 
 use std::collections::BTreeMap;
 
@@ -20,7 +20,7 @@ pub struct ObserverCell {
     pub score: Estimate,
     /// Score of guessing every answer.
     pub chance: f64,
-    /// Share of the answers that follow from what is seen.
+    /// Share of the answers that follow from visible evidence.
     pub evidence: f64,
     /// Share of the things of all frames that are seen.
     pub seen: f64,
@@ -69,7 +69,7 @@ impl ObserverSummary {
     /// The results of these trials.
     #[must_use]
     pub fn new(trials: &Trials<ChoiceDetail>, clusters: &Clusters) -> Self {
-        // Of two trials for the same item, the later one counts.
+        // The later of two trials for the same item counts.
         let mut items = BTreeMap::<Subject, BTreeMap<ItemKey<'_>, TrialRef<'_>>>::new();
         for trial in trials.iter() {
             if trial.observed().is_some() {
@@ -155,7 +155,7 @@ impl ObserverSummary {
     }
 }
 
-/// What identifies an item: question, order of choices and repeat.
+/// Identity of an item: question, order of choices and repeat.
 type ItemKey<'a> = (&'a QuestionId, &'a [String], u32);
 
 /// The results of some trials; `None` without trials of frames that have a cluster.

@@ -107,7 +107,7 @@ impl PairDarkness {
         format!("{} (quartiles {low:.2}–{high:.2}), {source}", self.short())
     }
 
-    /// What is odd about the pairs, in full sentences; empty if nothing is.
+    /// Warnings about unusual pairs, as full sentences; empty if there are none.
     #[must_use]
     pub fn oddities(&self) -> Vec<String> {
         let name = &self.name;

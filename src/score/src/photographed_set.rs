@@ -16,7 +16,7 @@ pub struct PhotographedSet {
 }
 
 impl PhotographedSet {
-    /// What a reader must know of a set in the dark; `None` of one in the light.
+    /// Notice to readers about a set in the dark; `None` for one in the light.
     pub fn notice(self) -> Option<String> {
         if self.light == SetLight::Lit {
             return None;

@@ -25,7 +25,7 @@ pub use left_out::{ModelsLeftOut, models_left_out};
 /// Difference of two conditions at one level, for all models of the pool together, in the strict parsing and the lenient one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PooledFinding {
-    /// The two sides, and what is counted.
+    /// The two sides, and the replies that count.
     pub kind: PooledKind,
     /// Question family; `None` for all families together. Findings about false answers have [`Family::Presence`] alone.
     pub family: Option<Family>,
@@ -56,7 +56,7 @@ pub struct PooledFinding {
     pub dropped: usize,
     /// Number of clusters of the items.
     pub clusters: usize,
-    /// The smallest p-value that so many clusters allow, 2 / 2ᶜ.
+    /// Smallest p-value that this number of clusters, c, allows: 2 / 2ᶜ.
     pub least_p: f64,
     /// The smallest p-value after correction that the clusters allow; no verdict is possible if it is 0.05 or more.
     pub least_holm: f64,
@@ -97,7 +97,7 @@ impl PooledFinding {
         })
     }
 
-    /// What sentences may claim.
+    /// The statement that sentences may make.
     #[must_use]
     pub fn claim(&self) -> Claim {
         let parsed = |parsed: &PooledDifference| ParsedFinding {

@@ -1,11 +1,11 @@
-//! What a pooled finding compares, and which replies it counts: [`PooledKind`].
+//! [`PooledKind`]: the comparison of a pooled finding, and the replies that it counts.
 
 use super::confusion::FalseAnswer;
 use super::grid::GridItem;
 use darkqa_ground::types::Family;
 use darkqa_ground::types::degradation::Kind;
 
-/// The two sides of a pooled finding, and what is counted on each: right replies, unless a variant says otherwise.
+/// The two sides of a pooled finding. On each, right replies count, unless a variant defines others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum PooledKind {
     /// A degraded level against L0, without an enhancer.

@@ -1,4 +1,4 @@
-//! The difference that a planned run can detect, before anything is asked: [`PlannedSample`].
+//! [`PlannedSample`]: the difference that a planned run can detect, computed before any request.
 //!
 //! Paired answers right or wrong are a matched-pairs design. With n pairs, a share ψ of which differ between the two sides, a difference δ
 //! is detected with power 1 − β at level α if n δ² = D (t₁₋α⁄₂ √ψ + t₁₋β √(ψ − δ²))² (Connett, Smith and McHugh 1987, Stat. Med. 6:53). D is
@@ -38,7 +38,7 @@ pub struct PlannedSample {
     pub level: f64,
 }
 
-/// What a planned run can detect.
+/// Smallest effect that a planned run can detect.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Detectable {
     /// The smallest difference that is detected in 80 % of runs; `None` if none is.
@@ -48,7 +48,7 @@ pub struct Detectable {
 }
 
 impl PlannedSample {
-    /// What is detected.
+    /// Computes the smallest detectable effect.
     #[must_use]
     pub fn detectable(&self) -> Detectable {
         let clusters = self.questions.len() as f64;

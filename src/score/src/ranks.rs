@@ -12,7 +12,7 @@ pub struct RankRange {
     pub last: usize,
 }
 
-/// The rank of each model of a comparison by area, in its order. Two models of which neither is shown to be better share places.
+/// Ranks of the models of a comparison by area, in its order. Models without a detected difference share places.
 pub fn rank_ranges(best: &BestInTheDark) -> Vec<RankRange> {
     let ranks = best.models.iter().map(|model| {
         let (mut better, mut worse) = (0, 0);

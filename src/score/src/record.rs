@@ -53,7 +53,7 @@ impl Detail for ChoiceDetail {
         };
         self.strict = Some(strict.into());
         self.lenient = Some(lenient.into());
-        // A stored reply that is read again says nothing of what was seen, or of how likely each choice was.
+        // A stored reply that is parsed again lacks the observer's view and the probabilities of the choices.
         if let Some(chances) = &reply.chances {
             self.options = option_probabilities(chances, &self.choices);
         }

@@ -9,7 +9,7 @@ use super::grid::{Grid, TrialResult};
 use super::subject::Subject;
 use darkqa_ground::types::{Family, QuestionId, RunQuestion, StrictGroup};
 
-/// The share of groups of which all questions are answered rightly, of one subject in one reading.
+/// Share of groups in which a subject answers all questions right, in one reading.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroupCell {
     pub subject: Subject,
@@ -17,9 +17,9 @@ pub struct GroupCell {
     pub family: Option<Family>,
     /// How the replies were read.
     pub mode: ReadingMode,
-    /// Number of groups of which every question was answered rightly every time it was asked.
+    /// Number of groups in which every question was answered right every time.
     pub right: usize,
-    /// Number of groups of which a question was not asked, or has no reply. They are not scored.
+    /// Number of groups with a question that was not asked or has no reply. They are not scored.
     pub incomplete: usize,
     /// Share of `right` among the complete groups; `None` if there is none.
     pub share: Option<Estimate>,
@@ -32,7 +32,7 @@ pub struct GroupCell {
 pub struct GroupChance {
     /// Question family; `None` for all groups.
     pub family: Option<Family>,
-    /// The mean over the groups of which the run asks every question; `None` without such a group.
+    /// Mean over the groups that the run asks completely; `None` without such a group.
     pub share: Option<Estimate>,
 }
 
@@ -46,13 +46,13 @@ pub struct StrictScore {
     pub cells: Vec<GroupCell>,
     /// All groups first, then by family.
     pub chance: Vec<GroupChance>,
-    /// Number of groups of which the run asks any question.
+    /// Number of groups with at least one question in the run.
     pub groups: usize,
     /// Number of groups of one question: their strict score is accuracy.
     pub single: usize,
     /// Number of groups whose questions are about several frames.
     pub across_frames: usize,
-    /// Number of groups of which the run does not ask every question, so that they are complete for no subject.
+    /// Number of groups that the run asks only in part, so that they are complete for no subject.
     pub never_complete: usize,
 }
 
@@ -69,7 +69,7 @@ struct Group<'a> {
     cluster: usize,
 }
 
-/// What became of a group.
+/// Result of a group for one subject.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum GroupResult {
     /// None of its questions was asked.
@@ -201,8 +201,8 @@ impl Group<'_> {
         self.questions.len() == self.size
     }
 
-    /// What became of the group for a subject. An order or a repeat that was not asked of the subject does not count, as long as
-    /// every question has a reply and none failed.
+    /// Result of the group for a subject. An order or a repeat that was not asked of the subject does not count, if every question has a
+    /// reply and none failed.
     fn result(&self, grid: &Grid<'_>, subject: usize, mode: ReadingMode) -> GroupResult {
         let mut replied = BTreeSet::<&QuestionId>::new();
         let (mut is_asked, mut has_failed, mut is_right) = (false, false, true);

@@ -46,8 +46,8 @@ pub fn judged<'m>(models: impl IntoIterator<Item = &'m str>) -> BTreeSet<&'m str
     if others.is_empty() { all } else { others }
 }
 
-/// The models whose replies are counted together, sorted: those that are [`judged`]. Of references it is one alone, the observer if
-/// it is there: a mean of the observer and `random` would say nothing of either.
+/// The models to pool, sorted: those that are [`judged`]. If only reference models ran, one of them alone, preferably the observer: a mean
+/// of the observer and `random` would be meaningless.
 #[must_use]
 pub fn pooled_models<'m>(models: impl IntoIterator<Item = &'m str>) -> BTreeSet<&'m str> {
     let judged = judged(models);

@@ -38,13 +38,13 @@ enum Test {
     Fidelity,
 }
 
-/// Weight of what the report is about: what darkness costs, what each enhancer does, which model is best, and photographs in the dark.
+/// Weight of the main questions: the cost of darkness, the effect of each enhancer, the best model, and photographs in the dark.
 const MAIN: f64 = 1.0;
 
 /// Weight of noise beside the exposure drop.
 const NOISE: f64 = 0.5;
 
-/// Weight of all other questions together: they say how, not how much, accuracy is lost.
+/// Weight of all other questions together; they concern how accuracy is lost, not how much.
 const FURTHER: f64 = 0.5;
 
 /// Weight of a variant that sentences name only if it differs from the main one, beside the main one.
@@ -52,7 +52,7 @@ const OTHER_VARIANT: f64 = 0.25;
 
 type Tests = TestTree<Test>;
 
-/// What a run asks, as far as it decides how the level is shared.
+/// Contents of a run that decide how the level is shared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct AskedSets {
     pub models: usize,
@@ -94,7 +94,7 @@ impl Findings<'_> {
     }
 }
 
-/// The tests of a report. Which ones it has depends on what was asked, never on the answers.
+/// The tests of a report. They depend on the questions asked, never on the answers.
 fn tests(findings: &Findings<'_>) -> Tests {
     let sets = pooled(findings);
     let of_kind = |is_of: &dyn Fn(PooledKind) -> bool| {
@@ -180,7 +180,7 @@ fn pooled<'f>(findings: &'f Findings<'_>) -> Vec<PooledTests<'f>> {
 }
 
 impl PooledTests<'_> {
-    /// The tests of the set. Levels of which a mean is tested follow it, from the outermost one on.
+    /// The tests of the set. The single levels of a tested mean follow it, from the outermost one on.
     fn tests(&self, findings: &Findings<'_>) -> Tests {
         let weight = if is_main(&findings.grid, self.variant) {
             1.0
@@ -264,7 +264,7 @@ fn below_blind(findings: &Findings<'_>) -> Tests {
     )
 }
 
-/// What photographs in the dark cost, whether synthetic images stand for them, and what enhancers do to them.
+/// Tests about photographs in the dark: their cost, whether synthetic images can replace them, and the effect of enhancers.
 fn photographs(findings: &Findings<'_>) -> Vec<Tests> {
     let models = judged(findings.grid.subjects.iter().map(|subject| &*subject.model));
     let kinds = [

@@ -1,4 +1,4 @@
-//! Tests of what is found over all models: [`super::pooled`] and [`super::best`], from made records.
+//! Tests of the findings over all models, [`super::pooled`] and [`super::best`], on synthetic records.
 
 use super::best::best_in_the_dark;
 use super::choice::ReadingMode;
@@ -221,7 +221,7 @@ fn the_best_is_shown_better_than_every_other() {
         assert_eq!((best.items, best.dropped, best.clusters), (23, 1, 12));
         let names: Vec<&str> = best.models.iter().map(|model| &*model.model).collect();
         assert_eq!(names, ["good", "same", "guess"]);
-        // Of 23 items 21 and 20 are right in the dark; L0 does not count.
+        // 21 and 20 of 23 items are right in the dark; L0 does not count.
         let mean = |index: usize| best.models[index].mean.value;
         assert!((mean(0) - 21.0 / 23.0).abs() < 1e-12);
         assert!((mean(1) - 20.0 / 23.0).abs() < 1e-12);
@@ -265,8 +265,8 @@ fn below_blind_is_what_the_corrected_test_shows() {
     assert_eq!(below("L5-noise"), ["m"]);
 }
 
-/// The records of a model about presence, two questions a frame: something is there in the first, and not in the second. `reply` gives
-/// the reply to a question, of which `true` says that something is there.
+/// Records of a model about presence, two questions a frame: an object is present in the first, and absent in the second. `reply` gives the
+/// answer to a question; `true` means present.
 fn presence(model: &str, condition: &str, reply: fn(usize, bool) -> Option<bool>) -> Vec<Record> {
     let mut records = records(model, condition, |_| Some(true));
     for (item, record) in records.iter_mut().enumerate() {

@@ -18,7 +18,7 @@ fn standings(finding: &FindingByReading) -> Vec<Option<Standing>> {
         .collect()
 }
 
-/// All is right by exposure drop and at L0; with noise as the readings say.
+/// Replies that are right by exposure drop and at L0, and follow the two functions with noise.
 fn ladder(paper: fn(usize) -> Option<bool>, physical: fn(usize) -> Option<bool>) -> Vec<Record> {
     let mut all = records("m", "L0", |_| Some(true));
     for level in 1..=5 {
@@ -122,7 +122,7 @@ fn items_without_a_reply_leave_every_column_and_unasked_levels_are_named() {
         let claim = LightClaim::NoiseCompounds(second.and_then(|subject| subject.level));
         let of_second = find(&found, &claim);
         assert_eq!(standings(of_second), [Some(Standing::Holds), None]);
-        // What was not asked under a reading does not hold under all.
+        // A claim that was not asked under one reading does not hold under all.
         assert_eq!(of_second.robustness, Robustness::Some);
     });
 }

@@ -1,4 +1,4 @@
-//! What the pixels contribute: the [`distances`] of probabilities with an image from those without.
+//! Effect of the image on a model's probabilities: the [`distances`] of probabilities with an image from those without.
 
 use super::confident_reply::usable;
 use crate::grid::Grid;

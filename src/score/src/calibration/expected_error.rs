@@ -56,7 +56,7 @@ impl Bin {
     }
 }
 
-/// The squared error if each cluster counts so many times. Replies of equal confidence are in one bin.
+/// The squared error with each cluster counted `times(cluster)` times. Replies of equal confidence are in one bin.
 fn squared(replies: &[ConfidentReply], times: impl Fn(u32) -> usize) -> f64 {
     let weight = |reply: &ConfidentReply| times(reply.cluster);
     let n: usize = replies.iter().map(weight).sum();
@@ -118,7 +118,7 @@ mod tests {
 
     #[test]
     fn ties_are_not_divided() {
-        // 40 replies could be two bins, but all have one confidence: the order within says nothing.
+        // 40 replies could fill two bins, but all have one confidence: their order is arbitrary.
         let made = replies((0..40).map(|i| (0.5, i < 20)));
         let mixed = replies((0..40).map(|i| (0.5, i % 2 == 0)));
         assert!((squared(&made, |_| 1) - squared(&mixed, |_| 1)).abs() < 1e-15);

@@ -56,7 +56,7 @@ pub struct Calibration {
     pub error: Option<Estimate>,
     /// Mean Brier score over all choices, 0 to 2 (Brier 1950, Mon. Weather Rev. 78:1).
     pub brier: Estimate,
-    /// 1 less the Brier score over that of equal probabilities for all choices: 0 says no more than a guess.
+    /// 1 − Brier score / Brier score of equal probabilities for all choices; 0 is a guess, 1 is perfect.
     pub skill: Estimate,
     /// Mean negative logarithm of the probability of the true choice, in nats.
     pub nll: Estimate,
@@ -164,7 +164,7 @@ fn ratio(
     ratio_of(draws, &terms.collect::<Vec<_>>())
 }
 
-/// The same of terms: the cluster of each, what it adds above and what it adds below.
+/// Ratio of two sums. Each term has its cluster, its addend to the numerator and its addend to the denominator.
 fn ratio_of(draws: &Resamples, terms: &[(u32, f64, f64)]) -> Estimate {
     let mut by_cluster = vec![[0.0; 2]; draws.clusters()];
     for (cluster, above, below) in terms {
@@ -176,7 +176,7 @@ fn ratio_of(draws: &Resamples, terms: &[(u32, f64, f64)]) -> Estimate {
         let sums = by_cluster.iter().map(|sums| sums[side] as f32);
         draws.sums(&sums.collect::<Vec<_>>())
     };
-    // A draw of clusters without a reply says nothing.
+    // Draws of clusters without a reply have no ratio.
     let pairs = sums(0).into_iter().zip(sums(1));
     let pairs = pairs.filter(|(_, below)| *below > 0.0);
     let ratios = pairs.map(|(above, below)| above / below);

@@ -3,7 +3,8 @@
 use super::confident_reply::usable;
 use crate::grid::Grid;
 
-/// What a model gives to the choices of one place, and what is true there. A preference for a letter is the difference of both.
+/// Mean probability of the choices at one position, and how often the true choice is there. The difference of both is a preference for a
+/// letter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PositionShare {
     /// Index of the place: 0 is A.
@@ -12,7 +13,7 @@ pub struct PositionShare {
     pub p: f64,
     /// Share of the questions whose true choice stands there.
     pub truth: f64,
-    /// Number of replies to questions that have so many choices.
+    /// Number of replies to questions with a choice at this position.
     pub n: usize,
 }
 

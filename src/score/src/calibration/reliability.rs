@@ -74,7 +74,7 @@ mod tests {
 
     #[test]
     fn bins_hold_all_replies_in_order_and_ties_are_not_divided() {
-        // 400 replies, each half as often right as its confidence says.
+        // 400 replies with an accuracy of half their confidence.
         let made = replies((0..400).map(|i| (f64::from(i) / 400.0, i % 8 < i / 100)));
         let bins = bins(10, &made);
         assert_eq!(bins.len(), 10);

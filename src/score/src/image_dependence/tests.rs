@@ -8,7 +8,7 @@ const CHOICES: [usize; 4] = [4, 4, 2, 4];
 enum Server {
     /// Answers by the image, right with this probability.
     Sees(f64),
-    /// Guesses, with this probability that it says the first letter.
+    /// Guesses, with this probability of the first letter.
     Guesses(f64),
     /// Drops every n-th image, at random; the model sees the others.
     Drops(u64),
@@ -79,7 +79,7 @@ fn uniform(random: &mut SplitMix) -> f64 {
     (random.bits() >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// Number of runs of so many replies in which replies are found to be independent of the image.
+/// Number of runs of `replies` replies in which they are found to be independent of the image.
 fn found(runs: u64, replies: usize, server: Server) -> usize {
     let runs = (0..runs).map(|seed| Run::new(seed.wrapping_mul(0x1234_5679), server));
     runs.filter_map(|run| run.found_within(replies)).count()

@@ -26,7 +26,7 @@ pub struct ModelsLeftOut {
     pub is_more: bool,
 }
 
-/// The models that the findings leave out, by set and by what they did not answer.
+/// The models that the findings leave out, by set and by the levels that they lack.
 #[must_use]
 pub fn models_left_out(grid: &Grid<'_>) -> Vec<ModelsLeftOut> {
     let mut all = Vec::new();

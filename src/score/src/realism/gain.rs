@@ -22,7 +22,7 @@ const FINE: usize = 601;
 /// The greatest misfit of a fit, in ln spread (chosen: self-made pairs have up to 0.1, a pair whose low-light image was made
 /// without a sensor 0.9 and more).
 pub const MOST_MISFIT: f64 = 0.3;
-/// The number of bins that a fit needs (chosen): the shape of a curve of fewer says little.
+/// Number of bins that a fit needs (chosen): fewer do not determine the shape of a curve.
 const LEAST_BINS: usize = 4;
 
 /// The gains of the synthetic images, in ascending order.

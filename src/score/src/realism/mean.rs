@@ -20,7 +20,7 @@ pub struct Mean {
 }
 
 impl Mean {
-    /// Mean of numbers, some of which may be infinite; `None` without numbers.
+    /// Mean of numbers; some may be infinite. `None` without numbers.
     #[must_use]
     pub fn from_values(numbers: &[f64]) -> Option<Self> {
         let n = numbers.len();

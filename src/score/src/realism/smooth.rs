@@ -1,8 +1,8 @@
 //! Blocks of an image that are smooth without noise: [`SmoothBlocks`], and the spread of an image in them: [`SpreadCurve`].
 //!
-//! What varies within such a block of the low-light image is noise, and its spread by clean code is what a noise model must
-//! give. The spread about a plane is too small or too large by what demosaicing, rounding and texture do; an estimate that
-//! passes a real and a synthetic image through the same steps is not.
+//! The variation within such a block of the low-light image is noise, and a noise model must reproduce its spread as a function of the
+//! clean code. The spread about a plane is biased by demosaicing, rounding and texture; a comparison is not, because the real and the
+//! synthetic image pass through the same steps.
 
 use super::quantile::quantile;
 use darkqa_ground::types::Rgb;
@@ -19,7 +19,7 @@ const LEAST: [usize; 2] = [20, 10];
 const BRIGHT: u8 = 250;
 /// Darkest clean code of a block after the exposure drop: below it, rounding leaves no spread (chosen).
 const DARKEST: f64 = 1.0;
-/// Least spread in codes: what rounding leaves of smaller ones says nothing (chosen).
+/// Least spread in codes; rounding destroys smaller ones (chosen).
 const LEAST_SPREAD: f64 = 0.05;
 
 /// Blocks of 8 × 8 pixels that are smooth in the image in normal light, by their clean code after the exposure drop.
@@ -36,7 +36,7 @@ pub struct SpreadCurve {
     pub(super) bins: [Option<f64>; BINS],
 }
 
-/// What decides whether a block of the image in normal light is used.
+/// Properties of a block in normal light that decide whether it is used.
 struct BlockLight {
     index: usize,
     /// Mean code after the exposure drop.

@@ -1,4 +1,4 @@
-//! Which question of a bank each question about an image asks: [`BankIndex`].
+//! [`BankIndex`]: the bank's question behind each question about an image.
 
 use std::collections::{BTreeSet, HashMap};
 

@@ -41,11 +41,11 @@ pub struct AgreementCell {
     pub refused: usize,
     /// Number of trials without a reply. They are not counted.
     pub failed: usize,
-    /// Share of the replies that say that the image does not tell; `None` if the questions have no such choice.
+    /// Share of the replies “cannot tell from the image”; `None` if the questions have no such choice.
     pub cannot_tell: Option<Estimate>,
 }
 
-/// What a cell is to the others of its model.
+/// Role of a cell among those of its model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CellRole {
     /// The floor: no image was shown.
@@ -57,7 +57,7 @@ pub enum CellRole {
 }
 
 impl AgreementCell {
-    /// What the cell is to the others of its model.
+    /// Role of this cell among those of its model.
     pub fn role(&self) -> CellRole {
         let subject = &self.subject;
         if subject.view == Some(View::Blind) {
@@ -150,7 +150,7 @@ impl Part<'_, '_> {
         }
     }
 
-    /// Share of the replies of which something holds; it takes the answer, if one could be read, and the choices.
+    /// Share of the replies for which `holds` is true. It takes the answer, if one could be parsed, and the choices.
     fn share(&self, holds: impl Fn(Option<&str>, &[String]) -> bool) -> Option<Estimate> {
         let mut counts = vec![ClusterCount::default(); self.grid.clusters];
         for (item, result) in self.grid.family_items(self.subject, self.family) {

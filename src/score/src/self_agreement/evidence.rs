@@ -105,8 +105,8 @@ pub(super) fn evidence(
     let value = of(share(counts)?, share(&bounds.blind)?, share(&bounds.again)?);
     let drawn = drawn_shares(counts, draws).into_iter().zip(&bounds.drawn);
     let drawn = drawn.map(|(here, [floor, ceiling])| of(here, *floor, *ceiling));
-    // A draw without a reply says nothing. Where floor and ceiling meet, which happens in fewer draws than lie outside the interval, an
-    // end of the interval is never infinite.
+    // Draws without a reply are dropped. Floor and ceiling coincide in fewer draws than lie outside the interval, so no end of the interval
+    // is infinite.
     let drawn: Vec<f64> = drawn.filter(|value| !value.is_nan()).collect();
     let replies = counts.iter().map(|count| count.replies as usize).sum();
     Some(Estimate::around(value, draws.interval(drawn), replies))

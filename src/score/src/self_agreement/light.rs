@@ -10,16 +10,16 @@ use darkqa_ground::types::{
     View,
 };
 
-/// What identifies a question to a model: its name, and the order of its choices.
+/// Identity of a question for a model: its name, and the order of its choices.
 type QuestionKey<'a> = (&'a QuestionId, &'a [String]);
 
-/// The replies of one model at L0, each question once: the reference of everything else that it says.
+/// The replies of one model at L0, each question once: the reference for its other replies.
 pub(super) struct LightAnswers<'a> {
     model: &'a str,
     by_question: HashMap<QuestionKey<'a>, Vec<TrialRef<'a>>>,
 }
 
-/// What became of the questions to a model in the light.
+/// Counts of a model's replies in the light.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LightReplies {
     pub model: String,
@@ -31,7 +31,7 @@ pub struct LightReplies {
     pub read: Option<Estimate>,
     /// Number of replies that refuse.
     pub refused: usize,
-    /// Number of replies that say that the image does not tell.
+    /// Number of replies “cannot tell from the image”.
     pub cannot_tell: usize,
     /// Whether the questions have such a choice.
     pub has_way_out: bool,
@@ -145,7 +145,7 @@ impl<'a> LightAnswers<'a> {
         all_held(held)
     }
 
-    /// What became of the questions in the light, in a reading.
+    /// Counts the replies in the light, in a reading.
     pub(super) fn replies(&self, mode: ReadingMode) -> LightReplies {
         let replied: Vec<TrialRef<'_>> = self.first().filter(|trial| !trial.failed()).collect();
         let read = replied

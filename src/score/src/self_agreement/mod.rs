@@ -1,12 +1,12 @@
-//! How far each model agrees with its own answers in the light, where nobody knows the true ones: [`SelfAgreement`].
+//! Agreement of each model with its own answers in the light, for questions without known true answers: [`SelfAgreement`].
 //!
-//! The reference of a model is its own reading at L0, for each question and order of choices. A trial is held against it as another
-//! trial is held against the truth, so that the counts by cluster, the paired tests, Holm's correction and the crossing of a curve
-//! are those of the other reports; nothing here is an accuracy. By the triangle inequality the accuracy that is lost in a
-//! condition is at most one minus the agreement there, whatever the true answers are.
+//! The reference of a model is its own answer at L0, for each question and order of choices. A trial is scored against it as another trial
+//! is scored against the truth, so that the counts by cluster, the paired tests, Holm's correction and the crossing of a curve are those of
+//! the other reports; nothing here is an accuracy. By the triangle inequality the accuracy that is lost in a condition is at most one minus
+//! the agreement there, whatever the true answers are.
 //!
-//! Agreement alone says little: a model that answers no to everything agrees with itself. Beside it stand κ with the expected
-//! agreement by question, the entropy of the answers, the agreement of the model without an image (the floor) and of the same
+//! Agreement alone is weak evidence: a model that answers no to everything agrees with itself. It is therefore reported with κ with the
+//! expected agreement by question, the entropy of the answers, the agreement of the model without an image (the floor) and of the same
 //! question asked again at L0 (the ceiling), and the share of the way from the floor to the ceiling ([`evidence`]).
 //!
 //! Sources: metamorphic testing for want of an oracle (Spieker and Gotlieb 2019, arXiv:1910.00262); flips of predictions under
@@ -47,11 +47,11 @@ use darkqa_ground::types::{ChoiceDetail, ModelListing, RunQuestion, Trials};
 /// All results of a run without true answers.
 #[derive(Debug)]
 pub struct SelfAgreement<'a> {
-    /// What was answered, by subject and item.
+    /// The answers, by subject and item.
     pub grid: Grid<'a>,
     /// The unit that is treated as independent.
     pub unit: ClusterUnit,
-    /// What each model answered in the light, in each reading.
+    /// Counts of each model's replies in the light, in each reading.
     pub light: Vec<LightReplies>,
     /// The agreement of each subject with its model's answers in the light. The cell of L0 is that of the questions asked again.
     pub cells: Vec<AgreementCell>,
@@ -63,7 +63,7 @@ pub struct SelfAgreement<'a> {
     pub curves: Vec<EvidenceCurve>,
     /// Answers given against those at L0.
     pub confusions: Vec<Confusion>,
-    /// Rates of “yes” where L0 says no, and the other way round.
+    /// Rates of “yes” where the answer at L0 is no, and the other way round.
     pub hallucinations: Vec<Hallucination>,
     /// Counts of replies, unreadable replies and failures of each subject.
     pub health: Vec<Health>,
@@ -74,7 +74,7 @@ pub struct SelfAgreement<'a> {
 }
 
 impl<'a> SelfAgreement<'a> {
-    /// The results of trials without true answers. `ties` says what ties frames to each other.
+    /// Computes the results of trials without true answers. `ties` relates frames to each other.
     #[must_use]
     pub fn new(
         trials: &'a Trials<ChoiceDetail>,
@@ -150,7 +150,7 @@ impl<'a> SelfAgreement<'a> {
         items.filter(|item| item.asked.repeat == 0).count()
     }
 
-    /// What a model answered in the light, in the strict reading.
+    /// Counts of a model's replies in the light, in the strict reading.
     pub fn light_of(&self, model: &str) -> Option<&LightReplies> {
         let mut light = self.light.iter();
         light.find(|light| light.model == model && light.mode == ReadingMode::Strict)

@@ -1,4 +1,4 @@
-//! What a model says to each question of a bank in the light: [`QuestionInLight`].
+//! [`QuestionInLight`]: a model's answers to each question of a bank in the light.
 
 use std::collections::BTreeMap;
 
@@ -31,7 +31,7 @@ pub struct QuestionInLight {
 }
 
 impl QuestionInLight {
-    /// Whether the answers differ from image to image, so that agreement says something.
+    /// True if the answers differ between images; else agreement is no evidence.
     pub fn is_informative(&self) -> bool {
         self.images > 0 && self.top_share < UNINFORMATIVE
     }

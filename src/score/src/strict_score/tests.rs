@@ -1,4 +1,4 @@
-//! The strict score against what is computed by hand, from made records: 24 questions of three choices, two about each of 12 frames.
+//! Tests of the strict score against hand-computed values, on 24 questions with three choices, two about each of 12 frames.
 
 use super::*;
 use crate::tests::{records, with_grid};

@@ -15,7 +15,7 @@ type Row = (
     [f64; 2],
 );
 
-/// Two choices, 40 % yes but where the name says other.
+/// Models with two choices; 40 % of answers are yes unless the name states another share.
 const MODELS: [Row; 6] = [
     (
         "keeps 90 %",

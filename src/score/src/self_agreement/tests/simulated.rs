@@ -1,4 +1,4 @@
-//! Simulated models, and what is found in their records.
+//! Simulated models, and the findings from their records.
 
 use serde_json::json;
 
@@ -33,7 +33,7 @@ impl Draws {
 /// The answer of a model: its answer in the light, and random numbers.
 pub(super) type Answer = fn(usize, &mut Draws) -> usize;
 
-/// A simulated model: its share of “yes” in the light, and what it answers without an image, asked again in the light, and in the dark.
+/// A simulated model: its share of “yes” in the light, and its answers without an image, asked again in the light, and in the dark.
 pub(super) struct Simulated {
     pub(super) yes: f64,
     pub(super) blind: Answer,
@@ -100,7 +100,7 @@ pub(super) fn questions() -> Vec<RunQuestion> {
 }
 
 impl Simulated {
-    /// The records: without an image, twice at L0, and at each level with a share of what the light says kept by the first.
+    /// The records: without an image, twice at L0, and at each level.
     pub(super) fn records(&self, levels: &[(&str, Answer)]) -> Vec<Record> {
         let mut draws = Draws(SplitMix(7));
         let mut records = Vec::new();
@@ -126,7 +126,7 @@ impl Simulated {
     }
 }
 
-/// What is found in records.
+/// Computes the self-agreement of records and reads a value from it.
 pub(super) fn found<T>(records: &[Record], read: impl FnOnce(&SelfAgreement<'_>) -> T) -> T {
     let questions = questions();
     let listing = ModelListing::default();
