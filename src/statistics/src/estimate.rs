@@ -101,7 +101,7 @@ impl Estimate {
     /// The interval, cut by the exact intervals of the shares of clusters that are wholly right and wholly wrong: the share right is
     /// at least that of wholly right clusters, and at most one minus that of wholly wrong ones.
     ///
-    /// This says nothing of clusters that differ much in size, so that it is left out if the largest has three times the mean or more.
+    /// The bound is invalid for clusters that differ much in size, so it is not applied if the largest has three times the mean or more.
     fn kept_by_whole_clusters(self, sums: &[(f64, f64)]) -> Self {
         const ROUNDING: f64 = 1e-9;
         let all: f64 = sums.iter().map(|(_, n)| n).sum();
@@ -227,7 +227,7 @@ mod tests {
             assert!((share.low - low).abs() < 1e-9, "{pairs:?}: {share:?}");
             assert!((share.high - high).abs() < 1e-9, "{pairs:?}: {share:?}");
         }
-        // One cluster holds most replies: wholly wrong clusters say little of the share.
+        // One cluster holds most replies, so wholly wrong clusters do not bound the share.
         let large = [
             (1, 1),
             (2, 2),

@@ -43,7 +43,7 @@ mod tests {
 
     #[test]
     fn a_large_cluster_counts_for_more_than_it_is_away() {
-        // Of 12 replies 6 are right. The large cluster has half of them.
+        // 6 of 12 replies are right. The large cluster has half of them.
         let sums = [(5.0, 6.0), (0.0, 0.0), (1.0, 3.0), (0.0, 3.0)];
         let found = residuals(&sums, 0.5);
         let expected = [

@@ -17,7 +17,7 @@ pub enum Significance {
     Worse,
     /// No difference is shown. This does not show that the two are equal.
     NotShown,
-    /// No verdict is possible: with so few clusters and so many tests the corrected p cannot be below 0.05, however large the
+    /// No verdict is possible: with this few clusters and this many tests the corrected p cannot be below 0.05, however large the
     /// difference is.
     TooFewClusters,
     /// Fewer items are shared than a verdict needs (`MIN_PAIRS` of the comparison).
@@ -103,9 +103,9 @@ const MIN_CARRYING: f64 = 1000.0;
 /// Seed of the random swaps (chosen). It is fixed, so that the same records give the same p-value.
 const SEED: u64 = 0x7377_6170;
 
-/// [`sign_flip`] where its table has at most 2²⁸ cells. Else [`normal_swaps`] if so many clusters carry the difference that it is
-/// exact to 10⁻⁴, and the Monte Carlo estimate (1 + hits) / (1 + draws) from 100,000 seeded swaps if they do not (Phipson and Smyth
-/// 2010, Stat. Appl. Genet. Mol. Biol. 9:39), which is never below the exact size.
+/// [`sign_flip`] if its table has at most 2²⁸ cells. Else [`normal_swaps`] if enough clusters carry the difference for it to be exact to
+/// 10⁻⁴. Else the Monte Carlo estimate (1 + hits) / (1 + draws) from 100,000 seeded swaps (Phipson and Smyth 2010, Stat. Appl. Genet. Mol.
+/// Biol. 9:39), which is never below the exact size.
 #[must_use]
 pub fn swap_test(differences: &[i64]) -> SwapTest {
     let reduced = reduced(differences);
@@ -163,7 +163,7 @@ fn drawn_swaps(differences: &[i64], draws: usize) -> f64 {
     (1 + hits.count()) as f64 / (1 + draws) as f64
 }
 
-/// The smallest two-sided p-value that swaps of so many clusters can give: 2 / 2ᶜ.
+/// Smallest two-sided p-value that swaps of this number of clusters, c, can give: 2 / 2ᶜ.
 #[must_use]
 pub fn least_p(clusters: usize) -> f64 {
     (2.0 * libm::exp2(-(clusters as f64))).min(1.0)
@@ -184,8 +184,7 @@ pub fn gcd(a: u64, b: u64) -> u64 {
 
 /// Exact two-sided p-value of McNemar's test (McNemar 1947, Psychometrika 12:153; exact as the binomial sign test).
 ///
-/// `gained` and `lost` are the numbers of pairs of which only one side is right. The test treats pairs as independent;
-/// [`sign_flip`] does not.
+/// `gained` and `lost` are the numbers of pairs with only one side right. The test treats pairs as independent; [`sign_flip`] does not.
 #[must_use]
 pub fn mcnemar(gained: usize, lost: usize) -> f64 {
     let smaller = gained.min(lost);

@@ -45,7 +45,7 @@ impl ThinLevel {
         self.replies < MIN_REPLIES || self.clusters < MIN_CLUSTERS
     }
 
-    /// What a threshold needs of each level up to the crossing, in words.
+    /// Requirement on each level up to the crossing, in words.
     pub fn needed() -> String {
         format!(
             "{MIN_REPLIES} replies in {MIN_CLUSTERS} clusters, and {:.0} % of those at L0, at each level up to the crossing",
@@ -96,7 +96,7 @@ impl LevelCounts {
             .map(|index| self.size(index))
             .collect();
         let clean = *sizes.first().filter(|clean| clean.replies > 0)?;
-        // If all levels are small, the area still says what it can; only fragments are left out.
+        // If all levels are small, the area is still computed; only fragments are left out.
         let is_left_out = |size: &ThinLevel| {
             size.replies == 0 || size.is_fragment() || size.is_small() && !clean.is_small()
         };
