@@ -122,7 +122,7 @@ pub(super) fn lacks_notes<T: Serialize + StoredLine>(path: &Path) -> bool {
     true
 }
 
-/// Replaces a file by these lines; what is no file is set aside.
+/// Replaces a file by these lines; anything else at its path is set aside.
 fn replace<T: Serialize>(path: &Path, lines: &[T]) -> Result<()> {
     if !path.is_file() {
         set_file_aside(path)?;

@@ -40,7 +40,7 @@ pub(super) const FIDELITY: &str = "fidelity.jsonl";
 
 /// The subfolder of a run for Batch API files.
 pub const BATCH: &str = "batch";
-/// The file in it that says what happened to each batch.
+/// The file with the state of each batch.
 pub const BATCH_STATE: &str = "state.jsonl";
 /// The subfolder of a run for its plan, which is written before the run.
 pub const PLAN: &str = "plan";
@@ -274,7 +274,7 @@ const MOST_MANIFEST: u64 = 64 << 20;
 
 fn any_manifest(folder: &Path) -> Result<Option<RunManifest>> {
     let path = folder.join(MANIFEST);
-    // What is named as a folder may be a file.
+    // The path may lead through a file.
     if let Err(e) = fs::symlink_metadata(&path)
         && matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory)
     {

@@ -1,4 +1,4 @@
-//! What several run folders say about images, each once: [`more_thumbnails`], [`more_fidelity`].
+//! Notes about images from several run folders, without duplicates: [`more_thumbnails`], [`more_fidelity`].
 
 use std::collections::HashSet;
 use std::hash::Hash;
@@ -29,7 +29,7 @@ pub fn more_fidelity(
     more(present, folders, read_fidelity, (place, is_wanted))
 }
 
-/// What these folders hold and `present` does not, each place once, of the frames that are wanted.
+/// Notes in these folders that `present` lacks, one for each place, of the wanted frames.
 fn more<T, P: Eq + Hash>(
     present: &[T],
     folders: &[&Path],

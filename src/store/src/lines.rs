@@ -164,7 +164,7 @@ struct BadLine {
     problem: String,
 }
 
-/// What the replies of some lines were charged, as far as they can still be read.
+/// Tokens charged for the replies of damaged lines, as far as they can be read.
 fn paid(bad: &[BadLine]) -> String {
     let tokens = |bad: &BadLine| {
         let value: serde_json::Value = serde_json::from_slice(&bad.line).ok()?;
@@ -190,7 +190,7 @@ const REMEDY_OF_A_RECORD: &str = "the command that made the run, called again, s
 pub(super) trait StoredLine: Sized + Send {
     /// The name in error messages, with its article.
     const WHAT: &str;
-    /// What a user can do about a line that is none.
+    /// Remedy for a damaged line.
     const REMEDY: &str =
         "the command that made the run, called again, makes the file again from its data";
 
@@ -288,8 +288,8 @@ fn is_of<T: StoredLine>(path: &Path, complete: u64) -> Result<bool> {
 /// Cuts off an incomplete last line: everything after the last line end.
 ///
 /// # Errors
-/// If nothing in the file says that it has lines of this kind: no whole line does, or there is none and it does not begin as one. Such a
-/// file is left as it is.
+/// If the file does not look like one of this kind: no whole line parses, or there is none and the incomplete one does not begin as one.
+/// Such a file is left unchanged.
 pub(super) fn repair<T: StoredLine>(path: &Path, mut file: &File) -> Result<()> {
     const STEP: u64 = 64 * 1024;
     let unreadable = |e| Error::file(path, "read", e);

@@ -1,4 +1,4 @@
-//! What the records of a run were when something was made from them: [`LogMark`].
+//! [`LogMark`]: state of a run's records at the time when a file was derived from them.
 
 use std::io::{ErrorKind, Read, Seek, SeekFrom};
 use std::path::Path;

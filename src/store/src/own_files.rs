@@ -1,4 +1,4 @@
-//! Whether the files of a run folder are its own, so that what is written goes nowhere else: [`check_own`].
+//! Check that a run folder has no links, so that writing changes no file elsewhere: [`check_own`].
 //!
 //! A run folder may come from a stranger. A link in it would have this program write into a file or a folder outside of it.
 
@@ -11,7 +11,7 @@ use darkqa_ground::error::{Error, Result};
 
 /// The subfolders of a run that lines are appended in.
 const INNER: [&str; 1] = [BATCH];
-/// The files that are appended to. All others are replaced by new files, which leaves what they link to as it is.
+/// The files that are appended to. All others are replaced by new files, so that the target of a link stays unchanged.
 const APPENDED: [&str; 4] = [RECORDS, THUMBNAILS, FIDELITY, BATCH_STATE];
 
 /// Refuses a run folder in which a folder or a file that is appended to is a link, or an entry is a pipe or a device. The folder itself
@@ -47,7 +47,7 @@ fn check_entries(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// What an entry is, if what is written to it would go elsewhere.
+/// Kind of an entry that would redirect writing elsewhere; `None` for a regular one.
 fn foreign(entry: &DirEntry) -> Option<&'static str> {
     let name = entry.file_name();
     // Without following links.

@@ -17,7 +17,7 @@ const MOST_LINE: usize = 64 << 20;
 pub(super) struct Pieces<'p> {
     path: &'p Path,
     file: File,
-    /// What is read and belongs to a line that is not complete yet.
+    /// Bytes already read of a line that is not complete yet.
     unread: Vec<u8>,
     /// The place of the next line in the file, in bytes.
     start: u64,

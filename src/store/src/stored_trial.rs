@@ -1,4 +1,4 @@
-//! What a run that goes on needs of a trial that it has: [`StoredTrial`].
+//! [`StoredTrial`]: the part of a stored trial that a resumed run needs.
 
 use std::num::NonZeroU32;
 
@@ -8,7 +8,7 @@ use serde::{Deserialize, Deserializer};
 use darkqa_ground::types::small_number::{SmallNumber, Tokens};
 use darkqa_ground::types::{Finish, LostAttempts, Shared, TrialKey, Usage, Via};
 
-/// A trial of a run, without what was asked and what was answered: 56 bytes.
+/// A trial of a run, without question and answer: 56 bytes.
 #[derive(Debug, Clone, Deserialize)]
 pub struct StoredTrial {
     /// The key of the trial.
@@ -46,7 +46,7 @@ impl StoredTrial {
         self.max_tokens.map(NonZeroU32::get)
     }
 
-    /// The tokens that the server charged; `None` if it did not say.
+    /// The tokens that the server charged; `None` if it did not report them.
     pub fn usage(&self) -> Option<Usage> {
         self.usage.usage()
     }
@@ -56,13 +56,13 @@ impl StoredTrial {
         self.lost.as_ref().map_or(0, |lost| lost.attempts)
     }
 
-    /// These attempts, and the requests of which the server stated no tokens; `None` if there are none.
+    /// These attempts, and the requests without a token count from the server; `None` if there are none.
     pub fn lost(&self) -> Option<&LostAttempts> {
         self.lost.as_deref()
     }
 
-    /// Adds what was paid for an earlier record of the same trial, the latest first. A reply is followed by other readings of itself, which
-    /// repeat its attempts, by a reply with a larger limit, or by a failure to get one, which does not replace it.
+    /// Adds the cost of an earlier record of the same trial; the latest record comes first. An earlier record may be the same reply, parsed
+    /// differently, whose attempts are the same; or a reply with a smaller limit; or one that this record failed to replace.
     pub(super) fn follow(&mut self, earlier: &Self) {
         let own = self.lost.as_deref().copied().unwrap_or_default();
         let before = earlier.lost.as_deref().copied().unwrap_or_default();

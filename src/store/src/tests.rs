@@ -121,7 +121,7 @@ fn an_incomplete_last_line_is_removed_and_a_broken_line_is_set_aside() {
     let path = base.path().join(RECORDS);
     let text = fs::read_to_string(&path).unwrap();
     fs::write(&path, text.replacen("{\"key\"", "{\"kex\"", 1)).unwrap();
-    // Whoever only reads is told.
+    // A reader gets an error.
     let error = read_records::<ChoiceDetail>(base.path())
         .unwrap_err()
         .to_string();

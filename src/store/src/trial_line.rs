@@ -1,10 +1,10 @@
-//! What the place of a trial among those of its run follows from: [`TrialLine`].
+//! [`TrialLine`]: the part of a record from which the position of its trial follows.
 
 use serde::Deserialize;
 
 use darkqa_ground::types::{Condition, QuestionId, TrialKey};
 
-/// What names a trial, of the line of its record.
+/// Fields of a record's line that identify the trial.
 #[derive(Debug, Deserialize)]
 pub struct TrialLine {
     /// The key of the trial.

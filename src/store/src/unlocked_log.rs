@@ -56,7 +56,7 @@ impl UnlockedLog {
         Ok(begun)
     }
 
-    /// Looks for records of another process, before this one appends so many bytes.
+    /// Looks for records of another process before this one appends `bytes` bytes.
     pub(super) fn appends(&mut self, log: &File, bytes: usize) {
         let length = log.metadata().map_or(self.end, |log| log.len());
         if length != self.end && self.found == Found::None {

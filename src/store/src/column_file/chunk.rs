@@ -93,7 +93,7 @@ impl Chunk {
         }
     }
 
-    /// The pages of the column, and what the row group needs to know of them.
+    /// The pages of the column, and its entry for the row group.
     pub(super) fn close(self) -> Result<(Bytes, ColumnCloseResult)> {
         let closed = self.writer.close()?;
         Ok((self.pages.bytes()?, closed))

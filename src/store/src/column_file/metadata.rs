@@ -1,4 +1,4 @@
-//! What a Parquet file says of itself: [`FileMetadata`].
+//! [`FileMetadata`]: the metadata of a Parquet file.
 
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
@@ -10,7 +10,7 @@ use darkqa_ground::error::{Error, Result};
 use darkqa_ground::files::guarded::guarded;
 use darkqa_ground::files::reading;
 
-/// What the program writes of itself into its Parquet files.
+/// Value of `created_by` in the Parquet files of this program.
 pub const CREATED_BY: &str = concat!("darkqa-eval version ", env!("CARGO_PKG_VERSION"));
 
 /// The metadata of a file.

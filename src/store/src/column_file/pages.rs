@@ -17,7 +17,7 @@ impl Pages {
         Self(Arc::new(Mutex::new(TrackedWrite::new(Vec::new()))))
     }
 
-    /// What was written.
+    /// Takes the bytes written so far.
     pub(super) fn bytes(&self) -> Result<Bytes> {
         let mut pages = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let pages = std::mem::replace(&mut *pages, TrackedWrite::new(Vec::new()));
