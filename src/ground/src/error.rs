@@ -95,16 +95,18 @@ const KEPT: (usize, usize) = (300, 200);
 
 /// A text whose lines are no longer than a message may be, whatever names and values data hold.
 fn bounded(text: &str) -> String {
-    let lines = text.split('\n').map(|line| {
-        let length = line.chars().count();
-        if length <= LONGEST_LINE {
-            return line.to_owned();
-        }
-        let start: String = line.chars().take(KEPT.0).collect();
-        let end: String = line.chars().skip(length - KEPT.1).collect();
-        format!("{start} … {end}")
-    });
-    lines.collect::<Vec<String>>().join("\n")
+    text.split('\n')
+        .map(|line| {
+            let length = line.chars().count();
+            if length <= LONGEST_LINE {
+                return line.to_owned();
+            }
+            let start: String = line.chars().take(KEPT.0).collect();
+            let end: String = line.chars().skip(length - KEPT.1).collect();
+            format!("{start} … {end}")
+        })
+        .collect::<Vec<String>>()
+        .join("\n")
 }
 
 impl Error {

@@ -107,11 +107,12 @@ fn create_folder(path: &Path) -> Result<()> {
 fn replace(path: &Path, content: &[u8], sync: impl FnOnce(&File) -> io::Result<()>) -> Result<()> {
     create_folder(path)?;
     let unfinished = unfinished(path);
-    let written = create_new(&unfinished).and_then(|mut file| {
-        file.write_all(content)?;
-        sync(&file)
-    });
-    written.map_err(|e| Error::file(&unfinished, "write", e))?;
+    create_new(&unfinished)
+        .and_then(|mut file| {
+            file.write_all(content)?;
+            sync(&file)
+        })
+        .map_err(|e| Error::file(&unfinished, "write", e))?;
     fs::rename(&unfinished, path).map_err(|e| Error::file(path, "write", e))
 }
 

@@ -117,8 +117,9 @@ pub fn text(path: &Path) -> Result<String> {
 /// # Errors
 /// If the file cannot be read, is larger than 1 MB, or is not UTF-8.
 pub fn settings(path: &Path) -> Result<String> {
-    let text = read_at_most(path, MOST_SETTINGS).and_then(utf8);
-    text.map_err(|e| Error::file(path, "read", e))
+    read_at_most(path, MOST_SETTINGS)
+        .and_then(utf8)
+        .map_err(|e| Error::file(path, "read", e))
 }
 
 /// Reads a file of at most `most` bytes.

@@ -33,8 +33,7 @@ pub fn names() -> Vec<&'static str> {
 pub fn space(name: &str) -> Option<Labels> {
     let (_, table, void) = SPACES.iter().find(|(known, ..)| *known == name)?;
     let (mut labels, mut expressible) = (BTreeMap::new(), BTreeSet::new());
-    let lines = table.lines().filter(|line| !line.starts_with('#'));
-    for line in lines {
+    for line in table.lines().filter(|line| !line.starts_with('#')) {
         let mut cells = line.split('\t');
         let [id, word, canonical] = [(); 3].map(|()| cells.next().unwrap_or_default().to_owned());
         if cells.next().is_none() {

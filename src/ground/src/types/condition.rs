@@ -20,8 +20,11 @@ pub struct EnhancerName(String);
 impl EnhancerName {
     /// Checks a name: it must not be empty and may only have letters, digits, `_`, `-` and `.`.
     pub fn new(name: &str) -> Result<Self, Error> {
-        let fits = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
-        if name.is_empty() || !name.chars().all(fits) {
+        if name.is_empty()
+            || !name
+                .chars()
+                .all(|c: char| c.is_ascii_alphanumeric() || "_-.".contains(c))
+        {
             return Err(Error::usage(
                 "--llie",
                 format_args!(
@@ -215,8 +218,7 @@ mod tests {
             "E5-noise",
             "L2-noise",
         ];
-        let key = |name: &&str| name.parse::<Condition>().unwrap();
-        names.sort_by_key(key);
+        names.sort_by_key(|name| name.parse::<Condition>().unwrap());
         assert_eq!(
             names,
             [

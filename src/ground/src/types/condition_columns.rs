@@ -31,8 +31,9 @@ impl<'a> ConditionColumns<'a> {
         let degradation = condition.and_then(|condition| condition.degradation());
         let level = condition.map(Condition::level);
         // The darkness of pairs differs by frame; it is in the facts about the image.
-        let same = level.filter(|level| *level != AxisLevel::PAIR);
-        let light = same.filter(|level| level.axis().is_none_or(|axis| axis == Axis::LIGHT));
+        let light = level
+            .filter(|level| *level != AxisLevel::PAIR)
+            .filter(|level| level.axis().is_none_or(|axis| axis == Axis::LIGHT));
         let severity = degradation.map(Degradation::severity);
         Self {
             condition,
@@ -46,8 +47,9 @@ impl<'a> ConditionColumns<'a> {
             ev: light.map(AxisLevel::value),
             severity: severity.filter(|_| light.is_none()),
             reading: degradation.and_then(Degradation::reading).or_else(|| {
-                let pair = condition.and_then(Condition::pair);
-                pair.and_then(PairDark::reading)
+                condition
+                    .and_then(Condition::pair)
+                    .and_then(PairDark::reading)
             }),
             enhancer: condition.and_then(|condition| condition.enhancer.as_ref()),
         }

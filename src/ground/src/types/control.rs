@@ -123,10 +123,12 @@ impl FromStr for Control {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let found = Self::ALL.into_iter().find(|control| control.name() == text);
-        found.ok_or_else(|| {
-            let names = Self::ALL.map(Self::name).join(", ");
-            format!("observer:{text} is not a control; there are: {names}")
-        })
+        Self::ALL
+            .into_iter()
+            .find(|control| control.name() == text)
+            .ok_or_else(|| {
+                let names = Self::ALL.map(Self::name).join(", ");
+                format!("observer:{text} is not a control; there are: {names}")
+            })
     }
 }

@@ -185,9 +185,10 @@ impl Kind {
     /// The first kind of the same axis, which stands for all of them.
     #[must_use]
     pub(super) fn first_of_axis(self) -> Self {
-        let mut kinds = Self::ALL.into_iter();
-        let first = kinds.find(|other| other.axis() == self.axis());
-        first.unwrap_or(self)
+        Self::ALL
+            .into_iter()
+            .find(|other| other.axis() == self.axis())
+            .unwrap_or(self)
     }
 
     /// The severities of the paper, or of a kind that the paper does not have, which are the default.
@@ -351,8 +352,11 @@ impl ReadingName {
     /// # Errors
     /// If it is empty or has other characters.
     pub fn new(name: &str) -> Result<Self, Error> {
-        let fits = |c: char| c.is_ascii_alphanumeric() || "_.-".contains(c);
-        if name.is_empty() || !name.chars().all(fits) {
+        if name.is_empty()
+            || !name
+                .chars()
+                .all(|c: char| c.is_ascii_alphanumeric() || "_.-".contains(c))
+        {
             let problem = format_args!(
                 "{name:?} is not a valid name of a light reading: only letters, digits, '_', '.' and '-' are allowed"
             );

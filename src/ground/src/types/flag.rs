@@ -19,8 +19,9 @@ const MAX_THREADS: usize = 1024;
 /// The text names the expected value.
 pub fn positive(text: &str) -> Result<f64, String> {
     let value = text.trim().parse().ok();
-    let value = value.filter(|value: &f64| value.is_finite() && *value > 0.0);
-    value.ok_or_else(|| "a number above 0 expected".to_owned())
+    value
+        .filter(|value: &f64| value.is_finite() && *value > 0.0)
+        .ok_or_else(|| "a number above 0 expected".to_owned())
 }
 
 /// Reads a duration above 0, in seconds.
@@ -31,8 +32,9 @@ pub fn seconds(text: &str) -> Result<Duration, String> {
     let duration = positive(text)
         .ok()
         .and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
-    let duration = duration.filter(|duration| !duration.is_zero());
-    duration.ok_or_else(|| "a number of seconds above 0 expected".to_owned())
+    duration
+        .filter(|duration| !duration.is_zero())
+        .ok_or_else(|| "a number of seconds above 0 expected".to_owned())
 }
 
 /// Reads a number of threads.
@@ -41,8 +43,9 @@ pub fn seconds(text: &str) -> Result<Duration, String> {
 /// The text names the expected value.
 pub fn threads(text: &str) -> Result<NonZeroUsize, String> {
     let threads = text.trim().parse().ok();
-    let threads = threads.filter(|threads: &NonZeroUsize| threads.get() <= MAX_THREADS);
-    threads.ok_or_else(|| format!("a number from 1 to {MAX_THREADS} expected"))
+    threads
+        .filter(|threads: &NonZeroUsize| threads.get() <= MAX_THREADS)
+        .ok_or_else(|| format!("a number from 1 to {MAX_THREADS} expected"))
 }
 
 /// Writes an enum's value as its word on the command line.
@@ -58,8 +61,8 @@ pub fn write_word(value: &impl ValueEnum, f: &mut fmt::Formatter<'_>) -> fmt::Re
 /// If no value of the enum has this word.
 pub fn read_word<T: ValueEnum>(word: &str) -> error::Result<T> {
     T::from_str(word, false).map_err(|_| {
-        let values = T::value_variants().iter();
-        let words: Vec<String> = values
+        let words: Vec<String> = T::value_variants()
+            .iter()
             .filter_map(|value| Some(value.to_possible_value()?.get_name().to_owned()))
             .collect();
         let problem = format_args!("it is not one of {}", words.join(", "));

@@ -74,13 +74,17 @@ impl InputNote {
     #[must_use]
     pub fn rule(&self) -> Option<String> {
         let orientation = self.orientation.map(|turn| format!("orientation {turn}"));
-        let is_converted = |colour: &&ColourNote| colour.handling == ColourHandling::Converted;
-        let colour = self.colour.as_ref().filter(is_converted);
-        let colour = colour.map(|_| format!("colour {COLOUR_VERSION}"));
+        let colour = self
+            .colour
+            .as_ref()
+            .filter(|colour| colour.handling == ColourHandling::Converted)
+            .map(|_| format!("colour {COLOUR_VERSION}"));
         let depth = self.depth.map(|depth| depth.words().to_owned());
         let exposure = self.exposure_ev.map(|ev| format!("exposure {ev}"));
-        let parts = [orientation, colour, depth, exposure].into_iter();
-        let parts: Vec<String> = parts.flatten().collect();
+        let parts: Vec<String> = [orientation, colour, depth, exposure]
+            .into_iter()
+            .flatten()
+            .collect();
         (!parts.is_empty()).then(|| parts.join("; "))
     }
 
@@ -215,8 +219,9 @@ impl InputSummary {
         self.0.iter().map(|(remark, count)| {
             let found: usize = count.images.values().sum();
             let verb = if found == 1 { " is" } else { "s are" };
-            let details = count.images.iter();
-            let details: Vec<String> = details
+            let details: Vec<String> = count
+                .images
+                .iter()
                 .map(|(detail, images)| format!("{detail}: {images}"))
                 .collect();
             format!(

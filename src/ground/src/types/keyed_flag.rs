@@ -196,8 +196,10 @@ pub const KEYED_FLAGS: [KeyedFlag; 14] = [
 #[must_use]
 pub fn keyed_form(flag: &str) -> Option<(&'static KeyedFlag, &'static str)> {
     KEYED_FLAGS.iter().find_map(|keyed| {
-        let mut keys = keyed.keys.iter();
-        let (key, _) = keys.find(|(key, own)| *own == flag && !key.is_empty())?;
+        let (key, _) = keyed
+            .keys
+            .iter()
+            .find(|(key, own)| *own == flag && !key.is_empty())?;
         Some((keyed, *key))
     })
 }
@@ -306,8 +308,11 @@ mod tests {
 
     fn settings(flag: &str, text: &str) -> Result<Vec<(&'static str, Option<String>)>, String> {
         let keyed = KeyedFlag::named(flag).unwrap();
-        let settings = keyed.settings(text, |_| true)?.into_iter();
-        Ok(settings.map(|one| (one.flag, one.value)).collect())
+        Ok(keyed
+            .settings(text, |_| true)?
+            .into_iter()
+            .map(|one| (one.flag, one.value))
+            .collect())
     }
 
     fn with(flag: &'static str, value: &str) -> (&'static str, Option<String>) {

@@ -60,8 +60,9 @@ impl FromStr for KindSet {
                 "all" => Self::ALL,
                 word => {
                     let words = Kind::ALL.map(Kind::word).join(", ");
-                    let kind = Kind::from_word(word).map(Self::only);
-                    kind.ok_or_else(|| format!("{word:?} is not one of {words}, both, all"))?
+                    Kind::from_word(word)
+                        .map(Self::only)
+                        .ok_or_else(|| format!("{word:?} is not one of {words}, both, all"))?
                 }
             };
             set.0 |= part.0;

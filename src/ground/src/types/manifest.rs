@@ -156,9 +156,12 @@ impl RunManifest {
 
 /// The fields of an object that are not null.
 fn fields(object: &Value) -> BTreeMap<String, Value> {
-    let fields = object.as_object().into_iter().flatten();
-    let set = fields.filter(|(_, value)| !value.is_null());
-    set.map(|(field, value)| (field.clone(), value.clone()))
+    object
+        .as_object()
+        .into_iter()
+        .flatten()
+        .filter(|(_, value)| !value.is_null())
+        .map(|(field, value)| (field.clone(), value.clone()))
         .collect()
 }
 

@@ -127,8 +127,9 @@ mod tests {
         let reading = prop::option::of("[A-Za-z0-9_.-]{1,12}");
         prop::option::of(
             (kind, 1..=1600_u16, reading).prop_map(|(kind, severity, reading)| {
-                let reading = reading.filter(|_| kind.has_readings());
-                let reading = reading.map(|name| ReadingName::new(&name).unwrap());
+                let reading = reading
+                    .filter(|_| kind.has_readings())
+                    .map(|name| ReadingName::new(&name).unwrap());
                 Degradation::new(kind, Severity::hundredths(severity), reading).unwrap()
             }),
         )

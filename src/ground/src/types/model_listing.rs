@@ -129,11 +129,10 @@ impl ModelListing {
     /// True if people answered under this name, or under the name before a run or a time in brackets, as `human (one)`.
     #[must_use]
     pub fn is_people(&self, name: &str) -> bool {
-        let is_of = |people: &String| {
+        self.people.iter().any(|people| {
             let rest = name.strip_prefix(&**people);
             rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(" ("))
-        };
-        self.people.iter().any(is_of)
+        })
     }
 
     /// These models without people; the people if there are no others.

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Deserialize;
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::View;
 use super::manifest::RunManifest;
@@ -45,8 +45,11 @@ struct Noted {
 impl StoredViews {
     /// Reads the views that a manifest records.
     pub fn from_manifest(manifest: &RunManifest) -> Self {
-        let read = |value: &Value| serde_json::from_value::<Views>(value.clone()).ok();
-        if let Some(known) = manifest.settings.get(VIEWS).and_then(read) {
+        if let Some(known) = manifest
+            .settings
+            .get(VIEWS)
+            .and_then(|value| serde_json::from_value::<Views>(value.clone()).ok())
+        {
             return Self {
                 known,
                 is_whole: true,
@@ -54,8 +57,10 @@ impl StoredViews {
         }
         // The models that the command before asked by its file.
         let models = manifest.settings.get("models").cloned();
-        let models = models.and_then(|models| serde_json::from_value::<Vec<Noted>>(models).ok());
-        let models = models.into_iter().flatten();
+        let models = models
+            .and_then(|models| serde_json::from_value::<Vec<Noted>>(models).ok())
+            .into_iter()
+            .flatten();
         Self {
             known: models.map(|model| (model.name, model.view)).collect(),
             is_whole: false,
@@ -104,7 +109,9 @@ impl StoredViews {
     }
 
     fn views(&self, name: &str) -> Option<BTreeSet<View>> {
-        let known = self.known.get(name).cloned();
-        known.or_else(|| self.is_whole.then(|| BTreeSet::from([View::Image])))
+        self.known
+            .get(name)
+            .cloned()
+            .or_else(|| self.is_whole.then(|| BTreeSet::from([View::Image])))
     }
 }

@@ -11,8 +11,10 @@ pub fn nearest<'a, S: AsRef<str> + 'a>(
     known: impl IntoIterator<Item = &'a S>,
 ) -> Option<&'a str> {
     let name = name.to_lowercase();
-    let known = known.into_iter().map(AsRef::as_ref);
-    let alike = known.map(|other| (jaro_winkler(&name, &other.to_lowercase()), other));
+    let alike = known
+        .into_iter()
+        .map(AsRef::as_ref)
+        .map(|other| (jaro_winkler(&name, &other.to_lowercase()), other));
     let near = alike.filter(|(alike, _)| *alike > ALIKE);
     // `min_by` returns the first of equal elements, `max_by` the last.
     let nearest = near.min_by(|(a, _), (b, _)| b.total_cmp(a));

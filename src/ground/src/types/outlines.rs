@@ -15,13 +15,17 @@ impl RunQuestion {
     pub fn outlines(&self) -> Vec<PixelBox> {
         let about = self.evidence.get("about").and_then(Value::as_str);
         let about = about.filter(|about| !about.is_empty());
-        let segments = self.evidence.get("segments").and_then(Value::as_array);
-        let segments = segments.into_iter().flatten();
-        let wanted = segments.filter(|segment| match (&self.family, about) {
-            (Family::Closest, _) => true,
-            (_, about) => about.is_some() && segment.get("word").and_then(Value::as_str) == about,
-        });
-        wanted
+        self.evidence
+            .get("segments")
+            .and_then(Value::as_array)
+            .into_iter()
+            .flatten()
+            .filter(|segment| match (&self.family, about) {
+                (Family::Closest, _) => true,
+                (_, about) => {
+                    about.is_some() && segment.get("word").and_then(Value::as_str) == about
+                }
+            })
             .filter_map(|segment| pixel_box(segment.get("bbox")?))
             .collect()
     }

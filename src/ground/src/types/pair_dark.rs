@@ -36,8 +36,11 @@ impl PhotoName {
             let problem = format!("{name:?} is not a valid name of a dark photograph: {problem}");
             Err(Error::usage("dark", problem))
         };
-        let fits = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "_-.".contains(c);
-        if !name.starts_with(|c: char| c.is_ascii_lowercase()) || !name.chars().all(fits) {
+        if !name.starts_with(|c: char| c.is_ascii_lowercase())
+            || !name
+                .chars()
+                .all(|c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "_-.".contains(c))
+        {
             return wrong(
                 "it begins with a letter from a to z, and has only these, digits, '_', '-' and '.'",
             );
@@ -128,8 +131,10 @@ impl PairDark {
         match self {
             Self::Photograph(name) => format!("{name} (real)"),
             Self::Match(kind, reading) => {
-                let reading = reading.as_ref().filter(|name| **name != ReadingName::PAPER);
-                let reading = reading.map_or(String::new(), |name| format!(" @{name}"));
+                let reading = reading
+                    .as_ref()
+                    .filter(|name| **name != ReadingName::PAPER)
+                    .map_or(String::new(), |name| format!(" @{name}"));
                 format!("{}{reading} (as dark as real)", kind.title())
             }
         }
@@ -142,8 +147,10 @@ impl fmt::Display for PairDark {
         match self {
             Self::Photograph(name) => f.pad(name.as_str()),
             Self::Match(kind, reading) => {
-                let reading = reading.as_ref().filter(|name| **name != ReadingName::PAPER);
-                let reading = reading.map_or(String::new(), |name| format!("@{name}"));
+                let reading = reading
+                    .as_ref()
+                    .filter(|name| **name != ReadingName::PAPER)
+                    .map_or(String::new(), |name| format!("@{name}"));
                 f.pad(&format!("{MATCH}-{kind}{reading}"))
             }
         }

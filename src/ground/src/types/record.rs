@@ -161,9 +161,11 @@ impl<D> Record<D> {
     /// Text of the reply, or else of the refusal, or else of the error.
     #[must_use]
     pub fn text_or_error(&self) -> Option<&str> {
-        let reply = self.reply.as_deref().filter(|text| !text.is_empty());
-        let error = || self.failure.as_ref().map(|failure| &*failure.message);
-        reply.or(self.refusal.as_deref()).or_else(error)
+        self.reply
+            .as_deref()
+            .filter(|text| !text.is_empty())
+            .or(self.refusal.as_deref())
+            .or_else(|| self.failure.as_ref().map(|failure| &*failure.message))
     }
 
     /// The record with a failure after this number of requests.

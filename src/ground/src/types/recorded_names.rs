@@ -76,8 +76,8 @@ impl RecordedNames {
     }
 
     fn other(&self, shown: &str) -> Option<&str> {
-        let mut names = self.0.iter();
-        names
+        self.0
+            .iter()
             .find(|(_, name)| *name == shown)
             .map(|(name, _)| name.as_str())
     }
@@ -88,8 +88,9 @@ mod tests {
     use super::*;
 
     fn moved(names: &mut RecordedNames, moves: &[(&str, &str)]) {
-        let moves = moves.iter();
-        let moves = moves.map(|(old, new)| ((*old).to_owned(), (*new).to_owned()));
+        let moves = moves
+            .iter()
+            .map(|(old, new)| ((*old).to_owned(), (*new).to_owned()));
         names.rename(&moves.collect());
     }
 

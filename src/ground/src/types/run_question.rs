@@ -121,8 +121,10 @@ impl RunQuestion {
                 groups.is_some_and(|(group, other)| group != other),
             ),
         ];
-        let differing = parts.into_iter().find(|(_, differs)| *differs);
-        differing.map(|(part, _)| part)
+        parts
+            .into_iter()
+            .find(|(_, differs)| *differs)
+            .map(|(part, _)| part)
     }
 
     /// The question without its evidence, which may be ten times as large as the rest; the name in [`bank_id`](Self::bank_id) stays.
@@ -149,8 +151,10 @@ impl RunQuestion {
     /// The name of the question among those that are asked about every image; its own name if it is about one image alone.
     #[must_use]
     pub fn bank_id(&self) -> &str {
-        let bank_id = self.evidence.get(BANK_ID).and_then(Value::as_str);
-        bank_id.unwrap_or(&self.id.0)
+        self.evidence
+            .get(BANK_ID)
+            .and_then(Value::as_str)
+            .unwrap_or(&self.id.0)
     }
 
     /// The stored form of a question at an index, about a frame of this scene.

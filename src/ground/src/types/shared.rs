@@ -102,8 +102,8 @@ mod tests {
     #[test]
     fn equal_values_are_kept_once() {
         let mut distinct = Distinct::default();
-        let text = |text: &str| Shared::from(text.to_owned());
-        let [mut one, mut other, mut same] = ["a", "b", "a"].map(text);
+        let [mut one, mut other, mut same] =
+            ["a", "b", "a"].map(|text| Shared::from(text.to_owned()));
         for value in [&mut one, &mut other, &mut same] {
             distinct.share(value);
         }

@@ -4,8 +4,11 @@ use std::borrow::Cow;
 
 /// A text as one word of a POSIX shell: in single quotes, if a shell would split it or find a meaning in it.
 pub fn shell_word(text: &str) -> Cow<'_, str> {
-    let is_plain = |c: char| c.is_alphanumeric() || "-_./:=,@%+".contains(c);
-    if !text.is_empty() && text.chars().all(is_plain) {
+    if !text.is_empty()
+        && text
+            .chars()
+            .all(|c: char| c.is_alphanumeric() || "-_./:=,@%+".contains(c))
+    {
         return Cow::Borrowed(text);
     }
     Cow::Owned(format!("'{}'", text.replace('\'', "'\\''")))

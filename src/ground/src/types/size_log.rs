@@ -182,8 +182,10 @@ impl SizeLog {
     }
 
     fn fixed(&self) -> String {
-        let side = |side: Option<usize>| side.map_or("any".to_owned(), |side| side.to_string());
-        let [width, height] = self.fixed.unwrap_or_default().map(side);
+        let [width, height] = self
+            .fixed
+            .unwrap_or_default()
+            .map(|side: Option<usize>| side.map_or("any".to_owned(), |side| side.to_string()));
         format!("{width} × {height}")
     }
 }

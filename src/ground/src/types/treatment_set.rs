@@ -85,8 +85,9 @@ impl TreatmentSet {
     /// Names of the treatments; the untouched frame comes first.
     fn words(self) -> Vec<&'static str> {
         let kinds = Kind::ALL.map(Some).into_iter();
-        let all = std::iter::once(None).chain(kinds);
-        all.filter(|treatment| self.includes(*treatment))
+        std::iter::once(None)
+            .chain(kinds)
+            .filter(|treatment| self.includes(*treatment))
             .map(|treatment| treatment.map_or(UNTOUCHED, Kind::word))
             .chain(self.and(Self::DARK).map(|_| PHOTOGRAPHS))
             .collect()
@@ -113,8 +114,10 @@ impl TreatmentSet {
 
 impl From<KindSet> for TreatmentSet {
     fn from(kinds: KindSet) -> Self {
-        let each = kinds.kinds().map(|kind| Self::only(Some(kind)));
-        each.fold(Self::NONE, Self::or)
+        kinds
+            .kinds()
+            .map(|kind| Self::only(Some(kind)))
+            .fold(Self::NONE, Self::or)
     }
 }
 
@@ -134,8 +137,8 @@ impl FromStr for TreatmentSet {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let mut words = text.split(',');
-        words.try_fold(Self::NONE, |set, word| Ok(set.or(Self::from_word(word)?)))
+        text.split(',')
+            .try_fold(Self::NONE, |set, word| Ok(set.or(Self::from_word(word)?)))
     }
 }
 

@@ -18,8 +18,10 @@ pub const UNKNOWN: &str = "misc";
 type NameTable = BTreeMap<&'static str, &'static str>;
 
 fn table(text: &'static str) -> NameTable {
-    let lines = text.lines().filter(|line| !line.starts_with('#'));
-    lines.filter_map(|line| line.split_once('\t')).collect()
+    text.lines()
+        .filter(|line| !line.starts_with('#'))
+        .filter_map(|line| line.split_once('\t'))
+        .collect()
 }
 
 static TABLES: LazyLock<[NameTable; 3]> = LazyLock::new(|| [OVERRIDES, HM3D, THOR].map(table));

@@ -187,14 +187,20 @@ impl<D: StoredDetail> Trials<D> {
         for facts in &self.facts {
             is_met[facts.item as usize] = true;
         }
-        let items = self.items.all().iter().zip(is_met);
-        items.map(|(item, is_met)| is_met.then_some(item)).collect()
+        self.items
+            .all()
+            .iter()
+            .zip(is_met)
+            .map(|(item, is_met)| is_met.then_some(item))
+            .collect()
     }
 
     /// The questions that were asked, with their frames; a question may be met several times.
     pub fn questions(&self) -> impl Iterator<Item = (&QuestionId, &FrameId)> {
-        let items = self.items().into_iter().flatten();
-        items.map(|item| (&*item.question, &*item.frame))
+        self.items()
+            .into_iter()
+            .flatten()
+            .map(|item| (&*item.question, &*item.frame))
     }
 
     /// The models and conditions that were asked, by number, with `None` as [`items`](Self::items).
@@ -371,11 +377,15 @@ impl<D: StoredDetail> Trials<D> {
         distinct.dedup();
         let ranks: BTreeMap<_, u32> = distinct.into_iter().zip(0..).collect();
         let places: Vec<u32> = places.iter().map(|place| ranks[place]).collect();
-        let rank = |facts: &TrialFacts<D::Facts>| {
-            let question = u64::from(questions[facts.item as usize]);
-            question << 32 | u64::from(places[facts.asked as usize])
-        };
-        let mut order: Vec<(u64, u32)> = self.facts.iter().map(rank).zip(0..).collect();
+        let mut order: Vec<(u64, u32)> = self
+            .facts
+            .iter()
+            .map(|facts| {
+                let question = u64::from(questions[facts.item as usize]);
+                question << 32 | u64::from(places[facts.asked as usize])
+            })
+            .zip(0..)
+            .collect();
         let rest = |place: u32| {
             let facts = &self.facts[place as usize];
             let repeat = self.items.get(facts.item).repeat;

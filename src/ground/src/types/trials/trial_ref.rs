@@ -282,8 +282,9 @@ impl<'t> TrialRef<'t, ChoiceDetail> {
     /// The frame whose image was shown.
     #[must_use]
     pub fn shown(self) -> &'t FrameId {
-        let other = self.images().and_then(|images| images.shown_frame.as_ref());
-        other.unwrap_or(self.frame())
+        self.images()
+            .and_then(|images| images.shown_frame.as_ref())
+            .unwrap_or(self.frame())
     }
 
     /// The observer's view, without the outlines of single objects.

@@ -35,8 +35,9 @@ impl<T: Hash + Eq> Values<T> {
     /// The number of the value that `is_it`; a key of it has the same hash.
     pub(super) fn find(&self, key: &impl Hash, is_it: impl Fn(&T) -> bool) -> Option<u32> {
         let hash = self.hashes.hash_one(key);
-        let number = self.numbers.find(hash, |number| is_it(self.get(*number)));
-        number.copied()
+        self.numbers
+            .find(hash, |number| is_it(self.get(*number)))
+            .copied()
     }
 
     /// Keeps a value that is new.
