@@ -173,13 +173,11 @@ fn seconds(value: &str) -> Result<f64, String> {
     let number = |text: &str| text.trim().parse::<f64>().ok();
     let seconds = match value.split_once('/') {
         None => number(value),
-        Some((above, below)) => {
-            let parts = number(above).zip(number(below));
-            parts.map(|(above, below)| above / below)
-        }
+        Some((above, below)) => number(above)
+            .zip(number(below))
+            .map(|(above, below)| above / below),
     };
-    let seconds = seconds.filter(|seconds| *seconds > 0.0 && *seconds <= LONGEST);
-    seconds.ok_or_else(|| {
+    seconds.filter(|seconds| *seconds > 0.0 && *seconds <= LONGEST).ok_or_else(|| {
         format!("base-time={value}: a number of seconds above 0, up to {LONGEST}, expected, as 1/120 or 0.01")
     })
 }

@@ -237,22 +237,24 @@ mod tests {
 
     fn interpolated(bayer: &Bayer) -> Vec<Vec<[f32; 3]>> {
         let last = bayer.height() - 1;
-        let pixels = |row: usize| {
-            let around = [
-                if row == 0 { 1 } else { row - 1 },
-                row,
-                if row == last { row - 1 } else { row + 1 },
-            ];
-            let pixel = |column: usize| {
-                let site = column / 2;
-                let mut colours = [[[0.0; LANES]; 3]; 2];
-                let rows = around.map(|row| bayer.sites(row));
-                demosaic(rows, row, site / LANES, &mut colours);
-                colours[column % 2].map(|channel| channel[site % LANES])
-            };
-            (0..bayer.width()).map(pixel).collect()
-        };
-        (0..bayer.height()).map(pixels).collect()
+        (0..bayer.height())
+            .map(|row: usize| {
+                let around = [
+                    if row == 0 { 1 } else { row - 1 },
+                    row,
+                    if row == last { row - 1 } else { row + 1 },
+                ];
+                (0..bayer.width())
+                    .map(|column: usize| {
+                        let site = column / 2;
+                        let mut colours = [[[0.0; LANES]; 3]; 2];
+                        let rows = around.map(|row| bayer.sites(row));
+                        demosaic(rows, row, site / LANES, &mut colours);
+                        colours[column % 2].map(|channel| channel[site % LANES])
+                    })
+                    .collect()
+            })
+            .collect()
     }
 
     #[test]

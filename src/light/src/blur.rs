@@ -41,14 +41,17 @@ pub fn blurred_codes<'a>(clean: impl Into<Clean<'a>>, streak: Streak) -> Rgb {
     let isa = Isa::best();
     let blur = Blur::new(clean, streak, isa);
     let width = 3 * clean.width();
-    let rows = blurred.samples_mut().par_chunks_mut(width).enumerate();
-    rows.for_each_init(
-        || (Scratch::default(), vec![0.0; width]),
-        |(scratch, light), (row, codes)| {
-            blur.row(row, scratch, light);
-            encode(light, codes, isa);
-        },
-    );
+    blurred
+        .samples_mut()
+        .par_chunks_mut(width)
+        .enumerate()
+        .for_each_init(
+            || (Scratch::default(), vec![0.0; width]),
+            |(scratch, light), (row, codes)| {
+                blur.row(row, scratch, light);
+                encode(light, codes, isa);
+            },
+        );
     blurred
 }
 
@@ -110,8 +113,8 @@ impl RowWeights {
             .collect();
         let inner = half
             .iter()
-            .take_while(|weight| (*weight - half[0]).abs() < 1e-12);
-        let inner = inner.count();
+            .take_while(|weight| (*weight - half[0]).abs() < 1e-12)
+            .count();
         let pairs = (inner..half.len()).map(|at| (at, half[at] as f32));
         Some(Self {
             equal: 2 * inner - 1,
@@ -139,28 +142,30 @@ impl Blur {
         let stride = 3 * (width + 2 * margin);
         // Whole lanes are read; the last of them extend beyond the row.
         let mut light = vec![0.0; height * stride + 2 * LANES];
-        let rows = light[..height * stride].par_chunks_mut(stride).enumerate();
-        rows.for_each(|(row, padded)| {
-            let samples = row * 3 * width..(row + 1) * 3 * width;
-            let inside = &mut padded[3 * margin..3 * (margin + width)];
-            match clean {
-                Clean::Codes(codes) => {
-                    let shown = shown_light();
-                    for (light, code) in inside.iter_mut().zip(&codes.samples()[samples]) {
-                        *light = shown[usize::from(*code)];
+        light[..height * stride]
+            .par_chunks_mut(stride)
+            .enumerate()
+            .for_each(|(row, padded)| {
+                let samples = row * 3 * width..(row + 1) * 3 * width;
+                let inside = &mut padded[3 * margin..3 * (margin + width)];
+                match clean {
+                    Clean::Codes(codes) => {
+                        let shown = shown_light();
+                        for (light, code) in inside.iter_mut().zip(&codes.samples()[samples]) {
+                            *light = shown[usize::from(*code)];
+                        }
+                    }
+                    Clean::Codes16(codes) => {
+                        for (light, code) in inside.iter_mut().zip(&codes.samples()[samples]) {
+                            *light = curve::gamma_expand(f64::from(*code) / 65_535.0) as f32;
+                        }
+                    }
+                    Clean::Light(light) | Clean::Scene(light) => {
+                        inside.copy_from_slice(&light.samples()[samples]);
                     }
                 }
-                Clean::Codes16(codes) => {
-                    for (light, code) in inside.iter_mut().zip(&codes.samples()[samples]) {
-                        *light = curve::gamma_expand(f64::from(*code) / 65_535.0) as f32;
-                    }
-                }
-                Clean::Light(light) | Clean::Scene(light) => {
-                    inside.copy_from_slice(&light.samples()[samples]);
-                }
-            }
-            repeat_edges(padded, margin);
-        });
+                repeat_edges(padded, margin);
+            });
         Self {
             light,
             height,

@@ -197,8 +197,14 @@ mod tests {
     use darkqa_ground::types::{Degradation, FrameId};
 
     fn picture() -> Rgb {
-        let sample = |i: u32| (i.wrapping_mul(2_654_435_761) >> 24) as u8;
-        Rgb::new(37, 151, (0..3 * 37 * 151).map(sample).collect()).unwrap()
+        Rgb::new(
+            37,
+            151,
+            (0..3 * 37 * 151)
+                .map(|i: u32| (i.wrapping_mul(2_654_435_761) >> 24) as u8)
+                .collect(),
+        )
+        .unwrap()
     }
 
     fn key() -> NoiseKey {

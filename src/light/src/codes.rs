@@ -32,15 +32,16 @@ const DARKEST: f32 = 1.0 / 1_048_576.0;
 
 /// The codes of light by pieces of equal width in each octave.
 static TABLE: LazyLock<Box<[Piece]>> = LazyLock::new(|| {
-    let pieces = (0..(OCTAVES as u32) << PIECES.ilog2()).map(|piece| {
-        let begin = f32::from_bits(DARKEST.to_bits() + (piece << WITHIN));
-        let code = (255.0 * libm::pow(f64::from(begin), 1.0 / curve::GAMMA) + 0.5).floor();
-        Piece {
-            next: at_least(libm::pow((code + 0.5) / 255.0, curve::GAMMA)),
-            code: code as u32,
-        }
-    });
-    pieces.collect()
+    (0..(OCTAVES as u32) << PIECES.ilog2())
+        .map(|piece| {
+            let begin = f32::from_bits(DARKEST.to_bits() + (piece << WITHIN));
+            let code = (255.0 * libm::pow(f64::from(begin), 1.0 / curve::GAMMA) + 0.5).floor();
+            Piece {
+                next: at_least(libm::pow((code + 0.5) / 255.0, curve::GAMMA)),
+                code: code as u32,
+            }
+        })
+        .collect()
 });
 
 /// The smallest single-precision number that is not below `x`.

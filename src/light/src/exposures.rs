@@ -98,8 +98,14 @@ mod tests {
     }
 
     fn picture() -> Rgb {
-        let sample = |i: u32| (i.wrapping_mul(2_654_435_761) >> 24) as u8;
-        Rgb::new(40, 150, (0..3 * 40 * 150).map(sample).collect()).unwrap()
+        Rgb::new(
+            40,
+            150,
+            (0..3 * 40 * 150)
+                .map(|i: u32| (i.wrapping_mul(2_654_435_761) >> 24) as u8)
+                .collect(),
+        )
+        .unwrap()
     }
 
     /// A degradation of a frame with these settings.
@@ -276,11 +282,12 @@ mod tests {
     fn motion_blurs_and_does_not_darken() {
         assert_eq!(image("T33.33-motion", "gain=4", "speed=0"), picture());
         let mean_light = |image: &Rgb| {
-            let light = image
+            image
                 .samples()
                 .iter()
-                .map(|code| (f64::from(*code) / 255.0).powf(2.2));
-            light.sum::<f64>() / image.samples().len() as f64
+                .map(|code| (f64::from(*code) / 255.0).powf(2.2))
+                .sum::<f64>()
+                / image.samples().len() as f64
         };
         let blurred = image("T33.33-motion", "gain=4", "angle=20");
         assert_ne!(blurred, picture());

@@ -17,10 +17,10 @@ impl Levels {
         levels.retain(|level| *level != AxisLevel::PAIR);
         let on = |axis: Axis| move |level: &&AxisLevel| level.axis() == Some(axis);
         let is_clean = levels.iter().all(|level| level.severity().is_none());
-        let light = levels
+        let has_ladders = levels
             .iter()
-            .filter(|level| level.axis() != Some(Axis::MOTION));
-        let has_ladders = light.eq(&ladder(LIGHT));
+            .filter(|level| level.axis() != Some(Axis::MOTION))
+            .eq(&ladder(LIGHT));
         for axis in Axis::ALL.into_iter().filter(|_| !is_clean) {
             let mut of_axis = kinds.kinds().filter(|kind| kind.axis() == axis);
             match (of_axis.next(), self.0.iter().find(on(axis))) {
@@ -36,8 +36,11 @@ impl Levels {
                     levels.retain(|level| level.axis() != Some(axis));
                 }
                 (None, Some(level)) => {
-                    let all = Kind::ALL.into_iter().filter(|kind| kind.axis() == axis);
-                    let words: Vec<&str> = all.map(Kind::word).collect();
+                    let words: Vec<&str> = Kind::ALL
+                        .into_iter()
+                        .filter(|kind| kind.axis() == axis)
+                        .map(Kind::word)
+                        .collect();
                     let problem = format_args!(
                         "{level} is a level of {}, of which --variant {kinds} names none",
                         words.join(", ")

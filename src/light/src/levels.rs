@@ -53,8 +53,10 @@ impl FromStr for Levels {
 
 /// The kind on whose axis a text lies, and the text without the letter of that axis.
 fn on_axis(text: &str) -> (Kind, &str) {
-    let is_number = |rest: &&str| rest.starts_with(|c: char| c.is_ascii_digit());
-    match text.strip_prefix(['T', 't']).filter(is_number) {
+    match text
+        .strip_prefix(['T', 't'])
+        .filter(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
+    {
         Some(number) => (Kind::Motion, number),
         None => (LIGHT, text),
     }
@@ -78,8 +80,10 @@ fn example(kind: Kind) -> &'static str {
 
 /// The levels of a kind's own ladder, from L0.
 pub(super) fn ladder(kind: Kind) -> Vec<AxisLevel> {
-    let ladder = kind.ladder().iter();
-    let ladder = ladder.map(|severity| AxisLevel::new(kind, *severity));
+    let ladder = kind
+        .ladder()
+        .iter()
+        .map(|severity| AxisLevel::new(kind, *severity));
     std::iter::once(AxisLevel::L0).chain(ladder).collect()
 }
 
@@ -160,8 +164,8 @@ fn steps(item: &str, from: &str, rest: &str) -> Result<Vec<AxisLevel>, String> {
             value(step)
         ));
     }
-    let severities = (from..=to).step_by(usize::from(step));
-    Ok(severities
+    Ok((from..=to)
+        .step_by(usize::from(step))
         .map(|severity| match severity {
             0 => AxisLevel::L0,
             severity => AxisLevel::new(kind, Severity::hundredths(severity)),
@@ -209,8 +213,10 @@ fn measured(kind: Kind, number: &str) -> Result<AxisLevel, String> {
     if number.parse::<f64>() == Ok(0.0) {
         return Ok(AxisLevel::L0);
     }
-    let is_above = |value: f64| value > kind.largest().value();
-    if number.parse().is_ok_and(is_above) {
+    if number
+        .parse()
+        .is_ok_and(|value: f64| value > kind.largest().value())
+    {
         return Err(format!(
             "{number:?} is above {} {}, the maximum",
             kind.largest(),

@@ -108,8 +108,8 @@ impl FromStr for MotionAngle {
             return Ok(Self::Random);
         }
         let degrees = text.parse().ok();
-        let degrees = degrees.filter(|degrees: &f64| degrees.abs() <= 360.0);
         degrees
+            .filter(|degrees: &f64| degrees.abs() <= 360.0)
             .map(Self::Degrees)
             .ok_or_else(|| "a number of degrees from -360 to 360, or random, expected".to_owned())
     }
@@ -188,8 +188,7 @@ mod tests {
         assert!((random(0, "a") - random(0, "b")).abs() > 1e-6);
         assert!((random(0, "a") - random(1, "a")).abs() > 1e-6);
         // Uniform over a half turn: the deviation of the mean of 400 is 2.6°.
-        let angles = (0..400).map(|i| random(i, "a"));
-        let angles: Vec<f64> = angles.collect();
+        let angles: Vec<f64> = (0..400).map(|i| random(i, "a")).collect();
         assert!(angles.iter().all(|angle| (0.0..180.0).contains(angle)));
         let mean = angles.iter().sum::<f64>() / 400.0;
         assert!((mean - 90.0).abs() < 13.0, "{mean}");

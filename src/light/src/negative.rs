@@ -78,8 +78,10 @@ impl Negative {
     fn developed_by(clean: Clean<'_>, capture: Capture) -> Self {
         let (height, width) = (clean.height(), clean.width());
         let mut balanced = Bayer::covering(height, width);
-        let lines = balanced.lines_mut().enumerate();
-        lines.for_each(|(row, mut line)| capture.capture_row(clean, row, &mut line));
+        balanced
+            .lines_mut()
+            .enumerate()
+            .for_each(|(row, mut line)| capture.capture_row(clean, row, &mut line));
         Self::from_balanced(capture.developer, balanced, [height, width])
     }
 
@@ -100,14 +102,17 @@ impl Negative {
     pub fn develop_by(&self, drop_ev: f64) -> Rgb {
         let [height, width] = self.size;
         let mut degraded = Rgb::black(height, width);
-        let rows = degraded.samples_mut().par_chunks_mut(3 * width).enumerate();
-        rows.for_each_init(
-            || vec![0.0; 3 * width],
-            |display, (row, codes)| {
-                self.developer.display(&self.balanced, row, display);
-                self.developer.encode(display, drop_ev, codes);
-            },
-        );
+        degraded
+            .samples_mut()
+            .par_chunks_mut(3 * width)
+            .enumerate()
+            .for_each_init(
+                || vec![0.0; 3 * width],
+                |display, (row, codes)| {
+                    self.developer.display(&self.balanced, row, display);
+                    self.developer.encode(display, drop_ev, codes);
+                },
+            );
         degraded
     }
 }

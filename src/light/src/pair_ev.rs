@@ -70,13 +70,17 @@ fn srgb(code: f64) -> f64 {
 /// The luminance of each pixel, with this light of codes from 0 to 1.
 fn luminance(image: &Rgb, light: impl Fn(f64) -> f64) -> Vec<f64> {
     let linear: [f64; 256] = std::array::from_fn(|code| light(code as f64 / 255.0));
-    let pixels = image.samples().chunks_exact(3).map(|pixel| {
-        let light = pixel.iter().zip(LUMINANCE);
-        light
-            .map(|(code, weight)| weight * linear[usize::from(*code)])
-            .sum::<f64>()
-    });
-    pixels.collect()
+    image
+        .samples()
+        .chunks_exact(3)
+        .map(|pixel| {
+            pixel
+                .iter()
+                .zip(LUMINANCE)
+                .map(|(code, weight)| weight * linear[usize::from(*code)])
+                .sum::<f64>()
+        })
+        .collect()
 }
 
 /// The mean; 0 without numbers.

@@ -77,9 +77,10 @@ impl Synthesis {
     /// Name of the reading that has these choices, whatever the camera; `custom` if there is none.
     #[must_use]
     pub fn name(&self) -> ReadingName {
-        let mut readings = LightReading::ALL.into_iter();
-        let same = readings.find(|reading| Self::new(*reading, self.camera.clone()) == *self);
-        same.map_or(ReadingName::CUSTOM, LightReading::name)
+        LightReading::ALL
+            .into_iter()
+            .find(|reading| Self::new(*reading, self.camera.clone()) == *self)
+            .map_or(ReadingName::CUSTOM, LightReading::name)
     }
 }
 
@@ -104,8 +105,8 @@ impl Readings {
     /// Several named readings with one camera; `paper` alone for an empty list.
     #[must_use]
     pub fn named(readings: &[LightReading], camera: &CameraModel) -> Self {
-        let contents = readings.iter();
-        let contents: BTreeMap<_, _> = contents
+        let contents: BTreeMap<_, _> = readings
+            .iter()
             .map(|reading| (reading.name(), Synthesis::new(*reading, camera.clone())))
             .collect();
         if contents.is_empty() {
@@ -121,8 +122,11 @@ impl Readings {
 
     /// The sensor of all readings, with neither its gain nor its ratio pinned.
     pub fn camera(&self) -> CameraModel {
-        let camera = self.0.values().next().map(|content| &content.camera);
-        camera.map_or_else(CameraModel::default, CameraModel::unpinned)
+        self.0
+            .values()
+            .next()
+            .map(|content| &content.camera)
+            .map_or_else(CameraModel::default, CameraModel::unpinned)
     }
 
     /// Content of a degradation's light reading. For a kind without readings it is any of them, because the pixels do not

@@ -231,8 +231,12 @@ impl LightSettings {
             let kinds = self.variants.kinds();
             for kind in kinds.filter(|kind| AxisLevel::new(*kind, severity) == *level) {
                 let readings: Vec<Option<ReadingName>> = if kind.has_readings() {
-                    let readings = self.kinds.sensor.readings.iter();
-                    readings.map(|(name, _)| Some(name.clone())).collect()
+                    self.kinds
+                        .sensor
+                        .readings
+                        .iter()
+                        .map(|(name, _)| Some(name.clone()))
+                        .collect()
                 } else {
                     vec![None]
                 };
@@ -325,11 +329,10 @@ fn readings(args: &SensorArgs) -> Result<Readings> {
         let problem = "cannot be combined with several profiles; name one in --profile";
         return Err(Error::usage(flag, problem));
     }
-    let by_light = |reading: &&LightReading| {
-        Synthesis::new(**reading, camera.clone()).coupling == Coupling::Photon
-    };
     if args.ratio.is_some()
-        && let Some(reading) = chosen.iter().find(by_light)
+        && let Some(reading) = chosen
+            .iter()
+            .find(|reading| Synthesis::new(**reading, camera.clone()).coupling == Coupling::Photon)
     {
         let name = reading.name();
         let problem = format!("the ratio of {name} is 2^EV; leave out --noise ratio or {name}");

@@ -97,7 +97,7 @@ fn middle_gain() -> f64 {
 fn the_ratio_of_raw_samples_is_that_of_the_formula() {
     for reading in LightReading::ALL {
         for grey in GREYS {
-            let levels = Severity::LADDER.map(|level| {
+            let deviations = Severity::LADDER.map(|level| {
                 let [found, expected] = raw(reading, middle_gain(), grey, level);
                 let name = reading.name();
                 assert!(
@@ -106,16 +106,19 @@ fn the_ratio_of_raw_samples_is_that_of_the_formula() {
                 );
                 found
             });
-            let falls = levels.windows(2).map(|pair| pair[0] / pair[1]);
-            let falls: Vec<f64> = falls.collect();
+            let falls: Vec<f64> = deviations
+                .windows(2)
+                .map(|pair| pair[0] / pair[1])
+                .collect();
             match reading {
                 LightReading::Paper | LightReading::Eld => {
                     assert!(falls.iter().all(|fall| (fall - 1.0).abs() < 0.01));
                 }
                 // At least as the root of the light.
                 LightReading::Level | LightReading::Physical => {
-                    let steps = Severity::LADDER.windows(2);
-                    let steps = steps.map(|pair| pair[1].value() - pair[0].value());
+                    let steps = Severity::LADDER
+                        .windows(2)
+                        .map(|pair| pair[1].value() - pair[0].value());
                     for (fall, step) in falls.iter().zip(steps) {
                         let root = libm::exp2(step / 2.0);
                         assert!(*fall > 0.98 * root, "{reading:?}: {fall} against {root}");
@@ -150,11 +153,16 @@ fn documented() -> Vec<(String, [[f64; 5]; 4])> {
         let [_, name, numbers @ .., _] = &cells[..] else {
             return None;
         };
-        let five = |cell: &&str| -> Option<[f64; 5]> {
-            let numbers = cell.split(' ').map(|word| word.parse().ok());
-            numbers.collect::<Option<Vec<f64>>>()?.try_into().ok()
-        };
-        let numbers: Vec<[f64; 5]> = numbers.iter().map(five).collect::<Option<_>>()?;
+        let numbers: Vec<[f64; 5]> = numbers
+            .iter()
+            .map(|cell| -> Option<[f64; 5]> {
+                cell.split(' ')
+                    .map(|word| word.parse().ok())
+                    .collect::<Option<Vec<f64>>>()?
+                    .try_into()
+                    .ok()
+            })
+            .collect::<Option<_>>()?;
         Some((name.trim_matches('`').to_owned(), numbers.try_into().ok()?))
     });
     rows.collect()
@@ -173,8 +181,11 @@ fn the_table_of_the_documentation_is_measured() {
         let code = |grey| Severity::LADDER.map(|level| code(reading, middle_gain(), grey, level));
         let found = [raw(first), raw(second), code(first), code(second)];
         for (found, row) in found.iter().zip(rows) {
-            let is_off = |(found, stated): (&f64, &f64)| (found / stated - 1.0).abs() > 0.02;
-            if found.iter().zip(&row).any(is_off) {
+            if found
+                .iter()
+                .zip(&row)
+                .any(|(found, stated): (&f64, &f64)| (found / stated - 1.0).abs() > 0.02)
+            {
                 off.push(format!("{reading:?} {found:.2?}, stated {row:?}"));
             }
         }

@@ -81,8 +81,9 @@ fn chi_square(observed: &[u64], expected: impl Fn(usize) -> f64) -> f64 {
 fn moments(counts: &[u64], at: impl Fn(usize) -> f64) -> [f64; 2] {
     let n = counts.iter().sum::<u64>() as f64;
     let sum = |f: &dyn Fn(f64) -> f64| {
-        let terms = counts.iter().enumerate();
-        terms
+        counts
+            .iter()
+            .enumerate()
             .map(|(index, count)| *count as f64 * f(at(index)))
             .sum::<f64>()
     };

@@ -98,8 +98,9 @@ impl Streak {
                 });
             }
         }
-        let taps = weights.into_iter();
-        taps.filter(|(_, weight)| *weight > LEAST)
+        weights
+            .into_iter()
+            .filter(|(_, weight)| *weight > LEAST)
             .map(|(offset, weight)| Tap { offset, weight })
             .collect()
     }
@@ -143,8 +144,12 @@ mod tests {
     use super::*;
 
     fn taps(length: f64, angle: f64) -> BTreeMap<[isize; 2], f64> {
-        let taps = Streak::new(length, angle).unwrap().taps().into_iter();
-        taps.map(|tap| (tap.offset, tap.weight)).collect()
+        Streak::new(length, angle)
+            .unwrap()
+            .taps()
+            .into_iter()
+            .map(|tap| (tap.offset, tap.weight))
+            .collect()
     }
 
     /// Lengths and directions of every sort: short and long, along the axes, between them, and beyond a quarter turn.

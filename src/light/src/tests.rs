@@ -39,8 +39,12 @@ fn statistics(image: &Rgb) -> [[f64; 2]; 3] {
     let n = (image.height() * image.width()) as f64;
     std::array::from_fn(|channel| {
         let codes = || {
-            let samples = image.samples().iter().skip(channel).step_by(3);
-            samples.map(|code| f64::from(*code))
+            image
+                .samples()
+                .iter()
+                .skip(channel)
+                .step_by(3)
+                .map(|code| f64::from(*code))
         };
         let mean = codes().sum::<f64>() / n;
         let variance = codes().map(|code| (code - mean).powi(2)).sum::<f64>() / n;
@@ -321,8 +325,11 @@ fn the_tone_curve_is_applied_where_it_is_set() {
 #[test]
 fn coupling_makes_the_ratio_the_drop() {
     let physical = Synthesis::new(LightReading::Physical, CameraModel::default());
-    let ratios = Severity::LADDER.map(|level| physical.state(&key(1, "a"), level).ratio);
-    for (found, expected) in ratios.iter().zip([4.0, 16.0, 64.0, 181.02, 512.0]) {
+    for (found, expected) in Severity::LADDER
+        .map(|level| physical.state(&key(1, "a"), level).ratio)
+        .iter()
+        .zip([4.0, 16.0, 64.0, 181.02, 512.0])
+    {
         assert!((found - expected).abs() < 0.01, "{found}");
     }
     let paper = Synthesis::default();

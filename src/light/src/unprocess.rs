@@ -72,10 +72,11 @@ impl Undoing for &[f32; 256] {
 /// Light of each 16-bit code in front of the camera.
 static LINEAR_LIGHT_16: LazyLock<Box<[f32; 65_536]>> = LazyLock::new(|| {
     let codes = 0..=u16::MAX;
-    let light = codes.map(|code| {
-        curve::gamma_expand(curve::inverse_smoothstep(f64::from(code) / 65_535.0)) as f32
-    });
-    let light: Vec<f32> = light.collect();
+    let light: Vec<f32> = codes
+        .map(|code| {
+            curve::gamma_expand(curve::inverse_smoothstep(f64::from(code) / 65_535.0)) as f32
+        })
+        .collect();
     light
         .try_into()
         .unwrap_or_else(|_| unreachable!("there are 65 536 codes"))
@@ -379,8 +380,14 @@ mod tests {
 
     /// Every code, in the channels of 16 × 16 pixels in three orders.
     fn codes() -> Rgb {
-        let pixel = |i: u32| [i as u8, (i * 101) as u8, 255 - i as u8];
-        Rgb::new(16, 16, (0..256).flat_map(pixel).collect()).unwrap()
+        Rgb::new(
+            16,
+            16,
+            (0..256)
+                .flat_map(|i: u32| [i as u8, (i * 101) as u8, 255 - i as u8])
+                .collect(),
+        )
+        .unwrap()
     }
 
     /// The light that a display shows for a code, plus a number of codes.
@@ -389,8 +396,11 @@ mod tests {
     }
 
     fn light(image: &Rgb, more: f64) -> Light {
-        let samples = image.samples().iter();
-        let samples = samples.map(|code| shown(*code, more)).collect();
+        let samples = image
+            .samples()
+            .iter()
+            .map(|code| shown(*code, more))
+            .collect();
         Light::new(image.height(), image.width(), samples).unwrap()
     }
 

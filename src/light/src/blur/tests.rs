@@ -6,12 +6,18 @@ use super::*;
 
 /// Textured pixels, a bright lamp and a dark corner.
 fn picture(height: usize, width: usize) -> Rgb {
-    let sample = |i: usize| match (i / 3 / width, i / 3 % width) {
-        (row, column) if row < 4 && column < 4 => 0,
-        (row, column) if row % 9 == 5 && column % 11 == 6 => 255,
-        _ => (i.wrapping_mul(2_654_435_761) >> 24) as u8,
-    };
-    Rgb::new(height, width, (0..3 * height * width).map(sample).collect()).unwrap()
+    Rgb::new(
+        height,
+        width,
+        (0..3 * height * width)
+            .map(|i: usize| match (i / 3 / width, i / 3 % width) {
+                (row, column) if row < 4 && column < 4 => 0,
+                (row, column) if row % 9 == 5 && column % 11 == 6 => 255,
+                _ => (i.wrapping_mul(2_654_435_761) >> 24) as u8,
+            })
+            .collect(),
+    )
+    .unwrap()
 }
 
 fn streak(length: f64, angle: f64) -> Streak {
@@ -109,8 +115,10 @@ fn still_and_even_pictures_are_unchanged() {
 #[test]
 fn threads_and_instructions_change_nothing() {
     let clean = picture(40, 150);
-    let light = clean.samples().iter();
-    let light = light.map(|code| shown_light()[usize::from(*code)]);
+    let light = clean
+        .samples()
+        .iter()
+        .map(|code| shown_light()[usize::from(*code)]);
     let light = Light::new(40, 150, light.collect()).unwrap();
     for (length, angle) in PATHS {
         let path = streak(length, angle);

@@ -117,8 +117,11 @@ impl Calibration {
     /// If a number cannot be written.
     pub fn to_toml(&self, comments: &[String]) -> Result<String> {
         let keys = toml::to_string(self).map_err(|e| Error::data(&self.name, e))?;
-        let comments = comments.iter().flat_map(|line| ["# ", line, "\n"]);
-        Ok(comments.chain([keys.as_str()]).collect())
+        Ok(comments
+            .iter()
+            .flat_map(|line| ["# ", line, "\n"])
+            .chain([keys.as_str()])
+            .collect())
     }
 
     fn check(&self) -> std::result::Result<(), String> {
@@ -224,12 +227,14 @@ impl Calibration {
 
     /// Index of the step whose own gain is nearest in ln K; the lower one of two that are equally near.
     fn nearest_of_given(&self, gain: f64) -> usize {
-        let distance = |step: &GainStep| {
-            let ratio = step.gain.map(|own| libm::log(own / gain).abs());
-            ratio.unwrap_or(f64::INFINITY)
-        };
-        let steps = self.steps.iter().map(distance).enumerate();
-        steps
+        self.steps
+            .iter()
+            .map(|step| {
+                step.gain
+                    .map(|own| libm::log(own / gain).abs())
+                    .unwrap_or(f64::INFINITY)
+            })
+            .enumerate()
             .min_by(|a, b| a.1.total_cmp(&b.1))
             .map_or(0, |(index, _)| index)
     }

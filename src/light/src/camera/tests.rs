@@ -57,11 +57,15 @@ fn states(model: &CameraModel, n: usize) -> Vec<CameraState> {
 fn kolmogorov(mut sample: Vec<f64>, cdf: impl Fn(f64) -> f64) -> f64 {
     sample.sort_by(f64::total_cmp);
     let n = sample.len() as f64;
-    let gap = |(i, x): (usize, &f64)| {
-        let f = cdf(*x);
-        (f - i as f64 / n).abs().max(((i + 1) as f64 / n - f).abs())
-    };
-    sample.iter().enumerate().map(gap).fold(0.0, f64::max) * n.sqrt()
+    sample
+        .iter()
+        .enumerate()
+        .map(|(i, x): (usize, &f64)| {
+            let f = cdf(*x);
+            (f - i as f64 / n).abs().max(((i + 1) as f64 / n - f).abs())
+        })
+        .fold(0.0, f64::max)
+        * n.sqrt()
 }
 
 #[test]
