@@ -238,8 +238,9 @@ impl Bvh {
         // A node stands behind its parent.
         let mut depths = vec![1; self.nodes.len()];
         for place in 0..self.nodes.len() {
-            let children = self.nodes[place].children.iter();
-            for child in children
+            for child in self.nodes[place]
+                .children
+                .iter()
                 .filter_map(|child| child.node())
                 .filter(|child| *child > place)
             {
@@ -488,8 +489,12 @@ mod tests {
         let mut hit_count = 0;
         for _ in 0..2000 {
             let ray = Ray::new(point(6.0), point(1.0).normalize());
-            let all = tree.leaves.iter().filter_map(|leaf| leaf.hit_by(&ray, 5.0));
-            let nearest = all.map(|(distance, _)| distance).reduce(f32::min);
+            let nearest = tree
+                .leaves
+                .iter()
+                .filter_map(|leaf| leaf.hit_by(&ray, 5.0))
+                .map(|(distance, _)| distance)
+                .reduce(f32::min);
             assert_eq!(tree.first(&ray, 5.0).map(|hit| hit.distance), nearest);
             assert_eq!(tree.blocked(&ray, 5.0), nearest.is_some());
             hit_count += usize::from(nearest.is_some());

@@ -62,9 +62,14 @@ impl FloorPlan {
     /// Adds things on top of a thing.
     fn fill(&mut self, thing: usize, place: &str, [height, from]: [f32; 2], mess: f32) {
         let pose = self.scene.things[thing].pose;
-        let faces = self.scene.mesh.faces.iter().zip(&self.scene.owners);
-        let corners = faces.filter(|(_, owner)| **owner == thing);
-        let corners = corners.flat_map(|(face, _)| face.corners.map(|corner| corner.at));
+        let corners = self
+            .scene
+            .mesh
+            .faces
+            .iter()
+            .zip(&self.scene.owners)
+            .filter(|(_, owner)| **owner == thing)
+            .flat_map(|(face, _)| face.corners.map(|corner| corner.at));
         let (mut low, mut high) = (Vec3::splat(f32::MAX), Vec3::splat(f32::MIN));
         for corner in corners.map(|at| pose.to_piece(at)) {
             (low, high) = (low.min(corner), high.max(corner));
@@ -99,28 +104,38 @@ impl FloorPlan {
     /// Whether a point is just above an upper side of a thing.
     fn is_above(&self, thing: usize, place: Vec3) -> bool {
         let flat = |v: Vec3| vec2(v.x, v.z);
-        let mut faces = self.scene.mesh.faces.iter().zip(&self.scene.owners);
-        faces.any(|(face, owner)| {
-            let corners = face.corners.map(|corner| corner.at);
-            let level = |corner: Vec3| (place.y - corner.y).abs() < 0.012;
-            if *owner != thing || !corners.into_iter().all(level) {
-                return false;
-            }
-            let [a, b, c] = corners.map(|corner| flat(corner) - flat(place));
-            let turns = [a.perp_dot(b), b.perp_dot(c), c.perp_dot(a)];
-            turns.iter().all(|turn| *turn >= 0.0) || turns.iter().all(|turn| *turn <= 0.0)
-        })
+        self.scene
+            .mesh
+            .faces
+            .iter()
+            .zip(&self.scene.owners)
+            .any(|(face, owner)| {
+                let corners = face.corners.map(|corner| corner.at);
+                if *owner != thing
+                    || !corners
+                        .into_iter()
+                        .all(|corner| (place.y - corner.y).abs() < 0.012)
+                {
+                    return false;
+                }
+                let [a, b, c] = corners.map(|corner| flat(corner) - flat(place));
+                let turns = [a.perp_dot(b), b.perp_dot(c), c.perp_dot(a)];
+                turns.iter().all(|turn| *turn >= 0.0) || turns.iter().all(|turn| *turn <= 0.0)
+            })
     }
 
     /// Adds a piece unless it would meet another thing than the one that it lies on.
     fn add_if_free(&mut self, piece: Piece, pose: Pose, below: Option<usize>) -> bool {
-        let corners = piece.mesh.faces.iter().flat_map(|face| face.corners);
-        let corners = corners.map(|corner| pose.to_room(corner.at));
-        let space = corners.fold([Vec3::MAX, Vec3::MIN], |[low, high], at| {
-            [low.min(at), high.max(at)]
-        });
-        let mut others = self.boxes.iter().enumerate();
-        let blocked = others.any(|(thing, other)| {
+        let space = piece
+            .mesh
+            .faces
+            .iter()
+            .flat_map(|face| face.corners)
+            .map(|corner| pose.to_room(corner.at))
+            .fold([Vec3::MAX, Vec3::MIN], |[low, high], at| {
+                [low.min(at), high.max(at)]
+            });
+        let blocked = self.boxes.iter().enumerate().any(|(thing, other)| {
             let is_flat = other[1].y - other[0].y < 0.02;
             Some(thing) != below && !is_flat && meet(&space, other)
         });

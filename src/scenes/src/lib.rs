@@ -210,8 +210,10 @@ impl Room {
         let (plan, camera) = (self.plan(), self.drawn().camera);
         let mut near = vec![f32::MAX; plan.scene.things.len()];
         for (face, owner) in plan.scene.mesh.faces.iter().zip(&plan.scene.owners) {
-            let visible = face.points(SPACING).filter(|point| camera.sees(*point));
-            let nearest = visible.map(|point| point.distance(camera.at));
+            let nearest = face
+                .points(SPACING)
+                .filter(|point| camera.sees(*point))
+                .map(|point| point.distance(camera.at));
             near[*owner] = nearest.fold(near[*owner], f32::min);
         }
         let things = plan.scene.things.iter().zip(near);
@@ -366,8 +368,13 @@ mod tests {
             frames: 120,
             ..Rooms::default()
         };
-        let trees = rooms.all().map(|(_, room)| room.plan().scene.tree());
-        let deepest = trees.step_by(2).map(|tree| tree.depth()).max().unwrap();
+        let deepest = rooms
+            .all()
+            .map(|(_, room)| room.plan().scene.tree())
+            .step_by(2)
+            .map(|tree| tree.depth())
+            .max()
+            .unwrap();
         assert!((5..Bvh::MAX_DEPTH - 4).contains(&deepest), "{deepest}");
     }
 
@@ -384,8 +391,10 @@ mod tests {
         let defaults = Rooms::default();
         assert!(cached_frames(defaults.size, defaults.light) >= defaults.frames);
         let sizes = [[640, 480], [3000, 2000], [4000, 4000]];
-        let cached = |size| cached_frames(size, RoomLight::Display);
-        assert_eq!(sizes.map(cached), [50, 2, 1]);
+        assert_eq!(
+            sizes.map(|size| cached_frames(size, RoomLight::Display)),
+            [50, 2, 1]
+        );
         assert_eq!(cached_frames([640, 480], RoomLight::Linear), 18);
     }
 
@@ -406,8 +415,12 @@ mod tests {
             };
             // The views of room 17, drawn before any other, and after those of the rooms before it.
             let some = |first, count| {
-                let rooms = rooms.all().map(|(_, room)| room);
-                let rooms: Vec<Room> = rooms.skip(first).take(count).collect();
+                let rooms: Vec<Room> = rooms
+                    .all()
+                    .map(|(_, room)| room)
+                    .skip(first)
+                    .take(count)
+                    .collect();
                 rooms.iter().map(drawn).collect::<Vec<_>>()
             };
             let (alone, row) = (some(34, 2), some(30, 6));

@@ -66,8 +66,10 @@ impl Lighting<'_> {
 
     /// The direct light of lamps and windows at a point.
     pub(super) fn direct(&self, at: Vec3, normal: Vec3, sample: LightSample) -> Vec3 {
-        let lights = self.scene.lights.iter().enumerate();
-        lights
+        self.scene
+            .lights
+            .iter()
+            .enumerate()
             .map(|(i, light)| self.from(light, at, normal, sample.pair(i)))
             .sum()
     }

@@ -45,8 +45,9 @@ impl<'a> LightGrid<'a> {
                     stratum: (x % STRATA) + (y % STRATA) * STRATA,
                     place: [x as i32, y as i32],
                 };
-                let shaded = spot.as_ref().filter(|spot| spot.glow == Vec3::ZERO);
-                shaded.map_or([Vec3::ZERO; 2], |spot| lighting.incoming(spot, sample))
+                spot.as_ref()
+                    .filter(|spot| spot.glow == Vec3::ZERO)
+                    .map_or([Vec3::ZERO; 2], |spot| lighting.incoming(spot, sample))
             })
             .collect();
         let mut light = Self {
@@ -63,11 +64,12 @@ impl<'a> LightGrid<'a> {
             }
         }
         let [direct, indirect] = &light.incoming;
-        let both = direct
+        let mut lit: Vec<f32> = direct
             .iter()
             .zip(indirect)
-            .map(|(a, b)| brightness(*a + *b));
-        let mut lit: Vec<f32> = both.filter(|light| *light > 0.0).collect();
+            .map(|(a, b)| brightness(*a + *b))
+            .filter(|light| *light > 0.0)
+            .collect();
         let place = (lit.len() as f32 * DARKER) as usize;
         if place < lit.len() {
             light.typical = *lit.select_nth_unstable_by(place, f32::total_cmp).1;
@@ -126,15 +128,17 @@ impl<'a> LightGrid<'a> {
         if weights > 0.02 {
             return sum / weights;
         }
-        let samples = (0..STRATA * STRATA).map(|stratum| {
-            let sample = LightSample {
-                stratum,
-                place: [(x * 8.0) as i32, (y * 8.0) as i32],
-            };
-            let [direct, indirect] = self.lighting.incoming(spot, sample);
-            direct + indirect
-        });
-        samples.sum::<Vec3>() / (STRATA * STRATA) as f32
+        (0..STRATA * STRATA)
+            .map(|stratum| {
+                let sample = LightSample {
+                    stratum,
+                    place: [(x * 8.0) as i32, (y * 8.0) as i32],
+                };
+                let [direct, indirect] = self.lighting.incoming(spot, sample);
+                direct + indirect
+            })
+            .sum::<Vec3>()
+            / (STRATA * STRATA) as f32
     }
 
     /// The light that a point of the image sends to the camera.

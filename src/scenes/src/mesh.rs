@@ -85,8 +85,9 @@ impl Mesh {
     pub(super) fn grid(&mut self, rows: &[Vec<Vec3>], surface: &Surface) {
         let surface = self.surface(surface);
         let (height, width) = (rows.len(), rows.first().map_or(0, Vec::len));
-        let closed = |row: &Vec<Vec3>| row[0].distance_squared(row[width - 1]) < 1e-10;
-        let round = rows.iter().all(closed);
+        let round = rows
+            .iter()
+            .all(|row| row[0].distance_squared(row[width - 1]) < 1e-10);
         let normal = |y: usize, x: usize| {
             let (left, right) = match (x, round) {
                 (0, true) => (width - 2, 1),
@@ -109,11 +110,12 @@ impl Mesh {
         };
         let corners: Vec<Vec<Corner>> = (0..height)
             .map(|y| {
-                let corner = |x| Corner {
-                    at: rows[y][x],
-                    normal: normal(y, x),
-                };
-                (0..width).map(corner).collect()
+                (0..width)
+                    .map(|x| Corner {
+                        at: rows[y][x],
+                        normal: normal(y, x),
+                    })
+                    .collect()
             })
             .collect();
         for pair in corners.windows(2) {
@@ -201,12 +203,14 @@ impl Mesh {
             } else {
                 sign(ROWS as f32 / 2.0 - row as f32)
             };
-            let side = |side: usize| {
-                let out = ball(row, side);
-                let corner = vec3(sign(out.x), height, sign(out.z)) * inner;
-                middle + corner + out * radius
-            };
-            let mut line: Vec<Vec3> = (0..SIDES).rev().map(side).collect();
+            let mut line: Vec<Vec3> = (0..SIDES)
+                .rev()
+                .map(|side: usize| {
+                    let out = ball(row, side);
+                    let corner = vec3(sign(out.x), height, sign(out.z)) * inner;
+                    middle + corner + out * radius
+                })
+                .collect();
             line.push(line[0]);
             rows.push(line);
         }
@@ -221,8 +225,10 @@ impl Mesh {
         let surface = self.surface(surface);
         let middle = ring.iter().sum::<Vec3>() / ring.len() as f32;
         for pair in ring.windows(2) {
-            let corner = |at| Corner { at, normal };
-            self.triangle([middle, pair[0], pair[1]].map(corner), surface);
+            self.triangle(
+                [middle, pair[0], pair[1]].map(|at| Corner { at, normal }),
+                surface,
+            );
         }
     }
 
@@ -266,11 +272,12 @@ impl Mesh {
         let across = axis.cross(aside).normalize_or_zero();
         let over = axis.cross(across);
         let ring = |middle: Vec3, radius: f32| -> Vec<Vec3> {
-            let point = |side: usize| {
-                let around = cos_sin(TAU * (side % SIDES) as f32 / SIDES as f32);
-                middle + (across * around.x + over * around.y) * radius
-            };
-            (0..=SIDES).map(point).collect()
+            (0..=SIDES)
+                .map(|side: usize| {
+                    let around = cos_sin(TAU * (side % SIDES) as f32 / SIDES as f32);
+                    middle + (across * around.x + over * around.y) * radius
+                })
+                .collect()
         };
         let (low, high) = (ring(from, radii[0]), ring(to, radii[1]));
         self.grid(&[low.clone(), high.clone()], surface);
@@ -280,15 +287,18 @@ impl Mesh {
 
     /// An ellipsoid by its center and its three radii.
     pub(super) fn ball(&mut self, middle: Vec3, radii: Vec3, surface: &Surface) {
-        let row = |row: usize| -> Vec<Vec3> {
-            let down = cos_sin(PI * row as f32 / ROWS as f32);
-            let point = |side: usize| {
-                let around = cos_sin(TAU * (side % SIDES) as f32 / SIDES as f32);
-                middle + vec3(around.x * down.y, down.x, around.y * down.y) * radii
-            };
-            (0..=SIDES).rev().map(point).collect()
-        };
-        let rows: Vec<Vec<Vec3>> = (0..=ROWS).map(row).collect();
+        let rows: Vec<Vec<Vec3>> = (0..=ROWS)
+            .map(|row: usize| -> Vec<Vec3> {
+                let down = cos_sin(PI * row as f32 / ROWS as f32);
+                (0..=SIDES)
+                    .rev()
+                    .map(|side: usize| {
+                        let around = cos_sin(TAU * (side % SIDES) as f32 / SIDES as f32);
+                        middle + vec3(around.x * down.y, down.x, around.y * down.y) * radii
+                    })
+                    .collect()
+            })
+            .collect();
         self.grid(&rows, surface);
     }
 
@@ -374,15 +384,16 @@ impl Mesh {
 
     /// Multiplies all lengths by a factor.
     pub(super) fn scale(&mut self, factor: f32) {
-        let corners = self.faces.iter_mut().flat_map(|face| &mut face.corners);
-        corners.for_each(|corner| corner.at *= factor);
+        self.faces
+            .iter_mut()
+            .flat_map(|face| &mut face.corners)
+            .for_each(|corner| corner.at *= factor);
     }
 }
 
 /// The lowest and the highest corner of the bounding box of triangles.
 pub(super) fn bounds(faces: &[Face]) -> [Vec3; 2] {
-    let corners = faces.iter().flat_map(|face| face.corners);
-    corners.fold(
+    faces.iter().flat_map(|face| face.corners).fold(
         [Vec3::splat(f32::MAX), Vec3::splat(f32::MIN)],
         |[low, high], corner| [low.min(corner.at), high.max(corner.at)],
     )
@@ -390,9 +401,10 @@ pub(super) fn bounds(faces: &[Face]) -> [Vec3; 2] {
 
 /// A closed ring of points about y, by its radius and its height above `foot`; `depth` stretches it along z.
 fn ring(foot: Vec3, (radius, height): (f32, f32), depth: f32) -> Vec<Vec3> {
-    let point = |side: usize| {
-        let around = cos_sin(TAU * (side % SIDES) as f32 / SIDES as f32);
-        foot + vec3(around.x * radius, height, around.y * radius * depth)
-    };
-    (0..=SIDES).map(point).collect()
+    (0..=SIDES)
+        .map(|side: usize| {
+            let around = cos_sin(TAU * (side % SIDES) as f32 / SIDES as f32);
+            foot + vec3(around.x * radius, height, around.y * radius * depth)
+        })
+        .collect()
 }

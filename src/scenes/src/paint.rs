@@ -52,8 +52,10 @@ impl Paint {
     /// A random paint with one of these names.
     pub(super) fn random(names: &[&str], dice: &mut Dice) -> Self {
         let name = dice.pick(names);
-        let known = NAMED.iter().find(|(known, _)| *known == name);
-        let (name, codes) = known.map_or(NAMED[0], |found| *found);
+        let (name, codes) = NAMED
+            .iter()
+            .find(|(known, _)| *known == name)
+            .map_or(NAMED[0], |found| *found);
         Self {
             name,
             color: rgb(dice.pick(codes)),

@@ -93,8 +93,7 @@ impl FloorPlan {
     pub(super) fn walls(&mut self) {
         for (i, wall) in WALLS.into_iter().enumerate() {
             let width = self.width(wall);
-            let doorways = self.shell.doorways.iter();
-            let holes = doorways.filter(|(of, ..)| *of == wall);
+            let holes = self.shell.doorways.iter().filter(|(of, ..)| *of == wall);
             let mut holes: Vec<([f32; 2], f32)> = holes
                 .map(|(_, along, top)| (along.map(|x| x - width / 2.0), *top))
                 .collect();

@@ -69,13 +69,16 @@ pub(super) fn render(scene: &Scene, tree: &Bvh, camera: &Camera, shown: RoomLigh
     let pixel = |i: usize, curve: fn(Vec3) -> Vec3| {
         let (at, color) = ([i % width, i / width], colors[i]);
         if is_edge(&spots, &colors, camera.size, at, exposure) {
-            let rays = SUBPIXELS.map(|[dx, dy]| [at[0] as f32 + dx, at[1] as f32 + dy]);
-            let colors = rays.map(|[x, y]| {
-                let spot = Spot::through_mirror(scene, tree, &camera.ray(x, y));
-                let color = spot.map_or(color, |spot| light.shade(&spot, camera.at, [x, y]));
-                curve(color * exposure)
-            });
-            colors.iter().sum::<Vec3>() / 4.0
+            SUBPIXELS
+                .map(|[dx, dy]| [at[0] as f32 + dx, at[1] as f32 + dy])
+                .map(|[x, y]| {
+                    let spot = Spot::through_mirror(scene, tree, &camera.ray(x, y));
+                    let color = spot.map_or(color, |spot| light.shade(&spot, camera.at, [x, y]));
+                    curve(color * exposure)
+                })
+                .iter()
+                .sum::<Vec3>()
+                / 4.0
         } else {
             curve(color * exposure)
         }
@@ -111,23 +114,27 @@ pub(super) fn render(scene: &Scene, tree: &Bvh, camera: &Camera, shown: RoomLigh
 fn spots(scene: &Scene, tree: &Bvh, camera: &Camera) -> Vec<Option<Spot>> {
     let [width, height] = camera.size;
     let places = (0..width * height).into_par_iter().with_min_len(width);
-    let spots = places.map(|i| {
-        let ray = camera.ray((i % width) as f32, (i / width) as f32);
-        Spot::through_mirror(scene, tree, &ray)
-    });
-    spots.collect()
+    places
+        .map(|i| {
+            let ray = camera.ray((i % width) as f32, (i / width) as f32);
+            Spot::through_mirror(scene, tree, &ray)
+        })
+        .collect()
 }
 
 /// Depth of each pixel in millimetres along the optical axis, at most 65,535; 0 if there is none.
 fn depth(spots: &[Option<Spot>], camera: &Camera) -> Vec<u16> {
     let (width, axis) = (camera.size[0], camera.axis());
-    let depths = spots.iter().enumerate().map(|(i, spot)| {
-        let ray = camera.ray((i % width) as f32, (i / width) as f32);
-        spot.map_or(0, |spot| {
-            (spot.distance * ray.direction.dot(axis) * 1000.0 + 0.5) as u16
+    spots
+        .iter()
+        .enumerate()
+        .map(|(i, spot)| {
+            let ray = camera.ray((i % width) as f32, (i / width) as f32);
+            spot.map_or(0, |spot| {
+                (spot.distance * ray.direction.dot(axis) * 1000.0 + 0.5) as u16
+            })
         })
-    });
-    depths.collect()
+        .collect()
 }
 
 /// The number of the thing at each pixel of a small view, from 1; 0 if there is none.
@@ -218,15 +225,16 @@ fn tone_mapped(light: Vec3) -> Vec3 {
 fn srgb_code(value: f32) -> u8 {
     /// The minimum light of each code above 0: halfway, in codes, from the code below.
     static STEPS: LazyLock<Vec<f32>> = LazyLock::new(|| {
-        let step = |code: u16| {
-            let value = (f32::from(code) - 0.5) / 255.0;
-            if value <= 0.04045 {
-                value / 12.92
-            } else {
-                libm::powf((value + 0.055) / 1.055, 2.4)
-            }
-        };
-        (1..=255).map(step).collect()
+        (1..=255)
+            .map(|code: u16| {
+                let value = (f32::from(code) - 0.5) / 255.0;
+                if value <= 0.04045 {
+                    value / 12.92
+                } else {
+                    libm::powf((value + 0.055) / 1.055, 2.4)
+                }
+            })
+            .collect()
     });
     STEPS.partition_point(|step| *step <= value) as u8
 }

@@ -91,8 +91,9 @@ impl FromStr for Rooms {
 /// The number of frames in a text.
 fn frames(text: &str) -> Result<usize, String> {
     let frames = text.parse().ok();
-    let frames = frames.filter(|frames| (1..=MOST).contains(frames));
-    frames.ok_or_else(|| format!("a number from 1 to {MOST} expected"))
+    frames
+        .filter(|frames| (1..=MOST).contains(frames))
+        .ok_or_else(|| format!("a number from 1 to {MOST} expected"))
 }
 
 /// The width and height in a text, in pixels.
@@ -102,8 +103,9 @@ fn size(text: &str) -> Result<[usize; 2], String> {
         pixels.filter(|pixels| (32..=LONGEST).contains(pixels))
     };
     let sides = text.split_once('x');
-    let sides = sides.and_then(|(width, height)| Some([pixels(width)?, pixels(height)?]));
-    sides.ok_or_else(|| format!("WIDTHxHEIGHT of 32 to {LONGEST} pixels expected"))
+    sides
+        .and_then(|(width, height)| Some([pixels(width)?, pixels(height)?]))
+        .ok_or_else(|| format!("WIDTHxHEIGHT of 32 to {LONGEST} pixels expected"))
 }
 
 #[cfg(test)]

@@ -59,8 +59,11 @@ enum Copies {
 /// The entries of a table; the line that cannot be read if there is one.
 fn read(table: &'static str) -> Result<Vec<Recipe>, &'static str> {
     let mut recipes: Vec<Recipe> = Vec::new();
-    let lines = table.lines().filter(|line| !line.starts_with('#'));
-    for line in lines.filter(|line| !line.trim().is_empty()) {
+    for line in table
+        .lines()
+        .filter(|line| !line.starts_with('#'))
+        .filter(|line| !line.trim().is_empty())
+    {
         if line.starts_with('[') {
             recipes.push(head(line).ok_or(line)?);
         } else {
@@ -122,8 +125,10 @@ impl Part {
     fn add_to(&self, mesh: &mut Mesh, surface: &Surface) -> Option<()> {
         let point = |place: &[f32]| Vec3::from_slice(place);
         let pairs = |numbers: &[f32]| -> Vec<(f32, f32)> {
-            let pairs = numbers.chunks_exact(2);
-            pairs.map(|pair| (pair[0], pair[1])).collect()
+            numbers
+                .chunks_exact(2)
+                .map(|pair| (pair[0], pair[1]))
+                .collect()
         };
         match (self.solid, &self.numbers[..]) {
             ("box", &[x, to_x, y, to_y, z, to_z]) => {
@@ -217,8 +222,10 @@ pub(in super::super) fn piece(name: &str, dice: &mut Dice) -> Piece {
         [] => ALL.to_vec(),
         colors => colors.to_vec(),
     };
-    let known = RECIPES.iter().find(|recipe| recipe.name == name);
-    let choice = known.map_or("", |recipe| dice.pick(&colors(recipe)));
+    let choice = RECIPES
+        .iter()
+        .find(|recipe| recipe.name == name)
+        .map_or("", |recipe| dice.pick(&colors(recipe)));
     let main = paint(choice, dice);
     painted(name, main, dice)
 }
@@ -255,10 +262,11 @@ pub(in super::super) fn painted(name: &str, main: Paint, dice: &mut Dice) -> Pie
 
 /// The names of the things that are found at a place, as `floor`.
 pub(in super::super) fn found(place: &str) -> Vec<&'static str> {
-    let found = RECIPES
+    RECIPES
         .iter()
-        .filter(|recipe| recipe.places.contains(&place));
-    found.map(|recipe| recipe.name).collect()
+        .filter(|recipe| recipe.places.contains(&place))
+        .map(|recipe| recipe.name)
+        .collect()
 }
 
 #[cfg(test)]
