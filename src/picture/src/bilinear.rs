@@ -73,21 +73,22 @@ fn scaled(length: usize, factor: f64) -> usize {
 fn taps(length: usize, factor: f64) -> Vec<Tap> {
     let count = scaled(length, factor);
     let last = length - 1;
-    let tap = |index: usize| {
-        let position = ((index as f64 + 0.5) / factor - 0.5) as f32;
-        let floor = position.floor();
-        let (first, fraction) = match floor {
-            floor if floor < 0.0 => (0, 0.0),
-            floor if floor as usize >= last => (last, 0.0),
-            floor => (floor as usize, position - floor),
-        };
-        Tap {
-            at: [first, (first + 1).min(last)],
-            weights: [1.0 - fraction, fraction]
-                .map(|weight| (weight * ONE).round_ties_even() as i32),
-        }
-    };
-    (0..count).map(tap).collect()
+    (0..count)
+        .map(|index: usize| {
+            let position = ((index as f64 + 0.5) / factor - 0.5) as f32;
+            let floor = position.floor();
+            let (first, fraction) = match floor {
+                floor if floor < 0.0 => (0, 0.0),
+                floor if floor as usize >= last => (last, 0.0),
+                floor => (floor as usize, position - floor),
+            };
+            Tap {
+                at: [first, (first + 1).min(last)],
+                weights: [1.0 - fraction, fraction]
+                    .map(|weight| (weight * ONE).round_ties_even() as i32),
+            }
+        })
+        .collect()
 }
 
 /// Interpolates one row of the source at the columns of the result, into `out`.

@@ -222,8 +222,10 @@ fn inflated(chunk: &[u8]) -> Result<Vec<u8>, String> {
     let data = chunk.get(end + 2..).ok_or_else(broken)?;
     let mut profile = Vec::new();
     let bound = MOST_PROFILE as u64 + 1;
-    let mut reader = flate2::read::ZlibDecoder::new(data).take(bound);
-    reader.read_to_end(&mut profile).map_err(|_| broken())?;
+    flate2::read::ZlibDecoder::new(data)
+        .take(bound)
+        .read_to_end(&mut profile)
+        .map_err(|_| broken())?;
     if profile.len() > MOST_PROFILE {
         return Err(too_large());
     }
@@ -271,8 +273,10 @@ impl Gamma {
         const SRGB: [u32; 8] = [
             31_270, 32_900, 64_000, 33_000, 30_000, 60_000, 15_000, 6_000,
         ];
-        let mut pairs = found.iter().zip(SRGB);
-        pairs.all(|(found, expected)| found.abs_diff(expected) <= Self::PRIMARIES_OFF)
+        found
+            .iter()
+            .zip(SRGB)
+            .all(|(found, expected)| found.abs_diff(expected) <= Self::PRIMARIES_OFF)
     }
 }
 

@@ -159,8 +159,9 @@ impl<'a> Bytes<'a> {
     /// The objects of a group.
     fn objects(self, group: u64) -> Result<Vec<Object>, String> {
         let messages = self.messages(group)?;
-        let table = messages.iter().find(|message| message.kind == SYMBOL_TABLE);
-        let table = table
+        let table = messages
+            .iter()
+            .find(|message| message.kind == SYMBOL_TABLE)
             .ok_or("the HDF5 file has groups that are not read; write it with h5py's default")?;
         let (tree, heap) = (table.data.number(0, 8)?, table.data.number(8, 8)?);
         self.expect(heap, b"HEAP")?;
@@ -260,8 +261,10 @@ impl ArrayLayout {
     fn read(file: &Bytes<'_>, header: u64) -> Result<Self, String> {
         let messages = file.messages(header)?;
         let message = |kind| {
-            let found = messages.iter().find(|message| message.kind == kind);
-            found.map(|message| message.data)
+            messages
+                .iter()
+                .find(|message| message.kind == kind)
+                .map(|message| message.data)
         };
         let lacking = || "the HDF5 file names something that is no array".to_owned();
         let size = size(message(DATASPACE).ok_or_else(lacking)?)?;
@@ -357,8 +360,13 @@ impl ArrayLayout {
     /// The bytes of a chunk before its filters. Of `left_out`, a bit each, the filters were not used.
     fn unfiltered(&self, stored: &[u8], left_out: u64, whole: usize) -> Result<Vec<u8>, String> {
         let mut bytes = stored.to_vec();
-        let used = self.filters.iter().enumerate().rev();
-        for (_, filter) in used.filter(|(place, _)| left_out >> place & 1 == 0) {
+        for (_, filter) in self
+            .filters
+            .iter()
+            .enumerate()
+            .rev()
+            .filter(|(place, _)| left_out >> place & 1 == 0)
+        {
             bytes = match filter {
                 Filter::Checksum => {
                     bytes.truncate(bytes.len().saturating_sub(4));
@@ -449,8 +457,8 @@ fn filters(message: Bytes<'_>) -> Result<Vec<Filter>, String> {
 /// Decompressed bytes, at most this many.
 fn inflated(bytes: &[u8], most: usize) -> Result<Vec<u8>, String> {
     let mut whole = Vec::new();
-    let mut reader = flate2::read::ZlibDecoder::new(bytes).take(most as u64 + 1);
-    reader
+    flate2::read::ZlibDecoder::new(bytes)
+        .take(most as u64 + 1)
         .read_to_end(&mut whole)
         .map_err(|_| "the HDF5 file is broken: a chunk cannot be decompressed".to_owned())?;
     Ok(whole)

@@ -304,8 +304,11 @@ impl ImageFile {
                 Rgb::new(height, width, codes).map(|codes| Pixels::Codes8(Arc::new(codes)))
             }
             Samples::Light(_) => {
-                let codes = image.into_rgb16().into_raw().into_iter();
-                let light = codes.map(|code| f32::from(code) / 65_535.0);
+                let light = image
+                    .into_rgb16()
+                    .into_raw()
+                    .into_iter()
+                    .map(|code| f32::from(code) / 65_535.0);
                 self.scaled_light(height, width, light.collect())
             }
         };
@@ -365,13 +368,14 @@ impl ImageFile {
 
     /// Interpretation of the samples, after a check that a colour image has no grey profile.
     fn samples_of(&self, is_grey: bool) -> Result<Samples> {
-        let samples = self.samples(self.facts()).and_then(|samples| {
-            if let Samples::Codes(Some(space)) = &samples {
-                space.check(is_grey)?;
-            }
-            Ok(samples)
-        });
-        samples.map_err(|problem| self.wrong(problem))
+        self.samples(self.facts())
+            .and_then(|samples| {
+                if let Samples::Codes(Some(space)) = &samples {
+                    space.check(is_grey)?;
+                }
+                Ok(samples)
+            })
+            .map_err(|problem| self.wrong(problem))
     }
 
     fn wrong(&self, problem: impl std::fmt::Display) -> Error {
@@ -388,11 +392,11 @@ impl ImageFile {
 
     /// The facts of the file beside its pixels; of a file that is no image, none.
     fn facts(&self) -> &FileFacts {
-        let read = || match FileFormat::detect(&self.bytes) {
-            Ok(format) => FileFacts::read(&self.bytes, format),
-            Err(_) => FileFacts::NONE,
-        };
-        self.facts.get_or_init(read)
+        self.facts
+            .get_or_init(|| match FileFormat::detect(&self.bytes) {
+                Ok(format) => FileFacts::read(&self.bytes, format),
+                Err(_) => FileFacts::NONE,
+            })
     }
 
     /// The decoder of a file of codes.

@@ -150,13 +150,14 @@ impl Payload {
     /// The image as `data:image/png;base64,…`; the bytes are shared, not copied.
     #[must_use]
     pub fn data_url(&self) -> Bytes {
-        let encode = || {
-            let mut url = format!("data:image/{};base64,", self.facts.format);
-            url.reserve_exact(self.file.len().div_ceil(3) * 4);
-            STANDARD.encode_string(&self.file, &mut url);
-            url.into()
-        };
-        self.data_url.get_or_init(encode).clone()
+        self.data_url
+            .get_or_init(|| {
+                let mut url = format!("data:image/{};base64,", self.facts.format);
+                url.reserve_exact(self.file.len().div_ceil(3) * 4);
+                STANDARD.encode_string(&self.file, &mut url);
+                url.into()
+            })
+            .clone()
     }
 }
 

@@ -92,8 +92,11 @@ impl ReadingRule {
     fn linear_flags(&self) -> Vec<String> {
         let linear = (self.transfer == Transfer::Linear).then_some("--decode transfer=linear");
         let exposure = self.exposure_ev.map(|_| "--decode exposure");
-        let flags = [linear, exposure].into_iter().flatten();
-        flags.map(str::to_owned).collect()
+        [linear, exposure]
+            .into_iter()
+            .flatten()
+            .map(str::to_owned)
+            .collect()
     }
 }
 

@@ -23,9 +23,11 @@ impl Conversion {
     /// Whether all of 17 × 17 × 17 evenly spaced colours change by one code of 255 at most.
     pub(super) fn is_identity(&self) -> bool {
         let grid: Vec<f64> = (0..17).map(|i| f64::from(i) / 16.0).collect();
-        let curves = self.curves.iter();
-        let light = curves.map(|curve| grid.iter().map(|value| curve.light(*value)).collect());
-        let light: Vec<Vec<f64>> = light.collect();
+        let light: Vec<Vec<f64>> = self
+            .curves
+            .iter()
+            .map(|curve| grid.iter().map(|value| curve.light(*value)).collect())
+            .collect();
         // 16-bit codes show parts of a code.
         let is_near = |light: f64, value: f64| {
             let code = f64::from(SIXTEEN.encode(light)) / 65_535.0;
@@ -75,8 +77,9 @@ impl Conversion {
     fn tables(&self, most: u32) -> [Vec<f64>; 3] {
         self.curves.each_ref().map(|curve| {
             let codes = 0..=most;
-            let light = codes.map(|code| curve.light(f64::from(code) / f64::from(most)));
-            light.collect()
+            codes
+                .map(|code| curve.light(f64::from(code) / f64::from(most)))
+                .collect()
         })
     }
 

@@ -130,13 +130,15 @@ impl Header {
         let four = |at: usize| bytes.get(at..)?.first_chunk::<4>().copied();
         let tags = u32::from_be_bytes(four(128)?) as usize;
         // Each tag takes 12 bytes of the profile.
-        let tags = (0..tags.min(bytes.len() / 12)).map_while(|tag| four(132 + 12 * tag));
-        let has_tables = tags.into_iter().any(|tag| {
-            [
-                b"A2B0", b"A2B1", b"A2B2", b"D2B0", b"D2B1", b"D2B2", b"D2B3",
-            ]
-            .contains(&&tag)
-        });
+        let has_tables = (0..tags.min(bytes.len() / 12))
+            .map_while(|tag| four(132 + 12 * tag))
+            .into_iter()
+            .any(|tag| {
+                [
+                    b"A2B0", b"A2B1", b"A2B2", b"D2B0", b"D2B1", b"D2B2", b"D2B3",
+                ]
+                .contains(&&tag)
+            });
         Some(Self {
             space: four(16)?,
             connection: four(20)?,
@@ -164,7 +166,10 @@ fn name(profile: &ColorProfile) -> String {
 
 /// The printable characters of a text, cut to [`LONGEST`] letters.
 fn readable(text: &str) -> String {
-    let printed = text.chars().filter(|letter| !letter.is_control());
-    let text: String = printed.take(LONGEST).collect();
+    let text: String = text
+        .chars()
+        .filter(|letter| !letter.is_control())
+        .take(LONGEST)
+        .collect();
     text.trim().to_owned()
 }

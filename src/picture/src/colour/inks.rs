@@ -75,13 +75,15 @@ impl Inks {
             Self::Formula(_) => pixels.iter().flat_map(|inks| by_formula(*inks)).collect(),
             Self::Profile(colours) => {
                 let mut last = ([0; 4], colours.table.srgb([0; 4]));
-                let codes = pixels.iter().flat_map(|inks| {
-                    if last.0 != *inks {
-                        last = (*inks, colours.table.srgb(*inks));
-                    }
-                    last.1
-                });
-                codes.collect()
+                pixels
+                    .iter()
+                    .flat_map(|inks| {
+                        if last.0 != *inks {
+                            last = (*inks, colours.table.srgb(*inks));
+                        }
+                        last.1
+                    })
+                    .collect()
             }
         }
     }

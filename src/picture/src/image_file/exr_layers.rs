@@ -136,11 +136,11 @@ impl Collected {
 
 /// Whether a layer is flat and has the three channels of colour.
 fn has_colours(header: &Header) -> bool {
-    let has = |name: &&str| {
-        let name = Text::from(*name);
-        header.channels.find_index_of_channel(&name).is_some()
-    };
-    !header.deep && CHANNELS.iter().all(has)
+    !header.deep
+        && CHANNELS.iter().all(|name| {
+            let name = Text::from(*name);
+            header.channels.find_index_of_channel(&name).is_some()
+        })
 }
 
 /// Checks that the channels are floats, that they are not compressed by DWA, and that the layer covers the image.
@@ -153,8 +153,7 @@ fn check(header: &Header) -> Result<(), String> {
         let problem = "an OpenEXR image of the lossy compression DWAA or DWAB, which is not read; save it with ZIP or PIZ";
         return Err(problem.to_owned());
     }
-    let channels = header.channels.list.iter();
-    let mut used = channels.filter(|channel| {
+    let mut used = header.channels.list.iter().filter(|channel| {
         let name = channel.name.to_string();
         name == "A" || CHANNELS.contains(&&*name)
     });
@@ -198,8 +197,10 @@ fn primaries(stated: &Chromaticities) -> Primaries {
 
 fn are_others(found: &Primaries) -> bool {
     let numbers = |of: &Primaries| [of.red, of.green, of.blue, of.white];
-    let pairs = numbers(found).into_iter().zip(numbers(&Primaries::SRGB));
-    let mut off = pairs.flat_map(|(a, b)| [a[0] - b[0], a[1] - b[1]]);
+    let mut off = numbers(found)
+        .into_iter()
+        .zip(numbers(&Primaries::SRGB))
+        .flat_map(|(a, b)| [a[0] - b[0], a[1] - b[1]]);
     off.any(|off| off.is_nan() || off.abs() > PRIMARIES_OFF)
 }
 

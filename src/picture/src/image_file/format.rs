@@ -84,8 +84,9 @@ impl FileFormat {
         if has(0, b"RIFF") && has(8, b"WEBP") {
             return Ok(Self::WebP);
         }
-        let known = marks.into_iter().find(|(mark, _)| has(0, mark));
-        known
+        marks
+            .into_iter()
+            .find(|(mark, _)| has(0, mark))
             .map(|(_, format)| format)
             .ok_or_else(|| format!("not an image: {READ} expected"))
     }

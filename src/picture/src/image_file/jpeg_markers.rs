@@ -37,8 +37,7 @@ impl<'a> JpegOutline<'a> {
     /// Reads the markers one after another up to the samples; a truncated file is read up to its end.
     pub(super) fn parse(file: &'a [u8]) -> Self {
         let mut outline = Self::default();
-        let headers = Segments(file).take_while(|(marker, _)| *marker != SAMPLES);
-        for (marker, segment) in headers {
+        for (marker, segment) in Segments(file).take_while(|(marker, _)| *marker != SAMPLES) {
             if is_frame_header(marker) && outline.components.is_none() {
                 // It follows the precision (1 byte), the height and the width (2 bytes each).
                 outline.components = segment.get(5).copied();

@@ -72,8 +72,12 @@ impl<'a> ColourChunks<'a> {
             b"sRGB" => self.is_srgb = true,
             b"gAMA" => self.gamma.exponent = four.map(|bytes| u32::from_be_bytes(*bytes)),
             b"cHRM" => {
-                let numbers = data.as_chunks::<4>().0.iter();
-                let numbers: Vec<u32> = numbers.map(|four| u32::from_be_bytes(*four)).collect();
+                let numbers: Vec<u32> = data
+                    .as_chunks::<4>()
+                    .0
+                    .iter()
+                    .map(|four| u32::from_be_bytes(*four))
+                    .collect();
                 self.gamma.primaries = numbers.try_into().ok();
             }
             _ => {}

@@ -87,8 +87,10 @@ impl<'a> TiffOutline<'a> {
         ] {
             let offsets = reader.values(&directory, offsets);
             let counts = reader.values(&directory, counts);
-            let ends = offsets.iter().zip(&counts);
-            let end = ends.map(|(offset, count)| offset.saturating_add(*count));
+            let end = offsets
+                .iter()
+                .zip(&counts)
+                .map(|(offset, count)| offset.saturating_add(*count));
             outline.end = outline.end.max(end.max().unwrap_or(0));
         }
         for _ in 0..MOST_PAGES {
@@ -221,8 +223,9 @@ impl<'a> Reader<'a> {
         let bytes = bytes_of(entry.kind);
         let places =
             (0..entry.count.min(MOST_VALUES)).map(|index| entry.at.checked_add(index * bytes));
-        let values = places.map_while(|at| self.number(at?, bytes as usize));
-        values.collect()
+        places
+            .map_while(|at| self.number(at?, bytes as usize))
+            .collect()
     }
 }
 

@@ -207,8 +207,11 @@ fn channels<const N: usize>(values: &[f64]) -> Option<[Vec<f64>; N]> {
 
 /// A curve each; `None` if there are fewer or more, or a number is not finite.
 fn curves<const N: usize>(curves: &[moxcms::ToneReprCurve]) -> Option<[ToneCurve; N]> {
-    let curves = curves.iter().map(ToneCurve::from_profile);
-    let curves: Vec<ToneCurve> = curves.collect::<Result<_, _>>().ok()?;
+    let curves: Vec<ToneCurve> = curves
+        .iter()
+        .map(ToneCurve::from_profile)
+        .collect::<Result<_, _>>()
+        .ok()?;
     curves.try_into().ok()
 }
 
@@ -222,12 +225,13 @@ fn places(
     }
     Some([0, 1, 2, 3].map(|ink| {
         let last = points[ink] - 1;
-        let amounts = (0..=u8::MAX).map(|amount| {
-            let at = before(ink, f64::from(amount) / 255.0).clamp(0.0, 1.0) * last as f64;
-            let below = (at as usize).min(last - 1);
-            (below, at - below as f64)
-        });
-        amounts.collect()
+        (0..=u8::MAX)
+            .map(|amount| {
+                let at = before(ink, f64::from(amount) / 255.0).clamp(0.0, 1.0) * last as f64;
+                let below = (at as usize).min(last - 1);
+                (below, at - below as f64)
+            })
+            .collect()
     }))
 }
 
@@ -253,11 +257,12 @@ mod tests {
     /// A table of two points an ink, whose lightness falls by a quarter for each full ink, and whose a and b are 0.
     fn grey(is_16: bool) -> LutDataType {
         let zero = if is_16 { 0x8000 } else { 128 };
-        let corners = (0..16_u16).flat_map(|corner| {
-            let most = if is_16 { 0xFF00 } else { 255 };
-            [most - most / 4 * corner.count_ones() as u16, zero, zero]
-        });
-        let clut: Vec<u16> = corners.collect();
+        let clut: Vec<u16> = (0..16_u16)
+            .flat_map(|corner| {
+                let most = if is_16 { 0xFF00 } else { 255 };
+                [most - most / 4 * corner.count_ones() as u16, zero, zero]
+            })
+            .collect();
         let straight = |channels: usize| [0_u16, if is_16 { 65_535 } else { 255 }].repeat(channels);
         let store = |codes: Vec<u16>| {
             if is_16 {
