@@ -19,8 +19,7 @@ pub(super) fn built_in(word: &Path) -> Result<Option<&'static BuiltIn>> {
     if word.extension().is_some() || text.contains(['/', '\\', ':']) {
         return Ok(None);
     }
-    let found = BUILT_IN.iter().find(|enhancer| enhancer.name == text);
-    found.map(Some).ok_or_else(|| {
+    BUILT_IN.iter().find(|enhancer| enhancer.name == text).map(Some).ok_or_else(|| {
         let names = BUILT_IN.map(|enhancer| enhancer.name);
         let near = nearest(text, &names);
         let near = near.map_or_else(String::new, |name| format!("did you mean {name}? "));

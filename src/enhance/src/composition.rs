@@ -50,8 +50,9 @@ impl OtherSize {
     pub(super) fn failure(self, fed: [usize; 2]) -> RunFailure {
         let [_, height, width] = self.layout.places();
         let side = |place: usize| usize::try_from(*self.dims.get(place)?).ok();
-        let given = side(height).zip(side(width));
-        let given = given.map(|(height, width)| [height, width]);
+        let given = side(height)
+            .zip(side(width))
+            .map(|(height, width)| [height, width]);
         RunFailure::OtherSize {
             fed,
             given: given.filter(|_| self.dims.len() == self.layout.rank()),
@@ -78,8 +79,9 @@ impl Composition {
             rounding: convention.rounding.unwrap_or_default(),
         };
         if let (Channels::Y, Some(image)) = (channels, &composition.image) {
-            let names = image.names().iter();
-            let names: Vec<usize> = names
+            let names: Vec<usize> = image
+                .names()
+                .iter()
                 .map(|name| if name == INPUT { 3 } else { 1 })
                 .collect();
             if image.channels(&names) != 1 {
@@ -117,8 +119,7 @@ impl Composition {
         outputs: &[OutputTensor<'a>],
         size: [usize; 2],
     ) -> Result<Vec<ImageTensor<'a>>, OtherSize> {
-        let readings = self.outputs.iter().zip(outputs);
-        let laid_out = readings.map(|(reading, output)| {
+        let laid_out = self.outputs.iter().zip(outputs).map(|(reading, output)| {
             let layout = reading
                 .layout(&output.dims, size)
                 .ok_or_else(|| OtherSize {
@@ -186,8 +187,7 @@ impl Composition {
     ) -> Result<Planes, OutOfRange> {
         let mut outputs = outputs.iter();
         let size = outputs.as_slice()[0].size();
-        let names = image.names().iter();
-        let images = names.filter_map(|name| match name.as_str() {
+        let images = image.names().iter().filter_map(|name| match name.as_str() {
             INPUT => dark,
             _ => outputs.next(),
         });

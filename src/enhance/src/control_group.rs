@@ -53,8 +53,11 @@ fn unused(own: &str, mount: &Path) -> Option<u64> {
         let below = Path::new(path).components();
         let below = below.filter(|part| matches!(part, Component::Normal(_)));
         let group = folder.join(below.collect::<std::path::PathBuf>());
-        let groups = group.ancestors().take_while(|at| at.starts_with(&folder));
-        groups.filter_map(|at| rest(at, layout)).min()
+        group
+            .ancestors()
+            .take_while(|at| at.starts_with(&folder))
+            .filter_map(|at| rest(at, layout))
+            .min()
     };
     LAYOUTS.iter().filter_map(of_layout).min()
 }
@@ -64,8 +67,10 @@ fn own_group<'a>(own: &'a str, controller: &str) -> Option<&'a str> {
     own.lines().find_map(|line| {
         let (_, rest) = line.split_once(':')?;
         let (controllers, path) = rest.split_once(':')?;
-        let mut controllers = controllers.split(',');
-        controllers.any(|one| one == controller).then_some(path)
+        controllers
+            .split(',')
+            .any(|one| one == controller)
+            .then_some(path)
     })
 }
 

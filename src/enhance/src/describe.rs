@@ -133,8 +133,11 @@ impl Description {
                 );
             }
             None if SizeRule::new(fixed, convention, feeding.pad).takes_any_size() => {
-                let others = MULTIPLES[1..].iter().map(ToString::to_string);
-                let others = others.collect::<Vec<_>>().join(", ");
+                let others = MULTIPLES[1..]
+                    .iter()
+                    .map(ToString::to_string)
+                    .collect::<Vec<_>>()
+                    .join(", ");
                 let source = format!("tried first, then {others} if it fails");
                 lines.add("multiple", MULTIPLES[0], source);
             }
@@ -220,8 +223,11 @@ impl Description {
 
 fn aligned(path: &Path, lines: &[ConventionLine]) -> String {
     let width = |cell: fn(&ConventionLine) -> &str| {
-        let cells = lines.iter().map(|line| cell(line).chars().count());
-        cells.max().unwrap_or(0)
+        lines
+            .iter()
+            .map(|line| cell(line).chars().count())
+            .max()
+            .unwrap_or(0)
     };
     let widths = [width(|line| &line.key), width(|line| &line.value)];
     let mut text = format!("{}\n", path.display());

@@ -84,8 +84,11 @@ impl Enhancer {
             probes: [probe, swapped],
         } = trials;
         let mut others = self.other_outputs(&frames, probe.best())?;
-        let plausible = others.iter().filter(|output| output.problem.is_none());
-        let plausible: Vec<String> = plausible.map(|output| output.title.clone()).collect();
+        let plausible: Vec<String> = others
+            .iter()
+            .filter(|output| output.problem.is_none())
+            .map(|output| output.title.clone())
+            .collect();
         let stated = self.stated_pair();
         let is_plausible = |pair: &RangePair| probe.plausible().contains(pair);
         let mut found = match (image, stated) {
@@ -223,11 +226,13 @@ impl Enhancer {
         let graph = graph.map_err(|problem| self.fault(problem))?;
         let seen: Vec<Codes> = frames.iter().map(Codes::from_rgb).collect();
         let made = made(&[graph], frames)?.unwrap_or_default();
-        let columns = made.into_iter().map(|made| {
-            let pair = PairTrial::new(ranges, &seen, made);
-            column(&pair, format!("image = \"{text}\", {ranges}"))
-        });
-        Ok(columns.collect())
+        Ok(made
+            .into_iter()
+            .map(|made| {
+                let pair = PairTrial::new(ranges, &seen, made);
+                column(&pair, format!("image = \"{text}\", {ranges}"))
+            })
+            .collect())
     }
 
     /// The images of the outputs that are not read.
@@ -294,17 +299,23 @@ fn shown(
 }
 
 fn columns(probe: &Probe, title: impl Fn(RangePair) -> String) -> Vec<ExaminedConvention> {
-    let pairs = probe.pairs.iter();
-    pairs.map(|pair| column(pair, title(pair.ranges))).collect()
+    probe
+        .pairs
+        .iter()
+        .map(|pair| column(pair, title(pair.ranges)))
+        .collect()
 }
 
 fn column(pair: &PairTrial, title: String) -> ExaminedConvention {
-    let images = pair.made.iter().zip(&pair.verdicts);
-    let images = images.map(|(made, verdict)| ExaminedImage {
-        image: made.to_rgb(),
-        facts: made.facts(),
-        problem: verdict.map(|verdict| verdict.to_string()),
-    });
+    let images = pair
+        .made
+        .iter()
+        .zip(&pair.verdicts)
+        .map(|(made, verdict)| ExaminedImage {
+            image: made.to_rgb(),
+            facts: made.facts(),
+            problem: verdict.map(|verdict| verdict.to_string()),
+        });
     ExaminedConvention {
         title,
         images: images.collect(),

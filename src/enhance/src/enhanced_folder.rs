@@ -19,10 +19,10 @@ impl FromStr for EnhancedFolder {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let parts = text
+        let (name, folder) = text
             .split_once('=')
-            .filter(|(_, folder)| !folder.is_empty());
-        let (name, folder) = parts.ok_or("NAME=DIR expected, such as mine=enhanced/")?;
+            .filter(|(_, folder)| !folder.is_empty())
+            .ok_or("NAME=DIR expected, such as mine=enhanced/")?;
         let name = EnhancerName::new(name).map_err(|_| {
             format!("{name:?} is no name: only letters, digits, '_', '-' and '.' are allowed")
         })?;

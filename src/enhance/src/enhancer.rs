@@ -129,9 +129,9 @@ impl Enhancer {
         let remarks = graph
             .unread_images()
             .into_iter()
-            .chain(random_words(&random));
-        let remarks = remarks.map(|words| sidecar::named(&words, &file.path));
-        let remarks = remarks.collect();
+            .chain(random_words(&random))
+            .map(|words| sidecar::named(&words, &file.path))
+            .collect();
         let enhancer = Self {
             named: file.named,
             digest: file.digest,

@@ -58,8 +58,12 @@ impl Expression {
     /// # Errors
     /// The names that are not, and all that there are.
     pub(super) fn check_names(&self, key: &str, known: &[&str]) -> Result<(), String> {
-        let unknown = self.names.iter().filter(|n| !known.contains(&n.as_str()));
-        let unknown: Vec<String> = unknown.map(|name| format!("`{name}`")).collect();
+        let unknown: Vec<String> = self
+            .names
+            .iter()
+            .filter(|n| !known.contains(&n.as_str()))
+            .map(|name| format!("`{name}`"))
+            .collect();
         if unknown.is_empty() {
             return Ok(());
         }

@@ -75,8 +75,9 @@ impl FedImage<'_> {
         for channel in 0..3 {
             for row in (window.top..window.bottom).map(|at| pad.source(at, dark.height())) {
                 for column in (window.left..window.right).map(|at| pad.source(at, dark.width())) {
-                    let place = row.zip(column);
-                    let place = place.map(|(row, column)| 3 * (row * dark.width() + column));
+                    let place = row
+                        .zip(column)
+                        .map(|(row, column)| 3 * (row * dark.width() + column));
                     let byte = place.map_or(0, |place| dark.samples()[place + channel]);
                     samples.push(f32::from(byte) / 255.0);
                 }

@@ -211,8 +211,12 @@ fn fill<T, I: Iterator<Item = u8>>(
         SampleOrder::Packed => {
             for (row, line) in rows.iter().zip(data.chunks_exact_mut(3 * width)) {
                 for channel in 0..3 {
-                    let samples = line.iter_mut().skip(channel).step_by(3);
-                    for (sample, byte) in samples.zip(row_of(*row, channel)) {
+                    for (sample, byte) in line
+                        .iter_mut()
+                        .skip(channel)
+                        .step_by(3)
+                        .zip(row_of(*row, channel))
+                    {
                         *sample = value(channel, byte);
                     }
                 }

@@ -142,10 +142,11 @@ fn name_of(stem: &str) -> Result<EnhancerName> {
     if stem.chars().all(fits) {
         return EnhancerName::new(stem);
     }
-    let words = stem
+    let mut name = stem
         .split(|c: char| !fits(c))
-        .filter(|word| !word.is_empty());
-    let mut name = words.collect::<Vec<_>>().join("-");
+        .filter(|word| !word.is_empty())
+        .collect::<Vec<_>>()
+        .join("-");
     if !stem.is_ascii() {
         let digest: String = Digest::from_bytes(stem.as_bytes()).to_string();
         let digest = digest.rsplit(':').next().unwrap_or_default();
@@ -201,11 +202,12 @@ fn digest(
 /// Number of outputs of a model: field 12 of its `GraphProto`, which is field 7 of the `ModelProto` (`onnx/onnx.proto`).
 fn output_count(model: &[u8]) -> usize {
     let within = |range: Range<usize>, wanted: u64| {
-        let found = fields(model, range).filter_map(Result::ok);
-        found.filter_map(move |field| match field {
-            (number, FieldValue::Bytes(bytes)) if number == wanted => Some(bytes),
-            _ => None,
-        })
+        fields(model, range)
+            .filter_map(Result::ok)
+            .filter_map(move |field| match field {
+                (number, FieldValue::Bytes(bytes)) if number == wanted => Some(bytes),
+                _ => None,
+            })
     };
     let graphs = within(0..model.len(), 7);
     graphs.map(|graph| within(graph, 12).count()).sum()
@@ -261,13 +263,14 @@ const MOST_BYTES: u64 = i32::MAX as u64;
 
 /// The bytes of an ONNX file. A file that is too large to be one is refused before it is read.
 fn read_model(path: &Path) -> Result<Vec<u8>> {
-    let unreadable = |e: std::io::Error| match e.kind() {
-        ErrorKind::NotFound => {
-            Error::usage("--llie", format_args!("{}: no such file", path.display()))
-        }
-        _ => Error::file(path, "read", e),
-    };
-    let size = std::fs::metadata(path).map_err(unreadable)?.len();
+    let size = std::fs::metadata(path)
+        .map_err(|e| match e.kind() {
+            ErrorKind::NotFound => {
+                Error::usage("--llie", format_args!("{}: no such file", path.display()))
+            }
+            _ => Error::file(path, "read", e),
+        })?
+        .len();
     if size > MOST_BYTES {
         return Err(Error::Enhancer {
             path: path.to_owned(),

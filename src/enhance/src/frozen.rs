@@ -87,19 +87,21 @@ fn shapes(model: &[u8]) -> Vec<Vec<usize>> {
             }
         }
     }
-    let shapes = used
-        .into_iter()
-        .filter_map(|name| constants.get(&model[name]));
-    shapes.filter(|shape| !shape.is_empty()).cloned().collect()
+    used.into_iter()
+        .filter_map(|name| constants.get(&model[name]))
+        .filter(|shape| !shape.is_empty())
+        .cloned()
+        .collect()
 }
 
 /// Positions of the strings and messages in one field of a message.
 fn parts(model: &[u8], message: Range<usize>, field: u64) -> Vec<Range<usize>> {
-    let parts = fields(model, message).filter_map(|part| match part {
-        Ok((number, FieldValue::Bytes(bytes))) if number == field => Some(bytes),
-        _ => None,
-    });
-    parts.collect()
+    fields(model, message)
+        .filter_map(|part| match part {
+            Ok((number, FieldValue::Bytes(bytes))) if number == field => Some(bytes),
+            _ => None,
+        })
+        .collect()
 }
 
 /// Name of a tensor, and its entries if they are a few positive 64-bit integers, else none.
@@ -122,8 +124,10 @@ fn tensor_of(model: &[u8], tensor: Range<usize>) -> (Vec<u8>, Vec<usize>) {
             _ => {}
         }
     }
-    let positive = |value: &i64| usize::try_from(*value).ok().filter(|value| *value > 0);
-    let entries: Option<Vec<usize>> = values.iter().map(positive).collect();
+    let entries: Option<Vec<usize>> = values
+        .iter()
+        .map(|value: &i64| usize::try_from(*value).ok().filter(|value| *value > 0))
+        .collect();
     let entries = entries.filter(|entries| element == INT64 && entries.len() <= MOST_ENTRIES);
     (name, entries.unwrap_or_default())
 }

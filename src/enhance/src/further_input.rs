@@ -43,11 +43,13 @@ impl Places {
         }
         let all = || std::iter::once(image).chain(TensorLayout::ALL);
         let fitting = || all().filter(|layout| layout.rank() == port.dims.len());
-        let sure = fitting().find(|layout| {
-            let channels = port.dims[layout.places()[0]].known();
-            matches!(channels, Some(1 | 3))
-        });
-        let [channels, rows, columns] = sure.or_else(|| fitting().next())?.places();
+        let [channels, rows, columns] = fitting()
+            .find(|layout| {
+                let channels = port.dims[layout.places()[0]].known();
+                matches!(channels, Some(1 | 3))
+            })
+            .or_else(|| fitting().next())?
+            .places();
         Some(Self {
             channels: Some(channels),
             rows,
@@ -58,8 +60,10 @@ impl Places {
     /// The other dimensions.
     fn others(self, port: &Port) -> impl Iterator<Item = &Dim> {
         let own = [self.channels, Some(self.rows), Some(self.columns)];
-        let dims = port.dims.iter().enumerate();
-        dims.filter(move |(place, _)| !own.contains(&Some(*place)))
+        port.dims
+            .iter()
+            .enumerate()
+            .filter(move |(place, _)| !own.contains(&Some(*place)))
             .map(|(_, dim)| dim)
     }
 
@@ -240,8 +244,10 @@ impl FurtherInput {
         let values = if planar || channels == 1 {
             planes
         } else {
-            let pixels = (0..plane).flat_map(|pixel| (0..channels).map(move |c| (c, pixel)));
-            pixels.map(|(c, pixel)| planes[c * plane + pixel]).collect()
+            (0..plane)
+                .flat_map(|pixel| (0..channels).map(move |c| (c, pixel)))
+                .map(|(c, pixel)| planes[c * plane + pixel])
+                .collect()
         };
         let dims = self.dims(places, channels, size);
         let data = TensorData::floats(&self.port.element, values);
@@ -251,8 +257,11 @@ impl FurtherInput {
 
 /// Number of elements of an input with fixed dimensions, at most one of them not 1; `None` for others.
 fn vector_length(port: &Port) -> Option<usize> {
-    let sizes = port.dims.iter().map(Dim::known);
-    let sizes = sizes.collect::<Option<Vec<usize>>>()?;
+    let sizes = port
+        .dims
+        .iter()
+        .map(Dim::known)
+        .collect::<Option<Vec<usize>>>()?;
     let long = sizes.iter().filter(|size| **size > 1).count();
     (long == 1 && sizes.len() <= 2).then(|| sizes.iter().product())
 }
@@ -311,8 +320,11 @@ pub(super) const ATTENTION: [&str; 4] = ["mask", "gray", "grey", "att"];
 
 /// A name as a key of a TOML file, in quotes if needed.
 fn quoted(name: &str) -> String {
-    let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-    if !name.is_empty() && name.chars().all(bare) {
+    if !name.is_empty()
+        && name
+            .chars()
+            .all(|c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-')
+    {
         name.to_owned()
     } else {
         format!("{name:?}")

@@ -121,14 +121,14 @@ impl Graph {
             }
             Ended::TooLarge => return Ok(Err(RunFailure::TooLarge(limits.memory).words())),
         };
-        let loaded = session
+        Ok(session
             .map_err(|e| load_problem(&one_line(&e), runtime.version()))
-            .and_then(|session| Self::new(session, sidecar, preset, runtime));
-        Ok(loaded.map(|mut graph| {
-            graph.limit_time(limits.time);
-            graph.limit_memory(limits.memory);
-            graph
-        }))
+            .and_then(|session| Self::new(session, sidecar, preset, runtime))
+            .map(|mut graph| {
+                graph.limit_time(limits.time);
+                graph.limit_memory(limits.memory);
+                graph
+            }))
     }
 
     fn new(

@@ -171,15 +171,17 @@ fn is_missing(output: &Output) -> bool {
 /// Last non-empty line of stdout and stderr, else the exit status.
 fn last_line(output: &Output) -> String {
     let text = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes));
-    let mut lines = text.iter().flat_map(|text| text.lines());
-    let last = lines.rfind(|line| !line.trim().is_empty());
+    let last = text
+        .iter()
+        .flat_map(|text| text.lines())
+        .rfind(|line| !line.trim().is_empty());
     last.map_or_else(|| output.status.to_string(), |line| line.trim().to_owned())
 }
 
 fn wheel_in(folder: &Path) -> Result<PathBuf, String> {
     let entries = fs::read_dir(folder).map_err(|e| path_error(folder, "cannot be read", &e))?;
-    let mut paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
-    paths
+    entries
+        .filter_map(|entry| Some(entry.ok()?.path()))
         .find(|path| path.extension().is_some_and(|extension| extension == "whl"))
         .ok_or_else(|| "pip downloaded no wheel".to_owned())
 }

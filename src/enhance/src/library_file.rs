@@ -178,8 +178,8 @@ impl<F: Read + Seek> Header<'_, F> {
             }
             let mut names = vec![0; usize::try_from(length).map_err(|_| Flaw::Cut)?];
             let read = self.file.seek(SeekFrom::Start(offset));
-            let read = read.and_then(|_| self.file.read_exact(&mut names));
-            read.map_err(Flaw::Unreadable)?;
+            read.and_then(|_| self.file.read_exact(&mut names))
+                .map_err(Flaw::Unreadable)?;
             if !names.windows(ENTRY.len()).any(|name| name == ENTRY) {
                 return Err(Flaw::Wrong(
                     "is not ONNX Runtime: it exports no OrtGetApiBase",

@@ -102,26 +102,28 @@ impl Output {
         };
         let names = outputs.iter().map(|port| port.name.as_str());
         let known: Vec<&str> = names.chain([INPUT]).collect();
-        let slices = image.names().iter();
-        let slices = slices.filter(|name| sliced(outputs, name).is_some());
-        let slices: Vec<&str> = slices.map(String::as_str).collect();
+        let slices: Vec<&str> = image
+            .names()
+            .iter()
+            .filter(|name| sliced(outputs, name).is_some())
+            .map(String::as_str)
+            .collect();
         let known_names = [&known[..], &slices].concat();
-        let unknown = |problem| {
-            format!(
-                "cannot be read: {problem}; its outputs are {}",
-                list(outputs)
-            )
-        };
-        image.check_names("image", &known_names).map_err(unknown)?;
-        let names = image.names().iter().filter(|name| *name != INPUT);
-        let outputs: Vec<Self> = names
+        image
+            .check_names("image", &known_names)
+            .map_err(|problem| {
+                format!(
+                    "cannot be read: {problem}; its outputs are {}",
+                    list(outputs)
+                )
+            })?;
+        let outputs: Vec<Self> = image.names().iter().filter(|name| *name != INPUT)
             .map(|name| {
                 if let Some((port, slice)) = sliced(outputs, name) {
                     return Self::from_slice(port, slice, &fits);
                 }
                 let port = outputs.iter().find(|port| port.name == *name);
-                let port = port.filter(|port| channels.iter().any(|count| fits(port, *count)));
-                let port = port.ok_or_else(|| {
+                let port = port.filter(|port| channels.iter().any(|count| fits(port, *count))).ok_or_else(|| {
                     format!(
                         "gives {name:?}, which image = \"{image}\" names, but which is not an image of {}; it has {}",
                         if channels == [1] { "one channel (channels = \"y\")" } else { "one or three channels" },
@@ -157,15 +159,17 @@ impl Output {
         slice: ChannelSlice,
         fits: impl Fn(&Port, usize) -> bool,
     ) -> Result<Self, String> {
-        let mut counts = port.channel_counts().into_iter();
-        let count = counts.find(|count| *count >= slice.end && fits(port, *count));
-        let count = count.ok_or_else(|| {
-            format!(
-                "has no channels {} to {} (counted from 0) of the input's size in {port}",
-                slice.first,
-                slice.end - 1
-            )
-        })?;
+        let count = port
+            .channel_counts()
+            .into_iter()
+            .find(|count| *count >= slice.end && fits(port, *count))
+            .ok_or_else(|| {
+                format!(
+                    "has no channels {} to {} (counted from 0) of the input's size in {port}",
+                    slice.first,
+                    slice.end - 1
+                )
+            })?;
         Ok(Self {
             layout: port.layout(count),
             port: port.clone(),
@@ -188,8 +192,11 @@ fn sliced<'a>(outputs: &'a [Port], name: &str) -> Option<(&'a Port, ChannelSlice
 
 /// A name as expressions write it, in backticks if needed.
 pub(super) fn in_expression(name: &str) -> String {
-    let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
-    if name.chars().all(is_word) && !name.starts_with(|c: char| c.is_ascii_digit()) {
+    if name
+        .chars()
+        .all(|c: char| c.is_ascii_alphanumeric() || c == '_')
+        && !name.starts_with(|c: char| c.is_ascii_digit())
+    {
         name.to_owned()
     } else {
         format!("`{name}`")
@@ -199,8 +206,8 @@ pub(super) fn in_expression(name: &str) -> String {
 /// Why none of the outputs is the image, and what to state or export.
 fn no_image(outputs: &[Port], channels: Channels, fits: impl Fn(&Port, usize) -> bool) -> String {
     let wide = |port: &&Port| {
-        let counts = port.channel_counts().into_iter();
-        counts
+        port.channel_counts()
+            .into_iter()
             .filter(|count| *count > 1 && *count != 3)
             .find(|count| fits(port, *count))
     };
@@ -307,8 +314,10 @@ fn stated_output(
 ///
 /// A name of the first output counts only if the others are named too: see [`Port::is_numbered`].
 fn by_name(outputs: &[Port], images: &[usize]) -> Option<usize> {
-    let named = |i: &usize| IMAGE_NAMES.contains(&outputs[*i].name.as_str());
-    let mut matching = images.iter().copied().filter(named);
+    let mut matching = images
+        .iter()
+        .copied()
+        .filter(|i: &usize| IMAGE_NAMES.contains(&outputs[*i].name.as_str()));
     let only = matching.next().filter(|_| matching.next().is_none())?;
     let named_by_hand = only > 0 || !outputs.iter().any(Port::is_numbered);
     named_by_hand.then_some(only)

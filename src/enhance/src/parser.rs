@@ -224,14 +224,18 @@ impl Parser {
     }
 
     fn operator(&mut self, operators: &[(char, Term)]) -> Option<Term> {
-        let found = operators.iter().find(|(c, _)| self.taken(*c));
-        found.map(|(_, term)| *term)
+        operators
+            .iter()
+            .find(|(c, _)| self.taken(*c))
+            .map(|(_, term)| *term)
     }
 
     /// The characters from here on that belong to a word.
     fn word(&mut self, belongs: impl Fn(char) -> bool) -> String {
-        let rest = self.characters[self.at..].iter();
-        let word: String = rest.take_while(|c| belongs(**c)).collect();
+        let word: String = self.characters[self.at..]
+            .iter()
+            .take_while(|c| belongs(**c))
+            .collect();
         self.at += word.chars().count();
         word
     }

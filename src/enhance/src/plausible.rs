@@ -105,8 +105,12 @@ impl Codes {
             return Self::from_rgb(image);
         }
         let mut samples = vec![0.0; height * width * 3];
-        let lines = image.samples().chunks_exact(3 * image.width());
-        for (y, line) in lines.take(height * factor).enumerate() {
+        for (y, line) in image
+            .samples()
+            .chunks_exact(3 * image.width())
+            .take(height * factor)
+            .enumerate()
+        {
             let sums = &mut samples[y / factor * width * 3..][..width * 3];
             let squares = line.chunks_exact(3 * factor);
             for (sum, square) in sums.chunks_exact_mut(3).zip(squares) {
@@ -144,8 +148,11 @@ impl Codes {
     /// The codes as an image, clamped and rounded; values that are not numbers are black.
     pub(super) fn to_rgb(&self) -> Rgb {
         let mut image = Rgb::black(self.height, self.width);
-        let samples = image.samples_mut().iter_mut().zip(&self.samples);
-        samples.for_each(|(byte, code)| *byte = code.round().clamp(0.0, 255.0) as u8);
+        image
+            .samples_mut()
+            .iter_mut()
+            .zip(&self.samples)
+            .for_each(|(byte, code)| *byte = code.round().clamp(0.0, 255.0) as u8);
         image
     }
 
@@ -165,10 +172,10 @@ impl Codes {
     }
 
     fn luma(&self) -> Plane {
-        let pixels = self.samples.chunks_exact(3);
-        let luma = pixels.map(|pixel| {
-            let weighted = pixel.iter().zip(LUMA);
-            weighted
+        let luma = self.samples.chunks_exact(3).map(|pixel| {
+            pixel
+                .iter()
+                .zip(LUMA)
                 .map(|(code, weight)| weight * f64::from(code.clamp(0.0, 255.0)))
                 .sum()
         });
@@ -181,16 +188,20 @@ impl Codes {
     /// Red less blue of each block, relative to its light; 3 codes keep black blocks from counting.
     fn warmth(&self) -> Vec<f64> {
         let channels = [0, 1, 2].map(|channel| {
-            let samples = self.samples.iter().skip(channel).step_by(3);
-            let samples = samples
+            let samples = self
+                .samples
+                .iter()
+                .skip(channel)
+                .step_by(3)
                 .map(|code| f64::from(code.clamp(0.0, 255.0)))
                 .collect();
             let width = self.width;
             Plane { width, samples }.blocks().samples
         });
         let [red, green, blue] = &channels;
-        let blocks = red.iter().zip(green).zip(blue);
-        blocks
+        red.iter()
+            .zip(green)
+            .zip(blue)
             .map(|((red, green), blue)| (red - blue) / (red + green + blue + 3.0))
             .collect()
     }
@@ -217,8 +228,8 @@ pub fn brightness(image: &Rgb) -> f64 {
         }
     }
     let pixels = (image.height() * image.width()) as f64;
-    let weighted = sums.iter().zip(LUMA);
-    weighted
+    sums.iter()
+        .zip(LUMA)
         .map(|(sum, weight)| weight * *sum as f64)
         .sum::<f64>()
         / pixels
@@ -298,8 +309,9 @@ fn structure(before: &Plane, after: &Plane) -> Option<Verdict> {
     let sizes: Vec<f64> = was.iter().map(|step| step.abs()).collect();
     let strong = percentile(&sizes, 0.75);
     let sign = |step: f64| if step == 0.0 { 0.0 } else { step.signum() };
-    let pairs = was.iter().zip(&is);
-    let agreement: Vec<f64> = pairs
+    let agreement: Vec<f64> = was
+        .iter()
+        .zip(&is)
         .filter(|(was, _)| was.abs() >= strong)
         .map(|(was, is)| sign(*was) * sign(*is))
         .collect();
@@ -347,8 +359,10 @@ impl Plane {
     fn steps(&self) -> Vec<f64> {
         let below = self.samples.get(self.width..).unwrap_or_default();
         let down = self.samples.iter().zip(below).map(|(a, b)| b - a);
-        let lines = self.samples.chunks_exact(self.width);
-        let right = lines.flat_map(|line| line.windows(2).map(|pair| pair[1] - pair[0]));
+        let right = self
+            .samples
+            .chunks_exact(self.width)
+            .flat_map(|line| line.windows(2).map(|pair| pair[1] - pair[0]));
         down.chain(right).collect()
     }
 

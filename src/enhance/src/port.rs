@@ -113,9 +113,9 @@ impl Port {
 
     /// Sizes of the dimensions that can be channels, as far as the graph fixes them.
     pub(super) fn channel_counts(&self) -> Vec<usize> {
-        let layouts = TensorLayout::ALL.into_iter();
-        let fitting = layouts.filter(|layout| layout.rank() == self.dims.len());
-        fitting
+        TensorLayout::ALL
+            .into_iter()
+            .filter(|layout| layout.rank() == self.dims.len())
             .filter_map(|layout| self.dims[layout.places()[0]].known())
             .filter(|count| *count <= MOST_CHANNELS)
             .collect()

@@ -113,33 +113,37 @@ fn all() -> Result<BTreeMap<String, PresetContent>> {
 
 /// Number that a preset gives an input of this name, and the preset's name.
 pub(super) fn number_of(input: &str) -> Option<(Number, String)> {
-    let mut presets = all().ok()?.into_iter();
-    presets.find_map(|(name, content)| match content.sidecar.extra.get(input)? {
-        ExtraValue::Number(number) | ExtraValue::Map(number) => Some((*number, name)),
-        ExtraValue::List(_) | ExtraValue::Noise(_) | ExtraValue::From(_) => None,
-    })
+    all()
+        .ok()?
+        .into_iter()
+        .find_map(|(name, content)| match content.sidecar.extra.get(input)? {
+            ExtraValue::Number(number) | ExtraValue::Map(number) => Some((*number, name)),
+            ExtraValue::List(_) | ExtraValue::Noise(_) | ExtraValue::From(_) => None,
+        })
 }
 
 /// Names of the presets that know a list of outputs by its channels.
 pub(super) fn that_know(outputs: &[Port]) -> Vec<String> {
-    let presets = all().unwrap_or_default().into_iter();
-    let known = presets.filter(|(_, content)| content.by_channels(outputs).is_some());
-    known.map(|(name, _)| name).collect()
+    all()
+        .unwrap_or_default()
+        .into_iter()
+        .filter(|(_, content)| content.by_channels(outputs).is_some())
+        .map(|(name, _)| name)
+        .collect()
 }
 
 impl PresetContent {
     /// Index of the image, by the channels of all outputs.
     fn by_channels(&self, outputs: &[Port]) -> Option<usize> {
         let channels: Vec<Option<usize>> = outputs.iter().map(Port::channels).collect();
-        let is_it = |list: &&OutputList| {
+        let list = self.signatures.iter().find(|list| {
             list.channels.len() == channels.len()
                 && list
                     .channels
                     .iter()
                     .zip(&channels)
                     .all(|(a, b)| Some(*a) == *b)
-        };
-        let list = self.signatures.iter().find(is_it)?;
+        })?;
         list.nth.checked_sub(1)
     }
 
@@ -151,16 +155,20 @@ impl PresetContent {
         }
         let place = |name: &String| outputs.iter().position(|port| port.name == *name);
         let numbered = outputs.iter().any(Port::is_numbered);
-        let mut places = self.names.iter().filter_map(place);
-        places.find(|place| *place > 0 || !numbered)
+        self.names
+            .iter()
+            .filter_map(place)
+            .find(|place| *place > 0 || !numbered)
     }
 
     /// Whether the outputs have all names of the expression of the image.
     fn image_of(&self, outputs: &[Port]) -> Option<&Expression> {
-        let has = |name: &String| name == "input" || outputs.iter().any(|port| port.name == *name);
-        self.image
-            .as_ref()
-            .filter(|image| image.names().iter().all(has))
+        self.image.as_ref().filter(|image| {
+            image
+                .names()
+                .iter()
+                .all(|name| name == "input" || outputs.iter().any(|port| port.name == *name))
+        })
     }
 }
 
@@ -199,8 +207,11 @@ impl PresetContent {
 
     /// How the authors' model is fed and read: the lines of a sidecar, with the usual ranges where the preset states none.
     fn conventions(&self) -> String {
-        let image = self.image.as_ref().map(ToString::to_string);
-        let image = image.or_else(|| self.stacked.as_ref().map(|stacked| stacked.image.clone()));
+        let image = self
+            .image
+            .as_ref()
+            .map(ToString::to_string)
+            .or_else(|| self.stacked.as_ref().map(|stacked| stacked.image.clone()));
         let outputs = match image {
             Some(image) => format!("image = {image:?}"),
             None => format!("output {}", self.names.join(" or ")),
@@ -210,8 +221,9 @@ impl PresetContent {
             ("range_out", "0..1"),
             ("rounding", "round"),
         ];
-        let usual = usual.map(|(key, value)| (key.to_owned(), toml::Value::from(value)));
-        let mut keys: BTreeMap<String, toml::Value> = usual.into();
+        let mut keys: BTreeMap<String, toml::Value> = usual
+            .map(|(key, value)| (key.to_owned(), toml::Value::from(value)))
+            .into();
         if let Ok(toml::Value::Table(stated)) = toml::Value::try_from(&self.sidecar) {
             keys.extend(stated);
         }
@@ -299,9 +311,11 @@ impl Preset {
         if is_named(&family(&self.name.replace("-pp", "++"))) {
             return None;
         }
-        let others = all().ok()?.into_keys();
-        let named = others.filter(|name| is_named(name) || is_named(&family(name)));
-        named.max_by_key(|name| (is_named(name), std::cmp::Reverse(name.len())))
+        all()
+            .ok()?
+            .into_keys()
+            .filter(|name| is_named(name) || is_named(&family(name)))
+            .max_by_key(|name| (is_named(name), std::cmp::Reverse(name.len())))
     }
 
     /// The rules that choose an output.
@@ -380,8 +394,12 @@ impl Preset {
 
     /// Whether one output alone has three channels or one, or may have.
     fn is_only_image(&self, outputs: &[Port]) -> bool {
-        let may_be = |port: &&Port| port.channels().is_none_or(|count| matches!(count, 1 | 3));
-        self.content.image.is_none() && outputs.iter().filter(may_be).count() == 1
+        self.content.image.is_none()
+            && outputs
+                .iter()
+                .filter(|port| port.channels().is_none_or(|count| matches!(count, 1 | 3)))
+                .count()
+                == 1
     }
 
     /// Differences between a graph and the authors' model; `None` if there are none.
@@ -401,8 +419,11 @@ impl Preset {
                 list(outputs)
             ));
         }
-        let other = |port: &&Port| !content.sidecar.extra.contains_key(&port.name);
-        let others: Vec<Port> = inputs.iter().filter(other).cloned().collect();
+        let others: Vec<Port> = inputs
+            .iter()
+            .filter(|port| !content.sidecar.extra.contains_key(&port.name))
+            .cloned()
+            .collect();
         (others.len() > 1).then(|| {
             format!(
                 "inputs are not those of the preset: it takes {}",

@@ -23,8 +23,9 @@ impl RangePair {
     /// The pairs with these ranges; `None` stands for each range in turn.
     pub(super) fn all(input: Option<ValueRange>, output: Option<ValueRange>) -> Vec<Self> {
         let of = |stated: Option<ValueRange>| {
-            let all = ValueRange::ALL.into_iter();
-            all.filter(move |range| stated.is_none_or(|stated| stated == *range))
+            ValueRange::ALL
+                .into_iter()
+                .filter(move |range| stated.is_none_or(|stated| stated == *range))
                 .map(ValueScale::Range)
         };
         of(input)
@@ -63,8 +64,11 @@ impl RangePair {
 
     /// These lines in a sentence.
     fn stated(self) -> String {
-        let lines = self.lines().into_iter().map(|line| format!("`{line}`"));
-        lines.collect::<Vec<_>>().join(" and ")
+        self.lines()
+            .into_iter()
+            .map(|line| format!("`{line}`"))
+            .collect::<Vec<_>>()
+            .join(" and ")
     }
 }
 
@@ -193,8 +197,11 @@ pub(super) enum Conclusion {
 impl Probe {
     /// The pairs whose images are plausible.
     pub(super) fn plausible(&self) -> Vec<RangePair> {
-        let pairs = self.pairs.iter().filter(|pair| pair.verdict().is_none());
-        pairs.map(|pair| pair.ranges).collect()
+        self.pairs
+            .iter()
+            .filter(|pair| pair.verdict().is_none())
+            .map(|pair| pair.ranges)
+            .collect()
     }
 
     /// Draws the conclusion.
@@ -223,9 +230,11 @@ impl Probe {
 
     /// The pairs that may be advised in place of the usual one: those whose images of all frames are plausible.
     fn advised(&self) -> Vec<RangePair> {
-        let pairs = self.pairs.iter();
-        let others = pairs.filter(|pair| pair.ranges != self.usual && pair.is_clean());
-        others.map(|pair| pair.ranges).collect()
+        self.pairs
+            .iter()
+            .filter(|pair| pair.ranges != self.usual && pair.is_clean())
+            .map(|pair| pair.ranges)
+            .collect()
     }
 
     /// Leaves out pairs that are plausible on most frames, but not on all.

@@ -162,12 +162,14 @@ impl Enhancer {
             let seen: Vec<Codes> = frames.iter().map(Codes::from_rgb).collect();
             let mut pairs = [(); N].map(|()| Vec::new());
             for fed_alike in RangePair::all(input, output).chunk_by(|a, b| a.input == b.input) {
-                let graphs = conventions.iter().flat_map(|convention| {
-                    fed_alike
-                        .iter()
-                        .map(|ranges| self.read_by(convention, *ranges))
-                });
-                let graphs: Vec<Graph> = graphs.collect::<Result<_>>()?;
+                let graphs: Vec<Graph> = conventions
+                    .iter()
+                    .flat_map(|convention| {
+                        fed_alike
+                            .iter()
+                            .map(|ranges| self.read_by(convention, *ranges))
+                    })
+                    .collect::<Result<_>>()?;
                 // A failure in one range does not predict failure in the others at this size.
                 let Some(made) = made(&graphs, &frames)? else {
                     continue 'sizes;
@@ -182,10 +184,10 @@ impl Enhancer {
                 && self.may_be_normalised(input)
             {
                 for pair in RangePair::normalised(output) {
-                    let graphs = conventions
+                    let graphs: Vec<Graph> = conventions
                         .iter()
-                        .map(|convention| self.read_by(convention, pair));
-                    let graphs: Vec<Graph> = graphs.collect::<Result<_>>()?;
+                        .map(|convention| self.read_by(convention, pair))
+                        .collect::<Result<_>>()?;
                     // The sizes are those of the plain ranges, so what fails here is no reason to try others.
                     let made = made(&graphs, &frames)?.unwrap_or_default();
                     for (pairs, made) in pairs.iter_mut().zip(made) {

@@ -174,8 +174,10 @@ impl Node {
 
     /// Whether a dropout may be in training mode: its third input is not a constant that is false.
     fn is_training(&self, constants: &BTreeMap<String, bool>) -> bool {
-        let mode = self.inputs.get(2).filter(|name| !name.is_empty());
-        mode.is_some_and(|name| constants.get(name) != Some(&false))
+        self.inputs
+            .get(2)
+            .filter(|name| !name.is_empty())
+            .is_some_and(|name| constants.get(name) != Some(&false))
     }
 }
 

@@ -197,18 +197,24 @@ fn output(graph: &Graph, planes: &Planes) -> error::Result<Result<Planes, String
 
 /// Distance, along a side, of the farthest sample that differs from `middle`.
 fn farthest_moved(before: &Planes, after: &Planes, middle: [usize; 2]) -> usize {
-    let pairs = before.samples.iter().zip(&after.samples);
-    let moved = pairs.enumerate().filter(|(_, (a, b))| {
-        // False for two NaNs: neither has moved.
-        (*a - *b).abs() > MOVED
-    });
+    let moved = before
+        .samples
+        .iter()
+        .zip(&after.samples)
+        .enumerate()
+        .filter(|(_, (a, b))| {
+            // False for two NaNs: neither has moved.
+            (*a - *b).abs() > MOVED
+        });
     let pixels = before.height * before.width;
-    let distances = moved.map(|(index, _)| {
-        let pixel = index % pixels;
-        let (y, x) = (pixel / before.width, pixel % before.width);
-        y.abs_diff(middle[0]).max(x.abs_diff(middle[1]))
-    });
-    distances.max().unwrap_or(0)
+    moved
+        .map(|(index, _)| {
+            let pixel = index % pixels;
+            let (y, x) = (pixel / before.width, pixel % before.width);
+            y.abs_diff(middle[0]).max(x.abs_diff(middle[1]))
+        })
+        .max()
+        .unwrap_or(0)
 }
 
 #[cfg(test)]

@@ -116,8 +116,7 @@ impl Surroundings {
         LibraryPlace::ALL
             .into_iter()
             .flat_map(|place| {
-                let folders = self.folders(place).into_iter();
-                folders.flat_map(move |folder| {
+                self.folders(place).into_iter().flat_map(move |folder| {
                     libraries_in(&folder)
                         .into_iter()
                         .map(move |path| (place, path))
@@ -133,8 +132,9 @@ impl Surroundings {
     /// The Python packages of ONNX Runtime that hold no library: those before 1.19, where it is a part of the Python module.
     pub(super) fn packages_without_library(&self) -> Vec<PathBuf> {
         let places = [LibraryPlace::Environment, LibraryPlace::Python];
-        let folders = places.into_iter().flat_map(|place| self.folders(place));
-        let mut empty: Vec<PathBuf> = folders
+        let mut empty: Vec<PathBuf> = places
+            .into_iter()
+            .flat_map(|place| self.folders(place))
             .filter(|folder| libraries_in(folder).is_empty())
             .collect();
         empty.dedup();
@@ -233,8 +233,11 @@ fn libraries_in(folder: &Path) -> Vec<PathBuf> {
 
 /// Paths in a folder, sorted; empty if it cannot be read.
 fn sorted_entries(folder: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(folder).into_iter().flatten();
-    let mut paths: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
+    let mut paths: Vec<PathBuf> = std::fs::read_dir(folder)
+        .into_iter()
+        .flatten()
+        .filter_map(|e| Some(e.ok()?.path()))
+        .collect();
     paths.sort();
     paths
 }
@@ -272,8 +275,11 @@ mod tests {
     }
 
     fn paths(surroundings: &Surroundings) -> Vec<PathBuf> {
-        let candidates = surroundings.candidates().into_iter();
-        candidates.map(|(_, path)| path).collect()
+        surroundings
+            .candidates()
+            .into_iter()
+            .map(|(_, path)| path)
+            .collect()
     }
 
     #[test]

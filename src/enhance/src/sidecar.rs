@@ -168,8 +168,7 @@ impl ModelSidecar {
                 "output and image are both stated; state image alone, which names its outputs",
             ));
         }
-        let values = sidecar.extra.iter();
-        let mut checks = values.map(|(name, value)| value.check(name));
+        let mut checks = sidecar.extra.iter().map(|(name, value)| value.check(name));
         let input = sidecar.input.as_ref();
         let input = input.map_or(Ok(()), |input| input.check_names("input", &["image"]));
         checks
@@ -218,10 +217,10 @@ impl ModelSidecar {
     /// Checks that no number makes an image too large or a value unusable.
     fn check_bounds(&self) -> Result<(), String> {
         let means = [self.mean, self.mean_out].into_iter().flatten().flatten();
-        let deviations = [self.std, self.std_out].into_iter();
-        let mut deviations = deviations.flatten().flatten();
-        let is_scale = |number: f32| (1.0 / MOST_SCALE..=MOST_SCALE).contains(&number);
-        if !means.map(f32::abs).all(|mean| mean <= MOST_SCALE) || !deviations.all(is_scale) {
+        let mut deviations = [self.std, self.std_out].into_iter().flatten().flatten();
+        if !means.map(f32::abs).all(|mean| mean <= MOST_SCALE)
+            || !deviations.all(|number: f32| (1.0 / MOST_SCALE..=MOST_SCALE).contains(&number))
+        {
             return Err(format!(
                 "mean is three numbers of at most {MOST_SCALE}, and std three from {} to {MOST_SCALE}",
                 1.0 / MOST_SCALE

@@ -57,8 +57,9 @@ impl Signature {
         if let (Channels::Y, Some(problem)) = (channels, mismatch) {
             return Err(problem);
         }
-        let extras = inputs.iter().filter(|port| port.name != image.name);
-        let extras = extras
+        let extras = inputs
+            .iter()
+            .filter(|port| port.name != image.name)
             .map(|port| FurtherInput::new(port, convention.extra.get(&port.name), layout))
             .collect::<Result<Vec<_>, String>>()?;
         let mut stated = convention.extra.keys();
@@ -119,14 +120,21 @@ fn image_input<'a>(
     convention: &ModelSidecar,
 ) -> Result<(&'a Port, TensorLayout), String> {
     let channels = convention.channels.unwrap_or_default();
-    let is_free = |port: &&Port| !port.is_scalar() && !convention.extra.contains_key(&port.name);
-    let images: Vec<&Port> = inputs.iter().filter(is_free).collect();
+    let images: Vec<&Port> = inputs
+        .iter()
+        .filter(|port| !port.is_scalar() && !convention.extra.contains_key(&port.name))
+        .collect();
     // If all but one lack a value, the message names the first of those.
-    let likely = |port: &&&Port| {
-        let name = port.name.to_lowercase();
-        port.layout(channels.count()).is_some() && !ATTENTION.iter().any(|word| name.contains(word))
-    };
-    let Some(image) = images.iter().find(likely).or(images.first()).copied() else {
+    let Some(image) = images
+        .iter()
+        .find(|port| {
+            let name = port.name.to_lowercase();
+            port.layout(channels.count()).is_some()
+                && !ATTENTION.iter().any(|word| name.contains(word))
+        })
+        .or(images.first())
+        .copied()
+    else {
         if let Some(port) = inputs
             .iter()
             .find(|port| port.dims.is_empty() && port.element.is_fed())
@@ -207,8 +215,11 @@ fn unusable_shape(port: &Port) -> Option<String> {
         3 | 4 if three || one => None,
         3 | 4 => {
             let counts = port.channel_counts();
-            let mut counts = counts.into_iter().filter(|count| (2..=16).contains(count));
-            counts.find(|count| *count != 3).map(several)
+            counts
+                .into_iter()
+                .filter(|count| (2..=16).contains(count))
+                .find(|count| *count != 3)
+                .map(several)
         }
         rank => Some(format!(
             "{rank} dimensions: several frames at a time; export it for single images of [1, 3, height, width]"

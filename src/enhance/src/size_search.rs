@@ -115,9 +115,8 @@ fn multiple(graph: &Graph) -> Result<Option<usize>> {
 
 /// Height and width of the trial of a multiple: two different primes, from 3 on, times the multiple.
 fn trial_size(multiple: usize) -> [usize; 2] {
-    let is_prime = |n: &usize| (2..*n).all(|divisor| !n.is_multiple_of(divisor));
     let mut primes = (3..)
-        .filter(is_prime)
+        .filter(|n: &usize| (2..*n).all(|divisor| !n.is_multiple_of(divisor)))
         .skip_while(|n| n * multiple < LEAST_SIDE);
     [(); 2].map(|()| primes.next().map_or(multiple, |prime| prime * multiple))
 }

@@ -71,10 +71,10 @@ impl FromStr for Tiling {
         match text {
             "auto" => Ok(Self::Auto),
             "whole" => Ok(Self::Whole),
-            side => {
-                let side = side.parse().map(Self::Side);
-                side.map_err(|_| "expected a side in pixels, whole or auto".to_owned())
-            }
+            side => side
+                .parse()
+                .map(Self::Side)
+                .map_err(|_| "expected a side in pixels, whole or auto".to_owned()),
         }
     }
 }
@@ -142,8 +142,9 @@ impl TilePlan {
 
     /// The tiles row by row, each by its spans along both sides.
     pub(super) fn tiles(&self) -> impl Iterator<Item = (TileSpan, TileSpan)> {
-        let rows = self.rows.iter();
-        rows.flat_map(|row| self.columns.iter().map(|column| (*row, *column)))
+        self.rows
+            .iter()
+            .flat_map(|row| self.columns.iter().map(|column| (*row, *column)))
     }
 
     /// Number of tiles in rows and columns.
@@ -309,10 +310,15 @@ mod tests {
             for (row, column) in plan.tiles() {
                 let pixels = (row.output_start..row.output_end)
                     .flat_map(|y| (column.output_start..column.output_end).map(move |x| (y, x)));
-                let byte = |(y, x): (usize, usize)| {
-                    [(y * 5 + x * 3 + shift * column.input_start) as u8; 3]
-                };
-                canvas.add(row, column, &pixels.flat_map(byte).collect::<Vec<_>>());
+                canvas.add(
+                    row,
+                    column,
+                    &pixels
+                        .flat_map(|(y, x): (usize, usize)| {
+                            [(y * 5 + x * 3 + shift * column.input_start) as u8; 3]
+                        })
+                        .collect::<Vec<_>>(),
+                );
             }
             canvas.finish([37, 50])
         };

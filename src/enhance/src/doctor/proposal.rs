@@ -99,8 +99,11 @@ pub(super) fn propose(
 ) -> Found {
     match probe.plausible().as_slice() {
         several @ [_, _, ..] if stated.is_none() && probe.conclusion() == Conclusion::Assumed => {
-            let others = several.iter().filter(|pair| **pair != probe.usual);
-            let others: Vec<String> = others.map(ToString::to_string).collect();
+            let others: Vec<String> = several
+                .iter()
+                .filter(|pair| **pair != probe.usual)
+                .map(ToString::to_string)
+                .collect();
             return Found::nothing(format!(
                 "With {} its images can be enhanced images: a run assumes these usual ranges and says so. They can with {} too; compare them below with the model's own examples.",
                 probe.usual,

@@ -10,15 +10,16 @@ fn preset(name: &str) -> Preset {
 /// Float images with these numbers of channels and any size; a single number if 0.
 fn ports(all: &[(&str, usize)]) -> Vec<Port> {
     let any = || Dim::Free("n".into());
-    let ports = all.iter().map(|(name, channels)| Port {
-        name: (*name).to_owned(),
-        element: ElementType::Float32,
-        dims: match channels {
-            0 => vec![Dim::Known(1)],
-            channels => vec![Dim::Known(1), Dim::Known(*channels), any(), any()],
-        },
-    });
-    ports.collect()
+    all.iter()
+        .map(|(name, channels)| Port {
+            name: (*name).to_owned(),
+            element: ElementType::Float32,
+            dims: match channels {
+                0 => vec![Dim::Known(1)],
+                channels => vec![Dim::Known(1), Dim::Known(*channels), any(), any()],
+            },
+        })
+        .collect()
 }
 
 /// A preset's statements for a graph with these outputs.
@@ -91,9 +92,12 @@ fn every_preset_is_described_and_stands_in_the_help() {
 #[test]
 fn every_preset_has_its_source() {
     for (name, content) in all().unwrap() {
-        let hex = |c: char| c.is_ascii_digit() || ('a'..='f').contains(&c);
         assert!(
-            content.commit.len() == 7 && content.commit.chars().all(hex),
+            content.commit.len() == 7
+                && content
+                    .commit
+                    .chars()
+                    .all(|c: char| c.is_ascii_digit() || ('a'..='f').contains(&c)),
             "{name}"
         );
         assert_eq!(content.repository.split('/').count(), 2, "{name}");
