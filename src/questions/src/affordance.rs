@@ -10,8 +10,10 @@ use darkqa_ground::types::Family;
 
 /// Two candidates for every activity: yes and no.
 pub(super) fn candidates(context: &RuleContext<'_>) -> Vec<RuleResult> {
-    let activities = context.book.activity.iter();
-    activities
+    context
+        .book
+        .activity
+        .iter()
         .flat_map(|activity| {
             let reject = |answer, reason| {
                 rejected(Family::Affordance, &activity.activity, Some(answer), reason)
@@ -56,10 +58,10 @@ fn yes(context: &RuleContext<'_>, activity: &ActivityRule) -> Result<RuleResult,
 /// Whether a yes is possible in this data set: it can name all objects of one enabler. Else "no" would be the answer to every
 /// question about the activity.
 fn can_be_enabled(context: &RuleContext<'_>, activity: &ActivityRule) -> bool {
-    let mut enablers = activity.enablers.iter();
-    enablers.any(|tokens| {
-        let mut tokens = tokens.iter();
-        tokens.all(|token| context.vocabulary.has_token(token))
+    activity.enablers.iter().any(|tokens| {
+        tokens
+            .iter()
+            .all(|token| context.vocabulary.has_token(token))
     })
 }
 

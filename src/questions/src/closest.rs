@@ -82,8 +82,10 @@ fn classes<'a>(objects: &[NearObject<'a>], book: &'a RuleBook) -> Vec<(&'a str, 
         let Some(word) = segment.called(book) else {
             continue;
         };
-        let is_new = |(class, known): &(&str, &str)| *class != segment.class && *known != word;
-        if classes.iter().all(is_new) {
+        if classes
+            .iter()
+            .all(|(class, known)| *class != segment.class && *known != word)
+        {
             classes.push((&segment.class, word));
         }
     }
@@ -103,10 +105,11 @@ fn eligible(context: &RuleContext<'_>, segment: &Segment) -> bool {
 /// The distance in mm from the first object's 10 % depth quantile to the smallest one of the others. `None` if another is
 /// nearer or there is none.
 fn near_gap(objects: &[NearObject<'_>], first: NearObject<'_>) -> Option<u32> {
-    let others = objects
+    let nearest = objects
         .iter()
-        .filter(|(segment, _)| segment.id != first.0.id);
-    let nearest = others.map(|(_, depth)| depth.p10).min()?;
+        .filter(|(segment, _)| segment.id != first.0.id)
+        .map(|(_, depth)| depth.p10)
+        .min()?;
     nearest.checked_sub(first.1.p10)
 }
 
@@ -123,10 +126,11 @@ fn check_gap(
     if gap < rule.gap_mm.into() || gap * 1_000_000 < near * rule.gap_ppm {
         return Err(Reason::Gap);
     }
-    let competes = |other: &&NearObject<'_>| {
-        rule.gap_scope == GapScope::Instances || other.0.class != first.0.class
-    };
-    let others: Vec<NearObject<'_>> = objects.iter().filter(competes).copied().collect();
+    let others: Vec<NearObject<'_>> = objects
+        .iter()
+        .filter(|other| rule.gap_scope == GapScope::Instances || other.0.class != first.0.class)
+        .copied()
+        .collect();
     match near_gap(&others, first) {
         None => Err(Reason::Disputed),
         Some(gap) if gap < rule.near_gap_mm => Err(Reason::Gap),
@@ -164,11 +168,12 @@ fn check_rivals(
             _ => {}
         }
     }
-    let loose = statistics
+    let loose: u64 = statistics
         .loose
         .iter()
-        .filter(|(class, _)| !background_class(class));
-    let loose: u64 = loose.map(|(_, pixels)| pixels).sum();
+        .filter(|(class, _)| !background_class(class))
+        .map(|(_, pixels)| pixels)
+        .sum();
     if statistics.ppm(loose) >= book.closest.rival_ppm {
         return Err(Reason::Rival);
     }

@@ -12,9 +12,11 @@ use darkqa_ground::types::Family;
 
 /// One candidate for every segment of a class whose colour may be asked.
 pub(super) fn candidates(context: &RuleContext<'_>, palette: &Palette) -> Vec<RuleResult> {
-    let segments = context.statistics.segments.iter();
-    let colored = segments.filter(|segment| context.book.is(&segment.class, ClassFlag::Color));
-    colored
+    context
+        .statistics
+        .segments
+        .iter()
+        .filter(|segment| context.book.is(&segment.class, ClassFlag::Color))
         .map(|segment| {
             let result = candidate(context, segment, palette);
             result.unwrap_or_else(|reason| rejected(Family::Color, &segment.class, None, reason))
@@ -113,11 +115,11 @@ fn check_light(
         Some(context.statistics.light),
         segment.around.map(|luma| [luma; 3]),
     ];
-    let in_light = |light: [u8; 3]| {
-        let code = |channel: usize| relative(segment.median[channel], light[channel]);
-        palette.color([0, 1, 2].map(code)) == Some(color)
-    };
-    if lights.into_iter().flatten().all(in_light) {
+    if lights.into_iter().flatten().all(|light: [u8; 3]| {
+        palette.color(
+            [0, 1, 2].map(|channel: usize| relative(segment.median[channel], light[channel])),
+        ) == Some(color)
+    }) {
         Ok(())
     } else {
         Err(Reason::Lit)
@@ -136,10 +138,10 @@ fn offered(context: &RuleContext<'_>, truth: Color) -> Option<(Vec<String>, usiz
                     .iter()
                     .any(|pair| *pair == [color, truth] || *pair == [truth, color])
             };
-            let others = Color::ALL
+            let mut others: Vec<Color> = Color::ALL
                 .into_iter()
-                .filter(|color| *color != truth && !near(*color));
-            let mut others: Vec<Color> = others.collect();
+                .filter(|color| *color != truth && !near(*color))
+                .collect();
             context.picker.shuffle("color", &mut others);
             others.truncate(4);
             others.push(truth);

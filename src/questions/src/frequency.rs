@@ -55,8 +55,13 @@ impl Frequency {
 
     fn total(&self, room: &str, except: Option<&str>) -> BTreeMap<&str, u64> {
         let mut total = BTreeMap::new();
-        let scenes = self.counts.get(room).into_iter().flatten();
-        for (_, counts) in scenes.filter(|(scene, _)| Some(scene.as_str()) != except) {
+        for (_, counts) in self
+            .counts
+            .get(room)
+            .into_iter()
+            .flatten()
+            .filter(|(scene, _)| Some(scene.as_str()) != except)
+        {
             for (class, count) in counts {
                 *total.entry(class.as_str()).or_insert(0) += count;
             }

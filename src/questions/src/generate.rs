@@ -154,8 +154,11 @@ pub fn generate(
                 frame: &frame.frame,
             },
         };
-        let families = request.families.iter();
-        for family in families.filter(|family| Family::PAPER.contains(family)) {
+        for family in request
+            .families
+            .iter()
+            .filter(|family| Family::PAPER.contains(family))
+        {
             let results = apply_rules(family, &context, request.palette);
             let counts = generated.counts.entry(family.clone()).or_default();
             for result in &results {
@@ -279,14 +282,13 @@ impl AnswerCounts {
             .into_iter()
             .partition(|candidate| candidate.truth == answer);
         let eligible = if wanted.is_empty() { others } else { wanted };
-        let rank = |candidate: &Candidate| {
+        let chosen = eligible.into_iter().min_by_key(|candidate| {
             let counts = self.0.get(&(family.clone(), candidate.text.clone()));
             let counts = counts.copied().unwrap_or_default();
             let (own, other) = (counts[candidate.truth], counts[1 - candidate.truth]);
             let bits = context.picker.bits(family.name(), &candidate.text);
             (i128::from(own) - i128::from(other), own + other, bits)
-        };
-        let chosen = eligible.into_iter().min_by_key(rank)?;
+        })?;
         let counts = self.0.entry((family, chosen.text.clone())).or_default();
         counts[chosen.truth] += 1;
         Some(chosen)

@@ -66,13 +66,15 @@ fn mean_light(codes: &[[u8; 3]]) -> f64 {
             libm::pow((value + 0.055) / 1.055, 2.4)
         }
     });
-    let luminance = |code: &[u8; 3]| -> f64 {
-        let parts = code.iter().zip(WEIGHTS);
-        parts
-            .map(|(code, weight)| light[usize::from(*code)] * f64::from(weight))
-            .sum()
-    };
-    let sum: f64 = codes.iter().map(luminance).sum();
+    let sum: f64 = codes
+        .iter()
+        .map(|code: &[u8; 3]| -> f64 {
+            code.iter()
+                .zip(WEIGHTS)
+                .map(|(code, weight)| light[usize::from(*code)] * f64::from(weight))
+                .sum()
+        })
+        .sum();
     (sum / codes.len().max(1) as f64).max(light[1] / 2.0)
 }
 

@@ -19,9 +19,11 @@ pub(super) fn candidates(context: &RuleContext<'_>) -> Vec<RuleResult> {
             .frequency
             .expected(room, &context.statistics.scene, rule.frequent)
     });
-    let classes = context.book.class.iter();
-    let asked = classes.filter(|(_, class)| class.flags.contains(&ClassFlag::Asked));
-    asked
+    context
+        .book
+        .class
+        .iter()
+        .filter(|(_, class)| class.flags.contains(&ClassFlag::Asked))
         .flat_map(|(class, _)| {
             let present = context.statistics.class_pixels(class) > 0;
             let result = if present {
@@ -39,8 +41,12 @@ pub(super) fn candidates(context: &RuleContext<'_>) -> Vec<RuleResult> {
 /// Yes: one segment that is called so is large enough, of one class and not cut by the border.
 fn yes(context: &RuleContext<'_>, class: &str) -> Result<Vec<RuleResult>, Reason> {
     let rule = &context.book.presence;
-    let segments = context.statistics.segments.iter();
-    let mut segments: Vec<&Segment> = segments.filter(|segment| segment.class == class).collect();
+    let mut segments: Vec<&Segment> = context
+        .statistics
+        .segments
+        .iter()
+        .filter(|segment| segment.class == class)
+        .collect();
     segments.sort_by_key(|segment| (std::cmp::Reverse(segment.area), segment.id));
     let mut shown: BTreeMap<&str, &Segment> = BTreeMap::new();
     let mut first_flaw = None;
@@ -113,8 +119,13 @@ fn no(
                 .keys()
                 .any(|word| group.names.contains(word))
     });
-    let resembles = |word: &String| context.book.resembles(word, class);
-    if confused || context.statistics.words.keys().any(resembles) {
+    if confused
+        || context
+            .statistics
+            .words
+            .keys()
+            .any(|word| context.book.resembles(word, class))
+    {
         return Err(Reason::Confusable);
     }
     if expected.is_some_and(|expected| !expected.contains(class)) {
@@ -126,9 +137,10 @@ fn no(
         "mirror_ppm": context.statistics.ppm(context.statistics.class_pixels("mirror")),
         "confusable": groups.flat_map(|group| &group.classes).collect::<BTreeSet<_>>(),
     });
-    let denied = words.into_iter();
-    let denied = denied.map(|word| candidate(context, (class, word), 1, &[], evidence.clone()));
-    Ok(denied.collect())
+    Ok(words
+        .into_iter()
+        .map(|word| candidate(context, (class, word), 1, &[], evidence.clone()))
+        .collect())
 }
 
 fn candidate(

@@ -117,17 +117,22 @@ impl<'a> Signs<'a> {
 
     fn seen(&self, sign: &Sign) -> Option<Vec<&'a Segment>> {
         let segments = self.tokens.get(sign.token.as_str())?;
-        let large = segments
+        let large: Vec<&Segment> = segments
             .iter()
-            .filter(|segment| self.statistics.area(segment) >= sign.area_ppm);
-        let large: Vec<&Segment> = large.copied().collect();
+            .filter(|segment| self.statistics.area(segment) >= sign.area_ppm)
+            .copied()
+            .collect();
         let enough = large.len() >= sign.least && sign.most.is_none_or(|most| large.len() <= most);
         enough.then_some(large)
     }
 
     fn area(&self, token: &str) -> u64 {
-        let segments = self.tokens.get(token).into_iter().flatten();
-        segments.map(|segment| segment.area).sum()
+        self.tokens
+            .get(token)
+            .into_iter()
+            .flatten()
+            .map(|segment| segment.area)
+            .sum()
     }
 
     fn wins(&self, contest: &Contest, score: u32) -> bool {
@@ -147,18 +152,18 @@ impl<'a> Signs<'a> {
     fn behind(&self, first: &[u32], second: &[u32]) -> bool {
         let rule = &self.book.doorway;
         let listed = |ids: &[u32]| -> Vec<&Segment> {
-            let segments = self.statistics.segments.iter();
-            segments
+            self.statistics
+                .segments
+                .iter()
                 .filter(|segment| ids.contains(&segment.id))
                 .collect()
         };
         let (first, second) = (listed(first), listed(second));
         let area = |list: &[&Segment]| -> u64 { list.iter().map(|segment| segment.area).sum() };
         let medians = |list: &[&Segment]| -> Option<Vec<u64>> {
-            let medians = list
-                .iter()
-                .map(|segment| Some(segment.measured(self.book)?.median.into()));
-            medians.collect()
+            list.iter()
+                .map(|segment| Some(segment.measured(self.book)?.median.into()))
+                .collect()
         };
         let (Some(near), Some(far)) = (medians(&first), medians(&second)) else {
             return false;

@@ -137,8 +137,9 @@ impl RuleContext<'_> {
     /// The segments that are evidence for a room type.
     pub(super) fn signs_of(&self, room: &str) -> Vec<&Segment> {
         let signs = self.signs.segments.get(room);
-        let segments = self.statistics.segments.iter();
-        segments
+        self.statistics
+            .segments
+            .iter()
             .filter(|segment| signs.is_some_and(|signs| signs.contains(&segment.id)))
             .collect()
     }
@@ -157,9 +158,13 @@ impl RuleContext<'_> {
 
     /// Whether a thing of a class may be hidden among the unnamed pixels of a coarse class. False for a token that is a word.
     pub(super) fn may_be_hidden(&self, class: &str) -> bool {
-        let hidden = self.book.class.get(class).map(|rule| &rule.hidden);
-        let mut hidden = hidden.into_iter().flatten();
-        hidden.any(|other| self.statistics.unnamed.contains_key(other))
+        self.book
+            .class
+            .get(class)
+            .map(|rule| &rule.hidden)
+            .into_iter()
+            .flatten()
+            .any(|other| self.statistics.unnamed.contains_key(other))
     }
 
     /// Whether the labels of the data set can show that a token is absent. A class must be expressible; a token that is a word

@@ -227,10 +227,10 @@ fn count<'a, K: Ord>(
 
 /// Expected number of right answers of uniform guesses, from the numbers of questions by number of choices.
 fn chance(sizes: &BTreeMap<usize, usize>) -> f64 {
-    let right = sizes
+    sizes
         .iter()
-        .map(|(size, count)| *count as f64 / *size as f64);
-    right.sum()
+        .map(|(size, count)| *count as f64 / *size as f64)
+        .sum()
 }
 
 fn coverage(
@@ -339,13 +339,16 @@ fn prior(list: &[&GeneratedQuestion]) -> f64 {
         }
     }
     let most_common = |text: &str, except: &str| {
-        let answers = counts.get(text).into_iter().flatten();
-        let counts = answers.map(|(answer, scenes)| {
-            let others = scenes.iter().filter(|(scene, _)| **scene != except);
-            (*answer, others.map(|(_, count)| count).sum::<usize>())
-        });
-        let best = counts.filter(|(_, count)| *count > 0);
-        best.min_by_key(|&(answer, count)| (std::cmp::Reverse(count), answer))
+        counts
+            .get(text)
+            .into_iter()
+            .flatten()
+            .map(|(answer, scenes)| {
+                let others = scenes.iter().filter(|(scene, _)| **scene != except);
+                (*answer, others.map(|(_, count)| count).sum::<usize>())
+            })
+            .filter(|(_, count)| *count > 0)
+            .min_by_key(|&(answer, count)| (std::cmp::Reverse(count), answer))
             .map(|(answer, _)| answer)
     };
     let (mut right, mut guesses) = (0_usize, BTreeMap::<usize, usize>::new());

@@ -18,9 +18,12 @@ impl Views {
     pub fn new(frames: &[FrameStatistics], palette: &Palette, book: &RuleBook) -> Self {
         let mut views = Self::default();
         for frame in frames {
-            let named = frame.segments.iter();
-            let named = named.filter(|segment| segment.source == WordSource::Name);
-            for segment in named.filter(|segment| segment.core >= book.color.view_px) {
+            for segment in frame
+                .segments
+                .iter()
+                .filter(|segment| segment.source == WordSource::Name)
+                .filter(|segment| segment.core >= book.color.view_px)
+            {
                 let colors = views.0.entry(Self::key(frame, segment)).or_default();
                 colors.insert(palette.color(segment.median));
             }

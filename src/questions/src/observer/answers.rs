@@ -45,11 +45,11 @@ impl Observation {
     fn affordance(&self, activity: usize, rules: &Rules) -> Option<String> {
         let book = rules.book();
         let activity = book.activity.get(activity)?;
-        let seen = |token: &String| self.statistics.shows(token, book);
-        let enabled = activity
-            .enablers
-            .iter()
-            .any(|tokens| tokens.iter().all(seen));
+        let enabled = activity.enablers.iter().any(|tokens| {
+            tokens
+                .iter()
+                .all(|token| self.statistics.shows(token, book))
+        });
         let yes = enabled || activity.rooms.contains(&self.room(rules)?);
         Some(yes_no(yes))
     }
@@ -57,8 +57,11 @@ impl Observation {
     /// Yes if the thing is seen. No if at least half of the area of all things is seen, and the thing is not among it: without
     /// this, a black image would be answered with no.
     fn presence(&self, thing: &ThingWord, rules: &Rules) -> Option<String> {
-        let mut seen = self.statistics.segments.iter();
-        let is_seen = seen.any(|segment| thing.calls(segment, rules.book()));
+        let is_seen = self
+            .statistics
+            .segments
+            .iter()
+            .any(|segment| thing.calls(segment, rules.book()));
         (is_seen || self.sees_half(rules)).then(|| yes_no(is_seen))
     }
 
@@ -68,9 +71,11 @@ impl Observation {
         let is_thing = |segment: &&Segment| !book.is(&segment.class, ClassFlag::Structural);
         let has_things = self.frame.segments.iter().any(|segment| is_thing(&segment));
         let area = |segments: &[Segment]| -> u64 {
-            let counted = segments.iter();
-            let counted = counted.filter(|segment| !has_things || is_thing(segment));
-            counted.map(|segment| segment.area).sum()
+            segments
+                .iter()
+                .filter(|segment| !has_things || is_thing(segment))
+                .map(|segment| segment.area)
+                .sum()
         };
         let (seen, all) = (area(&self.statistics.segments), area(&self.frame.segments));
         all > 0 && 2 * seen >= all
@@ -84,15 +89,18 @@ impl Observation {
         rules: &Rules,
         palette: &Palette,
     ) -> Option<String> {
-        let segments = self.frame.segments.iter();
-        let largest = segments
+        let largest = self
+            .frame
+            .segments
+            .iter()
             .filter(|segment| thing.calls(segment, rules.book()))
             .max_by_key(|segment| (segment.area, std::cmp::Reverse(segment.id)))?;
         let shade: &Shade = self.shades.get(&largest.id)?.as_ref()?;
         let texts = question.choices.texts();
-        let offered = Color::ALL.into_iter();
-        let offered = offered.filter(|color| texts.iter().any(|text| text == color.name()));
-        let offered: Vec<Color> = offered.collect();
+        let offered: Vec<Color> = Color::ALL
+            .into_iter()
+            .filter(|color| texts.iter().any(|text| text == color.name()))
+            .collect();
         let color = shade.name(palette, &offered)?;
         Some(color.name().to_owned())
     }
@@ -101,20 +109,23 @@ impl Observation {
     fn closest(&self, question: &Question, rules: &Rules) -> Option<String> {
         let book = rules.book();
         let texts = question.choices.texts();
-        let offered = |segment: &&Segment| {
-            let word = segment.called(book);
-            book.is(&segment.class, ClassFlag::Asked)
-                && texts.iter().any(|text| Some(&**text) == word)
-        };
-        let segments = self.statistics.segments.iter().filter(offered);
-        let measured: Vec<_> = segments
+        let measured: Vec<_> = self
+            .statistics
+            .segments
+            .iter()
+            .filter(|segment| {
+                let word = segment.called(book);
+                book.is(&segment.class, ClassFlag::Asked)
+                    && texts.iter().any(|text| Some(&**text) == word)
+            })
             .filter_map(|segment| Some((segment.measured(book)?, segment)))
             .collect();
         let (_, nearest) = measured
             .iter()
             .min_by_key(|(depth, _)| (depth.median, depth.p10))?;
-        let mut others = measured.iter();
-        let has_two = others.any(|(_, segment)| segment.class != nearest.class);
+        let has_two = measured
+            .iter()
+            .any(|(_, segment)| segment.class != nearest.class);
         has_two.then(|| nearest.called(book).map(str::to_owned))?
     }
 }

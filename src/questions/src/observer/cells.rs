@@ -92,11 +92,12 @@ impl Cells {
     /// The mask of each pixel.
     pub(super) fn mask_of_pixels(&self) -> Vec<u32> {
         let patches = &self.scales[0].patches;
-        let runs = self.runs.iter();
-        runs.flat_map(|run| {
-            std::iter::repeat_n(patches[run.patch as usize].mask, run.length as usize)
-        })
-        .collect()
+        self.runs
+            .iter()
+            .flat_map(|run| {
+                std::iter::repeat_n(patches[run.patch as usize].mask, run.length as usize)
+            })
+            .collect()
     }
 }
 
@@ -142,12 +143,14 @@ impl Scale {
             *counts.entry((cell_of(patch.cell), patch.mask)).or_default() += patch.count;
         }
         let numbers: BTreeMap<(usize, u32), usize> = counts.keys().copied().zip(0..).collect();
-        let part_of = smallest.iter();
-        let part_of = part_of.map(|patch| numbers[&(cell_of(patch.cell), patch.mask)] as u32);
-        let part_of = part_of.collect();
-        let patches = counts.into_iter();
-        let patches = patches.map(|((cell, mask), count)| Patch { cell, mask, count });
-        let patches: Vec<Patch> = patches.collect();
+        let part_of = smallest
+            .iter()
+            .map(|patch| numbers[&(cell_of(patch.cell), patch.mask)] as u32)
+            .collect();
+        let patches: Vec<Patch> = counts
+            .into_iter()
+            .map(|((cell, mask), count)| Patch { cell, mask, count })
+            .collect();
         let cells = patches.last().map_or(0, |last| last.cell + 1);
         Self {
             elements: elements(&patches, cells, side * scale, |cell| {

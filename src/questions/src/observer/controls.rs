@@ -231,8 +231,10 @@ fn drawn_outlines(frame: &ObservedFrame) -> Rgb {
     for (i, pixel) in image.samples_mut().chunks_exact_mut(3).enumerate() {
         let right = (i % width + 1 < width).then_some(i + 1);
         let below = masks.get(i + width).map(|_| i + width);
-        let mut others = [right, below].into_iter().flatten();
-        let is_outline = others.any(|other| masks[other] != masks[i]);
+        let is_outline = [right, below]
+            .into_iter()
+            .flatten()
+            .any(|other| masks[other] != masks[i]);
         pixel.fill(if is_outline { 0 } else { 128 });
     }
     image

@@ -52,11 +52,12 @@ fn by_tile(tiles: &Tiles, sums: &TileSums, whole: &Fit) -> Option<Fit> {
     let curves = curves(tiles, sums, whole);
     let moments = moments(tiles, sums, &curves);
     let found: Vec<Contrast> = moments.iter().map(Contrast::from_moments).collect();
-    let votes = (0..tiles.len()).filter(|tile| tiles.has_contrast(*tile));
-    let [yes, all] = votes.fold([0, 0], |[yes, all], tile| {
-        let agrees = AGREEING.contains(&found[tile].amplitude);
-        [yes + usize::from(agrees), all + 1]
-    });
+    let [yes, all] = (0..tiles.len())
+        .filter(|tile| tiles.has_contrast(*tile))
+        .fold([0, 0], |[yes, all], tile| {
+            let agrees = AGREEING.contains(&found[tile].amplitude);
+            [yes + usize::from(agrees), all + 1]
+        });
     if yes == 0 || 2 * yes < all {
         return None;
     }
@@ -110,8 +111,9 @@ fn curves(tiles: &Tiles, sums: &TileSums, whole: &Fit) -> [[f64; CODES]; 3] {
             .iter()
             .zip(&gains)
             .map(|(moments, gains)| {
-                let residual = moments.iter().zip(gains);
-                let residual: f64 = residual
+                let residual: f64 = moments
+                    .iter()
+                    .zip(gains)
                     .map(|(moments, gain)| moments.residual(*gain))
                     .sum();
                 residual
@@ -264,13 +266,15 @@ fn field(tiles: &Tiles, moments: &[[Moments; 3]], weights: &[f64]) -> Vec<[f64; 
         }
         equations.solve()
     });
-    let gains = terms.iter().map(|terms| {
-        fields.map(|field| {
-            let gain: f64 = field.iter().zip(terms).map(|(c, term)| c * term).sum();
-            gain.max(MIN_GAIN)
+    terms
+        .iter()
+        .map(|terms| {
+            fields.map(|field| {
+                let gain: f64 = field.iter().zip(terms).map(|(c, term)| c * term).sum();
+                gain.max(MIN_GAIN)
+            })
         })
-    });
-    gains.collect()
+        .collect()
 }
 
 /// Normal equations of a weighted linear regression on `N` terms; the first is constant.

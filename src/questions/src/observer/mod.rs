@@ -119,8 +119,9 @@ impl ObservedFrame {
             .iter()
             .filter(|(_, outline)| outline.confirmed >= min_confirmed);
         let light = Light::new(&self.cells, &self.tiles, &sums, &fit);
-        let shades = seen.map(|(id, _)| (*id, light.shade(masks[id] as u32)));
-        let shades: BTreeMap<u32, Option<Shade>> = shades.collect();
+        let shades: BTreeMap<u32, Option<Shade>> = seen
+            .map(|(id, _)| (*id, light.shade(masks[id] as u32)))
+            .collect();
         Observation {
             explained: fit.explained,
             statistics: self.seen_only(&shades),
@@ -186,8 +187,10 @@ impl Observation {
     /// The number of things that are detected by their whole outline. This does not decide answers.
     #[must_use]
     pub fn detected(&self) -> usize {
-        let outlines = self.outlines.values();
-        outlines.filter(|outline| outline.is_detected()).count()
+        self.outlines
+            .values()
+            .filter(|outline| outline.is_detected())
+            .count()
     }
 
     /// Whether the segment of this number is seen.
@@ -198,13 +201,16 @@ impl Observation {
 
     /// The segments of the frame that are not tiny, each with its number and class.
     pub fn segments(&self) -> impl Iterator<Item = (u32, &str)> {
-        let segments = self.frame.segments.iter();
-        segments.map(|segment| (segment.id, &*segment.class))
+        self.frame
+            .segments
+            .iter()
+            .map(|segment| (segment.id, &*segment.class))
     }
 
     /// For each thing by its number, the share of its outline that is confirmed, from 0 to 1, and the z of the whole outline.
     pub fn outlines(&self) -> impl Iterator<Item = (u32, f64, f64)> {
-        let outlines = self.outlines.iter();
-        outlines.map(|(id, outline)| (*id, outline.confirmed, outline.z))
+        self.outlines
+            .iter()
+            .map(|(id, outline)| (*id, outline.confirmed, outline.z))
     }
 }

@@ -240,20 +240,21 @@ fn filters(scale: &Scale, smallest: &[PatchSums], tiles: &[TileFit]) -> Vec<Filt
             elements().filter(|(element, _)| tiles[element.tile].is_disturbed == is_disturbed);
         [0, 1, 2].map(|channel| excess(alike.clone().map(|(_, contrast)| contrast[channel])))
     });
-    let filter = |(element, contrast): (&Element, &[Contrast; 3])| {
-        let excess = excess[usize::from(tiles[element.tile].is_disturbed)];
-        let mut filter = Filter::default();
-        for (contrast, excess) in contrast.iter().zip(excess) {
-            let (predicted, variance) = (contrast.predicted, contrast.variance * excess);
-            filter.add(&Filter {
-                output: predicted * contrast.received / variance,
-                power: predicted * predicted / variance,
-                rest: predicted * (contrast.received - predicted) / variance,
-            });
-        }
-        filter
-    };
-    elements().map(filter).collect()
+    elements()
+        .map(|(element, contrast)| {
+            let excess = excess[usize::from(tiles[element.tile].is_disturbed)];
+            let mut filter = Filter::default();
+            for (contrast, excess) in contrast.iter().zip(excess) {
+                let (predicted, variance) = (contrast.predicted, contrast.variance * excess);
+                filter.add(&Filter {
+                    output: predicted * contrast.received / variance,
+                    power: predicted * predicted / variance,
+                    rest: predicted * (contrast.received - predicted) / variance,
+                });
+            }
+            filter
+        })
+        .collect()
 }
 
 /// Ratio of the contrasts' scatter about the predicted ones to that expected from their variances; at least 1.

@@ -32,16 +32,18 @@ pub(super) fn area_mean(image: &Rgb, [width, height]: [usize; 2]) -> Cow<'_, Rgb
 
 /// For each of `to` equal parts of `from` pixels, the pixels that it covers and how much of them, in parts of a pixel / `to`.
 fn spans(from: usize, to: usize) -> Vec<Vec<(usize, u64)>> {
-    let span = |part: usize| {
-        let (start, end) = (part * from, (part + 1) * from);
-        let pixels = start / to..end.div_ceil(to);
-        let covered = pixels.map(|pixel| {
-            let overlap = end.min((pixel + 1) * to) - start.max(pixel * to);
-            (pixel, overlap as u64)
-        });
-        covered.collect()
-    };
-    (0..to).map(span).collect()
+    (0..to)
+        .map(|part: usize| {
+            let (start, end) = (part * from, (part + 1) * from);
+            let pixels = start / to..end.div_ceil(to);
+            pixels
+                .map(|pixel| {
+                    let overlap = end.min((pixel + 1) * to) - start.max(pixel * to);
+                    (pixel, overlap as u64)
+                })
+                .collect()
+        })
+        .collect()
 }
 
 #[cfg(test)]

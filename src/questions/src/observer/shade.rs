@@ -105,9 +105,11 @@ impl<'a> Light<'a> {
         for (part, whole) in self.sums.iter().zip(&coarsest.part_of) {
             sums[*whole as usize].add(part);
         }
-        let patches = coarsest.patches.iter().zip(&sums);
-        let undisturbed = patches.filter(|(patch, _)| !self.fit.tiles[patch.cell].is_disturbed);
-        undisturbed
+        coarsest
+            .patches
+            .iter()
+            .zip(&sums)
+            .filter(|(patch, _)| !self.fit.tiles[patch.cell].is_disturbed)
             .map(|(patch, sums)| {
                 let pixels = f64::from(patch.count);
                 let means = [0, 1, 2].map(|channel| sums.means(channel, pixels));
@@ -137,8 +139,8 @@ impl<'a> Light<'a> {
             .collect();
         let is_disturbed = |tile: usize| self.fit.tiles[tile].is_disturbed;
         let all_are = patches.iter().all(|(tile, ..)| is_disturbed(*tile));
-        let patches = patches.into_iter();
         let patches: Vec<_> = patches
+            .into_iter()
             .filter(|(tile, ..)| all_are || !is_disturbed(*tile))
             .collect();
         let places: Vec<[f64; 2]> = patches
@@ -203,8 +205,10 @@ impl Shade {
             return None;
         }
         let codes = [0, 1, 2].map(|channel| self.0[channel].mean.round() as u8);
-        let first = palette.color(codes).filter(|color| offered.contains(color));
-        first.or_else(|| self.most_probable(palette, offered))
+        palette
+            .color(codes)
+            .filter(|color| offered.contains(color))
+            .or_else(|| self.most_probable(palette, offered))
     }
 
     /// The offered colour with the most posterior mass; of several, the first.

@@ -32,20 +32,21 @@ fn normal(seed: u64) -> impl FnMut() -> f64 {
 fn discs(columns: usize, radius: f64) -> Vec<u32> {
     let [width, height] = SIZE;
     let side = (width / columns).min(height);
-    let mask = |i: usize| {
-        let (x, y) = (i % width, i / width);
-        let (column, row) = (x / side, y / side);
-        let middle = |at: usize| (at * side) as f64 + side as f64 / 2.0 - 0.5;
-        let (dx, dy) = (x as f64 - middle(column), y as f64 - middle(row));
-        let is_inside = dx * dx + dy * dy < radius * radius;
-        let is_inside = is_inside && column < columns && (row + 1) * side <= height;
-        if is_inside {
-            2 + (row * columns + column) as u32
-        } else {
-            1
-        }
-    };
-    (0..width * height).map(mask).collect()
+    (0..width * height)
+        .map(|i: usize| {
+            let (x, y) = (i % width, i / width);
+            let (column, row) = (x / side, y / side);
+            let middle = |at: usize| (at * side) as f64 + side as f64 / 2.0 - 0.5;
+            let (dx, dy) = (x as f64 - middle(column), y as f64 - middle(row));
+            let is_inside = dx * dx + dy * dy < radius * radius;
+            let is_inside = is_inside && column < columns && (row + 1) * side <= height;
+            if is_inside {
+                2 + (row * columns + column) as u32
+            } else {
+                1
+            }
+        })
+        .collect()
 }
 
 /// An image with the same code in all channels, by pixel.
@@ -111,18 +112,26 @@ fn z_is_contrast_over_noise_times_the_root_of_the_pixels() {
     });
     let cells = Cells::from_masks(&masks, SIZE);
     // An element of n inside and m outside has as much as 1 / (1/n + 1/m) pixels, in each of three channels.
-    let pixels = cells.scales.iter().map(|scale| -> f64 {
-        let own = scale.elements.iter().filter(|element| element.mask == 2);
-        own.map(|element| 3.0 / (1.0 / element.inside + 1.0 / element.outside))
-            .sum()
-    });
-    let pixels = pixels.fold(0.0, f64::max);
+    let pixels = cells
+        .scales
+        .iter()
+        .map(|scale| -> f64 {
+            scale
+                .elements
+                .iter()
+                .filter(|element| element.mask == 2)
+                .map(|element| 3.0 / (1.0 / element.inside + 1.0 / element.outside))
+                .sum()
+        })
+        .fold(0.0, f64::max);
     let expected = contrast / (deviation * deviation + 1.0 / 12.0_f64).sqrt() * pixels.sqrt();
-    let found = (0..8).flat_map(|seed| {
-        let noisy = in_noise(&untouched, deviation, seed);
-        look(&masks, &untouched, &noisy).split_off(2)
-    });
-    let found: Vec<f64> = found.map(|outline| outline.z).collect();
+    let found: Vec<f64> = (0..8)
+        .flat_map(|seed| {
+            let noisy = in_noise(&untouched, deviation, seed);
+            look(&masks, &untouched, &noisy).split_off(2)
+        })
+        .map(|outline| outline.z)
+        .collect();
     let mean = found.iter().sum::<f64>() / found.len() as f64;
     // The factors of the noise are never below 1, so that with thirteen outlines z is some 6 % below, and never above.
     assert!(

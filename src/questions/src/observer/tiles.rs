@@ -124,8 +124,9 @@ impl Tiles {
         let bands = untouched.chunks(band).zip(received.chunks(band));
         for (first, (untouched, received)) in (0..).step_by(self.columns.max(1)).zip(bands) {
             for (untouched, received) in untouched.chunks(row).zip(received.chunks(row)) {
-                let pieces = untouched.chunks(self.side * 3);
-                let pieces = pieces.zip(received.chunks(self.side * 3));
+                let pieces = untouched
+                    .chunks(self.side * 3)
+                    .zip(received.chunks(self.side * 3));
                 for (sums, (untouched, received)) in row_of_tiles.iter_mut().zip(pieces) {
                     add(sums, untouched, received);
                 }
@@ -152,10 +153,9 @@ impl Tiles {
         channel: usize,
     ) -> impl Iterator<Item = SameCode> {
         let range = self.range(tile, channel);
-        let counted = self.codes[range.clone()]
+        self.codes[range.clone()]
             .iter()
-            .zip(&self.counts[range.clone()]);
-        counted
+            .zip(&self.counts[range.clone()])
             .zip(&sums.0[range])
             .map(|((code, count), sums)| SameCode {
                 code: usize::from(*code),

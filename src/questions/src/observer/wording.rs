@@ -54,8 +54,10 @@ impl QuestionTopic {
         }
         let word = |singular: &str, plural: &str| {
             book.class.iter().find_map(|(class, rule)| {
-                let mut words = rule.words.iter();
-                let word = words.find(|word| text == book.filled(singular, plural, word))?;
+                let word = rule
+                    .words
+                    .iter()
+                    .find(|word| text == book.filled(singular, plural, word))?;
                 Some(ThingWord {
                     class: class.clone(),
                     word: word.clone(),

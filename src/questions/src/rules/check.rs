@@ -99,8 +99,12 @@ impl RuleBook {
                 ));
             }
         }
-        let grammar = self.words.plural.iter().chain(&self.words.an);
-        let mut named = grammar.chain(self.words.spelled.values());
+        let mut named = self
+            .words
+            .plural
+            .iter()
+            .chain(&self.words.an)
+            .chain(self.words.spelled.values());
         match named.find(|word| !known.contains(word.as_str())) {
             Some(word) => Err(format!("[words] has {word:?}, which no class has")),
             None => Ok(()),
@@ -118,19 +122,19 @@ impl RuleBook {
                 return Err(format!("room.order has {room:?} twice"));
             }
         }
-        let named = order
+        for room in order
             .iter()
-            .chain(self.contest.iter().flat_map(|c| [&c.winner, &c.loser]));
-        let named = named.chain(self.activity.iter().flat_map(|activity| &activity.rooms));
-        for room in named {
+            .chain(self.contest.iter().flat_map(|c| [&c.winner, &c.loser]))
+            .chain(self.activity.iter().flat_map(|activity| &activity.rooms))
+        {
             if !rooms.contains(room.as_str()) {
                 return Err(format!("the room {room:?} has no clue"));
             }
         }
-        let signs = self.clue.iter().flat_map(|clue| {
-            let seen = clue.seen.iter().map(|sign| &sign.token);
-            seen.chain(&clue.unseen)
-        });
+        let signs = self
+            .clue
+            .iter()
+            .flat_map(|clue| clue.seen.iter().map(|sign| &sign.token).chain(&clue.unseen));
         let enablers = self
             .activity
             .iter()

@@ -161,18 +161,20 @@ impl RuleBook {
     pub fn resembles(&self, word: &str, class: &str) -> bool {
         let plain = word.replace('_', " ");
         let spelled = self.words.spelled.get(&plain).unwrap_or(&plain);
-        let words = self.class.get(class).into_iter();
-        let mut words = words.flat_map(|class| &class.words);
-        words.any(|known| {
-            let before = spelled.strip_suffix(known.as_str());
-            before.is_some_and(|before| before.is_empty() || before.ends_with(' '))
-        })
+        self.class
+            .get(class)
+            .into_iter()
+            .flat_map(|class| &class.words)
+            .any(|known| {
+                let before = spelled.strip_suffix(known.as_str());
+                before.is_some_and(|before| before.is_empty() || before.ends_with(' '))
+            })
     }
 
     /// The token of a segment by its word and class; the class itself if no token matches.
     #[must_use]
     pub fn token<'a>(&'a self, name: &str, class: &'a str) -> &'a str {
-        let matches = |token: &&TokenRule| {
+        let token = self.token.iter().find(|token| {
             let word_matches = token.names.contains(name)
                 || token
                     .starts
@@ -180,8 +182,7 @@ impl RuleBook {
                     .any(|start| name.starts_with(start.as_str()))
                 || token.names.is_empty() && token.starts.is_empty();
             word_matches && token.class.as_deref().is_none_or(|only| only == class)
-        };
-        let token = self.token.iter().find(matches);
+        });
         token.map_or(class, |token| &token.token)
     }
 }
@@ -214,8 +215,12 @@ mod tests {
     fn every_word_has_its_article() {
         let rules = Rules::built_in().unwrap();
         let book = rules.book();
-        let words = book.class.values().flat_map(|class| &class.words);
-        for word in words.filter(|word| !book.words.plural.contains(*word)) {
+        for word in book
+            .class
+            .values()
+            .flat_map(|class| &class.words)
+            .filter(|word| !book.words.plural.contains(*word))
+        {
             let vowel = word.starts_with(['a', 'e', 'i', 'o', 'u']);
             assert_eq!(book.words.an.contains(word), vowel, "{word}");
             let plural = word.ends_with('s') && word != "chest of drawers";

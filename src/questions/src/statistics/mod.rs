@@ -263,8 +263,9 @@ impl FrameStatistics {
 
     /// The segments that are evidence.
     pub fn evidence<'a>(&'a self, book: &'a RuleBook) -> impl Iterator<Item = &'a Segment> {
-        let segments = self.segments.iter();
-        segments.filter(|segment| self.qualified(segment, book))
+        self.segments
+            .iter()
+            .filter(|segment| self.qualified(segment, book))
     }
 
     /// Whether the frame has any pixel of a token, tiny segments included.
@@ -275,9 +276,10 @@ impl FrameStatistics {
         }
         // Words are looked up without a class, because tiny segments are counted by word only. A token that needs a class
         // has the name of this class.
-        let words = self.words.keys();
-        let mut tokens = words.map(|word| book.token(word, ""));
-        tokens.any(|found| found == token)
+        self.words
+            .keys()
+            .map(|word| book.token(word, ""))
+            .any(|found| found == token)
     }
 }
 

@@ -73,8 +73,9 @@ impl LightSamples {
         let last = self
             .samples
             .partition_point(|sample| sample.place[1] < rows.end);
-        let near = self.samples[first..last].iter();
-        let near = near.filter(|sample| sample.mask != mask && columns.contains(&sample.place[0]));
+        let near = self.samples[first..last]
+            .iter()
+            .filter(|sample| sample.mask != mask && columns.contains(&sample.place[0]));
         high(near.map(|sample| pixel_luma(sample.rgb)), self.percents[1])
     }
 }

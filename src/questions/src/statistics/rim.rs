@@ -79,10 +79,8 @@ fn streak<T: PartialEq>(values: &[T]) -> Option<usize> {
     /// Number of values compared without a branch, so that the compiler can use SIMD.
     const LANES: usize = 32;
     let first = values.first()?;
-    let different = |lanes: &[T; LANES]| -> u32 {
-        let differs = lanes.iter().map(|value| u32::from(value != first));
-        differs.sum()
-    };
+    let different =
+        |lanes: &[T; LANES]| -> u32 { lanes.iter().map(|value| u32::from(value != first)).sum() };
     let (chunks, _) = values.as_chunks::<LANES>();
     let whole = LANES
         * chunks

@@ -254,8 +254,9 @@ impl<'a> SceneMaps<'a> {
         let [width, height] = self.size;
         let all = joint
             .iter()
-            .filter(|((_, id), _)| self.class(*id).is_none());
-        let all = all.map(|(_, count)| count).sum();
+            .filter(|((_, id), _)| self.class(*id).is_none())
+            .map(|(_, count)| count)
+            .sum();
         if all == 0 {
             return (0, 0, 0);
         }

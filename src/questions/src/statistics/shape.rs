@@ -55,13 +55,15 @@ fn rim(
         return (to - from) as u64;
     };
     let differs = |x: usize| above[x] != mask || below[x] != mask;
-    let both = above[from..to].iter().zip(&below[from..to]);
-    let count: u32 = both
+    let count: u32 = above[from..to]
+        .iter()
+        .zip(&below[from..to])
         .map(|(above, below)| u32::from(*above != mask) | u32::from(*below != mask))
         .sum();
     let last = (right - left > 1).then(|| right - 1);
-    let ends = std::iter::once(left).chain(last);
-    let whole = ends.filter(|x| (from..to).contains(x) && !differs(*x));
+    let whole = std::iter::once(left)
+        .chain(last)
+        .filter(|x| (from..to).contains(x) && !differs(*x));
     u64::from(count) + whole.count() as u64
 }
 
@@ -135,8 +137,10 @@ impl MaskShapes {
         };
         let word = own.map_or_else(
             || {
-                let of_class = labels.filter(|((_, id), _)| scene.class(*id) == Some(class));
-                let most_common = of_class.rev().max_by_key(|(_, count)| **count);
+                let most_common = labels
+                    .filter(|((_, id), _)| scene.class(*id) == Some(class))
+                    .rev()
+                    .max_by_key(|(_, count)| **count);
                 most_common.map_or("", |((_, id), _)| scene.word(*id))
             },
             |name| &name.name,

@@ -449,8 +449,9 @@ fn the_light_of_a_frame_is_that_of_its_surfaces() {
     let measured = measure(&frame, &labels, &rules, &palette, Digest::from_bytes(b"")).unwrap();
     assert_eq!(measured.light, [200; 3]);
     let around = |class: &str| {
-        let mut segments = measured.segments.iter();
-        segments
+        measured
+            .segments
+            .iter()
             .find(|segment| segment.class == class)
             .unwrap()
             .around

@@ -71,17 +71,16 @@ fn an_activity_that_the_data_set_cannot_enable_is_not_asked_about() {
     let reasons = |labels: &Labels, frames: &[FrameStatistics]| {
         let rules = Rules::built_in().unwrap();
         let results = run_rules_of(frames, |_| {}, &rules, labels);
-        let about = |result: &RuleResult| match result {
-            RuleResult::Viable(candidate) if candidate.about == "do the laundry" => Some(None),
-            RuleResult::Rejected(rejected) if rejected.about == "do the laundry" => {
-                Some(Some(rejected.reason))
-            }
-            _ => None,
-        };
         results
             .candidates
             .iter()
-            .filter_map(about)
+            .filter_map(|result| match result {
+                RuleResult::Viable(candidate) if candidate.about == "do the laundry" => Some(None),
+                RuleResult::Rejected(rejected) if rejected.about == "do the laundry" => {
+                    Some(Some(rejected.reason))
+                }
+                _ => None,
+            })
             .collect::<Vec<_>>()
     };
     let bedroom = [frame(&BEDROOM)];

@@ -193,7 +193,7 @@ fn two_views_of_a_thing_must_show_the_same_colour() {
     let reason = |other: FrameStatistics| {
         let first = view("a/0", "a", brown, 100_000, WordSource::Name);
         let results = run_rules(&[first, other], |_| {}, &Rules::built_in().unwrap());
-        let mut reasons = results
+        results
             .candidates
             .into_iter()
             .filter_map(|result| match result {
@@ -202,8 +202,9 @@ fn two_views_of_a_thing_must_show_the_same_colour() {
                     Some(Some(found.reason))
                 }
                 _ => None,
-            });
-        reasons.next().unwrap()
+            })
+            .next()
+            .unwrap()
     };
     let named = WordSource::Name;
     assert_eq!(reason(view("a/1", "a", brown, 100_000, named)), None);

@@ -20,7 +20,6 @@ use crate::colors::{Color, NONE, Palette};
 use crate::generate::{Generated, QuestionRequest, generate};
 use crate::reason::Reason;
 use crate::room::{NoRoom, RoomSigns, RoomSource, classify};
-use crate::rule_context::GeneratedQuestion;
 use crate::rule_context::{Candidate, RuleResult};
 use crate::rules::Rules;
 use crate::statistics::{

@@ -133,14 +133,18 @@ fn nothing_is_denied_that_a_coarse_class_may_hide() {
 fn only_words_of_the_data_set_are_denied() {
     let denied = |frames: &[FrameStatistics]| -> BTreeSet<String> {
         let results = run_rules(frames, |_| {}, &Rules::built_in().unwrap());
-        let results = results.candidates.into_iter();
-        let texts = results.filter_map(|result| match result {
-            RuleResult::Viable(found) if found.about == "lighting" && found.answer() == "no" => {
-                Some(found.text)
-            }
-            _ => None,
-        });
-        texts.collect()
+        results
+            .candidates
+            .into_iter()
+            .filter_map(|result| match result {
+                RuleResult::Viable(found)
+                    if found.about == "lighting" && found.answer() == "no" =>
+                {
+                    Some(found.text)
+                }
+                _ => None,
+            })
+            .collect()
     };
     let wall = frame(&[("wall", "wall", 500_000)]);
     let lamp = "Is there a lamp in the image?".to_owned();

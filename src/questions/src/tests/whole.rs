@@ -76,10 +76,11 @@ fn yes_and_no_are_nearly_even_before_anything_is_dropped() {
     )
     .generated;
     let mut counts: BTreeMap<(&Family, &str), [i64; 2]> = BTreeMap::new();
-    let binary = |asked: &&GeneratedQuestion| {
-        matches!(asked.question.family, Family::Affordance | Family::Presence)
-    };
-    for asked in generated.asked.iter().filter(binary) {
+    for asked in generated
+        .asked
+        .iter()
+        .filter(|asked| matches!(asked.question.family, Family::Affordance | Family::Presence))
+    {
         counts
             .entry((&asked.question.family, &asked.about))
             .or_default()[asked.question.choices.truth().unwrap()] += 1;
