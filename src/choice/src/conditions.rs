@@ -45,14 +45,19 @@ fn within(
         return Vec::new();
     };
     let has = |role: Role| elements.iter().any(|element| element.has(role));
-    let opening = |element: &&Element| !element.has(Role::And) && !element.has(Role::Adverb);
-    let head = elements.iter().find(opening).unwrap_or(first);
+    let head = elements
+        .iter()
+        .find(|element| !element.has(Role::And) && !element.has(Role::Adverb))
+        .unwrap_or(first);
     // "Were it brighter, I would …", "I would …, were it brighter".
-    let begins = |(before, element): (&Element, &Element)| {
-        before.boundary > Boundary::None && element.has(Role::Inverted)
-    };
     let inverted = head.has(Role::Inverted)
-        || (has(Role::ModalPast) && elements.iter().zip(&elements[1..]).any(begins));
+        || (has(Role::ModalPast)
+            && elements
+                .iter()
+                .zip(&elements[1..])
+                .any(|(before, element)| {
+                    before.boundary > Boundary::None && element.has(Role::Inverted)
+                }));
     // "With more light".
     let in_light = elements
         .windows(LIGHT.len())

@@ -21,8 +21,10 @@ pub(super) fn contradiction(view: &ReplyView<'_>) -> Option<Answer> {
 
 /// The text that stands with a letter as its label or in apposition.
 fn paired_text(view: &ReplyView<'_>, letter: &Name) -> Option<Name> {
-    let counts = |name: &Name| name.state.counts();
-    if let Some(text) = view.names.text_before(letter).filter(counts)
+    if let Some(text) = view
+        .names
+        .text_before(letter)
+        .filter(|name| name.state.counts())
         && view.text[letter.end..].starts_with([')', ']'])
     {
         let next = view.names.labelled_text(letter);

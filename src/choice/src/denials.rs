@@ -63,8 +63,13 @@ fn passed(clauses: &Clauses<'_>, at: usize) -> Option<usize> {
     }
     if word == "not" || word.ends_with("n't") {
         let within = at + 1..at + PARENTHESIS_WITHIN;
-        let second = within.into_iter().find(|at| clauses.is_sign(*at, &[',']));
-        return Some(second.unwrap_or(at) + 1);
+        return Some(
+            within
+                .into_iter()
+                .find(|at| clauses.is_sign(*at, &[',']))
+                .unwrap_or(at)
+                + 1,
+        );
     }
     list(clauses, at)
 }

@@ -103,8 +103,12 @@ impl Exclusions<'_> {
             let is_named = self.names.any(self.clause, element.start);
             // "It is wrong" refers to the last name.
             let pronoun = !is_named && last && self.is_pronoun(verb);
-            let name = self.names.last_before(element.start).filter(|_| pronoun);
-            return Some(name.unwrap_or(self.clause));
+            return Some(
+                self.names
+                    .last_before(element.start)
+                    .filter(|_| pronoun)
+                    .unwrap_or(self.clause),
+            );
         }
         // Without a verb, it is a predicate only directly after a name.
         let joints = [':', '-', '–', '—', '(', ',', '=', '→', ')', ']'];
@@ -124,12 +128,14 @@ impl Exclusions<'_> {
     /// Whether the clause of a verb has nothing but a pronoun before it.
     fn is_pronoun(&self, verb: usize) -> bool {
         let elements = &self.clauses.elements;
-        let subject = elements[..=verb].iter().rev();
-        let mut subject = subject.take_while(|element| element.start >= self.clause);
-        subject.all(|element| {
-            element
-                .roles
-                .has_any(&[Role::Pronoun, Role::Adverb, Role::Copula, Role::Modal])
-        })
+        elements[..=verb]
+            .iter()
+            .rev()
+            .take_while(|element| element.start >= self.clause)
+            .all(|element| {
+                element
+                    .roles
+                    .has_any(&[Role::Pronoun, Role::Adverb, Role::Copula, Role::Modal])
+            })
     }
 }

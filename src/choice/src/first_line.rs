@@ -28,8 +28,10 @@ pub(super) fn first_line(view: &ReplyView<'_>) -> Option<Answer> {
     let names_other = |name: &Name| {
         name.choice != Some(index) && name.delimiting > Delimiting::Loose && name.is_affirmed()
     };
-    let mut elements = view.clauses.elements.iter();
-    let taken_back = elements
+    let taken_back = view
+        .clauses
+        .elements
+        .iter()
         .find(|element| element.start > line.len() && element.has(Role::Retraction))
         .is_some_and(|back| {
             view.names

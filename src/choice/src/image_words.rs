@@ -9,12 +9,13 @@ use super::words::Role;
 
 /// The names of colors that describe the image: "the image is black", "gray noise", "I only see black", "completely black".
 pub(super) fn image_colors(clauses: &Clauses<'_>, texts: &[Name], offered: &ChoiceViews) -> Ranges {
-    let is_color = |name: &&Name| {
-        name.choice
-            .is_some_and(|choice| offered.naming[choice] == Naming::Color)
-    };
-    let colors = texts.iter().filter(is_color);
-    let described = colors.filter(|name| describes_image(clauses, name));
+    let described = texts
+        .iter()
+        .filter(|name| {
+            name.choice
+                .is_some_and(|choice| offered.naming[choice] == Naming::Color)
+        })
+        .filter(|name| describes_image(clauses, name));
     Ranges::new(described.map(|name| (name.start, name.end)).collect())
 }
 
@@ -146,8 +147,11 @@ fn is_head(clauses: &Clauses<'_>, start: usize, noun: usize) -> bool {
                         | "whole"
                 )
     };
-    let before = (start..noun).rev().find(|at| !article(at));
-    let Some(within) = before.filter(|at| elements[*at].has(Role::Within)) else {
+    let Some(within) = (start..noun)
+        .rev()
+        .find(|at| !article(at))
+        .filter(|at| elements[*at].has(Role::Within))
+    else {
         return true;
     };
     within > start && elements[within - 1].has(Role::Portion)

@@ -109,22 +109,26 @@ fn letters(view: &ReplyView<'_>) -> Option<Answer> {
 /// The texts of choices, as whole words: "It is a kitchen."
 fn texts(view: &ReplyView<'_>) -> Option<Answer> {
     let index = view.affirmed_texts().next()?.choice?;
-    let another = |name: &Name| name.choice != Some(index) && name.state.counts();
-    Some(if view.names.all().any(another) {
-        Answer::Unparsed(UnreadReason::Ambiguous)
-    } else if is_denied(view, index) {
-        Answer::Unparsed(UnreadReason::Negated)
-    } else {
-        Answer::Chosen(index)
-    })
+    Some(
+        if view
+            .names
+            .all()
+            .any(|name| name.choice != Some(index) && name.state.counts())
+        {
+            Answer::Unparsed(UnreadReason::Ambiguous)
+        } else if is_denied(view, index) {
+            Answer::Unparsed(UnreadReason::Negated)
+        } else {
+            Answer::Chosen(index)
+        },
+    )
 }
 
 /// Whether a choice is denied anywhere.
 fn is_denied(view: &ReplyView<'_>, index: usize) -> bool {
-    let denied = |name: &Name| {
+    view.names.all().any(|name| {
         name.choice == Some(index) && matches!(name.state, State::Denied | State::Excluded)
-    };
-    view.names.all().any(denied)
+    })
 }
 
 /// The reason for a reply in which no choice is said to be there.

@@ -24,22 +24,22 @@ pub(super) static AFTER_I: LazyLock<Regex> =
 /// Every letter that names a choice, from left to right. A letter beyond the choices is included only if it is firmly
 /// delimited.
 pub(super) fn letters(text: &str, choices: usize, clauses: &Clauses<'_>) -> Vec<Name> {
-    let candidates = text
+    let names = text
         .bytes()
         .enumerate()
-        .filter(|(at, byte)| byte.is_ascii_alphabetic() && !is_inside(text.as_bytes(), *at));
-    let names = candidates.filter_map(|(start, byte)| {
-        let letter = char::from(byte);
-        let delimiting = delimiting(text, start, letter, clauses)?;
-        let choice = index_of(letter).filter(|index| *index < choices);
-        (choice.is_some() || delimiting == Delimiting::Firm).then_some(Name {
-            start,
-            end: start + 1,
-            choice,
-            delimiting,
-            state: State::Affirmed,
-        })
-    });
+        .filter(|(at, byte)| byte.is_ascii_alphabetic() && !is_inside(text.as_bytes(), *at))
+        .filter_map(|(start, byte)| {
+            let letter = char::from(byte);
+            let delimiting = delimiting(text, start, letter, clauses)?;
+            let choice = index_of(letter).filter(|index| *index < choices);
+            (choice.is_some() || delimiting == Delimiting::Firm).then_some(Name {
+                start,
+                end: start + 1,
+                choice,
+                delimiting,
+                state: State::Affirmed,
+            })
+        });
     names.collect()
 }
 

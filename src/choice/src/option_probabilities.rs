@@ -57,11 +57,13 @@ fn answer_position(positions: &[TokenPosition]) -> Option<usize> {
         return first;
     }
     let value = value_in(&whole)?;
-    let ends = positions.iter().scan(0, |end, at| {
-        *end += at.token.len();
-        Some(*end)
-    });
-    ends.enumerate()
+    positions
+        .iter()
+        .scan(0, |end, at| {
+            *end += at.token.len();
+            Some(*end)
+        })
+        .enumerate()
         .find(|(_, end)| *end > value.start)
         .map(|(index, _)| index)
 }
@@ -191,8 +193,11 @@ mod tests {
     fn the_position_is_the_first_of_the_answer() {
         let sure = [("B", -0.01), ("A", -5.0)];
         let marks = |tokens: &[&str]| -> Vec<TokenPosition> {
-            let marks = tokens.iter().map(|token| at(token, &[(*token, 0.0)]));
-            marks.chain([at("B", &sure)]).collect()
+            tokens
+                .iter()
+                .map(|token| at(token, &[(*token, 0.0)]))
+                .chain([at("B", &sure)])
+                .collect()
         };
         for before in [
             &[][..],

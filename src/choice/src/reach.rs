@@ -62,8 +62,9 @@ fn is_in_list(clauses: &Clauses<'_>, names: &Names<'_>, open: usize, at: usize) 
     if !is_break(at) || !begins_line {
         return false;
     }
-    let ahead = elements[at + 1..].iter().take(LINE_WORDS + 1);
-    let line: Vec<_> = ahead
+    let line: Vec<_> = elements[at + 1..]
+        .iter()
+        .take(LINE_WORDS + 1)
         .take_while(|element| element.kind != TokenKind::Break)
         .collect();
     let (Some(start), Some(end)) = (line.first(), line.last()) else {

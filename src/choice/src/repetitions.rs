@@ -101,10 +101,9 @@ fn is_list_of_two(
     };
     let labelled = start < list[0].start && {
         let from = names.letters.partition_point(|letter| letter.start < start);
-        let letters = names.letters[from..]
+        names.letters[from..]
             .iter()
-            .take_while(|letter| letter.start < end);
-        letters
+            .take_while(|letter| letter.start < end)
             .filter(|letter| names.labelled_text(letter).is_some())
             .count()
             >= 2

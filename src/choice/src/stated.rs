@@ -50,10 +50,11 @@ pub(super) fn stated(view: &ReplyView<'_>) -> Option<Answer> {
     }
     announcements.sort_by_key(|announcement| announcement.at);
     let of = |kind: MarkerKind| -> Vec<Announcement> {
-        let same = announcements
+        announcements
             .iter()
-            .filter(|announcement| announcement.kind == kind);
-        same.copied().collect()
+            .filter(|announcement| announcement.kind == kind)
+            .copied()
+            .collect()
     };
     last(view, &of(MarkerKind::Answer))
         .or_else(|| only(&of(MarkerKind::Decision), None))
@@ -62,13 +63,16 @@ pub(super) fn stated(view: &ReplyView<'_>) -> Option<Answer> {
 
 /// The markers of a remainder, if a choice was denied before: "A and C are out, which leaves B".
 fn leftovers<'a>(view: &'a ReplyView<'_>) -> impl Iterator<Item = Marker> + 'a {
-    let denied = view
+    let first = view
         .names
         .all()
-        .filter(|name| matches!(name.state, State::Denied | State::Excluded));
-    let first = denied.map(|name| name.start).min().unwrap_or(usize::MAX);
-    let elements = view.clauses.elements.iter();
-    elements
+        .filter(|name| matches!(name.state, State::Denied | State::Excluded))
+        .map(|name| name.start)
+        .min()
+        .unwrap_or(usize::MAX);
+    view.clauses
+        .elements
+        .iter()
         .filter(move |element| element.has(Role::Leaves) && element.start > first)
         .map(|element| Marker {
             start: element.start,
@@ -98,14 +102,12 @@ fn last(view: &ReplyView<'_>, announcements: &[Announcement]) -> Option<Answer> 
     let Answer::Chosen(chosen) = answer else {
         return Some(answer);
     };
-    let denies = |announcement: &Announcement| {
-        announcement.at > at && announcement.statement == Statement::IsNot(chosen)
-    };
-    let excludes = |name: &Name| {
-        name.start > at && name.choice == Some(chosen) && name.state == State::Excluded
-    };
     Some(
-        if announcements.iter().any(denies) || view.names.all().any(excludes) {
+        if announcements.iter().any(|announcement| {
+            announcement.at > at && announcement.statement == Statement::IsNot(chosen)
+        }) || view.names.all().any(|name| {
+            name.start > at && name.choice == Some(chosen) && name.state == State::Excluded
+        }) {
             Answer::Unparsed(UnreadReason::Negated)
         } else {
             answer
@@ -140,8 +142,12 @@ fn only(announcements: &[Announcement], view: Option<&ReplyView<'_>>) -> Option<
     }
     let other = |name: &&Name| name.choice != Some(chosen);
     let named = view.is_some_and(|view| {
-        let mut letters = view.names.letters.iter().filter(|name| name.state.counts());
-        letters.any(|name| other(&name)) || view.affirmed_texts().any(|name| other(&name))
+        view.names
+            .letters
+            .iter()
+            .filter(|name| name.state.counts())
+            .any(|name| other(&name))
+            || view.affirmed_texts().any(|name| other(&name))
     });
     Some(if named {
         Answer::Unparsed(UnreadReason::Ambiguous)
@@ -200,11 +206,10 @@ fn read_rest(view: &ReplyView<'_>, rest: &str) -> Option<Answer> {
 /// The name that a marker leads to, and the answer that it gives in its context.
 fn announced(view: &ReplyView<'_>, lead: &Lead) -> Option<(Name, Answer)> {
     let last_step = *lead.steps.last()?;
-    let longer = |name: &Name| name.end - name.start > 1;
     let name = view
         .names
         .text_from(last_step)
-        .filter(longer)
+        .filter(|name| name.end - name.start > 1)
         .or_else(|| letter_at(view, last_step))
         .or_else(|| {
             lead.steps
@@ -219,9 +224,11 @@ fn announced(view: &ReplyView<'_>, lead: &Lead) -> Option<(Name, Answer)> {
     let Some(index) = name.choice else {
         return Some((name, Answer::Unparsed(UnreadReason::OutOfRange)));
     };
-    let contradicts = |text: Name| text.choice != Some(index);
     let answer = if name.delimiting == Delimiting::Firm
-        && view.names.labelled_text(&name).is_some_and(contradicts)
+        && view
+            .names
+            .labelled_text(&name)
+            .is_some_and(|text| text.choice != Some(index))
     {
         Answer::Unparsed(UnreadReason::Contradiction)
     } else if alternative(view, &name) {
@@ -357,6 +364,9 @@ fn remains(view: &ReplyView<'_>, name: &Name) -> bool {
         .any(|element| element.slice(view.folded) == "only");
     let verb = verb.slice(view.folded);
     let is_left = verb.starts_with("remain") || verb.ends_with("left");
-    let excluded = |other: &Name| other.state == State::Excluded && other.start < name.start;
-    only || (is_left && view.names.all().any(excluded))
+    only || (is_left
+        && view
+            .names
+            .all()
+            .any(|other| other.state == State::Excluded && other.start < name.start))
 }

@@ -97,11 +97,12 @@ fn value_answer(value: &Value, choices: &ChoiceViews) -> Answer {
             agreed(&answers).unwrap_or(unread)
         }
         Value::Object(fields) => {
-            let named = fields.iter().filter(|(key, _)| {
-                let key = key_form(key);
-                KEYS.contains(&key.as_str()) || INNER_KEYS.contains(&key.as_str())
-            });
-            let answers: Vec<Answer> = named
+            let answers: Vec<Answer> = fields
+                .iter()
+                .filter(|(key, _)| {
+                    let key = key_form(key);
+                    KEYS.contains(&key.as_str()) || INNER_KEYS.contains(&key.as_str())
+                })
                 .map(|(_, value)| value_answer(value, choices))
                 .collect();
             agreed(&answers).unwrap_or(unread)
@@ -131,15 +132,17 @@ fn boxes(text: &str) -> impl Iterator<Item = &str> {
             let inner = text[at + opening.len()..].trim_start().strip_prefix('{')?;
             let inner = &inner[..inner.floor_char_boundary(BOX_BYTES)];
             let mut depth = 1_usize;
-            let close = inner.char_indices().find(|(_, c)| {
-                match c {
-                    '{' => depth += 1,
-                    '}' => depth -= 1,
-                    _ => {}
-                }
-                depth == 0
-            });
-            close.map(|(end, _)| &inner[..end])
+            inner
+                .char_indices()
+                .find(|(_, c)| {
+                    match c {
+                        '{' => depth += 1,
+                        '}' => depth -= 1,
+                        _ => {}
+                    }
+                    depth == 0
+                })
+                .map(|(end, _)| &inner[..end])
         })
     })
 }
@@ -150,13 +153,12 @@ fn text_answer(text: &str, choices: &ChoiceViews) -> Answer {
 
 /// The choice on which all answers agree. Answers that could not be read are ignored if there are others.
 fn agreed(answers: &[Answer]) -> Option<Answer> {
-    let is_readable = |answer: &&Answer| {
+    let mut readable = answers.iter().filter(|answer| {
         !matches!(
             answer,
             Answer::Unparsed(UnreadReason::NoChoice | UnreadReason::Empty | UnreadReason::Refused)
         )
-    };
-    let mut readable = answers.iter().filter(is_readable);
+    });
     let first = *readable.next().or(answers.first())?;
     let same = readable.all(|answer| *answer == first);
     Some(if same {

@@ -74,8 +74,8 @@ fn choices_of(texts: &[&str]) -> Choices {
 
 /// The replies of the table.
 fn table_of_replies() -> Vec<String> {
-    let lines = include_str!("../../../tests/data/replies.jsonl").lines();
-    lines
+    include_str!("../../../tests/data/replies.jsonl")
+        .lines()
         .map(|line| serde_json::from_str::<Case>(line).unwrap().reply)
         .collect()
 }

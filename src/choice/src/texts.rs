@@ -95,8 +95,11 @@ fn joined<'a>(
 ) -> impl Iterator<Item = Candidate> + 'a {
     let longest = offered.joined.keys().map(String::len).max().unwrap_or(0);
     let find = move |start: usize, end: usize, letters: &str| {
-        let choices = offered.joined.get(letters).into_iter().flatten();
-        choices
+        offered
+            .joined
+            .get(letters)
+            .into_iter()
+            .flatten()
             .map(move |&choice| Candidate {
                 start,
                 end,

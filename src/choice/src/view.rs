@@ -101,8 +101,10 @@ impl<'a> ReplyView<'a> {
 
     /// The letters that are delimited from the words around them, and said.
     pub(super) fn affirmed_letters(&self) -> impl Iterator<Item = &Name> + Clone {
-        let said = |name: &&Name| name.is_affirmed() && name.delimiting > Delimiting::Loose;
-        self.names.letters.iter().filter(said)
+        self.names
+            .letters
+            .iter()
+            .filter(|name| name.is_affirmed() && name.delimiting > Delimiting::Loose)
     }
 
     /// The texts that are said.

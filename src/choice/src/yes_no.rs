@@ -1,6 +1,6 @@
 //! A leading "yes" or "no": [`yes_or_no`].
 
-use super::names::{Delimiting, Name};
+use super::names::Delimiting;
 use super::view::ReplyView;
 use darkqa_ground::types::question::{Answer, UnreadReason};
 
@@ -22,12 +22,13 @@ pub(super) fn yes_or_no(view: &ReplyView<'_>) -> Option<Answer> {
     if !word.is_affirmed() {
         return None;
     }
-    let names_other = |name: &Name| {
-        name.choice == Some(other) && name.delimiting > Delimiting::Loose && name.state.counts()
-    };
-    Some(if view.names.all().any(names_other) {
-        Answer::Unparsed(UnreadReason::Ambiguous)
-    } else {
-        Answer::Chosen(chosen)
-    })
+    Some(
+        if view.names.all().any(|name| {
+            name.choice == Some(other) && name.delimiting > Delimiting::Loose && name.state.counts()
+        }) {
+            Answer::Unparsed(UnreadReason::Ambiguous)
+        } else {
+            Answer::Chosen(chosen)
+        },
+    )
 }

@@ -84,8 +84,10 @@ fn every_entry_decides_a_reply() {
         if role == Role::Neutral || OF_CHOICES.contains(&role) {
             continue;
         }
-        let example = EXAMPLES.iter().find(|(of, ..)| *of == role);
-        let (_, set, reply, found, control, other) = example.unwrap_or_else(|| panic!("{role:?}"));
+        let (_, set, reply, found, control, other) = EXAMPLES
+            .iter()
+            .find(|(of, ..)| *of == role)
+            .unwrap_or_else(|| panic!("{role:?}"));
         for word in list {
             // "It's" has its verb.
             let reply = reply.replace("{}", &word).replace("'s is ", "'s ");
@@ -128,9 +130,8 @@ fn every_neutral_phrase_hides_an_active_word() {
                 roles != Roles::from_role(Role::Neutral) && roles.has_any(&ACTIVE)
             })
         };
-        let parts = (0..words.len())
-            .flat_map(|start| (start + 1..=words.len()).map(move |end| (start, end)));
-        let hides = parts
+        let hides = (0..words.len())
+            .flat_map(|start| (start + 1..=words.len()).map(move |end| (start, end)))
             .filter(|(start, end)| end - start < words.len())
             .any(|(start, end)| acts(start, end));
         assert!(hides, "{phrase:?} hides nothing");
@@ -179,8 +180,12 @@ fn every_thing_of_the_questions_ends_in_a_head() {
     let is_head = |name: &str| heads.contains(&name.to_lowercase());
     let (mut known, mut missing) = (0, Vec::new());
     for (_, class) in rules["class"].as_table().unwrap() {
-        let words = class.get("words").and_then(toml::Value::as_array);
-        for word in words.into_iter().flatten() {
+        for word in class
+            .get("words")
+            .and_then(toml::Value::as_array)
+            .into_iter()
+            .flatten()
+        {
             let last = word.as_str().unwrap().split(' ').next_back().unwrap();
             if NO_HEADS.iter().any(|(word, _)| *word == last) {
                 assert!(!is_head(last), "{last}");
