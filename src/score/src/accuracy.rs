@@ -62,8 +62,9 @@ impl AccuracySummary {
         family: Option<&'s Family>,
         mode: ReadingMode,
     ) -> impl Iterator<Item = &'s AccuracyCell> + Clone {
-        let cells = self.cells.iter();
-        cells.filter(move |cell| cell.mode == mode && cell.family.as_ref() == family)
+        self.cells
+            .iter()
+            .filter(move |cell| cell.mode == mode && cell.family.as_ref() == family)
     }
 
     /// Cell of a subject, family and reading, if there is one.
@@ -89,13 +90,14 @@ pub fn summarize(
 ) -> AccuracySummary {
     let questions: Vec<OfferedChoices> = questions.into_iter().collect();
     let families = grid.groups();
-    let subjects = (0..grid.subjects.len()).into_par_iter();
-    let cells = subjects.flat_map_iter(|subject| {
-        let families = families.iter();
-        families
-            .flat_map(move |family| ReadingMode::ALL.map(|mode| cell(grid, subject, *family, mode)))
-    });
-    let mut cells: Vec<AccuracyCell> = cells.collect();
+    let mut cells: Vec<AccuracyCell> = (0..grid.subjects.len())
+        .into_par_iter()
+        .flat_map_iter(|subject| {
+            families.iter().flat_map(move |family| {
+                ReadingMode::ALL.map(|mode| cell(grid, subject, *family, mode))
+            })
+        })
+        .collect();
     // A family that a subject was not asked about has no cell.
     cells.retain(|cell| cell.accuracy.is_some() || cell.failed > 0);
     cells.extend(chance_cells(&questions));
@@ -122,8 +124,12 @@ fn cell(
     mode: ReadingMode,
 ) -> AccuracyCell {
     let (mut unparsed, mut failed) = (0, 0);
-    let items = grid.items.iter().enumerate();
-    for (index, _) in items.filter(|(_, item)| item.is_of(family)) {
+    for (index, _) in grid
+        .items
+        .iter()
+        .enumerate()
+        .filter(|(_, item)| item.is_of(family))
+    {
         let result = grid.result(subject, index);
         failed += usize::from(result == TrialResult::Failed);
         unparsed +=
@@ -145,8 +151,10 @@ fn cell(
 /// True if a person said that they cannot tell: that is read, and is no choice.
 fn cannot_tell(grid: &Grid<'_>, subject: usize, item: usize) -> bool {
     let trial = grid.trial(subject, item);
-    let strict = trial.and_then(darkqa_ground::types::TrialRef::strict);
-    strict.and_then(|reading| reading.why) == Some(UnreadReason::CannotTell)
+    trial
+        .and_then(darkqa_ground::types::TrialRef::strict)
+        .and_then(|reading| reading.why)
+        == Some(UnreadReason::CannotTell)
 }
 
 /// Share of questions answered correctly every time; `None` if each question was asked once.
@@ -190,28 +198,29 @@ fn always(
 /// The chance line: a cell for each family and reading, with the accuracy of a uniform guess.
 fn chance_cells(questions: &[OfferedChoices]) -> Vec<AccuracyCell> {
     let families: BTreeSet<&Family> = questions.iter().map(|question| &question.family).collect();
-    let groups = std::iter::once(None).chain(families.into_iter().map(Some));
-    let cells = groups.flat_map(|family| {
-        let of_family = questions
-            .iter()
-            .filter(|question| family.is_none_or(|family| question.family == *family));
-        let accuracy = chance(of_family);
-        ReadingMode::ALL.map(|mode| AccuracyCell {
-            subject: Subject {
-                model: CHANCE.to_owned(),
-                view: None,
-                level: None,
-                variant: KindReading::NONE,
-                enhancer: None,
-            },
-            family: family.cloned(),
-            mode,
-            right: 0,
-            unparsed: 0,
-            failed: 0,
-            accuracy,
-            always: None,
-        })
-    });
+    let cells = std::iter::once(None)
+        .chain(families.into_iter().map(Some))
+        .flat_map(|family| {
+            let of_family = questions
+                .iter()
+                .filter(|question| family.is_none_or(|family| question.family == *family));
+            let accuracy = chance(of_family);
+            ReadingMode::ALL.map(|mode| AccuracyCell {
+                subject: Subject {
+                    model: CHANCE.to_owned(),
+                    view: None,
+                    level: None,
+                    variant: KindReading::NONE,
+                    enhancer: None,
+                },
+                family: family.cloned(),
+                mode,
+                right: 0,
+                unparsed: 0,
+                failed: 0,
+                accuracy,
+                always: None,
+            })
+        });
     cells.collect()
 }

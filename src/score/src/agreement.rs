@@ -50,8 +50,8 @@ pub fn light_agreements(grid: &Grid<'_>) -> Vec<Agreement> {
 /// Agreement of every pair of models in every condition.
 #[must_use]
 pub fn agreements(grid: &Grid<'_>) -> Vec<Agreement> {
-    let pairs = pairs(grid, ComparisonKind::Model).into_iter();
-    pairs
+    pairs(grid, ComparisonKind::Model)
+        .into_iter()
         .filter_map(|(first, second)| agreement(grid, first, second))
         .collect()
 }
@@ -111,17 +111,19 @@ pub fn clustered_kappa(counts: &[AgreementCounts]) -> Option<Estimate> {
     let value = kappa(both, a, b)?;
     // κ = 2 (both − ab) / (a + b − 2ab).
     let denominator = a + b - 2.0 * a * b;
-    let influence = |r: &AgreementCounts| {
-        let (both, first, second) = (
-            r.both - both * r.all,
-            r.first - a * r.all,
-            r.second - b * r.all,
-        );
-        let crossed = 2.0 * (b * first + a * second);
-        (2.0 * both - crossed - value * (first + second - crossed)) / denominator / all
-    };
-    let asked = counts.iter().filter(|counts| counts.all > 0.0);
-    let influences: Vec<f64> = asked.map(influence).collect();
+    let influences: Vec<f64> = counts
+        .iter()
+        .filter(|counts| counts.all > 0.0)
+        .map(|r| {
+            let (both, first, second) = (
+                r.both - both * r.all,
+                r.first - a * r.all,
+                r.second - b * r.all,
+            );
+            let crossed = 2.0 * (b * first + a * second);
+            (2.0 * both - crossed - value * (first + second - crossed)) / denominator / all
+        })
+        .collect();
     let c = influences.len() as f64;
     let variance = c / (c - 1.0) * influences.iter().map(|x| x * x).sum::<f64>();
     let half = student(degrees_of_freedom(&influences)) * variance.sqrt();

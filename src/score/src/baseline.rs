@@ -59,8 +59,9 @@ pub fn baseline_rows(
     let rows = pairs.iter().filter_map(|&(new, old)| {
         let image = |subject, item| grid.trial(subject, item)?.sent();
         let is_other = |item| {
-            let images = image(new, item).zip(image(old, item));
-            images.is_some_and(|(new, old)| new != old)
+            image(new, item)
+                .zip(image(old, item))
+                .is_some_and(|(new, old)| new != old)
         };
         let mode = ReadingMode::Strict;
         Some(BaselineRow {
@@ -75,8 +76,9 @@ pub fn baseline_rows(
     });
     let mut rows: Vec<BaselineRow> = rows.collect();
     for is_reference in [false, true] {
-        let own = rows.iter_mut();
-        let own = own.filter(|row| row.subject.is_reference() == is_reference);
+        let own = rows
+            .iter_mut()
+            .filter(|row| row.subject.is_reference() == is_reference);
         correct(own.collect());
     }
     rows

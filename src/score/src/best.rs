@@ -61,8 +61,9 @@ impl BestInTheDark {
     /// Whether the clusters allow a verdict on any pair.
     #[must_use]
     pub fn is_possible(&self) -> bool {
-        let mut pairs = self.pairs.iter();
-        pairs.any(|pair| pair.significance.is_possible())
+        self.pairs
+            .iter()
+            .any(|pair| pair.significance.is_possible())
     }
 
     /// Whether the leader is shown to be better than every other model, by the correction over the pairs alone.
@@ -80,9 +81,11 @@ impl BestInTheDark {
     /// p-value of the leader being the best: the largest one of its pairs, each after Holm's correction over all pairs.
     #[must_use]
     pub(super) fn p_leader(&self) -> f64 {
-        let pairs = self.pairs.iter();
-        let own = pairs.filter(|pair| pair.first == self.leader().model);
-        own.map(|pair| pair.holm).fold(0.0, f64::max)
+        self.pairs
+            .iter()
+            .filter(|pair| pair.first == self.leader().model)
+            .map(|pair| pair.holm)
+            .fold(0.0, f64::max)
     }
 }
 
@@ -174,9 +177,13 @@ pub fn best_in_the_dark(grid: &Grid<'_>, mode: ReadingMode) -> Option<BestInTheD
         models.partition(|(_, levels)| levels.len() > 1 && levels.contains(&AxisLevel::L0));
     let (curves, apart) = with_most_answers(grid, curves, &variant);
     without.extend(apart);
-    let shared = |level: &AxisLevel| curves.iter().all(|(_, levels)| levels.contains(level));
-    let levels = curves.first()?.1.iter().copied().filter(shared);
-    let levels: Vec<AxisLevel> = levels.collect();
+    let levels: Vec<AxisLevel> = curves
+        .first()?
+        .1
+        .iter()
+        .copied()
+        .filter(|level| curves.iter().all(|(_, levels)| levels.contains(level)))
+        .collect();
     if curves.len() < 2 || levels.len() < 2 {
         return None;
     }
@@ -194,9 +201,9 @@ pub fn best_in_the_dark(grid: &Grid<'_>, mode: ReadingMode) -> Option<BestInTheD
         return None;
     }
     let split = lighter.len();
-    let models = (0..names.len())
-        .filter_map(|model| Some((scores.accuracy(model, names[model], split)?, model)));
-    let mut models: Vec<(DarkAccuracy, usize)> = models.collect();
+    let mut models: Vec<(DarkAccuracy, usize)> = (0..names.len())
+        .filter_map(|model| Some((scores.accuracy(model, names[model], split)?, model)))
+        .collect();
     models.sort_by(|(a, _), (b, _)| b.mean.value.total_cmp(&a.mean.value));
     let pairs = scores.pairs(&models, split);
     let leader = &models.first()?.0.model;
@@ -228,12 +235,15 @@ pub fn best_in_the_dark(grid: &Grid<'_>, mode: ReadingMode) -> Option<BestInTheD
 /// The levels at which a model was asked about raw images of a variant, with L0 if its clean frames are those of the same runs.
 fn levels(grid: &Grid<'_>, model: &str, variant: &KindReading) -> BTreeSet<AxisLevel> {
     let clean = Subject::seeing(model, AxisLevel::L0, variant, None);
-    let subjects = grid.subjects.iter().filter(|subject| {
-        let is_degraded =
-            subject.model == model && subject.enhancer.is_none() && subject.variant == *variant;
-        is_degraded || subject.is_for(&clean)
-    });
-    subjects.filter_map(|subject| subject.level).collect()
+    grid.subjects
+        .iter()
+        .filter(|subject| {
+            let is_degraded =
+                subject.model == model && subject.enhancer.is_none() && subject.variant == *variant;
+            is_degraded || subject.is_for(&clean)
+        })
+        .filter_map(|subject| subject.level)
+        .collect()
 }
 
 /// Splits the models into those that answered most and those that answered less. The latter are compared separately, so that they do not
@@ -243,14 +253,16 @@ fn with_most_answers<'g>(
     models: Vec<Asked<'g>>,
     variant: &KindReading,
 ) -> (Vec<Asked<'g>>, Vec<Asked<'g>>) {
-    let coverages = models.iter().map(|(model, levels)| {
-        let sides = levels.iter().filter_map(|level| {
-            let subject = grid.stand_in(&Subject::seeing(model, *level, variant, None))?;
-            Some((*level, vec![subject]))
-        });
-        Coverage::new(grid, sides, |_| true)
-    });
-    let coverages: Vec<Coverage> = coverages.collect();
+    let coverages: Vec<Coverage> = models
+        .iter()
+        .map(|(model, levels)| {
+            let sides = levels.iter().filter_map(|level| {
+                let subject = grid.stand_in(&Subject::seeing(model, *level, variant, None))?;
+                Some((*level, vec![subject]))
+            });
+            Coverage::new(grid, sides, |_| true)
+        })
+        .collect();
     let Some(most) = shared(&coverages) else {
         return (models, Vec::new());
     };
@@ -303,11 +315,15 @@ impl Scores {
     ) -> Self {
         let subject =
             |model: &str, level| grid.stand_in(&Subject::seeing(model, level, variant, None));
-        let subjects = models.iter().map(|model| {
-            let subjects = levels.iter().filter_map(|level| subject(model, *level));
-            subjects.collect()
-        });
-        let subjects: Vec<Vec<usize>> = subjects.collect();
+        let subjects: Vec<Vec<usize>> = models
+            .iter()
+            .map(|model| {
+                levels
+                    .iter()
+                    .filter_map(|level| subject(model, *level))
+                    .collect()
+            })
+            .collect();
         let mut scores = Self {
             items: Vec::new(),
             levels: levels.len(),
@@ -315,15 +331,21 @@ impl Scores {
             all_clusters: grid.clusters,
         };
         for (index, item) in grid.items.iter().enumerate() {
-            let answered = |subject: &usize| {
-                let reading = grid.result(*subject, index).reading(mode);
-                reading.map(|chosen| item.is_right(chosen))
-            };
-            let right = subjects.iter();
-            let right = right.map(|levels| levels.iter().map(answered).collect());
+            let right = subjects.iter().map(|levels| {
+                levels
+                    .iter()
+                    .map(|subject: &usize| {
+                        let reading = grid.result(*subject, index).reading(mode);
+                        reading.map(|chosen| item.is_right(chosen))
+                    })
+                    .collect()
+            });
             let Some(right) = right.collect::<Option<Vec<Vec<bool>>>>() else {
-                let asked = |subject: &usize| grid.result(*subject, index).is_asked();
-                let is_asked = subjects.iter().any(|levels| levels.iter().all(asked));
+                let is_asked = subjects.iter().any(|levels| {
+                    levels
+                        .iter()
+                        .all(|subject: &usize| grid.result(*subject, index).is_asked())
+                });
                 scores.dropped += usize::from(is_asked);
                 continue;
             };
@@ -369,19 +391,27 @@ impl Scores {
     /// The accuracies of a model, given by its index; the levels from `split` on are dark.
     fn accuracy(&self, model: usize, name: &str, split: usize) -> Option<DarkAccuracy> {
         let (n, dark) = (self.items.len(), split..self.levels);
-        let share = |level: usize| {
-            let right = self.items.iter().filter(|item| item.right[model][level]);
-            right.count() as f64 / n as f64
-        };
-        let by_level: Vec<f64> = (0..self.levels).map(share).collect();
+        let by_level: Vec<f64> = (0..self.levels)
+            .map(|level: usize| {
+                self.items
+                    .iter()
+                    .filter(|item| item.right[model][level])
+                    .count() as f64
+                    / n as f64
+            })
+            .collect();
         let count = dark.len() as f64;
-        let sums = self.sums(|item| item.right(model, &dark)).into_iter();
-        let sums = sums.map(|sum| (sum.net as f64 / count, f64::from(sum.items)));
-        let clean = self.sums(|item| item.right(model, &(0..1))).into_iter();
-        let clean = clean.map(|sum| ClusterCount {
-            right: sum.net as u32,
-            replies: sum.items,
-        });
+        let sums = self
+            .sums(|item| item.right(model, &dark))
+            .into_iter()
+            .map(|sum| (sum.net as f64 / count, f64::from(sum.items)));
+        let clean = self
+            .sums(|item| item.right(model, &(0..1)))
+            .into_iter()
+            .map(|sum| ClusterCount {
+                right: sum.net as u32,
+                replies: sum.items,
+            });
         let clean = Estimate::clustered(&clean.collect::<Vec<_>>())?;
         let chance = self.items.iter().map(|item| item.guess).sum::<f64>() / n as f64;
         let lost = |item: &ItemScores| {

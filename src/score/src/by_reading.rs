@@ -86,8 +86,9 @@ impl LightClaim {
 
 /// L1 to L5.
 fn paper_levels() -> Vec<AxisLevel> {
-    let ladder = Kind::Sensor.ladder().iter();
-    ladder
+    Kind::Sensor
+        .ladder()
+        .iter()
         .map(|severity| AxisLevel::new(Kind::Sensor, *severity))
         .collect()
 }
@@ -205,8 +206,9 @@ pub fn by_reading(grid: &Grid<'_>) -> Vec<FindingByReading> {
     let jobs: Vec<(&str, Option<&LightGroup>, LightClaim)> = models
         .into_iter()
         .flat_map(|(model, group)| {
-            let claims = claims(grid, model).into_iter();
-            claims.map(move |claim| (model, group, claim))
+            claims(grid, model)
+                .into_iter()
+                .map(move |claim| (model, group, claim))
         })
         .collect();
     let found = jobs.into_par_iter().filter_map(|(model, group, claim)| {
@@ -218,8 +220,7 @@ pub fn by_reading(grid: &Grid<'_>) -> Vec<FindingByReading> {
 
 /// The subjects with noisy images.
 fn noisy<'g>(grid: &'g Grid<'_>) -> impl Iterator<Item = &'g Subject> {
-    let subjects = grid.subjects.iter();
-    subjects.filter(|subject| {
+    grid.subjects.iter().filter(|subject| {
         subject.view == Some(View::Image) && subject.variant.kind.is_some_and(Kind::has_readings)
     })
 }
@@ -288,9 +289,13 @@ impl Sides<'_, '_> {
 
     /// The model itself without images; else the only model that was asked so.
     fn blind(&self) -> Option<usize> {
-        let subjects = self.grid.subjects.iter().enumerate();
-        let blind = subjects.filter(|(_, subject)| subject.view == Some(View::Blind));
-        let blind: Vec<(usize, &Subject)> = blind.collect();
+        let blind: Vec<(usize, &Subject)> = self
+            .grid
+            .subjects
+            .iter()
+            .enumerate()
+            .filter(|(_, subject)| subject.view == Some(View::Blind))
+            .collect();
         let own = blind.iter().find(|(_, other)| other.model == self.model);
         match (own, &blind[..]) {
             (Some((index, _)), _) | (None, [(index, _)]) => Some(*index),
@@ -306,21 +311,27 @@ fn finding(
     readings: &[&ReadingName],
 ) -> Option<FindingByReading> {
     let asked_at = |reading: &ReadingName| {
-        let levels = claim.levels().into_iter();
-        let asked = levels.filter(|level| sides.find(&claim, *level, reading).is_some());
-        asked.collect::<BTreeSet<AxisLevel>>()
+        claim
+            .levels()
+            .into_iter()
+            .filter(|level| sides.find(&claim, *level, reading).is_some())
+            .collect::<BTreeSet<AxisLevel>>()
     };
     let levels: Vec<BTreeSet<AxisLevel>> = readings.iter().map(|name| asked_at(name)).collect();
-    let asked = levels.iter().filter(|levels| !levels.is_empty());
-    let shared = asked.cloned().reduce(|all, more| &all & &more)?;
+    let shared = levels
+        .iter()
+        .filter(|levels| !levels.is_empty())
+        .cloned()
+        .reduce(|all, more| &all & &more)?;
     let levels: Vec<AxisLevel> = shared.into_iter().collect();
     let pairs: Vec<Vec<(usize, usize)>> = readings
         .iter()
         .map(|reading| {
-            let pairs = levels
+            levels
                 .iter()
-                .map(|level| sides.find(&claim, *level, reading));
-            pairs.collect::<Option<_>>().unwrap_or_default()
+                .map(|level| sides.find(&claim, *level, reading))
+                .collect::<Option<_>>()
+                .unwrap_or_default()
         })
         .collect();
     let (kept, dropped) = shared_items(sides.grid, &pairs, claim.family());
@@ -366,16 +377,22 @@ fn shared_items(
         .flatten()
         .flat_map(|(first, second)| [*first, *second])
         .collect();
-    let items = grid.items.iter().enumerate();
-    let of_family = items.filter(|(_, item)| item.is_of(family));
-    let asked = of_family.map(|(index, _)| index).filter(|item| {
-        let mut sides = sides.iter();
-        sides.any(|side| grid.result(*side, *item).is_asked())
-    });
-    let (kept, dropped): (Vec<usize>, Vec<usize>) = asked.partition(|item| {
-        let mut sides = sides.iter();
-        sides.all(|side| grid.result(*side, *item).is_reply())
-    });
+    let (kept, dropped): (Vec<usize>, Vec<usize>) = grid
+        .items
+        .iter()
+        .enumerate()
+        .filter(|(_, item)| item.is_of(family))
+        .map(|(index, _)| index)
+        .filter(|item| {
+            sides
+                .iter()
+                .any(|side| grid.result(*side, *item).is_asked())
+        })
+        .partition(|item| {
+            sides
+                .iter()
+                .all(|side| grid.result(*side, *item).is_reply())
+        });
     (kept, dropped.len())
 }
 
@@ -392,8 +409,8 @@ fn effect(grid: &Grid<'_>, pairs: &[(usize, usize)], kept: &[usize]) -> Option<T
             let reading = grid.result(subject, index).reading(ReadingMode::Strict);
             i64::from(reading.is_some_and(|chosen| item.is_right(chosen)))
         };
-        let nets = pairs.iter();
-        let net: i64 = nets
+        let net: i64 = pairs
+            .iter()
             .map(|(first, second)| is_right(*first) - is_right(*second))
             .sum();
         let cluster = &mut clusters[item.cluster as usize];
@@ -418,9 +435,12 @@ fn corrected(mut found: Vec<FindingByReading>) -> Vec<FindingByReading> {
     let mut corrected = holm(&values.collect::<Vec<_>>()).into_iter();
     for finding in &mut found {
         let is_gain = finding.claim.is_gain();
-        let effects = finding.effects.iter_mut();
-        let tested = effects.filter_map(|effect| effect.effect.as_mut());
-        for (effect, holm) in tested.zip(&mut corrected) {
+        for (effect, holm) in finding
+            .effects
+            .iter_mut()
+            .filter_map(|effect| effect.effect.as_mut())
+            .zip(&mut corrected)
+        {
             effect.holm = holm;
             effect.standing = standing(effect, is_gain);
         }
@@ -442,8 +462,11 @@ fn standing(effect: &TestedEffect, is_gain: bool) -> Standing {
 /// The claim under the readings. A reading that was not asked shows nothing, so that the claim cannot hold under all.
 fn robustness(effects: &[EffectInReading]) -> Robustness {
     let count = |standing: Standing| {
-        let tested = effects.iter().filter_map(|effect| effect.effect);
-        tested.filter(|effect| effect.standing == standing).count()
+        effects
+            .iter()
+            .filter_map(|effect| effect.effect)
+            .filter(|effect| effect.standing == standing)
+            .count()
     };
     match (count(Standing::Holds), count(Standing::Opposite)) {
         (0, 0) => Robustness::Open,

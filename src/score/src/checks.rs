@@ -97,9 +97,12 @@ fn share(checks: &[&Check], holds: impl Fn(&Check) -> bool) -> Option<Estimate> 
 pub fn agreements(checks: &Checks) -> Vec<CheckAgreement> {
     let people: BTreeSet<&String> = checks.keys().map(|(person, _)| person).collect();
     let people: Vec<&String> = people.into_iter().collect();
-    let pairs = people.iter().enumerate();
-    let pairs = pairs.flat_map(|(i, first)| people[i + 1..].iter().map(|second| [*first, *second]));
-    pairs.filter_map(|pair| agreement(checks, pair)).collect()
+    people
+        .iter()
+        .enumerate()
+        .flat_map(|(i, first)| people[i + 1..].iter().map(|second| [*first, *second]))
+        .filter_map(|pair| agreement(checks, pair))
+        .collect()
 }
 
 fn agreement(checks: &Checks, [first, second]: [&String; 2]) -> Option<CheckAgreement> {
@@ -149,20 +152,22 @@ mod tests {
             _ => [Right, Wrong],
         };
         let all = (0..50).flat_map(|i| {
-            let found = people.into_iter().zip(both(i));
-            found.map(move |(person, finding)| {
-                let check = Check {
-                    person: person.to_owned(),
-                    family: if i % 2 == 0 {
-                        Family::Color
-                    } else {
-                        Family::Presence
-                    },
-                    scene: format!("{i}"),
-                    finding,
-                };
-                ((person.to_owned(), QuestionId(format!("{i}"))), check)
-            })
+            people
+                .into_iter()
+                .zip(both(i))
+                .map(move |(person, finding)| {
+                    let check = Check {
+                        person: person.to_owned(),
+                        family: if i % 2 == 0 {
+                            Family::Color
+                        } else {
+                            Family::Presence
+                        },
+                        scene: format!("{i}"),
+                        finding,
+                    };
+                    ((person.to_owned(), QuestionId(format!("{i}"))), check)
+                })
         });
         all.collect()
     }

@@ -177,8 +177,11 @@ mod tests {
         let ids: Vec<QuestionId> = (0..questions)
             .map(|i| QuestionId(format!("q{i:03}")))
             .collect();
-        let known = frames.iter().enumerate().filter(|_| scenes > 0);
-        let known = known.map(|(i, frame)| (frame.clone(), format!("s{}", i % scenes.max(1))));
+        let known = frames
+            .iter()
+            .enumerate()
+            .filter(|_| scenes > 0)
+            .map(|(i, frame)| (frame.clone(), format!("s{}", i % scenes.max(1))));
         let pairs = ids.iter().zip(frames.iter().cycle());
         let scenes = known.collect();
         Clusters::new(
@@ -195,12 +198,17 @@ mod tests {
         let name = |name: &str| FrameId(name.to_owned());
         let ids: Vec<QuestionId> = (0..6).map(|i| QuestionId(format!("q{i}"))).collect();
         let frames = ["ab", "bc", "c", "d", "ef", "a c"].map(name);
-        let several = frames.iter().filter(|frame| frame.0.len() > 1);
-        let images = several.map(|frame| {
-            let letters = frame.0.chars().filter(|letter| *letter != ' ');
-            let images = letters.map(|letter| name(&letter.to_string()));
-            (frame.clone(), images.collect())
-        });
+        let images = frames
+            .iter()
+            .filter(|frame| frame.0.len() > 1)
+            .map(|frame| {
+                let images = frame
+                    .0
+                    .chars()
+                    .filter(|letter| *letter != ' ')
+                    .map(|letter| name(&letter.to_string()));
+                (frame.clone(), images.collect())
+            });
         let ties = FrameTies {
             images: images.collect(),
             ..FrameTies::default()

@@ -48,8 +48,11 @@ impl CommonItems {
             if questions.len() == all.len() {
                 continue;
             }
-            let items = grid.items.iter().enumerate();
-            let items = items.filter(|(item, _)| grid.trial(index, *item).is_some());
+            let items = grid
+                .items
+                .iter()
+                .enumerate()
+                .filter(|(item, _)| grid.trial(index, *item).is_some());
             questions.extend(items.map(|(_, item)| &*item.asked.question));
         }
         if asked.values().all(|questions| questions.len() == all.len()) {
@@ -83,8 +86,10 @@ impl CommonItems {
 fn model_subjects<'g>(grid: &'g Grid<'_>) -> impl Iterator<Item = (usize, &'g Subject)> {
     let models = grid.subjects.iter().map(|subject| &*subject.model);
     let models: BTreeSet<&str> = grid.listing.without_people(models).into_iter().collect();
-    let subjects = grid.subjects.iter().enumerate();
-    subjects.filter(move |(_, subject)| models.contains(&*subject.model))
+    grid.subjects
+        .iter()
+        .enumerate()
+        .filter(move |(_, subject)| models.contains(&*subject.model))
 }
 
 /// Whether each item has a reply of every model with images, in any condition. Models without any reply do not count, and people count

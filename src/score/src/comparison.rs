@@ -167,26 +167,27 @@ type Job<'a> = (ComparisonKind, Option<&'a Family>, usize, usize);
 
 /// The comparisons that have items, not yet corrected.
 fn paired(grid: &Grid<'_>, jobs: Vec<Job<'_>>) -> Vec<Comparison> {
-    let jobs = jobs.into_par_iter();
-    let found = jobs.filter_map(|(kind, family, first, second)| {
-        let paired = |mode| PairedComparison::new(grid, first, second, family, mode);
-        let strict = paired(ReadingMode::Strict)?;
-        let differs = grid.parsings_differ(first) || grid.parsings_differ(second);
-        let lenient = if differs {
-            paired(ReadingMode::Lenient)?
-        } else {
-            strict.clone()
-        };
-        Some(Comparison {
-            kind,
-            first: grid.subjects[first].clone(),
-            second: grid.subjects[second].clone(),
-            family: family.cloned(),
-            strict: TestedComparison::new(strict),
-            lenient: TestedComparison::new(lenient),
-            least_holm: 1.0,
-        })
-    });
+    let found = jobs
+        .into_par_iter()
+        .filter_map(|(kind, family, first, second)| {
+            let paired = |mode| PairedComparison::new(grid, first, second, family, mode);
+            let strict = paired(ReadingMode::Strict)?;
+            let differs = grid.parsings_differ(first) || grid.parsings_differ(second);
+            let lenient = if differs {
+                paired(ReadingMode::Lenient)?
+            } else {
+                strict.clone()
+            };
+            Some(Comparison {
+                kind,
+                first: grid.subjects[first].clone(),
+                second: grid.subjects[second].clone(),
+                family: family.cloned(),
+                strict: TestedComparison::new(strict),
+                lenient: TestedComparison::new(lenient),
+                least_holm: 1.0,
+            })
+        });
     found.collect()
 }
 
@@ -194,20 +195,24 @@ fn paired(grid: &Grid<'_>, jobs: Vec<Job<'_>>) -> Vec<Comparison> {
 /// each of them.
 #[must_use]
 pub fn lights_between(grid: &Grid<'_>, names: &[String]) -> Vec<Comparison> {
-    let subjects = grid.subjects.iter().enumerate();
-    let named = subjects.filter(|(_, subject)| names.contains(&subject.model));
-    let named: Vec<(usize, &Subject)> = named.collect();
+    let named: Vec<(usize, &Subject)> = grid
+        .subjects
+        .iter()
+        .enumerate()
+        .filter(|(_, subject)| names.contains(&subject.model))
+        .collect();
     let mut pairs = Vec::new();
     for (place, (index, subject)) in named.iter().enumerate() {
-        let later = named[place + 1..].iter();
-        let others = later
+        let others = named[place + 1..]
+            .iter()
             .filter(|(_, other)| other.model != subject.model && is_other_light(subject, other));
         pairs.extend(others.map(|(other, _)| (*index, *other)));
     }
     let families = grid.groups();
     let jobs = families.iter().flat_map(|family| {
-        let pairs = pairs.iter();
-        pairs.map(|(first, second)| (ComparisonKind::Light, *family, *first, *second))
+        pairs
+            .iter()
+            .map(|(first, second)| (ComparisonKind::Light, *family, *first, *second))
     });
     corrected(paired(grid, jobs.collect()))
 }
@@ -328,8 +333,10 @@ fn later_models(grid: &Grid<'_>, index: usize, judged: &BTreeSet<&str>) -> Vec<u
 /// with the images of other runs.
 fn later_lights(grid: &Grid<'_>, index: usize) -> Vec<usize> {
     let subject = &grid.subjects[index];
-    let later = grid.subjects.iter().enumerate().skip(index + 1);
-    later
+    grid.subjects
+        .iter()
+        .enumerate()
+        .skip(index + 1)
         .filter(|(_, other)| other.model == subject.model && is_other_light(subject, other))
         .map(|(other, _)| other)
         .collect()
@@ -347,8 +354,10 @@ fn is_other_light(one: &Subject, other: &Subject) -> bool {
 /// The same model without images; if it was never asked so, all models without images.
 fn blind(grid: &Grid<'_>, subject: &Subject) -> Vec<usize> {
     let all = || {
-        let subjects = grid.subjects.iter().enumerate();
-        subjects.filter(|(_, other)| other.view == Some(View::Blind))
+        grid.subjects
+            .iter()
+            .enumerate()
+            .filter(|(_, other)| other.view == Some(View::Blind))
     };
     let same_model: Vec<usize> = all()
         .filter(|(_, other)| other.model == subject.model)

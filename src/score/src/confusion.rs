@@ -32,11 +32,10 @@ pub struct Confusion {
 pub fn confusions(grid: &Grid<'_>) -> Vec<Confusion> {
     let mut all = Vec::new();
     for family in grid.families() {
-        let items = grid
+        let labels: BTreeSet<&str> = grid
             .items
             .iter()
-            .filter(|item| *item.asked.family == *family);
-        let labels: BTreeSet<&str> = items
+            .filter(|item| *item.asked.family == *family)
             .flat_map(|item| item.asked.choices.iter().map(String::as_str))
             .collect();
         if labels.len() > MAX_LABELS {
@@ -84,8 +83,9 @@ impl Confusion {
     #[must_use]
     pub fn shares(&self) -> Vec<(usize, usize)> {
         let predicted = |label: usize| self.counts.iter().map(|row| row[label]).sum();
-        let labels = self.counts.iter().enumerate();
-        labels
+        self.counts
+            .iter()
+            .enumerate()
             .map(|(label, row)| (predicted(label), row.iter().sum()))
             .collect()
     }
@@ -250,11 +250,13 @@ impl Collapse {
 /// Shannon entropy of counts, in bits.
 fn entropy(counts: impl Iterator<Item = usize> + Clone) -> f64 {
     let all: usize = counts.clone().sum();
-    let terms = counts.filter(|count| *count > 0).map(|count| {
-        let share = count as f64 / all as f64;
-        -share * libm::log2(share)
-    });
-    terms.sum()
+    counts
+        .filter(|count| *count > 0)
+        .map(|count| {
+            let share = count as f64 / all as f64;
+            -share * libm::log2(share)
+        })
+        .sum()
 }
 
 /// A false answer to a presence question.
@@ -312,12 +314,15 @@ pub struct Hallucination {
 /// replies, but as neither "yes" nor "no".
 #[must_use]
 pub fn hallucinations(grid: &Grid<'_>) -> Vec<Hallucination> {
-    let subjects = grid.subjects.iter().enumerate();
-    let rates = subjects.map(|(index, subject)| Hallucination {
-        subject: subject.clone(),
-        false_positive: rate(grid, index, FalseAnswer::Yes),
-        false_negative: rate(grid, index, FalseAnswer::No),
-    });
+    let rates = grid
+        .subjects
+        .iter()
+        .enumerate()
+        .map(|(index, subject)| Hallucination {
+            subject: subject.clone(),
+            false_positive: rate(grid, index, FalseAnswer::Yes),
+            false_negative: rate(grid, index, FalseAnswer::No),
+        });
     rates
         .filter(|rates| rates.false_positive.is_some() || rates.false_negative.is_some())
         .collect()

@@ -41,16 +41,16 @@ impl Coverage {
 
     /// Number of answered items at each level.
     fn counts(&self) -> Vec<(AxisLevel, usize)> {
-        let levels = self.0.iter();
-        let counts = levels
-            .map(|(level, items)| (*level, items.iter().filter(|answered| **answered).count()));
-        counts.collect()
+        self.0
+            .iter()
+            .map(|(level, items)| (*level, items.iter().filter(|answered| **answered).count()))
+            .collect()
     }
 
     /// The levels with any answer.
     pub(super) fn levels(&self) -> impl Iterator<Item = AxisLevel> {
-        let counts = self.counts().into_iter();
-        counts
+        self.counts()
+            .into_iter()
             .filter(|(_, count)| *count > 0)
             .map(|(level, _)| level)
     }
@@ -61,17 +61,21 @@ impl Coverage {
             return [0, 0];
         };
         let count = |answered: Option<&Vec<bool>>| {
-            let both = answered.into_iter().flatten().zip(all);
-            both.filter(|(here, there)| **here && **there).count()
+            answered
+                .into_iter()
+                .flatten()
+                .zip(all)
+                .filter(|(here, there)| **here && **there)
+                .count()
         };
         [count(Some(all)), count(self.0.get(&level))]
     }
 
     /// The levels at which less is answered than [`LEAST_SHARE`] of what `most` has, with both numbers of items.
     pub(super) fn lacking(&self, most: &Self) -> Lacking {
-        let levels = most.0.keys();
-        let counts = levels.map(|level| (*level, self.level_counts(most, *level)));
-        counts
+        most.0
+            .keys()
+            .map(|level| (*level, self.level_counts(most, *level)))
             .filter(|(_, [all, here])| (*here as f64) < LEAST_SHARE * *all as f64)
             .collect()
     }

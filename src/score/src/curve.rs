@@ -55,11 +55,10 @@ pub struct CurvePoints {
 impl CurvePoints {
     /// All curves of a grid that have L0 and at least one degraded level.
     pub(super) fn all(grid: &Grid<'_>) -> Vec<Self> {
-        let degraded = grid
+        let mut keys: Vec<(&str, &KindReading, Option<&EnhancerName>)> = grid
             .subjects
             .iter()
-            .filter(|subject| subject.view == Some(View::Image) && subject.variant.kind.is_some());
-        let mut keys: Vec<(&str, &KindReading, Option<&EnhancerName>)> = degraded
+            .filter(|subject| subject.view == Some(View::Image) && subject.variant.kind.is_some())
             .map(|subject| (&*subject.model, &subject.variant, subject.enhancer.as_ref()))
             .collect();
         // Equal keys stand together, and models in their order.
@@ -75,9 +74,11 @@ impl CurvePoints {
                         && LightGroup::meet(subject.variant.group.as_ref(), variant.group.as_ref())
                         || subject.variant == *variant && subject.enhancer.as_ref() == enhancer)
             };
-            let subjects = grid.subjects.iter().enumerate();
-            let on_curve = subjects.filter(|(_, subject)| on_curve(subject));
-            let mut subjects: Vec<(AxisLevel, usize)> = on_curve
+            let mut subjects: Vec<(AxisLevel, usize)> = grid
+                .subjects
+                .iter()
+                .enumerate()
+                .filter(|(_, subject)| on_curve(subject))
                 .filter_map(|(index, subject)| Some((subject.level?, index)))
                 .collect();
             subjects.sort_unstable();
@@ -98,8 +99,9 @@ impl CurvePoints {
 /// level.
 #[must_use]
 pub fn curves(grid: &Grid<'_>, draws: &Resamples, family: Option<&Family>) -> Vec<Curve> {
-    let all = CurvePoints::all(grid).into_par_iter();
-    all.filter_map(|points| curve(grid, draws, family, points))
+    CurvePoints::all(grid)
+        .into_par_iter()
+        .filter_map(|points| curve(grid, draws, family, points))
         .collect()
 }
 

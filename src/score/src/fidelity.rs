@@ -85,8 +85,10 @@ impl FidelityFindings {
         if measured.is_empty() {
             return None;
         }
-        let seeing = grid.subjects.iter();
-        let seeing = seeing.filter(|subject| subject.view == Some(View::Image));
+        let seeing = grid
+            .subjects
+            .iter()
+            .filter(|subject| subject.view == Some(View::Image));
         let models = grid
             .listing
             .without_people(seeing.map(|subject| &*subject.model));
@@ -102,15 +104,17 @@ impl FidelityFindings {
             }
         }
         let mut all = [(); 2].map(|()| PairCounts::new(grid.clusters));
-        let rows = conditions.into_iter().filter_map(|(key, subjects)| {
-            let sums = ConditionSums::new(grid, &subjects, &measured);
-            let (row, pairs) = (sums.row(key)?, &sums.pairs);
-            all.iter_mut()
-                .zip(pairs)
-                .for_each(|(all, pairs)| all.extend(pairs));
-            Some(row)
-        });
-        let mut rows: Vec<ConditionFidelity> = rows.collect();
+        let mut rows: Vec<ConditionFidelity> = conditions
+            .into_iter()
+            .filter_map(|(key, subjects)| {
+                let sums = ConditionSums::new(grid, &subjects, &measured);
+                let (row, pairs) = (sums.row(key)?, &sums.pairs);
+                all.iter_mut()
+                    .zip(pairs)
+                    .for_each(|(all, pairs)| all.extend(pairs));
+                Some(row)
+            })
+            .collect();
         if rows.is_empty() {
             return None;
         }
@@ -243,10 +247,10 @@ fn correct(rows: &mut [ConditionFidelity]) {
 /// Spearman's rank correlation of mean accuracy and mean fidelity over the conditions; `None` with fewer than three, or if one of
 /// these is the same everywhere.
 fn rank_correlation(rows: &[ConditionFidelity], index: usize) -> Option<f64> {
-    let pairs = rows
+    let (fidelity, accuracy): (Vec<f64>, Vec<f64>) = rows
         .iter()
-        .filter_map(|row| Some((row.means[index]?, row.accuracy)));
-    let (fidelity, accuracy): (Vec<f64>, Vec<f64>) = pairs.unzip();
+        .filter_map(|row| Some((row.means[index]?, row.accuracy)))
+        .unzip();
     if fidelity.len() < 3 {
         return None;
     }
@@ -264,12 +268,14 @@ fn rank_correlation(rows: &[ConditionFidelity], index: usize) -> Option<f64> {
 
 /// Ranks from 1; equal numbers share the mean of their ranks.
 fn ranks(numbers: &[f64]) -> Vec<f64> {
-    let rank = |number: &f64| {
-        let below = numbers.iter().filter(|other| *other < number).count();
-        let equal = numbers
-            .iter()
-            .filter(|other| other.total_cmp(number).is_eq());
-        below as f64 + f64::midpoint(equal.count() as f64, 1.0)
-    };
-    numbers.iter().map(rank).collect()
+    numbers
+        .iter()
+        .map(|number: &f64| {
+            let below = numbers.iter().filter(|other| *other < number).count();
+            let equal = numbers
+                .iter()
+                .filter(|other| other.total_cmp(number).is_eq());
+            below as f64 + f64::midpoint(equal.count() as f64, 1.0)
+        })
+        .collect()
 }

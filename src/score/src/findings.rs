@@ -243,10 +243,14 @@ impl<'a> Findings<'a> {
     #[must_use]
     pub fn models_of(&self, variant: &KindReading) -> Vec<&str> {
         let mut models = pool(&self.grid);
-        let of_variant = self.left_out.iter().filter(|set| {
-            set.kind == PooledKind::Darkness && set.variant == *variant && !set.is_more
-        });
-        let apart: Vec<&String> = of_variant.flat_map(|set| &set.models).collect();
+        let apart: Vec<&String> = self
+            .left_out
+            .iter()
+            .filter(|set| {
+                set.kind == PooledKind::Darkness && set.variant == *variant && !set.is_more
+            })
+            .flat_map(|set| &set.models)
+            .collect();
         models.retain(|model| !apart.iter().any(|name| name == model));
         models
     }
@@ -255,12 +259,15 @@ impl<'a> Findings<'a> {
     /// without images. The test is paired, with Holm's correction over the conditions of the two models.
     #[must_use]
     pub fn below_blind(&self, subject: &Subject, family: Option<&Family>) -> Vec<&str> {
-        let below = self.comparisons.iter().filter(|comparison| {
-            comparison.kind == ComparisonKind::Blind
-                && comparison.family.as_ref() == family
-                && comparison.first == *subject
-                && comparison.strict.significance == Significance::Worse
-        });
-        below.map(|comparison| &*comparison.second.model).collect()
+        self.comparisons
+            .iter()
+            .filter(|comparison| {
+                comparison.kind == ComparisonKind::Blind
+                    && comparison.family.as_ref() == family
+                    && comparison.first == *subject
+                    && comparison.strict.significance == Significance::Worse
+            })
+            .map(|comparison| &*comparison.second.model)
+            .collect()
     }
 }

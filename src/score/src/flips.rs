@@ -15,8 +15,10 @@ pub struct FirstFailure {
 /// First failing levels for every curve of a grid.
 #[must_use]
 pub fn first_failures(grid: &Grid<'_>) -> Vec<FirstFailure> {
-    let curves = CurvePoints::all(grid).into_iter();
-    curves.map(|curve| FirstFailure { curve }).collect()
+    CurvePoints::all(grid)
+        .into_iter()
+        .map(|curve| FirstFailure { curve })
+        .collect()
 }
 
 impl FirstFailure {

@@ -141,8 +141,9 @@ impl<'a> Grid<'a> {
         let mut indices = BTreeMap::<Subject, usize>::new();
         let mut subjects_of = Vec::with_capacity(asked.len());
         for (asked, is_met) in asked.iter().zip(met.asked) {
-            let subject = asked.filter(|_| is_met);
-            let subject = subject.map(|(model, condition)| Subject::new(model, condition));
+            let subject = asked
+                .filter(|_| is_met)
+                .map(|(model, condition)| Subject::new(model, condition));
             subjects_of.push(subject.clone());
             indices.extend(subject.map(|subject| (subject, 0)));
         }
@@ -229,8 +230,11 @@ impl<'a> Grid<'a> {
     /// The variants that were asked, sorted: kinds of degradation in each light reading.
     #[must_use]
     pub fn variants(&self) -> BTreeSet<&KindReading> {
-        let variants = self.subjects.iter().map(|subject| &subject.variant);
-        variants.filter(|variant| variant.kind.is_some()).collect()
+        self.subjects
+            .iter()
+            .map(|subject| &subject.variant)
+            .filter(|variant| variant.kind.is_some())
+            .collect()
     }
 
     /// The variant where only one is shown: of the first kind that was asked and those that extend it the last, in its first light
@@ -239,8 +243,11 @@ impl<'a> Grid<'a> {
     pub fn main_variant(&self) -> Option<KindReading> {
         let variants = self.variants();
         let root = variants.first()?.kind.map(Kind::root);
-        let of_root = |variant: &&KindReading| variant.kind.map(Kind::root) == root;
-        let kind = variants.iter().copied().rfind(of_root)?.kind;
+        let kind = variants
+            .iter()
+            .copied()
+            .rfind(|variant| variant.kind.map(Kind::root) == root)?
+            .kind;
         variants
             .into_iter()
             .find(|variant| variant.kind == kind)
@@ -251,8 +258,8 @@ impl<'a> Grid<'a> {
     /// runs meets its own.
     #[must_use]
     pub fn stand_in(&self, subject: &Subject) -> Option<usize> {
-        let any = || self.subjects.iter().position(|other| other.is_for(subject));
-        self.find(subject).or_else(any)
+        self.find(subject)
+            .or_else(|| self.subjects.iter().position(|other| other.is_for(subject)))
     }
 
     /// Items of a family, each with its result for a subject.
@@ -262,8 +269,10 @@ impl<'a> Grid<'a> {
         family: Option<&'s Family>,
     ) -> impl Iterator<Item = (&'s GridItem<'a>, TrialResult)> + 's {
         let results = &self.results[subject * self.items.len()..(subject + 1) * self.items.len()];
-        let all = self.items.iter().zip(results.iter().copied());
-        all.filter(move |(item, _)| item.is_of(family))
+        self.items
+            .iter()
+            .zip(results.iter().copied())
+            .filter(move |(item, _)| item.is_of(family))
     }
 
     /// Numbers of right replies and of replies of a subject, by cluster.
@@ -289,8 +298,10 @@ impl<'a> Grid<'a> {
     #[must_use]
     pub fn restricted(&self, kept: &[bool]) -> Self {
         let cells = |subject: usize| {
-            let items = kept.iter().enumerate().filter(|(_, kept)| **kept);
-            items.map(move |(item, _)| subject * self.items.len() + item)
+            kept.iter()
+                .enumerate()
+                .filter(|(_, kept)| **kept)
+                .map(move |(item, _)| subject * self.items.len() + item)
         };
         let cells: Vec<usize> = (0..self.subjects.len()).flat_map(cells).collect();
         let items = self.items.iter().zip(kept);

@@ -122,8 +122,10 @@ impl<T: Copy> Branch<T> {
 
     /// The branches with tests that are not rejected.
     fn open(&self) -> impl Iterator<Item = (usize, &Self)> {
-        let branches = self.branches.iter().enumerate();
-        branches.filter(|(_, branch)| branch.remaining > 0)
+        self.branches
+            .iter()
+            .enumerate()
+            .filter(|(_, branch)| branch.remaining > 0)
     }
 
     /// Rejects the test at the end of a way.
@@ -169,8 +171,10 @@ mod tests {
 
     /// The p-values after correction of tests that are their own p-values.
     fn corrected(tree: &TestTree<f64>) -> Vec<f64> {
-        let tests = adjusted(tree, |p| p).into_iter();
-        tests.map(|(_, p)| (p * 1e9).round() / 1e9).collect()
+        adjusted(tree, |p| p)
+            .into_iter()
+            .map(|(_, p)| (p * 1e9).round() / 1e9)
+            .collect()
     }
 
     fn leaves(values: &[f64]) -> TestTree<f64> {

@@ -56,16 +56,17 @@ impl Health {
     /// Number of replies without a choice for one of these reasons.
     #[must_use]
     pub fn unread_for(&self, reasons: &[UnreadReason]) -> usize {
-        let count = |reason| self.unread.get(reason).copied().unwrap_or(0);
-        reasons.iter().map(count).sum()
+        reasons
+            .iter()
+            .map(|reason| self.unread.get(reason).copied().unwrap_or(0))
+            .sum()
     }
 }
 
 /// Health of every subject, in the order of the grid.
 #[must_use]
 pub fn healths(grid: &Grid<'_>) -> Vec<Health> {
-    let subjects = grid.subjects.iter().enumerate();
-    let healths = subjects.map(|(index, subject)| {
+    let healths = grid.subjects.iter().enumerate().map(|(index, subject)| {
         let mut health = Health {
             subject: subject.clone(),
             replies: 0,

@@ -252,14 +252,15 @@ impl Counts {
             other_truth: 0,
             usual: 0,
         };
-        let same_wording = sorted.chunk_by(|one, other| one.wording == other.wording);
-        for replies in same_wording.filter(|replies| replies.len() > 1 || letter.is_some()) {
+        for replies in sorted
+            .chunk_by(|one, other| one.wording == other.wording)
+            .filter(|replies| replies.len() > 1 || letter.is_some())
+        {
             counts.wordings += 1;
             let Some(usual) = letter.or_else(|| Some(most_frequent(replies)?.0)) else {
                 continue;
             };
-            let other = replies.iter().filter(|reply| reply.truth != usual);
-            for reply in other {
+            for reply in replies.iter().filter(|reply| reply.truth != usual) {
                 counts.other_truth += 1;
                 counts.usual += usize::from(reply.chosen == usual);
             }

@@ -108,8 +108,10 @@ impl ObserverSummary {
     /// The controls that are not at chance, over all conditions or in one. The intervals of the conditions are not corrected for
     /// their number: rather a sound observer is hidden than a broken one shown.
     pub fn refutations(&self) -> impl Iterator<Item = &ObserverCell> {
-        let all = self.controls.iter().chain(&self.cells);
-        all.filter(|cell| cell.refutes())
+        self.controls
+            .iter()
+            .chain(&self.cells)
+            .filter(|cell| cell.refutes())
     }
 
     /// Whether the observer's lines are not shown: a control is not at chance, or none was asked.
@@ -122,14 +124,16 @@ impl ObserverSummary {
     /// The standing control over all conditions, of each run that has its own.
     #[must_use]
     pub fn standing_controls(&self) -> Vec<&ObserverCell> {
-        let of = |standing| -> Vec<&ObserverCell> {
-            let is_it = |cell: &&ObserverCell| {
-                Control::from_model_name(&cell.subject.model) == Some(standing)
-            };
-            self.controls.iter().filter(is_it).collect()
-        };
-        let mut all = Control::STANDING.into_iter().map(of);
-        all.find(|cells| !cells.is_empty()).unwrap_or_default()
+        Control::STANDING
+            .into_iter()
+            .map(|standing| -> Vec<&ObserverCell> {
+                self.controls
+                    .iter()
+                    .filter(|cell| Control::from_model_name(&cell.subject.model) == Some(standing))
+                    .collect()
+            })
+            .find(|cells| !cells.is_empty())
+            .unwrap_or_default()
     }
 
     /// The standing control in the condition of a cell.
@@ -141,17 +145,17 @@ impl ObserverSummary {
             .model
             .strip_prefix(OBSERVER)
             .unwrap_or_default();
-        let mut names = Control::STANDING
+        Control::STANDING
             .into_iter()
             .map(Control::model_name)
-            .flat_map(|name| [format!("{name}{run}"), name]);
-        names.find_map(|model| {
-            let subject = Subject {
-                model,
-                ..cell.subject.clone()
-            };
-            self.cells.iter().find(|other| other.subject == subject)
-        })
+            .flat_map(|name| [format!("{name}{run}"), name])
+            .find_map(|model| {
+                let subject = Subject {
+                    model,
+                    ..cell.subject.clone()
+                };
+                self.cells.iter().find(|other| other.subject == subject)
+            })
     }
 }
 

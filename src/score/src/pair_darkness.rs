@@ -12,28 +12,34 @@ const ONE_EXPOSURE: f64 = 0.5;
 /// How dark the photographs of the frames are that a subject was shown, or that its images were made as dark as.
 #[must_use]
 pub fn pair_facts<'g>(grid: &Grid<'g>, subject: usize) -> BTreeMap<&'g FrameId, PairFacts> {
-    let trials = (0..grid.items.len()).filter_map(|item| grid.trial(subject, item));
-    let facts = trials.filter_map(|trial| {
-        let image = trial.images()?;
-        Some((trial.shown(), *image.pair.as_deref()?))
-    });
-    facts.collect()
+    (0..grid.items.len())
+        .filter_map(|item| grid.trial(subject, item))
+        .filter_map(|trial| {
+            let image = trial.images()?;
+            Some((trial.shown(), *image.pair.as_deref()?))
+        })
+        .collect()
 }
 
 /// How dark all photographs of a grid are, by name.
 #[must_use]
 pub fn from_grid(grid: &Grid<'_>) -> Vec<PairDarkness> {
-    let named = grid.subjects.iter().enumerate();
-    let named = named.filter_map(|(index, subject)| Some((subject.variant.photograph()?, index)));
-    let named: Vec<(&PhotoName, usize)> = named.collect();
+    let named: Vec<(&PhotoName, usize)> = grid
+        .subjects
+        .iter()
+        .enumerate()
+        .filter_map(|(index, subject)| Some((subject.variant.photograph()?, index)))
+        .collect();
     let names: BTreeSet<&PhotoName> = named.iter().map(|(name, _)| *name).collect();
-    let all = names.into_iter().filter_map(|name| {
-        let of_name = named.iter().filter(|(of, _)| *of == name);
-        let mut facts = BTreeMap::new();
-        of_name.for_each(|(_, subject)| facts.extend(pair_facts(grid, *subject)));
-        PairDarkness::new(name, &facts.into_values().collect::<Vec<_>>())
-    });
-    all.collect()
+    names
+        .into_iter()
+        .filter_map(|name| {
+            let of_name = named.iter().filter(|(of, _)| *of == name);
+            let mut facts = BTreeMap::new();
+            of_name.for_each(|(_, subject)| facts.extend(pair_facts(grid, *subject)));
+            PairDarkness::new(name, &facts.into_values().collect::<Vec<_>>())
+        })
+        .collect()
 }
 
 /// How dark the photographs of one name are beside their frames.

@@ -147,8 +147,9 @@ impl PairedTest {
     /// the squared differences of all items.
     pub(super) fn new(clusters: &[ClusterNet], scale: f64, squares: f64) -> Self {
         let n = clusters.iter().map(|cluster| cluster.items as usize).sum();
-        let sums = clusters.iter();
-        let sums = sums.map(|cluster| (cluster.net as f64 / scale, f64::from(cluster.items)));
+        let sums = clusters
+            .iter()
+            .map(|cluster| (cluster.net as f64 / scale, f64::from(cluster.items)));
         let (estimate, spread) = interval(&sums.collect::<Vec<_>>(), squares / scale / scale, n);
         let nets = clusters.iter().map(|cluster| cluster.net);
         let swapped = swap_test(&nets.collect::<Vec<_>>());
@@ -290,11 +291,12 @@ mod tests {
         };
         (0..4000).map(move |_| {
             let (clusters, items, shift) = (2 + draw(30), 1 + draw(8), draw(3));
-            let cluster = |_| ClusterNet {
-                net: (draw(2 * items + 1) + shift).min(2 * items) as i64 - items as i64,
-                items: items as u32,
-            };
-            (0..clusters).map(cluster).collect()
+            (0..clusters)
+                .map(|_| ClusterNet {
+                    net: (draw(2 * items + 1) + shift).min(2 * items) as i64 - items as i64,
+                    items: items as u32,
+                })
+                .collect()
         })
     }
 
@@ -341,10 +343,10 @@ mod tests {
 
     fn estimate(clusters: &[(i64, i64, i64)]) -> Estimate {
         let squares: i64 = clusters.iter().map(|(_, gained, lost)| gained + lost).sum();
-        let clusters = clusters
+        let clusters: Vec<(f64, f64)> = clusters
             .iter()
-            .map(|&(all, gained, lost)| ((gained - lost) as f64, all as f64));
-        let clusters: Vec<(f64, f64)> = clusters.collect();
+            .map(|&(all, gained, lost)| ((gained - lost) as f64, all as f64))
+            .collect();
         let n = clusters.iter().map(|(_, pairs)| pairs).sum::<f64>() as usize;
         difference(&clusters, squares as f64, n)
     }

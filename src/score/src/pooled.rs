@@ -141,8 +141,10 @@ pub fn pool<'g>(grid: &'g Grid<'_>) -> Vec<&'g str> {
 
 /// The [`pooled_models`] with images or without.
 fn models<'g>(grid: &'g Grid<'_>, view: View) -> Vec<&'g str> {
-    let subjects = grid.subjects.iter();
-    let asked = subjects.filter(|subject| subject.view == Some(view));
+    let asked = grid
+        .subjects
+        .iter()
+        .filter(|subject| subject.view == Some(view));
     let models = grid
         .listing
         .without_people(asked.map(|subject| &*subject.model));
@@ -162,20 +164,20 @@ impl PooledSet {
     fn all(grid: &Grid<'_>) -> BTreeSet<Self> {
         let seeing = grid.subjects.iter();
         // Findings are about levels, and the darkness of pairs is none: it has comparisons of its own.
-        let seeing = seeing
-            .filter(|subject| subject.view == Some(View::Image) && subject.variant.pair.is_none());
-        let sets = seeing.flat_map(|subject| {
-            let raw = PooledKind::for_raw(subject.variant.kind);
-            let kinds = match subject.enhancer {
-                None => raw,
-                Some(_) => vec![PooledKind::Enhancer],
-            };
-            kinds.into_iter().map(|kind| Self {
-                kind,
-                variant: subject.variant.clone(),
-                enhancer: subject.enhancer.clone(),
-            })
-        });
+        let sets = seeing
+            .filter(|subject| subject.view == Some(View::Image) && subject.variant.pair.is_none())
+            .flat_map(|subject| {
+                let raw = PooledKind::for_raw(subject.variant.kind);
+                let kinds = match subject.enhancer {
+                    None => raw,
+                    Some(_) => vec![PooledKind::Enhancer],
+                };
+                kinds.into_iter().map(|kind| Self {
+                    kind,
+                    variant: subject.variant.clone(),
+                    enhancer: subject.enhancer.clone(),
+                })
+            });
         sets.collect()
     }
 
@@ -210,26 +212,31 @@ impl PooledSet {
 
     /// The levels of the first side, sorted.
     fn levels(&self, grid: &Grid<'_>) -> BTreeSet<AxisLevel> {
-        let subjects = grid.subjects.iter().filter(|subject| {
-            subject.view == Some(View::Image)
-                && subject.variant == self.variant
-                && subject.enhancer == self.enhancer
-        });
-        subjects.filter_map(|subject| subject.level).collect()
+        grid.subjects
+            .iter()
+            .filter(|subject| {
+                subject.view == Some(View::Image)
+                    && subject.variant == self.variant
+                    && subject.enhancer == self.enhancer
+            })
+            .filter_map(|subject| subject.level)
+            .collect()
     }
 
     /// The models of each pair, first and second side, among those of the pool that have both sides at some level. Those that answered
     /// less than others stand apart.
     fn models<'g>(&self, grid: &'g Grid<'_>, levels: &BTreeSet<AxisLevel>) -> SetModels<'g> {
         let all = self.asked_models(grid, levels);
-        let coverages = all.iter().map(|[model, other]| {
-            let sides = levels.iter().filter_map(|level| {
-                let (first, second) = self.sides(grid, model, other, *level)?;
-                Some((*level, vec![first, second]))
-            });
-            Coverage::new(grid, sides, |item| self.kind.is_about(&grid.items[item]))
-        });
-        let coverages: Vec<Coverage> = coverages.collect();
+        let coverages: Vec<Coverage> = all
+            .iter()
+            .map(|[model, other]| {
+                let sides = levels.iter().filter_map(|level| {
+                    let (first, second) = self.sides(grid, model, other, *level)?;
+                    Some((*level, vec![first, second]))
+                });
+                Coverage::new(grid, sides, |item| self.kind.is_about(&grid.items[item]))
+            })
+            .collect();
         let mut models = SetModels::default();
         let Some(most) = shared(&coverages) else {
             return models;
@@ -238,8 +245,9 @@ impl PooledSet {
             let lacking = coverage.lacking(most);
             if lacking.is_empty() {
                 let levels = coverage.levels();
-                let more = levels.filter(|level| !most.levels().any(|known| known == *level));
-                let more: Vec<AxisLevel> = more.collect();
+                let more: Vec<AxisLevel> = levels
+                    .filter(|level| !most.levels().any(|known| known == *level))
+                    .collect();
                 if !more.is_empty() {
                     models.more.push((pair[0], more));
                 }
@@ -263,18 +271,19 @@ impl PooledSet {
         let pool = pool(grid);
         let own = pool.iter().map(|model| [*model, *model]);
         let asked = |pair: &[&str; 2]| {
-            let mut levels = levels.iter();
-            levels.any(|level| self.sides(grid, pair[0], pair[1], *level).is_some())
+            levels
+                .iter()
+                .any(|level| self.sides(grid, pair[0], pair[1], *level).is_some())
         };
         let own: Vec<[&str; 2]> = own.filter(asked).collect();
         if self.kind != PooledKind::Blind || !own.is_empty() {
             return own;
         }
         let blind = models(grid, View::Blind);
-        let pairs = pool
-            .iter()
-            .flat_map(|model| blind.iter().map(|other| [*model, *other]));
-        pairs.filter(asked).collect()
+        pool.iter()
+            .flat_map(|model| blind.iter().map(|other| [*model, *other]))
+            .filter(asked)
+            .collect()
     }
 }
 
@@ -323,10 +332,10 @@ impl SideCounts {
 #[must_use]
 pub fn pooled(grid: &Grid<'_>) -> (Vec<PooledFinding>, Vec<PooledFinding>) {
     let sets: Vec<PooledSet> = PooledSet::all(grid).into_iter().collect();
-    let findings = sets
+    let findings: Vec<PooledFinding> = sets
         .into_par_iter()
-        .flat_map_iter(|set| set_findings(grid, &set));
-    let findings: Vec<PooledFinding> = findings.collect();
+        .flat_map_iter(|set| set_findings(grid, &set))
+        .collect();
     findings
         .into_iter()
         .partition(|finding| finding.mean_over.is_empty())
@@ -350,10 +359,10 @@ fn averaged(
         return Vec::new();
     }
     let halves = [true, false].map(|severe| {
-        let own = levels
+        let own: Vec<&(AxisLevel, Vec<PooledItem>)> = levels
             .iter()
-            .filter(|(level, _)| is_severe(*level, set.variant.kind) == severe);
-        let own: Vec<&(AxisLevel, Vec<PooledItem>)> = own.collect();
+            .filter(|(level, _)| is_severe(*level, set.variant.kind) == severe)
+            .collect();
         let is_tested = severe || !set.kind.grows_with_the_level();
         if own.len() < 2 || !is_tested {
             return None;
@@ -374,11 +383,13 @@ fn averaged(
         for item in own.iter().flat_map(|(_, items)| items) {
             *asked.entry(item.index).or_default() += 1;
         }
-        let items = sums.into_iter().map(|(index, sides)| PooledItem {
-            index,
-            sides: sides.filter(|_| asked[&index] == own.len()),
-        });
-        let items: Vec<PooledItem> = items.collect();
+        let items: Vec<PooledItem> = sums
+            .into_iter()
+            .map(|(index, sides)| PooledItem {
+                index,
+                sides: sides.filter(|_| asked[&index] == own.len()),
+            })
+            .collect();
         let level = *mean_over.last()?;
         let pool = PoolOfLevels {
             models,
@@ -387,8 +398,11 @@ fn averaged(
         let found = finding(grid, set, pool, (level, &items), None)?;
         Some(PooledFinding { mean_over, ..found })
     });
-    let found = halves.into_iter().flatten();
-    found.flat_map(|one| corrected(vec![one])).collect()
+    halves
+        .into_iter()
+        .flatten()
+        .flat_map(|one| corrected(vec![one]))
+        .collect()
 }
 
 /// The models of a finding, and the number of levels over which it is a mean.
@@ -405,8 +419,10 @@ fn set_findings(grid: &Grid<'_>, set: &PooledSet) -> Vec<PooledFinding> {
     if models.is_empty() {
         return Vec::new();
     }
-    let at = |level: &AxisLevel| Some((*level, items(grid, set, &models, *level)?));
-    let levels: Vec<(AxisLevel, Vec<PooledItem>)> = levels.iter().filter_map(at).collect();
+    let levels: Vec<(AxisLevel, Vec<PooledItem>)> = levels
+        .iter()
+        .filter_map(|level| Some((*level, items(grid, set, &models, *level)?)))
+        .collect();
     let groups = match set.kind.only_family() {
         None => grid.groups(),
         only => vec![only],
@@ -415,13 +431,15 @@ fn set_findings(grid: &Grid<'_>, set: &PooledSet) -> Vec<PooledFinding> {
         models: &models,
         levels: 1,
     };
-    let findings = groups.into_iter().flat_map(|family| {
-        let levels = levels.iter();
-        let of_family =
-            levels.filter_map(|(level, items)| finding(grid, set, pool, (*level, items), family));
-        corrected(of_family.collect())
-    });
-    let mut findings: Vec<PooledFinding> = findings.collect();
+    let mut findings: Vec<PooledFinding> = groups
+        .into_iter()
+        .flat_map(|family| {
+            let levels = levels.iter();
+            let of_family = levels
+                .filter_map(|(level, items)| finding(grid, set, pool, (*level, items), family));
+            corrected(of_family.collect())
+        })
+        .collect();
     findings.extend(averaged(grid, set, &models, &levels));
     findings
 }
@@ -433,29 +451,34 @@ fn items(
     models: &[[&str; 2]],
     level: AxisLevel,
 ) -> Option<Vec<PooledItem>> {
-    let pairs = models.iter();
-    let pairs = pairs.map(|[model, other]| set.sides(grid, model, other, level));
-    let pairs: Vec<(usize, usize)> = pairs.collect::<Option<_>>()?;
-    let items = grid.items.iter().enumerate();
-    let items = items.filter(|(_, item)| set.kind.is_about(item));
-    let items = items.filter_map(|(index, item)| {
-        let (mut sides, mut is_asked, mut is_answered) = ([SideCounts::default(); 2], false, true);
-        for &(first, second) in &pairs {
-            let [a, b] = [first, second].map(|subject| grid.result(subject, index));
-            is_asked |= a.is_asked() && b.is_asked();
-            for (side, result) in sides.iter_mut().zip([a, b]) {
-                let TrialResult::Read { strict, lenient } = result else {
-                    is_answered = false;
-                    continue;
-                };
-                side.strict += u32::from(set.kind.counts(item, strict));
-                side.lenient += u32::from(set.kind.counts(item, lenient));
-                side.read += u32::from(strict.is_some());
+    let pairs: Vec<(usize, usize)> = models
+        .iter()
+        .map(|[model, other]| set.sides(grid, model, other, level))
+        .collect::<Option<_>>()?;
+    let items = grid
+        .items
+        .iter()
+        .enumerate()
+        .filter(|(_, item)| set.kind.is_about(item))
+        .filter_map(|(index, item)| {
+            let (mut sides, mut is_asked, mut is_answered) =
+                ([SideCounts::default(); 2], false, true);
+            for &(first, second) in &pairs {
+                let [a, b] = [first, second].map(|subject| grid.result(subject, index));
+                is_asked |= a.is_asked() && b.is_asked();
+                for (side, result) in sides.iter_mut().zip([a, b]) {
+                    let TrialResult::Read { strict, lenient } = result else {
+                        is_answered = false;
+                        continue;
+                    };
+                    side.strict += u32::from(set.kind.counts(item, strict));
+                    side.lenient += u32::from(set.kind.counts(item, lenient));
+                    side.read += u32::from(strict.is_some());
+                }
             }
-        }
-        let sides = is_answered.then_some(sides);
-        is_asked.then_some(PooledItem { index, sides })
-    });
+            let sides = is_answered.then_some(sides);
+            is_asked.then_some(PooledItem { index, sides })
+        });
     Some(items.collect())
 }
 
@@ -470,10 +493,11 @@ fn finding(
     let models = pool.models;
     let each = models.len() * pool.levels;
     let (mut answered, mut dropped) = (Vec::new(), 0);
-    let of_family = items
+    for (item, sides) in items
         .iter()
-        .map(|item| (&grid.items[item.index], item.sides));
-    for (item, sides) in of_family.filter(|(item, _)| item.is_of(family)) {
+        .map(|item| (&grid.items[item.index], item.sides))
+        .filter(|(item, _)| item.is_of(family))
+    {
         match sides {
             Some(sides) => answered.push((item.cluster, sides)),
             None => dropped += 1,
@@ -492,10 +516,11 @@ fn finding(
         strict
     };
     let read = |side: usize| {
-        let read = answered
+        answered
             .iter()
-            .map(|(_, sides)| f64::from(sides[side].read));
-        read.sum::<f64>() / replies
+            .map(|(_, sides)| f64::from(sides[side].read))
+            .sum::<f64>()
+            / replies
     };
     let clusters: BTreeSet<u32> = answered.iter().map(|(cluster, _)| *cluster).collect();
     let names = |side: usize| {

@@ -89,8 +89,8 @@ mod tests {
         use Significance::{Better, NotShown, TooFewClusters, Worse};
         let all = ["a", "b", "c", "d"];
         let ranges = |shown: &[(&str, &str, Significance)]| {
-            let ranks = rank_ranges(&best(&all, shown)).into_iter();
-            ranks
+            rank_ranges(&best(&all, shown))
+                .into_iter()
                 .map(|rank| (rank.first, rank.last))
                 .collect::<Vec<_>>()
         };

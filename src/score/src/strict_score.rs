@@ -88,11 +88,14 @@ impl StrictScore {
             return None;
         }
         let families: BTreeSet<&Family> = groups.iter().filter_map(|group| group.family).collect();
-        let families = std::iter::once(None).chain(families.into_iter().map(Some));
-        let families: Vec<Option<&Family>> = families.collect();
+        let families: Vec<Option<&Family>> = std::iter::once(None)
+            .chain(families.into_iter().map(Some))
+            .collect();
         let of_family = |family: Option<&Family>| -> Vec<&Group<'_>> {
-            let is_of = |group: &&Group<'_>| family.is_none() || group.family == family;
-            groups.iter().filter(is_of).collect()
+            groups
+                .iter()
+                .filter(|group| family.is_none() || group.family == family)
+                .collect()
         };
         let mut cells = Vec::new();
         for subject in 0..grid.subjects.len() {
@@ -114,8 +117,13 @@ impl StrictScore {
             groups: groups.len(),
             single: count(|group| group.size == 1),
             across_frames: count(|group| {
-                let frames = group.questions.iter().map(|question| &question.frame);
-                frames.collect::<BTreeSet<_>>().len() > 1
+                group
+                    .questions
+                    .iter()
+                    .map(|question| &question.frame)
+                    .collect::<BTreeSet<_>>()
+                    .len()
+                    > 1
             }),
             never_complete: count(|group| !group.is_asked_whole()),
         })
@@ -159,8 +167,10 @@ fn groups<'a>(grid: &Grid<'_>, questions: &'a [RunQuestion]) -> Vec<Group<'a>> {
                 .max()
                 .unwrap_or(0),
             family: family.filter(|family| {
-                let mut others = questions.iter().map(|question| &question.family);
-                others.all(|other| other == *family)
+                questions
+                    .iter()
+                    .map(|question| &question.family)
+                    .all(|other| other == *family)
             }),
             items: of_group.flatten().copied().collect(),
             questions,
@@ -269,18 +279,24 @@ fn chance(grid: &Grid<'_>, groups: &[&Group<'_>]) -> Option<Estimate> {
         .iter()
         .filter(|group| group.is_asked_whole())
         .collect();
-    let guess = |group: &&&Group<'_>| -> f64 {
-        let mut questions: Vec<&RunQuestion> = group.questions.clone();
-        questions.sort_by(|one, other| one.id.cmp(&other.id));
-        let guess = questions.iter().map(|question| {
-            let items = group.items.iter();
-            let times = items.filter(|item| *grid.items[**item].asked.question == question.id);
-            let times = i32::try_from(times.count().max(1)).unwrap_or(i32::MAX);
-            (question.choices.len() as f64).recip().powi(times)
-        });
-        guess.product()
-    };
-    let sum: f64 = groups.iter().map(guess).sum();
+    let sum: f64 = groups
+        .iter()
+        .map(|group| -> f64 {
+            let mut questions: Vec<&RunQuestion> = group.questions.clone();
+            questions.sort_by(|one, other| one.id.cmp(&other.id));
+            questions
+                .iter()
+                .map(|question| {
+                    let times = group
+                        .items
+                        .iter()
+                        .filter(|item| *grid.items[**item].asked.question == question.id);
+                    let times = i32::try_from(times.count().max(1)).unwrap_or(i32::MAX);
+                    (question.choices.len() as f64).recip().powi(times)
+                })
+                .product()
+        })
+        .sum();
     let n = groups.len();
     (n > 0).then(|| Estimate::exact(sum / n as f64, n))
 }

@@ -41,8 +41,11 @@ pub fn is_reference(model: &str) -> bool {
 #[must_use]
 pub fn judged<'m>(models: impl IntoIterator<Item = &'m str>) -> BTreeSet<&'m str> {
     let all: BTreeSet<&str> = models.into_iter().collect();
-    let others = all.iter().copied().filter(|model| !is_reference(model));
-    let others: BTreeSet<&str> = others.collect();
+    let others: BTreeSet<&str> = all
+        .iter()
+        .copied()
+        .filter(|model| !is_reference(model))
+        .collect();
     if others.is_empty() { all } else { others }
 }
 
@@ -54,8 +57,13 @@ pub fn pooled_models<'m>(models: impl IntoIterator<Item = &'m str>) -> BTreeSet<
     if !judged.iter().all(|model| is_reference(model)) {
         return judged;
     }
-    let observer = judged.iter().find(|model| is_observer(model));
-    observer.or(judged.first()).copied().into_iter().collect()
+    judged
+        .iter()
+        .find(|model| is_observer(model))
+        .or(judged.first())
+        .copied()
+        .into_iter()
+        .collect()
 }
 
 /// A model in a condition; every cell of a table belongs to one.

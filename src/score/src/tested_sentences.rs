@@ -101,8 +101,7 @@ fn tests(findings: &Findings<'_>) -> Tests {
         let sets = sets.iter().filter(|set| is_of(set.kind));
         TestTree::group(sets.map(|set| set.tests(findings)))
     };
-    let names = sets.iter().filter_map(|set| set.enhancer);
-    let names: BTreeSet<&EnhancerName> = names.collect();
+    let names: BTreeSet<&EnhancerName> = sets.iter().filter_map(|set| set.enhancer).collect();
     let enhancers = names.into_iter().map(|name| {
         let own = sets.iter().filter(|set| set.enhancer == Some(name));
         TestTree::group(own.map(|set| set.tests(findings)))
@@ -137,8 +136,12 @@ fn tests(findings: &Findings<'_>) -> Tests {
 /// darkness alone.
 fn is_main(grid: &Grid<'_>, variant: &KindReading) -> bool {
     let root = variant.kind.map(Kind::root);
-    let kinds = grid.variants().into_iter().map(|other| other.kind);
-    let last = kinds.filter(|kind| kind.map(Kind::root) == root).max();
+    let last = grid
+        .variants()
+        .into_iter()
+        .map(|other| other.kind)
+        .filter(|kind| kind.map(Kind::root) == root)
+        .max();
     variant.kind.is_none() || last == Some(variant.kind)
 }
 
@@ -187,15 +190,21 @@ impl PooledTests<'_> {
         } else {
             OTHER_VARIANT
         };
-        let averaged = findings.averaged.iter().enumerate().filter(|(_, mean)| {
-            mean.kind == self.kind
-                && mean.variant == *self.variant
-                && mean.enhancer.as_ref() == self.enhancer
-        });
-        let averaged: Vec<(usize, &PooledFinding)> = averaged.collect();
+        let averaged: Vec<(usize, &PooledFinding)> = findings
+            .averaged
+            .iter()
+            .enumerate()
+            .filter(|(_, mean)| {
+                mean.kind == self.kind
+                    && mean.variant == *self.variant
+                    && mean.enhancer.as_ref() == self.enhancer
+            })
+            .collect();
         let tests = |levels: &[(usize, &PooledFinding)]| -> Vec<Test> {
-            let tests = levels.iter().map(|(index, _)| Test::Pooled(*index));
-            tests.collect()
+            levels
+                .iter()
+                .map(|(index, _)| Test::Pooled(*index))
+                .collect()
         };
         if self.kind.grows_with_the_level() {
             let means = averaged.iter().map(|(index, _)| Test::Averaged(*index));
@@ -207,10 +216,11 @@ impl PooledTests<'_> {
         let is_severe = |(_, finding): &(usize, &PooledFinding)| finding.is_severe();
         let (severe, mild): (Vec<_>, Vec<_>) = self.levels.iter().copied().partition(is_severe);
         let mean = |is_severe: bool| {
-            let own = averaged
+            averaged
                 .iter()
-                .filter(|(_, mean)| mean.is_severe() == is_severe);
-            own.map(|(index, _)| Test::Averaged(*index)).next()
+                .filter(|(_, mean)| mean.is_severe() == is_severe)
+                .map(|(index, _)| Test::Averaged(*index))
+                .next()
         };
         let mut severe_tests = tests(&severe);
         severe_tests.reverse();
@@ -281,8 +291,11 @@ fn photographs(findings: &Findings<'_>) -> Vec<Tests> {
                 && models.contains(&*comparison.first.model)
                 && comparison.strict.significance.is_possible()
         };
-        let comparisons = findings.comparisons.iter().enumerate();
-        let stated = comparisons.filter(|(_, comparison)| is_stated(comparison));
+        let stated = findings
+            .comparisons
+            .iter()
+            .enumerate()
+            .filter(|(_, comparison)| is_stated(comparison));
         TestTree::group(stated.map(|(index, _)| TestTree::leaf(Test::Comparison(index))))
     });
     questions.into()
@@ -291,21 +304,26 @@ fn photographs(findings: &Findings<'_>) -> Vec<Tests> {
 /// The subjects of raw images at the darkest level of each main variant, of the models over which findings are pooled.
 fn darkest<'f>(findings: &'f Findings<'_>) -> Vec<&'f Subject> {
     let grid = &findings.grid;
-    let raw = grid.subjects.iter().filter(|subject| {
-        subject.enhancer.is_none()
-            && subject.variant.kind.is_some()
-            && is_main(grid, &subject.variant)
-            && findings
-                .models_of(&subject.variant)
-                .contains(&&*subject.model)
-    });
-    let raw: Vec<&Subject> = raw.collect();
+    let raw: Vec<&Subject> = grid
+        .subjects
+        .iter()
+        .filter(|subject| {
+            subject.enhancer.is_none()
+                && subject.variant.kind.is_some()
+                && is_main(grid, &subject.variant)
+                && findings
+                    .models_of(&subject.variant)
+                    .contains(&&*subject.model)
+        })
+        .collect();
     let level = |variant: &KindReading| -> Option<AxisLevel> {
-        let own = raw.iter().filter(|subject| subject.variant == *variant);
-        own.filter_map(|subject| subject.level).max()
+        raw.iter()
+            .filter(|subject| subject.variant == *variant)
+            .filter_map(|subject| subject.level)
+            .max()
     };
-    let darkest = raw.iter().copied();
-    darkest
+    raw.iter()
+        .copied()
         .filter(|subject| subject.level == level(&subject.variant))
         .collect()
 }
@@ -313,10 +331,13 @@ fn darkest<'f>(findings: &'f Findings<'_>) -> Vec<&'f Subject> {
 /// Answer collapse of each model in each family.
 fn collapses(findings: &Findings<'_>) -> Tests {
     let darkest = darkest(findings);
-    let confusions = findings.confusions.iter().enumerate();
-    let tested = confusions.filter(|(_, confusion)| {
-        darkest.contains(&&confusion.subject) && against_clean(confusion).is_some()
-    });
+    let tested = findings
+        .confusions
+        .iter()
+        .enumerate()
+        .filter(|(_, confusion)| {
+            darkest.contains(&&confusion.subject) && against_clean(confusion).is_some()
+        });
     TestTree::group(tested.map(|(index, _)| TestTree::leaf(Test::Collapse(index))))
 }
 
@@ -331,8 +352,7 @@ fn confidence(findings: &Findings<'_>) -> Tests {
         return TestTree::group([]);
     }
     let darkest = darkest(findings);
-    let calibrations = findings.calibrations.iter().enumerate();
-    let tested = calibrations.filter(|(_, row)| {
+    let tested = findings.calibrations.iter().enumerate().filter(|(_, row)| {
         row.replies >= LEAST_CONFIDENT_REPLIES && darkest.contains(&&row.subject)
     });
     TestTree::group(tested.map(|(index, row)| {

@@ -25,36 +25,37 @@ pub(super) type Answers = fn(usize) -> Option<bool>;
 /// The records of a model in a condition; without images if the condition is empty.
 pub(super) fn records(model: &str, condition: &str, answers: Answers) -> Vec<Record> {
     let condition: Option<Condition> = (!condition.is_empty()).then(|| condition.parse().unwrap());
-    let record = |item: usize| {
-        let right = answers(item);
-        let chosen = right.map(|right| AnswerReading {
-            chosen: Some(usize::from(!right)),
-            why: None,
-        });
-        let detail = ChoiceDetail {
-            frame: FrameId(format!("f{:02}", item / 2)),
-            family: [Family::Color, Family::RoomType][item % 2].clone(),
-            choices: ["a", "b", "c"].map(str::to_owned).to_vec(),
-            truth: Some(0),
-            repeat: 0,
-            strict: chosen,
-            lenient: chosen,
-            outcome: match right {
-                None => TrialOutcome::Failed,
-                Some(true) => TrialOutcome::Right,
-                Some(false) => TrialOutcome::Wrong,
-            },
-            image: None,
-            more_images: Vec::new(),
-            shown_frame: None,
-            observed: None,
-            options: None,
-        };
-        let key = Digest::from_bytes(format!("{item} {model} {condition:?}").as_bytes()).into();
-        let question = QuestionId(format!("q{item:02}"));
-        Record::blank(key, question, model, condition.clone(), detail)
-    };
-    (0..2 * FRAMES).map(record).collect()
+    (0..2 * FRAMES)
+        .map(|item: usize| {
+            let right = answers(item);
+            let chosen = right.map(|right| AnswerReading {
+                chosen: Some(usize::from(!right)),
+                why: None,
+            });
+            let detail = ChoiceDetail {
+                frame: FrameId(format!("f{:02}", item / 2)),
+                family: [Family::Color, Family::RoomType][item % 2].clone(),
+                choices: ["a", "b", "c"].map(str::to_owned).to_vec(),
+                truth: Some(0),
+                repeat: 0,
+                strict: chosen,
+                lenient: chosen,
+                outcome: match right {
+                    None => TrialOutcome::Failed,
+                    Some(true) => TrialOutcome::Right,
+                    Some(false) => TrialOutcome::Wrong,
+                },
+                image: None,
+                more_images: Vec::new(),
+                shown_frame: None,
+                observed: None,
+                options: None,
+            };
+            let key = Digest::from_bytes(format!("{item} {model} {condition:?}").as_bytes()).into();
+            let question = QuestionId(format!("q{item:02}"));
+            Record::blank(key, question, model, condition.clone(), detail)
+        })
+        .collect()
 }
 
 /// Runs a check on the grid of records.
@@ -71,11 +72,13 @@ fn find<'f>(
     kind: PooledKind,
     condition: &str,
 ) -> Vec<&'f PooledFinding> {
-    let of_kind = findings.iter().filter(|finding| {
-        let name = format!("{}-{}", finding.level, finding.variant);
-        finding.kind == kind && finding.family.is_none() && name == condition
-    });
-    of_kind.collect()
+    findings
+        .iter()
+        .filter(|finding| {
+            let name = format!("{}-{}", finding.level, finding.variant);
+            finding.kind == kind && finding.family.is_none() && name == condition
+        })
+        .collect()
 }
 
 #[test]
@@ -296,8 +299,10 @@ fn false_answers_are_the_other_word_and_not_a_missing_one() {
         let (findings, _) = pooled(grid);
         let of = |answer: FalseAnswer| -> Vec<&PooledFinding> {
             let kind = PooledKind::Hallucination(answer);
-            let of_kind = findings.iter().filter(|finding| finding.kind == kind);
-            of_kind.collect()
+            findings
+                .iter()
+                .filter(|finding| finding.kind == kind)
+                .collect()
         };
         let said_no = of(FalseAnswer::No);
         assert_eq!(said_no.len(), 2);

@@ -12,8 +12,9 @@ fn find<'f>(found: &'f [FindingByReading], claim: &LightClaim) -> &'f FindingByR
 }
 
 fn standings(finding: &FindingByReading) -> Vec<Option<Standing>> {
-    let effects = finding.effects.iter();
-    effects
+    finding
+        .effects
+        .iter()
         .map(|one| one.effect.map(|effect| effect.standing))
         .collect()
 }
@@ -50,9 +51,12 @@ fn a_claim_holds_where_its_interval_is_on_its_side() {
             .map(|one| one.effect.unwrap().difference.n);
         assert_eq!(numbers.collect::<Vec<_>>(), [24, 24]);
         // Seven claims under two readings: the smallest p counts 14 times.
-        let smallest = found.iter().flat_map(|finding| &finding.effects);
-        let smallest = smallest.filter_map(|one| one.effect).map(|one| one.p);
-        let smallest = smallest.fold(1.0, f64::min);
+        let smallest = found
+            .iter()
+            .flat_map(|finding| &finding.effects)
+            .filter_map(|one| one.effect)
+            .map(|one| one.p)
+            .fold(1.0, f64::min);
         assert!(effect.holm >= 14.0 * smallest, "{effect:?}");
         let costs = find(&found, &LightClaim::DarknessCosts);
         assert_eq!(
@@ -101,8 +105,12 @@ fn items_without_a_reply_leave_every_column_and_unasked_levels_are_named() {
         |item| (item != 7).then_some(false),
     );
     records_.retain(|record| {
-        let condition = record.condition.as_ref().map(ToString::to_string);
-        condition.as_deref() != Some("L2-noise@physical")
+        record
+            .condition
+            .as_ref()
+            .map(ToString::to_string)
+            .as_deref()
+            != Some("L2-noise@physical")
     });
     with_grid(&records_, |grid| {
         let found = by_reading(grid);

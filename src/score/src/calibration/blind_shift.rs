@@ -14,13 +14,15 @@ pub(super) fn distances(grid: &Grid<'_>, subject: usize) -> Vec<(u32, f64)> {
     let Some(blind) = blind.filter(|_| seeing.view == Some(View::Image)) else {
         return Vec::new();
     };
-    let items = grid.items.iter().enumerate();
-    let distances = items.filter_map(|(index, item)| {
-        let seen = usable(grid.trial(subject, index))?;
-        let unseen = usable(grid.trial(blind, index))?;
-        Some((item.cluster, distance(&seen.p, &unseen.p)))
-    });
-    distances.collect()
+    grid.items
+        .iter()
+        .enumerate()
+        .filter_map(|(index, item)| {
+            let seen = usable(grid.trial(subject, index))?;
+            let unseen = usable(grid.trial(blind, index))?;
+            Some((item.cluster, distance(&seen.p, &unseen.p)))
+        })
+        .collect()
 }
 
 /// The Jensen–Shannon distance of two distributions.
@@ -32,8 +34,9 @@ fn distance(one: &[f64], other: &[f64]) -> f64 {
             0.0
         }
     };
-    let pairs = one.iter().zip(other);
-    let divergence: f64 = pairs
+    let divergence: f64 = one
+        .iter()
+        .zip(other)
         .map(|(&p, &q)| {
             let middle = f64::midpoint(p, q);
             f64::midpoint(part(p, middle), part(q, middle))

@@ -22,8 +22,9 @@ const LEAST_IN_BIN: usize = 20;
 pub(super) fn estimate(draws: &Resamples, replies: &[ConfidentReply]) -> Estimate {
     let value = squared(replies, |_| 1);
     let drawn = draws.all();
-    let drawn = drawn.map(|draw| squared(replies, |cluster| draw.times(cluster)));
-    let drawn: Vec<f64> = drawn.collect();
+    let drawn: Vec<f64> = drawn
+        .map(|draw| squared(replies, |cluster| draw.times(cluster)))
+        .collect();
     let bias = drawn.iter().sum::<f64>() / drawn.len().max(1) as f64 - value;
     let moved = drawn.into_iter().map(|drawn| drawn - bias).collect();
     let interval = draws.interval(moved).map(root);
@@ -88,8 +89,8 @@ mod tests {
     use super::*;
 
     fn replies(of: impl IntoIterator<Item = (f64, bool)>) -> Vec<ConfidentReply> {
-        let replies = of.into_iter().enumerate();
-        replies
+        of.into_iter()
+            .enumerate()
             .map(|(index, (confidence, right))| ConfidentReply {
                 item: index,
                 cluster: index as u32,

@@ -145,8 +145,8 @@ fn growth(grid: &Grid<'_>, subject: usize, replies: &[ConfidentReply]) -> Option
 /// The mean distance to the probabilities without an image; `None` if there are none of the latter.
 fn blind_shift(grid: &Grid<'_>, draws: &Resamples, subject: usize) -> Option<Estimate> {
     let distances = blind_shift::distances(grid, subject);
-    let terms = distances.into_iter();
-    let terms: Vec<_> = terms
+    let terms: Vec<_> = distances
+        .into_iter()
         .map(|(cluster, distance)| (cluster, distance, 1.0))
         .collect();
     (!terms.is_empty()).then(|| ratio_of(draws, &terms))
@@ -159,8 +159,9 @@ fn ratio(
     above: impl Fn(&ConfidentReply) -> f64,
     below: impl Fn(&ConfidentReply) -> f64,
 ) -> Estimate {
-    let terms = replies.iter();
-    let terms = terms.map(|reply| (reply.cluster, above(reply), below(reply)));
+    let terms = replies
+        .iter()
+        .map(|reply| (reply.cluster, above(reply), below(reply)));
     ratio_of(draws, &terms.collect::<Vec<_>>())
 }
 
@@ -177,9 +178,11 @@ fn ratio_of(draws: &Resamples, terms: &[(u32, f64, f64)]) -> Estimate {
         draws.sums(&sums.collect::<Vec<_>>())
     };
     // Draws of clusters without a reply have no ratio.
-    let pairs = sums(0).into_iter().zip(sums(1));
-    let pairs = pairs.filter(|(_, below)| *below > 0.0);
-    let ratios = pairs.map(|(above, below)| above / below);
+    let ratios = sums(0)
+        .into_iter()
+        .zip(sums(1))
+        .filter(|(_, below)| *below > 0.0)
+        .map(|(above, below)| above / below);
     let (above, below) = terms.iter().fold((0.0, 0.0), |(above, below), term| {
         (above + term.1, below + term.2)
     });

@@ -58,8 +58,8 @@ mod tests {
     use super::*;
 
     fn replies(of: impl IntoIterator<Item = (f64, bool)>) -> Vec<ConfidentReply> {
-        let replies = of.into_iter().enumerate();
-        replies
+        of.into_iter()
+            .enumerate()
             .map(|(index, (confidence, right))| ConfidentReply {
                 item: index,
                 cluster: (index % 10) as u32,

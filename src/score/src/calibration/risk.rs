@@ -24,8 +24,10 @@ impl RiskCoverage {
         let n = replies.len();
         let mut risks = Vec::with_capacity(n);
         let mut wrong = 0.0;
-        let ties = replies.chunk_by(|a, b| a.confidence.total_cmp(&b.confidence).is_eq());
-        for tied in ties.rev() {
+        for tied in replies
+            .chunk_by(|a, b| a.confidence.total_cmp(&b.confidence).is_eq())
+            .rev()
+        {
             let share = tied.iter().filter(|reply| !reply.right).count() as f64 / tied.len() as f64;
             for _ in tied {
                 wrong += share;

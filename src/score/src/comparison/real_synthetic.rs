@@ -18,13 +18,17 @@ const NEAR: f64 = 1.0;
 pub(super) fn as_dark(grid: &Grid<'_>, photographed: usize) -> Vec<usize> {
     let subject = &grid.subjects[photographed];
     let facts = pair_facts(grid, photographed);
-    let others = grid.subjects.iter().enumerate().filter(|(_, other)| {
-        other.view == Some(View::Image)
-            && other.model == subject.model
-            && other.enhancer == subject.enhancer
-            && other.variant.group == subject.variant.group
-    });
-    let others: Vec<(usize, &Subject)> = others.collect();
+    let others: Vec<(usize, &Subject)> = grid
+        .subjects
+        .iter()
+        .enumerate()
+        .filter(|(_, other)| {
+            other.view == Some(View::Image)
+                && other.model == subject.model
+                && other.enhancer == subject.enhancer
+                && other.variant.group == subject.variant.group
+        })
+        .collect();
     let is_match = |(index, other): &&(usize, &Subject)| {
         other.variant.pair.is_some() && other.variant.synthetic_kind().is_some() && {
             // Images that are as dark as another photograph of the frames are not as dark as these.

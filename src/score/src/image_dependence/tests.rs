@@ -81,8 +81,10 @@ fn uniform(random: &mut SplitMix) -> f64 {
 
 /// Number of runs of `replies` replies in which they are found to be independent of the image.
 fn found(runs: u64, replies: usize, server: Server) -> usize {
-    let runs = (0..runs).map(|seed| Run::new(seed.wrapping_mul(0x1234_5679), server));
-    runs.filter_map(|run| run.found_within(replies)).count()
+    (0..runs)
+        .map(|seed| Run::new(seed.wrapping_mul(0x1234_5679), server))
+        .filter_map(|run| run.found_within(replies))
+        .count()
 }
 
 #[test]

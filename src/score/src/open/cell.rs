@@ -48,8 +48,10 @@ pub(super) fn cell(
     cluster: impl Fn(usize) -> usize,
 ) -> OpenCell {
     let count = |outcome| {
-        let same = answers.iter().filter(|answer| answer.outcome == outcome);
-        same.count()
+        answers
+            .iter()
+            .filter(|answer| answer.outcome == outcome)
+            .count()
     };
     let mut sums = BTreeMap::<usize, (f64, f64)>::new();
     for answer in answers {

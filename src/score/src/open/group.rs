@@ -63,8 +63,12 @@ pub(super) fn groups(questions: &[QuestionGroups]) -> Vec<Group> {
         .collect();
     let several = |names: BTreeSet<&String>, make: fn(String) -> Group| {
         let several = names.len() > 1;
-        let names = names.into_iter().filter(move |_| several);
-        names.cloned().map(make).collect::<Vec<_>>()
+        names
+            .into_iter()
+            .filter(move |_| several)
+            .cloned()
+            .map(make)
+            .collect::<Vec<_>>()
     };
     std::iter::once(Group::All)
         .chain(several(splits, Group::Split))

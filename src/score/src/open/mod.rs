@@ -43,8 +43,9 @@ impl OpenSummary {
     /// Score of a subject on a group.
     #[must_use]
     pub fn cell(&self, subject: &Subject, group: &Group) -> Option<&OpenCell> {
-        let mut cells = self.cells.iter();
-        cells.find(|cell| cell.subject == *subject && cell.group == *group)
+        self.cells
+            .iter()
+            .find(|cell| cell.subject == *subject && cell.group == *group)
     }
 
     /// Difference of a subject from a baseline on a group.
@@ -105,14 +106,17 @@ pub fn open_summary_listed(
     let (mut cells, mut changes) = (Vec::new(), Vec::new());
     for (subject, answers) in &by_subject {
         for group in &groups {
-            let is_scored_here = |answer: &&&ScoredAnswer| group.has(&questions[answer.question]);
-            let in_group: Vec<&ScoredAnswer> =
-                answers.iter().filter(is_scored_here).copied().collect();
+            let in_group: Vec<&ScoredAnswer> = answers
+                .iter()
+                .filter(|answer| group.has(&questions[answer.question]))
+                .copied()
+                .collect();
             cells.push(cell(subject, group, &in_group, cluster));
         }
         for (baseline, other) in baselines(subject) {
-            let mut subjects = by_subject.iter();
-            let Some((_, baseline_answers)) = subjects.find(|(subject, _)| subject.is_for(&other))
+            let Some((_, baseline_answers)) = by_subject
+                .iter()
+                .find(|(subject, _)| subject.is_for(&other))
             else {
                 continue;
             };

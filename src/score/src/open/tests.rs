@@ -32,8 +32,9 @@ fn marks_become_upstreams_score() {
         Missing,
         Unmarked,
     ];
-    let answers = outcomes.into_iter().enumerate();
-    let answers: Vec<ScoredAnswer> = answers
+    let answers: Vec<ScoredAnswer> = outcomes
+        .into_iter()
+        .enumerate()
         .map(|(i, outcome)| scored("L0", i, outcome))
         .collect();
     let summary = open_summary(&answers, &questions);
@@ -56,8 +57,9 @@ fn drops_are_of_unrounded_means_on_shared_questions() {
     let questions: Vec<QuestionGroups> = (0..6).map(|i| groups(i / 2, "a")).collect();
     let marks = |level: &str, marks: [i64; 6]| -> Vec<ScoredAnswer> {
         let outcome = |mark| if mark == 0 { Missing } else { Marked(mark) };
-        let marks = marks.into_iter().enumerate();
         marks
+            .into_iter()
+            .enumerate()
             .map(|(i, mark)| scored(level, i, outcome(mark)))
             .collect()
     };

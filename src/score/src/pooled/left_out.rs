@@ -33,11 +33,16 @@ pub fn models_left_out(grid: &Grid<'_>) -> Vec<ModelsLeftOut> {
     for set in PooledSet::all(grid) {
         let levels = set.levels(grid);
         let models = set.models(grid, &levels);
-        let asked = levels.iter().copied().filter(|level| {
-            let mut pooled = models.pooled.iter();
-            pooled.all(|[model, other]| set.sides(grid, model, other, *level).is_some())
-        });
-        let asked: Vec<AxisLevel> = asked.collect();
+        let asked: Vec<AxisLevel> = levels
+            .iter()
+            .copied()
+            .filter(|level| {
+                models
+                    .pooled
+                    .iter()
+                    .all(|[model, other]| set.sides(grid, model, other, *level).is_some())
+            })
+            .collect();
         let mut groups = BTreeMap::<(Vec<AxisLevel>, [usize; 2]), BTreeSet<&str>>::new();
         for (model, lacking) in models.apart {
             let sum = |side: usize| lacking.iter().map(|(_, items)| items[side]).sum();

@@ -89,10 +89,13 @@ impl GainFit {
             });
             (squares.sum::<f64>() / bins.len() as f64).sqrt()
         };
-        let misfits = (0..FINE).map(misfit).enumerate();
-        let (index, misfit) = misfits.fold((0, f64::INFINITY), |best, next| {
-            if next.1 < best.1 { next } else { best }
-        });
+        let (index, misfit) =
+            (0..FINE)
+                .map(misfit)
+                .enumerate()
+                .fold((0, f64::INFINITY), |best, next| {
+                    if next.1 < best.1 { next } else { best }
+                });
         Self {
             gain: Some(libm::exp(log_gain(index, FINE))),
             misfit: Some(misfit),
@@ -220,8 +223,12 @@ impl ReadingFit {
         if all.n < LEAST_VALUES {
             return Some((all, CameraOrigin::SamePairs));
         }
-        let others = self.pairs.iter().filter(|pair| pair.pair != name);
-        let gains: Vec<f64> = others.filter_map(|pair| pair.fit.fitted()).collect();
+        let gains: Vec<f64> = self
+            .pairs
+            .iter()
+            .filter(|pair| pair.pair != name)
+            .filter_map(|pair| pair.fit.fitted())
+            .collect();
         PooledGain::new(&gains).map(|gains| (gains, CameraOrigin::OtherPairs))
     }
 }

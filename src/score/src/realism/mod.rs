@@ -125,15 +125,19 @@ impl fmt::Display for NoiseMethod {
 pub fn psnr(a: &Rgb, b: &Rgb) -> Result<f64> {
     same_size(a, b)?;
     // 2¹⁶ squares of 255 and more fit a `u32`, which takes a third of the time of a `u64`.
-    let pieces = a.samples().chunks(1 << 16).zip(b.samples().chunks(1 << 16));
-    let sums = pieces.map(|(a, b)| {
-        let squares = a
-            .iter()
-            .zip(b)
-            .map(|(a, b)| u32::from(a.abs_diff(*b)).pow(2));
-        u64::from(squares.sum::<u32>())
-    });
-    let mean = sums.sum::<u64>() as f64 / a.samples().len() as f64;
+    let mean = a
+        .samples()
+        .chunks(1 << 16)
+        .zip(b.samples().chunks(1 << 16))
+        .map(|(a, b)| {
+            let squares = a
+                .iter()
+                .zip(b)
+                .map(|(a, b)| u32::from(a.abs_diff(*b)).pow(2));
+            u64::from(squares.sum::<u32>())
+        })
+        .sum::<u64>() as f64
+        / a.samples().len() as f64;
     Ok(10.0 * libm::log10(255.0 * 255.0 / mean))
 }
 
@@ -150,11 +154,12 @@ pub fn exposure_drop(normal: &Rgb, low: &Rgb) -> Result<f32> {
             .samples()
             .iter()
             .for_each(|code| counts[usize::from(*code)] += 1);
-        let light = counts
+        counts
             .iter()
             .zip(linear)
-            .map(|(n, light)| *n as f64 * light);
-        light.sum::<f64>() / image.samples().len() as f64
+            .map(|(n, light)| *n as f64 * light)
+            .sum::<f64>()
+            / image.samples().len() as f64
     };
     let black = |image: &Rgb| image.samples().iter().all(|code| *code == 0);
     if black(normal) || black(low) {

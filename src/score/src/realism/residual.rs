@@ -70,8 +70,9 @@ impl Residuals {
 
     /// For each clean code that occurs: the code, its number of samples, and the mean and standard deviation of its residuals.
     pub fn by_code(&self) -> impl Iterator<Item = (usize, i64, [f64; 2])> {
-        let codes = self.codes.iter().enumerate();
-        codes
+        self.codes
+            .iter()
+            .enumerate()
             .filter(|(_, [n, ..])| *n > 0)
             .map(|(code, [n, sum, squares])| {
                 let [count, sum, squares] = [*n, *sum, *squares].map(|x| x as f64);

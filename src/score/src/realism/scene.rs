@@ -97,8 +97,8 @@ impl BlockMeans {
         let near = |at: usize, size: usize| {
             (at..=at + 2 * REACH).map(move |place| place.saturating_sub(REACH).min(size - 1))
         };
-        let around = (0..height).flat_map(|row| (0..width).map(move |column| (row, column)));
-        let mut structure: Vec<f64> = around
+        let mut structure: Vec<f64> = (0..height)
+            .flat_map(|row| (0..width).map(move |column| (row, column)))
             .map(|(row, column)| {
                 let rows = near(row, height);
                 let sums = rows.map(|y| {
@@ -190,8 +190,10 @@ mod tests {
     #[test]
     fn a_mirrored_image_is_another_scene() {
         let normal = scene(3);
-        let rows = normal.samples().chunks(3 * SIZE[1]);
-        let mirrored = rows.flat_map(|row| row.chunks(3).rev().flatten().copied());
+        let mirrored = normal
+            .samples()
+            .chunks(3 * SIZE[1])
+            .flat_map(|row| row.chunks(3).rev().flatten().copied());
         let mirrored = Rgb::new(SIZE[0], SIZE[1], mirrored.collect()).unwrap();
         assert!(SceneMatch::new(&normal, &low(&mirrored, 4.0), 4.4).is_of_two_scenes());
     }

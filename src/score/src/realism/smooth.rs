@@ -49,17 +49,18 @@ impl SmoothBlocks {
     #[must_use]
     pub fn new(normal: &Rgb, drop_ev: f64) -> Self {
         let dropped = libm::exp2(-drop_ev / 2.2);
-        let blocks = (0..count(normal)).filter_map(|index| {
-            let block = Block::new(normal, index);
-            let code = block.mean() * dropped;
-            let is_used = block.brightest() < f64::from(BRIGHT) && code > DARKEST;
-            is_used.then(|| BlockLight {
-                index,
-                code,
-                spread: block.spread(),
+        let blocks: Vec<BlockLight> = (0..count(normal))
+            .filter_map(|index| {
+                let block = Block::new(normal, index);
+                let code = block.mean() * dropped;
+                let is_used = block.brightest() < f64::from(BRIGHT) && code > DARKEST;
+                is_used.then(|| BlockLight {
+                    index,
+                    code,
+                    spread: block.spread(),
+                })
             })
-        });
-        let blocks: Vec<BlockLight> = blocks.collect();
+            .collect();
         let mut codes: Vec<f64> = blocks.iter().map(|block| block.code).collect();
         codes.sort_by(f64::total_cmp);
         let edges: Vec<f64> = (1..BINS)
@@ -81,10 +82,11 @@ impl SmoothBlocks {
     pub fn spread(&self, image: &Rgb) -> SpreadCurve {
         SpreadCurve {
             bins: self.bins.each_ref().map(|blocks| {
-                let squares = blocks
+                let mean = blocks
                     .iter()
-                    .map(|index| Block::new(image, *index).spread().powi(2));
-                let mean = squares.sum::<f64>() / blocks.len() as f64;
+                    .map(|index| Block::new(image, *index).spread().powi(2))
+                    .sum::<f64>()
+                    / blocks.len() as f64;
                 (!blocks.is_empty()).then(|| libm::log(mean.sqrt().max(LEAST_SPREAD)))
             }),
         }
@@ -100,8 +102,11 @@ fn smoothest(blocks: &[&BlockLight]) -> Vec<usize> {
     let mut spreads: Vec<f64> = blocks.iter().map(|block| block.spread).collect();
     spreads.sort_by(f64::total_cmp);
     let most = quantile(&spreads, SMOOTH).unwrap_or_default();
-    let smooth = blocks.iter().filter(|block| block.spread <= most);
-    let smooth: Vec<usize> = smooth.map(|block| block.index).collect();
+    let smooth: Vec<usize> = blocks
+        .iter()
+        .filter(|block| block.spread <= most)
+        .map(|block| block.index)
+        .collect();
     if smooth.len() < least_smooth {
         return Vec::new();
     }

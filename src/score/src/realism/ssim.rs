@@ -72,15 +72,16 @@ fn mean(a: &Rgb, b: &Rgb, isa: Isa) -> f64 {
     let [height, width] = [a.height(), a.width()].map(|side| side - (TAPS - 1));
     let window = window();
     let mut sums = vec![0.0; height];
-    let bands = sums.par_chunks_mut(BAND).enumerate();
-    bands.for_each(|(band, sums)| {
-        isa.run(Band {
-            images: [a, b],
-            first: band * BAND,
-            window: &window,
-            sums,
+    sums.par_chunks_mut(BAND)
+        .enumerate()
+        .for_each(|(band, sums)| {
+            isa.run(Band {
+                images: [a, b],
+                first: band * BAND,
+                window: &window,
+                sums,
+            });
         });
-    });
     sums.iter().sum::<f64>() / (3 * height * width) as f64
 }
 
@@ -213,8 +214,14 @@ mod tests {
 
     /// An image by an integer rule. The expected values are those of scikit-image 0.26 for the same images.
     fn image(height: usize, width: usize, salt: usize) -> Rgb {
-        let sample = |i: usize| ((i * i * 31 + i * salt * 17 + salt) % 251) as u8;
-        Rgb::new(height, width, (0..height * width * 3).map(sample).collect()).unwrap()
+        Rgb::new(
+            height,
+            width,
+            (0..height * width * 3)
+                .map(|i: usize| ((i * i * 31 + i * salt * 17 + salt) % 251) as u8)
+                .collect(),
+        )
+        .unwrap()
     }
 
     const SKIMAGE: [(usize, usize, usize, f64); 4] = [

@@ -83,10 +83,11 @@ pub(super) fn cells(
     questions: &[QuestionInLight],
     mode: ReadingMode,
 ) -> Vec<AgreementCell> {
-    let informative = questions
+    let informative: BTreeSet<usize> = questions
         .iter()
-        .filter(|question| question.is_informative());
-    let informative: BTreeSet<usize> = informative.map(|question| question.index).collect();
+        .filter(|question| question.is_informative())
+        .map(|question| question.index)
+        .collect();
     let kept = grid.items.iter().map(|item| {
         let question = bank.position(&item.asked.question);
         question.is_some_and(|question| informative.contains(&question))
@@ -168,19 +169,21 @@ impl Part<'_, '_> {
 
     fn cannot_tell(&self) -> Option<Estimate> {
         let mut items = self.grid.family_items(self.subject, self.family);
-        let has_way_out = items.any(|(item, _)| {
-            let mut choices = item.asked.choices.iter();
-            choices.any(|choice| is_way_out(choice))
-        });
-        let share = || self.share(|answer, _| answer.is_some_and(is_way_out));
-        has_way_out.then(share).flatten()
+        let has_way_out =
+            items.any(|(item, _)| item.asked.choices.iter().any(|choice| is_way_out(choice)));
+        has_way_out
+            .then(|| self.share(|answer, _| answer.is_some_and(is_way_out)))
+            .flatten()
     }
 
     fn refused(&self) -> usize {
-        let items = self.grid.items.iter().enumerate();
-        let trials = items
+        self.grid
+            .items
+            .iter()
+            .enumerate()
             .filter(|(_, item)| item.is_of(self.family))
-            .filter_map(|(index, _)| self.grid.trial(self.subject, index));
-        trials.filter(|trial| is_refused(*trial)).count()
+            .filter_map(|(index, _)| self.grid.trial(self.subject, index))
+            .filter(|trial| is_refused(*trial))
+            .count()
     }
 }

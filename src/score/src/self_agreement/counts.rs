@@ -78,11 +78,14 @@ impl<'g> BankCounts<'g> {
     /// answer.
     pub(super) fn entropies(&self) -> [Option<f64>; 2] {
         [0, 1].map(|place| {
-            let questions = self.whole.values().filter_map(|counts| {
-                let answers = counts.answers.values().map(|answers| answers[place]);
-                entropy(answers, counts.choices)
-            });
-            let entropies: Vec<f64> = questions.collect();
+            let entropies: Vec<f64> = self
+                .whole
+                .values()
+                .filter_map(|counts| {
+                    let answers = counts.answers.values().map(|answers| answers[place]);
+                    entropy(answers, counts.choices)
+                })
+                .collect();
             (!entropies.is_empty()).then(|| entropies.iter().sum::<f64>() / entropies.len() as f64)
         })
     }

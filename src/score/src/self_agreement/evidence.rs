@@ -60,8 +60,9 @@ impl Bounds {
         if ceiling - floor < MIN_DISTANCE {
             return Err(NoEvidence::Close(ceiling - floor));
         }
-        let floors = drawn_shares(&blind, draws).into_iter();
-        let drawn = floors.zip(drawn_shares(&again, draws));
+        let drawn = drawn_shares(&blind, draws)
+            .into_iter()
+            .zip(drawn_shares(&again, draws));
         let drawn: Vec<[f64; 2]> = drawn.map(|(floor, ceiling)| [floor, ceiling]).collect();
         let distances = drawn.iter().map(|[floor, ceiling]| ceiling - floor);
         let [low, _] = draws.interval(distances.filter(|distance| !distance.is_nan()).collect());
@@ -90,8 +91,11 @@ fn drawn_shares(counts: &[ClusterCount], draws: &Resamples) -> Vec<f64> {
         draws.sums(&numbers)
     };
     let (right, replies) = (sums(|count| count.right), sums(|count| count.replies));
-    let shares = right.iter().zip(&replies).map(|(right, n)| right / n);
-    shares.collect()
+    right
+        .iter()
+        .zip(&replies)
+        .map(|(right, n)| right / n)
+        .collect()
 }
 
 /// Share of the way from the floor B to the ceiling C that the agreement G of a condition has: (G − B) / (C − B), with the interval of the
@@ -103,8 +107,10 @@ pub(super) fn evidence(
 ) -> Option<Estimate> {
     let of = |here: f64, floor: f64, ceiling: f64| (here - floor) / (ceiling - floor);
     let value = of(share(counts)?, share(&bounds.blind)?, share(&bounds.again)?);
-    let drawn = drawn_shares(counts, draws).into_iter().zip(&bounds.drawn);
-    let drawn = drawn.map(|(here, [floor, ceiling])| of(here, *floor, *ceiling));
+    let drawn = drawn_shares(counts, draws)
+        .into_iter()
+        .zip(&bounds.drawn)
+        .map(|(here, [floor, ceiling])| of(here, *floor, *ceiling));
     // Draws without a reply are dropped. Floor and ceiling coincide in fewer draws than lie outside the interval, so no end of the interval
     // is infinite.
     let drawn: Vec<f64> = drawn.filter(|value| !value.is_nan()).collect();
@@ -173,8 +179,9 @@ fn floor(bounds: &Bounds) -> Vec<f32> {
         counts.iter().map(|count| f64::from(count.replies)).sum()
     };
     let scale = replies(&bounds.again) / replies(&bounds.blind);
-    let blind = bounds.blind.iter();
-    blind
+    bounds
+        .blind
+        .iter()
         .map(|count| (f64::from(count.right) * scale) as f32)
         .collect()
 }

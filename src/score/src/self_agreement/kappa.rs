@@ -38,9 +38,12 @@ pub(super) fn kappa(
         *influence += change / all * (1.0 - expected);
         *influence /= (1.0 - expected) * (1.0 - expected);
     }
-    let answered = influences.iter().zip(by_cluster);
-    let answered = answered.filter(|(_, count)| count.replies > 0);
-    let influences: Vec<f64> = answered.map(|(influence, _)| *influence).collect();
+    let influences: Vec<f64> = influences
+        .iter()
+        .zip(by_cluster)
+        .filter(|(_, count)| count.replies > 0)
+        .map(|(influence, _)| *influence)
+        .collect();
     let c = influences.len() as f64;
     let variance = c / (c - 1.0) * influences.iter().map(|x| x * x).sum::<f64>();
     let (low, high) = if variance > 1e-18 {
@@ -65,17 +68,24 @@ pub(super) fn kappa(
 
 /// The number of items of a question that are expected to agree by habit.
 fn expected(counts: &AnswerCounts<'_>) -> f64 {
-    let products = counts.answers.values();
-    let products = products.map(|[light, here]| *light as f64 * *here as f64);
-    products.sum::<f64>() / counts.items as f64
+    counts
+        .answers
+        .values()
+        .map(|[light, here]| *light as f64 * *here as f64)
+        .sum::<f64>()
+        / counts.items as f64
 }
 
 /// The derivative of the expected number of a question in the direction of a cluster's counts.
 fn expected_change(whole: &AnswerCounts<'_>, own: &AnswerCounts<'_>) -> f64 {
     let items = whole.items as f64;
-    let answers = own.answers.iter().map(|(answer, [light, here])| {
-        let [whole_light, whole_here] = whole.answers[answer];
-        whole_here as f64 * *light as f64 + whole_light as f64 * *here as f64
-    });
-    answers.sum::<f64>() / items - expected(whole) / items * own.items as f64
+    own.answers
+        .iter()
+        .map(|(answer, [light, here])| {
+            let [whole_light, whole_here] = whole.answers[answer];
+            whole_here as f64 * *light as f64 + whole_light as f64 * *here as f64
+        })
+        .sum::<f64>()
+        / items
+        - expected(whole) / items * own.items as f64
 }

@@ -83,9 +83,11 @@ impl<'a> LightAnswers<'a> {
     /// The first reply of a model to each question at L0.
     pub(super) fn new(trials: &'a Trials<ChoiceDetail>, model: &'a str) -> Self {
         let mut by_question = HashMap::<QuestionKey<'a>, Vec<TrialRef<'a>>>::new();
-        let of_model = trials.iter().filter(|trial| trial.model() == model);
-        let first = of_model.filter(|trial| is_light(*trial) && trial.repeat() == 0);
-        for trial in first {
+        for trial in trials
+            .iter()
+            .filter(|trial| trial.model() == model)
+            .filter(|trial| is_light(*trial) && trial.repeat() == 0)
+        {
             let key = (trial.question(), trial.choices());
             by_question.entry(key).or_default().push(trial);
         }
@@ -94,8 +96,9 @@ impl<'a> LightAnswers<'a> {
 
     /// The first replies, in no order.
     pub(super) fn first(&self) -> impl Iterator<Item = TrialRef<'a>> + '_ {
-        let lists = self.by_question.values();
-        lists.filter_map(|trials| trials.first().copied())
+        self.by_question
+            .values()
+            .filter_map(|trials| trials.first().copied())
     }
 
     /// The choice that the model named at L0; `None` if no choice could be read there.
@@ -117,15 +120,17 @@ impl<'a> LightAnswers<'a> {
         trials: &'a Trials<ChoiceDetail>,
         mode: ReadingMode,
     ) -> Trials<ChoiceDetail> {
-        let of_model = trials.iter().filter(|trial| trial.model() == self.model);
-        let held = of_model.filter_map(|trial| {
-            let repeat = if is_light(trial) {
-                trial.repeat().checked_sub(1)?
-            } else {
-                trial.repeat()
-            };
-            Some((trial, repeat, self.reference(trial, mode)?))
-        });
+        let held = trials
+            .iter()
+            .filter(|trial| trial.model() == self.model)
+            .filter_map(|trial| {
+                let repeat = if is_light(trial) {
+                    trial.repeat().checked_sub(1)?
+                } else {
+                    trial.repeat()
+                };
+                Some((trial, repeat, self.reference(trial, mode)?))
+            });
         all_held(held)
     }
 
@@ -136,12 +141,12 @@ impl<'a> LightAnswers<'a> {
         other: &str,
         mode: ReadingMode,
     ) -> Trials<ChoiceDetail> {
-        let light = trials
+        let held = trials
             .iter()
-            .filter(|trial| trial.model() == other && is_light(*trial));
-        let first = light.filter(|trial| trial.repeat() == 0);
-        let read = first.filter(|trial| chosen(*trial, mode).is_some());
-        let held = read.filter_map(|trial| Some((trial, 0, self.reference(trial, mode)?)));
+            .filter(|trial| trial.model() == other && is_light(*trial))
+            .filter(|trial| trial.repeat() == 0)
+            .filter(|trial| chosen(*trial, mode).is_some())
+            .filter_map(|trial| Some((trial, 0, self.reference(trial, mode)?)));
         all_held(held)
     }
 

@@ -86,8 +86,11 @@ impl<'a> SelfAgreement<'a> {
         let draws = Resamples::new(clusters.count());
         let bank = BankIndex::new(questions);
         let grid = Grid::without_truths(trials, &clusters, listing);
-        let subjects = grid.subjects.iter();
-        let mut models: Vec<String> = subjects.map(|subject| subject.model.clone()).collect();
+        let mut models: Vec<String> = grid
+            .subjects
+            .iter()
+            .map(|subject| subject.model.clone())
+            .collect();
         models.dedup();
         let mut all = Self {
             unit: clusters.unit(),
@@ -115,8 +118,11 @@ impl<'a> SelfAgreement<'a> {
                 all.light.push(replies);
                 if mode == ReadingMode::Strict {
                     let found = comparisons(&grid);
-                    let within = |found: &Comparison| found.kind != ComparisonKind::Model;
-                    all.comparisons.extend(found.into_iter().filter(within));
+                    all.comparisons.extend(
+                        found
+                            .into_iter()
+                            .filter(|found| found.kind != ComparisonKind::Model),
+                    );
                     all.curves.extend(curves(&grid, &draws));
                     all.confusions.extend(confusions(&grid));
                     all.hallucinations.extend(hallucinations(&grid));
@@ -140,14 +146,19 @@ impl<'a> SelfAgreement<'a> {
     /// The models, in their order.
     pub fn models(&self) -> Vec<&str> {
         let light = self.light.iter();
-        let strict = light.filter(|light| light.mode == ReadingMode::Strict);
-        strict.map(|light| &*light.model).collect()
+        light
+            .filter(|light| light.mode == ReadingMode::Strict)
+            .map(|light| &*light.model)
+            .collect()
     }
 
     /// Number of items: questions about images, each in one order of its choices, without those that were only asked again.
     pub fn items(&self) -> usize {
-        let items = self.grid.items.iter();
-        items.filter(|item| item.asked.repeat == 0).count()
+        self.grid
+            .items
+            .iter()
+            .filter(|item| item.asked.repeat == 0)
+            .count()
     }
 
     /// Counts of a model's replies in the light, in the strict reading.
@@ -158,14 +169,17 @@ impl<'a> SelfAgreement<'a> {
 
     /// The cells of all families together in the strict reading.
     pub fn whole(&self) -> impl Iterator<Item = &AgreementCell> + Clone {
-        let cells = self.cells.iter();
-        cells.filter(|cell| cell.family.is_none() && cell.mode == ReadingMode::Strict)
+        self.cells
+            .iter()
+            .filter(|cell| cell.family.is_none() && cell.mode == ReadingMode::Strict)
     }
 
     /// Numbers of the bank's questions of a model: those that can tell something, and all.
     pub fn informative(&self, model: &str) -> (usize, usize) {
-        let questions = self.questions.iter();
-        let questions = questions.filter(|question| question.model == model);
+        let questions = self
+            .questions
+            .iter()
+            .filter(|question| question.model == model);
         let informative = questions.clone().filter(|found| found.is_informative());
         (informative.count(), questions.count())
     }
@@ -199,8 +213,8 @@ fn correct(comparisons: &mut [Comparison]) {
             _ => {}
         }
     }
-    let questions = std::iter::once(darkest.into_values().collect()).chain(enhanced.into_values());
-    let questions: Vec<Vec<usize>> = questions
+    let questions: Vec<Vec<usize>> = std::iter::once(darkest.into_values().collect())
+        .chain(enhanced.into_values())
         .filter(|tests: &Vec<usize>| !tests.is_empty())
         .collect();
     let tests = questions

@@ -55,12 +55,16 @@ fn score(records: &[Record], questions: &[RunQuestion]) -> StrictScore {
 
 /// The cell of all groups of a condition, in the strict reading.
 fn strict<'s>(score: &'s StrictScore, condition: &str) -> &'s GroupCell {
-    let mut cells = score.cells.iter().filter(|cell| {
-        cell.family.is_none()
-            && cell.mode == ReadingMode::Strict
-            && cell.subject.condition() == condition
-    });
-    cells.next().unwrap()
+    score
+        .cells
+        .iter()
+        .filter(|cell| {
+            cell.family.is_none()
+                && cell.mode == ReadingMode::Strict
+                && cell.subject.condition() == condition
+        })
+        .next()
+        .unwrap()
 }
 
 #[test]

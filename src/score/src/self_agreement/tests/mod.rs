@@ -111,10 +111,11 @@ fn dark_and_enhanced_images_are_compared_pair_by_pair() {
     let records = model.records(&[("L5-noise+lift", keep), ("L0+lift", half)]);
     found(&records, |found| {
         let of = |kind, condition: &str| {
-            let mut all = found.comparisons.iter();
-            let found = all
-                .find(|c| c.kind == kind && c.family.is_none() && c.first.condition() == condition);
-            found.unwrap()
+            found
+                .comparisons
+                .iter()
+                .find(|c| c.kind == kind && c.family.is_none() && c.first.condition() == condition)
+                .unwrap()
         };
         let dark = of(ComparisonKind::Level, "L5-noise");
         assert_eq!(
@@ -159,11 +160,10 @@ fn two_models_are_held_against_each_other_in_the_light_alone() {
         .map(|(index, mut record)| {
             record.model = "n".into();
             if record.detail.repeat == 0 && index % 10 == 0 {
-                let flip = |reading: AnswerReading| AnswerReading {
+                record.detail.strict = record.detail.strict.map(|reading| AnswerReading {
                     chosen: reading.chosen.map(|chosen| 1 - chosen),
                     ..reading
-                };
-                record.detail.strict = record.detail.strict.map(flip);
+                });
             }
             record
         });

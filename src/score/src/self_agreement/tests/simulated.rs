@@ -80,23 +80,24 @@ pub(super) fn record(
 
 /// The questions as a run stores them.
 pub(super) fn questions() -> Vec<RunQuestion> {
-    let ids = (0..IMAGES).flat_map(|image| (0..QUESTIONS).map(move |question| (image, question)));
-    let question = |(image, question): (usize, usize)| RunQuestion {
-        id: QuestionId(format!("q{question:02}@i{image:03}")),
-        place: image * QUESTIONS + question,
-        scene: String::new(),
-        frame: FrameId(format!("i{image:03}")),
-        family: [Family::Presence, Family::Other("light".into())][question % 2].clone(),
-        text: format!("Is there thing {question}?"),
-        choices: ["yes", "no"].map(str::to_owned).to_vec(),
-        answer: None,
-        extra_answers: None,
-        group: None,
-        evidence: json!({ BANK_ID: format!("q{question:02}") }),
-        image: None,
-        images: Vec::new(),
-    };
-    ids.map(question).collect()
+    (0..IMAGES)
+        .flat_map(|image| (0..QUESTIONS).map(move |question| (image, question)))
+        .map(|(image, question): (usize, usize)| RunQuestion {
+            id: QuestionId(format!("q{question:02}@i{image:03}")),
+            place: image * QUESTIONS + question,
+            scene: String::new(),
+            frame: FrameId(format!("i{image:03}")),
+            family: [Family::Presence, Family::Other("light".into())][question % 2].clone(),
+            text: format!("Is there thing {question}?"),
+            choices: ["yes", "no"].map(str::to_owned).to_vec(),
+            answer: None,
+            extra_answers: None,
+            group: None,
+            evidence: json!({ BANK_ID: format!("q{question:02}") }),
+            image: None,
+            images: Vec::new(),
+        })
+        .collect()
 }
 
 impl Simulated {
@@ -146,6 +147,7 @@ pub(super) fn cell(records: &[Record], condition: &str) -> AgreementCell {
 /// The cell of a condition.
 pub(super) fn at<'f>(found: &'f SelfAgreement<'_>, condition: &str) -> &'f AgreementCell {
     let mut cells = found.whole();
-    let cell = cells.find(|cell| cell.subject.condition() == condition);
-    cell.unwrap()
+    cells
+        .find(|cell| cell.subject.condition() == condition)
+        .unwrap()
 }
