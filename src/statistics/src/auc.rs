@@ -109,8 +109,9 @@ impl PairCounts {
             return None;
         }
         let (c, value) = (count as f64, self.concordant / self.pairs);
-        let influences = used.map(|[concordant, pairs]| (concordant - value * pairs) / self.pairs);
-        let influences: Vec<f64> = influences.collect();
+        let influences: Vec<f64> = used
+            .map(|[concordant, pairs]| (concordant - value * pairs) / self.pairs)
+            .collect();
         let squares: f64 = influences
             .iter()
             .map(|influence| influence * influence)
@@ -144,26 +145,30 @@ mod tests {
     use super::*;
 
     fn replies(list: &[(u32, f64, bool)]) -> Vec<RankedReply> {
-        let reply = |&(cluster, number, right)| RankedReply {
-            cluster,
-            number,
-            right,
-        };
-        list.iter().map(reply).collect()
+        list.iter()
+            .map(|&(cluster, number, right)| RankedReply {
+                cluster,
+                number,
+                right,
+            })
+            .collect()
     }
 
     /// Replies of `clusters` clusters with eight each; a step of the golden ratio spreads their numbers evenly.
     fn spread(clusters: u32, slope: f64) -> Vec<RankedReply> {
         let number = |i: u32| (f64::from(i) * 0.618_033_988_749_895).fract();
-        let of = |cluster: u32| {
-            (0..8).map(move |i| {
-                let place = 8 * cluster + i;
-                let right = place.is_multiple_of(2);
-                let number = number(place) + if right { slope } else { 0.0 };
-                (cluster, number, right)
-            })
-        };
-        replies(&(0..clusters).flat_map(of).collect::<Vec<_>>())
+        replies(
+            &(0..clusters)
+                .flat_map(|cluster: u32| {
+                    (0..8).map(move |i| {
+                        let place = 8 * cluster + i;
+                        let right = place.is_multiple_of(2);
+                        let number = number(place) + if right { slope } else { 0.0 };
+                        (cluster, number, right)
+                    })
+                })
+                .collect::<Vec<_>>(),
+        )
     }
 
     fn auc(replies: &[RankedReply], clusters: usize) -> Option<Auc> {

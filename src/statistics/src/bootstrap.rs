@@ -53,8 +53,10 @@ impl Resamples {
         if together > 1 {
             random.shuffle(&mut order);
         }
-        let units = order.into_iter().map(|place| (place / together) as u16);
-        let units = units.collect();
+        let units = order
+            .into_iter()
+            .map(|place| (place / together) as u16)
+            .collect();
         let mut times = vec![0_u8; DRAWS * count];
         if let Ok(uniform) = Uniform::new(0, count as u64) {
             for draw in times.chunks_mut(count) {
@@ -79,8 +81,7 @@ impl Resamples {
 
     /// The draws.
     pub fn all(&self) -> impl Iterator<Item = Draw<'_>> {
-        let draws = self.times.chunks(self.count.max(1));
-        draws.map(|times| Draw {
+        self.times.chunks(self.count.max(1)).map(|times| Draw {
             units: &self.units,
             times,
         })
@@ -101,14 +102,16 @@ impl Resamples {
         for (unit, number) in self.units.iter().zip(by_cluster) {
             by_unit[usize::from(*unit)] += number;
         }
-        let draws = self.times.chunks(self.count.max(1));
-        let sum = |times: &[u8]| -> f64 {
-            let parts = times.chunks(256).zip(by_unit.chunks(256));
-            parts
-                .map(|(times, numbers)| sum_of_products(times, numbers))
-                .sum()
-        };
-        draws.map(sum).collect()
+        self.times
+            .chunks(self.count.max(1))
+            .map(|times: &[u8]| -> f64 {
+                times
+                    .chunks(256)
+                    .zip(by_unit.chunks(256))
+                    .map(|(times, numbers)| sum_of_products(times, numbers))
+                    .sum()
+            })
+            .collect()
     }
 
     /// The 95 % interval of a statistic from its values in the draws, which may be infinite.
@@ -186,8 +189,11 @@ mod tests {
             let draws = Resamples::new(usize::from(clusters));
             assert!(draws.count <= MOST_UNITS && draws.count > MOST_UNITS / 2);
             let ones = draws.sums(&vec![1.0; usize::from(clusters)]);
-            let means = draws.sums(&numbers).into_iter().zip(ones);
-            let means = means.map(|(sum, n)| sum / n);
+            let means = draws
+                .sums(&numbers)
+                .into_iter()
+                .zip(ones)
+                .map(|(sum, n)| sum / n);
             let [low, high] = draws.interval(means.collect());
             let half = 1.959_964 * (n * n / 12.0 / n).sqrt();
             let ratio = (high - low) / (2.0 * half);

@@ -188,8 +188,10 @@ mod tests {
     }
 
     fn counts(pairs: &[(u32, u32)]) -> Vec<ClusterCount> {
-        let count = |&(right, replies)| ClusterCount { right, replies };
-        pairs.iter().map(count).collect()
+        pairs
+            .iter()
+            .map(|&(right, replies)| ClusterCount { right, replies })
+            .collect()
     }
 
     #[test]

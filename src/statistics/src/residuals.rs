@@ -12,16 +12,18 @@
 #[must_use]
 pub fn residuals(clusters: &[(f64, f64)], mean: f64) -> Vec<f64> {
     let all: f64 = clusters.iter().map(|(_, number)| number).sum();
-    let some = clusters.iter().filter(|(_, number)| *number > 0.0);
-    let residual = some.map(|(sum, number)| {
-        let others = all - number;
-        if others > 0.0 {
-            (sum - mean * number) / (others / all).sqrt()
-        } else {
-            f64::INFINITY
-        }
-    });
-    residual.collect()
+    clusters
+        .iter()
+        .filter(|(_, number)| *number > 0.0)
+        .map(|(sum, number)| {
+            let others = all - number;
+            if others > 0.0 {
+                (sum - mean * number) / (others / all).sqrt()
+            } else {
+                f64::INFINITY
+            }
+        })
+        .collect()
 }
 
 /// Intraclass correlation that is assumed where all replies are right, or none, or where no pair differs, so that the records cannot

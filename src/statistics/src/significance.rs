@@ -125,10 +125,7 @@ pub fn swap_test(differences: &[i64]) -> SwapTest {
 /// The number of equal clusters whose total difference would be as near to normal: (Σ d²)² / Σ d⁴. The excess kurtosis of the total
 /// is −2 divided by it.
 fn carrying(differences: &[i64]) -> f64 {
-    let power = |n: i32| -> f64 {
-        let powers = differences.iter().map(|d| (*d as f64).powi(n));
-        powers.sum()
-    };
+    let power = |n: i32| -> f64 { differences.iter().map(|d| (*d as f64).powi(n)).sum() };
     let squares = power(2);
     squares * squares / power(4)
 }
@@ -151,13 +148,14 @@ fn drawn_swaps(differences: &[i64], draws: usize) -> f64 {
     let observed = differences.iter().sum::<i64>().abs();
     let mut random = SplitMix(SEED);
     let mut swapped_sum = || -> i64 {
-        let blocks = differences.chunks(64);
-        let sums = blocks.map(|block| {
-            let bits = random.bits();
-            let signed = |(bit, d): (usize, &i64)| if bits >> bit & 1 == 0 { *d } else { -d };
-            block.iter().enumerate().map(signed).sum::<i64>()
-        });
-        sums.sum()
+        differences
+            .chunks(64)
+            .map(|block| {
+                let bits = random.bits();
+                let signed = |(bit, d): (usize, &i64)| if bits >> bit & 1 == 0 { *d } else { -d };
+                block.iter().enumerate().map(signed).sum::<i64>()
+            })
+            .sum()
     };
     let hits = (0..draws).filter(|_| swapped_sum().abs() >= observed);
     (1 + hits.count()) as f64 / (1 + draws) as f64
@@ -172,8 +170,11 @@ pub fn least_p(clusters: usize) -> f64 {
 /// Differences without zeros, divided by their greatest common divisor. That changes no p-value.
 fn reduced(differences: &[i64]) -> Vec<i64> {
     let divisor = differences.iter().fold(0, |a, d| gcd(a, d.unsigned_abs()));
-    let some = differences.iter().filter(|difference| **difference != 0);
-    some.map(|difference| difference / divisor as i64).collect()
+    differences
+        .iter()
+        .filter(|difference| **difference != 0)
+        .map(|difference| difference / divisor as i64)
+        .collect()
 }
 
 /// Greatest common divisor; that of 0 and a number is the number.
@@ -203,8 +204,7 @@ pub fn mcnemar(gained: usize, lost: usize) -> f64 {
 pub fn sign_flip(differences: &[i64]) -> f64 {
     let reduced = reduced(differences);
     let total = reduced.iter().sum::<i64>().unsigned_abs() as usize;
-    let sizes = reduced.iter().map(|d| d.unsigned_abs() as usize);
-    let mut sizes: Vec<usize> = sizes.collect();
+    let mut sizes: Vec<usize> = reduced.iter().map(|d| d.unsigned_abs() as usize).collect();
     sizes.sort_unstable();
     // The distribution of the sum k of the sizes with positive sign; the total difference is then 2k − max_total.
     let mut masses = vec![1.0];
@@ -215,11 +215,13 @@ pub fn sign_flip(differences: &[i64]) -> f64 {
         rest = &rest[repeats..];
     }
     let max_total: usize = sizes.iter().sum();
-    let extreme = masses
+    masses
         .iter()
         .enumerate()
-        .filter(|(positive, _)| (2 * positive).abs_diff(max_total) >= total);
-    extreme.map(|(_, mass)| mass).sum::<f64>().min(1.0)
+        .filter(|(positive, _)| (2 * positive).abs_diff(max_total) >= total)
+        .map(|(_, mass)| mass)
+        .sum::<f64>()
+        .min(1.0)
 }
 
 /// Probability masses of a sum of two numbers, the second in steps of `step`.
@@ -249,15 +251,16 @@ fn binomial(n: usize) -> Vec<f64> {
         }
         return masses;
     }
-    let mass = |k: usize| {
-        let log = log_factorial
-            - libm::lgamma(k as f64 + 1.0)
-            - libm::lgamma((n - k) as f64 + 1.0)
-            - log_outcomes;
-        let mass = libm::exp(log);
-        if mass < MIN_MASS { 0.0 } else { mass }
-    };
-    (0..=n).map(mass).collect()
+    (0..=n)
+        .map(|k: usize| {
+            let log = log_factorial
+                - libm::lgamma(k as f64 + 1.0)
+                - libm::lgamma((n - k) as f64 + 1.0)
+                - log_outcomes;
+            let mass = libm::exp(log);
+            if mass < MIN_MASS { 0.0 } else { mass }
+        })
+        .collect()
 }
 
 /// Holm's adjusted p-values (Holm 1979, Scand. J. Stat. 6:65), in the order of `values`. If those below 0.05 are called

@@ -310,10 +310,10 @@ fn non_increasing(values: &[f64], weights: &[f64]) -> Vec<f64> {
         }
         blocks.push(block);
     }
-    let fitted = blocks
+    blocks
         .into_iter()
-        .flat_map(|(value, _, length)| std::iter::repeat_n(value, length));
-    fitted.collect()
+        .flat_map(|(value, _, length)| std::iter::repeat_n(value, length))
+        .collect()
 }
 
 #[cfg(test)]
