@@ -57,11 +57,13 @@ fn each_parsed_line<T: StoredLine>(
     };
     while let Some(piece) = pieces.next()? {
         let lines = piece.lines();
-        let parsed = lines.par_iter().map(|line| {
-            let bytes = line.bytes.strip_suffix(b"\n").unwrap_or(line.bytes);
-            T::parse(bytes).ok()
-        });
-        let parsed: Vec<Option<T>> = parsed.collect();
+        let parsed: Vec<Option<T>> = lines
+            .par_iter()
+            .map(|line| {
+                let bytes = line.bytes.strip_suffix(b"\n").unwrap_or(line.bytes);
+                T::parse(bytes).ok()
+            })
+            .collect();
         for (line, parsed) in lines.iter().zip(parsed) {
             take(line.number, parsed);
         }
@@ -98,10 +100,9 @@ pub(super) fn set_file_aside(path: &Path) -> Result<PathBuf> {
         });
         PathBuf::from(name)
     };
-    let is_free = |path: &PathBuf| fs::symlink_metadata(path).is_err();
     let aside = (1..=MOST_ASIDE)
         .map(name)
-        .find(is_free)
+        .find(|path| fs::symlink_metadata(path).is_err())
         .unwrap_or_else(|| name(1));
     fs::rename(path, &aside).map_err(|e| Error::file(path, "rename", e))?;
     Ok(aside)

@@ -72,8 +72,8 @@ pub(super) fn write(folder: &Path, name: &str, content: &[u8]) -> Result<()> {
 }
 
 pub(super) fn write_manifest(folder: &Path, manifest: &RunManifest) -> Result<()> {
-    let unwritable = |e: serde_json::Error| Error::file(folder.join(MANIFEST), "write", e.into());
-    let mut text = serde_json::to_vec_pretty(manifest).map_err(unwritable)?;
+    let mut text = serde_json::to_vec_pretty(manifest)
+        .map_err(|e| Error::file(folder.join(MANIFEST), "write", e.into()))?;
     text.push(b'\n');
     write(folder, MANIFEST, &text)
 }
@@ -119,8 +119,10 @@ fn last_of_each<T: StoredLine>(
     let mut keys: Vec<(TrialKey, u32)> = all.iter().map(key).zip(0..).collect();
     keys.par_sort_unstable();
     let mut is_repeated = vec![false; all.len()];
-    let again = keys.chunk_by(|one, next| one.0 == next.0);
-    for places in again.filter(|places| places.len() > 1) {
+    for places in keys
+        .chunk_by(|one, next| one.0 == next.0)
+        .filter(|places| places.len() > 1)
+    {
         let (first, last) = (places[0].1 as usize, places[places.len() - 1].1 as usize);
         for (_, place) in places[..places.len() - 1].iter().rev() {
             let (earlier, later) = all.split_at_mut(last);
@@ -184,8 +186,10 @@ fn each_readable_note<T: StoredLine>(path: &Path, take: impl FnMut(T)) {
 #[must_use]
 pub fn find(base: &Path, hash: &str) -> Option<PathBuf> {
     let ending = format!("-{hash}");
-    let folders = fs::read_dir(base).ok()?.flatten().map(|entry| entry.path());
-    folders
+    fs::read_dir(base)
+        .ok()?
+        .flatten()
+        .map(|entry| entry.path())
         .filter(|path| {
             path.file_name()
                 .and_then(OsStr::to_str)
@@ -351,8 +355,12 @@ pub(super) fn check_same_run(
             second: after,
         } = difference;
         // A model of this name with other settings; the stored one has another name in the requested run.
-        let renamed = requested.columns.get(column).into_iter().flatten();
-        let mut renamed = renamed.filter(|(name, _)| *name != value);
+        let mut renamed = requested
+            .columns
+            .get(column)
+            .into_iter()
+            .flatten()
+            .filter(|(name, _)| *name != value);
         let content = stored
             .columns
             .get(column)

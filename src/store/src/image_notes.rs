@@ -37,7 +37,9 @@ fn more<T, P: Eq + Hash>(
     (place, is_wanted): (impl Fn(&T) -> P, impl Fn(&T) -> bool),
 ) -> Vec<T> {
     let mut known: HashSet<_> = present.iter().map(&place).collect();
-    let read = folders.iter().flat_map(|folder| read(folder));
-    read.filter(|one| is_wanted(one) && known.insert(place(one)))
+    folders
+        .iter()
+        .flat_map(|folder| read(folder))
+        .filter(|one| is_wanted(one) && known.insert(place(one)))
         .collect()
 }

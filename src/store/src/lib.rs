@@ -287,8 +287,11 @@ impl<D: Detail> Store<D> {
         )?;
         lost.check(&path, planned)?;
         let mut changed = ChangedQuestions::default();
-        let ids = questions.iter().map(|question| question.id.clone());
-        let places: HashMap<QuestionId, usize> = ids.zip(0..).collect();
+        let places: HashMap<QuestionId, usize> = questions
+            .iter()
+            .map(|question| question.id.clone())
+            .zip(0..)
+            .collect();
         for mut stored in stored_questions {
             let Some(&place) = places.get(&stored.id) else {
                 questions.push(stored);
@@ -386,8 +389,11 @@ impl<D: Detail> Store<D> {
                 *times = times.saturating_sub(1);
             }
         })?;
-        let pending = pending.into_iter().filter(|(_, times)| *times > 0);
-        Ok(pending.map(|(key, _)| key).collect())
+        Ok(pending
+            .into_iter()
+            .filter(|(_, times)| *times > 0)
+            .map(|(key, _)| key)
+            .collect())
     }
 
     /// The run folder.

@@ -66,11 +66,13 @@ pub(super) fn each_placed_line<T: StoredLine>(
     };
     while let Some(piece) = pieces.next()? {
         let lines = piece.lines();
-        let parsed = lines.par_iter().map(|line| {
-            let line = line.bytes.strip_suffix(b"\n").unwrap_or(line.bytes);
-            T::parse(line)
-        });
-        let parsed: Vec<serde_json::Result<T>> = parsed.collect();
+        let parsed: Vec<serde_json::Result<T>> = lines
+            .par_iter()
+            .map(|line| {
+                let line = line.bytes.strip_suffix(b"\n").unwrap_or(line.bytes);
+                T::parse(line)
+            })
+            .collect();
         for (line, value) in lines.iter().zip(parsed) {
             let value = value.map_err(|e| {
                 let problem = format!("not {}: {e}; {}", T::WHAT, T::REMEDY);
@@ -129,10 +131,9 @@ pub(super) fn set_aside<T: StoredLine>(path: &Path, aside: &Path) -> Result<()> 
         .map_err(|e| Error::file(path, "open", e))?;
     for bad in &bad {
         let blanks = vec![b' '; bad.line.len() - 1];
-        let written = file
-            .seek(SeekFrom::Start(bad.start))
-            .and_then(|_| file.write_all(&blanks));
-        written.map_err(|e| Error::file(path, "write", e))?;
+        file.seek(SeekFrom::Start(bad.start))
+            .and_then(|_| file.write_all(&blanks))
+            .map_err(|e| Error::file(path, "write", e))?;
     }
     file.sync_all().map_err(|e| Error::file(path, "write", e))?;
     let (what, whose) = match bad.len() {
@@ -166,12 +167,14 @@ struct BadLine {
 
 /// Tokens charged for the replies of damaged lines, as far as they can be read.
 fn paid(bad: &[BadLine]) -> String {
-    let tokens = |bad: &BadLine| {
-        let value: serde_json::Value = serde_json::from_slice(&bad.line).ok()?;
-        let usage: Usage = serde_json::from_value(value.get("usage")?.clone()).ok()?;
-        usage.total()
-    };
-    let known: Vec<u64> = bad.iter().filter_map(tokens).collect();
+    let known: Vec<u64> = bad
+        .iter()
+        .filter_map(|bad| {
+            let value: serde_json::Value = serde_json::from_slice(&bad.line).ok()?;
+            let usage: Usage = serde_json::from_value(value.get("usage")?.clone()).ok()?;
+            usage.total()
+        })
+        .collect();
     match known.len() {
         0 => "what was paid for it cannot be read".to_owned(),
         n if n == bad.len() => format!("{} tokens were paid for it", known.iter().sum::<u64>()),
@@ -266,8 +269,11 @@ fn is_of<T: StoredLine>(path: &Path, complete: u64) -> Result<bool> {
     let unreadable = |e| Error::file(path, "read", e);
     if complete == 0 {
         let mut first = [0];
-        let read = reading::open(path).and_then(|mut file| file.read(&mut first));
-        return Ok(read.map_err(unreadable)? == 1 && first == *b"{");
+        return Ok(reading::open(path)
+            .and_then(|mut file| file.read(&mut first))
+            .map_err(unreadable)?
+            == 1
+            && first == *b"{");
     }
     let Some(mut pieces) = Pieces::open(path)? else {
         return Ok(false);

@@ -45,8 +45,8 @@ impl LogMark {
         let mut tail = Vec::new();
         let start = log_bytes.saturating_sub(TAIL);
         let read = log.seek(SeekFrom::Start(start));
-        let read = read.and_then(|_| log.take(TAIL).read_to_end(&mut tail));
-        read.map_err(unreadable)?;
+        read.and_then(|_| log.take(TAIL).read_to_end(&mut tail))
+            .map_err(unreadable)?;
         Ok(Self {
             manifest: whole(MANIFEST)?,
             questions: whole(QUESTIONS)?,

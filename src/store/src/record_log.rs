@@ -29,8 +29,8 @@ impl RecordLog {
     /// # Errors
     /// If there are none.
     pub fn open(folder: &Path) -> Result<Self> {
-        let missing = || Error::file(folder.join(RECORDS), "open", ErrorKind::NotFound.into());
-        Self::open_if_there(folder)?.ok_or_else(missing)
+        Self::open_if_there(folder)?
+            .ok_or_else(|| Error::file(folder.join(RECORDS), "open", ErrorKind::NotFound.into()))
     }
 
     /// Opens the records of a run folder; `None` if there are none.
@@ -49,12 +49,13 @@ impl RecordLog {
     /// If the file cannot be read.
     pub fn line_from(&self, start: u64) -> Result<Vec<u8>> {
         let mut file = &self.file;
-        let line = file.seek(SeekFrom::Start(start)).and_then(|_| {
-            let mut line = Vec::new();
-            BufReader::with_capacity(LINE_BYTES, file).read_until(b'\n', &mut line)?;
-            Ok(line)
-        });
-        line.map_err(|e| Error::file(&self.path, "read", e))
+        file.seek(SeekFrom::Start(start))
+            .and_then(|_| {
+                let mut line = Vec::new();
+                BufReader::with_capacity(LINE_BYTES, file).read_until(b'\n', &mut line)?;
+                Ok(line)
+            })
+            .map_err(|e| Error::file(&self.path, "read", e))
     }
 
     /// The lines at these places, in their order. Neighbouring lines of the file are read together.
@@ -68,8 +69,7 @@ impl RecordLog {
         let mut lines = vec![Vec::new(); places.len()];
         for together in in_file.chunk_by(follows) {
             let start = places[together[0]].start;
-            let lengths = together.iter().map(|index| places[*index].length);
-            let length = lengths.sum();
+            let length = together.iter().map(|index| places[*index].length).sum();
             let block = bytes_at(&self.file, LinePlace { start, length });
             let block = block.map_err(|e| Error::file(&self.path, "read", e))?;
             for index in together {

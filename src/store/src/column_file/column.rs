@@ -76,8 +76,9 @@ impl<'r> Cell<'r> {
 
     /// A whole number; null if there is none.
     pub fn int<T: TryInto<i128>>(number: Option<T>) -> Self {
-        let number = number.and_then(|number| number.try_into().ok());
-        number.map_or(Self::Null, Self::Int)
+        number
+            .and_then(|number| number.try_into().ok())
+            .map_or(Self::Null, Self::Int)
     }
 }
 

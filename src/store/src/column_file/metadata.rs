@@ -35,15 +35,20 @@ impl FileMetadata {
         };
         let footer = guarded(|| {
             let mut reader = ParquetMetaDataReader::new();
-            let read = reader.try_parse(&file).and_then(|()| reader.finish());
-            read.map_err(|e| e.to_string())
+            reader
+                .try_parse(&file)
+                .and_then(|()| reader.finish())
+                .map_err(|e| e.to_string())
         });
         let Ok(footer) = footer else {
             return Ok(None);
         };
         let footer = footer.file_metadata();
-        let pairs = footer.key_value_metadata().into_iter().flatten();
-        let pairs = pairs.filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?)));
+        let pairs = footer
+            .key_value_metadata()
+            .into_iter()
+            .flatten()
+            .filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?)));
         Ok(Some(Self {
             created_by: footer.created_by().unwrap_or_default().to_owned(),
             pairs: pairs.collect(),

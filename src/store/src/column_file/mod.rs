@@ -89,13 +89,17 @@ impl<'c, R: Sync> ColumnFile<'c, R> {
         while !rows.is_empty() {
             if self.group.is_empty() {
                 let columns = self.file.schema_descr().columns().iter();
-                let chunk = |column| Chunk::new(Arc::clone(column), Arc::clone(&self.properties));
-                self.group = columns.map(chunk).collect();
+                self.group = columns
+                    .map(|column| Chunk::new(Arc::clone(column), Arc::clone(&self.properties)))
+                    .collect();
             }
             let (now, later) = rows.split_at(rows.len().min(self.limits.rows - self.rows));
-            let chunks = self.group.par_iter_mut().zip(self.columns);
-            let appended = chunks.map(|(chunk, column)| chunk.append(column, now));
-            let appended: std::result::Result<(), ParquetError> = appended.collect();
+            let appended: std::result::Result<(), ParquetError> = self
+                .group
+                .par_iter_mut()
+                .zip(self.columns)
+                .map(|(chunk, column)| chunk.append(column, now))
+                .collect();
             appended.map_err(|e| unwritable(&self.part, e))?;
             self.rows += now.len();
             let long: usize = self.group.iter().map(|chunk| chunk.long_bytes).sum();
@@ -115,8 +119,8 @@ impl<'c, R: Sync> ColumnFile<'c, R> {
                 *self.too_large.entry(column.name).or_default() += chunk.too_large;
             }
         }
-        let closed = chunks.into_par_iter().map(Chunk::close);
-        let closed: std::result::Result<Vec<_>, _> = closed.collect();
+        let closed: std::result::Result<Vec<_>, _> =
+            chunks.into_par_iter().map(Chunk::close).collect();
         let mut group = self.file.next_row_group()?;
         for (pages, closed) in closed? {
             group.append_column(&pages, closed)?;
@@ -134,8 +138,9 @@ impl<'c, R: Sync> ColumnFile<'c, R> {
         } else {
             self.end_group()
         };
-        let ended = ended.and_then(|()| self.file.close());
-        ended.map_err(|e| unwritable(&self.part, e))?;
+        ended
+            .and_then(|()| self.file.close())
+            .map_err(|e| unwritable(&self.part, e))?;
         fs::rename(&self.part, &self.path).map_err(|e| Error::file(&self.path, "write", e))?;
         Ok(self.too_large)
     }
@@ -143,8 +148,10 @@ impl<'c, R: Sync> ColumnFile<'c, R> {
 
 /// Snappy, which every reader has; dictionaries for all but keys, which have no value twice.
 fn properties<R>(columns: &[Column<R>], metadata: &FileMetadata) -> WriterProperties {
-    let pairs = metadata.pairs.iter();
-    let pairs = pairs.map(|(key, value)| KeyValue::new(key.clone(), value.clone()));
+    let pairs = metadata
+        .pairs
+        .iter()
+        .map(|(key, value)| KeyValue::new(key.clone(), value.clone()));
     let mut properties = WriterProperties::builder()
         .set_compression(Compression::SNAPPY)
         .set_created_by(metadata.created_by.clone())
