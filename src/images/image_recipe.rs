@@ -217,12 +217,18 @@ impl ImageRecipe {
             Draws::Shared => frame,
             Draws::Fresh => frame.at(severity),
         };
-        let how = (sensor.amplify, sensor.tone);
         let blurred = (!streak.is_still()).then(|| blur(clean, streak));
         let light = blurred.as_ref();
         let light = light.map_or(clean, |light| clean.with_light(light));
         let drops = [drop_ev, sensor.coupling.headroom_ev(drop_ev)];
-        Ok(develop_with_state(light, &key, &sensor.state, how, drops))
+        Ok(develop_with_state(
+            light,
+            &key,
+            &sensor.state,
+            sensor.amplify,
+            sensor.tone,
+            drops,
+        ))
     }
 }
 

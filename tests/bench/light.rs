@@ -161,9 +161,9 @@ fn motion(c: &mut Criterion) {
     let (auto, motion) = (AutoExposure::default(), Motion::default());
     for how in ["L5-auto", "L5-noise@physical"] {
         let how: darkqa_eval::Degradation = how.parse().unwrap();
-        let camera = (&auto, &motion);
         let physical = Synthesis::new(LightReading::Physical, CameraModel::default());
-        let applied = AppliedDegradation::new(&how, &physical, camera, view, &key()).unwrap();
+        let applied =
+            AppliedDegradation::new(&how, &physical, &auto, &motion, view, &key()).unwrap();
         group.bench_function(how.to_string(), |b| {
             b.iter(|| Exposures::default().degrade(black_box((&clean).into()), &applied, &key()));
         });

@@ -49,7 +49,8 @@ impl AppliedDegradation {
     pub fn new(
         how: &Degradation,
         synthesis: &Synthesis,
-        (auto, motion): (&AutoExposure, &Motion),
+        auto: &AutoExposure,
+        motion: &Motion,
         view: FrameView,
         key: &NoiseKey,
     ) -> Result<Self> {

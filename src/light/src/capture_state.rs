@@ -218,8 +218,8 @@ mod tests {
             width: 640,
             focal: None,
         };
-        let camera = (&AutoExposure::default(), &Motion::default());
-        AppliedDegradation::new(&how, &synthesis, camera, view, &key()).unwrap()
+        let (auto, motion) = (AutoExposure::default(), Motion::default());
+        AppliedDegradation::new(&how, &synthesis, &auto, &motion, view, &key()).unwrap()
     }
 
     const CASES: [(&str, LightReading); 9] = [

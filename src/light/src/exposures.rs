@@ -123,7 +123,7 @@ mod tests {
             width: 640,
             focal: None,
         };
-        AppliedDegradation::new(&how, synthesis, (&auto, &motion), view, &key("a"))
+        AppliedDegradation::new(&how, synthesis, &auto, &motion, view, &key("a"))
     }
 
     /// The same by a sensor whose gain and ratio are pinned, which automatic exposure ignores.

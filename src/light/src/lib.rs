@@ -120,8 +120,8 @@ pub fn degrade(
         width: clean.width(),
         focal: None,
     };
-    let camera = (&AutoExposure::default(), &Motion::default());
-    let applied = AppliedDegradation::new(how, synthesis, camera, view, key)?;
+    let (auto, motion) = (AutoExposure::default(), Motion::default());
+    let applied = AppliedDegradation::new(how, synthesis, &auto, &motion, view, key)?;
     Ok(Exposures::default().degrade(clean.into(), &applied, key))
 }
 

@@ -157,7 +157,7 @@ pub(super) fn develop_by(
     let state = synthesis.state_by(key, drop_ev);
     let Synthesis { amplify, tone, .. } = *synthesis;
     let headroom = synthesis.headroom_ev(drop_ev);
-    develop_with_state(clean, key, &state, (amplify, tone), [drop_ev, headroom])
+    develop_with_state(clean, key, &state, amplify, tone, [drop_ev, headroom])
 }
 
 /// A frame after an exposure drop, with the noise of a camera in the given state; the drop and the headroom of the light reading
@@ -167,7 +167,8 @@ pub fn develop_with_state(
     clean: Clean<'_>,
     key: &NoiseKey,
     state: &CameraState,
-    (amplify, tone): (Amplify, Tone),
+    amplify: Amplify,
+    tone: Tone,
     [drop_ev, headroom_ev]: [f64; 2],
 ) -> Rgb {
     let capture = Capture::with(key, state, amplify, tone, &Term::ALL, Isa::best());

@@ -276,8 +276,7 @@ impl KindSettings {
         key: &NoiseKey,
     ) -> Result<AppliedDegradation> {
         let synthesis = self.sensor.readings.for_degradation(Some(how))?;
-        let camera = (&self.auto, &self.motion);
-        AppliedDegradation::new(how, synthesis, camera, view, key)
+        AppliedDegradation::new(how, synthesis, &self.auto, &self.motion, view, key)
     }
 
     /// Checks what can be known of a degradation without its frame.

@@ -223,9 +223,11 @@ impl Settings {
     ) -> PyResult<AppliedDegradation> {
         let reading = self.kind.has_readings().then(|| self.synthesis.name());
         let view = FrameView { width, focal: None };
-        let camera = (&self.auto, &Motion::default());
+        let motion = Motion::default();
         Degradation::new(self.kind, severity, reading)
-            .and_then(|how| AppliedDegradation::new(&how, &self.synthesis, camera, view, key))
+            .and_then(|how| {
+                AppliedDegradation::new(&how, &self.synthesis, &self.auto, &motion, view, key)
+            })
             .map_err(|problem| value_error(&problem))
     }
 

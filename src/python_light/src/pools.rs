@@ -54,14 +54,14 @@ pub(crate) fn pool(_attached: Python<'_>, threads: usize) -> PyResult<Arc<Thread
 fn fill_tables() {
     let clean = Rgb::black(4, 4);
     let key = NoiseKey::new(0, &FrameId(String::new()));
-    let camera = (&AutoExposure::default(), &Motion::default());
+    let (auto, motion) = (AutoExposure::default(), Motion::default());
     let view = FrameView {
         width: 640,
         focal: None,
     };
     for kind in Kind::ALL {
         let applied = Degradation::new(kind, Severity::L3, None).and_then(|how| {
-            AppliedDegradation::new(&how, &Synthesis::default(), camera, view, &key)
+            AppliedDegradation::new(&how, &Synthesis::default(), &auto, &motion, view, &key)
         });
         if let Ok(applied) = applied {
             let state = CaptureState::new(&applied, &key);
