@@ -119,7 +119,7 @@ impl Enhancer {
             ImageOutput::Known => String::new(),
             ImageOutput::Unknown => self.output_title() + ", ",
         };
-        let columns = shown(&output, &probe, as_stated, (&swapped, order), others);
+        let columns = shown(&output, &probe, as_stated, &swapped, order, others);
         Ok(Examination {
             settled: found.settled,
             frames,
@@ -273,7 +273,8 @@ fn shown(
     output: &str,
     probe: &Probe,
     stated: Option<RangePair>,
-    (swapped, order): (&Probe, ChannelOrder),
+    swapped: &Probe,
+    order: ChannelOrder,
     others: Vec<ExaminedConvention>,
 ) -> Vec<ExaminedConvention> {
     let stated_title = stated.map(|pair| format!("{output}{pair}, as stated"));
