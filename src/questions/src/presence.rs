@@ -64,7 +64,7 @@ fn yes(context: &RuleContext<'_>, class: &str) -> Result<Vec<RuleResult>, Reason
     }
     let shown = shown.into_iter();
     let found =
-        shown.map(|(word, segment)| candidate(context, (class, word), 0, &[segment], json!({})));
+        shown.map(|(word, segment)| candidate(context, class, word, 0, &[segment], json!({})));
     Ok(found.collect())
 }
 
@@ -139,13 +139,14 @@ fn no(
     });
     Ok(words
         .into_iter()
-        .map(|word| candidate(context, (class, word), 1, &[], evidence.clone()))
+        .map(|word| candidate(context, class, word, 1, &[], evidence.clone()))
         .collect())
 }
 
 fn candidate(
     context: &RuleContext<'_>,
-    (class, word): (&str, &str),
+    class: &str,
+    word: &str,
     truth: usize,
     segments: &[&Segment],
     evidence: serde_json::Value,

@@ -42,7 +42,7 @@ pub fn measure(
             continue;
         };
         *classes.entry(class.to_owned()).or_insert(0) += count;
-        if !scene.is_named(frame, (mask, id), coarse) {
+        if !scene.is_named(frame, mask, id, coarse) {
             *unnamed.entry(class.to_owned()).or_insert(0) += count;
         }
         if mask == 0 {
@@ -51,7 +51,7 @@ pub fn measure(
     }
     let mut segments = Vec::new();
     for (mask, shape) in shapes.list.iter().enumerate() {
-        let Some(mut segment) = shapes.segment(frame, &scene, coarse, (mask as u32 + 1, shape))
+        let Some(mut segment) = shapes.segment(frame, &scene, coarse, mask as u32 + 1, shape)
         else {
             continue;
         };

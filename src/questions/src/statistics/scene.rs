@@ -217,12 +217,7 @@ impl<'a> SceneMaps<'a> {
     }
 
     /// True if pixels of a mask and a label have a word of their own: the name of their segment, or a label that identifies the object.
-    pub(super) fn is_named(
-        &self,
-        frame: &Frame,
-        (mask, id): (u32, u32),
-        coarse: &CoarseRule,
-    ) -> bool {
+    pub(super) fn is_named(&self, frame: &Frame, mask: u32, id: u32, coarse: &CoarseRule) -> bool {
         let number = (mask as usize)
             .checked_sub(1)
             .and_then(|mask| self.numbers.get(mask));

@@ -119,7 +119,8 @@ impl MaskShapes {
         frame: &Frame,
         scene: &SceneMaps<'_>,
         coarse: &CoarseRule,
-        (mask, shape): (u32, &MaskShape),
+        mask: u32,
+        shape: &MaskShape,
     ) -> Option<Segment> {
         let labels = self.joint.range((mask, 0)..=(mask, u32::MAX));
         let mut classes: BTreeMap<&str, u64> = BTreeMap::new();
