@@ -395,7 +395,7 @@ fn averaged(
             models,
             levels: own.len(),
         };
-        let found = finding(grid, set, pool, (level, &items), None)?;
+        let found = finding(grid, set, pool, level, &items, None)?;
         Some(PooledFinding { mean_over, ..found })
     });
     halves
@@ -435,8 +435,8 @@ fn set_findings(grid: &Grid<'_>, set: &PooledSet) -> Vec<PooledFinding> {
         .into_iter()
         .flat_map(|family| {
             let levels = levels.iter();
-            let of_family = levels
-                .filter_map(|(level, items)| finding(grid, set, pool, (*level, items), family));
+            let of_family =
+                levels.filter_map(|(level, items)| finding(grid, set, pool, *level, items, family));
             corrected(of_family.collect())
         })
         .collect();
@@ -487,7 +487,8 @@ fn finding(
     grid: &Grid<'_>,
     set: &PooledSet,
     pool: PoolOfLevels<'_>,
-    (level, items): (AxisLevel, &[PooledItem]),
+    level: AxisLevel,
+    items: &[PooledItem],
     family: Option<&Family>,
 ) -> Option<PooledFinding> {
     let models = pool.models;

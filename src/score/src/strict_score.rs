@@ -102,7 +102,7 @@ impl StrictScore {
             for family in &families {
                 let groups = of_family(*family);
                 for mode in ReadingMode::ALL {
-                    cells.extend(cell(grid, subject, (*family, &groups), mode));
+                    cells.extend(cell(grid, subject, *family, &groups, mode));
                 }
             }
         }
@@ -242,7 +242,8 @@ impl Group<'_> {
 fn cell(
     grid: &Grid<'_>,
     subject: usize,
-    (family, groups): (Option<&Family>, &[&Group<'_>]),
+    family: Option<&Family>,
+    groups: &[&Group<'_>],
     mode: ReadingMode,
 ) -> Option<GroupCell> {
     let mut counts = BTreeMap::<usize, ClusterCount>::new();

@@ -61,7 +61,7 @@ pub(super) fn confident_replies(grid: &Grid<'_>, subject: usize) -> SortedReplie
             Some(options) if options.reasoned => sorted.reasoned += 1,
             Some(options) => sorted
                 .replies
-                .extend(reply(trial, options, (index, item.cluster))),
+                .extend(reply(trial, options, index, item.cluster)),
         }
     }
     let replies = &mut sorted.replies;
@@ -73,7 +73,8 @@ pub(super) fn confident_replies(grid: &Grid<'_>, subject: usize) -> SortedReplie
 fn reply(
     trial: TrialRef<'_>,
     options: &OptionProbabilities,
-    (item, cluster): (usize, u32),
+    item: usize,
+    cluster: u32,
 ) -> Option<ConfidentReply> {
     let p = &options.p;
     let truth = *p.get(trial.truth()?)?;

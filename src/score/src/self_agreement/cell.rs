@@ -107,7 +107,7 @@ pub(super) fn cells(
             let few = restricted.counts(subject, family, mode);
             cell.informative = Estimate::clustered(&few);
             if cell.role() == CellRole::Other {
-                let bounds = Bounds::new(grid, (&cell.subject, family), mode, draws);
+                let bounds = Bounds::new(grid, &cell.subject, family, mode, draws);
                 let share = bounds.map(|bounds| evidence(&counts, &bounds, draws));
                 cell.evidence = share.transpose();
             }

@@ -46,7 +46,8 @@ impl Bounds {
     /// If one of them was not asked, or they are too close, or may be.
     pub(super) fn new(
         grid: &Grid<'_>,
-        (subject, family): (&Subject, Option<&Family>),
+        subject: &Subject,
+        family: Option<&Family>,
         mode: ReadingMode,
         draws: &Resamples,
     ) -> Result<Self, NoEvidence> {
@@ -146,7 +147,7 @@ pub(super) fn curves(grid: &Grid<'_>, draws: &Resamples) -> Vec<EvidenceCurve> {
     let all = CurvePoints::all(grid).into_iter().filter_map(|points| {
         let (_, light) = points.subjects.first()?;
         let (darkest, _) = points.subjects.last()?;
-        let bounds = Bounds::new(grid, (&grid.subjects[*light], None), mode, draws);
+        let bounds = Bounds::new(grid, &grid.subjects[*light], None, mode, draws);
         let threshold = match bounds {
             Err(reason) => Err(NoHalf::NoEvidence(reason)),
             Ok(bounds) => {
