@@ -15,7 +15,7 @@ pub fn more_thumbnails(
 ) -> Vec<Thumbnail> {
     let place = |thumbnail: &Thumbnail| (thumbnail.frame.clone(), thumbnail.condition.clone());
     let is_wanted = |thumbnail: &Thumbnail| is_wanted(&thumbnail.frame);
-    more(present, folders, read_thumbnails, (place, is_wanted))
+    more(present, folders, read_thumbnails, place, is_wanted)
 }
 
 /// The similarities of images in these folders that are not `present`, each once, of the frames that are wanted.
@@ -26,7 +26,7 @@ pub fn more_fidelity(
 ) -> Vec<ImageFidelity> {
     let place = |image: &ImageFidelity| (image.frame.clone(), image.condition.clone());
     let is_wanted = |image: &ImageFidelity| is_wanted(&image.frame);
-    more(present, folders, read_fidelity, (place, is_wanted))
+    more(present, folders, read_fidelity, place, is_wanted)
 }
 
 /// Notes in these folders that `present` lacks, one for each place, of the wanted frames.
@@ -34,7 +34,8 @@ fn more<T, P: Eq + Hash>(
     present: &[T],
     folders: &[&Path],
     read: impl Fn(&Path) -> Vec<T>,
-    (place, is_wanted): (impl Fn(&T) -> P, impl Fn(&T) -> bool),
+    place: impl Fn(&T) -> P,
+    is_wanted: impl Fn(&T) -> bool,
 ) -> Vec<T> {
     let mut known: HashSet<_> = present.iter().map(&place).collect();
     folders
