@@ -46,7 +46,7 @@ pub(super) fn tokens(text: &str) -> Vec<Token> {
             .last_mut()
             .filter(|last| last.end == start && last.kind == TokenKind::Word);
         match last {
-            Some(last) if joins(text, last, (previous, c), end) => last.end = end,
+            Some(last) if joins(text, last, previous, c, end) => last.end = end,
             _ if c == '\n' => tokens.push(Token {
                 start,
                 end,
@@ -70,7 +70,7 @@ pub(super) fn tokens(text: &str) -> Vec<Token> {
 }
 
 /// Whether a character that ends at byte `end` belongs to the word before it.
-fn joins(text: &str, word: &Token, (previous, c): (char, char), end: usize) -> bool {
+fn joins(text: &str, word: &Token, previous: char, c: char, end: usize) -> bool {
     if !matches!(c, '\'' | ',' | '.') {
         return spelled(c) && (spelled(previous) || matches!(previous, '\'' | '.' | ','));
     }
